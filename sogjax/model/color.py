@@ -1,0 +1,156 @@
+"""Colour spaces and the colour similarity of two blobs (Eq. 7)."""
+
+from collections.abc import Callable
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+Colors = Float[Array, "*batch 3"]
+
+COLOR_RADIUS = {"hsv_cylinder": 0.3, "hsv_cone": 0.15, "hsv": 0.15, "rgb": 0.1, "lab": 0.2}
+"""The colour spaces, each with the eps_sim of Eq. 7 that suits its scale."""
+
+_WHITE_D65 = (0.95047, 1.0, 1.08883)
+_XYZ_FROM_RGB = (
+    (0.4124564, 0.3575761, 0.1804375),
+    (0.2126729, 0.7151522, 0.0721750),
+    (0.0193339, 0.1191920, 0.9503041),
+)
+_LAB_KNEE = 6.0 / 29.0
+
+
+def wendland(distance: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
+    """The C2 radial basis function phi_{3,1}(r) = (1-r)^4 (4r+1) on [0, 1), 0 beyond."""
+    inside = jnp.maximum(1.0 - distance, 0.0)
+    return inside**4 * (4.0 * distance + 1.0)
+
+
+def color_distance(a: Colors, b: Colors, space: str) -> Float[Array, "*batch"]:
+    """Euclidean distance of colours of one space; in `hsv` the hue, in turns, wraps around."""
+    difference = a - b
+    if space == "hsv":
+        hue = difference[..., :1]
+        difference = jnp.concatenate([hue - jnp.round(hue), difference[..., 1:]], -1)
+    squared = jnp.sum(difference * difference, -1)
+    positive = squared > 0.0
+    return jnp.where(positive, jnp.sqrt(jnp.where(positive, squared, 1.0)), 0.0)
+
+
+def color_similarity(
+    a: Colors, b: Colors, space: str, color_radius: Float[Array, ""]
+) -> Float[Array, "*batch"]:
+    """d(c_i, c_j) of Eq. 7: 1 for equal colours, 0 from `color_radius` (eps_sim) on."""
+    return wendland(color_distance(a, b, space) / color_radius)
+
+
+def from_rgb(rgb: Colors, space: str) -> Colors:
+    """Colours in `space` from sRGB in 0..1.
+
+    hsv_cylinder: (s cos h, s sin h, v); hsv_cone: (s v cos h, s v sin h, v); hsv: hue in turns; lab: Lab / 100.
+
+    Raises:
+        ValueError: no such space.
+    """
+    return _conversions(space)[0](rgb)
+
+
+def to_rgb(colors: Colors, space: str) -> Colors:
+    """SRGB in 0..1 from colours in `space`, clipped to what sRGB holds."""
+    return jnp.clip(_conversions(space)[1](colors), 0.0, 1.0)
+
+
+def averaging_space(space: str) -> str:
+    """The space without wrap-around in which colours that end up in `space` are averaged."""
+    return "hsv_cylinder" if space == "hsv" else space
+
+
+def convert(colors: Colors, source: str, target: str) -> Colors:
+    """Colours of the space `source`, in the space `target`."""
+    return colors if source == target else from_rgb(to_rgb(colors, source), target)
+
+
+def _conversions(space: str) -> tuple[Callable[[Colors], Colors], Callable[[Colors], Colors]]:
+    table = {
+        "rgb": (lambda rgb: rgb, lambda rgb: rgb),
+        "hsv": (_hsv_from_rgb, _rgb_from_hsv),
+        "hsv_cylinder": (
+            lambda rgb: _cylinder_from_hsv(_hsv_from_rgb(rgb)),
+            lambda c: _rgb_from_hsv(_hsv_from_cylinder(c)),
+        ),
+        "hsv_cone": (_cone_from_rgb, _rgb_from_cone),
+        "lab": (_lab_from_rgb, _rgb_from_lab),
+    }
+    if space not in table:
+        raise ValueError(f"no colour space {space!r}; choose one of {', '.join(sorted(table))}")
+    return table[space]
+
+
+def _hsv_from_rgb(rgb: Colors) -> Colors:
+    red, green, blue = rgb[..., 0], rgb[..., 1], rgb[..., 2]
+    value = jnp.max(rgb, -1)
+    chroma = value - jnp.min(rgb, -1)
+    safe = jnp.where(chroma > 0.0, chroma, 1.0)
+    sextant = jnp.where(
+        value == red,
+        (green - blue) / safe,
+        jnp.where(value == green, 2.0 + (blue - red) / safe, 4.0 + (red - green) / safe),
+    )
+    hue = jnp.where(chroma > 0.0, jnp.mod(sextant / 6.0, 1.0), 0.0)
+    saturation = chroma / jnp.where(value > 0.0, value, 1.0)
+    return jnp.stack([hue, saturation, value], -1)
+
+
+def _rgb_from_hsv(hsv: Colors) -> Colors:
+    hue, saturation, value = hsv[..., 0], hsv[..., 1], hsv[..., 2]
+    channels = []
+    for shift in (5.0, 3.0, 1.0):
+        k = jnp.mod(shift + 6.0 * hue, 6.0)
+        channels.append(value - value * saturation * jnp.clip(jnp.minimum(k, 4.0 - k), 0.0, 1.0))
+    return jnp.stack(channels, -1)
+
+
+def _cylinder_from_hsv(hsv: Colors) -> Colors:
+    angle = 2.0 * jnp.pi * hsv[..., 0]
+    saturation = hsv[..., 1]
+    return jnp.stack([saturation * jnp.cos(angle), saturation * jnp.sin(angle), hsv[..., 2]], -1)
+
+
+def _hsv_from_cylinder(cylinder: Colors) -> Colors:
+    hue = jnp.mod(jnp.arctan2(cylinder[..., 1], cylinder[..., 0]) / (2.0 * jnp.pi), 1.0)
+    saturation = jnp.hypot(cylinder[..., 0], cylinder[..., 1])
+    return jnp.stack([hue, jnp.minimum(saturation, 1.0), cylinder[..., 2]], -1)
+
+
+def _cone_from_rgb(rgb: Colors) -> Colors:
+    cylinder = _cylinder_from_hsv(_hsv_from_rgb(rgb))
+    return jnp.concatenate([cylinder[..., :2] * cylinder[..., 2:], cylinder[..., 2:]], -1)
+
+
+def _rgb_from_cone(cone: Colors) -> Colors:
+    value = cone[..., 2:]
+    chroma = cone[..., :2] / jnp.where(value > 0.0, value, 1.0)
+    return _rgb_from_hsv(_hsv_from_cylinder(jnp.concatenate([chroma, value], -1)))
+
+
+def _lab_from_rgb(rgb: Colors) -> Colors:
+    linear = jnp.where(rgb <= 0.04045, rgb / 12.92, ((jnp.maximum(rgb, 0.04045) + 0.055) / 1.055) ** 2.4)
+    xyz = jnp.einsum("ij,...j->...i", jnp.array(_XYZ_FROM_RGB, rgb.dtype), linear, precision="highest")
+    ratio = xyz / jnp.array(_WHITE_D65, rgb.dtype).reshape((1,) * (rgb.ndim - 1) + (3,))
+    knee = _LAB_KNEE
+    f = jnp.where(
+        ratio > knee**3, jnp.cbrt(jnp.maximum(ratio, knee**3)), ratio / (3.0 * knee**2) + 4.0 / 29.0
+    )
+    x, y, z = f[..., 0], f[..., 1], f[..., 2]
+    return jnp.stack([116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)], -1) / 100.0
+
+
+def _rgb_from_lab(lab: Colors) -> Colors:
+    y = (100.0 * lab[..., 0] + 16.0) / 116.0
+    f = jnp.stack([y + lab[..., 1] / 5.0, y, y - lab[..., 2] / 2.0], -1)
+    knee = _LAB_KNEE
+    ratio = jnp.where(f > knee, f**3, 3.0 * knee**2 * (f - 4.0 / 29.0))
+    xyz = ratio * jnp.array(_WHITE_D65, lab.dtype).reshape((1,) * (lab.ndim - 1) + (3,))
+    inverse = jnp.linalg.inv(jnp.array(_XYZ_FROM_RGB, lab.dtype))
+    linear = jnp.clip(jnp.einsum("ij,...j->...i", inverse, xyz, precision="highest"), 0.0, 1.0)
+    gamma = 1.055 * jnp.maximum(linear, 0.0031308) ** (1.0 / 2.4) - 0.055
+    return jnp.where(linear <= 0.0031308, 12.92 * linear, gamma)

@@ -1,0 +1,39 @@
+"""Rotations about fixed axes, and the few conversions that the file formats need."""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+
+def cross_matrix(vectors: Float[Array, "*batch 3"]) -> Float[Array, "*batch 3 3"]:
+    """The matrix of the cross product with each vector from the left."""
+    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
+    zero = jnp.zeros_like(x)
+    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
+    return jnp.stack([jnp.stack(row, -1) for row in rows], -2)
+
+
+def rotation_about_axis(
+    axes: Float[Array, "*batch 3"], angles: Float[Array, "*batch"]
+) -> Float[Array, "*batch 3 3"]:
+    """Rotation by `angles` (radians) about unit `axes` (Rodrigues); smooth at zero, the axis being constant."""
+    cross = cross_matrix(axes)
+    sine, cosine = jnp.sin(angles)[..., None, None], jnp.cos(angles)[..., None, None]
+    eye = jnp.broadcast_to(jnp.eye(3, dtype=axes.dtype), cross.shape)
+    return eye + sine * cross + (1.0 - cosine) * (cross @ cross)
+
+
+def rigid_transform(
+    rotation: Float[Array, "*batch 3 3"], translation: Float[Array, "*batch 3"]
+) -> Float[Array, "*batch 4 4"]:
+    """The 4x4 matrix of a rotation followed by a translation."""
+    upper = jnp.concatenate([rotation, translation[..., None]], -1)
+    last = jnp.broadcast_to(jnp.array([0.0, 0.0, 0.0, 1.0], rotation.dtype), (*upper.shape[:-2], 1, 4))
+    return jnp.concatenate([upper, last], -2)
+
+
+def transform_points(
+    b_from_a: Float[Array, "*batch 4 4"], points: Float[Array, "*batch 3"]
+) -> Float[Array, "*batch 3"]:
+    """Points of frame a, expressed in frame b; one transform a point."""
+    rotated = jnp.einsum("...ij,...j->...i", b_from_a[..., :3, :3], points, precision="highest")
+    return rotated + b_from_a[..., :3, 3]

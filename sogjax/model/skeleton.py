@@ -1,0 +1,83 @@
+"""Skeletons of one-axis joints: parameter transform M (Eq. 1), limits, forward kinematics."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from sogjax.model.rotation import rigid_transform, rotation_about_axis
+
+
+class Skeleton(eqx.Module):
+    """A tree of joints that each turn about, or slide along, one axis.
+
+    Joint l has one joint parameter Lambda_l (radians or metres): its frame is the parent's frame, moved by
+    `offsets[l]` (metres, in the parent's frame), then turned about or moved along `axes[l]`.
+    Parents come before their children; a root's parent is -1 (the world).
+    """
+
+    names: tuple[str, ...] = eqx.field(static=True)
+    parents: tuple[int, ...] = eqx.field(static=True)
+    dof_names: tuple[str, ...] = eqx.field(static=True)
+    offsets: Float[Array, "joint 3"]
+    axes: Float[Array, "joint 3"]
+    revolute: Bool[Array, "joint"]
+    parameter_transform: Float[Array, "joint dof"]
+    """M of Eq. 1: joint parameters = M @ pose."""
+    dof_lower: Float[Array, "dof"]
+    dof_upper: Float[Array, "dof"]
+    """Limits of the degrees of freedom; -inf and inf where there are none."""
+
+    @property
+    def num_joints(self) -> int:
+        """Number of one-axis joints, which is also the number of joint parameters."""
+        return len(self.names)
+
+    @property
+    def num_dofs(self) -> int:
+        """Number of pose parameters."""
+        return len(self.dof_names)
+
+    def joint_params(self, pose: Float[Array, "dof"]) -> Float[Array, "joint"]:
+        """Lambda = M Theta (Eq. 1)."""
+        return jnp.matmul(self.parameter_transform, pose, precision="highest")
+
+    def joint_limits(self) -> tuple[Float[Array, "joint"], Float[Array, "joint"]]:
+        """Lower and upper limits l_l, l_h of the joint parameters, from those of the degrees of freedom."""
+        weights = self.parameter_transform
+        used = weights != 0.0
+        at_lower = jnp.where(used, weights, 1.0) * self.dof_lower[None, :]
+        at_upper = jnp.where(used, weights, 1.0) * self.dof_upper[None, :]
+        lower = jnp.sum(jnp.where(used, jnp.minimum(at_lower, at_upper), 0.0), axis=1)
+        upper = jnp.sum(jnp.where(used, jnp.maximum(at_lower, at_upper), 0.0), axis=1)
+        return lower, upper
+
+    def world_from_joint(self, pose: Float[Array, "dof"]) -> Float[Array, "joint 4 4"]:
+        """Forward kinematics: the frame of every joint in the world.
+
+        Transforms are composed by pointer doubling: round k joins each joint's chain of 2^k ancestors with the
+        next 2^k, so 61 joints in a chain of any shape take six batched products, however deep the tree is.
+        """
+        local = self._parent_from_joint(self.joint_params(pose))
+        transforms = jnp.concatenate([local, jnp.eye(4, dtype=local.dtype)[None]])
+        for ancestors in _doubled_ancestors(self.parents):
+            transforms = jnp.matmul(transforms[ancestors], transforms, precision="highest")
+        return transforms[:-1]
+
+    def _parent_from_joint(self, joint_params: Float[Array, "joint"]) -> Float[Array, "joint 4 4"]:
+        angles = jnp.where(self.revolute, joint_params, 0.0)
+        slides = jnp.where(self.revolute, 0.0, joint_params)
+        return rigid_transform(
+            rotation_about_axis(self.axes, angles), self.offsets + slides[:, None] * self.axes
+        )
+
+
+def _doubled_ancestors(parents: tuple[int, ...]) -> list[Int[np.ndarray, "joint_and_world"]]:
+    """For each round of pointer doubling the ancestor of every joint; the last slot is the world."""
+    world = len(parents)
+    ancestors = np.array([world if parent < 0 else parent for parent in parents] + [world])
+    rounds = []
+    while (ancestors != world).any():
+        rounds.append(ancestors)
+        ancestors = ancestors[ancestors]
+    return rounds
