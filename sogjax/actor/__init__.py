@@ -1,0 +1,1 @@
+"""From example poses to an actor (Section 5.2)."""

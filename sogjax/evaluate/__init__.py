@@ -1,0 +1,24 @@
+"""How far a motion is from the truth (Section 6)."""
+
+from sogjax.evaluate.markers import PointErrors, VirtualMarkers, attach_markers, joint_errors, marker_errors
+from sogjax.evaluate.metrics import ErrorSummary, LostPoint, lost_points, summarize
+from sogjax.evaluate.report import Evaluation, GroupEvaluation, evaluate_motion, evaluate_motions
+from sogjax.evaluate.swaps import Swap, identity_swaps
+
+__all__ = [
+    "ErrorSummary",
+    "Evaluation",
+    "GroupEvaluation",
+    "LostPoint",
+    "PointErrors",
+    "Swap",
+    "VirtualMarkers",
+    "attach_markers",
+    "evaluate_motion",
+    "evaluate_motions",
+    "identity_swaps",
+    "joint_errors",
+    "lost_points",
+    "marker_errors",
+    "summarize",
+]

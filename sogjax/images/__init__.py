@@ -1,0 +1,1 @@
+"""From pictures to Sums of Gaussians (Section 4.1)."""

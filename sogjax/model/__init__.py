@@ -1,0 +1,1 @@
+"""The nouns: Sums of Gaussians, colours, cameras, skeletons, bodies."""

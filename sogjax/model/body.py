@@ -77,7 +77,7 @@ class Body(eqx.Module):
 
     def rotated(self, rotation: Float[Array, "3 3"]) -> "Body":
         """The same body with its rest frame turned, so that it stands upright in a world with another vertical."""
-        turn = lambda vectors: jnp.einsum("ij,nj->ni", rotation, vectors, precision="highest")  # noqa: E731
+        turn = lambda vectors: jnp.einsum("ij,nj->ni", rotation, vectors, precision="highest")
         return eqx.tree_at(
             lambda b: (b.skeleton.offsets, b.skeleton.axes, b.blobs.offsets, b.landmarks.offsets),
             self,
@@ -94,17 +94,16 @@ def concatenate(bodies: Sequence[Body]) -> Body:
         return bodies[0]
     skeletons = [body.skeleton for body in bodies]
     first_joint = np.cumsum([0] + [skeleton.num_joints for skeleton in skeletons])
-    prefix = lambda body, names: tuple(f"{body.name}/{name}" for name in names)  # noqa: E731
-    flat = lambda parts: tuple(item for part in parts for item in part)  # noqa: E731
-    join = lambda field: jnp.concatenate([field(body) for body in bodies])  # noqa: E731
+    prefix = lambda body, names: tuple(f"{body.name}/{name}" for name in names)
+    flat = lambda parts: tuple(item for part in parts for item in part)
+    join = lambda field: jnp.concatenate([field(body) for body in bodies])
 
     def attachments(field: str) -> Attachments:
         parts: list[Attachments] = [getattr(body, field) for body in bodies]
         return Attachments(
             names=flat(prefix(body, part.names) for body, part in zip(bodies, parts, strict=True)),
             joints=flat(
-                tuple(j + int(first) for j in part.joints)
-                for part, first in zip(parts, first_joint[:-1], strict=True)
+                tuple(j + int(first) for j in part.joints) for part, first in zip(parts, first_joint[:-1], strict=True)
             ),
             offsets=jnp.concatenate([part.offsets for part in parts]),
         )
@@ -145,7 +144,7 @@ def dof_slices(bodies: Sequence[Body]) -> list[slice]:
 
 
 def _slices(counts: Sequence[int]) -> list[slice]:
-    ends: Int[np.ndarray, "n"] = np.cumsum(counts)
+    ends: Int[np.ndarray, n] = np.cumsum(counts)
     return [slice(int(end) - count, int(end)) for end, count in zip(ends, counts, strict=True)]
 
 

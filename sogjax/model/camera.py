@@ -33,9 +33,7 @@ class Camera(eqx.Module):
         return jnp.sqrt(self.intrinsics[..., 0, 0] * self.intrinsics[..., 1, 1])
 
 
-def project_points(
-    camera: Camera, points_world: Float[Array, "n 3"]
-) -> tuple[Float[Array, "n 2"], Float[Array, "n"]]:
+def project_points(camera: Camera, points_world: Float[Array, "n 3"]) -> tuple[Float[Array, "n 2"], Float[Array, "n"]]:
     """Undistorted pixels and depths (metres) of points; a depth below `NEAR` marks a pixel as meaningless."""
     pose = jnp.broadcast_to(camera.camera_from_world, (points_world.shape[0], 4, 4))
     points_camera = transform_points(pose, points_world)

@@ -36,9 +36,7 @@ def color_distance(a: Colors, b: Colors, space: str) -> Float[Array, "*batch"]:
     return jnp.where(positive, jnp.sqrt(jnp.where(positive, squared, 1.0)), 0.0)
 
 
-def color_similarity(
-    a: Colors, b: Colors, space: str, color_radius: Float[Array, ""]
-) -> Float[Array, "*batch"]:
+def color_similarity(a: Colors, b: Colors, space: str, color_radius: Float[Array, ""]) -> Float[Array, "*batch"]:
     """d(c_i, c_j) of Eq. 7: 1 for equal colours, 0 from `color_radius` (eps_sim) on."""
     return wendland(color_distance(a, b, space) / color_radius)
 
@@ -137,9 +135,7 @@ def _lab_from_rgb(rgb: Colors) -> Colors:
     xyz = jnp.einsum("ij,...j->...i", jnp.array(_XYZ_FROM_RGB, rgb.dtype), linear, precision="highest")
     ratio = xyz / jnp.array(_WHITE_D65, rgb.dtype).reshape((1,) * (rgb.ndim - 1) + (3,))
     knee = _LAB_KNEE
-    f = jnp.where(
-        ratio > knee**3, jnp.cbrt(jnp.maximum(ratio, knee**3)), ratio / (3.0 * knee**2) + 4.0 / 29.0
-    )
+    f = jnp.where(ratio > knee**3, jnp.cbrt(jnp.maximum(ratio, knee**3)), ratio / (3.0 * knee**2) + 4.0 / 29.0)
     x, y, z = f[..., 0], f[..., 1], f[..., 2]
     return jnp.stack([116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)], -1) / 100.0
 

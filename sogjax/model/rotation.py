@@ -12,9 +12,7 @@ def cross_matrix(vectors: Float[Array, "*batch 3"]) -> Float[Array, "*batch 3 3"
     return jnp.stack([jnp.stack(row, -1) for row in rows], -2)
 
 
-def rotation_about_axis(
-    axes: Float[Array, "*batch 3"], angles: Float[Array, "*batch"]
-) -> Float[Array, "*batch 3 3"]:
+def rotation_about_axis(axes: Float[Array, "*batch 3"], angles: Float[Array, "*batch"]) -> Float[Array, "*batch 3 3"]:
     """Rotation by `angles` (radians) about unit `axes` (Rodrigues); smooth at zero, the axis being constant."""
     cross = cross_matrix(axes)
     sine, cosine = jnp.sin(angles)[..., None, None], jnp.cos(angles)[..., None, None]

@@ -67,9 +67,7 @@ class Skeleton(eqx.Module):
     def _parent_from_joint(self, joint_params: Float[Array, "joint"]) -> Float[Array, "joint 4 4"]:
         angles = jnp.where(self.revolute, joint_params, 0.0)
         slides = jnp.where(self.revolute, 0.0, joint_params)
-        return rigid_transform(
-            rotation_about_axis(self.axes, angles), self.offsets + slides[:, None] * self.axes
-        )
+        return rigid_transform(rotation_about_axis(self.axes, angles), self.offsets + slides[:, None] * self.axes)
 
 
 def _doubled_ancestors(parents: tuple[int, ...]) -> list[Int[np.ndarray, "joint_and_world"]]:

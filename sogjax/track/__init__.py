@@ -1,0 +1,1 @@
+"""From frame to frame (Section 5.3)."""

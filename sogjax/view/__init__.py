@@ -1,0 +1,1 @@
+"""Pictures and Rerun files that show whether to trust a motion."""

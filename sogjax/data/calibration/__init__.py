@@ -1,0 +1,86 @@
+"""Camera calibrations: one reader a format, chosen by the content of the file."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from sogjax.data.calibration.rig import METRES_PER_UNIT, CameraEntry, CameraRig, rig_from_entries
+from sogjax.data.calibration.toml import read_toml, recognises_toml, write_toml
+from sogjax.errors import InputError
+
+__all__ = [
+    "FORMATS",
+    "CalibrationFormat",
+    "CameraEntry",
+    "CameraRig",
+    "calibration_format",
+    "find_calibrations",
+    "load_calibration",
+    "read_toml",
+    "rig_from_entries",
+    "write_toml",
+]
+
+MAX_BYTES = 16 * 2**20
+_HEAD_BYTES = 64 * 2**10
+
+
+@dataclass(frozen=True)
+class CalibrationFormat:
+    """A calibration format: how to tell it by its text, and how to read it."""
+
+    name: str
+    unit: str
+    """The unit of length that the format prescribes."""
+    recognises: Callable[[str], bool]
+    """Tells the format by the first 64 KiB of a file's text."""
+    read: Callable[[Path, str], CameraRig]
+    """Reads a file whose lengths are in a unit of `METRES_PER_UNIT`."""
+
+
+FORMATS: tuple[CalibrationFormat, ...] = (
+    CalibrationFormat("Anipose/Pose2Sim/FreeMoCap TOML", "m", recognises_toml, read_toml),
+)
+
+
+def load_calibration(path: Path, unit: str | None = None) -> CameraRig:
+    """The cameras of a calibration file of any known format; lengths become metres.
+
+    `unit` (`m` or `mm`) says what the file's lengths are, where it is not what the format prescribes.
+
+    Raises:
+        InputError: no such file, unknown format or unit, or something wrong inside.
+    """
+    if unit is not None and unit not in METRES_PER_UNIT:
+        raise InputError(f"{path}: unknown unit {unit!r} for its lengths; use {' or '.join(METRES_PER_UNIT)}")
+    if not path.is_file():
+        raise InputError(
+            f"{path}: there is no such calibration file; correct the name or calibrate the cameras"
+        )
+    if path.stat().st_size > MAX_BYTES:
+        raise InputError(
+            f"{path}: has {path.stat().st_size} bytes, too many for a calibration; give the right file"
+        )
+    found = calibration_format(path)
+    if found is None:
+        known = ", ".join(known.name for known in FORMATS)
+        raise InputError(f"{path}: is no calibration of a known format; export it as one of: {known}")
+    return found.read(path, unit or found.unit)
+
+
+def find_calibrations(folder: Path) -> list[Path]:
+    """The files in `folder` that some reader recognises or that are called `calibration.*`, sorted."""
+    files = sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))
+    return [path for path in files if path.stem == "calibration" or calibration_format(path) is not None]
+
+
+def calibration_format(path: Path) -> CalibrationFormat | None:
+    """The format of a file by its content, or None; a file that cannot be read has none."""
+    try:
+        with path.open("rb") as file:
+            text = file.read(_HEAD_BYTES).decode("utf-8-sig", errors="replace")
+    except OSError:
+        return None
+    if "\0" in text:
+        return None
+    return next((known for known in FORMATS if known.recognises(text)), None)

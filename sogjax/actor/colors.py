@@ -1,0 +1,117 @@
+"""Colours of the blobs: the example pictures projected back onto the body, hidden views left out (Section 5.2)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, UInt8
+
+from sogjax.model.body import Body
+from sogjax.model.camera import Camera, distort, project, project_points
+from sogjax.model.color import averaging_space, from_rgb, to_rgb
+
+SAMPLE_RADIUS = 0.8
+"""Samples are taken within this many sigmas of a blob's centre."""
+HIDING_RADIUS = 1.0
+"""A blob hides what lies behind it within this many sigmas of its centre."""
+MIN_SAMPLES = 12
+
+_RINGS = ((0.0, 1), (0.5, 6), (1.0, 10))
+"""Radius (in `SAMPLE_RADIUS`) and number of samples of each ring of the sampling pattern."""
+
+
+@dataclass(frozen=True)
+class ColoredView:
+    """One picture of the subject in a known pose."""
+
+    camera: Camera
+    image: UInt8[np.ndarray, "height width 3"]
+    """BGR."""
+    mask: Bool[np.ndarray, "height width"] | None
+    """The subject, where it is known."""
+    pose: Float[Array, "dof"]
+
+
+def back_projected_colors(body: Body, views: Sequence[ColoredView], color_space: str) -> Float[np.ndarray, "blob 3"]:
+    """Robust mean colour (sRGB, 0..1) of what the pictures show of every blob.
+
+    A blob that no picture shows takes the colour of the nearest blob that is shown.
+    """
+    samples: list[list[np.ndarray]] = [[] for _ in range(body.num_blobs)]
+    for view in views:
+        for blob, colors in enumerate(_samples(body, view)):
+            samples[blob].append(colors)
+    stacked = [np.concatenate(parts) for parts in samples]
+    colors = np.full((body.num_blobs, 3), np.nan)
+    for blob, rgb in enumerate(stacked):
+        if len(rgb) >= MIN_SAMPLES:
+            colors[blob] = _robust_mean(rgb, color_space)
+    return _filled(body, colors)
+
+
+def _samples(body: Body, view: ColoredView) -> list[Float[np.ndarray, "n 3"]]:
+    """Colours (RGB, 0..1) that one picture shows of every blob; none where the blob is hidden."""
+    pixels, visible = _sample_pixels(body, view)
+    height, width = view.image.shape[:2]
+    column, row = (np.rint(pixels[..., k]).astype(int) for k in (0, 1))
+    inside = (column >= 0) & (column < width) & (row >= 0) & (row < height) & visible
+    column, row = np.where(inside, column, 0), np.where(inside, row, 0)
+    if view.mask is not None:
+        inside &= view.mask[row, column]
+    rgb = view.image[row, column][..., ::-1] / 255.0
+    return [rgb[blob][inside[blob]] for blob in range(body.num_blobs)]
+
+
+def _sample_pixels(
+    body: Body, view: ColoredView
+) -> tuple[Float[np.ndarray, "blob sample 2"], Bool[np.ndarray, "blob sample"]]:
+    """Where the sampling pattern of every blob lies in the picture as recorded, and which samples are not hidden."""
+    blobs = body.posed_blobs(view.pose)
+    seen = project(view.camera, blobs)
+    depth = np.asarray(project_points(view.camera, blobs.means)[1], float)
+    centre, sigma = np.asarray(seen.means, float), np.asarray(seen.sigmas, float)
+    pattern = np.concatenate(
+        [
+            radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+            for radius, count in _RINGS
+            for angle in [np.arange(count) * 2.0 * np.pi / count]
+        ]
+    )
+    pixels = centre[:, None] + SAMPLE_RADIUS * sigma[:, None, None] * pattern[None]
+    distance = np.linalg.norm(pixels[:, :, None] - centre[None, None], axis=-1)
+    nearer = depth[None, :] < (depth - np.asarray(body.blob_sigmas, float))[:, None]
+    hidden = np.any((distance < HIDING_RADIUS * sigma) & nearer[:, None, :], axis=-1)
+    recorded = np.asarray(distort(view.camera, jnp.asarray(pixels.reshape(-1, 2), seen.means.dtype)))
+    return recorded.reshape(pixels.shape), ~hidden & np.asarray(seen.mask)[:, None]
+
+
+def _robust_mean(rgb: Float[np.ndarray, "n 3"], color_space: str) -> Float[np.ndarray, "3"]:
+    """Mean of the half of the samples that lie nearest to their median, in a colour space without wrap-around."""
+    space = averaging_space(color_space)
+    colors = np.asarray(from_rgb(jnp.asarray(rgb, jnp.float32), space))
+    distance = np.linalg.norm(colors - np.median(colors, axis=0), axis=1)
+    near = colors[distance <= np.median(distance)]
+    return np.asarray(to_rgb(jnp.asarray(near.mean(axis=0)), space), float)
+
+
+def _filled(body: Body, colors: Float[np.ndarray, "blob 3"]) -> Float[np.ndarray, "blob 3"]:
+    """Colours of blobs that were never seen, from the nearest blob that was."""
+    seen = np.isfinite(colors[:, 0])
+    if not seen.any():
+        return np.asarray(body.blob_colors, float)
+    means = np.asarray(body.posed_blobs(body.poses["rest"]).means, float)
+    distance = np.linalg.norm(means[:, None] - means[None, seen], axis=-1)
+    return colors[seen][np.argmin(distance, axis=1)]
+
+
+def colored(body: Body, colors: Float[np.ndarray, "blob 3"]) -> Body:
+    """The body with other blob colours (sRGB, 0..1)."""
+    return eqx.tree_at(lambda b: b.blob_colors, body, jnp.asarray(colors, body.blob_colors.dtype))
+
+
+def camera_of(rig: Camera, index: int) -> Camera:
+    """One camera of a stack."""
+    return jax.tree.map(lambda leaf: leaf[index], rig)

@@ -1,0 +1,87 @@
+"""The pose of an example picture set, from the masks alone: place, heading and named pose, then refined."""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from sogjax.actor.silhouettes import body_centre
+from sogjax.energy.objective import EnergyWeights, History, Views, energy
+from sogjax.model.body import Body
+from sogjax.solve import ConditionedAscent, Scales
+from sogjax.track.initial_pose import placed, root_position, turned
+from sogjax.track.scales import pose_scales
+
+NUM_HEADINGS = 16
+COARSE_ITERATIONS = 40
+FINE_ITERATIONS = 80
+NUM_FINE = 3
+"""Candidates that are climbed to the end."""
+
+
+def starts_at(
+    body: Body, centre: Float[np.ndarray, "3"], up: str, named: Sequence[str]
+) -> Float[Array, "heading named dof"]:
+    """The named poses at every heading, with the body's centre at a point (metres, world)."""
+    headings = np.arange(NUM_HEADINGS) * 2.0 * np.pi / NUM_HEADINGS - np.pi
+    return jnp.stack(
+        [
+            jnp.stack([centred(body, turned(body, body.poses[name], float(h), up), centre) for name in named])
+            for h in headings
+        ]
+    )
+
+
+def centred(body: Body, pose: Float[Array, "dof"], centre: Float[np.ndarray, "3"]) -> Float[Array, "dof"]:
+    """The pose moved so that the body's centre lies at a point (metres, world)."""
+    blobs = body.posed_blobs(pose)
+    root = root_position(body, pose)
+    return placed(body, pose, root + centre - np.asarray(body_centre(blobs.means, blobs.sigmas), float))
+
+
+def pose_from_silhouettes(
+    body: Body, views: Views, starts: Float[Array, "heading named dof"], weights: EnergyWeights
+) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
+    """The best pose by Eq. 9 and its energy.
+
+    Every named pose is climbed from the heading that suits it best and from the opposite one, since silhouettes hardly
+    tell front from back; the best few are climbed to the end.
+    """
+    num_headings, num_named, num_dofs = starts.shape
+    promise = _energies(body, starts.reshape(-1, num_dofs), views, weights).reshape(num_headings, num_named)
+    heading = jnp.argmax(promise, axis=0)
+    opposite = (heading + num_headings // 2) % num_headings
+    named = jnp.arange(num_named)
+    candidates = jnp.concatenate([starts[heading, named], starts[opposite, named]])
+    scales = pose_scales(body.skeleton)
+    poses, energies = _refined(body, candidates, views, weights, scales, jnp.asarray(COARSE_ITERATIONS))
+    best = jnp.argsort(-energies)[:NUM_FINE]
+    poses, energies = _refined(body, poses[best], views, weights, scales, jnp.asarray(FINE_ITERATIONS))
+    winner = jnp.argmax(energies)
+    return poses[winner], energies[winner]
+
+
+def _no_history(pose: Float[Array, "dof"]) -> History:
+    return History(pose, pose, jnp.asarray(False))
+
+
+@eqx.filter_jit
+def _energies(body: Body, poses: Array, views: Views, weights: EnergyWeights) -> Float[Array, "start"]:
+    return jax.lax.map(lambda pose: energy(body, pose, views, _no_history(pose), weights), poses)
+
+
+@eqx.filter_jit
+def _refined(
+    body: Body, poses: Array, views: Views, weights: EnergyWeights, scales: Scales, max_iterations: Array
+) -> tuple[Float[Array, "start dof"], Float[Array, "start"]]:
+    solver = ConditionedAscent(max_iterations=max_iterations)
+
+    def refine(pose):
+        objective = lambda p: energy(body, p, views, _no_history(pose), weights)
+        solution = solver.maximize(objective, pose, scales)
+        return solution.params, solution.value
+
+    return jax.lax.map(refine, poses)

@@ -1,0 +1,128 @@
+"""An actor from a recording's example poses: a named body, scaled to the subject and coloured."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from sogjax.actor.colors import ColoredView, back_projected_colors, camera_of, colored
+from sogjax.actor.estimate import estimate_shape
+from sogjax.actor.example_pose import pose_from_silhouettes, starts_at
+from sogjax.actor.shape import ShapeModel
+from sogjax.actor.silhouettes import (
+    COARSE_DEPTH,
+    FINE_DEPTH,
+    PosedPictures,
+    load_pictures,
+    pad_views,
+    silhouette_views,
+    subject_centre,
+)
+from sogjax.data.recording import ExamplePose, Recording
+from sogjax.energy.objective import EnergyWeights, Views
+from sogjax.errors import InputError
+from sogjax.model.body import Body
+from sogjax.model.camera import Camera
+from sogjax.model.frames import world_from_upright
+from sogjax.track.initial_pose import rough_pose
+
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class MadeActor:
+    """An actor in its own upright frame, and the poses of the example pictures in the recording's world."""
+
+    body: Body
+    example_poses: dict[str, Float[Array, "dof"]]
+    similarity: float
+    """Eq. 9 of the silhouettes, the mean over the example poses."""
+
+
+def make_actor(
+    recording: Recording,
+    body: Body,
+    subject: str | None,
+    color_space: str,
+    weights: EnergyWeights,
+    report: Report = lambda _: None,
+) -> MadeActor:
+    """Scale and colour a body after the example poses of one subject.
+
+    Raises:
+        InputError: no example poses of the subject, or pictures without masks.
+    """
+    examples = _examples_of(recording, subject)
+    rig = jax.tree.map(jnp.asarray, recording.rig.cameras)
+    turn = world_from_upright(recording.up)
+    upright = body.rotated(jnp.asarray(turn, body.blob_sigmas.dtype))
+    model = ShapeModel.from_body(upright)
+    pictures = [load_pictures(recording, example) for example in examples]
+    poses = []
+    for example, posed in zip(examples, pictures, strict=True):
+        report(f"pose of {example.name}")
+        poses.append(_example_pose(upright, example, posed, rig, recording.up, weights))
+    report("shape")
+    views = _same_capacity([silhouette_views(posed, rig, body.num_blobs, FINE_DEPTH) for posed in pictures])
+    no_shape = jnp.zeros(model.num_shape_params, body.blob_sigmas.dtype)
+    estimate = estimate_shape(model, jnp.stack(poses), no_shape, views, weights)
+    shaped = model.shaped(estimate.shape_params)
+    report("colours")
+    shown = [
+        ColoredView(camera_of(rig, camera), image, mask, pose)
+        for posed, pose in zip(pictures, estimate.poses, strict=True)
+        for camera, image, mask in zip(posed.cameras, posed.images, posed.masks, strict=True)
+    ]
+    actor = colored(shaped, back_projected_colors(shaped, shown, color_space))
+    actor = actor.rotated(jnp.asarray(turn.T, body.blob_sigmas.dtype))
+    if subject is not None:
+        actor = replace(actor, name=subject)
+    return MadeActor(
+        actor,
+        {example.name: pose for example, pose in zip(examples, estimate.poses, strict=True)},
+        float(estimate.similarity),
+    )
+
+
+def subjects_of(recording: Recording) -> tuple[str | None, ...]:
+    """The subjects that the example poses show; (None,) where they name none."""
+    names = dict.fromkeys(example.actor for example in recording.example_poses)
+    return tuple(names) or (None,)
+
+
+def _examples_of(recording: Recording, subject: str | None) -> list[ExamplePose]:
+    if not recording.example_poses:
+        raise InputError(
+            f"{recording.path}: no example poses to make an actor from; add example_poses/POSE/CAMERA.jpg "
+            "with CAMERA.mask.png, or give an actor file with actor=FILE"
+        )
+    subjects = subjects_of(recording)
+    if subject is None and len(subjects) > 1:
+        named = ", ".join(str(name) for name in subjects)
+        raise InputError(f"{recording.path}: the example poses show {named}; choose one with subject=NAME")
+    wanted = subject if subject is not None else subjects[0]
+    examples = [e for e in recording.example_poses if e.actor == wanted or (e.actor is None and len(subjects) == 1)]
+    if not examples:
+        named = ", ".join(str(name) for name in subjects)
+        raise InputError(f"{recording.path}: no example poses of subject={subject}; they show {named}")
+    return examples
+
+
+def _example_pose(
+    body: Body, example: ExamplePose, pictures: PosedPictures, rig: Camera, up: str, weights: EnergyWeights
+) -> Float[Array, "dof"]:
+    """The pose of one example: near its hint where there is one, else found from the masks."""
+    views = silhouette_views(pictures, rig, body.num_blobs, COARSE_DEPTH)
+    if example.initial_pose is not None:
+        starts = rough_pose(body, example.initial_pose, up)[None, None]
+    else:
+        starts = starts_at(body, subject_centre(pictures, rig), up, tuple(body.poses))
+    pose, _ = pose_from_silhouettes(body, views, starts, weights)
+    return pose
+
+
+def _same_capacity(views: Sequence[Views]) -> list[Views]:
+    capacity = max(view.images.capacity for view in views)
+    return [pad_views(view, capacity) for view in views]

@@ -1,0 +1,162 @@
+"""From config objects to the modules of the core: the only place where both are known."""
+
+from collections.abc import Sequence
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from sogjax.app.configs import ColorConfig, EnergyConfig, ImagesConfig, SolverConfig, TrackConfig
+from sogjax.data.image_file import read_image
+from sogjax.data.recording import Recording
+from sogjax.energy.objective import EnergyWeights, whole_image_overlap
+from sogjax.energy.overlap import EXACT_EXPONENT, PRINTED_EXPONENT
+from sogjax.errors import InputError
+from sogjax.images.cells import CellGrid, stack_cells
+from sogjax.images.quadtree import Candidates, quadtree
+from sogjax.model.body import Body
+from sogjax.model.camera import Camera
+from sogjax.model.color import COLOR_RADIUS, averaging_space, from_rgb
+from sogjax.solve import ConditionedAscent, OptimistixSolver, Scales, Solver
+from sogjax.track.culling import ImageReader
+from sogjax.track.scales import pose_scales
+from sogjax.track.tracker import Tracker
+
+OPTIMISTIX_METHODS = ("bfgs", "lbfgs", "nonlinear_cg")
+
+
+def one_of(key: str, value: str, allowed: Sequence[str]) -> str:
+    """The value, if it is allowed.
+
+    Raises:
+        InputError: it is not.
+    """
+    if value not in allowed:
+        raise InputError(f"{key}={value}: no such choice; use one of {', '.join(allowed)}")
+    return value
+
+
+def at_least(key: str, value: float, bound: float) -> float:
+    """The value, if it is a number not below the bound.
+
+    Raises:
+        InputError: it is not.
+    """
+    if not value >= bound or not np.isfinite(value):
+        raise InputError(f"{key}={value}: must be a number of at least {bound:g}")
+    return value
+
+
+def color_space_and_radius(config: ColorConfig) -> tuple[str, float]:
+    """The colour space and its eps_sim."""
+    space = one_of("color.space", config.space, tuple(COLOR_RADIUS))
+    radius = COLOR_RADIUS[space] if config.radius is None else config.radius
+    return space, at_least("color.radius", radius, 1e-6)
+
+
+def energy_weights(config: EnergyConfig) -> EnergyWeights:
+    """The constants of Eq. 10."""
+    exponent = one_of("energy.overlap_exponent", config.overlap_exponent, ("exact", "printed"))
+    gradient = one_of("energy.gradient", config.gradient, ("forward", "autodiff"))
+    return EnergyWeights(
+        limit_weight=at_least("energy.limit_weight", config.limit_weight, 0.0),
+        acceleration_weight=at_least("energy.acceleration_weight", config.acceleration_weight, 0.0),
+        exponent=EXACT_EXPONENT if exponent == "exact" else PRINTED_EXPONENT,
+        capped=config.capped,
+        gradient="forward" if gradient == "forward" else "autodiff",
+    )
+
+
+def solver(config: SolverConfig) -> Solver:
+    """The solver that a config names."""
+    methods = ("conditioned_ascent", "gradient_ascent", *OPTIMISTIX_METHODS)
+    method = one_of("solver.method", config.method, methods)
+    at_least("solver.epsilon", config.epsilon, 0.0)
+    at_least("solver.max_iterations", config.max_iterations, 1)
+    if method in OPTIMISTIX_METHODS:
+        return OptimistixSolver(method, epsilon=config.epsilon, max_iterations=config.max_iterations)
+    conditioned = method == "conditioned_ascent"
+    return ConditionedAscent(
+        epsilon=config.epsilon,
+        grow=at_least("solver.grow", config.grow, 1.0) if conditioned else 1.0,
+        shrink=at_least("solver.shrink", config.shrink, 0.0) if conditioned else 1.0,
+        min_iterations=config.min_iterations,
+        max_iterations=config.max_iterations,
+    )
+
+
+def solver_scales(config: SolverConfig, body: Body) -> Scales:
+    """First and largest steps for the degrees of freedom of a body."""
+    return pose_scales(
+        body.skeleton,
+        config.first_angle,
+        config.first_translation,
+        config.largest_angle,
+        config.largest_translation,
+    )
+
+
+def device_cameras(recording: Recording) -> Camera:
+    """The recording's cameras in jax's working precision."""
+    return jax.tree.map(jnp.asarray, recording.rig.cameras)
+
+
+def cell_grids(recording: Recording, depth: int) -> tuple[CellGrid, ...]:
+    """How the pictures of each camera are cut into cells."""
+    at_least("images.depth", depth, 1)
+    sizes = np.asarray(recording.rig.cameras.image_size).astype(int)
+    return tuple(CellGrid.from_depth(int(w), int(h), depth) for w, h in sizes)
+
+
+def tracker(recording: Recording, body: Body, grids: tuple[CellGrid, ...], config: TrackConfig) -> Tracker:
+    """The tracker of a recording for a body that stands upright in its world."""
+    cameras = device_cameras(recording)
+    space, radius = color_space_and_radius(config.color)
+    candidates = Candidates.from_grids(grids, cameras)
+    reader = ImageReader(
+        candidates=candidates,
+        color_radius=radius,
+        color_tolerance=config.images.color_tolerance,
+        box_enlargement=at_least("images.box_enlargement", config.images.box_enlargement, 0.0),
+        color_space=space,
+        plate_colors=_plate_colors(recording, grids, candidates, space, config.images),
+        plate_tolerance=at_least("images.plate_tolerance", config.images.plate_tolerance, 0.0),
+    )
+    return Tracker(
+        body=body,
+        cameras=cameras,
+        normalizers=whole_image_overlap(cameras.image_size),
+        reader=reader,
+        weights=energy_weights(config.energy),
+        solver=solver(config.solver),
+        scales=solver_scales(config.solver, body),
+        extrapolation=config.tracking.extrapolation,
+    )
+
+
+def _plate_colors(
+    recording: Recording,
+    grids: tuple[CellGrid, ...],
+    candidates: Candidates,
+    space: str,
+    config: ImagesConfig,
+) -> Float[Array, "camera candidate 3"] | None:
+    """Colours of the quad-tree nodes of the empty background.
+
+    Raises:
+        InputError: plates are asked for, but a camera has none, or one of another size.
+    """
+    if not config.use_plates:
+        return None
+    missing = [name for name in recording.rig.names if name not in recording.background]
+    if missing:
+        raise InputError(
+            f"{recording.path}: images.use_plates=true, but background/ has no picture of "
+            f"{', '.join(missing)}; add it, or set images.use_plates=false"
+        )
+    images = [read_image(recording.background[name]) for name in recording.rig.names]
+    cells = jnp.asarray(stack_cells(images, grids), candidates.sigmas.dtype) / 255.0
+    colors = from_rgb(cells, averaging_space(space))
+    tolerance = jnp.asarray(0.0, colors.dtype)
+    return jax.vmap(quadtree, in_axes=(0, 0, None))(colors, candidates, tolerance)[0]

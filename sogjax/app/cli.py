@@ -1,0 +1,68 @@
+"""The console script `sogjax`: one subcommand a task, with Hydra overrides as arguments."""
+
+import importlib
+import sys
+import textwrap
+from collections.abc import Sequence
+
+USAGE = "usage: sogjax COMMAND [key=value ...] [-m for a sweep], sogjax COMMAND --help"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command; 0: done, 2: the input was wrong (one sentence on standard error)."""
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    from sogjax.app.composition import SCHEMAS, composed
+    from sogjax.errors import InputError
+
+    if not arguments or arguments[0] in ("-h", "--help", "help"):
+        print(_overview())
+        return 0 if arguments else 2
+    if arguments[0] == "--version":
+        from sogjax import __version__
+
+        print(__version__)
+        return 0
+    command, overrides = arguments[0], arguments[1:]
+    if command not in SCHEMAS:
+        return _wrong_input(f"no command {command!r}; use one of {', '.join(SCHEMAS)} ({USAGE})")
+    if any(word in ("-h", "--help") for word in overrides):
+        print(command_help(command))
+        return 0
+    try:
+        if any(word in ("-m", "--multirun") for word in overrides):
+            from sogjax.app.sweep import run_sweep
+
+            return run_sweep(command, [word for word in overrides if word not in ("-m", "--multirun")])
+        config = composed(command, overrides)
+        importlib.import_module(f"sogjax.app.{command}").run(config)
+    except InputError as error:
+        return _wrong_input(str(error))
+    except KeyboardInterrupt:
+        print("\nstopped", file=sys.stderr)
+        return 130
+    return 0
+
+
+def command_help(command: str) -> str:
+    """Every option of a command with its default, unit and the paper's symbol."""
+    from sogjax.app.composition import SCHEMAS
+    from sogjax.app.configs import help_lines
+
+    schema = SCHEMAS[command]
+    lines = [f"sogjax {command} [key=value ...]", "", (schema.__doc__ or "").strip(), ""]
+    for key, default, text in help_lines(schema):
+        lines += textwrap.wrap(f"{key}={default}", 118, initial_indent="  ")
+        lines += textwrap.wrap(text, 110, initial_indent="        ", subsequent_indent="        ")
+    return "\n".join(lines)
+
+
+def _overview() -> str:
+    from sogjax.app.composition import SCHEMAS
+
+    rows = [f"  {name:<10} {(schema.__doc__ or '').strip()}" for name, schema in SCHEMAS.items()]
+    return "\n".join(["Markerless motion capture by Sums of Gaussians.", "", USAGE, "", *rows])
+
+
+def _wrong_input(sentence: str) -> int:
+    print(f"sogjax: {sentence}", file=sys.stderr)
+    return 2

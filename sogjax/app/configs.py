@@ -1,0 +1,187 @@
+"""Hydra schemas of the commands: the only place where defaults stand; the YAML files of `conf/` hold deltas.
+
+Every field carries its help text; `--help` prints it. Symbols in brackets are the paper's.
+"""
+
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import Any
+
+from omegaconf import MISSING
+
+
+def option(default: Any, help_text: str) -> Any:
+    """A config field with its default and the text that `--help` prints."""
+    return field(default=default, metadata={"help": help_text})
+
+
+def group(schema: type, help_text: str) -> Any:
+    """A config group."""
+    return field(default_factory=schema, metadata={"help": help_text})
+
+
+@dataclass
+class ColorConfig:
+    """Colour space and similarity (Eq. 7)."""
+
+    space: str = option("hsv_cylinder", "hsv_cylinder | hsv_cone | hsv (the paper's) | rgb | lab")
+    radius: float | None = option(None, "[eps_sim] colours farther apart do not match; null: the space's own")
+
+
+@dataclass
+class ImagesConfig:
+    """Pictures to Sums of Gaussians (Section 4.1) and culling (Section 6)."""
+
+    depth: int = option(8, "levels of the quad-tree below its root, the smallest power of two that holds a picture")
+    color_tolerance: float = option(0.15, "[eps_col] a node splits above this standard deviation; < 0: always")
+    box_enlargement: float = option(0.15, "border around an actor's box, as a part of its size")
+    use_plates: bool = option(False, "leave out image blobs that equal the empty background pictures")
+    plate_tolerance: float = option(0.1, "colours nearer than this to the plate's are background")
+
+
+@dataclass
+class EnergyConfig:
+    """The energy (Eq. 10)."""
+
+    limit_weight: float = option(1.0, "[w_l] weight of the joint limits, 1/rad^2")
+    acceleration_weight: float = option(0.05, "[w_a] weight of smooth motion, 1/rad^2")
+    overlap_exponent: str = option("exact", "exact | printed: Eq. 6 with or without the 1/2 that Eq. 2 implies")
+    capped: bool = option(True, "the cap of Eq. 8 against blobs that hide each other")
+    gradient: str = option("forward", "forward: closed form beside the value | autodiff: plain reverse mode")
+
+
+@dataclass
+class SolverConfig:
+    """The solver (Eq. 11, 12)."""
+
+    method: str = option("conditioned_ascent", "conditioned_ascent | gradient_ascent | bfgs | lbfgs | nonlinear_cg")
+    epsilon: float = option(0.002, "[epsilon] stop when a step is shorter, rad and m")
+    min_iterations: int = option(10, "[n_iter] iterations made at least")
+    max_iterations: int = option(200, "iterations made at most")
+    grow: float = option(1.2, "[mu+] growth of a step size while the gradient keeps its sign")
+    shrink: float = option(0.5, "[mu-] shrinkage where it does not")
+    first_angle: float = option(0.02, "[sigma_0] length of the first step of the angles, rad")
+    first_translation: float = option(0.01, "[sigma_0] length of the first step of the translations, m")
+    largest_angle: float = option(0.15, "bound on a step of an angle, rad")
+    largest_translation: float = option(0.05, "bound on a step of a translation, m")
+
+
+@dataclass
+class TrackingConfig:
+    """Prediction and the first frame (Section 5.3)."""
+
+    extrapolation: float = option(0.5, "[alpha] part of the last motion that is added to predict the next pose")
+
+
+@dataclass
+class OutputsConfig:
+    """What is written beside the motion."""
+
+    overlay: bool = option(True, "overlay.mp4, the skeleton on every camera's pictures")
+    overlay_width: int = option(1920, "width of the overlay video, px")
+    rerun: bool = option(True, "motion.rrd, for the Rerun viewer")
+    rerun_images: bool = option(True, "put the pictures into motion.rrd")
+    bvh: bool = option(True, "motion.bvh")
+
+
+@dataclass
+class TrackConfig:
+    """Track the actors of a recording."""
+
+    recording: str = option(MISSING, "folder of the recording")
+    out: str = option("", "folder for the results; default: outputs/RECORDING")
+    actor: Any = option(None, "actor file, or a list of them; null: made from the example poses")
+    body: str = option("human", "body that actors are made from: human, dog, or a body file")
+    start: int = option(0, "first frame to track, counted from the recording's first")
+    stop: int | None = option(None, "frame before which to stop; null: the end")
+    cameras: list[str] | None = option(None, "cameras to use; null: all")
+    color: ColorConfig = group(ColorConfig, "")
+    images: ImagesConfig = group(ImagesConfig, "")
+    energy: EnergyConfig = group(EnergyConfig, "")
+    solver: SolverConfig = group(SolverConfig, "")
+    tracking: TrackingConfig = group(TrackingConfig, "")
+    outputs: OutputsConfig = group(OutputsConfig, "")
+
+
+@dataclass
+class ActorConfig:
+    """Make an actor file from the example poses of a recording."""
+
+    recording: str = option(MISSING, "folder of the recording")
+    out: str = option(MISSING, "actor file to write")
+    subject: str | None = option(None, "which subject, where the recording has several")
+    body: str = option("human", "body to start from: human, dog, or a body file")
+    cameras: list[str] | None = option(None, "cameras to use; null: all")
+    color: ColorConfig = group(ColorConfig, "")
+    energy: EnergyConfig = group(EnergyConfig, "")
+
+
+@dataclass
+class SynthConfig:
+    """Render a recording with ground truth."""
+
+    out: str = option(MISSING, "folder to write; must not exist")
+    motion: str = option("walk", "walk | arms | squat_kick | cartwheel | pass")
+    actors: int = option(1, "number of people")
+    cameras: int = option(12, "number of cameras in the ring")
+    width: int = option(648, "width of the pictures, px")
+    height: int = option(486, "height of the pictures, px")
+    fps: float = option(30.0, "frames per second")
+    frames: int = option(60, "number of frames")
+    seed: int = option(0, "person, clothes, room and noise")
+    noise: float = option(0.012, "standard deviation of the sensor noise, of full scale")
+
+
+@dataclass
+class DemoConfig:
+    """Render a person, make the actor, track, evaluate: everything at once."""
+
+    out: str = option("outputs/demo", "folder for the results")
+    motion: str = option("walk", "walk | arms | squat_kick | cartwheel")
+    cameras: int = option(12, "number of cameras")
+    frames: int = option(60, "number of frames")
+    width: int = option(648, "width of the pictures, px")
+    height: int = option(486, "height of the pictures, px")
+    seed: int = option(0, "person, clothes, room and noise")
+    outputs: OutputsConfig = group(OutputsConfig, "")
+
+
+@dataclass
+class EvaluateConfig:
+    """Compare a motion with ground truth (Section 6)."""
+
+    motion: Any = option(MISSING, "motion.npz, or a list of them with several actors")
+    truth: str = option(MISSING, "ground_truth.npz")
+    out: str | None = option(None, "metrics.json to write; null: only print")
+
+
+@dataclass
+class ViewConfig:
+    """Write or open the Rerun recording of a motion."""
+
+    motion: Any = option(MISSING, "motion.npz, or a list of them with several actors")
+    recording: str = option(MISSING, "folder of the recording")
+    out: str | None = option(None, "motion.rrd to write; null: open the viewer")
+    images: bool = option(True, "with the pictures")
+
+
+@dataclass
+class ExportConfig:
+    """Write a motion in another format."""
+
+    motion: str = option(MISSING, "motion.npz")
+    to: str = option(MISSING, "file to write; its ending says the format: .bvh .npz")
+    up: str = option("z", "vertical of the motion's world: x y z -x -y -z")
+
+
+def help_lines(schema: type, prefix: str = "") -> list[tuple[str, str, str]]:
+    """(key, default, text) of every option of a schema, groups unfolded."""
+    lines: list[tuple[str, str, str]] = []
+    example = schema()
+    for entry in fields(schema):
+        default = getattr(example, entry.name)
+        if is_dataclass(default):
+            lines += help_lines(type(default), f"{prefix}{entry.name}.")
+        else:
+            shown = "required" if default == MISSING else "null" if default is None else str(default)
+            lines.append((prefix + entry.name, shown, entry.metadata["help"]))
+    return lines

@@ -1,0 +1,44 @@
+"""Files that are either whole or not there: write under a temporary name, then rename."""
+
+import errno
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from sogjax.errors import InputError
+
+_DISK_TROUBLE = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS}
+
+
+@contextmanager
+def atomic_path(path: Path) -> Iterator[Path]:
+    """A temporary path in the same folder and with the same suffix as `path`, renamed to it on success.
+
+    The folder is made where it is missing. When the body raises, nothing is left behind and an older file at
+    `path` stays as it was.
+
+    Raises:
+        InputError: the folder cannot be made or written, `path` is a folder, or the disk is full.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder, so no file can be written there; give the path of a file")
+    temporary = path.with_name(f".{path.stem[:80]}.{uuid.uuid4().hex[:8]}.tmp{path.suffix}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary.touch(exist_ok=False)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputError(
+            f"{path}: the folder {path.parent} cannot be written ({reason}); choose another"
+        ) from error
+    try:
+        yield temporary
+        temporary.replace(path)
+    except OSError as error:
+        if error.errno not in _DISK_TROUBLE:
+            raise
+        raise InputError(f"{path}: could not be written ({error.strerror}); choose another disk") from error
+    finally:
+        temporary.unlink(missing_ok=True)

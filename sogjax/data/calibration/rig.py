@@ -1,0 +1,139 @@
+"""The calibrated cameras of a recording, by name, and the checks that every calibration passes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from sogjax.errors import InputError
+from sogjax.model.camera import Camera
+
+ROTATION_TOLERANCE = 1e-3
+"""How far a rotation matrix of a file may be from orthonormal: files with four digits pass."""
+
+METRES_PER_UNIT = {"m": 1.0, "mm": 1e-3}
+"""The units of length that `unit` may name."""
+
+
+@dataclass(frozen=True)
+class CameraRig:
+    """Named cameras: a `Camera` whose leaves have a leading camera axis in the order of `names`."""
+
+    names: tuple[str, ...]
+    cameras: Camera
+
+    def __len__(self) -> int:
+        """Number of cameras."""
+        return len(self.names)
+
+    def camera(self, name: str) -> Camera:
+        """The one camera called `name`, without a camera axis."""
+        index = self.names.index(name)
+        return jax.tree.map(lambda leaf: leaf[index], self.cameras)
+
+    def image_size(self, name: str) -> tuple[int, int]:
+        """Width and height of a camera's images, in pixels."""
+        width, height = np.asarray(self.cameras.image_size)[self.names.index(name)]
+        return int(width), int(height)
+
+    def select(self, names: Sequence[str]) -> "CameraRig":
+        """The rig of `names`, in their order."""
+        indices = np.array([self.names.index(name) for name in names], int)
+        return CameraRig(tuple(names), jax.tree.map(lambda leaf: leaf[indices], self.cameras))
+
+
+@dataclass(frozen=True)
+class CameraEntry:
+    """One camera as read from a file, not yet checked; lengths in metres."""
+
+    name: str
+    intrinsics: Float[np.ndarray, "3 3"]
+    rotation: Float[np.ndarray, "3 3"]
+    """World to camera."""
+    translation: Float[np.ndarray, "3"]
+    distortion: Float[np.ndarray, "coefficient"]
+    """OpenCV's k1 k2 p1 p2 [k3]."""
+    size: tuple[int, int]
+
+
+def rig_from_entries(path: Path, entries: Sequence[CameraEntry]) -> CameraRig:
+    """The rig of the cameras read from `path`.
+
+    Raises:
+        InputError: no camera, two of one name, or a value that no camera can have.
+    """
+    if not entries:
+        raise InputError(f"{path}: holds no camera; give a calibration with at least one")
+    names = tuple(entry.name for entry in entries)
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"{path}: the camera name {name!r} occurs twice; give every camera its own name")
+    for entry in entries:
+        _check(path, entry)
+    stack = lambda arrays: jnp.asarray(np.stack(arrays).astype(float))  # noqa: E731
+    return CameraRig(
+        names,
+        Camera(
+            intrinsics=stack([entry.intrinsics for entry in entries]),
+            camera_from_world=stack([_camera_from_world(entry) for entry in entries]),
+            distortion=stack([_five_coefficients(entry) for entry in entries]),
+            image_size=stack([np.array(entry.size) for entry in entries]),
+        ),
+    )
+
+
+def _check(path: Path, entry: CameraEntry) -> None:
+    where = f"{path}: camera {entry.name!r}"
+    arrays = {
+        "intrinsic matrix": entry.intrinsics,
+        "rotation": entry.rotation,
+        "translation": entry.translation,
+        "distortion": entry.distortion,
+    }
+    for what, values in arrays.items():
+        if not np.isfinite(values).all():
+            raise InputError(f"{where}: its {what} {_text(values)} is not finite; calibrate it again")
+    if min(entry.size) <= 0:
+        raise InputError(
+            f"{where}: its size {list(entry.size)} is not positive; give width and height in pixels"
+        )
+    matrix = entry.intrinsics
+    if min(matrix[0, 0], matrix[1, 1]) <= 0:
+        focal = f"{matrix[0, 0]:g} and {matrix[1, 1]:g}"
+        raise InputError(f"{where}: its focal lengths {focal} are not positive; give them in pixels")
+    if np.abs(matrix[[0, 1, 2, 2], [1, 0, 0, 1]]).max() > 1e-6 * matrix[0, 0] or abs(matrix[2, 2] - 1) > 1e-6:
+        raise InputError(
+            f"{where}: its matrix {_text(matrix)} is not [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]; "
+            "calibrate it without skew"
+        )
+    rotation = entry.rotation
+    deviation = np.abs(rotation @ rotation.T - np.eye(3)).max()
+    if deviation > ROTATION_TOLERANCE or np.linalg.det(rotation) < 0:
+        raise InputError(
+            f"{where}: {_text(rotation)} is no rotation matrix (determinant {np.linalg.det(rotation):.3g}, "
+            f"R R^T differs from 1 by {deviation:.3g}); calibrate it again or export it with more digits"
+        )
+    if len(entry.distortion) not in (4, 5):
+        raise InputError(
+            f"{where}: it has {len(entry.distortion)} distortion coefficients; give k1 k2 p1 p2 [k3]"
+        )
+
+
+def _camera_from_world(entry: CameraEntry) -> Float[np.ndarray, "4 4"]:
+    u, _, vt = np.linalg.svd(entry.rotation)
+    transform = np.eye(4)
+    transform[:3, :3] = u @ vt
+    transform[:3, 3] = entry.translation
+    return transform
+
+
+def _five_coefficients(entry: CameraEntry) -> Float[np.ndarray, "5"]:
+    return np.pad(entry.distortion, (0, 5 - len(entry.distortion)))
+
+
+def _text(values: np.ndarray) -> str:
+    return str([float(f"{value:.6g}") for value in values.ravel()])

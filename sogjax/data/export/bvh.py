@@ -1,0 +1,227 @@
+"""BVH, the hierarchy and channels that Blender and most animation programs read.
+
+Y is up, +Z is where a body in its rest pose looks, lengths are metres unless asked otherwise, angles degrees.
+"""
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import takewhile
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial.transform import Rotation
+
+from sogjax.data.atomic import atomic_path
+from sogjax.data.motion import Motion
+from sogjax.errors import InputError
+from sogjax.model.frames import world_from_upright
+
+PER_METRE = {"m": 1.0, "cm": 100.0}
+"""The units of length that a BVH file may be written in; the file itself does not say which."""
+
+_SAME_PLACE = 1e-5
+"""Metres within which joints share their origin."""
+_CONSTANT = 1e-4
+"""Metres within which an offset counts as constant."""
+_SHORTEST_END = 0.01
+_DEFAULT_END = 0.05
+
+
+@dataclass
+class _Bone:
+    """A BVH joint: a chain of one-axis joints of one origin, in BVH's axes, relative to the parent bone."""
+
+    name: str
+    is_root: bool
+    positions: Float[np.ndarray, "frame 3"]
+    angles: Float[np.ndarray, "frame 3"]
+    """Degrees about Z, X, Y, each turned by the ones before it."""
+    end: Float[np.ndarray, "3"]
+    """Where the bone ends, if it has no children."""
+    children: list["_Bone"] = field(default_factory=list)
+
+    @property
+    def moves(self) -> bool:
+        """Whether it needs position channels."""
+        return self.is_root or bool(np.ptp(self.positions, axis=0).max() > _CONSTANT)
+
+    @property
+    def offset(self) -> Float[np.ndarray, "3"]:
+        return np.zeros(3) if self.is_root else np.median(self.positions, axis=0)
+
+
+def write_bvh(path: Path, motion: Motion, up: str = "z", unit: str = "m") -> None:
+    """Write `motion`, whose world has the vertical `up`, as BVH with Y up; lengths in `unit` (`m`, `cm`).
+
+    One-axis joints that share their origin become one BVH joint with three rotation channels. The root, and
+    joints that slide, have position channels too.
+
+    Raises:
+        InputError: no frames, unevenly spaced frames, or a path that cannot be written.
+        ValueError: no such unit.
+    """
+    if unit not in PER_METRE:
+        raise ValueError(f"no unit {unit!r}; use one of {', '.join(PER_METRE)}")
+    seconds = _frame_time(path, motion)
+    root = _root_bone(motion, up, PER_METRE[unit])
+    bones = list(_depth_first(root))
+    channels = [
+        np.concatenate([bone.positions, bone.angles], 1) if bone.moves else bone.angles for bone in bones
+    ]
+    lines = [
+        "HIERARCHY",
+        *_hierarchy(root),
+        "MOTION",
+        f"Frames: {motion.num_frames}",
+        f"Frame Time: {seconds:.9f}",
+    ]
+    lines += [_numbers(row) for row in np.concatenate(channels, axis=1)]
+    with atomic_path(path) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _frame_time(path: Path, motion: Motion) -> float:
+    steps = np.unique(np.diff(motion.frame))
+    if motion.num_frames == 0:
+        raise InputError(f"{path}: the motion has no frames; export one that has")
+    if len(steps) > 1:
+        raise InputError(
+            f"{path}: BVH needs evenly spaced frames, but the motion's lie {steps[0]} to {steps[-1]} apart; "
+            "track it without gaps"
+        )
+    return float(steps[0] if len(steps) else 1) / motion.fps
+
+
+def _root_bone(motion: Motion, up: str, scale: float) -> _Bone:
+    """The tree of bones, with lengths times `scale`."""
+    turn = world_from_upright("y") @ world_from_upright(up).T
+    transforms = motion.world_from_joint.astype(float)
+    rotations = turn @ transforms[..., :3, :3] @ turn.T
+    positions = transforms[..., :3, 3] @ turn.T
+    blobs = motion.blob_means.astype(float) @ turn.T
+    chains = _chains(motion)
+    names = _unique_names([[str(motion.joint_names[j]) for j in chain] for chain in chains])
+    chain_of = {joint: k for k, chain in enumerate(chains) for joint in chain}
+    bones: list[_Bone] = []
+    for chain, name in zip(chains, names, strict=True):
+        last, above = chain[-1], int(motion.joint_parents[chain[0]])
+        position, rotation = positions[:, last], rotations[:, last]
+        attached = blobs[0, np.isin(motion.blob_joint, chain)] - position[0]
+        if above >= 0:
+            to_parent = np.swapaxes(rotations[:, above], -1, -2)
+            position = np.einsum("tij,tj->ti", to_parent, position - positions[:, above])
+            rotation = to_parent @ rotation
+        bone = _Bone(
+            name=name,
+            is_root=above < 0,
+            positions=position * scale,
+            angles=_euler_angles(rotation),
+            end=_end(attached @ rotations[0, last], position[0]) * scale,
+        )
+        bones.append(bone)
+        if above >= 0:
+            bones[chain_of[above]].children.append(bone)
+    roots = [bone for bone in bones if bone.is_root]
+    return roots[0] if len(roots) == 1 else _common_root(roots)
+
+
+def _chains(motion: Motion) -> list[list[int]]:
+    """The joints that make one bone each, parents first.
+
+    A joint continues its parent's chain if it is the only child and does not leave the origin; also, in the
+    chain of the root, if it slides.
+    """
+    parents = motion.joint_parents
+    origins = motion.world_from_joint[..., :3, 3]
+    num_children = np.bincount(parents[parents >= 0], minlength=len(parents))
+    chains: list[list[int]] = []
+    chain_of: dict[int, list[int]] = {}
+    for joint, parent in enumerate(parents.tolist()):
+        continues = False
+        if parent >= 0 and num_children[parent] == 1:
+            apart = np.linalg.norm(origins[:, joint] - origins[:, parent], axis=-1).max()
+            at_root = parents[chain_of[parent][0]] < 0
+            continues = apart < _SAME_PLACE or bool(at_root and _slides(motion, joint))
+        if continues:
+            chain_of[joint] = chain_of[parent]
+            chain_of[joint].append(joint)
+        else:
+            chain_of[joint] = [joint]
+            chains.append(chain_of[joint])
+    return chains
+
+
+def _slides(motion: Motion, joint: int) -> bool:
+    """Whether the offset of a joint from its parent changes."""
+    parent = motion.world_from_joint[:, motion.joint_parents[joint]]
+    apart = motion.world_from_joint[:, joint, :3, 3] - parent[:, :3, 3]
+    offset = np.einsum("tji,tj->ti", parent[:, :3, :3], apart)
+    return bool(np.ptp(offset, axis=0).max() > _CONSTANT)
+
+
+def _euler_angles(rotation: Float[np.ndarray, "frame 3 3"]) -> Float[np.ndarray, "frame 3"]:
+    """Degrees about Z, X, Y without jumps of a turn."""
+    with warnings.catch_warnings():
+        warnings.simplefilter(
+            "ignore", UserWarning
+        )  # at X = 90 degrees scipy says that it chooses one of many
+        angles = Rotation.from_matrix(rotation).as_euler("ZXY", degrees=True)
+    return np.unwrap(angles, axis=0, period=360.0)
+
+
+def _end(attached: Float[np.ndarray, "blob 3"], offset: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+    """The farthest blob of a bone, or a short continuation of its parent."""
+    if len(attached):
+        farthest = attached[np.linalg.norm(attached, axis=-1).argmax()]
+        if np.linalg.norm(farthest) > _SHORTEST_END:
+            return farthest
+    length = np.linalg.norm(offset)
+    return _DEFAULT_END * (offset / length if length > _SHORTEST_END else np.array([0.0, 1.0, 0.0]))
+
+
+def _common_root(roots: list[_Bone]) -> _Bone:
+    """A still bone at the origin that holds several roots."""
+    still = np.zeros_like(roots[0].positions)
+    for root in roots:
+        root.is_root = False
+    return _Bone("world", True, still, still, np.zeros(3), roots)
+
+
+def _unique_names(chains: list[list[str]]) -> list[str]:
+    """For every chain the words with which all its joints' names begin, else its last joint's name."""
+    names: list[str] = []
+    for chain in chains:
+        columns = zip(*(name.split("_") for name in chain), strict=False)
+        words = [column[0] for column in takewhile(lambda column: len(set(column)) == 1, columns)]
+        name = "_".join("_".join(words or [chain[-1]]).split())
+        if name in names:
+            name = "_".join(chain[-1].split())
+        while name in names:
+            name += "_"
+        names.append(name)
+    return names
+
+
+def _depth_first(bone: _Bone) -> Iterator[_Bone]:
+    yield bone
+    for child in bone.children:
+        yield from _depth_first(child)
+
+
+def _hierarchy(bone: _Bone) -> list[str]:
+    """The lines that define a bone and what hangs from it."""
+    channels = ["Xposition", "Yposition", "Zposition"] if bone.moves else []
+    channels += ["Zrotation", "Xrotation", "Yrotation"]
+    inner = [f"OFFSET {_numbers(bone.offset)}", f"CHANNELS {len(channels)} {' '.join(channels)}"]
+    for child in bone.children:
+        inner += _hierarchy(child)
+    if not bone.children:
+        inner += ["End Site", "{", f"  OFFSET {_numbers(bone.end)}", "}"]
+    kind = "ROOT" if bone.is_root else "JOINT"
+    return [f"{kind} {bone.name}", "{", *("  " + line for line in inner), "}"]
+
+
+def _numbers(values: Float[np.ndarray, "n"]) -> str:
+    return " ".join(f"{value:.6f}" for value in values)

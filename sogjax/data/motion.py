@@ -1,0 +1,192 @@
+"""Motion: what tracking finds, one pose a frame and all that follows from it."""
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int, Shaped
+
+from sogjax.data.atomic import atomic_path
+from sogjax.data.npz_file import (
+    bool_array,
+    finite_array,
+    float_array,
+    int_array,
+    number,
+    read_npz,
+    text_array,
+)
+from sogjax.errors import InputError
+from sogjax.model.body import Body
+
+FORMAT_VERSION = 1
+
+
+@dataclass
+class Motion:
+    """The motion of one actor: poses, joints and blobs by frame; metres, radians, seconds, world frame."""
+
+    fps: float
+    frame: Int[np.ndarray, "frame"]
+    """Frames of the recording, increasing."""
+    time: Float[np.ndarray, "frame"]
+    """Seconds since frame 0 of the recording."""
+    pose: Float[np.ndarray, "frame dof"]
+    dof_names: Shaped[np.ndarray, "dof"]
+    joint_params: Float[np.ndarray, "frame joint_param"]
+    joint_param_names: Shaped[np.ndarray, "joint_param"]
+    joint_names: Shaped[np.ndarray, "joint"]
+    joint_parents: Int[np.ndarray, "joint"]
+    """-1 for a root; parents come before their children."""
+    world_from_joint: Float[np.ndarray, "frame joint 4 4"]
+    blob_means: Float[np.ndarray, "frame blob 3"]
+    blob_joint: Int[np.ndarray, "blob"]
+    blob_sigma: Float[np.ndarray, "blob"]
+    similarity: Float[np.ndarray, "frame"]
+    """NaN where it was not computed, as in `energy`."""
+    energy: Float[np.ndarray, "frame"]
+    iterations: Int[np.ndarray, "frame"]
+    converged: Bool[np.ndarray, "frame"]
+
+    @property
+    def num_frames(self) -> int:
+        """Number of frames."""
+        return len(self.frame)
+
+
+def motion_from_poses(
+    body: Body,
+    poses: Float[np.ndarray | Array, "frame dof"],
+    fps: float,
+    *,
+    frame: Int[np.ndarray, "frame"] | None = None,
+    similarity: Float[np.ndarray, "frame"] | None = None,
+    energy: Float[np.ndarray, "frame"] | None = None,
+    iterations: Int[np.ndarray, "frame"] | None = None,
+    converged: Bool[np.ndarray, "frame"] | None = None,
+) -> Motion:
+    """The motion of `body` through `poses`.
+
+    `frame` counts from 0 where it is not given; without a solver's account `similarity` and `energy` are NaN,
+    `iterations` 0 and `converged` true.
+    """
+    skeleton = body.skeleton
+    poses = jnp.asarray(poses, skeleton.offsets.dtype)
+    count = poses.shape[0]
+    frame = np.arange(count) if frame is None else frame
+    joint_params, world_from_joint, blob_means = _forward(body, poses)
+    unknown = np.full(count, np.nan)
+    return Motion(
+        fps=float(fps),
+        frame=frame,
+        time=frame / float(fps),
+        pose=np.asarray(poses),
+        dof_names=np.array(skeleton.dof_names, str),
+        joint_params=np.asarray(joint_params),
+        joint_param_names=np.array(skeleton.names, str),
+        joint_names=np.array(skeleton.names, str),
+        joint_parents=np.array(skeleton.parents, int),
+        world_from_joint=np.asarray(world_from_joint),
+        blob_means=np.asarray(blob_means),
+        blob_joint=np.array(body.blobs.joints, int),
+        blob_sigma=np.asarray(body.blob_sigmas),
+        similarity=unknown if similarity is None else similarity,
+        energy=unknown if energy is None else energy,
+        iterations=np.zeros(count, int) if iterations is None else iterations,
+        converged=np.ones(count, bool) if converged is None else converged,
+    )
+
+
+def save_motion(path: Path, motion: Motion) -> None:
+    """Write `motion.npz`."""
+    arrays = {entry.name: np.asarray(getattr(motion, entry.name)) for entry in fields(motion)}
+    arrays["format_version"] = np.array(FORMAT_VERSION)
+    with atomic_path(path) as temporary, temporary.open("wb") as file:
+        np.savez_compressed(file, **arrays)  # pyright: ignore[reportArgumentType]
+
+
+def load_motion(path: Path) -> Motion:
+    """Read `motion.npz`.
+
+    Raises:
+        InputError: no such file, no npz, another version, or an array missing, misshapen or not finite.
+    """
+    arrays = read_npz(path)
+    version = number(path, arrays, "format_version")
+    if version != FORMAT_VERSION:
+        raise InputError(f"{path}: has the format version {version:g}, not {FORMAT_VERSION}; track again")
+    fps = number(path, arrays, "fps")
+    if not 0 < fps < np.inf:
+        raise InputError(f"{path}: 'fps' is {fps}, not positive; correct it")
+    frame = int_array(path, arrays, "frame", (None,))
+    dof_names = text_array(path, arrays, "dof_names", (None,))
+    param_names = text_array(path, arrays, "joint_param_names", (None,))
+    joint_names = text_array(path, arrays, "joint_names", (None,))
+    blob_sigma = finite_array(path, arrays, "blob_sigma", (None,))
+    frames, joints, blobs = len(frame), len(joint_names), len(blob_sigma)
+    motion = Motion(
+        fps=fps,
+        frame=frame,
+        time=finite_array(path, arrays, "time", (frames,)),
+        pose=finite_array(path, arrays, "pose", (frames, len(dof_names))),
+        dof_names=dof_names,
+        joint_params=finite_array(path, arrays, "joint_params", (frames, len(param_names))),
+        joint_param_names=param_names,
+        joint_names=joint_names,
+        joint_parents=int_array(path, arrays, "joint_parents", (joints,)),
+        world_from_joint=finite_array(path, arrays, "world_from_joint", (frames, joints, 4, 4)),
+        blob_means=finite_array(path, arrays, "blob_means", (frames, blobs, 3)),
+        blob_joint=int_array(path, arrays, "blob_joint", (blobs,)),
+        blob_sigma=blob_sigma,
+        similarity=float_array(path, arrays, "similarity", (frames,)),
+        energy=float_array(path, arrays, "energy", (frames,)),
+        iterations=int_array(path, arrays, "iterations", (frames,)),
+        converged=bool_array(path, arrays, "converged", (frames,)),
+    )
+    _check(path, motion)
+    return motion
+
+
+@eqx.filter_jit
+def _forward(
+    body: Body, poses: Float[Array, "frame dof"]
+) -> tuple[Float[Array, "frame joint"], Float[Array, "frame joint 4 4"], Float[Array, "frame blob 3"]]:
+    skeleton = body.skeleton
+
+    def one(pose: Float[Array, "dof"]):
+        world_from_joint = skeleton.world_from_joint(pose)
+        return skeleton.joint_params(pose), world_from_joint, body.blobs.points_world(world_from_joint)
+
+    return jax.vmap(one)(poses)
+
+
+def _check(path: Path, motion: Motion) -> None:
+    """Refuse indices that point nowhere, and what is no succession of rigid frames."""
+    joints = np.arange(len(motion.joint_names))
+    wrong = (motion.joint_parents < -1) | (motion.joint_parents >= joints)
+    if wrong.any():
+        joint, parent = motion.joint_names[wrong][0], motion.joint_parents[wrong][0]
+        raise InputError(
+            f"{path}: 'joint_parents' gives {joint!s} the parent {parent}; parents come before their children"
+        )
+    wrong = (motion.blob_joint < 0) | (motion.blob_joint >= len(joints))
+    if wrong.any():
+        raise InputError(
+            f"{path}: 'blob_joint' holds {motion.blob_joint[wrong][0]}, which is no joint; correct it"
+        )
+    if (np.diff(motion.frame) <= 0).any():
+        raise InputError(
+            f"{path}: 'frame' does not increase ({motion.frame[:5].tolist()} ...); sort the frames"
+        )
+    for key in ("similarity", "energy"):
+        if np.isinf(getattr(motion, key)).any():
+            raise InputError(f"{path}: {key!r} is infinite somewhere; write NaN where it is not known")
+    rotation = motion.world_from_joint[..., :3, :3]
+    deviation = np.abs(rotation @ np.swapaxes(rotation, -1, -2) - np.eye(3)).max(initial=0.0)
+    if deviation > 1e-3:
+        raise InputError(
+            f"{path}: 'world_from_joint' holds no rotations (they are off by {deviation:.3g}); track again"
+        )

@@ -1,0 +1,104 @@
+"""Reading npz files that come from elsewhere: no pickles, bounded, one sentence where a key is wrong."""
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float, Int, Shaped
+
+from sogjax.errors import InputError
+
+MAX_BYTES = 4 * 2**30
+"""Bytes that the arrays of one file may take in memory."""
+
+
+def read_npz(path: Path) -> dict[str, np.ndarray]:
+    """All arrays of an npz file.
+
+    Raises:
+        InputError: no such file, no npz, pickled objects inside, or more than `MAX_BYTES`.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file; correct the path")
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(member.file_size for member in archive.infolist())
+        if size > MAX_BYTES:
+            raise InputError(
+                f"{path}: holds {size} bytes of arrays, more than {MAX_BYTES}; cut it into parts"
+            )
+        with np.load(path, allow_pickle=False) as arrays:
+            return {key: arrays[key] for key in arrays.files}
+    except InputError:
+        raise
+    except (OSError, ValueError, zipfile.BadZipFile, EOFError, KeyError, MemoryError, RuntimeError) as error:
+        raise InputError(
+            f"{path}: is not readable as npz without pickles ({error}); write it anew"
+        ) from error
+
+
+def float_array(
+    path: Path, arrays: dict[str, np.ndarray], key: str, shape: tuple[int | None, ...]
+) -> Float[np.ndarray, "..."]:
+    """The numbers `key`, of `shape` (None: any length), as floats; NaN and infinity pass."""
+    values = _array(path, arrays, key, shape, "iuf", "numbers")
+    return values if values.dtype.kind == "f" else values.astype(float)
+
+
+def finite_array(
+    path: Path, arrays: dict[str, np.ndarray], key: str, shape: tuple[int | None, ...]
+) -> Float[np.ndarray, "..."]:
+    """The finite numbers `key`, of `shape`, as floats."""
+    values = float_array(path, arrays, key, shape)
+    if not np.isfinite(values).all():
+        where = tuple(int(i) for i in np.argwhere(~np.isfinite(values))[0])
+        raise InputError(f"{path}: {key!r} is {values[where]} at {where}, not a finite number; correct it")
+    return values
+
+
+def int_array(
+    path: Path, arrays: dict[str, np.ndarray], key: str, shape: tuple[int | None, ...]
+) -> Int[np.ndarray, "..."]:
+    """The whole numbers `key`, of `shape`."""
+    return _array(path, arrays, key, shape, "iu", "whole numbers").astype(np.int64)
+
+
+def bool_array(
+    path: Path, arrays: dict[str, np.ndarray], key: str, shape: tuple[int | None, ...]
+) -> Bool[np.ndarray, "..."]:
+    """The truth values `key`, of `shape`."""
+    return _array(path, arrays, key, shape, "b", "true or false")
+
+
+def text_array(
+    path: Path, arrays: dict[str, np.ndarray], key: str, shape: tuple[int | None, ...]
+) -> Shaped[np.ndarray, "..."]:
+    """The texts `key`, of `shape`."""
+    if arrays.get(key, np.zeros(0)).size == 0 and 0 in shape:
+        return np.empty(0, "U1")
+    return _array(path, arrays, key, shape, "U", "text")
+
+
+def number(path: Path, arrays: dict[str, np.ndarray], key: str) -> float:
+    """The single number `key`."""
+    return float(_array(path, arrays, key, (), "iuf", "a number"))
+
+
+def _array(
+    path: Path,
+    arrays: dict[str, np.ndarray],
+    key: str,
+    shape: tuple[int | None, ...],
+    kinds: str,
+    what: str,
+) -> np.ndarray:
+    if key not in arrays:
+        raise InputError(f"{path}: has no array {key!r}; add it (there are: {', '.join(sorted(arrays))})")
+    values = arrays[key]
+    if values.dtype.kind not in kinds:
+        raise InputError(f"{path}: {key!r} is of type {values.dtype}; it should hold {what}")
+    fits = values.ndim == len(shape) and all(n in (None, m) for n, m in zip(shape, values.shape, strict=True))
+    if not fits:
+        wanted = ", ".join("any" if n is None else str(n) for n in shape)
+        raise InputError(f"{path}: {key!r} has the shape {values.shape}; it should be ({wanted})")
+    return values

@@ -1,0 +1,113 @@
+"""What `recording.yaml` says of a recording; every key is optional."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from sogjax.data.calibration.rig import METRES_PER_UNIT
+from sogjax.data.initial_pose import InitialPose, parse_initial_pose
+from sogjax.data.yaml_entry import Entry, read_entry
+from sogjax.model.frames import UP_AXES
+
+_KEYS = (
+    "fps",
+    "calibration",
+    "unit",
+    "up",
+    "cameras",
+    "frame_offset",
+    "first_frame",
+    "last_frame",
+    "example_poses",
+)
+
+
+@dataclass(frozen=True)
+class ExampleSettings:
+    """An entry of `example_poses`."""
+
+    name: str
+    actor: str | None = None
+    initial_pose: InitialPose | None = None
+
+
+@dataclass(frozen=True)
+class RecordingSettings:
+    """The content of `recording.yaml`; None where a key is absent."""
+
+    fps: float | None = None
+    calibration: str | None = None
+    unit: str | None = None
+    up: str | None = None
+    cameras: tuple[str, ...] | None = None
+    frame_offset: dict[str, int] = field(default_factory=dict)
+    first_frame: int | None = None
+    last_frame: int | None = None
+    example_poses: tuple[ExampleSettings, ...] | None = None
+
+
+def read_recording_settings(path: Path) -> RecordingSettings:
+    """Read `recording.yaml`; a file that is not there is as good as an empty one.
+
+    Raises:
+        InputError: no YAML, an unknown key, or a value of the wrong kind.
+    """
+    entry = read_entry(path) if path.exists() else Entry(path, "", None)
+    entries = {} if entry.value is None else entry.fields((), _KEYS)
+    given = {key: value for key, value in entries.items() if value.value is not None}
+    return RecordingSettings(
+        fps=_positive(given["fps"]) if "fps" in given else None,
+        calibration=given["calibration"].text() if "calibration" in given else None,
+        unit=given["unit"].choice(METRES_PER_UNIT, "a unit of length") if "unit" in given else None,
+        up=given["up"].choice(UP_AXES, "an axis") if "up" in given else None,
+        cameras=_camera_names(given["cameras"]) if "cameras" in given else None,
+        frame_offset=_offsets(given["frame_offset"]) if "frame_offset" in given else {},
+        first_frame=_whole(given["first_frame"]) if "first_frame" in given else None,
+        last_frame=_whole(given["last_frame"]) if "last_frame" in given else None,
+        example_poses=_examples(given["example_poses"]) if "example_poses" in given else None,
+    )
+
+
+def _positive(entry: Entry) -> float:
+    expected = "a positive number of frames per second"
+    result = entry.number(expected)
+    if result <= 0:
+        raise entry.error(expected)
+    return result
+
+
+def _whole(entry: Entry) -> int:
+    if isinstance(entry.value, bool) or not isinstance(entry.value, int):
+        raise entry.error("a whole number of frames")
+    return entry.value
+
+
+def _camera_names(entry: Entry) -> tuple[str, ...]:
+    names = tuple(item.text() for item in entry.items())
+    if not names or len(set(names)) < len(names):
+        raise entry.error("the names of at least one camera, each once")
+    return names
+
+
+def _offsets(entry: Entry) -> dict[str, int]:
+    return {camera: _whole(offset) for camera, offset in entry.mapping().items()}
+
+
+def _examples(entry: Entry) -> tuple[ExampleSettings, ...]:
+    examples = tuple(_example(item) for item in entry.items())
+    for example, item in zip(examples, entry.items(), strict=True):
+        if [other.name for other in examples].count(example.name) > 1:
+            raise item.fields(("name",), ("actor", "initial_pose"))["name"].error("each folder once")
+    return examples
+
+
+def _example(entry: Entry) -> ExampleSettings:
+    fields = entry.fields(("name",), ("actor", "initial_pose"))
+    given = {key: value for key, value in fields.items() if value.value is not None}
+    name = fields["name"].text()
+    if Path(name).name != name:
+        raise fields["name"].error("the name of a folder in example_poses/")
+    return ExampleSettings(
+        name=name,
+        actor=given["actor"].text() if "actor" in given else None,
+        initial_pose=parse_initial_pose(given["initial_pose"]) if "initial_pose" in given else None,
+    )

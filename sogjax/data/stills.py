@@ -1,0 +1,125 @@
+"""The single images of a recording: empty scenes and example poses, matched to the cameras by name."""
+
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from sogjax.data.calibration import CameraRig
+from sogjax.data.image_file import IMAGE_SUFFIXES, read_image, read_mask
+from sogjax.data.initial_pose import InitialPose
+from sogjax.data.recording_settings import ExampleSettings
+from sogjax.errors import InputError
+
+_MASK_SUFFIX = ".mask.png"
+
+
+@dataclass(frozen=True)
+class ExamplePose:
+    """Images of a subject in a pose that shows its size and colours (Section 5.2)."""
+
+    name: str
+    actor: str | None
+    images: dict[str, Path]
+    """By camera."""
+    masks: dict[str, Path]
+    """By camera; white = subject. A camera may have none."""
+    initial_pose: InitialPose | None
+
+
+def find_background(folder: Path, rig: CameraRig, calibrated: Iterable[str]) -> dict[str, Path]:
+    """By camera of `rig` the image of the empty scene in `folder`, where there is one.
+
+    Raises:
+        InputError: an image of no calibrated camera, of another size, or one that does not open.
+    """
+    images = _by_camera(folder, _files(folder, mask=False), set(calibrated))
+    images = {camera: images[camera] for camera in rig.names if camera in images}
+    _check_sizes(rig, images, {})
+    return images
+
+
+def find_example_poses(
+    folder: Path, rig: CameraRig, calibrated: Iterable[str], settings: tuple[ExampleSettings, ...] | None
+) -> tuple[ExamplePose, ...]:
+    """The example poses in `folder`: those that `settings` list, else one for every folder in it.
+
+    Raises:
+        InputError: a listed one is missing or empty, or an image or mask does not fit its camera.
+    """
+    if settings is None:
+        folders = sorted(path.name for path in folder.iterdir() if path.is_dir()) if folder.is_dir() else []
+        settings = tuple(ExampleSettings(name) for name in folders if not name.startswith("."))
+    known = set(calibrated)
+    return tuple(_example_pose(folder / entry.name, rig, known, entry) for entry in settings)
+
+
+def _example_pose(folder: Path, rig: CameraRig, calibrated: set[str], entry: ExampleSettings) -> ExamplePose:
+    if not folder.is_dir():
+        raise InputError(
+            f"{folder}: there is no such example pose; make the folder or correct recording.yaml"
+        )
+    images = _by_camera(folder, _files(folder, mask=False), calibrated)
+    masks = _by_camera(folder, _files(folder, mask=True), calibrated)
+    for camera, mask in masks.items():
+        if camera not in images:
+            raise InputError(f"{mask}: is a mask without its image; add {camera}.jpg or {camera}.png")
+    images = {camera: images[camera] for camera in rig.names if camera in images}
+    masks = {camera: masks[camera] for camera in rig.names if camera in masks}
+    if not images:
+        raise InputError(f"{folder}: holds no image of any camera; put CAMERA.jpg files there or remove it")
+    _check_sizes(rig, images, masks)
+    return ExamplePose(entry.name, entry.actor, images, masks, entry.initial_pose)
+
+
+def _files(folder: Path, mask: bool) -> list[Path]:
+    if not folder.is_dir():
+        return []
+    files = sorted(path for path in folder.iterdir() if not path.name.startswith("."))
+    is_mask = lambda path: path.name.endswith(_MASK_SUFFIX)
+    return [path for path in files if path.suffix.lower() in IMAGE_SUFFIXES and is_mask(path) == mask]
+
+
+def _by_camera(folder: Path, files: list[Path], calibrated: set[str]) -> dict[str, Path]:
+    found: dict[str, Path] = {}
+    for path in files:
+        camera = path.name.removesuffix(_MASK_SUFFIX).removesuffix(path.suffix)
+        if camera not in calibrated:
+            raise InputError(
+                f"{path}: there is no camera {camera!r} in the calibration, which has: "
+                f"{', '.join(sorted(calibrated))}; rename or remove the image"
+            )
+        if camera in found:
+            raise InputError(f"{folder}: holds both {found[camera].name} and {path.name}; remove one")
+        found[camera] = path
+    return found
+
+
+def _check_sizes(rig: CameraRig, images: dict[str, Path], masks: dict[str, Path]) -> None:
+    with ThreadPoolExecutor() as pool:
+        image_shapes = list(pool.map(lambda path: read_image(path).shape, images.values()))
+        mask_shapes = list(pool.map(lambda path: read_mask(path).shape, masks.values()))
+    for (camera, path), (height, width, _) in zip(images.items(), image_shapes, strict=True):
+        check_size(path, (width, height), rig, camera)
+    for (camera, path), (height, width) in zip(masks.items(), mask_shapes, strict=True):
+        if (width, height) != rig.image_size(camera):
+            wanted = "{}x{}".format(*rig.image_size(camera))
+            raise InputError(f"{path}: the mask is {width}x{height}, its image {wanted}; make them equal")
+
+
+def check_size(path: Path, size: tuple[int, int], rig: CameraRig, camera: str) -> None:
+    """Hold the (width, height) of images against the calibration.
+
+    Raises:
+        InputError: they differ.
+    """
+    width, height = calibrated = rig.image_size(camera)
+    if size == calibrated:
+        return
+    remedy = "calibrate the size that was recorded, or convert the images to the calibrated size"
+    if size == (height, width):
+        remedy = "turn the images by 90 degrees, or calibrate them as they stand"
+    raise InputError(
+        f"{path}: its images are {size[0]}x{size[1]}, but the calibration of {camera!r} is for "
+        f"{width}x{height}; {remedy}"
+    )

@@ -1,0 +1,141 @@
+"""The images of a recording, time step by time step, and writing videos."""
+
+import os
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+
+import cv2
+import numpy as np
+from jaxtyping import UInt8
+
+from sogjax.data.atomic import atomic_path
+from sogjax.data.image_file import read_image, read_mask
+from sogjax.data.recording import Recording
+from sogjax.data.source import Source, open_source
+from sogjax.errors import InputError
+
+__all__ = ["VideoWriter", "read_frames", "read_image", "read_mask"]
+
+
+def read_frames(recording: Recording, start: int = 0, stop: int | None = None) -> Iterator[list[np.ndarray]]:
+    """The images of each time step, BGR, in the order of the rig's cameras.
+
+    `start` and `stop` count from the recording's first frame. Threads decode the cameras, one time step
+    ahead of the consumer; when the consumer stops, all files are closed.
+
+    Raises:
+        InputError: a video ends early or changes its size.
+    """
+    stop = recording.num_frames if stop is None else min(stop, recording.num_frames)
+    if not 0 <= start <= stop:
+        raise ValueError(f"frames {start} to {stop} are not in a recording of {recording.num_frames} frames")
+    return _decoded_ahead(recording, start, stop)
+
+
+def _decoded_ahead(recording: Recording, start: int, stop: int) -> Iterator[list[np.ndarray]]:
+    if start == stop:
+        return
+    cores = os.cpu_count() or 1
+    cameras = recording.rig.names
+    threads = max(1, cores // len(cameras))
+    with ExitStack() as stack:
+        pool = stack.enter_context(ThreadPoolExecutor(min(len(cameras), cores)))
+        opened = [
+            pool.submit(
+                open_source,
+                recording.sources[camera],
+                recording.first_frame + start + recording.frame_offset[camera],
+                threads,
+            )
+            for camera in cameras
+        ]
+        stack.callback(_close_all, opened)
+        sources = [future.result() for future in opened]
+        upcoming = [pool.submit(source.read) for source in sources]
+        stack.callback(lambda: wait(upcoming))
+        for frame in range(start, stop):
+            images = [future.result() for future in upcoming]
+            if frame + 1 < stop:
+                upcoming[:] = [pool.submit(source.read) for source in sources]
+            yield [
+                _checked(recording, camera, image, frame)
+                for camera, image in zip(cameras, images, strict=True)
+            ]
+
+
+def _close_all(opened: list[Future[Source]]) -> None:
+    wait(opened)
+    for future in opened:
+        if future.exception() is None:
+            future.result().close()
+
+
+def _checked(recording: Recording, camera: str, image: np.ndarray | None, frame: int) -> np.ndarray:
+    source, number = recording.sources[camera], recording.first_frame + frame
+    if image is None:
+        raise InputError(
+            f"{source}: ends before frame {number}, though its header promises more; "
+            f"set `last_frame: {number - 1}` in recording.yaml, or convert the video again"
+        )
+    size = (image.shape[1], image.shape[0])
+    if size != recording.rig.image_size(camera):
+        raise InputError(
+            f"{source}: its frame {number} is {size[0]}x{size[1]}, unlike the first; convert it again"
+        )
+    return image
+
+
+class VideoWriter:
+    """Writes an mp4 (codec mp4v), within a `with` block; it gets its name only when it is whole.
+
+    The codec stores even sizes only: the last row or column of an odd image is left out.
+    """
+
+    def __init__(self, path: Path, fps: float):
+        if path.suffix.lower() != ".mp4":
+            raise InputError(f"{path}: videos are written as .mp4 only; change the ending")
+        self._path, self._fps = path, fps
+        self._stack = ExitStack()
+        self._writer: cv2.VideoWriter | None = None
+        self._shape: tuple[int, ...] | None = None
+
+    def __enter__(self) -> "VideoWriter":
+        self._temporary = self._stack.enter_context(atomic_path(self._path))
+        return self
+
+    def write(self, image: UInt8[np.ndarray, "height width 3"]) -> None:
+        """Append an image (BGR); all are of one size."""
+        writer = self._writer = self._writer or self._open(image)
+        self._shape = self._shape or image.shape
+        if image.shape != self._shape:
+            raise ValueError(f"{self._path}: an image of shape {image.shape} after one of {self._shape}")
+        writer.write(np.ascontiguousarray(image))
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Finish the file, or remove it after an error or where no image was written."""
+        if self._writer is not None:
+            self._writer.release()
+        elif error is None:
+            error = ValueError(f"{self._path}: no image was written")
+            self._stack.__exit__(ValueError, error, None)
+            raise error
+        self._stack.__exit__(kind, error, traceback)
+
+    def _open(self, image: UInt8[np.ndarray, "height width 3"]) -> cv2.VideoWriter:
+        height, width = image.shape[:2]
+        writer = cv2.VideoWriter(
+            str(self._temporary), cv2.VideoWriter.fourcc(*"mp4v"), self._fps, (width, height)
+        )
+        if not writer.isOpened():
+            raise InputError(
+                f"{self._path}: a video of {width}x{height} at {self._fps:g} fps cannot be written"
+            )
+        return writer

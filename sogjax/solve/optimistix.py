@@ -1,0 +1,76 @@
+"""Optimistix's minimisers behind the interface of the ascent: BFGS, L-BFGS and nonlinear conjugate gradients."""
+
+from collections.abc import Callable
+from typing import Literal
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import optimistix as optx
+from jaxtyping import Array, Float
+
+from sogjax.solve.solution import Objective, Params, Scales, Solution
+
+Method = Literal["bfgs", "lbfgs", "nonlinear_cg"]
+
+_MINIMISERS: dict[str, Callable] = {
+    "bfgs": optx.BFGS,
+    "lbfgs": optx.LBFGS,
+    "nonlinear_cg": optx.NonlinearCG,
+}
+
+
+class OptimistixSolver(eqx.Module):
+    """One of optimistix's minimisers, with a line search of its own.
+
+    The parameters are measured in `Scales.first_steps`, so that one unit means the same for angles and translations,
+    and the objective in its change over the first step along its gradient, which makes the tolerances
+    (`epsilon` on steps, in radians and metres) and the first step those of the ascent.
+    """
+
+    method: Method = eqx.field(static=True, default="bfgs")
+    epsilon: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=0.002)
+    max_iterations: int = eqx.field(static=True, default=200)
+
+    def maximize(self, objective: Objective, start: Params, scales: Scales) -> Solution:
+        """Minimise the negative objective from `start`; line-search steps count as iterations."""
+        with_gradient = jax.value_and_grad(objective)
+        first_value, gradient = with_gradient(start)
+        units = scales.first_steps[scales.kinds]
+        largest = jnp.max(jnp.abs(gradient * units))
+        gain = jnp.where(largest > 0.0, largest, 1.0)
+        cost = _linearizable(lambda z: (first_value - objective(start + z * units)) / gain)
+        tolerance = self.epsilon / jnp.max(units)
+        solver = optx.BestSoFarMinimiser(_MINIMISERS[self.method](rtol=0.0, atol=tolerance))
+        result = optx.minimise(
+            lambda z, _: cost(z), solver, jnp.zeros_like(start), max_steps=self.max_iterations, throw=False
+        )
+        params = start + result.value * units
+        value = objective(params)
+        usable = jnp.isfinite(value) & (value >= first_value)
+        steps = jnp.asarray(result.stats["num_steps"])
+        return Solution(
+            params=jnp.where(usable, params, start),
+            value=jnp.where(usable, value, first_value),
+            iterations=steps,
+            evaluations=steps + 2,
+            converged=(result.result == optx.RESULTS.successful) & usable,
+        )
+
+
+def _linearizable(function: Callable[[Params], Float[Array, ""]]) -> Callable[[Params], Float[Array, ""]]:
+    """The same function with a forward derivative made of its reverse-mode gradient.
+
+    Optimistix calls `jax.linearize`, which refuses functions with a `custom_vjp` such as the overlap.
+    """
+
+    @jax.custom_jvp
+    def wrapped(z: Params) -> Float[Array, ""]:
+        return function(z)
+
+    @wrapped.defjvp
+    def _(primals, tangents):
+        value, gradient = jax.value_and_grad(function)(*primals)
+        return value, jnp.sum(gradient * tangents[0])
+
+    return wrapped

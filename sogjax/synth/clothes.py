@@ -1,0 +1,150 @@
+"""Clothes, skin and hair: colours and patterns as functions of the surface in the bind pose."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from sogjax.synth.anatomy import INDEX, Anatomy
+from sogjax.synth.flesh import PARTS, bind_pose
+
+Colors = Float[np.ndarray, "n 3"]
+Rgb = tuple[float, float, float]
+
+_SKINS: tuple[Rgb, ...] = ((0.87, 0.68, 0.56), (0.78, 0.58, 0.45), (0.55, 0.38, 0.28), (0.93, 0.76, 0.66))
+_HAIR: tuple[Rgb, ...] = ((0.16, 0.11, 0.08), (0.38, 0.25, 0.14), (0.08, 0.07, 0.07), (0.62, 0.47, 0.28))
+_SHIRTS: tuple[tuple[Rgb, Rgb], ...] = (
+    ((0.62, 0.20, 0.20), (0.82, 0.76, 0.68)),
+    ((0.22, 0.36, 0.58), (0.80, 0.80, 0.78)),
+    ((0.78, 0.62, 0.26), (0.36, 0.25, 0.20)),
+    ((0.30, 0.48, 0.32), (0.72, 0.74, 0.58)),
+    ((0.52, 0.34, 0.54), (0.78, 0.70, 0.78)),
+)
+_TROUSERS: tuple[Rgb, ...] = ((0.20, 0.25, 0.36), (0.42, 0.38, 0.30), (0.22, 0.22, 0.23), (0.36, 0.40, 0.36))
+_SHOES: tuple[Rgb, ...] = ((0.80, 0.79, 0.77), (0.30, 0.20, 0.15), (0.15, 0.16, 0.19), (0.60, 0.25, 0.20))
+_PATTERNS = ("stripes", "plaid", "checks", "bars", "dots")
+_SLEEVES = (0.62, 0.75, 1.9)
+
+
+@dataclass(frozen=True)
+class Outfit:
+    """What one person wears; colours are sRGB in 0..1."""
+
+    skin: Rgb
+    hair: Rgb
+    shirt: tuple[Rgb, Rgb]
+    trousers: Rgb
+    shoes: Rgb
+    pattern: str
+    sleeve: float
+    """How far the sleeves reach: 0 shoulder, 1 elbow, 2 wrist."""
+
+
+def outfit_from_seed(rng: np.random.Generator, number: int) -> Outfit:
+    """Draw clothes; people of different `number` in one recording never wear the same shirt."""
+    pick = lambda items: items[int(rng.integers(len(items)))]
+    first = int(rng.integers(len(_SHIRTS)))
+    return Outfit(
+        skin=pick(_SKINS),
+        hair=pick(_HAIR),
+        shirt=_SHIRTS[(first + 2 * number) % len(_SHIRTS)],
+        trousers=pick(_TROUSERS),
+        shoes=pick(_SHOES),
+        pattern=pick(_PATTERNS),
+        sleeve=pick(_SLEEVES),
+    )
+
+
+@dataclass(frozen=True)
+class Wardrobe:
+    """An outfit fitted to a person: where each piece begins and ends on the surface of the bind pose."""
+
+    outfit: Outfit
+    anatomy: Anatomy
+    frames: Float[np.ndarray, "22 4 4"]
+
+    @classmethod
+    def fitted(cls, outfit: Outfit, anatomy: Anatomy) -> "Wardrobe":
+        """Fit the outfit to the person."""
+        return cls(outfit, anatomy, anatomy.world_from_joint(bind_pose(anatomy)))
+
+    def colors(self, part: Int[np.ndarray, "n"], rest: Float[np.ndarray, "n 3"]) -> Colors:
+        """SRGB colours of surface points, given their part (index into PARTS) and bind position (metres)."""
+        result = np.zeros((len(part), 3), np.float32)
+        for k, name in enumerate(PARTS):
+            chosen = part == k
+            if chosen.any():
+                paint = getattr(self, "_" + name.rpartition("_")[2])
+                result[chosen] = paint(rest[chosen], name)
+        return result
+
+    def _local(self, joint: str, rest: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+        frame = self.frames[INDEX[joint]].astype(rest.dtype)
+        return (rest - frame[:3, 3]) @ frame[:3, :3]
+
+    def _shirt(self, points: Float[np.ndarray, "n 3"]) -> Colors:
+        base, other = (np.array(color) for color in self.outfit.shirt)
+        return base + _pattern(self.outfit.pattern, points)[:, None] * (other - base)
+
+    def _torso(self, rest: Float[np.ndarray, "n 3"], _: str) -> Colors:
+        points = self._local("pelvis", rest)
+        colors = self._shirt(points)
+        belt = 0.055 * self.anatomy.stature / 1.75
+        colors[points[:, 2] < belt] = self.outfit.trousers
+        colors[np.abs(points[:, 2] - belt + 0.01) < 0.016] = 0.45 * np.array(self.outfit.trousers)
+        neck = self._local("neck", rest)
+        collar = np.hypot(neck[:, 0] - 0.02, neck[:, 1]) < 0.062
+        colors[collar & (neck[:, 2] > -0.02)] = self.outfit.skin
+        return colors
+
+    def _head(self, rest: Float[np.ndarray, "n 3"], _: str) -> Colors:
+        points = self._local("head", rest) * (1.75 / self.anatomy.stature)
+        x, y, z = points.T
+        colors = np.tile(np.array(self.outfit.skin), (len(points), 1))
+        hair = (z > 0.105 + 0.35 * np.minimum(0.09 - x, 0.0)) | ((x < 0.0) & (z > -0.02 + 0.9 * (x + 0.03)))
+        colors[hair & (x < 0.088)] = self.outfit.hair
+        front = x > 0.06
+        colors[front & (((np.abs(y) - 0.032) / 0.014) ** 2 + ((z - 0.052) / 0.008) ** 2 < 1)] = 0.12
+        colors[front & (((np.abs(y) - 0.033) / 0.02) ** 2 + ((z - 0.073) / 0.006) ** 2 < 1)] = self.outfit.hair
+        colors[front & ((y / 0.024) ** 2 + ((z + 0.012) / 0.007) ** 2 < 1)] = (0.62, 0.32, 0.30)
+        return colors
+
+    def _arm(self, rest: Float[np.ndarray, "n 3"], name: str) -> Colors:
+        side = name.partition("_")[0]
+        points = self._local(f"{side}_shoulder", rest)
+        upper, lower = (self.anatomy.length(f"{side}_{joint}") for joint in ("elbow", "wrist"))
+        sleeve = self.outfit.sleeve
+        hem = sleeve * upper if sleeve < 1.0 else upper + (sleeve - 1.0) * lower
+        colors = self._shirt(points)
+        colors[-points[:, 2] > hem - 0.015] = np.array(self.outfit.shirt[0]) * 0.8
+        colors[-points[:, 2] > hem + 0.01] = self.outfit.skin
+        return colors
+
+    def _leg(self, rest: Float[np.ndarray, "n 3"], name: str) -> Colors:
+        side = name.partition("_")[0]
+        points = self._local(f"{side}_hip", rest)
+        foot = self._local(f"{side}_ankle", rest)
+        colors = np.tile(np.array(self.outfit.trousers), (len(points), 1))
+        seam = (np.abs(points[:, 0]) < 0.006) & (foot[:, 2] > 0.0)
+        colors[seam] *= 0.7
+        colors[foot[:, 2] < 0.022] = self.outfit.shoes
+        sole = -self.anatomy.ankle_height + 0.016
+        colors[foot[:, 2] < sole] = 0.5 * np.array(self.outfit.shoes) + 0.15
+        return colors
+
+
+def _pattern(name: str, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
+    """Share of the second colour, 0..1, at points in the frame of the piece (metres, z along it)."""
+    x, y, z = points.T
+    around = np.where(np.abs(x) > np.abs(y), y, x)
+    square = lambda value, period, share=0.5: (np.mod(value, period) < share * period).astype(float)
+    if name == "stripes":
+        return square(z, 0.075, 0.45)
+    if name == "bars":
+        return square(y, 0.06, 0.4)
+    if name == "plaid":
+        return 0.5 * square(z, 0.09, 0.45) + 0.5 * square(y, 0.09, 0.45)
+    if name == "checks":
+        return np.abs(square(z, 0.11) - square(y, 0.11))
+    u, v = np.mod(around, 0.07) - 0.035, np.mod(z, 0.07) - 0.035
+    return (u * u + v * v < 0.021**2).astype(float)

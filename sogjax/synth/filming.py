@@ -1,0 +1,90 @@
+"""Films a stage with some of its cameras: plates, stills and videos."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+import cv2
+import numpy as np
+from jaxtyping import UInt8
+
+from sogjax.data.video import VideoWriter
+from sogjax.synth.exercises import EXAMPLE_POSES
+from sogjax.synth.picture import Person, Plate, Shadows, Shot, mask_of, plate_of, shot_of
+from sogjax.synth.stage import Stage
+
+_JPEG_QUALITY = 95
+_NOISE, _VIDEO, _STILL, _EMPTY = 7, 0, 1, 2
+"""Streams of random numbers: pictures have the same noise whoever renders them."""
+
+
+def num_pictures(stage_settings, cameras: int) -> int:  # noqa: ANN001
+    """How many pictures `film` makes with so many cameras, which is how often it yields."""
+    stills = len(EXAMPLE_POSES) * stage_settings.actors if stage_settings.example_poses else 0
+    return cameras * (1 + stills + stage_settings.frames)
+
+
+def example_folder(stage: Stage, actor: int, pose: str) -> str:
+    """Name of the folder of an example pose."""
+    return pose if stage.settings.actors == 1 else f"{stage.settings.actor_names[actor]}_{pose}"
+
+
+def film(stage: Stage, cameras: Sequence[int], folder: Path) -> Iterator[None]:
+    """Write everything that some cameras see into a recording's folder; yields after each picture."""
+    plates = {}
+    for camera in cameras:
+        plates[camera] = plate_of(stage.scene, stage.views[camera])
+        if stage.settings.background:
+            empty = stage.sensors[camera].exposed(plates[camera].total, _rng(stage, camera, _EMPTY, 0))
+            _write_image(folder / "background" / f"{stage.views[camera].name}.jpg", empty)
+        yield
+    if stage.settings.example_poses:
+        yield from _stills(stage, plates, folder)
+    yield from _videos(stage, plates, folder)
+
+
+def _stills(stage: Stage, plates: dict[int, Plate], folder: Path) -> Iterator[None]:
+    for actor, person in enumerate(stage.people):
+        for number, pose in enumerate(EXAMPLE_POSES):
+            shots = _shots(stage, plates, [person], [stage.example_pose(actor, pose)])
+            place = folder / "example_poses" / example_folder(stage, actor, pose)
+            for camera, shot in shots:
+                rng = _rng(stage, camera, _STILL, 10 * actor + number)
+                name = stage.views[camera].name
+                _write_image(place / f"{name}.jpg", stage.sensors[camera].exposed(shot.light, rng))
+                _write_image(place / f"{name}.mask.png", np.uint8(255) * mask_of(shot).astype(np.uint8))
+                yield
+
+
+def _videos(stage: Stage, plates: dict[int, Plate], folder: Path) -> Iterator[None]:
+    with ExitStack() as stack:
+        writers = {}
+        for camera in plates:
+            path = folder / "videos" / f"{stage.views[camera].name}.mp4"
+            writers[camera] = stack.enter_context(VideoWriter(path, stage.settings.fps))
+        for frame in range(stage.settings.frames):
+            for camera, shot in _shots(stage, plates, stage.people, stage.poses(frame)):
+                rng = _rng(stage, camera, _VIDEO, frame)
+                writers[camera].write(stage.sensors[camera].exposed(shot.light, rng))
+                yield
+
+
+def _shots(
+    stage: Stage, plates: dict[int, Plate], people: Sequence[Person], poses: Sequence
+) -> Iterator[tuple[int, Shot]]:
+    """What each camera sees of people in poses; surface and shadows are made once for all cameras."""
+    meshes = [person.figure.posed(pose) for person, pose in zip(people, poses, strict=True)]
+    shadows = Shadows.of(meshes) if stage.settings.shadows else None
+    for camera, plate in plates.items():
+        yield camera, shot_of(stage.views[camera], plate, people, meshes, shadows)
+
+
+def _rng(stage: Stage, camera: int, kind: int, number: int) -> np.random.Generator:
+    return np.random.default_rng([stage.settings.seed, _NOISE, camera, kind, number])
+
+
+def _write_image(path: Path, image: UInt8[np.ndarray, "..."]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    parameters = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY] if path.suffix == ".jpg" else []
+    encoded = cv2.imencode(path.suffix, image, parameters)[1]
+    path.write_bytes(encoded.tobytes())

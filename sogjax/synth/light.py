@@ -1,0 +1,104 @@
+"""Light of the rendered room: one lamp far away with soft shadows, light from all around, a faint second lamp."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from sogjax.synth.figure import Mesh
+from sogjax.synth.raster import Window, rasterize
+from sogjax.synth.rotations import frame, unit
+
+LAMP = unit(np.array([0.34, -0.26, 0.90]))
+"""Direction towards the lamp."""
+UP = np.array([0.0, 0.0, 1.0])
+
+_LAMP_COLOR = np.array([0.80, 0.77, 0.72], np.float32)
+_FILL = unit(np.array([-0.6, 0.7, 0.35]))
+_FILL_COLOR = np.array([0.10, 0.11, 0.13], np.float32)
+_SKY = np.array([0.40, 0.41, 0.43], np.float32)
+_GROUND = np.array([0.21, 0.20, 0.18], np.float32)
+_FAR = 1e6
+
+
+def ambient(normals: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+    """Light from all around, more of it from above, and the faint second lamp."""
+    share = (0.5 + 0.5 * normals[:, 2:]).astype(np.float32)
+    fill = np.maximum(normals @ _FILL, 0.0).astype(np.float32)
+    return _GROUND + share * (_SKY - _GROUND) + fill[:, None] * _FILL_COLOR
+
+
+def direct(normals: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+    """Light of the lamp where nothing is in its way (Lambert)."""
+    return np.maximum(normals @ LAMP, 0.0).astype(np.float32)[:, None] * _LAMP_COLOR
+
+
+def linear_from_srgb(colors: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
+    """Share of light that a surface of this displayed colour sends back."""
+    return np.asarray(colors, np.float32) ** np.float32(2.2)
+
+
+def srgb_from_linear(light: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
+    """Displayed values in 0..1; what is too bright saturates."""
+    return np.clip(light, 0.0, 1.0) ** np.float32(1.0 / 2.2)
+
+
+@dataclass(frozen=True)
+class ShadowMap:
+    """Distances along the light at which meshes first stop it, on a grid across it."""
+
+    axes: Float[np.ndarray, "3 3"]
+    """Columns: the grid's x and y, and the direction from the lamp."""
+    origin: Float[np.ndarray, "3"]
+    """Of the grid, and of the distances, in the grid's axes (metres)."""
+    spacing: float
+    spread: float
+    """Radius over which shadows are softened, metres."""
+    bias: float
+    depths: Float[np.ndarray, "row column"]
+
+    @classmethod
+    def of(
+        cls,
+        meshes: Sequence[Mesh],
+        towards: Float[np.ndarray, "3"] = LAMP,
+        spacing: float = 0.012,
+        spread: float = 0.03,
+        bias: float = 0.03,
+    ) -> "ShadowMap":
+        """The map of some meshes, lit from the direction `towards`."""
+        axes = frame(-towards, [1.0, 0.0, 0.0])
+        points = [mesh.vertices @ axes for mesh in meshes]
+        everything = np.concatenate(points)
+        origin = everything.min(0) - np.array([spread, spread, 0.0]) - 2.0 * spacing
+        extent = everything.max(0) - origin + spread + 2.0 * spacing
+        size = np.ceil(extent[:2] / spacing).astype(int) + 1
+        window = Window(0, 0, int(size[0]), int(size[1]))
+        depths = np.full((window.height, window.width), _FAR, np.float32)
+        for mesh, local in zip(meshes, points, strict=True):
+            local = local - origin
+            hits = rasterize(
+                local[:, :2] / spacing, local[:, 2] + 0.5, mesh.faces, window, perspective=False, cull=False
+            )
+            old = depths[hits.rows, hits.columns]
+            depths[hits.rows, hits.columns] = np.minimum(old, hits.depths.astype(np.float32) - 0.5)
+        return cls(axes, origin, spacing, spread, bias, depths)
+
+    def lit(self, points: Float[np.ndarray, "n 3"], taps: int = 8) -> Float[np.ndarray, "n"]:
+        """Share of the lamp that reaches each point (world), 0..1."""
+        local = ((points @ self.axes) - self.origin).astype(np.float32)
+        height, width = self.depths.shape
+        limit = local[:, 2] - np.float32(self.bias)
+        count = np.zeros(len(points), np.float32)
+        angles = 2.39996 * np.arange(taps)
+        radii = self.spread * np.sqrt((np.arange(taps) + 0.5) / taps)
+        flat = self.depths.ravel()
+        for angle, radius in zip(angles, radii, strict=True):
+            shift = (radius * np.array([np.cos(angle), np.sin(angle)]) / self.spacing + 0.5).astype(np.float32)
+            x = (local[:, 0] * np.float32(1.0 / self.spacing) + shift[0]).astype(np.int32)
+            y = (local[:, 1] * np.float32(1.0 / self.spacing) + shift[1]).astype(np.int32)
+            outside = (x < 0) | (x >= width) | (y < 0) | (y >= height)
+            x[outside] = y[outside] = 0
+            count += outside | (flat[y * width + x] >= limit)
+        return count / np.float32(taps)

@@ -1,0 +1,209 @@
+"""What one camera sees: the empty scene once, then the people in it, frame by frame."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+
+from sogjax.synth import light
+from sogjax.synth.clothes import Wardrobe
+from sogjax.synth.figure import Figure, Mesh
+from sogjax.synth.raster import Hits, Window, rasterize
+from sogjax.synth.rotations import unit
+from sogjax.synth.scene import Scene
+from sogjax.synth.views import View
+
+OVERSAMPLING = 2
+"""Samples a pixel in each direction."""
+
+
+@dataclass(frozen=True)
+class Person:
+    """A person to draw, with clothes fitted."""
+
+    figure: Figure
+    wardrobe: Wardrobe
+
+    @classmethod
+    def dressed(cls, figure: Figure) -> "Person":
+        """Fit the clothes of a figure."""
+        return cls(figure, Wardrobe.fitted(figure.outfit, figure.anatomy))
+
+
+@dataclass(frozen=True)
+class Shadows:
+    """Where people in one frame take light away: the lamp's, and the light from above near their feet."""
+
+    lamp: light.ShadowMap
+    above: light.ShadowMap
+
+    @classmethod
+    def of(cls, meshes: Sequence[Mesh]) -> "Shadows":
+        """Shadows of people."""
+        wide = light.ShadowMap.of(meshes, light.UP, spacing=0.03, spread=0.22, bias=0.02)
+        return cls(light.ShadowMap.of(meshes), wide)
+
+
+@dataclass(frozen=True)
+class Plate:
+    """The empty scene in one camera: the light of its pixels, in two parts, and what they show (linear)."""
+
+    ambient: Float[np.ndarray, "row column 3"]
+    direct: Float[np.ndarray, "row column 3"]
+    points: Float[np.ndarray, "row column 3"]
+
+    @property
+    def total(self) -> Float[np.ndarray, "row column 3"]:
+        """The picture without people."""
+        return self.ambient + self.direct
+
+
+def _sample_pixels(view: View, points: Float[np.ndarray, "n 3"]) -> tuple[np.ndarray, np.ndarray]:
+    """Projected points in the grid of samples, where integers are the samples' places, and depths."""
+    pixels, depths = view.project(points)
+    return (pixels + 0.5) * OVERSAMPLING - 0.5, depths
+
+
+def _averaged(samples: Float[np.ndarray, "row column channel"]) -> Float[np.ndarray, "r c channel"]:
+    n = OVERSAMPLING
+    total = samples[::n, ::n].copy()
+    for i in range(n * n):
+        if i:
+            total += samples[i // n :: n, i % n :: n]
+    return total / np.float32(n * n)
+
+
+def plate_of(scene: Scene, view: View) -> Plate:
+    """Draw the empty scene."""
+    window = Window(0, 0, view.width * OVERSAMPLING, view.height * OVERSAMPLING)
+    pixels, depths = _sample_pixels(view, scene.mesh.vertices)
+    hits = rasterize(pixels, depths, scene.mesh.faces, window)
+    vertices = np.concatenate([scene.mesh.vertices, scene.uv], 1, dtype=np.float32)
+    values = hits.interpolated(vertices, scene.mesh.faces)
+    normals = scene.mesh.normals[scene.mesh.faces[hits.faces, 0]].astype(np.float32)
+    albedo = light.linear_from_srgb(scene.colors(hits.faces, values[:, 3:]))
+
+    def image(samples: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "row column 3"]:
+        filled = np.zeros((window.height, window.width, 3), np.float32)
+        filled[hits.rows, hits.columns] = samples
+        return filled
+
+    # Where the shadows of the furniture fall is looked up once a pixel: they are softer than that anyway.
+    points, upwards = (image(v)[::OVERSAMPLING, ::OVERSAMPLING] for v in (values[:, :3], normals))
+    lit = scene.shadow.lit((points + np.float32(0.02) * upwards).reshape(-1, 3), taps=6)
+    lamp = _averaged(image(albedo * light.direct(normals))) * lit.reshape(view.height, view.width, 1)
+    return Plate(_averaged(image(albedo * light.ambient(normals))), lamp, np.ascontiguousarray(points))
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A picture with people in it."""
+
+    light: Float[np.ndarray, "row column 3"]
+    """Linear."""
+    coverage: Float[np.ndarray, "row column"]
+    """Share of each pixel that shows people."""
+
+
+def shot_of(
+    view: View, plate: Plate, people: Sequence[Person], meshes: Sequence[Mesh], shadows: Shadows | None
+) -> Shot:
+    """Draw people into the empty scene."""
+    picture = plate.total
+    coverage = np.zeros(picture.shape[:2], np.float32)
+    if shadows is not None:
+        _darken(picture, view, plate, meshes, shadows)
+    colors, covered, window = _people_samples(view, people, meshes, shadows)
+    if window.width and window.height:
+        small = Window(*(value // OVERSAMPLING for value in (window.x, window.y, window.width, window.height)))
+        share = _averaged(covered)[..., 0]
+        picture[small.slices] = picture[small.slices] * (1.0 - share)[..., None] + _averaged(colors)
+        coverage[small.slices] = share
+    return Shot(picture, coverage)
+
+
+def _people_samples(
+    view: View, people: Sequence[Person], meshes: Sequence[Mesh], shadows: Shadows | None
+) -> tuple[np.ndarray, np.ndarray, Window]:
+    """Light and coverage of the samples of the smallest window that holds all people."""
+    limit = Window(0, 0, view.width * OVERSAMPLING, view.height * OVERSAMPLING)
+    projected = [_sample_pixels(view, mesh.vertices) for mesh in meshes]
+    visible = np.concatenate([pixels[depths > 0.0] for pixels, depths in projected])
+    window = Window.around(visible, limit) if len(visible) else Window(0, 0, 0, 0)
+    colors = np.zeros((window.height, window.width, 3), np.float32)
+    covered = np.zeros((window.height, window.width, 1), np.float32)
+    nearest = np.full((window.height, window.width), np.inf)
+    for person, mesh, (pixels, depths) in zip(people, meshes, projected, strict=True):
+        hits = rasterize(pixels, depths, mesh.faces, window)
+        front = hits.depths < nearest[hits.rows, hits.columns]
+        hits = Hits(*(values[front] for values in vars(hits).values()))
+        nearest[hits.rows, hits.columns] = hits.depths
+        colors[hits.rows, hits.columns] = _shaded(person, mesh, hits, shadows)
+        covered[hits.rows, hits.columns] = 1.0
+    return colors, covered, window
+
+
+def _shaded(person: Person, mesh: Mesh, hits: Hits, shadows: Shadows | None) -> Float[np.ndarray, "n 3"]:
+    """Light that the person sends to the camera from the places seen."""
+    figure = person.figure
+    attributes = np.concatenate([mesh.vertices, mesh.normals, figure.rest], 1, dtype=np.float32)
+    values = hits.interpolated(attributes, mesh.faces)
+    points, normals, rest = values[:, :3], unit(values[:, 3:6]), values[:, 6:]
+    albedo = light.linear_from_srgb(person.wardrobe.colors(figure.face_part[hits.faces], rest))
+    lamp = light.direct(normals)
+    if shadows is not None:
+        lamp = lamp * shadows.lamp.lit(points + np.float32(0.02) * normals)[:, None]
+    return albedo * (light.ambient(normals) + lamp)
+
+
+def _darken(
+    picture: Float[np.ndarray, "row column 3"],
+    view: View,
+    plate: Plate,
+    meshes: Sequence[Mesh],
+    shadows: Shadows,
+) -> None:
+    """Take away from the empty scene the light that the people stop."""
+    bodies = np.concatenate([mesh.vertices for mesh in meshes])
+    on_floor = bodies - bodies[:, 2:] / light.LAMP[2] * light.LAMP
+    margin = 0.25 * np.array([[1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]])
+    swept = np.concatenate([bodies, on_floor, (on_floor[None, ::7] + margin[:, None]).reshape(-1, 3)])
+    pixels, depths = view.project(swept)
+    if not (depths > 0.0).any():
+        return
+    window = Window.around(pixels[depths > 0.0], Window(0, 0, view.width, view.height), even=False)
+    if not (window.width and window.height):
+        return
+    rows, columns = window.slices
+    points = plate.points[rows, columns].reshape(-1, 3)
+    near = np.abs(points[:, :2]).max(1) < np.abs(swept[:, :2]).max() + 0.1
+    lit, open_above = np.ones(len(points), np.float32), np.ones(len(points), np.float32)
+    lit[near] = shadows.lamp.lit(points[near])
+    open_above[near] = shadows.above.lit(points[near], taps=12)
+    shape = (window.height, window.width, 1)
+    softened = 0.45 + 0.55 * open_above.reshape(shape)
+    picture[rows, columns] = (
+        plate.ambient[rows, columns] * softened + plate.direct[rows, columns] * lit.reshape(shape)
+    )
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """How one camera turns light into numbers."""
+
+    gain: Float[np.ndarray, "3"]
+    noise: float
+
+    def exposed(
+        self, picture: Float[np.ndarray, "row column 3"], rng: np.random.Generator
+    ) -> UInt8[np.ndarray, "row column 3"]:
+        """The picture as recorded, BGR."""
+        values = light.srgb_from_linear(picture[..., ::-1] * self.gain[::-1].astype(np.float32))
+        values = values + np.float32(self.noise) * rng.standard_normal(values.shape, np.float32)
+        return np.clip(values * 255.0 + 0.5, 0.0, 255.0).astype(np.uint8)
+
+
+def mask_of(shot: Shot) -> Bool[np.ndarray, "row column"]:
+    """The pixels that show people by at least a half."""
+    return shot.coverage >= 0.5

@@ -1,0 +1,153 @@
+"""Renders a whole recording with its ground truth into a folder."""
+
+import shutil
+import uuid
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from sogjax.data.calibration.rig import CameraEntry, rig_from_entries
+from sogjax.data.calibration.toml import write_toml
+from sogjax.data.ground_truth import GroundTruth, save_ground_truth
+from sogjax.errors import InputError
+from sogjax.synth.anatomy import Anatomy, Pose
+from sogjax.synth.crew import film_all, num_workers
+from sogjax.synth.exercises import EXAMPLE_POSES
+from sogjax.synth.filming import example_folder, num_pictures
+from sogjax.synth.landmarks import LANDMARKS, MARKERS, landmark_points, marker_vertices
+from sogjax.synth.settings import SynthSettings
+from sogjax.synth.stage import Stage, stage_of
+
+Progress = Callable[[Iterable, int, str], Iterable]
+"""Wraps an iterable, given its length and a label, and yields the same."""
+
+_ROUGHNESS = 0.025
+"""Metres by which a rough landmark is off, standard deviation on each axis."""
+_ROUGH = 8
+"""Stream of random numbers."""
+
+
+def silent(items: Iterable, total: int, label: str) -> Iterable:
+    """No progress bar."""
+    return items
+
+
+def render_recording(
+    settings: SynthSettings, out: Path, progress: Progress = silent, workers: int | None = None
+) -> Path:
+    """Render a recording into the folder `out`, which appears when it is whole.
+
+    Args:
+        settings: what to render; the same settings give the same pictures, bit for bit.
+        out: a folder that does not exist yet, or is empty.
+        progress: wraps the pictures to count them.
+        workers: processes to use; the default is one a core, one only for short recordings.
+
+    Raises:
+        InputError: a setting is wrong, or `out` cannot be used.
+    """
+    settings.check()
+    out = Path(out)
+    _check_free(out)
+    stage = stage_of(settings)
+    temporary = _temporary_beside(out)
+    try:
+        _write_descriptions(stage, temporary)
+        pictures = num_pictures(settings, settings.cameras)
+        workers = workers or num_workers(pictures, settings.cameras)
+        for _ in progress(film_all(stage, temporary, workers), pictures, "rendering"):
+            pass
+        for log in temporary.glob(".worker_*.log"):
+            log.unlink()
+        if out.exists():
+            out.rmdir()
+        temporary.rename(out)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+    return out
+
+
+def _check_free(out: Path) -> None:
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise InputError(f"out={out}: is there already and not an empty folder; choose another or remove it")
+
+
+def _temporary_beside(out: Path) -> Path:
+    temporary = out.with_name(f".{out.name[:80]}.{uuid.uuid4().hex[:8]}.tmp")
+    try:
+        temporary.mkdir(parents=True)
+    except OSError as error:
+        raise InputError(f"out={out}: its folder cannot be written ({error.strerror}); choose another") from error
+    return temporary
+
+
+def _write_descriptions(stage: Stage, folder: Path) -> None:
+    """Everything but the pictures."""
+    entries = [
+        CameraEntry(
+            name=view.name,
+            intrinsics=view.matrix,
+            rotation=view.camera_from_world[:3, :3],
+            translation=view.camera_from_world[:3, 3],
+            distortion=view.distortion,
+            size=(view.width, view.height),
+        )
+        for view in stage.views
+    ]
+    write_toml(folder / "calibration.toml", rig_from_entries(folder / "calibration.toml", entries))
+    save_ground_truth(folder / "ground_truth.npz", ground_truth_of(stage))
+    rough = [_rough(stage, actor, 0, stage.poses(0)[actor]) for actor in range(stage.settings.actors)]
+    several = dict(zip(stage.settings.actor_names, rough, strict=True))
+    _write_yaml(folder / "initial_pose.yaml", rough[0] if len(rough) == 1 else several)
+    _write_yaml(folder / "recording.yaml", _description(stage))
+
+
+def _description(stage: Stage) -> dict:
+    settings = stage.settings
+    description: dict = {"fps": settings.fps, "calibration": "calibration.toml", "unit": "m", "up": "z"}
+    if settings.example_poses:
+        description["example_poses"] = [
+            {
+                "name": example_folder(stage, actor, pose),
+                "actor": settings.actor_names[actor],
+                "initial_pose": _rough(stage, actor, 1 + number, stage.example_pose(actor, pose)),
+            }
+            for actor in range(settings.actors)
+            for number, pose in enumerate(EXAMPLE_POSES)
+        ]
+    return description
+
+
+def ground_truth_of(stage: Stage) -> GroundTruth:
+    """True markers and joints of every frame."""
+    several = stage.settings.actors > 1
+    prefixes = [f"{name}/" if several else "" for name in stage.settings.actor_names]
+    vertices = [marker_vertices(person.figure) for person in stage.people]
+    markers, joints = [], []
+    for frame in range(stage.settings.frames):
+        poses = stage.poses(frame)
+        placed = list(zip(stage.people, poses, vertices, strict=True))
+        markers.append(np.concatenate([person.figure.posed(pose).vertices[v] for person, pose, v in placed]))
+        joints.append(np.concatenate([landmark_points(p.figure.anatomy, pose) for p, pose, _ in placed]))
+    return GroundTruth(
+        fps=stage.settings.fps,
+        markers=np.stack(markers),
+        marker_names=tuple(prefix + name for prefix in prefixes for name in MARKERS),
+        joints=np.stack(joints),
+        joint_names=tuple(prefix + name for prefix in prefixes for name in LANDMARKS),
+    )
+
+
+def _rough(stage: Stage, actor: int, number: int, pose: Pose) -> dict:
+    """Landmarks as a person would read them off, as plain YAML."""
+    anatomy: Anatomy = stage.people[actor].figure.anatomy
+    rng = np.random.default_rng([stage.settings.seed, _ROUGH, actor, number])
+    points = landmark_points(anatomy, pose)
+    points = points + _ROUGHNESS * rng.standard_normal(points.shape)
+    return {"landmarks": {name: np.round(p, 3).tolist() for name, p in zip(LANDMARKS, points, strict=True)}}
+
+
+def _write_yaml(path: Path, content: dict) -> None:
+    path.write_text(yaml.safe_dump(content, sort_keys=False, default_flow_style=None), encoding="utf-8")

@@ -1,0 +1,58 @@
+"""Rotations of the rendered figure, in plain numpy: about the axes, between frames, parts of a twist."""
+
+from collections.abc import Iterable
+
+import numpy as np
+from jaxtyping import Float
+
+Matrix = Float[np.ndarray, "3 3"]
+Vector = Float[np.ndarray, "3"]
+
+MIRROR = np.diag([1.0, -1.0, 1.0])
+"""Reflection of left and right in the body's frame (x forward, y left, z up)."""
+
+
+def about(axis: str, angle: float) -> Matrix:
+    """Rotation by `angle` (radians) about the coordinate axis `x`, `y` or `z`."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    rotation = np.eye(3)
+    i, j = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
+    rotation[i, i] = rotation[j, j] = cosine
+    rotation[j, i], rotation[i, j] = sine, -sine
+    return rotation
+
+
+def turned(*turns: tuple[str, float]) -> Matrix:
+    """The product of rotations about coordinate axes, angles in degrees; the last one acts first."""
+    rotation = np.eye(3)
+    for axis, degrees in turns:
+        rotation = rotation @ about(axis, np.deg2rad(degrees))
+    return rotation
+
+
+def mirrored(rotation: Matrix) -> Matrix:
+    """The same turn on the other side of the body."""
+    return MIRROR @ rotation @ MIRROR
+
+
+def frame(z: Iterable[float], towards_x: Iterable[float]) -> Matrix:
+    """The right-handed frame whose z axis is along `z` and whose x axis leans towards `towards_x`."""
+    z_axis = unit(np.asarray(z, float))
+    y_axis = unit(np.cross(z_axis, np.asarray(towards_x, float)))
+    return np.stack([np.cross(y_axis, z_axis), y_axis, z_axis], axis=1)
+
+
+def unit(vector: Float[np.ndarray, "*batch 3"]) -> Float[np.ndarray, "*batch 3"]:
+    """The vectors at length one; a zero vector stays zero."""
+    return vector / np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), 1e-12)
+
+
+def partial_twist(rotation: Matrix, share: float) -> Matrix:
+    """The rotation with only `share` of its twist about the z axis, its swing kept.
+
+    The swing-twist decomposition through quaternions: R = swing * twist_z.
+    """
+    trace = rotation[0, 0] + rotation[1, 1] + rotation[2, 2]
+    # (1 + trace, R10 - R01) is 4 w (w, z) of the quaternion; half the twist angle is atan2(z, w).
+    half = np.arctan2(rotation[1, 0] - rotation[0, 1], 1.0 + trace)
+    return rotation @ about("z", -2.0 * (1.0 - share) * half)

@@ -1,0 +1,134 @@
+"""Which image blobs can matter to a body: those near it and of its colours (Section 6)."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from sogjax.energy.overlap import pair_color_similarities
+from sogjax.images.quadtree import Candidates, keep_blobs, quadtree
+from sogjax.model.camera import Camera, project
+from sogjax.model.color import averaging_space, color_distance, convert, from_rgb
+from sogjax.model.skeleton import Skeleton
+from sogjax.model.sog import Sog
+
+CAPACITIES = (256, 512, 1024, 2048, 4096, 8192, 16384, 32768, 65536)
+"""The sizes of padded image Sogs. Few, so that few programs are compiled."""
+
+BLOB_RADIUS = 3.0
+"""Sigmas around a blob's centre that belong to the box of a body."""
+
+
+class Capacities(eqx.Module):
+    """Slots for the image blobs of one camera that pass the first test (leaf, in the box) and both tests."""
+
+    near: int = eqx.field(static=True)
+    matching: int = eqx.field(static=True)
+
+    def holding(self, near: int, matching: int, headroom: float = 1.0) -> "Capacities":
+        """These capacities, or where the counts do not fit, the next sizes that hold `headroom` times as many."""
+        return Capacities(
+            self.near if near <= self.near else capacity_for(near * headroom),
+            self.matching if matching <= self.matching else capacity_for(matching * headroom),
+        )
+
+
+def capacity_for(count: float) -> int:
+    """The smallest of `CAPACITIES` that holds `count` blobs; the largest where none does."""
+    return next((capacity for capacity in CAPACITIES if capacity >= count), CAPACITIES[-1])
+
+
+class ImageReader(eqx.Module):
+    """Turns the cells of one frame into Sogs: how colours are read and which blobs are kept."""
+
+    candidates: Candidates
+    color_radius: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    """eps_sim of Eq. 7."""
+    color_tolerance: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    """eps_col of Section 4.1."""
+    box_enlargement: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    """Part of the box's size that is added on each side."""
+    color_space: str = eqx.field(static=True)
+    plate_colors: Float[Array, "camera candidate 3"] | None = None
+    """Colours of every node of the empty background, in the averaging space; None: plates are not used."""
+    plate_tolerance: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=0.1)
+    """Image blobs whose colour is nearer than this to the plate's are left out."""
+
+    def leaves(
+        self, cells: Float[Array, "camera rows columns 3"]
+    ) -> tuple[Float[Array, "camera candidate 3"], Bool[Array, "camera candidate"]]:
+        """Colours (averaging space) and leaves of the quad-trees of all cameras, from sRGB cells in 0..1."""
+        colors = from_rgb(cells, averaging_space(self.color_space))
+        colors, leaves = jax.vmap(quadtree, in_axes=(0, 0, None))(colors, self.candidates, self.color_tolerance)
+        if self.plate_colors is not None:
+            distance = color_distance(colors, self.plate_colors, averaging_space(self.color_space))
+            leaves = leaves & (distance > self.plate_tolerance)
+        return colors, leaves
+
+    def near_blobs(
+        self,
+        cells: Float[Array, "camera rows columns 3"],
+        boxes: Float[Array, "camera actor 2 2"],
+        capacity: int,
+    ) -> tuple[Sog, Int[Array, "camera"]]:
+        """Image blobs inside the boxes, coloured in the working space, and how many there are for each camera."""
+        colors, leaves = self.leaves(cells)
+        keep = leaves & jax.vmap(_in_boxes)(self.candidates.means, self.candidates.sigmas, boxes)
+        select = jax.vmap(keep_blobs, in_axes=(0, 0, 0, 0, None))
+        near, _, counts = select(self.candidates.means, self.candidates.sigmas, colors, keep, capacity)
+        working = convert(near.colors, averaging_space(self.color_space), self.color_space)
+        return eqx.tree_at(lambda sog: sog.colors, near, working), counts
+
+    def matching_blobs(
+        self, near: Sog, body: Sog, capacity: int
+    ) -> tuple[Sog, Float[Array, "camera body image"], Int[Array, "camera"]]:
+        """The near blobs whose colour resembles some blob of the body, with all colour similarities."""
+
+        def one_camera(image: Sog):
+            similarities = pair_color_similarities(image, body, self.color_space, self.color_radius)
+            keep = jnp.any(similarities > 0.0, axis=0) & image.mask
+            kept, chosen, count = keep_blobs(image.means, image.sigmas, image.colors, keep, capacity)
+            return kept, jnp.where(kept.mask[None, :], similarities[:, chosen], 0.0), count
+
+        return jax.vmap(one_camera)(near)
+
+
+def actor_of_blobs(skeleton: Skeleton, blob_joints: tuple[int, ...]) -> Int[np.ndarray, "blob"]:
+    """Number of the tree (the actor) that each blob belongs to."""
+    actors: list[int] = []
+    for joint, parent in enumerate(skeleton.parents):
+        actors.append(max(actors, default=-1) + 1 if parent < 0 else actors[parent])
+        del joint
+    return np.array([actors[joint] for joint in blob_joints], int)
+
+
+def body_boxes(
+    blobs: Sog, camera: Camera, actors: Int[np.ndarray, "blob"], enlargement: Float[Array, ""]
+) -> Float[Array, "actor 2 2"]:
+    """For one camera the enlarged box (lowest and highest x, y in pixels) of every actor; empty when not seen."""
+    seen = project(camera, blobs)
+    radius = BLOB_RADIUS * seen.sigmas[:, None]
+    boxes = []
+    for actor in range(int(actors.max()) + 1):
+        mine = (seen.mask & jnp.asarray(actors == actor))[:, None]
+        low = jnp.min(jnp.where(mine, seen.means - radius, jnp.inf), axis=0)
+        high = jnp.max(jnp.where(mine, seen.means + radius, -jnp.inf), axis=0)
+        border = enlargement * jnp.maximum(high - low, 0.0)
+        boxes.append(jnp.stack([low - border, high + border]))
+    return jnp.stack(boxes)
+
+
+def union_boxes(a: Float[Array, "*batch 2 2"], b: Float[Array, "*batch 2 2"]) -> Float[Array, "*batch 2 2"]:
+    """The smallest boxes that hold the boxes of both."""
+    low = jnp.minimum(a[..., 0, :], b[..., 0, :])
+    return jnp.stack([low, jnp.maximum(a[..., 1, :], b[..., 1, :])], axis=-2)
+
+
+def _in_boxes(
+    means: Float[Array, "n 2"], sigmas: Float[Array, "n"], boxes: Float[Array, "actor 2 2"]
+) -> Bool[Array, "n"]:
+    """Image blobs whose square touches one of the boxes."""
+    above = means[:, None, :] + sigmas[:, None, None] >= boxes[None, :, 0, :]
+    below = means[:, None, :] - sigmas[:, None, None] <= boxes[None, :, 1, :]
+    return jnp.any(jnp.all(above & below, axis=-1), axis=-1)

@@ -1,0 +1,177 @@
+"""The pose of the first frame from a rough description: a named pose and a place, or a handful of landmarks."""
+
+from collections.abc import Mapping
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+from jaxtyping import Array, Float
+
+from sogjax.data.initial_pose import InitialPose
+from sogjax.errors import InputError
+from sogjax.model.body import Body
+from sogjax.model.frames import axis_vector
+
+LANDMARK_NOISE = 0.03
+"""Metres: what a landmark is expected to be off."""
+POSE_SPREAD = 1.5
+"""Radians: how far joint angles lie from the start pose, where the landmarks do not say."""
+NUM_HEADINGS = 12
+MIN_LANDMARKS = 4
+
+
+def rough_pose(body: Body, description: InitialPose, up: str) -> Float[Array, "dof"]:
+    """The pose that a description means; `body` stands upright in the recording's world (vertical `up`) already.
+
+    Raises:
+        InputError: unknown pose, degree of freedom or landmark; too few landmarks; nothing that says where.
+    """
+    start = _named_pose(body, description.pose)
+    if description.position is not None:
+        start = placed(body, start, np.asarray(description.position, float))
+    if description.heading is not None:
+        start = turned(body, start, np.radians(description.heading), up)
+    if description.landmarks:
+        return fit_landmarks(body, up, start, description.landmarks, description.heading is not None)
+    if description.position is None:
+        raise InputError(
+            "the initial pose has neither `position` nor `landmarks`; give the root's position in metres, "
+            f"or at least {MIN_LANDMARKS} landmarks"
+        )
+    return start
+
+
+def placed(body: Body, pose: Float[Array, "dof"], position: Float[np.ndarray, "3"]) -> Float[Array, "dof"]:
+    """The pose with the root at a position (metres, world)."""
+    for joint, dof, weight in _root_dofs(body, revolute=False):
+        axis = np.asarray(body.skeleton.axes[joint], float)
+        offset = np.asarray(body.skeleton.offsets[joint], float)
+        pose = pose.at[dof].set(float(axis @ (position - offset)) / weight)
+    return pose
+
+
+def root_position(body: Body, pose: Float[Array, "dof"]) -> Float[np.ndarray, "3"]:
+    """Where the root is in a pose (metres, world): the end of the chain of joints that have no offset."""
+    offsets = np.asarray(body.skeleton.offsets)
+    chain = _root_joints(body)
+    at_root = [joint for joint in chain[1:] if np.linalg.norm(offsets[joint]) > 1e-9]
+    last = chain[chain.index(at_root[0]) - 1] if at_root else chain[-1]
+    return np.asarray(body.skeleton.world_from_joint(pose)[last, :3, 3], float)
+
+
+def turned(body: Body, pose: Float[Array, "dof"], heading: float, up: str) -> Float[Array, "dof"]:
+    """The pose turned to a heading (radians about the vertical; 0 is the rest pose's)."""
+    vertical = axis_vector(up)
+    for joint, dof, weight in _root_dofs(body, revolute=True):
+        along = float(np.asarray(body.skeleton.axes[joint], float) @ vertical)
+        if abs(along) > 0.99:
+            return pose.at[dof].set(heading * np.sign(along) / weight)
+    return pose
+
+
+def fit_landmarks(
+    body: Body,
+    up: str,
+    start: Float[Array, "dof"],
+    landmarks: Mapping[str, tuple[float, float, float]],
+    keep_heading: bool = False,
+) -> Float[Array, "dof"]:
+    """The pose whose landmarks lie nearest to the given points, by least squares from several headings.
+
+    Raises:
+        InputError: unknown landmark names, or fewer than four.
+    """
+    indices, targets = landmark_targets(body, landmarks)
+    centre = jnp.mean(targets, axis=0)
+    middle = jnp.mean(body.posed_landmarks(start)[indices], axis=0)
+    start = placed(body, start, root_position(body, start) + np.asarray(centre - middle, float))
+    headings = [None] if keep_heading else np.arange(NUM_HEADINGS) * 2.0 * np.pi / NUM_HEADINGS - np.pi
+    starts = jnp.stack([start if h is None else turned(body, start, float(h), up) for h in headings])
+    fitted, costs = _fit_all(body, starts, indices, targets)
+    return fitted[jnp.argmin(jnp.where(jnp.isfinite(costs), costs, jnp.inf))]
+
+
+def landmark_targets(
+    body: Body, landmarks: Mapping[str, tuple[float, float, float]]
+) -> tuple[Array, Float[Array, "landmark 3"]]:
+    """Indices of the named landmarks in the body and the points they should lie on.
+
+    Raises:
+        InputError: unknown landmark names, or fewer than four.
+    """
+    known = body.landmarks.names
+    unknown = sorted(set(landmarks) - set(known))
+    if unknown:
+        raise InputError(
+            f"unknown landmark {', '.join(unknown)}: the body {body.name!r} has {', '.join(known)}; "
+            "rename it, or add it under `landmarks` of the body file"
+        )
+    if len(landmarks) < MIN_LANDMARKS:
+        raise InputError(
+            f"{len(landmarks)} landmarks are too few to fit the body {body.name!r}; "
+            f"give at least {MIN_LANDMARKS}, well spread"
+        )
+    indices = jnp.array([known.index(name) for name in landmarks])
+    return indices, jnp.array(list(landmarks.values()), body.landmarks.offsets.dtype)
+
+
+@jax.jit
+def _fit_all(
+    body: Body, starts: Float[Array, "start dof"], indices: Array, targets: Float[Array, "landmark 3"]
+) -> tuple[Float[Array, "start dof"], Float[Array, "start"]]:
+    solver = optx.LevenbergMarquardt(rtol=1e-4, atol=1e-4)
+    lower, upper = body.skeleton.joint_limits()
+
+    def fit(start):
+        def residuals(pose, _):
+            distances = (body.posed_landmarks(pose)[indices] - targets) / LANDMARK_NOISE
+            prior = (pose - start) / POSE_SPREAD
+            params = body.skeleton.joint_params(pose)
+            limits = jnp.maximum(lower - params, 0.0) + jnp.maximum(params - upper, 0.0)
+            return distances, prior, 30.0 * limits
+
+        result = optx.least_squares(residuals, solver, start, max_steps=100, throw=False)
+        cost = sum(jnp.sum(part**2) for part in residuals(result.value, None))
+        return result.value, cost
+
+    return jax.vmap(fit)(starts)
+
+
+def _named_pose(body: Body, pose: str | Mapping[str, float] | None) -> Float[Array, "dof"]:
+    if pose is None:
+        return body.poses["rest"]
+    if isinstance(pose, str):
+        if pose not in body.poses:
+            raise InputError(f"unknown pose {pose!r}: the body {body.name!r} has {', '.join(sorted(body.poses))}")
+        return body.poses[pose]
+    values = body.poses["rest"]
+    for name, value in pose.items():
+        if name not in body.skeleton.dof_names:
+            raise InputError(
+                f"unknown degree of freedom {name!r} in the initial pose: the body {body.name!r} has "
+                f"{', '.join(body.skeleton.dof_names)}"
+            )
+        values = values.at[body.skeleton.dof_names.index(name)].set(value)
+    return values
+
+
+def _root_joints(body: Body) -> list[int]:
+    """The chain of joints from the root down to the first one where the tree branches."""
+    parents = body.skeleton.parents
+    chain = [parents.index(-1)]
+    while len(children := [j for j, parent in enumerate(parents) if parent == chain[-1]]) == 1:
+        chain.append(children[0])
+    return chain
+
+
+def _root_dofs(body: Body, revolute: bool) -> list[tuple[int, int, float]]:
+    """(joint, dof, weight) of the root chain's joints that turn (or slide)."""
+    transform = np.asarray(body.skeleton.parameter_transform)
+    kinds = np.asarray(body.skeleton.revolute)
+    found = []
+    for joint in _root_joints(body):
+        if bool(kinds[joint]) is revolute and np.any(transform[joint]):
+            dof = int(np.argmax(np.abs(transform[joint])))
+            found.append((joint, dof, float(transform[joint, dof])))
+    return found

@@ -1,0 +1,177 @@
+"""Tracking (Section 5.3): predict, cull, solve, advance; one compiled step for every frame of a recording."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int, UInt8
+
+from sogjax.energy.objective import EnergyTerms, EnergyWeights, History, Views, energy, energy_terms
+from sogjax.model.body import Body
+from sogjax.model.camera import Camera
+from sogjax.model.color import from_rgb
+from sogjax.model.sog import Sog
+from sogjax.solve import Scales, Solver
+from sogjax.track.culling import (
+    CAPACITIES,
+    Capacities,
+    ImageReader,
+    actor_of_blobs,
+    body_boxes,
+    capacity_for,
+    union_boxes,
+)
+
+HEADROOM = 1.6
+"""Slots for image blobs, as a multiple of what the first frame needs."""
+
+
+class TrackState(eqx.Module):
+    """The poses of the two frames before, and how many of them are known (0, 1, 2)."""
+
+    previous: Float[Array, "dof"]
+    before_previous: Float[Array, "dof"]
+    num_known: Int[Array, ""]
+
+    @classmethod
+    def from_pose(cls, pose: Float[Array, "dof"]) -> "TrackState":
+        """The state before the first frame, from a rough pose."""
+        return cls(pose, pose, jnp.asarray(0))
+
+    def advanced(self, pose: Float[Array, "dof"]) -> "TrackState":
+        """The state after a frame whose pose was found; the first one has no history but itself."""
+        first = self.num_known == 0
+        return TrackState(pose, jnp.where(first, pose, self.previous), jnp.minimum(self.num_known + 1, 2))
+
+
+class FrameResult(eqx.Module):
+    """What was found in one frame."""
+
+    pose: Float[Array, "dof"]
+    terms: EnergyTerms
+    iterations: Int[Array, ""]
+    converged: Bool[Array, ""]
+    num_near: Int[Array, "camera"]
+    num_matching: Int[Array, "camera"]
+    images: Sog
+    """The image blobs that were used, for each camera (working colour space)."""
+
+
+class Tracker(eqx.Module):
+    """Everything that stays the same while a recording is tracked; several actors are one body (`concatenate`)."""
+
+    body: Body
+    cameras: Camera
+    normalizers: Float[Array, "camera"]
+    reader: ImageReader
+    weights: EnergyWeights
+    solver: Solver
+    scales: Scales
+    extrapolation: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    """alpha of Section 5.3."""
+
+    def predicted(self, state: TrackState) -> Float[Array, "dof"]:
+        """Theta_0 of Section 5.3: linear extrapolation of the last two poses."""
+        return state.previous + self.extrapolation * (state.previous - state.before_previous)
+
+    def boxes(self, state: TrackState) -> Float[Array, "camera actor 2 2"]:
+        """Where the actors may be seen: around the last pose and the predicted one."""
+        actors = actor_of_blobs(self.body.skeleton, self.body.blobs.joints)
+        around = lambda pose: jax.vmap(body_boxes, in_axes=(None, 0, None, None))(
+            self.body.posed_blobs(pose), self.cameras, actors, self.reader.box_enlargement
+        )
+        return union_boxes(around(state.previous), around(self.predicted(state)))
+
+    def views(
+        self, cells: UInt8[Array, "camera rows columns 3"], state: TrackState, capacities: Capacities
+    ) -> tuple[Views, Int[Array, "camera"], Int[Array, "camera"]]:
+        """What the cameras see, culled, and the counts that must be held against the capacities."""
+        rgb = cells.astype(self.cameras.intrinsics.dtype) / 255.0
+        near, num_near = self.reader.near_blobs(rgb, self.boxes(state), capacities.near)
+        body_colors = from_rgb(self.body.blob_colors, self.reader.color_space)
+        body = eqx.tree_at(lambda sog: sog.colors, self.body.posed_blobs(state.previous), body_colors)
+        images, similarities, num_matching = self.reader.matching_blobs(near, body, capacities.matching)
+        return Views(self.cameras, images, similarities, self.normalizers), num_near, num_matching
+
+    def step(
+        self, state: TrackState, cells: UInt8[Array, "camera rows columns 3"], capacities: Capacities
+    ) -> tuple[TrackState, FrameResult]:
+        """Find the pose of one frame from its cells (sRGB bytes)."""
+        views, num_near, num_matching = self.views(cells, state, capacities)
+        history = History(state.previous, state.before_previous, state.num_known == 2)
+        objective = lambda pose: energy(self.body, pose, views, history, self.weights)
+        solution = self.solver.maximize(objective, self.predicted(state), self.scales)
+        result = FrameResult(
+            pose=solution.params,
+            terms=energy_terms(self.body, solution.params, views, history, self.weights),
+            iterations=solution.iterations,
+            converged=solution.converged,
+            num_near=num_near,
+            num_matching=num_matching,
+            images=views.images,
+        )
+        return state.advanced(solution.params), result
+
+
+_step = eqx.filter_jit(Tracker.step)
+
+
+@dataclass
+class TrackedFrame:
+    """The result of one frame, and the capacities it was computed with."""
+
+    index: int
+    result: FrameResult
+    capacities: Capacities
+
+
+def track(
+    tracker: Tracker,
+    start: Float[Array, "dof"],
+    frames: Iterable[UInt8[np.ndarray, "camera rows columns 3"]],
+) -> Iterator[TrackedFrame]:
+    """Track the frames one after the other from a rough pose of the first one.
+
+    The step is compiled once, with room for `HEADROOM` times the image blobs of the first frame; a frame that needs
+    more is done again with the next capacity (and compiles again), so no blob is ever cut off unseen.
+
+    Raises:
+        ValueError: more image blobs than the largest capacity.
+    """
+    state = TrackState.from_pose(start)
+    capacities: Capacities | None = None
+    for index, cells in enumerate(frames):
+        device_cells = jnp.asarray(cells)
+        if capacities is None:
+            capacities = first_capacities(tracker, state, device_cells)
+        while True:
+            next_state, result = _step(tracker, state, device_cells, capacities)
+            needed = capacities.holding(int(result.num_near.max()), int(result.num_matching.max()), HEADROOM)
+            if needed == capacities:
+                break
+            if needed.near > CAPACITIES[-1] or int(result.num_near.max()) > CAPACITIES[-1]:
+                raise ValueError(f"frame {index}: {int(result.num_near.max())} image blobs near the body")
+            capacities = needed
+        state = next_state
+        yield TrackedFrame(index, result, capacities)
+
+
+def first_capacities(tracker: Tracker, state: TrackState, cells: UInt8[Array, "camera rows columns 3"]) -> Capacities:
+    """Capacities with headroom for what the first frame needs."""
+    capacity = capacity_for(int(_num_near(tracker, state, cells).max()) * HEADROOM)
+    counted = _num_matching(tracker, state, cells, Capacities(near=capacity, matching=CAPACITIES[0]))
+    return Capacities(near=capacity, matching=capacity_for(int(counted.max()) * HEADROOM))
+
+
+@eqx.filter_jit
+def _num_near(tracker: Tracker, state: TrackState, cells: Array) -> Int[Array, "camera"]:
+    rgb = cells.astype(tracker.cameras.intrinsics.dtype) / 255.0
+    return tracker.reader.near_blobs(rgb, tracker.boxes(state), CAPACITIES[0])[1]
+
+
+@eqx.filter_jit
+def _num_matching(tracker: Tracker, state: TrackState, cells: Array, capacities: Capacities) -> Int[Array, "camera"]:
+    return tracker.views(cells, state, capacities)[2]

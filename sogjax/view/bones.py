@@ -1,0 +1,125 @@
+"""What to draw of a motion: bones between distinct joints, left and right apart, in an actor's colours."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+
+from sogjax.data.motion import Motion
+
+SAME_ORIGIN = 1e-4
+"""Metres. One-axis joints nearer than this to their parent in every frame are drawn as one."""
+SHORTEST_TIP = 0.02
+"""Metres. A last joint whose blobs are all nearer gets no bone to its tip."""
+
+LEFT, MIDDLE, RIGHT = 0, 1, 2
+
+_PALETTE = np.array(
+    [
+        [[64, 156, 255], [255, 236, 140], [255, 96, 64]],
+        [[40, 220, 190], [200, 255, 170], [240, 80, 220]],
+        [[150, 120, 255], [220, 200, 255], [255, 170, 40]],
+        [[120, 220, 60], [240, 240, 240], [255, 120, 170]],
+    ],
+    np.uint8,
+)
+"""RGB of left, middle and right for one actor after the other."""
+
+
+@dataclass(frozen=True)
+class Bones:
+    """Line segments of one motion."""
+
+    points: Float[np.ndarray, "frame point 3"]
+    """Metres, world: the distinct joints, then the tips of the last ones."""
+    num_joints: int
+    """How many of the points are joints."""
+    edges: Int[np.ndarray, "edge 2"]
+    """From point to point."""
+    sides: Int[np.ndarray, "edge"]
+    """LEFT, MIDDLE or RIGHT of each edge."""
+
+
+def bones_from_motion(motion: Motion) -> Bones:
+    """Every joint to its nearest ancestor at another place; the last ones also to their farthest blob."""
+    drawn_as = _drawn_as(motion)
+    parents = np.asarray(motion.joint_parents, int)
+    joints = np.unique(drawn_as[drawn_as >= 0]).tolist()
+    edges = [(drawn_as[parents[j]], j) for j in joints if parents[j] >= 0 and drawn_as[parents[j]] >= 0]
+    tips = _tips(motion, drawn_as, set(joints) - {parent for parent, _ in edges})
+    number = {joint: k for k, joint in enumerate(joints)}
+    pairs = [(number[a], number[b]) for a, b in edges]
+    pairs += [(number[joint], len(joints) + k) for k, (joint, _) in enumerate(tips)]
+    sides = sides_of(motion)[np.array([b for _, b in edges] + [joint for joint, _ in tips], int)]
+    points = [
+        motion.world_from_joint[:, joints][..., :3, 3],
+        motion.blob_means[:, [blob for _, blob in tips]],
+    ]
+    return Bones(
+        points=np.concatenate(points, axis=1).astype(np.float32),
+        num_joints=len(joints),
+        edges=np.array(pairs, int).reshape(-1, 2),
+        sides=sides,
+    )
+
+
+def sides_of(motion: Motion) -> Int[np.ndarray, "joint"]:
+    """LEFT, MIDDLE or RIGHT of every joint, by its name."""
+    return np.array([_side(str(name)) for name in motion.joint_names], int)
+
+
+def actor_palette(actor: int) -> UInt8[np.ndarray, "3 3"]:
+    """RGB of an actor's left, middle and right; actors far down the list share colours."""
+    return _PALETTE[actor % len(_PALETTE)]
+
+
+def blob_palette(motion: Motion, actor: int) -> UInt8[np.ndarray, "blob 3"]:
+    """RGB of an actor's blobs, by the side of their joint."""
+    return actor_palette(actor)[sides_of(motion)[np.asarray(motion.blob_joint, int)]]
+
+
+def _side(name: str) -> int:
+    words = name.rsplit("/", 1)[-1].lower().replace("-", "_").replace(".", "_").split("_")
+    if "left" in words or words[0] == "l" or words[-1] == "l":
+        return LEFT
+    if "right" in words or words[0] == "r" or words[-1] == "r":
+        return RIGHT
+    return MIDDLE
+
+
+def _drawn_as(motion: Motion) -> Int[np.ndarray, "joint"]:
+    """For each joint the topmost one at the same place; -1 for joints that only place the root in the world.
+
+    A root's translations are joints of their own, some of which stay on the world's axes: nothing is drawn
+    above the first joint that has a blob or more than one child.
+    """
+    parents = np.asarray(motion.joint_parents, int)
+    origins = motion.world_from_joint[:, :, :3, 3]
+    body = _body_joints(parents, np.asarray(motion.blob_joint, int))
+    drawn_as = np.full(len(parents), -1)
+    for j, parent in enumerate(parents):
+        if body[j]:
+            together = parent >= 0 and np.abs(origins[:, j] - origins[:, parent]).max() < SAME_ORIGIN
+            drawn_as[j] = drawn_as[parent] if together and drawn_as[parent] >= 0 else j
+    return drawn_as
+
+
+def _body_joints(parents: np.ndarray, blob_joint: np.ndarray) -> np.ndarray:
+    """False for the chain of joints between the world and the first joint with a blob or several children."""
+    body = np.zeros(len(parents), bool)
+    children = np.bincount(parents[parents >= 0], minlength=len(parents))
+    for j, parent in enumerate(parents):
+        body[j] = (parent >= 0 and body[parent]) or children[j] != 1 or j in blob_joint
+    return body
+
+
+def _tips(motion: Motion, drawn_as: np.ndarray, last: set[int]) -> list[tuple[int, int]]:
+    """(joint, farthest blob) of each last joint that has a blob away from it."""
+    blob_as = drawn_as[np.asarray(motion.blob_joint, int)]
+    tips = []
+    for joint in sorted(last):
+        blobs = np.flatnonzero(blob_as == joint)
+        lengths = np.linalg.norm(motion.blob_means[0, blobs] - motion.world_from_joint[0, joint, :3, 3], axis=-1)
+        if blobs.size and lengths.max() > SHORTEST_TIP:
+            tips.append((int(joint), int(blobs[lengths.argmax()])))
+    return tips

@@ -1,0 +1,121 @@
+"""The Rerun file, read back with Rerun's own reader."""
+
+from collections import defaultdict
+
+import cv2
+import numpy as np
+import pytest
+from motion_cases import points_on, walking_motion
+from rerun.chunk import RrdReader
+from rig_cases import black, opencv_pixels, recording_of, ring_rig
+
+from sogjax.data.ground_truth import GroundTruth
+from sogjax.errors import InputError
+from sogjax.view.rerun import ImageBlobs, view_command, write_rerun
+
+
+def read_back(path):
+    """Every column of the file: {entity: {column: rows}}, rows in the order of the frames."""
+    columns = defaultdict(dict)
+    for chunk in RrdReader(path).stream():
+        batch = chunk.to_record_batch()
+        for name in batch.schema.names:
+            columns[str(chunk.entity_path)].setdefault(name, []).extend(batch.column(name).to_pylist())
+    return columns
+
+
+@pytest.fixture
+def motion():
+    return walking_motion(6, first_frame=2)
+
+
+def test_bodies_and_curves_are_in_the_file_frame_by_frame(tmp_path, motion):
+    penalty = np.arange(6.0)
+    traces = {"energy": [np.arange(3.0) + 10 * k for k in range(6)]}
+    path = tmp_path / "motion.rrd"
+    recording = recording_of(ring_rig(), 10)
+    write_rerun(path, recording, [motion], names=["ann"], terms={"limit_penalty": penalty}, traces=traces)
+    found = read_back(path)
+    blobs = found["/world/actors/ann/blobs"]
+    np.testing.assert_allclose(blobs["Ellipsoids3D:centers"][-6:], motion.blob_means, atol=1e-6)
+    strips = np.array(found["/world/actors/ann/skeleton"]["LineStrips3D:strips"])
+    assert strips.shape == (6, 6, 2, 3)
+    np.testing.assert_allclose(strips[:, 0, 0], motion.world_from_joint[:, 3, :3, 3], atol=1e-6)
+    similarity = found["/curves/energy/similarity"]
+    np.testing.assert_allclose(np.ravel(similarity["Scalars:scalars"]), motion.similarity)
+    assert similarity["frame"] == list(range(2, 8))
+    np.testing.assert_allclose(np.ravel(found["/curves/penalties/limit_penalty"]["Scalars:scalars"]), penalty)
+    trace = found["/curves/trace/energy"]
+    np.testing.assert_allclose(np.ravel(trace["Scalars:scalars"]), np.concatenate(traces["energy"]))
+    assert trace["iteration"] == list(range(18))
+    assert trace["frame"] == [2 + k // 3 for k in range(18)]
+    assert len(RrdReader(path).blueprints()) == 1
+
+
+def test_pictures_are_freed_of_distortion_so_that_the_pinhole_holds(tmp_path):
+    rig = ring_rig(2, size=(1280, 960), distortion=(-0.25, 0.06, 2e-3, -2e-3, 0.0))
+    motion = walking_motion(1, still=True)
+    point = np.array([0.35, 0.3, 1.6])
+    images = black(rig)
+    for image, name in zip(images, rig.names, strict=True):
+        x, y = opencv_pixels(rig, name, point)
+        cv2.circle(image, (round(x * 16), round(y * 16)), 6 * 16, (255, 255, 255), -1, cv2.LINE_AA, 4)
+    path = tmp_path / "motion.rrd"
+    write_rerun(path, recording_of(rig, 1), [motion], frames=[images], picture_width=640, quality=95)
+    found = read_back(path)
+    for name in rig.names:
+        stored = found[f"/world/cameras/{name}"]
+        matrix = np.array(stored["Pinhole:image_from_camera"][0]).reshape(3, 3).T  # column-major
+        np.testing.assert_array_equal(np.ravel(stored["Pinhole:resolution"]), [640, 480])
+        rotation = np.array(stored["Transform3D:mat3x3"][0]).reshape(3, 3).T
+        center = np.ravel(stored["Transform3D:translation"][0])
+        ray = matrix @ rotation.T @ (point - center)
+        blob = found[f"/world/cameras/{name}/picture"]["EncodedImage:blob"][0][0]
+        picture = cv2.imdecode(np.frombuffer(bytes(blob), np.uint8), cv2.IMREAD_GRAYSCALE).astype(float)
+        picture[picture < 40] = 0.0
+        ys, xs = np.mgrid[:480, :640]
+        seen = np.array([(xs * picture).sum(), (ys * picture).sum()]) / picture.sum() + 0.5
+        # half a pixel is added: Rerun's pixel (0, 0) is the corner of the picture
+        np.testing.assert_allclose(seen, ray[:2] / ray[2], atol=0.5)
+
+
+def test_image_blobs_and_markers_lie_in_the_small_picture_and_the_world(tmp_path, motion):
+    rig = ring_rig(1)
+    markers = np.concatenate([np.full((2, 2, 3), 9.0), points_on(motion, (3, 6), np.zeros((2, 3)))])
+    markers[3, 0] = np.nan
+    sog = ImageBlobs(np.array([[-0.5, -0.5], [319.5, 239.5]]), np.array([4.0, 8.0]), np.array([[1, 0, 0], [0, 0.5, 1]]))
+    path = tmp_path / "motion.rrd"
+    truth = GroundTruth(50.0, markers, ("a", "b"))
+    recording = recording_of(rig, 8)
+    write_rerun(path, recording, [motion], image_blobs=[[sog]] * 6, truth=truth, picture_width=160)
+    found = read_back(path)
+    blobs = found["/world/cameras/cam0/blobs"]
+    np.testing.assert_allclose(blobs["Points2D:positions"][0], [[0, 0], [160, 120]])
+    np.testing.assert_allclose(blobs["Points2D:radii"][0], [2.0, 4.0])
+    assert blobs["frame"] == list(range(2, 8))
+    shown = found["/world/truth/markers"]["Points3D:positions"]
+    shown = [row for row in shown if row]
+    assert [len(row) for row in shown] == [2, 1, 2, 2, 2, 2]
+    np.testing.assert_allclose(shown[1][0], markers[3, 1], atol=1e-6)
+
+
+def test_several_actors_have_their_own_entities(tmp_path, motion):
+    path = tmp_path / "motion.rrd"
+    write_rerun(path, recording_of(ring_rig(1), 8, up="-y"), [motion, motion])
+    found = read_back(path)
+    for name in ("actor", "actor_2"):
+        assert f"/world/actors/{name}/blobs" in found
+        assert f"/curves/energy/energy/{name}" in found
+    assert np.ravel(found["/world"]["ViewCoordinates:xyz"])[1] == 2  # ViewDir.Down: y points down
+
+
+def test_a_motion_of_another_recording_is_refused_and_leaves_no_file(tmp_path, motion):
+    with pytest.raises(InputError, match="give the recording that was tracked"):
+        write_rerun(tmp_path / "a.rrd", recording_of(ring_rig(1), 5), [motion], frames=[black(ring_rig(1))] * 6)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_viewer_listens_to_this_machine_only(tmp_path):
+    command = view_command(tmp_path / "a.rrd", web=True)
+    assert command[command.index("--bind") + 1] == "127.0.0.1"
+    assert "--bind" not in view_command(tmp_path / "a.rrd")

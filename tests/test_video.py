@@ -1,0 +1,195 @@
+"""Images of a recording arrive complete, in order and in step; videos that are written are whole."""
+
+import gc
+import os
+import threading
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from small_recording import (
+    FPS,
+    frame_image,
+    frame_of,
+    make_recording,
+    shared_recording,
+    toml_camera,
+    write_calibration,
+    write_image,
+    write_images,
+    write_video,
+)
+
+from sogjax.data.recording import open_recording
+from sogjax.data.video import VideoWriter, read_frames, read_image, read_mask
+from sogjax.errors import InputError
+
+
+def frames_read(recording, *span):
+    return [[frame_of(image) for image in images] for images in read_frames(recording, *span)]
+
+
+def test_all_frames_of_all_cameras_in_the_rigs_order(tmp_path):
+    recording = open_recording(make_recording(tmp_path / "r", frames=6))
+    steps = list(read_frames(recording))
+    assert [[frame_of(image) for image in images] for images in steps] == [[t, t] for t in range(6)]
+    left, right = steps[0]
+    assert left.dtype == np.uint8
+    assert left.shape == (48, 64, 3)
+    assert left[:, 16].mean() < 45 < right[:, 16].mean()
+
+
+@pytest.mark.parametrize("span", [(0, 3), (2, 5), (5, None), (3, 3), (0, 99)])
+def test_start_and_stop(tmp_path, span):
+    recording = open_recording(make_recording(tmp_path / "r", frames=6))
+    assert frames_read(recording, *span) == [[t, t] for t in range(6)[span[0] : span[1]]]
+
+
+def test_a_span_outside_the_recording_is_an_error_of_the_caller(tmp_path):
+    recording = open_recording(make_recording(tmp_path / "r"))
+    for span in [(-1, 2), (3, 2), (9, None)]:
+        with pytest.raises(ValueError, match="4 frames"):
+            read_frames(recording, *span)
+
+
+def test_offsets_and_first_frame(tmp_path):
+    """Frame t of a camera is frame t + offset of its file; start counts from the first frame."""
+    yaml = "up: z\nframe_offset: {left: 2, right: -1}\nfirst_frame: 2\nlast_frame: 4\n"
+    recording = open_recording(make_recording(tmp_path / "r", frames=8, settings=yaml))
+    assert frames_read(recording) == [[4, 1], [5, 2], [6, 3]]
+    assert frames_read(recording, 1, 2) == [[5, 2]]
+
+
+def test_image_folders_are_read_as_videos_are(tmp_path):
+    folder = make_recording(tmp_path / "r", cameras=(), settings="up: z\nframe_offset: {left: 1}\n")
+    write_calibration(folder, toml_camera("left"), toml_camera("right"))
+    write_images(folder / "images" / "left", first=98, frames=5)
+    write_video(folder / "videos" / "right.mp4")
+    assert frames_read(open_recording(folder), 1) == [[2, 1], [3, 2], [4, 3]]
+
+
+def test_decoding_runs_ahead_of_the_consumer_in_other_threads(tmp_path, monkeypatch):
+    read_by, read = [], cv2.VideoCapture.read
+
+    class Spy:
+        def __init__(self, capture):
+            self._capture = capture
+
+        def __getattr__(self, name):
+            return getattr(self._capture, name)
+
+        def read(self):
+            read_by.append(threading.get_ident())
+            return read(self._capture)
+
+    recording = open_recording(make_recording(tmp_path / "r"))
+    capture = cv2.VideoCapture
+    monkeypatch.setattr(cv2, "VideoCapture", lambda *arguments: Spy(capture(*arguments)))
+    frames = read_frames(recording)
+    next(frames)
+    for _ in range(200):
+        if len(read_by) == 4:
+            break
+        threading.Event().wait(0.01)
+    assert len(read_by) == 4, "two cameras, the first frame and the one ahead"
+    assert threading.get_ident() not in read_by
+
+
+def open_files(folder):
+    return [fd for fd in Path("/proc/self/fd").iterdir() if os.path.realpath(fd).startswith(str(folder))]
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="needs /proc to see the open files")
+def test_a_consumer_that_stops_early_leaves_nothing_open(tmp_path):
+    recording = open_recording(make_recording(tmp_path / "r"))
+    assert open_files(tmp_path) == []
+    threads = threading.active_count()
+    frames = read_frames(recording)
+    next(frames)
+    assert len(open_files(tmp_path)) == 2
+    frames.close()  # pyright: ignore[reportAttributeAccessIssue]
+    gc.collect()
+    assert open_files(tmp_path) == []
+    assert threading.active_count() == threads
+
+
+def test_a_video_that_ends_early_is_one_sentence(tmp_path):
+    folder = make_recording(tmp_path / "r", frames=6)
+    recording = open_recording(folder)
+    write_video(folder / "videos" / "right.mp4", frames=3)
+    with pytest.raises(InputError, match=r"right\.mp4: ends before frame 3.*last_frame: 2"):
+        list(read_frames(recording))
+
+
+def test_a_video_that_vanishes_or_changes_size_is_one_sentence(tmp_path):
+    folder = make_recording(tmp_path / "r")
+    recording = open_recording(folder)
+    write_video(folder / "videos" / "right.mp4", size=(32, 32))
+    with pytest.raises(InputError, match=r"right\.mp4.*32x32"):
+        list(read_frames(recording))
+    (folder / "videos" / "right.mp4").unlink()
+    with pytest.raises(InputError, match=r"right\.mp4"):
+        list(read_frames(recording))
+
+
+def test_an_image_of_another_size_among_others_is_named(tmp_path):
+    folder = make_recording(tmp_path / "r", cameras=(), settings="up: z\nfps: 25\n")
+    write_calibration(folder, toml_camera("left"))
+    write_images(folder / "images" / "left")
+    write_image(folder / "images" / "left" / "000002.png", frame_image(0, 0, (32, 32)))
+    with pytest.raises(InputError, match=r"000002\.png: is 32x32"):
+        list(read_frames(open_recording(folder)))
+
+
+@pytest.mark.parametrize("name", ["rendered_walk", "real_tpose"])
+def test_seeking_is_exact_in_real_videos(name):
+    folder = shared_recording(name)
+    if folder is None:
+        pytest.skip(f"there is no recording {name} beside the project")
+    recording = open_recording(folder)
+    start = recording.num_frames - 3
+    images = next(iter(read_frames(recording, start)))
+    for camera, image in list(zip(recording.rig.names, images, strict=True))[:2]:
+        capture = cv2.VideoCapture(str(recording.sources[camera]))
+        for _ in range(start + 1):
+            _, expected = capture.read()
+        capture.release()
+        np.testing.assert_array_equal(image, expected)
+
+
+def test_a_written_video_is_read_again(tmp_path):
+    with VideoWriter(tmp_path / "new" / "overlay.mp4", FPS) as video:
+        for frame in range(5):
+            video.write(frame_image(0, frame))
+        assert not (tmp_path / "new" / "overlay.mp4").exists()
+    capture = cv2.VideoCapture(str(tmp_path / "new" / "overlay.mp4"))
+    assert capture.get(cv2.CAP_PROP_FPS) == FPS
+    assert [frame_of(capture.read()[1]) for _ in range(5)] == [0, 1, 2, 3, 4]
+    assert not capture.read()[0]
+    capture.release()
+    assert os.listdir(tmp_path / "new") == ["overlay.mp4"]
+
+
+def test_a_video_is_whole_or_not_there(tmp_path):
+    with pytest.raises(RuntimeError), VideoWriter(tmp_path / "a.mp4", FPS) as video:
+        video.write(frame_image(0, 0))
+        raise RuntimeError
+    with pytest.raises(ValueError, match="no image"), VideoWriter(tmp_path / "a.mp4", FPS):
+        pass
+    with pytest.raises(ValueError, match="shape"), VideoWriter(tmp_path / "a.mp4", FPS) as video:
+        video.write(frame_image(0, 0))
+        video.write(frame_image(0, 0, (32, 32)))
+    assert os.listdir(tmp_path) == []
+    with pytest.raises(InputError, match=r"a\.avi"):
+        VideoWriter(tmp_path / "a.avi", FPS)
+
+
+def test_images_and_masks(tmp_path):
+    image = np.random.default_rng(0).integers(0, 255, (12, 17, 3), np.uint8)
+    write_image(tmp_path / "image.png", image)
+    np.testing.assert_array_equal(read_image(tmp_path / "image.png"), image)
+    write_image(tmp_path / "mask.png", np.array([[0, 127], [128, 255]], np.uint8))
+    assert read_mask(tmp_path / "mask.png").tolist() == [[False, False], [True, True]]
+    with pytest.raises(InputError, match=r"absent\.png"):
+        read_image(tmp_path / "absent.png")
