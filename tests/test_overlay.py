@@ -35,7 +35,7 @@ def test_points_of_the_picture_are_those_of_opencv_with_distortion():
 
 
 def test_long_motions_are_projected_in_parts_without_a_seam():
-    rig, motion = ring_rig(2), walking_motion(300, still=True)
+    rig, motion = ring_rig(2), walking_motion(3000, still=True)
     pixels, _ = picture_points(rig, motion.blob_means)
     np.testing.assert_allclose(pixels, np.broadcast_to(pixels[:, :1], pixels.shape), atol=1e-3)
 
@@ -107,19 +107,22 @@ def test_blobs_are_circles_of_radius_sigma_in_the_picture():
     distances = np.hypot(xs - center[0], ys - center[1])
     below = ys > center[1] + 0.5 * radius  # the lowest blob: nothing else is drawn there
     assert below.sum() > 10
-    np.testing.assert_allclose(distances[below], radius, atol=1.6)
+    assert distances[below].mean() == pytest.approx(radius, abs=0.5)
+    np.testing.assert_allclose(distances[below], radius, atol=2.5)  # the line has a width
 
 
 def test_actors_and_sides_have_colours_of_their_own():
-    rig = ring_rig(1)
+    rig = ring_rig(1, size=(1280, 960))
     ann, bob = walking_motion(2), walking_motion(2, start=(0.0, 0.6, 1.0))
 
-    def colors(motions):
-        return {tuple(color) for color in overlay_frame(black(rig), rig, motions, 0).reshape(-1, 3)}
+    def shows(motions, color):
+        return (overlay_frame(black(rig), rig, motions, 0) == color).all(axis=2).any()
 
-    both = colors([ann, bob])
-    assert {(255, 156, 64), (64, 96, 255)} <= colors([ann])
-    assert {(255, 156, 64), (64, 96, 255), (190, 220, 40), (220, 80, 240)} <= both
+    for color in ((255, 156, 64), (64, 96, 255)):  # BGR of the first actor's left and right
+        assert shows([ann], color)
+    for color in ((190, 220, 40), (220, 80, 240)):
+        assert shows([ann, bob], color)
+        assert not shows([ann], color)
 
 
 def test_cameras_can_be_chosen_and_actors_come_and_go():

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import yaml
 from jaxtyping import Float
+from numpy.typing import ArrayLike
 
 from sogjax.data import actor_rows
 from sogjax.data.actor_rows import WORLD, Row, filled_table, names, table
@@ -35,9 +36,7 @@ def named_body(name: str) -> Path:
     """
     shipped = {path.stem: path for path in sorted(_BODIES.glob("*.yaml"))}
     if name not in shipped:
-        raise InputError(
-            f"no body {name!r} comes with sogjax; choose one of {', '.join(shipped)} or give a file"
-        )
+        raise InputError(f"no body {name!r} comes with sogjax; choose one of {', '.join(shipped)} or give a file")
     return shipped[name]
 
 
@@ -54,23 +53,18 @@ def load_body(path: Path) -> Body:
     )
     name = actor_rows.plain_name(document["name"])
     metres = METRES[document["unit"].choice(METRES, "a unit of length")] if "unit" in document else 1.0
-    space = (
-        document["color_space"].choice(COLOR_RADIUS, "a colour space") if "color_space" in document else "rgb"
-    )
+    space = document["color_space"].choice(COLOR_RADIUS, "a colour space") if "color_space" in document else "rgb"
     joint_rows = actor_rows.sorted_by_parent(
         filled_table(document["joints"], ("name", "parent", "offset", "axis", "kind"))
     )
     dof_rows = filled_table(document["dofs"], ("name", "joints"), ("limits",))
     blob_rows = filled_table(document["blobs"], ("name", "joint", "offset", "sigma"), ("color", "colour"))
-    landmark_rows = (
-        table(document["landmarks"], ("name", "joint", "offset")) if "landmarks" in document else []
-    )
+    landmark_rows = table(document["landmarks"], ("name", "joint", "offset")) if "landmarks" in document else []
     shape_rows = table(document["shape"], ("name",), _SHAPE_FIELDS) if "shape" in document else []
 
     skeleton, dof_metres = _skeleton(joint_rows, dof_rows, metres)
     colors = [
-        actor_rows.color(row, place, space)
-        for row, place in zip(blob_rows, document["blobs"].items(), strict=True)
+        actor_rows.color(row, place, space) for row, place in zip(blob_rows, document["blobs"].items(), strict=True)
     ]
     known = (skeleton.names, names(blob_rows), names(blob_rows), names(landmark_rows))
     return Body(
@@ -105,9 +99,7 @@ def save_body(path: Path, body: Body) -> None:
 _SHAPE_FIELDS = ("joint_offsets", "blob_offsets", "blob_sigmas", "landmark_offsets")
 
 
-def _skeleton(
-    joint_rows: list[Row], dof_rows: list[Row], metres: float
-) -> tuple[Skeleton, Float[np.ndarray, "dof"]]:
+def _skeleton(joint_rows: list[Row], dof_rows: list[Row], metres: float) -> tuple[Skeleton, Float[np.ndarray, "dof"]]:
     """The skeleton, and the factors that turn the file's values of degrees of freedom into metres or radians.
 
     A DoF that only slides joints is a length; one that also turns joints is an angle, and its weight of a
@@ -131,9 +123,7 @@ def _skeleton(
         offsets=jnp.asarray(metres * np.array([row["offset"].numbers() for row in joint_rows])),
         axes=jnp.asarray(np.array([actor_rows.axis(row["axis"]) for row in joint_rows])),
         revolute=jnp.asarray(revolute),
-        parameter_transform=jnp.asarray(
-            transform * np.where(revolute[:, None] | is_length[None, :], 1.0, metres)
-        ),
+        parameter_transform=jnp.asarray(transform * np.where(revolute[:, None] | is_length[None, :], 1.0, metres)),
         dof_lower=jnp.asarray(limits[:, 0]),
         dof_upper=jnp.asarray(limits[:, 1]),
     )
@@ -152,21 +142,22 @@ def _attachments(rows: list[Row], joints: Sequence[str], metres: float) -> Attac
 def _lines(body: Body) -> Iterator[str]:
     skeleton = body.skeleton
     yield from (f"name: {_flow(body.name)}", "unit: m", "color_space: rgb", "", "joints:")
+    offsets, axes, revolute = map(np.asarray, (skeleton.offsets, skeleton.axes, skeleton.revolute))
     for k, name in enumerate(skeleton.names):
         parent = skeleton.parents[k]
         yield _row(
             name=name,
             parent=WORLD if parent < 0 else skeleton.names[parent],
-            offset=_numbers(skeleton.offsets[k]),
-            axis=_axis(np.asarray(skeleton.axes[k])),
-            kind="revolute" if skeleton.revolute[k] else "prismatic",
+            offset=_numbers(offsets[k]),
+            axis=_axis(axes[k]),
+            kind="revolute" if revolute[k] else "prismatic",
         )
     yield from ("", "dofs:")
     weights = np.asarray(skeleton.parameter_transform)
+    bounds = np.asarray(skeleton.dof_lower), np.asarray(skeleton.dof_upper)
     for k, name in enumerate(skeleton.dof_names):
         moved = {skeleton.names[j]: _number(weights[j, k]) for j in np.flatnonzero(weights[:, k])}
-        bounds = np.asarray(skeleton.dof_lower)[k], np.asarray(skeleton.dof_upper)[k]
-        limits = [_number(bound) if np.isfinite(bound) else None for bound in bounds]
+        limits = [_number(bound[k]) if np.isfinite(bound[k]) else None for bound in bounds]
         yield _row(name=name, limits="none" if limits == [None, None] else limits, joints=moved)
     yield from ("", "blobs:")
     sigmas, colors = np.asarray(body.blob_sigmas), np.round(np.asarray(body.blob_colors), COLOR_DECIMALS)
@@ -187,20 +178,20 @@ def _lines(body: Body) -> Iterator[str]:
 
 
 def _points(points: Attachments, joints: Sequence[str]) -> Iterator[dict[str, object]]:
-    for name, joint, offset in zip(points.names, points.joints, points.offsets, strict=True):
+    for name, joint, offset in zip(points.names, points.joints, np.asarray(points.offsets), strict=True):
         yield {"name": name, "joint": joints[joint], "offset": _numbers(offset)}
 
 
-def _axis(axis: Float[np.ndarray, "3"]) -> str | list[float]:
+def _axis(axis: Float[np.ndarray, "3"]) -> str | list[int | float]:
     letters = [letter for letter in UP_AXES if np.array_equal(axis, axis_vector(letter))]
     return letters[0] if letters else _numbers(axis)
 
 
-def _numbers(values) -> list[float]:
+def _numbers(values: ArrayLike) -> list[int | float]:
     return [_number(value) for value in np.asarray(values)]
 
 
-def _number(value: np.floating) -> float:
+def _number(value: np.floating) -> int | float:
     """The number with the fewest digits that gives this value in its own precision."""
     if not np.isfinite(value):
         raise ValueError(f"a body with the number {value} cannot be written")
@@ -213,7 +204,5 @@ def _row(**fields: object) -> str:
 
 
 def _flow(value: object) -> str:
-    text = yaml.safe_dump(
-        value, default_flow_style=True, sort_keys=False, width=float("inf"), allow_unicode=True
-    )
+    text = yaml.safe_dump(value, default_flow_style=True, sort_keys=False, width=float("inf"), allow_unicode=True)
     return text.removesuffix("...\n").strip()

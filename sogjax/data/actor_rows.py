@@ -133,9 +133,7 @@ def color(row: Row, place: Entry, space: str) -> list[float]:
     """The colour of a blob, in the colour space of the file, under either spelling of the key."""
     spellings = [key for key in ("color", "colour") if key in row]
     if len(spellings) != 1:
-        raise InputError(
-            f"{place.path}: {place.key} needs one key `color`, three numbers in the space {space}"
-        )
+        raise InputError(f"{place.path}: {place.key} needs one key `color`, three numbers in the space {space}")
     low, high = (0.0, 1.0) if space in ("rgb", "hsv") else (-1.5, 1.5)
     expected = f"three numbers from {low:g} to {high:g}: a colour in the space {space}"
     values = row[spellings[0]].numbers(expected)
@@ -156,9 +154,7 @@ def pose(entry: Entry, dof_names: Sequence[str]) -> Float[np.ndarray, "dof"]:
 def shape_group(row: Row, known: dict[str, Sequence[str]]) -> ShapeGroup:
     """One shape parameter; `known` gives for each of its lists the names that may stand there."""
     scaled = {
-        field: tuple(
-            item.choice(options, f"the name of a {field.split('_')[0]}") for item in row[field].items()
-        )
+        field: tuple(item.choice(options, f"the name of a {field.split('_')[0]}") for item in row[field].items())
         for field, options in known.items()
         if field in row
     }

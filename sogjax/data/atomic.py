@@ -30,9 +30,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
         temporary.touch(exist_ok=False)
     except OSError as error:
         reason = error.strerror or str(error)
-        raise InputError(
-            f"{path}: the folder {path.parent} cannot be written ({reason}); choose another"
-        ) from error
+        raise InputError(f"{path}: the folder {path.parent} cannot be written ({reason}); choose another") from error
     try:
         yield temporary
         temporary.replace(path)

@@ -66,9 +66,7 @@ def load_ground_truth(path: Path) -> GroundTruth:
     if markers is None and joints is None:
         raise InputError(f"{path}: holds neither 'markers' nor 'joints'; add one of them")
     if markers is not None and joints is not None and len(markers) != len(joints):
-        raise InputError(
-            f"{path}: 'markers' has {len(markers)} frames and 'joints' {len(joints)}; make them equal"
-        )
+        raise InputError(f"{path}: 'markers' has {len(markers)} frames and 'joints' {len(joints)}; make them equal")
     return GroundTruth(fps, markers, marker_names, joints, joint_names)
 
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from sogjax.data.yaml_entry import Entry, read_entry
+from sogjax.data.yaml_entry import Entry, read_yaml
 from sogjax.errors import InputError
 
 _KEYS = ("pose", "position", "heading", "landmarks")
@@ -40,9 +40,7 @@ def load_initial_poses(path: Path, actors: Sequence[str]) -> dict[str, InitialPo
         )
     for actor in actors:
         if actor not in poses:
-            raise InputError(
-                f"{path}: has no pose for the actor {actor!r}, only for: {', '.join(poses)}; add it"
-            )
+            raise InputError(f"{path}: has no pose for the actor {actor!r}, only for: {', '.join(poses)}; add it")
     for name in poses:
         if name not in actors:
             raise InputError(f"{path}: {name!r} is no actor; rename it to one of: {', '.join(actors)}")
@@ -55,11 +53,9 @@ def read_initial_poses(path: Path) -> InitialPose | dict[str, InitialPose]:
     Raises:
         InputError: no such file, or a value is wrong.
     """
-    entry = read_entry(path)
+    entry = read_yaml(path)
     actors = entry.mapping()
-    several = actors and all(
-        name not in _KEYS and isinstance(actor.value, dict) for name, actor in actors.items()
-    )
+    several = actors and all(name not in _KEYS and isinstance(actor.value, dict) for name, actor in actors.items())
     if several:
         return {name: parse_initial_pose(actor) for name, actor in actors.items()}
     return parse_initial_pose(entry)

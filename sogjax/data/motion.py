@@ -174,13 +174,9 @@ def _check(path: Path, motion: Motion) -> None:
         )
     wrong = (motion.blob_joint < 0) | (motion.blob_joint >= len(joints))
     if wrong.any():
-        raise InputError(
-            f"{path}: 'blob_joint' holds {motion.blob_joint[wrong][0]}, which is no joint; correct it"
-        )
+        raise InputError(f"{path}: 'blob_joint' holds {motion.blob_joint[wrong][0]}, which is no joint; correct it")
     if (np.diff(motion.frame) <= 0).any():
-        raise InputError(
-            f"{path}: 'frame' does not increase ({motion.frame[:5].tolist()} ...); sort the frames"
-        )
+        raise InputError(f"{path}: 'frame' does not increase ({motion.frame[:5].tolist()} ...); sort the frames")
     for key in ("similarity", "energy"):
         if np.isinf(getattr(motion, key)).any():
             raise InputError(f"{path}: {key!r} is infinite somewhere; write NaN where it is not known")

@@ -24,17 +24,13 @@ def read_npz(path: Path) -> dict[str, np.ndarray]:
         with zipfile.ZipFile(path) as archive:
             size = sum(member.file_size for member in archive.infolist())
         if size > MAX_BYTES:
-            raise InputError(
-                f"{path}: holds {size} bytes of arrays, more than {MAX_BYTES}; cut it into parts"
-            )
+            raise InputError(f"{path}: holds {size} bytes of arrays, more than {MAX_BYTES}; cut it into parts")
         with np.load(path, allow_pickle=False) as arrays:
             return {key: arrays[key] for key in arrays.files}
     except InputError:
         raise
     except (OSError, ValueError, zipfile.BadZipFile, EOFError, KeyError, MemoryError, RuntimeError) as error:
-        raise InputError(
-            f"{path}: is not readable as npz without pickles ({error}); write it anew"
-        ) from error
+        raise InputError(f"{path}: is not readable as npz without pickles ({error}); write it anew") from error
 
 
 def float_array(

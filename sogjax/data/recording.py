@@ -89,9 +89,7 @@ def open_recording(path: Path) -> Recording:
         sources=sources,
         frame_offset=offsets,
         background=find_background(path / "background", rig, calibrated.names),
-        example_poses=find_example_poses(
-            path / "example_poses", rig, calibrated.names, settings.example_poses
-        ),
+        example_poses=find_example_poses(path / "example_poses", rig, calibrated.names, settings.example_poses),
         initial_poses=_initial_poses(path / "initial_pose.yaml"),
         ground_truth=_ground_truth(path / "ground_truth.npz"),
         warnings=(*warnings, *_doubts(path, settings, rig)),
@@ -102,18 +100,14 @@ def _calibration(path: Path, settings: RecordingSettings) -> Path:
     if settings.calibration is not None:
         named = path / settings.calibration
         if not named.is_file():
-            raise InputError(
-                f"{path / 'recording.yaml'}: calibration: there is no file {named}; correct the name"
-            )
+            raise InputError(f"{path / 'recording.yaml'}: calibration: there is no file {named}; correct the name")
         return named
     found = find_calibrations(path)
     if not found:
         raise InputError(f"{path}: holds no calibration file; add calibration.toml")
     if len(found) > 1:
         names = ", ".join(file.name for file in found)
-        raise InputError(
-            f"{path}: holds several calibrations ({names}); name one as `calibration:` in recording.yaml"
-        )
+        raise InputError(f"{path}: holds several calibrations ({names}); name one as `calibration:` in recording.yaml")
     return found[0]
 
 
@@ -130,8 +124,7 @@ def _cameras(
     for camera in wanted:
         if camera not in calibrated:
             raise InputError(
-                f"{calibration}: has no camera {camera!r}, only: {', '.join(calibrated)}; "
-                f"calibrate it{otherwise}"
+                f"{calibration}: has no camera {camera!r}, only: {', '.join(calibrated)}; calibrate it{otherwise}"
             )
         if camera not in filmed:
             raise InputError(
@@ -166,8 +159,7 @@ def _frames(
     if latest < earliest:
         lengths = ", ".join(f"{camera} {info.num_frames}" for camera, info in infos.items())
         raise InputError(
-            f"{path}: the videos have no frame in common ({lengths} frames); "
-            "correct `frame_offset:` or the videos"
+            f"{path}: the videos have no frame in common ({lengths} frames); correct `frame_offset:` or the videos"
         )
     first, last = settings.first_frame, settings.last_frame
     for key, frame in (("first_frame", first), ("last_frame", last)):
@@ -178,15 +170,11 @@ def _frames(
             )
     first, last = earliest if first is None else first, latest if last is None else last
     if last < first:
-        raise InputError(
-            f"{path / 'recording.yaml'}: last_frame: {last} is before first_frame {first}; swap them"
-        )
+        raise InputError(f"{path / 'recording.yaml'}: last_frame: {last} is before first_frame {first}; swap them")
     warnings = ()
     if settings.last_frame is None and len(set(ends.values())) > 1:
         lengths = ", ".join(f"{camera} {info.num_frames}" for camera, info in infos.items())
-        warnings = (
-            f"{path}: the videos differ in length ({lengths} frames); frames {first} to {last} are used",
-        )
+        warnings = (f"{path}: the videos differ in length ({lengths} frames); frames {first} to {last} are used",)
     return first, last - first + 1, warnings
 
 
@@ -208,9 +196,7 @@ def _doubts(path: Path, settings: RecordingSettings, rig: CameraRig) -> tuple[st
     """Sentences on what is not wrong for sure."""
     doubts = []
     if settings.up is None:
-        doubts.append(
-            f"{path}: says nothing of the vertical; {DEFAULT_UP} is taken (`up:` in recording.yaml)"
-        )
+        doubts.append(f"{path}: says nothing of the vertical; {DEFAULT_UP} is taken (`up:` in recording.yaml)")
     distances = np.linalg.norm(np.asarray(rig.cameras.camera_from_world)[:, :3, 3], axis=-1)
     if distances.max() > FAR_CAMERA:
         doubts.append(

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from sogjax.data.calibration.rig import METRES_PER_UNIT
 from sogjax.data.initial_pose import InitialPose, parse_initial_pose
-from sogjax.data.yaml_entry import Entry, read_entry
+from sogjax.data.yaml_entry import Entry, read_yaml
 from sogjax.model.frames import UP_AXES
 
 _KEYS = (
@@ -51,7 +51,7 @@ def read_recording_settings(path: Path) -> RecordingSettings:
     Raises:
         InputError: no YAML, an unknown key, or a value of the wrong kind.
     """
-    entry = read_entry(path) if path.exists() else Entry(path, "", None)
+    entry = read_yaml(path) if path.exists() else Entry(path, "", None)
     entries = {} if entry.value is None else entry.fields((), _KEYS)
     given = {key: value for key, value in entries.items() if value.value is not None}
     return RecordingSettings(

@@ -1,11 +1,11 @@
 """The images of one camera, one after the other: a video, or a folder of numbered images."""
 
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import cv2
 import numpy as np
@@ -22,16 +22,16 @@ _COUNT_PACKETS_BELOW = 256 * 2**20
 Image = UInt8[np.ndarray, "height width 3"]
 
 
-class Source(Protocol):
+class Source(ABC):
     """Sequential access to the images of one camera."""
 
+    @abstractmethod
     def read(self) -> Image | None:
         """The next image (BGR), or None after the last."""
-        ...
 
+    @abstractmethod
     def close(self) -> None:
         """Release the file."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -107,9 +107,7 @@ def numbered_images(folder: Path) -> list[Path]:
     for path in paths:
         match = re.search(r"([0-9]{1,18})$", path.stem)
         if match is None:
-            raise InputError(
-                f"{path}: its name does not end in a number; call the images 000000.png and so on"
-            )
+            raise InputError(f"{path}: its name does not end in a number; call the images 000000.png and so on")
         number = int(match[1])
         if number in numbers:
             raise InputError(f"{path}: has the number of {numbers[number].name}; keep one image a frame")
@@ -123,7 +121,7 @@ def numbered_images(folder: Path) -> list[Path]:
     return [numbers[number] for number in sorted(numbers)]
 
 
-class _VideoFile:
+class _VideoFile(Source):
     """A video, decoded by FFmpeg; rotation metadata is applied."""
 
     def __init__(self, path: Path, start: int, threads: int):
@@ -150,7 +148,7 @@ class _VideoFile:
             self._capture.grab()
 
 
-class _ImageFolder:
+class _ImageFolder(Source):
     """A folder of numbered images, all of one size."""
 
     def __init__(self, folder: Path, start: int):

@@ -56,9 +56,7 @@ def find_example_poses(
 
 def _example_pose(folder: Path, rig: CameraRig, calibrated: set[str], entry: ExampleSettings) -> ExamplePose:
     if not folder.is_dir():
-        raise InputError(
-            f"{folder}: there is no such example pose; make the folder or correct recording.yaml"
-        )
+        raise InputError(f"{folder}: there is no such example pose; make the folder or correct recording.yaml")
     images = _by_camera(folder, _files(folder, mask=False), calibrated)
     masks = _by_camera(folder, _files(folder, mask=True), calibrated)
     for camera, mask in masks.items():

@@ -60,10 +60,7 @@ def _decoded_ahead(recording: Recording, start: int, stop: int) -> Iterator[list
             images = [future.result() for future in upcoming]
             if frame + 1 < stop:
                 upcoming[:] = [pool.submit(source.read) for source in sources]
-            yield [
-                _checked(recording, camera, image, frame)
-                for camera, image in zip(cameras, images, strict=True)
-            ]
+            yield [_checked(recording, camera, image, frame) for camera, image in zip(cameras, images, strict=True)]
 
 
 def _close_all(opened: list[Future[Source]]) -> None:
@@ -82,9 +79,7 @@ def _checked(recording: Recording, camera: str, image: np.ndarray | None, frame:
         )
     size = (image.shape[1], image.shape[0])
     if size != recording.rig.image_size(camera):
-        raise InputError(
-            f"{source}: its frame {number} is {size[0]}x{size[1]}, unlike the first; convert it again"
-        )
+        raise InputError(f"{source}: its frame {number} is {size[0]}x{size[1]}, unlike the first; convert it again")
     return image
 
 
@@ -131,11 +126,7 @@ class VideoWriter:
 
     def _open(self, image: UInt8[np.ndarray, "height width 3"]) -> cv2.VideoWriter:
         height, width = image.shape[:2]
-        writer = cv2.VideoWriter(
-            str(self._temporary), cv2.VideoWriter.fourcc(*"mp4v"), self._fps, (width, height)
-        )
+        writer = cv2.VideoWriter(str(self._temporary), cv2.VideoWriter.fourcc(*"mp4v"), self._fps, (width, height))
         if not writer.isOpened():
-            raise InputError(
-                f"{self._path}: a video of {width}x{height} at {self._fps:g} fps cannot be written"
-            )
+            raise InputError(f"{self._path}: a video of {width}x{height} at {self._fps:g} fps cannot be written")
         return writer

@@ -30,9 +30,7 @@ class Entry:
 
     def error(self, expected: str) -> InputError:
         """The complaint that the value is not what was expected."""
-        return InputError(
-            f"{self.path}: {self.key or 'the content'} is {_shown(self.value)}, expected {expected}"
-        )
+        return InputError(f"{self.path}: {self.key or 'the content'} is {_shown(self.value)}, expected {expected}")
 
     def mapping(self) -> dict[str, "Entry"]:
         """The entries of a mapping with arbitrary names."""
@@ -53,9 +51,7 @@ class Entry:
         for key in required:
             if key not in entries:
                 needed = ", ".join(required)
-                raise InputError(
-                    f"{self.path}: {self.key or 'the file'} lacks the key `{key}`; it needs {needed}"
-                )
+                raise InputError(f"{self.path}: {self.key or 'the file'} lacks the key `{key}`; it needs {needed}")
         return entries
 
     def fields(self, required: Collection[str], optional: Collection[str] = ()) -> dict[str, "Entry"]:
@@ -138,7 +134,7 @@ class _StrictLoader(yaml.SafeLoader):
     def compose_node(self, parent, index):
         if self.check_event(yaml.AliasEvent):
             mark = self.peek_event().start_mark
-            raise ComposerError(None, None, "aliases (*name) are not allowed", mark)
+            raise ComposerError(None, None, "aliases (*name) are not allowed, write the value out", mark)
         return super().compose_node(parent, index)
 
     def construct_mapping(self, node, deep=False):

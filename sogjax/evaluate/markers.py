@@ -75,7 +75,7 @@ def attach_markers(motion: Motion, markers: Float[np.ndarray, "frame marker 3"])
 
     Done in the first frame that has the marker; `markers` has one row for each row of `motion`.
     """
-    present = np.isfinite(markers).all(axis=2)
+    present = ~np.isnan(markers.sum(axis=2))
     first = present.argmax(axis=0)
     points = np.where(present.any(axis=0)[:, None], markers[first, np.arange(len(first))], 0.0)
     distances = np.linalg.norm(motion.blob_means[first] - points[:, None], axis=-1)

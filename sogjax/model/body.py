@@ -148,7 +148,7 @@ def _slices(counts: Sequence[int]) -> list[slice]:
     return [slice(int(end) - count, int(end)) for end, count in zip(ends, counts, strict=True)]
 
 
-def _block_diagonal(blocks: Sequence[Float[Array, "joint dof"]]) -> Float[Array, "joints dofs"]:
+def _block_diagonal(blocks: Sequence[Float[Array, "_ _"]]) -> Float[Array, "joints dofs"]:
     rows = []
     for k, block in enumerate(blocks):
         left = sum(b.shape[1] for b in blocks[:k])

@@ -93,16 +93,23 @@ class Wardrobe:
         colors[points[:, 2] < belt] = self.outfit.trousers
         colors[np.abs(points[:, 2] - belt + 0.01) < 0.016] = 0.45 * np.array(self.outfit.trousers)
         neck = self._local("neck", rest)
-        collar = np.hypot(neck[:, 0] - 0.02, neck[:, 1]) < 0.062
-        colors[collar & (neck[:, 2] > -0.02)] = self.outfit.skin
+        bare = (np.hypot(neck[:, 0] - 0.01, neck[:, 1]) < 0.08) & (self._over_collar(rest) > 0.0)
+        colors[bare] = self.outfit.skin
         return colors
+
+    def _over_collar(self, rest: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
+        """Height over the rim of the collar, which is lower in front."""
+        neck = self._local("neck", rest) * (1.75 / self.anatomy.stature)
+        return neck[:, 2] + 0.45 * neck[:, 0] - 0.028
 
     def _head(self, rest: Float[np.ndarray, "n 3"], _: str) -> Colors:
         points = self._local("head", rest) * (1.75 / self.anatomy.stature)
         x, y, z = points.T
         colors = np.tile(np.array(self.outfit.skin), (len(points), 1))
-        hair = (z > 0.105 + 0.35 * np.minimum(0.09 - x, 0.0)) | ((x < 0.0) & (z > -0.02 + 0.9 * (x + 0.03)))
-        colors[hair & (x < 0.088)] = self.outfit.hair
+        collar = self._over_collar(rest) < 0.0
+        colors[collar] = 0.85 * np.array(self.outfit.shirt[0])
+        hair = (z > 0.105 + 0.35 * np.minimum(0.09 - x, 0.0)) | ((x < 0.0) & (z > 0.0 + 0.7 * (x + 0.03)))
+        colors[hair & (x < 0.088) & ~collar] = self.outfit.hair
         front = x > 0.06
         colors[front & (((np.abs(y) - 0.032) / 0.014) ** 2 + ((z - 0.052) / 0.008) ** 2 < 1)] = 0.12
         colors[front & (((np.abs(y) - 0.033) / 0.02) ** 2 + ((z - 0.073) / 0.006) ** 2 < 1)] = self.outfit.hair

@@ -89,7 +89,7 @@ ARMS: Sequence[tuple[float, Angles]] = (
 )
 
 _SQUAT = {
-    **both(**{"raise": 86.0, "plane": 8.0, "elbow": 8.0, "roll": -10.0}),
+    **both(**{"raise": 118.0, "plane": 8.0, "elbow": 8.0, "roll": -10.0}),
     "pelvis_z": -0.205,
     "pelvis_x": -0.085,
     "tip": 28.0,

@@ -80,19 +80,19 @@ class Walk:
         sway, lead = side * effort * np.sin(np.pi * beat), -side * effort * np.cos(np.pi * beat)
         # Low while both feet stand wide apart (whole beats), high while one leg passes the other.
         bob = 0.014 * np.cos(2.0 * np.pi * (beat - 0.5)) * effort
-        height = self.anatomy.hip_height - 0.012 - 0.030 * effort + bob
-        position = np.array([*ground, height]) + heading_matrix(heading) @ np.array([0.0, 0.018 * sway, 0.0])
+        height = self.anatomy.hip_height - 0.012 - 0.024 * effort + bob
+        position = np.array([*ground, height]) + heading_matrix(heading) @ np.array([0.03 * effort, 0.018 * sway, 0.0])
         pose = pose_from_angles(self._angles(lead, effort), position, self._pelvis(heading, lead, sway))
         for name in SIDES:
             pose = self._leg(pose, name, beat)
         return pose
 
     def _pelvis(self, heading: float, lead: float, sway: float) -> Matrix:
-        return heading_matrix(heading) @ turned(("z", 5.0 * lead), ("x", 2.0 * sway), ("y", 2.0))
+        return heading_matrix(heading) @ turned(("z", 5.0 * lead), ("x", 2.0 * sway), ("y", 3.0))
 
     def _angles(self, lead: float, effort: float) -> dict[str, float]:
         """Trunk and arms; `lead` is 1 when the left leg is behind and the right one in front, -1 the other way."""
-        angles = {"bend": 3.0 * effort, "turn": -9.0 * lead, "look": 4.0 * lead, "nod": 2.0}
+        angles = {"bend": 2.0 + 3.0 * effort, "turn": -9.0 * lead, "look": 4.0 * lead, "nod": 2.0}
         for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
             swing = self.swing * (24.0 * sign * lead * 0.9 + 4.0 * effort)
             angles |= {

@@ -14,11 +14,11 @@ LAMP = unit(np.array([0.34, -0.26, 0.90]))
 """Direction towards the lamp."""
 UP = np.array([0.0, 0.0, 1.0])
 
-_LAMP_COLOR = np.array([0.80, 0.77, 0.72], np.float32)
+_LAMP_COLOR = np.array([0.98, 0.94, 0.87], np.float32)
 _FILL = unit(np.array([-0.6, 0.7, 0.35]))
 _FILL_COLOR = np.array([0.10, 0.11, 0.13], np.float32)
-_SKY = np.array([0.40, 0.41, 0.43], np.float32)
-_GROUND = np.array([0.21, 0.20, 0.18], np.float32)
+_SKY = np.array([0.50, 0.51, 0.53], np.float32)
+_GROUND = np.array([0.27, 0.26, 0.235], np.float32)
 _FAR = 1e6
 
 

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from sogjax.synth.anatomy import Anatomy, Pose
+from sogjax.synth.cartwheel import Cartwheel
 from sogjax.synth.exercises import ARMS, Exercise, squat_kick_keys
 from sogjax.synth.gait import Walk, circle, egg
 
@@ -31,7 +32,10 @@ def motions_of(kind: str, anatomies: Sequence[Anatomy], rng: np.random.Generator
             return [Walk(anatomies[0], egg(2.2, 1.7, turn))]
         return _passing(anatomies, turn)
     lanes = _LANE * (np.arange(len(anatomies)) - (len(anatomies) - 1) / 2.0)
-    return [_exercise(kind, anatomy, turn, lane, 0.35 * k) for k, (anatomy, lane) in enumerate(zip(anatomies, lanes, strict=True))]
+    return [
+        _exercise(kind, anatomy, turn, lane, 0.35 * number)
+        for number, (anatomy, lane) in enumerate(zip(anatomies, lanes, strict=True))
+    ]
 
 
 def _passing(anatomies: Sequence[Anatomy], turn: float) -> list[Motion]:
@@ -50,6 +54,10 @@ def _passing(anatomies: Sequence[Anatomy], turn: float) -> list[Motion]:
 
 
 def _exercise(kind: str, anatomy: Anatomy, turn: float, lane: float, delay: float) -> Motion:
+    """Something done on the spot, or along a lane of one's own."""
+    ahead = np.array([np.cos(turn), np.sin(turn), 0.0])
     aside = np.array([-np.sin(turn), np.cos(turn), 0.0])
+    if kind == "cartwheel":
+        return Cartwheel(anatomy, lane * ahead, turn, delay)
     keys = ARMS if kind == "arms" else squat_kick_keys()
     return Exercise(anatomy, keys, lane * aside, turn, delay)

@@ -54,7 +54,7 @@ def ring_of_views(settings: SynthSettings, rng: np.random.Generator) -> tuple[Vi
         centre = np.array([radius * np.cos(angle), radius * np.sin(angle), height])
         target = _TARGET + 0.06 * rng.uniform(-1, 1, 3)
         roll = np.deg2rad(1.5) * rng.uniform(-1, 1)
-        focal = min(1.06 * settings.height, 0.80 * settings.width) * (1.0 + 0.04 * rng.uniform(-1, 1))
+        focal = min(1.16 * settings.height, 0.87 * settings.width) * (1.0 + 0.04 * rng.uniform(-1, 1))
         aspect = 1.0 + 0.002 * rng.uniform(-1, 1)
         middle = (np.array([settings.width, settings.height]) - 1.0) / 2.0
         middle = middle + 0.01 * settings.width * rng.uniform(-1, 1, 2)

@@ -44,8 +44,8 @@ def bones_from_motion(motion: Motion) -> Bones:
     """Every joint to its nearest ancestor at another place; the last ones also to their farthest blob."""
     drawn_as = _drawn_as(motion)
     parents = np.asarray(motion.joint_parents, int)
-    joints = np.unique(drawn_as[drawn_as >= 0]).tolist()
-    edges = [(drawn_as[parents[j]], j) for j in joints if parents[j] >= 0 and drawn_as[parents[j]] >= 0]
+    joints: list[int] = sorted({int(joint) for joint in drawn_as if joint >= 0})
+    edges = [(int(drawn_as[parents[j]]), j) for j in joints if parents[j] >= 0 and drawn_as[parents[j]] >= 0]
     tips = _tips(motion, drawn_as, set(joints) - {parent for parent, _ in edges})
     number = {joint: k for k, joint in enumerate(joints)}
     pairs = [(number[a], number[b]) for a, b in edges]

@@ -209,7 +209,7 @@ def _fixed_point(
     pixels: Float[np.ndarray, "point 2"],
 ) -> tuple[np.ndarray, list[tuple[int, int]]]:
     """Which points are finite, and all as OpenCV's fixed-point numbers."""
-    seen = np.isfinite(pixels).all(axis=1)
+    seen = ~np.isnan(pixels.sum(axis=1))
     fixed: Int[np.ndarray, "point 2"] = np.rint(np.where(seen[:, None], pixels, 0) * 2**SUBPIXEL_BITS).astype(int)
     return seen, [(int(x), int(y)) for x, y in fixed]
 

@@ -11,7 +11,8 @@ from jaxtyping import Array, Float
 from sogjax.data.calibration import CameraRig
 from sogjax.model.camera import NEAR, Camera, distort, project_points
 
-FRAMES_AT_ONCE = 256
+POINTS_AT_ONCE = 8192
+"""Every motion is projected in blocks of this size, so that the projection is compiled once for a rig."""
 
 
 def picture_points(
@@ -22,16 +23,17 @@ def picture_points(
     A pixel is NaN behind a camera and far outside its picture, where a lens model means nothing.
     """
     cameras = jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float32), rig.cameras)
-    num_frames, num_points, _ = points.shape
-    pixels = np.empty((len(rig.names), num_frames, num_points, 2), np.float32)
-    depths = np.empty(pixels.shape[:-1], np.float32)
-    for start in range(0, num_frames, FRAMES_AT_ONCE):
-        part = slice(start, start + FRAMES_AT_ONCE)
-        flat = jnp.asarray(points[part].reshape(-1, 3), jnp.float32)
-        where, depth = _project(cameras, flat)
-        pixels[:, part] = np.asarray(where).reshape(len(rig.names), -1, num_points, 2)
-        depths[:, part] = np.asarray(depth).reshape(len(rig.names), -1, num_points)
-    return pixels, depths
+    flat = points.reshape(-1, 3).astype(np.float32)
+    pixels = np.empty((len(rig), len(flat), 2), np.float32)
+    depths = np.empty((len(rig), len(flat)), np.float32)
+    for start in range(0, len(flat), POINTS_AT_ONCE):
+        part = flat[start : start + POINTS_AT_ONCE]
+        padded = np.pad(part, ((0, POINTS_AT_ONCE - len(part)), (0, 0)))
+        where, depth = _project(cameras, jnp.asarray(padded))
+        pixels[:, start : start + len(part)] = np.asarray(where)[:, : len(part)]
+        depths[:, start : start + len(part)] = np.asarray(depth)[:, : len(part)]
+    shape = (len(rig), *points.shape[:2])
+    return pixels.reshape(*shape, 2), depths.reshape(shape)
 
 
 @eqx.filter_jit

@@ -70,7 +70,8 @@ def write_rerun(
     """
     names = list(names) if names else ["actor", *(f"actor_{k + 2}" for k in range(len(motions) - 1))][: len(motions)]
     cameras = [picture_camera(recording.rig, name, picture_width) for name in recording.rig.names]
-    layout = _blueprint(recording, motions, names, image_blobs is not None, bool(traces))
+    curves = _plots_with(terms or {}, traces or {})
+    layout = _blueprint(recording, motions, names, image_blobs is not None, curves)
     with atomic_path(Path(path)) as temporary:
         stream = rr.RecordingStream(APPLICATION)
         stream.set_log_time_enabled(False)
@@ -81,8 +82,8 @@ def write_rerun(
         for k, (name, motion) in enumerate(zip(names, motions, strict=True)):
             colors = blob_palette(motion, k) if blob_colors is None else _bytes(blob_colors[k])
             _log_actor(stream, f"/world/actors/{name}", motion, k, colors)
-            _log_curves(stream, motion, name if len(motions) > 1 else None, _own_curves(motion))
-        _log_curves(stream, motions[0], None, terms or {})
+            _log_curves(stream, motion, name if len(motions) > 1 else None, _own_curves(motion), 3 * k)
+        _log_curves(stream, motions[0], None, terms or {}, 3 * len(motions))
         _log_traces(stream, motions[0], traces or {})
         if truth is not None and truth.markers is not None:
             _log_markers(stream, recording, truth, motions)
@@ -94,7 +95,7 @@ def write_rerun(
 def view_command(path: Path, web: bool = False) -> list[str]:
     """The command that opens a Rerun file in a window, or serves it to a browser of this machine only."""
     command = [sys.executable, "-m", "rerun", str(path)]
-    return [*command, "--web-viewer", "--bind", "127.0.0.1"] if web else command
+    return [*command, "--serve-web", "--bind", "127.0.0.1"] if web else command
 
 
 def _log_cameras(
@@ -148,11 +149,16 @@ def _own_curves(motion: Motion) -> dict[str, np.ndarray]:
 
 
 def _log_curves(
-    stream: rr.RecordingStream, motion: Motion, actor: str | None, curves: Mapping[str, np.ndarray]
+    stream: rr.RecordingStream,
+    motion: Motion,
+    actor: str | None,
+    curves: Mapping[str, np.ndarray],
+    first_color: int,
 ) -> None:
-    for name, values in curves.items():
+    for k, (name, values) in enumerate(curves.items()):
         entity = f"/curves/{_plot(name)}/{name}" + (f"/{actor}" if actor else "")
-        stream.log(entity, rr.SeriesLines(names=f"{name} {actor}" if actor else name), static=True)
+        title, color = f"{name} {actor}" if actor else name, _CURVE_COLORS[(first_color + k) % len(_CURVE_COLORS)]
+        stream.log(entity, rr.SeriesLines(names=title, colors=color, widths=1.5), static=True)
         values = np.asarray(values, float)
         stream.send_columns(entity, _times(motion), rr.Scalars.columns(scalars=values))
 
@@ -220,7 +226,7 @@ def _log_pictures(
 
 
 def _blueprint(
-    recording: Recording, motions: Sequence[Motion], names: Sequence[str], with_blobs: bool, with_traces: bool
+    recording: Recording, motions: Sequence[Motion], names: Sequence[str], with_blobs: bool, plots: dict[str, str]
 ) -> rrb.Blueprint:
     """A large 3-D view, a few cameras beside it, the curves below."""
     shown = _spread(recording.rig.names, CAMERAS_SHOWN // 2 if with_blobs else CAMERAS_SHOWN)
@@ -232,7 +238,6 @@ def _blueprint(
         if with_blobs:
             contents = ["$origin/blobs", *skeletons]
             views.append(rrb.Spatial2DView(origin=origin, contents=contents, name=f"{name} blobs"))
-    plots = _PLOTS | (_TRACES if with_traces else {})
     curves = [rrb.TimeSeriesView(origin=f"/curves/{plot}", name=title) for plot, title in plots.items()]
     scene = rrb.Spatial3DView(origin="/world", name="Scene", eye_controls=_eye(recording, motions))
     top = rrb.Horizontal(scene, rrb.Grid(*views, grid_columns=2), column_shares=[1, 1])
@@ -244,8 +249,16 @@ def _blueprint(
     )
 
 
-_PLOTS = {"energy": "Similarity and energy", "penalties": "Penalties", "iterations": "Iterations"}
-_TRACES = {"trace": "Within frames (timeline: iteration)"}
+_CURVE_COLORS = ((90, 170, 255), (255, 170, 60), (120, 220, 120), (255, 110, 120), (190, 140, 255), (240, 220, 90))
+
+
+def _plots_with(terms: Mapping[str, np.ndarray], traces: Mapping[str, Sequence[np.ndarray]]) -> dict[str, str]:
+    """Titles of the plots that have something to show."""
+    plots = {"energy": "Similarity and energy"}
+    if any(_plot(name) == "penalties" for name in terms):
+        plots["penalties"] = "Penalties"
+    plots["iterations"] = "Iterations"
+    return plots | ({"trace": "Within frames (timeline: iteration)"} if traces else {})
 
 
 def _plot(curve: str) -> str:

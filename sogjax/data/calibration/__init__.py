@@ -54,13 +54,9 @@ def load_calibration(path: Path, unit: str | None = None) -> CameraRig:
     if unit is not None and unit not in METRES_PER_UNIT:
         raise InputError(f"{path}: unknown unit {unit!r} for its lengths; use {' or '.join(METRES_PER_UNIT)}")
     if not path.is_file():
-        raise InputError(
-            f"{path}: there is no such calibration file; correct the name or calibrate the cameras"
-        )
+        raise InputError(f"{path}: there is no such calibration file; correct the name or calibrate the cameras")
     if path.stat().st_size > MAX_BYTES:
-        raise InputError(
-            f"{path}: has {path.stat().st_size} bytes, too many for a calibration; give the right file"
-        )
+        raise InputError(f"{path}: has {path.stat().st_size} bytes, too many for a calibration; give the right file")
     found = calibration_format(path)
     if found is None:
         known = ", ".join(known.name for known in FORMATS)

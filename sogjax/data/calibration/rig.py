@@ -74,7 +74,7 @@ def rig_from_entries(path: Path, entries: Sequence[CameraEntry]) -> CameraRig:
             raise InputError(f"{path}: the camera name {name!r} occurs twice; give every camera its own name")
     for entry in entries:
         _check(path, entry)
-    stack = lambda arrays: jnp.asarray(np.stack(arrays).astype(float))  # noqa: E731
+    stack = lambda arrays: jnp.asarray(np.stack(arrays).astype(float))
     return CameraRig(
         names,
         Camera(
@@ -98,9 +98,7 @@ def _check(path: Path, entry: CameraEntry) -> None:
         if not np.isfinite(values).all():
             raise InputError(f"{where}: its {what} {_text(values)} is not finite; calibrate it again")
     if min(entry.size) <= 0:
-        raise InputError(
-            f"{where}: its size {list(entry.size)} is not positive; give width and height in pixels"
-        )
+        raise InputError(f"{where}: its size {list(entry.size)} is not positive; give width and height in pixels")
     matrix = entry.intrinsics
     if min(matrix[0, 0], matrix[1, 1]) <= 0:
         focal = f"{matrix[0, 0]:g} and {matrix[1, 1]:g}"
@@ -118,9 +116,7 @@ def _check(path: Path, entry: CameraEntry) -> None:
             f"R R^T differs from 1 by {deviation:.3g}); calibrate it again or export it with more digits"
         )
     if len(entry.distortion) not in (4, 5):
-        raise InputError(
-            f"{where}: it has {len(entry.distortion)} distortion coefficients; give k1 k2 p1 p2 [k3]"
-        )
+        raise InputError(f"{where}: it has {len(entry.distortion)} distortion coefficients; give k1 k2 p1 p2 [k3]")
 
 
 def _camera_from_world(entry: CameraEntry) -> Float[np.ndarray, "4 4"]:

@@ -18,9 +18,7 @@ _CAMERA_KEYS = ("matrix", "rotation", "translation")
 
 def recognises_toml(text: str) -> bool:
     """Whether `text` looks like a table of cameras."""
-    return bool(
-        re.search(r"^\s*\[[^\[\]]+\]\s*(#.*)?$", text, re.M) and re.search(r"^\s*matrix\s*=", text, re.M)
-    )
+    return bool(re.search(r"^\s*\[[^\[\]]+\]\s*(#.*)?$", text, re.M) and re.search(r"^\s*matrix\s*=", text, re.M))
 
 
 def read_toml(path: Path, unit: str = "m") -> CameraRig:
@@ -73,9 +71,7 @@ def _entry(path: Path, key: str, table: dict[str, Any], unit: str) -> CameraEntr
         raise InputError(f"{where}: fisheye = true is not supported yet; use a camera with the pinhole model")
     size = _numbers(where, table, "size", (2,))
     if not (np.isfinite(size).all() and (size == np.round(size)).all()):
-        raise InputError(
-            f"{where}: size = {table['size']} is not two whole numbers; give width and height in pixels"
-        )
+        raise InputError(f"{where}: size = {table['size']} is not two whole numbers; give width and height in pixels")
     rotation = _numbers(where, table, "rotation", (3,))
     if not np.isfinite(rotation).all():
         raise InputError(f"{where}: rotation = {table['rotation']} is not finite; give a Rodrigues vector")
@@ -89,9 +85,7 @@ def _entry(path: Path, key: str, table: dict[str, Any], unit: str) -> CameraEntr
     )
 
 
-def _numbers(
-    where: str, table: dict[str, Any], key: str, shape: tuple[int | None, ...]
-) -> Float[np.ndarray, "..."]:
+def _numbers(where: str, table: dict[str, Any], key: str, shape: tuple[int | None, ...]) -> Float[np.ndarray, "..."]:
     if key not in table:
         raise InputError(f"{where}: has no {key!r}; add it, or calibrate the camera again")
     try:

@@ -67,9 +67,7 @@ def write_bvh(path: Path, motion: Motion, up: str = "z", unit: str = "m") -> Non
     seconds = _frame_time(path, motion)
     root = _root_bone(motion, up, PER_METRE[unit])
     bones = list(_depth_first(root))
-    channels = [
-        np.concatenate([bone.positions, bone.angles], 1) if bone.moves else bone.angles for bone in bones
-    ]
+    channels = [np.concatenate([bone.positions, bone.angles], 1) if bone.moves else bone.angles for bone in bones]
     lines = [
         "HIERARCHY",
         *_hierarchy(root),
@@ -164,9 +162,7 @@ def _slides(motion: Motion, joint: int) -> bool:
 def _euler_angles(rotation: Float[np.ndarray, "frame 3 3"]) -> Float[np.ndarray, "frame 3"]:
     """Degrees about Z, X, Y without jumps of a turn."""
     with warnings.catch_warnings():
-        warnings.simplefilter(
-            "ignore", UserWarning
-        )  # at X = 90 degrees scipy says that it chooses one of many
+        warnings.simplefilter("ignore", UserWarning)  # at X = 90 degrees scipy says that it chooses one of many
         angles = Rotation.from_matrix(rotation).as_euler("ZXY", degrees=True)
     return np.unwrap(angles, axis=0, period=360.0)
 

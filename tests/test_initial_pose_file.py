@@ -1,0 +1,61 @@
+"""Rough poses are read in both their forms, for one actor and for several."""
+
+import pytest
+
+from sogjax.data.initial_pose import InitialPose, load_initial_poses
+from sogjax.errors import InputError
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "initial_pose.yaml"
+
+
+def test_the_two_forms_alone_and_together(path):
+    path.write_text("landmarks: {pelvis: [0, 1.5, -2], toe: [1, 2, 3]}\n")
+    expected = InitialPose(landmarks={"pelvis": (0.0, 1.5, -2.0), "toe": (1.0, 2.0, 3.0)})
+    assert load_initial_poses(path, ["Ann"]) == {"Ann": expected}
+    path.write_text("pose: tpose\nposition: [1, 2, 3]\nheading: 90\n")
+    assert load_initial_poses(path, ["Ann"])["Ann"] == InitialPose("tpose", (1.0, 2.0, 3.0), 90.0)
+    path.write_text("pose: {elbow: 0.5}\nlandmarks: {toe: [1, 2, 3]}\n")
+    pose = InitialPose({"elbow": 0.5}, landmarks={"toe": (1.0, 2.0, 3.0)})
+    assert load_initial_poses(path, ["Ann"])["Ann"] == pose
+
+
+def test_several_actors_are_a_mapping(path):
+    path.write_text("Ann: {pose: rest}\nBob: {landmarks: {toe: [1, 2, 3]}}\n")
+    poses = load_initial_poses(path, ["Bob", "Ann"])
+    assert list(poses) == ["Bob", "Ann"]
+    assert poses["Ann"] == InitialPose("rest")
+    path.write_text("Ann: {pose: rest}\n")
+    assert load_initial_poses(path, ["Ann"]) == {"Ann": InitialPose("rest")}
+
+
+@pytest.mark.parametrize(
+    ("content", "actors", "words"),
+    [
+        ("pose: rest", ["Ann", "Bob"], ("one actor", "Ann, Bob")),
+        ("Ann: {pose: rest}", ["Ann", "Bob"], ("'Bob'",)),
+        ("Ann: {pose: rest}\nCarl: {pose: rest}", ["Ann"], ("'Carl'", "Ann")),
+        ("", ["Ann"], ("empty",)),
+        ("{}", ["Ann"], ("landmarks",)),
+        ("- 1", ["Ann"], ("mapping",)),
+        ("heading: 3", ["Ann"], ("landmarks",)),
+        ("pose: rest\nheading: north", ["Ann"], ("heading", "'north'")),
+        ("pose: rest\nheading: .nan", ["Ann"], ("heading", "nan")),
+        ("pose: rest\nposition: [1, 2]", ["Ann"], ("position", "[1, 2]")),
+        ("pose: rest\nposition: [1, 2, .inf]", ["Ann"], ("position[2]", "inf")),
+        ("pose: 3", ["Ann"], ("pose", "3")),
+        ("pose: {elbow: bent}", ["Ann"], ("pose.elbow", "'bent'")),
+        ("landmarks: [1, 2, 3]", ["Ann"], ("landmarks", "[1, 2, 3]")),
+        ("landmarks: {toe: up}", ["Ann"], ("landmarks.toe", "'up'")),
+        ("landmarks: {toe: [1, 2, .nan]}", ["Ann"], ("landmarks.toe[2]", "nan")),
+        ("Ann: {pose: rest, place: [1, 2, 3]}", ["Ann"], ("Ann.place", "position")),
+    ],
+)
+def test_wrong_values_are_named(path, content, actors, words):
+    path.write_text(content)
+    with pytest.raises(InputError) as error:
+        load_initial_poses(path, actors)
+    for word in (str(path), *words):
+        assert word in str(error.value)
