@@ -146,9 +146,17 @@ def evaluate_motion(
 def evaluate_motions(
     motions: Mapping[str, Motion], truth: GroundTruth, joint_mapping: Mapping[str, str] | None = None
 ) -> GroupEvaluation:
-    """Compare several actors' motions, by name, with a truth whose names have the prefixes `NAME/`."""
+    """Compare actors' motions, by name, with a truth whose names have the prefixes `NAME/`.
+
+    A truth without prefixes is that of the only actor.
+
+    Raises:
+        InputError: an actor that the truth does not have; several actors, but a truth of one.
+    """
+    alone = len(motions) == 1 and not truth.subjects
     evaluations = {
-        name: evaluate_motion(motion, truth.subject(name), name, joint_mapping) for name, motion in motions.items()
+        name: evaluate_motion(motion, truth if alone else truth.subject(name), name, joint_mapping)
+        for name, motion in motions.items()
     }
     return GroupEvaluation(evaluations, identity_swaps(motions, truth) if len(motions) > 1 else ())
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float
 
 from sogjax.model.rotation import transform_points
 from sogjax.model.skeleton import Skeleton
@@ -144,7 +144,7 @@ def dof_slices(bodies: Sequence[Body]) -> list[slice]:
 
 
 def _slices(counts: Sequence[int]) -> list[slice]:
-    ends: Int[np.ndarray, n] = np.cumsum(counts)
+    ends = np.cumsum(counts)
     return [slice(int(end) - count, int(end)) for end, count in zip(ends, counts, strict=True)]
 
 

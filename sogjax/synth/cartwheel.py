@@ -18,8 +18,15 @@ _HALF = 1.65
 """Seconds from the start to upside down."""
 _REST = 0.3
 """Seconds of standing still before the way back."""
-_WRIST_HEIGHT = 0.036
+_WRIST_HEIGHT = 0.021
 """Of a hand flat on the floor."""
+
+_FLAT_HAND = {
+    # Palms down, the fingers forwards and a little inwards; an upright hand's fingers point down its -z axis.
+    "left": np.stack([[0.6, -0.8, 0.0], [0.0, 0.0, 1.0], [-0.8, -0.6, 0.0]], axis=1),
+    "right": np.stack([[0.6, 0.8, 0.0], [0.0, 0.0, -1.0], [-0.8, 0.6, 0.0]], axis=1),
+}
+"""Of a body that faces along x; columns are the hand's axes."""
 
 _STANDING = {"left_foot": 1.0, "right_foot": 1.0, "left_foot_y": 0.062, "right_foot_y": -0.062}
 _UP = both(**{"raise": 168.0, "plane": 82.0, "elbow": 4.0})
@@ -28,8 +35,8 @@ _LUNGE = {**_STANDING, "left_foot_y": 0.24}
 _FLYING = {"right_foot_y": -0.062, "left_foot_y": 0.24}
 
 _FIRST_HALF: tuple[tuple[float, Mapping[str, float]], ...] = (
-    (0.0, {**_STANDING, **READY, "y": 0.0, "z": 0.0}),
-    (0.15, {**_STANDING, **READY, "y": 0.0, "z": 0.0}),
+    (0.0, {**_STANDING, **READY, "turned": 0.0, "y": 0.0, "z": 0.0}),
+    (0.15, {**_STANDING, **READY, "turned": 0.0, "y": 0.0, "z": 0.0}),
     (0.55, {**_STANDING, **_UP, "turned": -2.0, "y": -0.012}),
     (0.72, {**_LUNGE, **_UP, "left_foot_y": 0.16, "left_foot_z": 0.045, "turned": 2.0, "y": 0.03, "z": -0.012}),
     (0.90, {**_LUNGE, **_UP, "turned": 12.0, "y": 0.115, "z": -0.035, "left_hand": 0.0}),
@@ -73,8 +80,7 @@ class Cartwheel:
         pelvis = np.array([0.0, (values["y"] - _MIDDLE) * stature, self._standing() + values["z"] * stature])
         body = facing @ turned(("x", -values["turned"]))
         floor = {name: self.middle + facing @ np.array([0.0, y * stature, 0.0]) for name, y in _places(values)}
-        angles = values | {f"{side}_wrist": 78.0 * values[f"{side}_hand"] for side in SIDES}
-        pose = pose_from_angles(angles, self.middle + facing @ pelvis, body)
+        pose = pose_from_angles(values, self.middle + facing @ pelvis, body)
         for side in SIDES:
             pose = self._foot(pose, side, floor[f"{side}_foot"], values)
             pose = self._hand(pose, side, floor[f"{side}_hand"], values[f"{side}_hand"])
@@ -110,7 +116,11 @@ class Cartwheel:
         held = floor + np.array([0.0, 0.0, _WRIST_HEIGHT * self.anatomy.stature])
         target = free + hold * (held - free)
         limb = (f"{side}_shoulder", f"{side}_elbow", f"{side}_wrist")
-        return reach(self.anatomy, pose, limb, target, -heading_matrix(self.heading)[:, 0])
+        facing = heading_matrix(self.heading)
+        pose = reach(self.anatomy, pose, limb, target, -facing[:, 0])
+        forearm = self.anatomy.world_from_joint(pose)[INDEX[f"{side}_elbow"], :3, :3]
+        flat = forearm.T @ facing @ _FLAT_HAND[side]
+        return pose.with_rotation(f"{side}_wrist", _between(np.eye(3), flat, hold))
 
 
 def _places(values: Mapping[str, float]) -> list[tuple[str, float]]:

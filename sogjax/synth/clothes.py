@@ -40,19 +40,12 @@ class Outfit:
     """How far the sleeves reach: 0 shoulder, 1 elbow, 2 wrist."""
 
 
-def outfit_from_seed(rng: np.random.Generator, number: int) -> Outfit:
-    """Draw clothes; people of different `number` in one recording never wear the same shirt."""
-    pick = lambda items: items[int(rng.integers(len(items)))]
-    first = int(rng.integers(len(_SHIRTS)))
-    return Outfit(
-        skin=pick(_SKINS),
-        hair=pick(_HAIR),
-        shirt=_SHIRTS[(first + 2 * number) % len(_SHIRTS)],
-        trousers=pick(_TROUSERS),
-        shoes=pick(_SHOES),
-        pattern=pick(_PATTERNS),
-        sleeve=pick(_SLEEVES),
-    )
+def outfits_from_seed(rng: np.random.Generator, count: int) -> list[Outfit]:
+    """Draw clothes for several people, who wear different shirts, trousers and shoes."""
+    draw = lambda items: [items[k % len(items)] for k in rng.permutation(len(items))]
+    rows = zip(*(draw(items) for items in (_SKINS, _HAIR, _SHIRTS, _TROUSERS, _SHOES, _PATTERNS)), strict=False)
+    sleeves = rng.choice(_SLEEVES, count)
+    return [Outfit(*row, sleeve=float(sleeve)) for row, sleeve in zip(rows, sleeves, strict=False)]
 
 
 @dataclass(frozen=True)
@@ -82,13 +75,13 @@ class Wardrobe:
         frame = self.frames[INDEX[joint]].astype(rest.dtype)
         return (rest - frame[:3, 3]) @ frame[:3, :3]
 
-    def _shirt(self, points: Float[np.ndarray, "n 3"]) -> Colors:
+    def _shirt(self, points: Float[np.ndarray, "n 3"], radius: float) -> Colors:
         base, other = (np.array(color) for color in self.outfit.shirt)
-        return base + _pattern(self.outfit.pattern, points)[:, None] * (other - base)
+        return base + _pattern(self.outfit.pattern, points, radius)[:, None] * (other - base)
 
     def _torso(self, rest: Float[np.ndarray, "n 3"], _: str) -> Colors:
         points = self._local("pelvis", rest)
-        colors = self._shirt(points)
+        colors = self._shirt(points, 0.134)
         belt = 0.055 * self.anatomy.stature / 1.75
         colors[points[:, 2] < belt] = self.outfit.trousers
         colors[np.abs(points[:, 2] - belt + 0.01) < 0.016] = 0.45 * np.array(self.outfit.trousers)
@@ -122,7 +115,7 @@ class Wardrobe:
         upper, lower = (self.anatomy.length(f"{side}_{joint}") for joint in ("elbow", "wrist"))
         sleeve = self.outfit.sleeve
         hem = sleeve * upper if sleeve < 1.0 else upper + (sleeve - 1.0) * lower
-        colors = self._shirt(points)
+        colors = self._shirt(points, 0.0669)
         colors[-points[:, 2] > hem - 0.015] = np.array(self.outfit.shirt[0]) * 0.8
         colors[-points[:, 2] > hem + 0.01] = self.outfit.skin
         return colors
@@ -140,18 +133,21 @@ class Wardrobe:
         return colors
 
 
-def _pattern(name: str, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
-    """Share of the second colour, 0..1, at points in the frame of the piece (metres, z along it)."""
+def _pattern(name: str, points: Float[np.ndarray, "n 3"], radius: float) -> Float[np.ndarray, "n"]:
+    """Share of the second colour, 0..1, at points in the frame of the piece (metres, z along it).
+
+    `radius` turns angles around the piece into metres of cloth.
+    """
     x, y, z = points.T
-    around = np.where(np.abs(x) > np.abs(y), y, x)
+    around = radius * np.arctan2(y, x)
     square = lambda value, period, share=0.5: (np.mod(value, period) < share * period).astype(float)
     if name == "stripes":
         return square(z, 0.075, 0.45)
     if name == "bars":
-        return square(y, 0.06, 0.4)
+        return square(around, 0.0701, 0.4)
     if name == "plaid":
-        return 0.5 * square(z, 0.09, 0.45) + 0.5 * square(y, 0.09, 0.45)
+        return 0.5 * square(z, 0.09, 0.45) + 0.5 * square(around, 0.0842, 0.45)
     if name == "checks":
-        return np.abs(square(z, 0.11) - square(y, 0.11))
-    u, v = np.mod(around, 0.07) - 0.035, np.mod(z, 0.07) - 0.035
+        return np.abs(square(z, 0.11) - square(around, 0.1052))
+    u, v = np.mod(around, 0.0701) - 0.035, np.mod(z, 0.07) - 0.035
     return (u * u + v * v < 0.021**2).astype(float)

@@ -118,9 +118,9 @@ def _kick(side: str) -> list[tuple[float, Angles]]:
         "tip": -14.0,
         "bend": 4.0,
         "pelvis_x": 0.01,
-        f"{side}_foot_x": 0.42,
+        f"{side}_foot_x": 0.46,
         f"{side}_foot_y": -0.035,
-        f"{side}_foot_z": 0.44,
+        f"{side}_foot_z": 0.37,
         f"{side}_foot_pitch": -38.0,
     }
     shifted = {**_GUARD, "pelvis_y": weight, "pelvis_z": -0.008}

@@ -18,7 +18,7 @@ _NOISE, _VIDEO, _STILL, _EMPTY = 7, 0, 1, 2
 """Streams of random numbers: pictures have the same noise whoever renders them."""
 
 
-def num_pictures(stage_settings, cameras: int) -> int:  # noqa: ANN001
+def num_pictures(stage_settings, cameras: int) -> int:
     """How many pictures `film` makes with so many cameras, which is how often it yields."""
     stills = len(EXAMPLE_POSES) * stage_settings.actors if stage_settings.example_poses else 0
     return cameras * (1 + stills + stage_settings.frames)

@@ -135,9 +135,7 @@ def _trunk(anatomy: Anatomy) -> list[Lump]:
             (-0.01, 0.125 * sign * wide, -0.03),
             (0.058, 0.054),
         )
-        slope = Lump(
-            "neck", "torso", (0.0, 0.02 * sign, 0.03), (-0.008, 0.11 * sign * wide, -0.035), (0.042, 0.045)
-        )
+        slope = Lump("neck", "torso", (0.0, 0.02 * sign, 0.03), (-0.008, 0.11 * sign * wide, -0.035), (0.042, 0.045))
         lumps += [breast, buttock, yoke, slope]
     return lumps
 
@@ -179,7 +177,8 @@ def _leg(anatomy: Anatomy, side: str) -> list[Lump]:
     part = f"{side}_leg"
     upper = anatomy.length(f"{side}_knee") / anatomy.stature * _AVERAGE_STATURE
     lower = anatomy.length(f"{side}_ankle") / anatomy.stature * _AVERAGE_STATURE
-    ankle = anatomy.ankle_height / anatomy.stature * _AVERAGE_STATURE
+    # Melting the lumps together makes the soles about 7 mm thicker.
+    ankle = anatomy.ankle_height / anatomy.stature * _AVERAGE_STATURE - 0.007
     ball = anatomy.offsets[INDEX[f"{side}_toe"]] / anatomy.stature * _AVERAGE_STATURE
     return [
         Lump(f"{side}_hip", part, (0.0, 0.0, -0.03), (0.004, 0.0, -upper), (0.090, 0.062)),

@@ -69,6 +69,8 @@ class Walk:
     """Length of a step, as a share of the stature."""
     swing: float = 1.0
     """How far the arms swing, 1 = as usual."""
+    aside: float = 9.0
+    """Degrees by which hanging arms are held away from the body."""
     first: str = "right"
 
     def __call__(self, time: float) -> Pose:
@@ -97,8 +99,8 @@ class Walk:
             swing = self.swing * (24.0 * sign * lead * 0.9 + 4.0 * effort)
             angles |= {
                 # A raise in the plane between forwards and sideways keeps the hand clear of the thigh.
-                f"{side}_raise": float(np.hypot(swing, 9.0)),
-                f"{side}_plane": float(np.rad2deg(np.arctan2(9.0, swing))),
+                f"{side}_raise": float(np.hypot(swing, self.aside)),
+                f"{side}_plane": float(np.rad2deg(np.arctan2(self.aside, swing))),
                 f"{side}_elbow": 16.0 + self.swing * (14.0 * effort + 0.45 * max(swing, 0.0)),
                 f"{side}_palm": -10.0,
             }
@@ -177,9 +179,7 @@ class Walk:
         toe = max(from_pitch, 0.0) * (1.0 - share) ** 3
         return self._set_leg(pose, side, ankle, rotation, toe, heading)
 
-    def _set_leg(
-        self, pose: Pose, side: str, ankle: Vector, rotation: Matrix, toe: float, heading: float
-    ) -> Pose:
+    def _set_leg(self, pose: Pose, side: str, ankle: Vector, rotation: Matrix, toe: float, heading: float) -> Pose:
         limb = (f"{side}_hip", f"{side}_knee", f"{side}_ankle")
         pole = heading_matrix(heading)[:, 0]
         pose = reach(self.anatomy, pose, limb, ankle, pole, rotation)

@@ -13,9 +13,7 @@ _STRETCH = 0.999
 """A reaching limb never gets quite straight: the bend direction stays defined."""
 
 
-def pose_from_angles(
-    angles: Mapping[str, float], position: Vector, heading: Matrix | None = None
-) -> Pose:
+def pose_from_angles(angles: Mapping[str, float], position: Vector, heading: Matrix | None = None) -> Pose:
     """A pose from angles in degrees; what is not named is zero, i.e. upright with hanging arms.
 
     Trunk: `bend` (forwards), `lean` (to the left), `turn` (to the left), shared by three joints of the spine;

@@ -14,7 +14,7 @@ Motion = Callable[[float], Pose]
 
 _LANE = 1.25
 """Metres between people who exercise side by side."""
-_INNER, _OUTER = 0.86, 1.48
+_INNER, _OUTER = 0.84, 1.50
 """Radii of the two circles on which people walk past each other."""
 
 
@@ -49,7 +49,8 @@ def _passing(anatomies: Sequence[Anatomy], turn: float) -> list[Motion]:
             path = circle((0.0, 0.0), _INNER, turn + around - 0.62, 1.0)
         else:
             path = circle((0.0, 0.0), _OUTER, turn + around + 0.62, -1.0)
-        walks.append(Walk(anatomy, path, delay=0.15, swing=0.75, first="right" if k % 2 else "left"))
+        first = "right" if k % 2 else "left"
+        walks.append(Walk(anatomy, path, delay=0.15, swing=0.7, aside=6.0, first=first))
     return walks
 
 

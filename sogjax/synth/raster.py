@@ -4,10 +4,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
+
+Corners = Float[np.ndarray, "2 3 face"]
+"""Pixel x and y of the three corners of faces."""
 
 _CHUNK = 1_500_000
-"""Candidate pixels handled at a time."""
+"""Pixels drawn at a time."""
 _EMPTY = np.iinfo(np.int64).max
 _FACE_BITS = 24
 _DEPTH_STEPS = 2.0**30
@@ -54,18 +57,22 @@ class Hits:
     columns: Int[np.ndarray, "n"]
     """Of the window."""
     faces: Int[np.ndarray, "n"]
-    barycentric: Float[np.ndarray, "n 3"]
+    barycentric: Float[np.ndarray, "3 n"]
     """Weights of the face's corners, corrected for perspective."""
     depths: Float[np.ndarray, "n"]
+
+    def where(self, kept: Bool[np.ndarray, "n"]) -> "Hits":
+        """Only some of the hits."""
+        return Hits(self.rows[kept], self.columns[kept], self.faces[kept], self.barycentric[:, kept], self.depths[kept])
 
     def interpolated(
         self, values: Float[np.ndarray, "vertex channel"], faces: Int[np.ndarray, "face 3"]
     ) -> Float[np.ndarray, "n channel"]:
         """Values of the vertices, at the hits."""
         corners = faces[self.faces]
-        total = self.barycentric[:, :1] * values[corners[:, 0]]
-        total += self.barycentric[:, 1:2] * values[corners[:, 1]]
-        total += self.barycentric[:, 2:] * values[corners[:, 2]]
+        total = self.barycentric[0, :, None] * values[corners[:, 0]]
+        total += self.barycentric[1, :, None] * values[corners[:, 1]]
+        total += self.barycentric[2, :, None] * values[corners[:, 2]]
         return total
 
 
@@ -88,61 +95,62 @@ def rasterize(
             parallel projection.
         cull: leave out faces that are seen from behind.
     """
-    corners = pixels[faces] - np.array([window.x, window.y], float)
-    areas = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    corners = (pixels - np.array([window.x, window.y], float)).T[:, faces.T]
+    areas = _areas(corners)
     # Image y points down, so an outward counter-clockwise face has a negative area in the picture.
-    drawn = ((areas < 0.0) if cull else (areas != 0.0)) & (depths[faces] > 0.0).all(1)
-    drawn &= (corners.max(1) >= 0.0).all(1) & (corners.min(1) <= [window.width - 1, window.height - 1]).all(1)
+    drawn = ((areas < 0.0) if cull else (areas != 0.0)) & (depths > 0.0)[faces.T].all(0)
+    lower, upper = corners.min(1), corners.max(1)
+    drawn &= (upper >= 0.0).all(0) & (lower[0] <= window.width - 1) & (lower[1] <= window.height - 1)
     chosen = np.flatnonzero(drawn)
-    corners, areas = corners[chosen], areas[chosen]
-    linear = (1.0 / depths if perspective else depths)[faces[chosen]]
+    corners, areas = corners[:, :, chosen], areas[chosen]
+    linear = (1.0 / depths if perspective else depths)[faces[chosen].T]
     best = np.full(window.width * window.height, _EMPTY, np.int64)
     if len(chosen):
-        slopes = _slopes(corners, areas, linear)
+        plane = _plane(corners, areas, linear)
         face, row, first, count = _spans(corners, window)
         for part in _parts(count):
-            _draw(best, face[part], row[part], first[part], count[part], slopes, window, perspective)
+            _draw(best, face[part], row[part], first[part], count[part], plane, window, perspective)
     return _hits(best, chosen, corners, areas, linear, window, perspective)
 
 
-def _cross(a: Float[np.ndarray, "*n 2"], b: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n"]:
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+def _areas(corners: Corners) -> Float[np.ndarray, "face"]:
+    """Twice the signed areas."""
+    x, y = corners
+    return (x[1] - x[0]) * (y[2] - y[0]) - (y[1] - y[0]) * (x[2] - x[0])
 
 
-def _slopes(corners: np.ndarray, areas: np.ndarray, linear: np.ndarray) -> tuple[np.ndarray, ...]:
+def _plane(corners: Corners, areas: np.ndarray, linear: np.ndarray) -> Float[np.ndarray, "3 face"]:
     """Of each face the plane a x + b y + c that its `linear` values at the corners lie on."""
-    (x0, y0), (x1, y1), (x2, y2) = (corners[:, k].T for k in range(3))
-    first, second = linear[:, 1] - linear[:, 0], linear[:, 2] - linear[:, 0]
-    a = (first * (y2 - y0) - second * (y1 - y0)) / areas
-    b = (second * (x1 - x0) - first * (x2 - x0)) / areas
-    return a, b, linear[:, 0] - a * x0 - b * y0
+    x, y = corners
+    first, second = linear[1] - linear[0], linear[2] - linear[0]
+    a = (first * (y[2] - y[0]) - second * (y[1] - y[0])) / areas
+    b = (second * (x[1] - x[0]) - first * (x[2] - x[0])) / areas
+    return np.stack([a, b, linear[0] - a * x[0] - b * y[0]])
 
 
-def _spans(corners: np.ndarray, window: Window) -> tuple[np.ndarray, ...]:
+def _spans(corners: Corners, window: Window) -> tuple[Int[np.ndarray, "span"], ...]:
     """The rows of pixels that the faces cover: face, row, first column and number of columns of each."""
-    top = np.maximum(np.ceil(corners[..., 1].min(1)), 0).astype(np.int64)
-    bottom = np.minimum(np.floor(corners[..., 1].max(1)), window.height - 1).astype(np.int64)
+    x, y = corners
+    top = np.maximum(np.ceil(y.min(0)), 0).astype(np.int64)
+    bottom = np.minimum(np.floor(y.max(0)), window.height - 1).astype(np.int64)
     rows = np.maximum(bottom - top + 1, 0)
-    face = np.repeat(np.arange(len(corners)), rows)
+    face = np.repeat(np.arange(len(rows)), rows)
     row = np.arange(len(face)) - np.repeat(np.cumsum(rows) - rows - top, rows)
     left, right = np.full(len(face), np.inf), np.full(len(face), -np.inf)
     for k in range(3):
-        (xa, ya), (xb, yb) = corners[:, k].T, corners[:, (k + 1) % 3].T
-        level = ya == yb
-        slope = np.where(level, 0.0, (xb - xa) / np.where(level, 1.0, yb - ya))
-        lower, upper = np.minimum(ya, yb)[face], np.maximum(ya, yb)[face]
-        x = xa[face] + slope[face] * (row - ya[face])
-        meets = (row >= lower) & (row <= upper)
-        for end in (xa, xb):  # a level edge covers its whole length
-            here = meets & level[face]
-            left = np.where(here, np.minimum(left, end[face]), left)
-            right = np.where(here, np.maximum(right, end[face]), right)
-        left = np.where(meets, np.minimum(left, x), left)
-        right = np.where(meets, np.maximum(right, x), right)
+        # An edge along a row needs no care: the other two begin at its ends.
+        drop = y[(k + 1) % 3] - y[k]
+        level = drop == 0.0
+        slope = (x[(k + 1) % 3] - x[k]) / np.where(level, 1.0, drop)
+        along = row - y[k][face]
+        meets = (along * (row - y[(k + 1) % 3][face]) <= 0.0) & ~level[face]
+        crossing = x[k][face] + slope[face] * along
+        left = np.minimum(left, np.where(meets, crossing, np.inf))
+        right = np.maximum(right, np.where(meets, crossing, -np.inf))
     first = np.ceil(np.clip(left - _SLACK, 0, window.width)).astype(np.int64)
     last = np.floor(np.clip(right + _SLACK, -1, window.width - 1)).astype(np.int64)
     count = last - first + 1
-    kept = count > 0
+    kept = np.flatnonzero(count > 0)
     return face[kept], row[kept], first[kept], count[kept]
 
 
@@ -154,29 +162,46 @@ def _parts(counts: Int[np.ndarray, "n"]) -> list[slice]:
     return [slice(a, b) for a, b in pairwise(bounds) if b > a]
 
 
-def _draw(best, face, row, first, count, slopes, window, perspective) -> None:  # noqa: ANN001
+def _draw(
+    best: Int[np.ndarray, "pixel"],
+    face: Int[np.ndarray, "span"],
+    row: Int[np.ndarray, "span"],
+    first: Int[np.ndarray, "span"],
+    count: Int[np.ndarray, "span"],
+    plane: Float[np.ndarray, "3 face"],
+    window: Window,
+    perspective: bool,
+) -> None:
     """Enter spans of pixels into the buffer of smallest keys (depth, face)."""
-    a, b, c = slopes
-    start = a[face] * first + b[face] * row + c[face]
+    a, b, c = plane[:, face]
     along = np.arange(int(count.sum())) - np.repeat(np.cumsum(count) - count, count)
-    value = np.repeat(start, count) + np.repeat(a[face], count) * along
+    value = np.repeat(a * first + b * row + c, count) + np.repeat(a, count) * along
     depth = 1.0 / value if perspective else value
     key = (depth * _DEPTH_STEPS).astype(np.int64) << _FACE_BITS
     np.minimum.at(best, np.repeat(row * window.width + first, count) + along, key | np.repeat(face, count))
 
 
-def _hits(best, chosen, corners, areas, linear, window, perspective) -> Hits:  # noqa: ANN001
+def _hits(
+    best: Int[np.ndarray, "pixel"],
+    chosen: Int[np.ndarray, "face"],
+    corners: Corners,
+    areas: Float[np.ndarray, "face"],
+    linear: Float[np.ndarray, "3 face"],
+    window: Window,
+    perspective: bool,
+) -> Hits:
+    """The nearest face of each pixel and the weights of its corners there."""
     seen = np.flatnonzero(best != _EMPTY)
     face = best[seen] & ((1 << _FACE_BITS) - 1)
     rows, columns = seen // window.width, seen % window.width
-    ax, ay, bx, by, cx, cy = corners.reshape(-1, 6)[face].T
-    inverse = 1.0 / areas[face]
-    weights = np.empty((len(seen), 3))
-    weights[:, 0] = ((bx - columns) * (cy - rows) - (by - rows) * (cx - columns)) * inverse
-    weights[:, 1] = ((cx - columns) * (ay - rows) - (cy - rows) * (ax - columns)) * inverse
-    weights[:, 2] = 1.0 - weights[:, 0] - weights[:, 1]
-    scaled = weights * linear[face]
-    value = scaled.sum(1)
+    unit_planes = np.stack([_plane(corners, areas, np.eye(3)[:, k : k + 1]) for k in range(2)])
+    weights = np.empty((3, len(seen)))
+    for k in range(2):
+        a, b, c = unit_planes[k]
+        weights[k] = a[face] * columns + b[face] * rows + c[face]
+    weights[2] = 1.0 - weights[0] - weights[1]
+    scaled = weights * linear[:, face]
+    value = scaled.sum(0)
     if perspective:
-        weights, value = scaled / value[:, None], 1.0 / value
+        weights, value = scaled / value, 1.0 / value
     return Hits(rows, columns, chosen[face], weights.astype(np.float32), value)

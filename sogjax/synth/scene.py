@@ -66,9 +66,7 @@ class Scene:
     shadow: ShadowMap
     """Of everything but floor, walls and ceiling."""
 
-    def colors(
-        self, faces: Int[np.ndarray, "n"], uv: Float[np.ndarray, "n 2"]
-    ) -> Float[np.ndarray, "n 3"]:
+    def colors(self, faces: Int[np.ndarray, "n"], uv: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 3"]:
         """SRGB colours at surface coordinates of faces."""
         kind = self.face_texture[faces]
         order = np.argsort(kind, kind="stable")
@@ -182,9 +180,7 @@ def _standing_thing(angle: float, rng: np.random.Generator) -> list[Panel]:
     return _box(place, lower, facing, _cover(rng)) + _box(stacked, upper, facing + 0.4, _cover(rng))
 
 
-def _box(
-    place: Float[np.ndarray, "3"], size: Float[np.ndarray, "3"], turn: float, texture: Texture
-) -> list[Panel]:
+def _box(place: Float[np.ndarray, "3"], size: Float[np.ndarray, "3"], turn: float, texture: Texture) -> list[Panel]:
     """A box without bottom whose footprint is centred at `place`."""
     u, v = size[0] * _direction(turn), size[1] * _direction(turn + np.pi / 2)
     z = np.array([0.0, 0.0, size[2]])

@@ -66,7 +66,9 @@ class SynthSettings:
         self._check_range("distortion", -0.3, 0.1)
         for name in ("width", "height"):
             if getattr(self, name) % 2:
-                raise InputError(f"{name}={getattr(self, name)} is odd, which video files do not take; use an even number")
+                raise InputError(
+                    f"{name}={getattr(self, name)} is odd, which video files do not take; use an even number"
+                )
 
     @property
     def actor_names(self) -> tuple[str, ...]:

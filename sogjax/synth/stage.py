@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sogjax.synth.anatomy import Pose, anatomy_from_seed
-from sogjax.synth.clothes import outfit_from_seed
+from sogjax.synth.clothes import outfits_from_seed
 from sogjax.synth.exercises import EXAMPLE_POSES, standing_pose
 from sogjax.synth.figure import make_figure
 from sogjax.synth.motions import Motion, motions_of
@@ -43,10 +43,10 @@ class Stage:
 def stage_of(settings: SynthSettings) -> Stage:
     """Make everything; the same settings make the same things."""
     stream = lambda *key: np.random.default_rng([settings.seed, *key])
+    outfits = outfits_from_seed(stream(_PEOPLE, 100), settings.actors)
     people = []
-    for number in range(settings.actors):
+    for number, outfit in enumerate(outfits):
         anatomy = anatomy_from_seed(stream(_PEOPLE, number))
-        outfit = outfit_from_seed(stream(_PEOPLE, 100), number)
         people.append(Person.dressed(make_figure(anatomy, outfit)))
     anatomies = [person.figure.anatomy for person in people]
     return Stage(
@@ -61,4 +61,4 @@ def stage_of(settings: SynthSettings) -> Stage:
 
 def _sensor(settings: SynthSettings, rng: np.random.Generator) -> Sensor:
     spread = settings.camera_variation * np.clip(rng.standard_normal(4), -2.0, 2.0)
-    return Sensor(gain=(1.0 + spread[0]) * (1.0 + spread[1:] / 3.0), noise=settings.noise)
+    return Sensor(gain=(1.0 + spread[0]) * (1.0 + spread[1:] / 3.0), noise=settings.noise, seed=settings.seed)

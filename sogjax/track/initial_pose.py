@@ -132,7 +132,7 @@ def _fit_all(
             return distances, prior, 30.0 * limits
 
         result = optx.least_squares(residuals, solver, start, max_steps=100, throw=False)
-        cost = sum(jnp.sum(part**2) for part in residuals(result.value, None))
+        cost = jnp.sum(jnp.concatenate([part**2 for part in residuals(result.value, None)]))
         return result.value, cost
 
     return jax.vmap(fit)(starts)

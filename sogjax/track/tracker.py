@@ -1,5 +1,6 @@
 """Tracking (Section 5.3): predict, cull, solve, advance; one compiled step for every frame of a recording."""
 
+import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
@@ -121,11 +122,14 @@ _step = eqx.filter_jit(Tracker.step)
 
 @dataclass
 class TrackedFrame:
-    """The result of one frame, and the capacities it was computed with."""
+    """The result of one frame, the capacities it was computed with, and how long that took."""
 
     index: int
     result: FrameResult
     capacities: Capacities
+    color_space: str
+    """Of the colours in `result.images`."""
+    seconds: float
 
 
 def track(
@@ -144,6 +148,7 @@ def track(
     state = TrackState.from_pose(start)
     capacities: Capacities | None = None
     for index, cells in enumerate(frames):
+        begin = time.perf_counter()
         device_cells = jnp.asarray(cells)
         if capacities is None:
             capacities = first_capacities(tracker, state, device_cells)
@@ -156,7 +161,8 @@ def track(
                 raise ValueError(f"frame {index}: {int(result.num_near.max())} image blobs near the body")
             capacities = needed
         state = next_state
-        yield TrackedFrame(index, result, capacities)
+        seconds = time.perf_counter() - begin
+        yield TrackedFrame(index, jax.device_get(result), capacities, tracker.reader.color_space, seconds)
 
 
 def first_capacities(tracker: Tracker, state: TrackState, cells: UInt8[Array, "camera rows columns 3"]) -> Capacities:

@@ -1,0 +1,48 @@
+"""`sogjax demo`: render a person, make the actor, track, evaluate; everything at once."""
+
+import time
+from pathlib import Path
+
+from sogjax.app.composition import composed
+from sogjax.app.configs import DemoConfig, TrackConfig
+from sogjax.app.outputs import prepare_folder
+from sogjax.app.progress import progress
+from sogjax.app.recordings import say
+from sogjax.app.track import Run
+from sogjax.app.track import run as run_track
+from sogjax.synth import SynthSettings, cached_recording, default_cache_dir
+
+
+def run(config: DemoConfig) -> Run:
+    """Render the demo recording if it is not there, and track it.
+
+    Raises:
+        InputError: a setting out of range, or a folder that cannot be written.
+    """
+    begin = time.perf_counter()
+    out = prepare_folder(Path(config.out))
+    settings = SynthSettings(
+        motion=config.motion,
+        cameras=config.cameras,
+        frames=config.frames,
+        width=config.width,
+        height=config.height,
+        seed=config.seed,
+    )
+    recording = cached_recording(settings, default_cache_dir(), progress)
+    say(f"rendered recording: {recording}")
+    rendered = time.perf_counter()
+    track_config: TrackConfig = composed("track", [f"recording={_quoted(recording)}", f"out={_quoted(out)}"])
+    track_config.outputs = config.outputs
+    result = run_track(track_config)
+    print(
+        f"rendering {rendered - begin:.1f} s (0 when it was there already), "
+        f"actor, tracking and outputs {time.perf_counter() - rendered:.1f} s"
+    )
+    return result
+
+
+def _quoted(path: Path) -> str:
+    """A path as Hydra's grammar takes it, whatever characters it has."""
+    escaped = str(path).replace("\\", "\\\\").replace("'", "\\'")
+    return f"'{escaped}'"

@@ -1,0 +1,44 @@
+"""`sogjax evaluate`: compare motions with ground truth."""
+
+from pathlib import Path
+
+from sogjax.app.configs import EvaluateConfig
+from sogjax.app.recordings import file_list
+from sogjax.data.ground_truth import GroundTruth, load_ground_truth
+from sogjax.data.motion import Motion, load_motion
+from sogjax.errors import InputError
+from sogjax.evaluate import GroupEvaluation, evaluate_motions
+
+
+def run(config: EvaluateConfig) -> GroupEvaluation:
+    """Print the table; write the JSON file where one is asked for.
+
+    Raises:
+        InputError: files that do not open or do not fit together.
+    """
+    truth = load_ground_truth(Path(config.truth))
+    evaluation = evaluate_motions(named_motions(file_list(config.motion), truth), truth)
+    print(evaluation.table())
+    if config.out is not None:
+        evaluation.to_json(Path(config.out))
+        print(config.out)
+    return evaluation
+
+
+def named_motions(paths: list[Path], truth: GroundTruth) -> dict[str, Motion]:
+    """The motions by actor: `motion_NAME.npz` is NAME's, where the truth has several subjects.
+
+    Raises:
+        InputError: a motion whose file name tells no subject of the truth.
+    """
+    if len(paths) == 1 and len(truth.subjects) < 2:
+        return {"actor": load_motion(paths[0])}
+    motions = {}
+    for path in paths:
+        name = path.stem.removeprefix("motion_")
+        if name not in truth.subjects:
+            raise InputError(
+                f"{path}: the truth's subjects are {', '.join(truth.subjects)}; name the file motion_NAME.npz after one"
+            )
+        motions[name] = load_motion(path)
+    return motions

@@ -1,0 +1,118 @@
+"""Opening recordings and actors for the commands, and saying what was noticed."""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import jax.numpy as jnp
+
+from sogjax.actor.make import make_actor, subjects_of
+from sogjax.app.build import color_space_and_radius, energy_weights
+from sogjax.app.configs import ColorConfig, EnergyConfig
+from sogjax.data.actor_file import load_body, named_body
+from sogjax.data.initial_pose import load_initial_poses
+from sogjax.data.recording import Recording, open_recording
+from sogjax.errors import InputError
+from sogjax.model.body import Body
+from sogjax.model.frames import world_from_upright
+from sogjax.track.initial_pose import rough_pose
+
+
+def say(text: str) -> None:
+    """A line for the person at the terminal, apart from the results on standard output."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def opened(path: str, cameras: Sequence[str] | None = None) -> Recording:
+    """A recording, with some of its cameras or all, its warnings said.
+
+    Raises:
+        InputError: anything wrong with it, or a camera that it does not have.
+    """
+    recording = open_recording(Path(path))
+    for warning in recording.warnings:
+        say(f"warning: {warning}")
+    if not cameras:
+        return recording
+    unknown = [name for name in cameras if name not in recording.rig.names]
+    if unknown:
+        raise InputError(
+            f"cameras={','.join(cameras)}: {recording.path} has no camera {', '.join(unknown)}; "
+            f"it has {', '.join(recording.rig.names)}"
+        )
+    return replace(recording, rig=recording.rig.select(tuple(cameras)))
+
+
+def body_named(name: str) -> Body:
+    """A body that comes with the program, or one from a file.
+
+    Raises:
+        InputError: neither.
+    """
+    path = Path(name)
+    return load_body(path if path.is_file() else named_body(name))
+
+
+def file_list(value: Any) -> list[Path]:
+    """One file or several, as a config gives them."""
+    values = value if isinstance(value, (list, tuple)) else [value]
+    return [Path(str(item)) for item in values]
+
+
+def actors_of(recording: Recording, files: Any, body: str, color: ColorConfig) -> tuple[list[Body], bool]:
+    """The actors of a recording and whether they were made just now from its example poses.
+
+    Raises:
+        InputError: a wrong actor file; two actors of one name; example poses that do not suffice.
+    """
+    if files is not None:
+        actors = [load_body(path) for path in file_list(files)]
+        names = [actor.name for actor in actors]
+        if len(set(names)) < len(names):
+            raise InputError(f"actor={files}: two actors are named {names[0]!r}; give each its own `name`")
+        return actors, False
+    space, _ = color_space_and_radius(color)
+    cameras = recording.rig.names
+    subjects = subjects_of(recording)
+    return [_made_actor(str(recording.path), cameras, body, subject, space) for subject in subjects], True
+
+
+@cache
+def _made_actor(path: str, cameras: tuple[str, ...], body: str, subject: str | None, space: str) -> Body:
+    """The actor of a recording; made once a process, so that the members of a sweep share it."""
+    recording = open_recording(Path(path))
+    recording = replace(recording, rig=recording.rig.select(cameras))
+    label = "actor" if subject is None else f"actor {subject}"
+    weights = energy_weights(EnergyConfig())
+    return make_actor(
+        recording, body_named(body), subject, space, weights, report=lambda stage: say(f"{label}: {stage}")
+    ).body
+
+
+def upright(body: Body, recording: Recording) -> Body:
+    """A body that stands upright in the recording's world."""
+    return body.rotated(jnp.asarray(world_from_upright(recording.up), body.blob_sigmas.dtype))
+
+
+def first_poses(recording: Recording, bodies: Sequence[Body]) -> list[Any]:
+    """The rough poses of frame 0, of bodies that stand upright in the recording's world.
+
+    Raises:
+        InputError: there is no initial_pose.yaml, or something in it is wrong.
+    """
+    if recording.initial_poses is None:
+        raise InputError(
+            f"{recording.path}: no initial_pose.yaml; write the rough pose of frame 0 into it, by `position`, "
+            "`heading` and `pose`, or by `landmarks`"
+        )
+    descriptions = load_initial_poses(recording.initial_poses, [body.name for body in bodies])
+    poses = []
+    for body in bodies:
+        try:
+            poses.append(rough_pose(body, descriptions[body.name], recording.up))
+        except InputError as error:
+            raise InputError(f"{recording.initial_poses}: {error}") from error
+    return poses

@@ -1,0 +1,78 @@
+"""Sweeps: `-m` runs every combination of the overrides and ends with a table."""
+
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from sogjax.app.composition import SCHEMAS, conf_dir, register_schemas, to_object
+from sogjax.errors import InputError
+
+COLUMNS = ("mean mm", "std mm", "joints mm", "lost", "iterations", "not converged", "frames/s")
+
+
+def run_sweep(command: str, overrides: Sequence[str]) -> int:
+    """Run a command for every combination of overrides such as `energy.limit_weight=0,1,2`.
+
+    Raises:
+        InputError: a command other than track.
+    """
+    if command != "track":
+        raise InputError(f"sogjax {command} -m: only track can be swept; commands: {', '.join(SCHEMAS)}")
+    program = sys.argv
+    sys.argv = [f"sogjax {command}", "-m", *overrides]
+    try:
+        sweep_main(track_task)()
+    finally:
+        sys.argv = program
+    return 0
+
+
+def sweep_main(task: Callable[[Any], Any]) -> Callable[[], Any]:
+    """Hydra's entry point for a task of the track config."""
+    import hydra
+
+    register_schemas()
+    return hydra.main(version_base="1.3", config_path=str(conf_dir()), config_name="track")(task)
+
+
+def track_task(tree: Any) -> dict[str, float]:
+    """One member of a sweep: track into the member's own folder; the numbers of its row."""
+    from hydra.core.hydra_config import HydraConfig
+    from hydra.types import RunMode
+
+    from sogjax.app import track
+
+    config = to_object("track", tree)
+    if not config.out or HydraConfig.get().mode == RunMode.MULTIRUN:
+        config.out = HydraConfig.get().runtime.output_dir
+    return row_numbers(track.run(config))
+
+
+def row_numbers(result: Any) -> dict[str, float]:
+    """What a sweep's table shows of one run."""
+    import numpy as np
+
+    numbers: dict[str, float] = dict.fromkeys(COLUMNS, float("nan"))
+    if result.evaluation is not None:
+        summary = result.evaluation.summary
+        numbers["mean mm"], numbers["std mm"] = 1000.0 * summary.mean, 1000.0 * summary.std
+        joints = [e.joints.errors for e in result.evaluation.evaluations.values() if e.joints is not None]
+        if joints:
+            numbers["joints mm"] = 1000.0 * float(np.nanmean(np.concatenate(joints, axis=1)))
+        numbers["lost"] = sum(len(e.lost) for e in result.evaluation.evaluations.values())
+    numbers["iterations"] = float(np.mean([frame.result.iterations for frame in result.frames]))
+    numbers["not converged"] = sum(not bool(frame.result.converged) for frame in result.frames)
+    numbers["frames/s"] = result.times.frames_per_second("step")
+    return numbers
+
+
+def table(rows: Sequence[tuple[str, dict[str, float] | str]]) -> str:
+    """A plain-text table: what was set, and what came of it."""
+    width = max(len("settings"), *(len(name) for name, _ in rows)) if rows else 8
+    lines = [f"{'settings':<{width}}" + "".join(f"{column:>15}" for column in COLUMNS)]
+    for name, numbers in rows:
+        if isinstance(numbers, str):
+            lines.append(f"{name:<{width}}   failed: {numbers}")
+        else:
+            lines.append(f"{name:<{width}}" + "".join(f"{numbers[column]:>15.2f}" for column in COLUMNS))
+    return "\n".join(lines)

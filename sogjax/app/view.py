@@ -1,0 +1,37 @@
+"""`sogjax view`: a motion in Rerun."""
+
+import subprocess
+import tempfile
+from pathlib import Path
+
+from sogjax.app.configs import ViewConfig
+from sogjax.app.progress import progress
+from sogjax.app.recordings import file_list, opened
+from sogjax.data.ground_truth import load_ground_truth
+from sogjax.data.motion import load_motion
+from sogjax.data.video import read_frames
+from sogjax.view.rerun import view_command, write_rerun
+
+
+def run(config: ViewConfig) -> Path:
+    """Write the Rerun file, or open the viewer on it where no file is asked for.
+
+    Raises:
+        InputError: files that do not open or do not fit together.
+    """
+    recording = opened(config.recording)
+    motions = [load_motion(path) for path in file_list(config.motion)]
+    out = Path(config.out) if config.out is not None else Path(tempfile.mkdtemp()) / "motion.rrd"
+    first = int(motions[0].frame[0]) - recording.first_frame
+    write_rerun(
+        out,
+        recording,
+        motions,
+        frames=read_frames(recording, first, first + motions[0].num_frames) if config.images else None,
+        truth=None if recording.ground_truth is None else load_ground_truth(recording.ground_truth),
+        progress=progress,
+    )
+    print(out)
+    if config.out is None:
+        subprocess.run(view_command(out), check=False)
+    return out

@@ -1,0 +1,47 @@
+"""Rendered recordings are kept: the same settings are rendered once on a machine."""
+
+import hashlib
+import json
+import os
+from dataclasses import asdict
+from pathlib import Path
+
+from sogjax.errors import InputError
+from sogjax.synth.render import Progress, render_recording, silent
+from sogjax.synth.settings import SynthSettings
+
+SYNTH_VERSION = 1
+"""To be raised with every change that alters the pictures."""
+
+
+def default_cache_dir() -> Path:
+    """Where recordings are kept: SOGJAX_CACHE, else the system's folder for caches."""
+    own = os.environ.get("SOGJAX_CACHE")
+    if own:
+        return Path(own)
+    system = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
+    return Path(system) / "sogjax" if system else Path.home() / ".cache" / "sogjax"
+
+
+def cache_name(settings: SynthSettings) -> str:
+    """The folder's name for these settings: readable, and different for different settings."""
+    content = json.dumps({"version": SYNTH_VERSION, **asdict(settings)}, sort_keys=True)
+    return f"{settings.motion}{settings.actors}-{hashlib.sha256(content.encode()).hexdigest()[:12]}"
+
+
+def cached_recording(settings: SynthSettings, cache_dir: Path | None = None, progress: Progress = silent) -> Path:
+    """The recording with these settings, rendered now if it is not there yet.
+
+    Raises:
+        InputError: a setting is wrong, or the folder cannot be written.
+    """
+    settings.check()
+    folder = (cache_dir or default_cache_dir()) / "recordings" / cache_name(settings)
+    if folder.is_dir() and any(folder.iterdir()):
+        return folder
+    try:
+        return render_recording(settings, folder, progress)
+    except (InputError, OSError):
+        if folder.is_dir() and any(folder.iterdir()):  # another process was faster
+            return folder
+        raise
