@@ -12,6 +12,7 @@ from jaxtyping import Array, Bool, Float, UInt8
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, distort, project, project_points
 from sogjax.model.color import averaging_space, from_rgb, to_rgb
+from sogjax.model.sog import Sog
 
 SAMPLE_RADIUS = 0.8
 """Samples are taken within this many sigmas of a blob's centre."""
@@ -45,11 +46,12 @@ def back_projected_colors(body: Body, views: Sequence[ColoredView], color_space:
         for blob, colors in enumerate(_samples(body, view)):
             samples[blob].append(colors)
     stacked = [np.concatenate(parts) for parts in samples]
-    colors = np.full((body.num_blobs, 3), np.nan)
-    for blob, rgb in enumerate(stacked):
-        if len(rgb) >= MIN_SAMPLES:
-            colors[blob] = _robust_mean(rgb, color_space)
-    return _filled(body, colors)
+    space = averaging_space(color_space)
+    converted = np.asarray(from_rgb(jnp.asarray(np.concatenate(stacked), jnp.float32), space))
+    parts = np.split(converted, np.cumsum([len(part) for part in stacked])[:-1])
+    seen = np.array([len(part) >= MIN_SAMPLES for part in parts])
+    means = np.stack([_robust_mean(part) if enough else np.zeros(3) for part, enough in zip(parts, seen, strict=True)])
+    return _filled(body, np.asarray(to_rgb(jnp.asarray(means, jnp.float32), space), float), seen)
 
 
 def _samples(body: Body, view: ColoredView) -> list[Float[np.ndarray, "n 3"]]:
@@ -69,9 +71,8 @@ def _sample_pixels(
     body: Body, view: ColoredView
 ) -> tuple[Float[np.ndarray, "blob sample 2"], Bool[np.ndarray, "blob sample"]]:
     """Where the sampling pattern of every blob lies in the picture as recorded, and which samples are not hidden."""
-    blobs = body.posed_blobs(view.pose)
-    seen = project(view.camera, blobs)
-    depth = np.asarray(project_points(view.camera, blobs.means)[1], float)
+    seen, depths = _seen_blobs(body, view.camera, view.pose)
+    depth = np.asarray(depths, float)
     centre, sigma = np.asarray(seen.means, float), np.asarray(seen.sigmas, float)
     pattern = np.concatenate(
         [
@@ -84,22 +85,30 @@ def _sample_pixels(
     distance = np.linalg.norm(pixels[:, :, None] - centre[None, None], axis=-1)
     nearer = depth[None, :] < (depth - np.asarray(body.blob_sigmas, float))[:, None]
     hidden = np.any((distance < HIDING_RADIUS * sigma) & nearer[:, None, :], axis=-1)
-    recorded = np.asarray(distort(view.camera, jnp.asarray(pixels.reshape(-1, 2), seen.means.dtype)))
+    recorded = np.asarray(_distorted(view.camera, jnp.asarray(pixels.reshape(-1, 2), seen.means.dtype)))
     return recorded.reshape(pixels.shape), ~hidden & np.asarray(seen.mask)[:, None]
 
 
-def _robust_mean(rgb: Float[np.ndarray, "n 3"], color_space: str) -> Float[np.ndarray, "3"]:
-    """Mean of the half of the samples that lie nearest to their median, in a colour space without wrap-around."""
-    space = averaging_space(color_space)
-    colors = np.asarray(from_rgb(jnp.asarray(rgb, jnp.float32), space))
+@eqx.filter_jit
+def _seen_blobs(body: Body, camera: Camera, pose: Float[Array, "dof"]) -> tuple[Sog, Float[Array, "blob"]]:
+    """The projected blobs and their depths (metres)."""
+    blobs = body.posed_blobs(pose)
+    return project(camera, blobs), project_points(camera, blobs.means)[1]
+
+
+_distorted = eqx.filter_jit(distort)
+
+
+def _robust_mean(colors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "3"]:
+    """Mean of the half of the samples that lie nearest to their median."""
     distance = np.linalg.norm(colors - np.median(colors, axis=0), axis=1)
-    near = colors[distance <= np.median(distance)]
-    return np.asarray(to_rgb(jnp.asarray(near.mean(axis=0)), space), float)
+    return colors[distance <= np.median(distance)].mean(axis=0)
 
 
-def _filled(body: Body, colors: Float[np.ndarray, "blob 3"]) -> Float[np.ndarray, "blob 3"]:
-    """Colours of blobs that were never seen, from the nearest blob that was."""
-    seen = np.isfinite(colors[:, 0])
+def _filled(
+    body: Body, colors: Float[np.ndarray, "blob 3"], seen: Bool[np.ndarray, "blob"]
+) -> Float[np.ndarray, "blob 3"]:
+    """Colours of blobs that were never seen, from the nearest blob that was; the body's own where none was."""
     if not seen.any():
         return np.asarray(body.blob_colors, float)
     means = np.asarray(body.posed_blobs(body.poses["rest"]).means, float)

@@ -1,8 +1,7 @@
 """An actor from example poses (Section 5.2): all poses and one set of shape parameters, climbed together."""
 
-from collections.abc import Sequence
-
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -32,13 +31,16 @@ def estimate_shape(
     model: ShapeModel,
     poses: Float[Array, "pose dof"],
     shape_params: Float[Array, "shape"],
-    views: Sequence[Views],
+    views: Views,
     weights: EnergyWeights,
     max_iterations: int = 150,
 ) -> Estimate:
-    """Climb the mean of Eq. 9 over the example poses, from rough poses and shape parameters."""
+    """Climb the mean of Eq. 9 over the example poses, from rough poses and shape parameters.
+
+    `views` has a leading axis for the poses (`stack_views`).
+    """
     scales = _scales(pose_scales(model.body.skeleton), poses.shape[0], shape_params.shape[0])
-    return _climb(model, poses, shape_params, tuple(views), weights, scales, max_iterations)
+    return _climb(model, poses, shape_params, views, weights, scales, max_iterations)
 
 
 @eqx.filter_jit
@@ -49,9 +51,9 @@ def _climb(model, poses, shape_params, views, weights, scales, max_iterations) -
         poses = params[: num_poses * num_dofs].reshape(num_poses, num_dofs)
         shape = params[num_poses * num_dofs :]
         body = model.shaped(shape)
-        scores = [pose_score(body, pose, view, weights) for pose, view in zip(poses, views, strict=True)]
+        scores = jax.vmap(pose_score, in_axes=(None, 0, 0, None))(body, poses, views, weights)
         unusual = jnp.sum((shape[1:] / SHAPE_SPREAD) ** 2)
-        return sum(scores, jnp.zeros(())) / num_poses - SHAPE_WEIGHT * unusual
+        return jnp.mean(scores) - SHAPE_WEIGHT * unusual
 
     start = jnp.concatenate([poses.reshape(-1), shape_params])
     solver = ConditionedAscent(max_iterations=max_iterations)

@@ -37,9 +37,13 @@ def starts_at(
 
 def centred(body: Body, pose: Float[Array, "dof"], centre: Float[np.ndarray, "3"]) -> Float[Array, "dof"]:
     """The pose moved so that the body's centre lies at a point (metres, world)."""
+    return placed(body, pose, root_position(body, pose) + centre - np.asarray(_centre_of(body, pose), float))
+
+
+@eqx.filter_jit
+def _centre_of(body: Body, pose: Float[Array, "dof"]) -> Float[Array, "3"]:
     blobs = body.posed_blobs(pose)
-    root = root_position(body, pose)
-    return placed(body, pose, root + centre - np.asarray(body_centre(blobs.means, blobs.sigmas), float))
+    return body_centre(blobs.means, blobs.sigmas)
 
 
 def pose_from_silhouettes(
@@ -48,20 +52,21 @@ def pose_from_silhouettes(
     """The best pose by Eq. 9 and its energy.
 
     Every named pose is climbed from the heading that suits it best and from the opposite one, since silhouettes hardly
-    tell front from back; the best few are climbed to the end.
+    tell front from back; the best few are climbed to the end. A single start is climbed to the end at once.
     """
-    num_headings, num_named, num_dofs = starts.shape
-    promise = _energies(body, starts.reshape(-1, num_dofs), views, weights).reshape(num_headings, num_named)
-    heading = jnp.argmax(promise, axis=0)
-    opposite = (heading + num_headings // 2) % num_headings
-    named = jnp.arange(num_named)
-    candidates = jnp.concatenate([starts[heading, named], starts[opposite, named]])
     scales = pose_scales(body.skeleton)
-    poses, energies = _refined(body, candidates, views, weights, scales, jnp.asarray(COARSE_ITERATIONS))
-    best = jnp.argsort(-energies)[:NUM_FINE]
-    poses, energies = _refined(body, poses[best], views, weights, scales, jnp.asarray(FINE_ITERATIONS))
-    winner = jnp.argmax(energies)
-    return poses[winner], energies[winner]
+    refined = lambda pose, iterations: _refined(body, pose, views, weights, scales, jnp.asarray(iterations))
+    num_headings, num_named, num_dofs = starts.shape
+    candidates = starts.reshape(-1, num_dofs)
+    if len(candidates) > 1:
+        promise = _energies(body, candidates, views, weights).reshape(num_headings, num_named)
+        heading = jnp.argmax(promise, axis=0)
+        opposite = (heading + num_headings // 2) % num_headings
+        named = jnp.arange(num_named)
+        candidates = jnp.concatenate([starts[heading, named], starts[opposite, named]])
+        coarse = sorted((refined(pose, COARSE_ITERATIONS) for pose in candidates), key=lambda found: -float(found[1]))
+        candidates = [pose for pose, _ in coarse[:NUM_FINE]]
+    return max((refined(pose, FINE_ITERATIONS) for pose in candidates), key=lambda found: float(found[1]))
 
 
 def _no_history(pose: Float[Array, "dof"]) -> History:
@@ -75,13 +80,14 @@ def _energies(body: Body, poses: Array, views: Views, weights: EnergyWeights) ->
 
 @eqx.filter_jit
 def _refined(
-    body: Body, poses: Array, views: Views, weights: EnergyWeights, scales: Scales, max_iterations: Array
-) -> tuple[Float[Array, "start dof"], Float[Array, "start"]]:
+    body: Body,
+    start: Float[Array, "dof"],
+    views: Views,
+    weights: EnergyWeights,
+    scales: Scales,
+    max_iterations: Array,
+) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
     solver = ConditionedAscent(max_iterations=max_iterations)
-
-    def refine(pose):
-        objective = lambda p: energy(body, p, views, _no_history(pose), weights)
-        solution = solver.maximize(objective, pose, scales)
-        return solution.params, solution.value
-
-    return jax.lax.map(refine, poses)
+    objective = lambda pose: energy(body, pose, views, _no_history(pose), weights)
+    solution = solver.maximize(objective, start, scales)
+    return solution.params, solution.value

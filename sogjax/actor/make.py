@@ -1,6 +1,6 @@
 """An actor from a recording's example poses: a named body, scaled to the subject and coloured."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import jax
@@ -16,12 +16,13 @@ from sogjax.actor.silhouettes import (
     FINE_DEPTH,
     PosedPictures,
     load_pictures,
-    pad_views,
+    same_capacity,
     silhouette_views,
+    stack_views,
     subject_centre,
 )
 from sogjax.data.recording import ExamplePose, Recording
-from sogjax.energy.objective import EnergyWeights, Views
+from sogjax.energy.objective import EnergyWeights
 from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
@@ -60,20 +61,22 @@ def make_actor(
     upright = body.rotated(jnp.asarray(turn, body.blob_sigmas.dtype))
     model = ShapeModel.from_body(upright)
     pictures = [load_pictures(recording, example) for example in examples]
+    coarse = same_capacity([silhouette_views(posed, rig, body.num_blobs, COARSE_DEPTH) for posed in pictures])
     poses = []
-    for example, posed in zip(examples, pictures, strict=True):
+    for example, posed, views in zip(examples, pictures, coarse, strict=True):
         report(f"pose of {example.name}")
-        poses.append(_example_pose(upright, example, posed, rig, recording.up, weights))
+        starts = _starts(upright, example, posed, rig, recording.up)
+        poses.append(pose_from_silhouettes(upright, views, starts, weights)[0])
     report("shape")
-    views = _same_capacity([silhouette_views(posed, rig, body.num_blobs, FINE_DEPTH) for posed in pictures])
+    views = stack_views([silhouette_views(posed, rig, body.num_blobs, FINE_DEPTH) for posed in pictures])
     no_shape = jnp.zeros(model.num_shape_params, body.blob_sigmas.dtype)
     estimate = estimate_shape(model, jnp.stack(poses), no_shape, views, weights)
     shaped = model.shaped(estimate.shape_params)
     report("colours")
     shown = [
-        ColoredView(camera_of(rig, camera), image, mask, pose)
+        ColoredView(camera_of(rig, camera), image, posed.masks[camera], pose)
         for posed, pose in zip(pictures, estimate.poses, strict=True)
-        for camera, image, mask in zip(posed.cameras, posed.images, posed.masks, strict=True)
+        for camera, image in posed.images.items()
     ]
     actor = colored(shaped, back_projected_colors(shaped, shown, color_space))
     actor = actor.rotated(jnp.asarray(turn.T, body.blob_sigmas.dtype))
@@ -102,7 +105,7 @@ def _examples_of(recording: Recording, subject: str | None) -> list[ExamplePose]
     if subject is None and len(subjects) > 1:
         named = ", ".join(str(name) for name in subjects)
         raise InputError(f"{recording.path}: the example poses show {named}; choose one with subject=NAME")
-    wanted = subject if subject is not None else subjects[0]
+    wanted = next(iter(subjects)) if subject is None else subject
     examples = [e for e in recording.example_poses if e.actor == wanted or (e.actor is None and len(subjects) == 1)]
     if not examples:
         named = ", ".join(str(name) for name in subjects)
@@ -110,19 +113,10 @@ def _examples_of(recording: Recording, subject: str | None) -> list[ExamplePose]
     return examples
 
 
-def _example_pose(
-    body: Body, example: ExamplePose, pictures: PosedPictures, rig: Camera, up: str, weights: EnergyWeights
-) -> Float[Array, "dof"]:
-    """The pose of one example: near its hint where there is one, else found from the masks."""
-    views = silhouette_views(pictures, rig, body.num_blobs, COARSE_DEPTH)
+def _starts(
+    body: Body, example: ExamplePose, pictures: PosedPictures, rig: Camera, up: str
+) -> Float[Array, "heading named dof"]:
+    """Where to look for the pose of one example: at its hint where there is one, else anywhere."""
     if example.initial_pose is not None:
-        starts = rough_pose(body, example.initial_pose, up)[None, None]
-    else:
-        starts = starts_at(body, subject_centre(pictures, rig), up, tuple(body.poses))
-    pose, _ = pose_from_silhouettes(body, views, starts, weights)
-    return pose
-
-
-def _same_capacity(views: Sequence[Views]) -> list[Views]:
-    capacity = max(view.images.capacity for view in views)
-    return [pad_views(view, capacity) for view in views]
+        return rough_pose(body, example.initial_pose, up)[None, None]
+    return starts_at(body, subject_centre(pictures, rig), up, tuple(body.poses))

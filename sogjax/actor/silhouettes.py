@@ -1,7 +1,10 @@
 """Example poses as silhouettes: what Eq. 9 compares a body of unknown shape and pose with."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -27,20 +30,19 @@ SILHOUETTE_TOLERANCE = 0.15
 
 @dataclass(frozen=True)
 class PosedPictures:
-    """The pictures of one example pose, by camera index, with their masks where there are any."""
+    """The pictures of one example pose by camera (its index in the rig), with their masks."""
 
     name: str
-    cameras: tuple[int, ...]
-    images: tuple[UInt8[np.ndarray, "_h _w 3"], ...]
+    images: dict[int, UInt8[np.ndarray, "_h _w 3"]]
     """BGR."""
-    masks: tuple[Bool[np.ndarray, "_h _w"], ...]
+    masks: dict[int, Bool[np.ndarray, "_h _w"]]
 
 
 def load_pictures(recording: Recording, example: ExamplePose) -> PosedPictures:
     """The pictures of an example pose that have masks.
 
     Raises:
-        InputError: fewer than two cameras have a picture with a mask; a mask that is empty or full.
+        InputError: fewer than two cameras have a picture with a mask; a mask that is empty or full; another size.
     """
     names = [name for name in recording.rig.names if name in example.images and name in example.masks]
     if len(names) < 2:
@@ -48,44 +50,80 @@ def load_pictures(recording: Recording, example: ExamplePose) -> PosedPictures:
             f"{recording.path}: the example pose {example.name!r} has {len(names)} pictures with a mask; "
             "give CAMERA.mask.png (white = subject) beside at least two pictures"
         )
-    masks = tuple(read_mask(example.masks[name]) for name in names)
-    for name, mask in zip(names, masks, strict=True):
-        if mask.all() or not mask.any():
-            raise InputError(
-                f"{example.masks[name]}: the mask is {'full' if mask.all() else 'empty'}; white must mark the subject"
-            )
-    return PosedPictures(
-        example.name,
-        tuple(recording.rig.names.index(name) for name in names),
-        tuple(read_image(example.images[name]) for name in names),
-        masks,
-    )
+    images: dict[int, np.ndarray] = {}
+    masks: dict[int, np.ndarray] = {}
+    for camera, name in enumerate(recording.rig.names):
+        if name not in names:
+            continue
+        images[camera], masks[camera] = read_image(example.images[name]), read_mask(example.masks[name])
+        _check_picture(example.images[name], images[camera], recording.rig.image_size(name))
+        _check_mask(example.masks[name], masks[camera])
+    return PosedPictures(example.name, images, masks)
+
+
+def _check_picture(path: Path, image: UInt8[np.ndarray, "_h _w 3"], size: tuple[int, int]) -> None:
+    height, width = image.shape[:2]
+    if (width, height) != size:
+        raise InputError(
+            f"{path}: is {width}x{height} pixels, the calibration is for {size[0]}x{size[1]}; "
+            "use pictures of the calibrated size"
+        )
+
+
+def _check_mask(path: Path, mask: Bool[np.ndarray, "_h _w"]) -> None:
+    if mask.all() or not mask.any():
+        raise InputError(f"{path}: the mask is {'full' if mask.all() else 'empty'}; white must mark the subject")
 
 
 def silhouette_views(pictures: PosedPictures, rig: Camera, num_blobs: int, depth: int) -> Views:
-    """The masks of one example pose as Sogs: blobs of the subject match the body, others repel it a little."""
-    cameras = jax.tree.map(lambda leaf: jnp.asarray(leaf)[np.array(pictures.cameras)], rig)
-    grids = tuple(CellGrid.from_depth(m.shape[1], m.shape[0], depth) for m in pictures.masks)
-    white = [np.repeat(mask[..., None], 3, axis=-1).astype(np.uint8) * 255 for mask in pictures.masks]
-    cells = jnp.asarray(stack_cells(white, grids), cameras.intrinsics.dtype) / 255.0
-    candidates = Candidates.from_grids(grids, cameras)
-    tolerance = jnp.asarray(SILHOUETTE_TOLERANCE, cells.dtype)
-    colors, leaves = jax.jit(jax.vmap(quadtree, in_axes=(0, 0, None)))(cells, candidates, tolerance)
-    capacity = capacity_for(int(leaves.sum(axis=1).max()))
+    """The masks of one example pose as Sogs: blobs of the subject match the body, others repel it a little.
+
+    A camera without a picture shows nothing.
+    """
+    sizes = np.asarray(rig.image_size).astype(int)
+    grids = tuple(CellGrid.from_depth(int(width), int(height), depth) for width, height in sizes)
+    white = [
+        np.repeat(pictures.masks.get(k, np.zeros((height, width), bool))[..., None], 3, axis=-1).astype(np.uint8) * 255
+        for k, (width, height) in enumerate(sizes)
+    ]
+    present = jnp.asarray([k in pictures.masks for k in range(len(grids))])
+    cells = jnp.asarray(stack_cells(white, grids))
+    candidates = Candidates.from_grids(grids, rig)
+    capacity = capacity_for(int(_num_leaves(cells, candidates)))
+    images, match = _silhouette_sogs(cells, candidates, present, capacity)
+    similarities = jnp.repeat(match[:, None, :], num_blobs, axis=1)
+    return Views(rig, images, similarities, whole_image_overlap(rig.image_size))
+
+
+@eqx.filter_jit
+def _leaves(cells: UInt8[Array, "camera rows columns 3"], candidates: Candidates) -> tuple[Array, Array]:
+    tolerance = jnp.asarray(SILHOUETTE_TOLERANCE, candidates.sigmas.dtype)
+    return jax.vmap(quadtree, in_axes=(0, 0, None))(cells.astype(tolerance.dtype) / 255.0, candidates, tolerance)
+
+
+def _num_leaves(cells: UInt8[Array, "camera rows columns 3"], candidates: Candidates) -> int:
+    return int(jnp.max(jnp.sum(_leaves(cells, candidates)[1], axis=1)))
+
+
+@eqx.filter_jit
+def _silhouette_sogs(
+    cells: UInt8[Array, "camera rows columns 3"], candidates: Candidates, present: Bool[Array, "camera"], capacity: int
+) -> tuple[Sog, Float[Array, "camera image"]]:
+    """The image blobs and how each matches the colour of the body."""
+    colors, leaves = _leaves(cells, candidates)
+    leaves = leaves & present[:, None]
     select = jax.vmap(keep_blobs, in_axes=(0, 0, 0, 0, None))
     images, _, _ = select(candidates.means, candidates.sigmas, colors, leaves, capacity)
     coverage = images.colors[..., 0]
     match = coverage + (1.0 - coverage) * BACKGROUND_SIMILARITY
-    match = jnp.where(images.mask, match, 0.0)
-    similarities = jnp.repeat(match[:, None, :], num_blobs, axis=1)
-    return Views(cameras, images, similarities, whole_image_overlap(cameras.image_size))
+    return images, jnp.where(images.mask, match, 0.0)
 
 
 def subject_centre(pictures: PosedPictures, rig: Camera) -> Float[np.ndarray, "3"]:
     """The point nearest to the rays through the centres of all masks: about the subject's centre (metres, world)."""
     normal = np.zeros((3, 3))
     target = np.zeros(3)
-    for camera, mask in zip(pictures.cameras, pictures.masks, strict=True):
+    for camera, mask in pictures.masks.items():
         pixel = np.argwhere(mask)[:, ::-1].mean(axis=0)
         matrix = np.asarray(rig.intrinsics[camera], float)
         world = np.asarray(rig.camera_from_world[camera], float)
@@ -97,8 +135,18 @@ def subject_centre(pictures: PosedPictures, rig: Camera) -> Float[np.ndarray, "3
     return np.linalg.solve(normal, target)
 
 
-def pad_views(views: Views, capacity: int) -> Views:
-    """The same views with more padding, so that several pose's views have one shape (and compile once)."""
+def same_capacity(views: Sequence[Views]) -> list[Views]:
+    """The same views with as much padding as the largest needs, so that they have one shape and compile once."""
+    capacity = max(view.images.capacity for view in views)
+    return [_padded(view, capacity) for view in views]
+
+
+def stack_views(views: Sequence[Views]) -> Views:
+    """Views of several poses with a leading axis for the poses."""
+    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *same_capacity(views))
+
+
+def _padded(views: Views, capacity: int) -> Views:
     extra = capacity - views.images.capacity
     at_end = lambda leaf, fill=0.0: jnp.pad(leaf, ((0, 0), (0, extra)), constant_values=fill)
     images = Sog(

@@ -5,9 +5,10 @@ from pathlib import Path
 from sogjax.actor.make import make_actor
 from sogjax.app.build import color_space_and_radius, energy_weights
 from sogjax.app.configs import ActorConfig
-from sogjax.app.outputs import prepare_folder
+from sogjax.app.outputs import results_folder
 from sogjax.app.recordings import body_named, opened, say
 from sogjax.data.actor_file import save_body
+from sogjax.errors import InputError
 
 
 def run(config: ActorConfig) -> Path:
@@ -16,13 +17,15 @@ def run(config: ActorConfig) -> Path:
     Raises:
         InputError: anything wrong with the recording, its example poses or the body.
     """
-    recording = opened(config.recording, config.cameras)
-    out = Path(config.out)
-    prepare_folder(out.parent)
     space, _ = color_space_and_radius(config.color)
-    made = make_actor(
-        recording, body_named(config.body), config.subject, space, energy_weights(config.energy), report=say
-    )
-    save_body(out, made.body)
+    weights = energy_weights(config.energy)
+    recording = opened(config.recording, config.cameras)
+    body = body_named(config.body)
+    out = Path(config.out)
+    if out.is_dir():
+        raise InputError(f"out={out}: is a folder; give the actor file to write, such as out={out / 'actor.yaml'}")
+    with results_folder(out.parent):
+        made = make_actor(recording, body, config.subject, space, weights, report=say)
+        save_body(out, made.body)
     print(out)
     return out

@@ -48,6 +48,23 @@ def at_least(key: str, value: float, bound: float) -> float:
     return value
 
 
+def check(config: TrackConfig) -> None:
+    """Look at every setting before anything is done that takes time.
+
+    Raises:
+        InputError: a value that is no choice or out of range.
+    """
+    color_space_and_radius(config.color)
+    energy_weights(config.energy)
+    solver(config.solver)
+    for key in ("first_angle", "first_translation", "largest_angle", "largest_translation"):
+        at_least(f"solver.{key}", getattr(config.solver, key), 1e-6)
+    at_least("images.depth", config.images.depth, 1)
+    at_least("images.box_enlargement", config.images.box_enlargement, 0.0)
+    at_least("images.plate_tolerance", config.images.plate_tolerance, 0.0)
+    at_least("outputs.overlay_width", config.outputs.overlay_width, 64)
+
+
 def color_space_and_radius(config: ColorConfig) -> tuple[str, float]:
     """The colour space and its eps_sim."""
     space = one_of("color.space", config.space, tuple(COLOR_RADIUS))

@@ -1,7 +1,8 @@
 """Config objects from the YAML files of `conf/` and the overrides of a command line."""
 
-import re
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from sogjax.app import configs
+from sogjax.app.overrides import plain_sentence, ready_for_hydra
 from sogjax.errors import InputError
 
 SCHEMAS: dict[str, type] = {
@@ -48,36 +50,40 @@ def composed(command: str, overrides: Sequence[str]) -> Any:
         InputError: an unknown key, a value of the wrong type, a required key that is missing.
     """
     register_schemas()
+    words = ready_for_hydra(overrides, sweep=False)
     GlobalHydra.instance().clear()
     try:
         with initialize_config_dir(str(conf_dir()), version_base="1.3"):
-            tree = compose(command, overrides=list(overrides))
-    except (HydraException, OmegaConfBaseException) as error:
-        raise InputError(_one_sentence(command, str(error))) from error
-    return to_object(command, tree)
+            tree = compose(command, overrides=words)
+        return to_object(command, tree)
+    except InputError:
+        raise
+    except (HydraException, OmegaConfBaseException, ValueError) as error:
+        raise InputError(plain_sentence(command, SCHEMAS[command], error)) from error
 
 
 def to_object(command: str, tree: Any) -> Any:
     """The schema object of a composed config.
 
     Raises:
-        InputError: a required key that is missing.
+        InputError: a required key that is missing, or a number that is none.
     """
     missing = sorted(OmegaConf.missing_keys(tree))
     if missing:
-        example = f"{missing[0]}=..."
-        raise InputError(f"sogjax {command} needs {', '.join(missing)}: add {example} (see sogjax {command} --help)")
-    return OmegaConf.to_object(tree)
+        examples = " ".join(f"{key}=..." for key in missing)
+        raise InputError(f"{command} needs {', '.join(missing)}; add {examples} (see sogjax {command} --help)")
+    config = OmegaConf.to_object(tree)
+    for key, value in _numbers(config):
+        if not math.isfinite(value):
+            raise InputError(f"{key}={value}: must be a finite number")
+    return config
 
 
-def _one_sentence(command: str, message: str) -> str:
-    """Hydra's message without its hints about internals."""
-    lines = [line.strip() for line in message.splitlines() if line.strip()]
-    lines = [
-        line for line in lines if not re.match(r"(full_key|object_type|reference_type|See http|Set the env)", line)
-    ]
-    text = " ".join(lines[:3])
-    unknown = re.search(r"Key '([^']+)' is not in struct|Could not override '([^']+)'", text)
-    if unknown:
-        return f"unknown config key {unknown.group(2) or unknown.group(1)}: see sogjax {command} --help for the keys"
-    return f"{text}: see sogjax {command} --help"
+def _numbers(config: Any, prefix: str = "") -> Iterator[tuple[str, float]]:
+    """Every floating-point number of a config object, with its key."""
+    for entry in fields(config):
+        value = getattr(config, entry.name)
+        if is_dataclass(value):
+            yield from _numbers(value, f"{prefix}{entry.name}.")
+        elif isinstance(value, float):
+            yield prefix + entry.name, value

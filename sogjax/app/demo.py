@@ -5,7 +5,7 @@ from pathlib import Path
 
 from sogjax.app.composition import composed
 from sogjax.app.configs import DemoConfig, TrackConfig
-from sogjax.app.outputs import prepare_folder
+from sogjax.app.outputs import results_folder
 from sogjax.app.progress import progress
 from sogjax.app.recordings import say
 from sogjax.app.track import Run
@@ -19,8 +19,12 @@ def run(config: DemoConfig) -> Run:
     Raises:
         InputError: a setting out of range, or a folder that cannot be written.
     """
+    with results_folder(Path(config.out)) as out:
+        return _run_in(config, out)
+
+
+def _run_in(config: DemoConfig, out: Path) -> Run:
     begin = time.perf_counter()
-    out = prepare_folder(Path(config.out))
     settings = SynthSettings(
         motion=config.motion,
         cameras=config.cameras,

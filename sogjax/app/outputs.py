@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,12 +30,27 @@ if TYPE_CHECKING:
     from sogjax.app.track import Run
 
 
-def prepare_folder(path: Path) -> Path:
+@contextmanager
+def results_folder(path: Path) -> Iterator[Path]:
     """The folder for results, made if it is not there; found out before the work begins, not after.
+
+    When the work ends with an error, the folders made for it are removed, unless there is something in them.
 
     Raises:
         InputError: it cannot be made or written.
     """
+    made = [folder for folder in (path, *path.parents) if not folder.exists()]
+    try:
+        _make_writable(path)
+        yield path
+    except BaseException:
+        for folder in made:
+            with suppress(OSError):
+                folder.rmdir()
+        raise
+
+
+def _make_writable(path: Path) -> None:
     try:
         path.mkdir(parents=True, exist_ok=True)
         probe = path / f".probe-{uuid.uuid4().hex}"
@@ -43,7 +59,6 @@ def prepare_folder(path: Path) -> Path:
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputError(f"{path}: cannot write there ({reason}); choose another folder with out=DIR") from error
-    return path
 
 
 def file_name(stem: str, ending: str, actor: str, num_actors: int) -> str:
@@ -81,7 +96,11 @@ def evaluate(result: Run, out: Path) -> None:
     if len(result.motions) > 1 and not set(result.motions) <= set(truth.subjects):
         say(f"warning: {result.recording.ground_truth} knows {', '.join(truth.subjects)}; nothing is compared")
         return
-    result.evaluation = evaluate_motions(result.motions, truth)
+    try:
+        result.evaluation = evaluate_motions(result.motions, truth)
+    except InputError as error:
+        say(f"warning: nothing is compared: {error}")
+        return
     result.evaluation.to_json(out / "metrics.json")
     result.files.append(out / "metrics.json")
 

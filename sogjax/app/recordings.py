@@ -103,16 +103,26 @@ def first_poses(recording: Recording, bodies: Sequence[Body]) -> list[Any]:
     Raises:
         InputError: there is no initial_pose.yaml, or something in it is wrong.
     """
-    if recording.initial_poses is None:
-        raise InputError(
-            f"{recording.path}: no initial_pose.yaml; write the rough pose of frame 0 into it, by `position`, "
-            "`heading` and `pose`, or by `landmarks`"
-        )
-    descriptions = load_initial_poses(recording.initial_poses, [body.name for body in bodies])
+    path = check_initial_poses(recording)
+    descriptions = load_initial_poses(path, [body.name for body in bodies])
     poses = []
     for body in bodies:
         try:
             poses.append(rough_pose(body, descriptions[body.name], recording.up))
         except InputError as error:
-            raise InputError(f"{recording.initial_poses}: {error}") from error
+            raise InputError(f"{path}: {error}") from error
     return poses
+
+
+def check_initial_poses(recording: Recording) -> Path:
+    """The file of the rough poses.
+
+    Raises:
+        InputError: there is none.
+    """
+    if recording.initial_poses is None:
+        raise InputError(
+            f"{recording.path}: no initial_pose.yaml; write the rough pose of frame 0 into it, by `position`, "
+            "`heading` and `pose`, or by `landmarks`"
+        )
+    return recording.initial_poses

@@ -1,10 +1,12 @@
 """Sweeps: `-m` runs every combination of the overrides and ends with a table."""
 
+import os
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from sogjax.app.composition import SCHEMAS, conf_dir, register_schemas, to_object
+from sogjax.app.overrides import plain_sentence, ready_for_hydra
 from sogjax.errors import InputError
 
 COLUMNS = ("mean mm", "std mm", "joints mm", "lost", "iterations", "not converged", "frames/s")
@@ -14,25 +16,63 @@ def run_sweep(command: str, overrides: Sequence[str]) -> int:
     """Run a command for every combination of overrides such as `energy.limit_weight=0,1,2`.
 
     Raises:
-        InputError: a command other than track.
+        InputError: a command other than track, or an override that cannot be.
     """
     if command != "track":
-        raise InputError(f"sogjax {command} -m: only track can be swept; commands: {', '.join(SCHEMAS)}")
+        others = ", ".join(name for name in SCHEMAS if name != "track")
+        raise InputError(f"{command} -m: only track can be swept, not {others}; leave -m out")
+    words = ready_for_hydra(overrides, sweep=True)
     program = sys.argv
-    sys.argv = [f"sogjax {command}", "-m", *overrides]
+    sys.argv = ["sogjax track", "-m", *words]
     try:
-        sweep_main(track_task)()
+        return run_hydra(track_task)
     finally:
         sys.argv = program
-    return 0
 
 
-def sweep_main(task: Callable[[Any], Any]) -> Callable[[], Any]:
-    """Hydra's entry point for a task of the track config."""
+def sweep_main(task: Callable[[Any], Any]) -> int:
+    """What an experiment's script ends with: run the task as `sys.argv` says; the exit status."""
+    try:
+        return run_hydra(task)
+    except InputError as error:
+        print(f"sogjax: {error}", file=sys.stderr)
+        return 2
+
+
+def run_hydra(task: Callable[[Any], Any]) -> int:
+    """Run a task of the track config once, or with `-m` as a sweep, whose other members go on where one fails.
+
+    Raises:
+        InputError: an override that cannot be; or the only run has wrong input.
+    """
     import hydra
+    from hydra.errors import HydraException
+    from omegaconf.errors import OmegaConfBaseException
 
     register_schemas()
-    return hydra.main(version_base="1.3", config_path=str(conf_dir()), config_name="track")(task)
+    wrong: list[str] = []
+
+    def member(tree: Any) -> Any:
+        try:
+            return task(tree)
+        except InputError as error:
+            wrong.append(str(error))
+            return str(error)
+
+    before = os.environ.get("HYDRA_FULL_ERROR")
+    os.environ["HYDRA_FULL_ERROR"] = "1"  # errors come here instead of being printed with a traceback
+    try:
+        hydra.main(version_base="1.3", config_path=str(conf_dir()), config_name="track")(member)()
+    except (HydraException, OmegaConfBaseException) as error:
+        raise InputError(plain_sentence("track", SCHEMAS["track"], error)) from error
+    finally:
+        if before is None:
+            del os.environ["HYDRA_FULL_ERROR"]
+        else:
+            os.environ["HYDRA_FULL_ERROR"] = before
+    if wrong:
+        raise InputError(wrong[0] if len(wrong) == 1 else f"{len(wrong)} runs failed; the first: {wrong[0]}")
+    return 0
 
 
 def track_task(tree: Any) -> dict[str, float]:

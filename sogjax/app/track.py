@@ -12,9 +12,9 @@ from omegaconf import OmegaConf
 
 from sogjax.app import build
 from sogjax.app.configs import TrackConfig
-from sogjax.app.outputs import prepare_folder, write_results
+from sogjax.app.outputs import results_folder, write_results
 from sogjax.app.progress import progress
-from sogjax.app.recordings import actors_of, first_poses, opened, say, upright
+from sogjax.app.recordings import actors_of, check_initial_poses, first_poses, opened, say, upright
 from sogjax.app.timing import StageTimes
 from sogjax.data.motion import Motion, motion_from_poses
 from sogjax.data.recording import Recording
@@ -46,11 +46,14 @@ def run(config: TrackConfig) -> Run:
     Raises:
         InputError: anything wrong with the recording, the actors or the config.
     """
+    build.check(config)
     recording = opened(config.recording, config.cameras)
-    out = prepare_folder(Path(config.out or f"outputs/{recording.name}"))
-    bodies, made = actors_of(recording, config.actor, config.body, config.color)
-    result = track_recording(recording, bodies, config)
-    write_results(result, out, config.outputs, OmegaConf.structured(config), bodies if made else [])
+    frame_range(recording, config)
+    check_initial_poses(recording)
+    with results_folder(Path(config.out or f"outputs/{recording.name}")) as out:
+        bodies, made = actors_of(recording, config.actor, config.body, config.color)
+        result = track_recording(recording, bodies, config)
+        write_results(result, out, config.outputs, OmegaConf.structured(config), bodies if made else [])
     say_results(result)
     return result
 

@@ -10,6 +10,7 @@ from sogjax.app.recordings import file_list, opened
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.motion import load_motion
 from sogjax.data.video import read_frames
+from sogjax.view.frames import frame_range
 from sogjax.view.rerun import view_command, write_rerun
 
 
@@ -22,12 +23,12 @@ def run(config: ViewConfig) -> Path:
     recording = opened(config.recording)
     motions = [load_motion(path) for path in file_list(config.motion)]
     out = Path(config.out) if config.out is not None else Path(tempfile.mkdtemp()) / "motion.rrd"
-    first = int(motions[0].frame[0]) - recording.first_frame
+    first, stop = (number - recording.first_frame for number in frame_range(recording, motions))
     write_rerun(
         out,
         recording,
         motions,
-        frames=read_frames(recording, first, first + motions[0].num_frames) if config.images else None,
+        frames=read_frames(recording, first, stop) if config.images else None,
         truth=None if recording.ground_truth is None else load_ground_truth(recording.ground_truth),
         progress=progress,
     )

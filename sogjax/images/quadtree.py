@@ -41,8 +41,13 @@ class Candidates(eqx.Module):
         tables = [_node_table(grid, shape, num_levels) for grid in grids]
         means, sigmas, inside = (np.stack(parts) for parts in zip(*tables, strict=True))
         dtype = cameras.intrinsics.dtype
-        undistorted = jax.jit(jax.vmap(undistort))(cameras, jnp.asarray(means, dtype))
+        undistorted = _undistorted(cameras, jnp.asarray(means, dtype))
         return cls(undistorted, jnp.asarray(sigmas, dtype), jnp.asarray(inside), shape, num_levels)
+
+
+@jax.jit
+def _undistorted(cameras: Camera, pixels: Float[Array, "camera n 2"]) -> Float[Array, "camera n 2"]:
+    return jax.vmap(undistort)(cameras, pixels)
 
 
 def _node_table(

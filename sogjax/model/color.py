@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 Colors = Float[Array, "*batch 3"]
+BroadcastColors = Float[Array, "*#batch 3"]
 
 COLOR_RADIUS = {"hsv_cylinder": 0.3, "hsv_cone": 0.15, "hsv": 0.15, "rgb": 0.1, "lab": 0.2}
 """The colour spaces, each with the eps_sim of Eq. 7 that suits its scale."""
@@ -25,7 +26,7 @@ def wendland(distance: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
     return inside**4 * (4.0 * distance + 1.0)
 
 
-def color_distance(a: Colors, b: Colors, space: str) -> Float[Array, "*batch"]:
+def color_distance(a: BroadcastColors, b: BroadcastColors, space: str) -> Float[Array, "*#batch"]:
     """Euclidean distance of colours of one space; in `hsv` the hue, in turns, wraps around."""
     difference = a - b
     if space == "hsv":
@@ -36,7 +37,9 @@ def color_distance(a: Colors, b: Colors, space: str) -> Float[Array, "*batch"]:
     return jnp.where(positive, jnp.sqrt(jnp.where(positive, squared, 1.0)), 0.0)
 
 
-def color_similarity(a: Colors, b: Colors, space: str, color_radius: Float[Array, ""]) -> Float[Array, "*batch"]:
+def color_similarity(
+    a: BroadcastColors, b: BroadcastColors, space: str, color_radius: Float[Array, ""]
+) -> Float[Array, "*#batch"]:
     """d(c_i, c_j) of Eq. 7: 1 for equal colours, 0 from `color_radius` (eps_sim) on."""
     return wendland(color_distance(a, b, space) / color_radius)
 

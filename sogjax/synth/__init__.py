@@ -21,7 +21,7 @@ _LAZY = {"render_recording": "render", "cached_recording": "cache", "default_cac
 """Loaded on first use: the settings alone are needed by every command line."""
 
 
-def __getattr__(name: str) -> Any:  # noqa: ANN401
+def __getattr__(name: str) -> Any:
     if name not in _LAZY:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module

@@ -101,14 +101,16 @@ class Anatomy:
 
 
 def anatomy_from_seed(rng: np.random.Generator) -> Anatomy:
-    """Draw a person: stature 1.60 to 1.90 m, limb proportions within about 4 %, girth within about 12 %."""
+    """Draw a person: stature 1.60 to 1.90 m, limb proportions within about 4 %, girth within about 9 %."""
     stature = float(rng.uniform(1.60, 1.90))
-    girth = float(rng.uniform(0.92, 1.14))
+    girth = float(rng.uniform(0.90, 1.08))
     legs, arms, breadth = (float(value) for value in rng.uniform(0.965, 1.035, 3))
     offsets = np.zeros((len(JOINTS), 3))
+    # With longer legs everything is a little smaller, so that the stature stays what it is.
+    size = stature / (0.522 + 0.478 * legs)
 
     def place(name: str, x: float, y: float, z: float) -> None:
-        offsets[INDEX[name]] = np.array([x, y, z]) * stature
+        offsets[INDEX[name]] = np.array([x, y, z]) * size
 
     place("spine", -0.004, 0.0, 0.058)
     place("waist", 0.0, 0.0, 0.062)

@@ -42,8 +42,8 @@ _FIRST_HALF: tuple[tuple[float, Mapping[str, float]], ...] = (
     (0.90, {**_LUNGE, **_UP, "turned": 12.0, "y": 0.115, "z": -0.035, "left_hand": 0.0}),
     (1.12, {**_FLYING, **_UP, **_OPEN, "left_foot": 1.0, "turned": 50.0, "y": 0.235, "z": -0.078}),
     (1.30, {**_FLYING, **_UP, **_OPEN, "left_foot": 1.0, "turned": 90.0, "y": 0.345, "z": -0.068, "left_hand": 1.0}),
-    (1.44, {**_FLYING, **_UP, **_OPEN, "turned": 126.0, "left_hand": 1.0, "right_hand": 0.35}),
-    (1.53, {**_FLYING, **_UP, **_OPEN, "turned": 150.0, "left_hand": 1.0, "right_hand": 1.0}),
+    (1.44, {**_FLYING, **_UP, **_OPEN, "turned": 126.0, "z": 0.01, "left_hand": 1.0, "right_hand": 0.35}),
+    (1.53, {**_FLYING, **_UP, **_OPEN, "turned": 150.0, "z": 0.06, "left_hand": 1.0, "right_hand": 1.0}),
 )
 
 

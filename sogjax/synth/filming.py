@@ -9,8 +9,11 @@ import numpy as np
 from jaxtyping import UInt8
 
 from sogjax.data.video import VideoWriter
+from sogjax.synth.anatomy import Pose
 from sogjax.synth.exercises import EXAMPLE_POSES
-from sogjax.synth.picture import Person, Plate, Shadows, Shot, mask_of, plate_of, shot_of
+from sogjax.synth.picture import Person, Shadows, Shot, mask_of, shot_of
+from sogjax.synth.plate import Plate, plate_of
+from sogjax.synth.settings import SynthSettings
 from sogjax.synth.stage import Stage
 
 _JPEG_QUALITY = 95
@@ -18,10 +21,10 @@ _NOISE, _VIDEO, _STILL, _EMPTY = 7, 0, 1, 2
 """Streams of random numbers: pictures have the same noise whoever renders them."""
 
 
-def num_pictures(stage_settings, cameras: int) -> int:
-    """How many pictures `film` makes with so many cameras, which is how often it yields."""
-    stills = len(EXAMPLE_POSES) * stage_settings.actors if stage_settings.example_poses else 0
-    return cameras * (1 + stills + stage_settings.frames)
+def num_pictures(settings: SynthSettings) -> int:
+    """How many pictures a recording takes, which is how often `film` yields for all cameras together."""
+    stills = len(EXAMPLE_POSES) * settings.actors if settings.example_poses else 0
+    return settings.cameras * (1 + stills + settings.frames)
 
 
 def example_folder(stage: Stage, actor: int, pose: str) -> str:
@@ -70,7 +73,7 @@ def _videos(stage: Stage, plates: dict[int, Plate], folder: Path) -> Iterator[No
 
 
 def _shots(
-    stage: Stage, plates: dict[int, Plate], people: Sequence[Person], poses: Sequence
+    stage: Stage, plates: dict[int, Plate], people: Sequence[Person], poses: Sequence[Pose]
 ) -> Iterator[tuple[int, Shot]]:
     """What each camera sees of people in poses; surface and shadows are made once for all cameras."""
     meshes = [person.figure.posed(pose) for person, pose in zip(people, poses, strict=True)]

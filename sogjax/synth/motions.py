@@ -13,7 +13,7 @@ Motion = Callable[[float], Pose]
 """The pose at a time in seconds."""
 
 _LANE = 1.25
-"""Metres between people who exercise side by side."""
+"""Metres between people who exercise beside or behind each other, where they have room for arms and legs."""
 _INNER, _OUTER = 0.84, 1.50
 """Radii of the two circles on which people walk past each other."""
 
@@ -60,5 +60,6 @@ def _exercise(kind: str, anatomy: Anatomy, turn: float, lane: float, delay: floa
     aside = np.array([-np.sin(turn), np.cos(turn), 0.0])
     if kind == "cartwheel":
         return Cartwheel(anatomy, lane * ahead, turn, delay)
-    keys = ARMS if kind == "arms" else squat_kick_keys()
-    return Exercise(anatomy, keys, lane * aside, turn, delay)
+    if kind == "arms":
+        return Exercise(anatomy, ARMS, lane * ahead, turn, delay)
+    return Exercise(anatomy, squat_kick_keys(), lane * aside, turn, delay)

@@ -1,27 +1,22 @@
-"""What one camera sees: the empty scene once, then the people in it, frame by frame."""
+"""People in front of the empty scene, as a camera sees them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Bool, Float
 
 from sogjax.synth import light
 from sogjax.synth.clothes import Wardrobe
 from sogjax.synth.figure import Figure, Mesh
+from sogjax.synth.plate import OVERSAMPLING, Plate, averaged, sample_pixels
 from sogjax.synth.raster import Hits, Window, rasterize
 from sogjax.synth.rotations import unit
-from sogjax.synth.scene import Scene
 from sogjax.synth.views import View
-
-OVERSAMPLING = 2
-"""Samples a pixel in each direction."""
 
 _CONTACT = 0.25
 """Metres around people within which they take away light from above."""
 _LEAST_AMBIENT = 0.45
-_NOISE_BANK = 1 << 22
 
 
 @dataclass(frozen=True)
@@ -52,57 +47,6 @@ class Shadows:
 
 
 @dataclass(frozen=True)
-class Plate:
-    """The empty scene in one camera: the light of its pixels, in two parts, and what they show (linear)."""
-
-    ambient: Float[np.ndarray, "row column 3"]
-    direct: Float[np.ndarray, "row column 3"]
-    points: Float[np.ndarray, "row column 3"]
-
-    @property
-    def total(self) -> Float[np.ndarray, "row column 3"]:
-        """The picture without people."""
-        return self.ambient + self.direct
-
-
-def _sample_pixels(view: View, points: Float[np.ndarray, "n 3"]) -> tuple[np.ndarray, np.ndarray]:
-    """Projected points in the grid of samples, where integers are the samples' places, and depths."""
-    pixels, depths = view.project(points)
-    return (pixels + 0.5) * OVERSAMPLING - 0.5, depths
-
-
-def _averaged(samples: Float[np.ndarray, "row column channel"]) -> Float[np.ndarray, "r c channel"]:
-    n = OVERSAMPLING
-    total = samples[::n, ::n].copy()
-    for i in range(n * n):
-        if i:
-            total += samples[i // n :: n, i % n :: n]
-    return total / np.float32(n * n)
-
-
-def plate_of(scene: Scene, view: View) -> Plate:
-    """Draw the empty scene."""
-    window = Window(0, 0, view.width * OVERSAMPLING, view.height * OVERSAMPLING)
-    pixels, depths = _sample_pixels(view, scene.mesh.vertices)
-    hits = rasterize(pixels, depths, scene.mesh.faces, window)
-    vertices = np.concatenate([scene.mesh.vertices, scene.uv], 1, dtype=np.float32)
-    values = hits.interpolated(vertices, scene.mesh.faces)
-    normals = scene.mesh.normals[scene.mesh.faces[hits.faces, 0]].astype(np.float32)
-    albedo = light.linear_from_srgb(scene.colors(hits.faces, values[:, 3:]))
-
-    def image(samples: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "row column 3"]:
-        filled = np.zeros((window.height, window.width, 3), np.float32)
-        filled[hits.rows, hits.columns] = samples
-        return filled
-
-    # Where the shadows of the furniture fall is looked up once a pixel: they are softer than that anyway.
-    points, upwards = (image(v)[::OVERSAMPLING, ::OVERSAMPLING] for v in (values[:, :3], normals))
-    lit = scene.shadow.lit((points + np.float32(0.02) * upwards).reshape(-1, 3), taps=6)
-    lamp = _averaged(image(albedo * light.direct(normals))) * lit.reshape(view.height, view.width, 1)
-    return Plate(_averaged(image(albedo * light.ambient(normals))), lamp, np.ascontiguousarray(points))
-
-
-@dataclass(frozen=True)
 class Shot:
     """A picture with people in it."""
 
@@ -123,8 +67,8 @@ def shot_of(
     colors, covered, window = _people_samples(view, people, meshes, shadows)
     if window.width and window.height:
         small = Window(*(value // OVERSAMPLING for value in (window.x, window.y, window.width, window.height)))
-        share = _averaged(covered)[..., 0]
-        picture[small.slices] = picture[small.slices] * (1.0 - share)[..., None] + _averaged(colors)
+        share = averaged(covered)[..., 0]
+        picture[small.slices] = picture[small.slices] * (1.0 - share)[..., None] + averaged(colors)
         coverage[small.slices] = share
     return Shot(picture, coverage)
 
@@ -134,7 +78,7 @@ def _people_samples(
 ) -> tuple[np.ndarray, np.ndarray, Window]:
     """Light and coverage of the samples of the smallest window that holds all people."""
     limit = Window(0, 0, view.width * OVERSAMPLING, view.height * OVERSAMPLING)
-    projected = [_sample_pixels(view, mesh.vertices) for mesh in meshes]
+    projected = [sample_pixels(view, mesh.vertices) for mesh in meshes]
     visible = np.concatenate([pixels[depths > 0.0] for pixels, depths in projected])
     window = Window.around(visible, limit) if len(visible) else Window(0, 0, 0, 0)
     colors = np.zeros((window.height, window.width, 3), np.float32)
@@ -190,33 +134,6 @@ def _darken(
     shape = (window.height, window.width, 1)
     left = _LEAST_AMBIENT + (1.0 - _LEAST_AMBIENT) * open_above.reshape(shape)
     picture[rows, columns] = plate.ambient[rows, columns] * left + plate.direct[rows, columns] * lit.reshape(shape)
-
-
-@cache
-def _noise_bank(seed: int) -> Float[np.ndarray, "n"]:
-    """Many normal numbers; pictures take theirs from it, which is ten times faster than drawing new ones."""
-    return np.random.default_rng([seed, 31]).standard_normal(_NOISE_BANK, np.float32)
-
-
-@dataclass(frozen=True)
-class Sensor:
-    """How one camera turns light into numbers."""
-
-    gain: Float[np.ndarray, "3"]
-    noise: float
-    """Standard deviation in units of the brightest value."""
-    seed: int = 0
-
-    def exposed(
-        self, picture: Float[np.ndarray, "row column 3"], rng: np.random.Generator
-    ) -> UInt8[np.ndarray, "row column 3"]:
-        """The picture as recorded, BGR."""
-        values = light.srgb_from_linear(picture[..., ::-1] * self.gain[::-1].astype(np.float32)) * np.float32(255.0)
-        if self.noise > 0.0:
-            first = int(rng.integers(_NOISE_BANK))
-            noise = np.take(_noise_bank(self.seed), np.arange(first, first + values.size), mode="wrap")
-            values += np.float32(255.0 * self.noise) * noise.reshape(values.shape)
-        return np.clip(values + 0.5, 0.0, 255.0).astype(np.uint8)
 
 
 def mask_of(shot: Shot) -> Bool[np.ndarray, "row column"]:

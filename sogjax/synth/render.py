@@ -55,7 +55,7 @@ def render_recording(
     temporary = _temporary_beside(out)
     try:
         _write_descriptions(stage, temporary)
-        pictures = num_pictures(settings, settings.cameras)
+        pictures = num_pictures(settings)
         workers = workers or num_workers(pictures, settings.cameras)
         for _ in progress(film_all(stage, temporary, workers), pictures, "rendering"):
             pass

@@ -1,6 +1,7 @@
 """Rotations of the rendered figure, in plain numpy: about the axes, between frames, parts of a twist."""
 
 from collections.abc import Iterable
+from math import cos, radians, sin
 
 import numpy as np
 from jaxtyping import Float
@@ -8,25 +9,31 @@ from jaxtyping import Float
 Matrix = Float[np.ndarray, "3 3"]
 Vector = Float[np.ndarray, "3"]
 
+_PLANES = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}
+
 MIRROR = np.diag([1.0, -1.0, 1.0])
 """Reflection of left and right in the body's frame (x forward, y left, z up)."""
 
 
 def about(axis: str, angle: float) -> Matrix:
     """Rotation by `angle` (radians) about the coordinate axis `x`, `y` or `z`."""
-    cosine, sine = np.cos(angle), np.sin(angle)
-    rotation = np.eye(3)
-    i, j = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
-    rotation[i, i] = rotation[j, j] = cosine
-    rotation[j, i], rotation[i, j] = sine, -sine
-    return rotation
+    return _about(axis, cos(angle), sin(angle))
 
 
 def turned(*turns: tuple[str, float]) -> Matrix:
     """The product of rotations about coordinate axes, angles in degrees; the last one acts first."""
     rotation = np.eye(3)
     for axis, degrees in turns:
-        rotation = rotation @ about(axis, np.deg2rad(degrees))
+        if degrees != 0.0:
+            rotation = rotation @ _about(axis, cos(radians(degrees)), sin(radians(degrees)))
+    return rotation
+
+
+def _about(axis: str, cosine: float, sine: float) -> np.ndarray:
+    rotation = np.eye(3)
+    i, j = _PLANES[axis]
+    rotation[i, i] = rotation[j, j] = cosine
+    rotation[j, i], rotation[i, j] = sine, -sine
     return rotation
 
 

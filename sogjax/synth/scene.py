@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -194,7 +195,7 @@ def _barrel(place: Float[np.ndarray, "3"], radius: float, height: float, texture
     angles = np.linspace(0, 2 * np.pi, 13)
     rim = [place + radius * _direction(angle) for angle in angles]
     z = np.array([0.0, 0.0, height])
-    sides = [Panel(a, b - a, z, texture) for a, b in zip(rim[:-1], rim[1:], strict=True)]
+    sides = [Panel(a, b - a, z, texture) for a, b in pairwise(rim)]
     half = radius * 0.70
     lid = _box(place + z * 0.98, np.array([2 * half, 2 * half, 0.02 * height + 0.01]), 0.3, texture)
     return sides + lid

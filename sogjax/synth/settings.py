@@ -75,7 +75,7 @@ class SynthSettings:
         """The people's names."""
         return ACTOR_NAMES[: self.actors]
 
-    def _check_range(self, name: str, lowest: float, highest: float) -> None:
+    def _check_range(self, name: str, lowest: int | float, highest: int | float) -> None:
         value = getattr(self, name)
         if not lowest <= value <= highest:
             raise InputError(f"{name}={value} is out of range; choose a value from {lowest} to {highest}")

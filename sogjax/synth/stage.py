@@ -9,8 +9,9 @@ from sogjax.synth.clothes import outfits_from_seed
 from sogjax.synth.exercises import EXAMPLE_POSES, standing_pose
 from sogjax.synth.figure import make_figure
 from sogjax.synth.motions import Motion, motions_of
-from sogjax.synth.picture import Person, Sensor
+from sogjax.synth.picture import Person
 from sogjax.synth.scene import Scene, cluttered_room
+from sogjax.synth.sensor import Sensor
 from sogjax.synth.settings import SynthSettings
 from sogjax.synth.views import View, ring_of_views
 

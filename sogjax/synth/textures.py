@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 Colors = Float[np.ndarray, "n 3"]
 Coordinates = Float[np.ndarray, "n 2"]
+Palette = Float[np.ndarray, "color 3"]
 Rgb = tuple[float, float, float]
 
 
@@ -42,11 +43,11 @@ def value_noise(uv: Coordinates, seed: int) -> Float[np.ndarray, "n"]:
     return top + share[:, 1] * (bottom - top)
 
 
-def _plain(uv: Coordinates, palette: Colors, period: float, seed: int) -> Colors:
+def _plain(uv: Coordinates, palette: Palette, period: float, seed: int) -> Colors:
     return np.broadcast_to(palette[0], (len(uv), 3))
 
 
-def _planks(uv: Coordinates, palette: Colors, period: float, seed: int) -> Colors:
+def _planks(uv: Coordinates, palette: Palette, period: float, seed: int) -> Colors:
     row = np.floor(uv[:, 1] / period).astype(int)
     rng = np.random.default_rng([seed, 3])
     shift = rng.random(512)[row % 512] * 2.0
@@ -58,16 +59,16 @@ def _planks(uv: Coordinates, palette: Colors, period: float, seed: int) -> Color
     return colors * (0.92 + 0.12 * fibre)[:, None] * np.where(gap, 0.6, 1.0)[:, None]
 
 
-def _checks(uv: Coordinates, palette: Colors, period: float, seed: int) -> Colors:
+def _checks(uv: Coordinates, palette: Palette, period: float, seed: int) -> Colors:
     odd = np.mod(np.floor(uv / period).sum(1), 2.0).astype(int)
     return palette[odd]
 
 
-def _stripes(uv: Coordinates, palette: Colors, period: float, seed: int) -> Colors:
+def _stripes(uv: Coordinates, palette: Palette, period: float, seed: int) -> Colors:
     return palette[np.floor(uv[:, 0] / period).astype(int) % len(palette)]
 
 
-def _bricks(uv: Coordinates, palette: Colors, period: float, seed: int) -> Colors:
+def _bricks(uv: Coordinates, palette: Palette, period: float, seed: int) -> Colors:
     row = np.floor(uv[:, 1] / (0.4 * period)).astype(int)
     u = uv[:, 0] + 0.5 * period * (row % 2)
     brick = np.floor(u / period).astype(int)
@@ -77,12 +78,12 @@ def _bricks(uv: Coordinates, palette: Colors, period: float, seed: int) -> Color
     return np.where(mortar[:, None], palette[-1], colors)
 
 
-def _wall(uv: Coordinates, palette: Colors, period: float, seed: int) -> Colors:
+def _wall(uv: Coordinates, palette: Palette, period: float, seed: int) -> Colors:
     colors = np.where((uv[:, 1] < 1.05)[:, None], palette[1], palette[0])
     return np.where((uv[:, 1] < 0.12)[:, None], palette[2], colors)
 
 
-def _poster(uv: Coordinates, palette: Colors, period: float, seed: int) -> Colors:
+def _poster(uv: Coordinates, palette: Palette, period: float, seed: int) -> Colors:
     """A picture of overlapping discs and bars on a ground, with a white rim."""
     rng = np.random.default_rng([seed, 11])
     colors = np.tile(palette[0], (len(uv), 1))
@@ -95,7 +96,7 @@ def _poster(uv: Coordinates, palette: Colors, period: float, seed: int) -> Color
     return colors
 
 
-def _shelf(uv: Coordinates, palette: Colors, period: float, seed: int) -> Colors:
+def _shelf(uv: Coordinates, palette: Palette, period: float, seed: int) -> Colors:
     """Boards with books of many colours between them."""
     rng = np.random.default_rng([seed, 13])
     shelf = np.floor(uv[:, 1] / period).astype(int)
@@ -107,7 +108,7 @@ def _shelf(uv: Coordinates, palette: Colors, period: float, seed: int) -> Colors
     return np.where((level < 0.09)[:, None], palette[0], colors)
 
 
-_KINDS: dict[str, Callable[[Coordinates, Colors, float, int], Colors]] = {
+_KINDS: dict[str, Callable[[Coordinates, Palette, float, int], Colors]] = {
     "plain": _plain,
     "planks": _planks,
     "checks": _checks,

@@ -57,7 +57,12 @@ def root_position(body: Body, pose: Float[Array, "dof"]) -> Float[np.ndarray, "3
     chain = _root_joints(body)
     at_root = [joint for joint in chain[1:] if np.linalg.norm(offsets[joint]) > 1e-9]
     last = chain[chain.index(at_root[0]) - 1] if at_root else chain[-1]
-    return np.asarray(body.skeleton.world_from_joint(pose)[last, :3, 3], float)
+    return np.asarray(_joint_frames(body, pose)[last, :3, 3], float)
+
+
+@jax.jit
+def _joint_frames(body: Body, pose: Float[Array, "dof"]) -> Float[Array, "joint 4 4"]:
+    return body.skeleton.world_from_joint(pose)
 
 
 def turned(body: Body, pose: Float[Array, "dof"], heading: float, up: str) -> Float[Array, "dof"]:
@@ -84,7 +89,7 @@ def fit_landmarks(
     """
     indices, targets = landmark_targets(body, landmarks)
     centre = jnp.mean(targets, axis=0)
-    middle = jnp.mean(body.posed_landmarks(start)[indices], axis=0)
+    middle = jnp.mean(jax.jit(Body.posed_landmarks)(body, start)[indices], axis=0)
     start = placed(body, start, root_position(body, start) + np.asarray(centre - middle, float))
     headings = [None] if keep_heading else np.arange(NUM_HEADINGS) * 2.0 * np.pi / NUM_HEADINGS - np.pi
     starts = jnp.stack([start if h is None else turned(body, start, float(h), up) for h in headings])
@@ -132,7 +137,7 @@ def _fit_all(
             return distances, prior, 30.0 * limits
 
         result = optx.least_squares(residuals, solver, start, max_steps=100, throw=False)
-        cost = jnp.sum(jnp.concatenate([part**2 for part in residuals(result.value, None)]))
+        cost = jnp.sum(jnp.concatenate([part.reshape(-1) ** 2 for part in residuals(result.value, None)]))
         return result.value, cost
 
     return jax.vmap(fit)(starts)

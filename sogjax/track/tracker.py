@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int, UInt8
 
 from sogjax.energy.objective import EnergyTerms, EnergyWeights, History, Views, energy, energy_terms
+from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.color import from_rgb
@@ -143,7 +144,7 @@ def track(
     more is done again with the next capacity (and compiles again), so no blob is ever cut off unseen.
 
     Raises:
-        ValueError: more image blobs than the largest capacity.
+        InputError: more image blobs than the largest capacity.
     """
     state = TrackState.from_pose(start)
     capacities: Capacities | None = None
@@ -158,7 +159,10 @@ def track(
             if needed == capacities:
                 break
             if needed.near > CAPACITIES[-1] or int(result.num_near.max()) > CAPACITIES[-1]:
-                raise ValueError(f"frame {index}: {int(result.num_near.max())} image blobs near the body")
+                raise InputError(
+                    f"frame {index}: a picture has {int(result.num_near.max())} image blobs near the body, of which "
+                    f"{CAPACITIES[-1]} can be used; lower images.depth or raise images.color_tolerance"
+                )
             capacities = needed
         state = next_state
         seconds = time.perf_counter() - begin
