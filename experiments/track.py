@@ -3,7 +3,9 @@
 python experiments/track.py recording=FOLDER -m energy.limit_weight=0,1,2
 """
 
+import sys
+
 from sogjax.app.sweep import sweep_main, track_task
 
 if __name__ == "__main__":
-    sweep_main(track_task)()
+    sys.exit(sweep_main(track_task))

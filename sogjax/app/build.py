@@ -37,7 +37,7 @@ def one_of(key: str, value: str, allowed: Sequence[str]) -> str:
     return value
 
 
-def at_least(key: str, value: float, bound: float) -> float:
+def at_least(key: str, value: float | int, bound: float | int) -> float | int:
     """The value, if it is a number not below the bound.
 
     Raises:
@@ -164,9 +164,9 @@ def _plate_colors(
     Raises:
         InputError: plates are asked for, but a camera has none, or one of another size.
     """
-    if not config.use_plates:
-        return None
     missing = [name for name in recording.rig.names if name not in recording.background]
+    if config.use_plates is False or (config.use_plates is None and missing):
+        return None
     if missing:
         raise InputError(
             f"{recording.path}: images.use_plates=true, but background/ has no picture of "

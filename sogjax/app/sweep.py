@@ -5,11 +5,13 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from sogjax.app.composition import SCHEMAS, conf_dir, register_schemas, to_object
+from sogjax.app.composition import SCHEMAS, composed, conf_dir, register_schemas, to_object
 from sogjax.app.overrides import plain_sentence, ready_for_hydra
 from sogjax.errors import InputError
 
 COLUMNS = ("mean mm", "std mm", "joints mm", "lost", "iterations", "not converged", "frames/s")
+CHECKED_MEMBERS = 100
+"""Members of a sweep that are looked at before it begins."""
 
 
 def run_sweep(command: str, overrides: Sequence[str]) -> int:
@@ -22,12 +24,34 @@ def run_sweep(command: str, overrides: Sequence[str]) -> int:
         others = ", ".join(name for name in SCHEMAS if name != "track")
         raise InputError(f"{command} -m: only track can be swept, not {others}; leave -m out")
     words = ready_for_hydra(overrides, sweep=True)
+    _check_members(words)
     program = sys.argv
     sys.argv = ["sogjax track", "-m", *words]
     try:
         return run_hydra(track_task)
     finally:
         sys.argv = program
+
+
+def _check_members(words: Sequence[str]) -> None:
+    """Compose the members before Hydra makes their folders.
+
+    Raises:
+        InputError: a member that cannot be.
+    """
+    from hydra._internal.core_plugins.basic_sweeper import BasicSweeper
+    from hydra.core.override_parser.overrides_parser import OverridesParser
+    from hydra.errors import HydraException
+
+    own = [word for word in words if not word.lstrip("+~").startswith("hydra")]
+    try:
+        (members,) = BasicSweeper.split_arguments(OverridesParser.create().parse_overrides(own), None)
+    except HydraException as error:
+        if len(own) < len(words):  # another sweeper than Hydra's own may understand it
+            return
+        raise InputError(plain_sentence("track", SCHEMAS["track"], error)) from error
+    for member in members[:CHECKED_MEMBERS]:
+        composed("track", member)
 
 
 def sweep_main(task: Callable[[Any], Any]) -> int:

@@ -95,7 +95,8 @@ def frame_range(recording: Recording, config: TrackConfig) -> tuple[int, int]:
     last = recording.num_frames if config.stop is None else config.stop
     if not 0 <= config.start < last <= recording.num_frames:
         raise InputError(
-            f"start={config.start} stop={config.stop}: {recording.path} has the frames 0 to {recording.num_frames}"
+            f"start={config.start} stop={'null' if config.stop is None else config.stop}: {recording.path} has the "
+            f"frames 0 to {recording.num_frames - 1}; choose 0 <= start < stop <= {recording.num_frames}"
         )
     return config.start, last
 
@@ -121,20 +122,28 @@ def _motions(
     }
 
 
+STAGES = {
+    "decode": "waiting for decoded pictures",
+    "cells": "averaging pictures to cells",
+    "step": "tracking step",
+    "whole": "whole, end to end",
+}
+
+
 def say_results(result: Run) -> None:
-    """The table on standard output, the files below."""
+    """The tables on standard output, then the files."""
     if result.evaluation is not None:
-        print(result.evaluation.table())
+        print(result.evaluation.table(details=False), end="\n\n")
+    for stage, text in STAGES.items():
+        print(f"{text:<32}{result.times.frames_per_second(stage):10.1f} frames/s")
     iterations = np.mean([int(frame.result.iterations) for frame in result.frames])
-    not_converged = sum(not bool(frame.result.converged) for frame in result.frames)
-    print(
-        f"{len(result.frames)} frames: {iterations:.1f} iterations a frame, {not_converged} not converged; "
-        f"frames/s: decoding {result.times.frames_per_second('decode'):.1f}, "
-        f"cells {result.times.frames_per_second('cells'):.1f}, "
-        f"tracking step {result.times.frames_per_second('step'):.1f}, "
-        f"whole {result.times.frames_per_second('whole'):.1f} (first frame {result.times.first('whole'):.1f} s)"
-    )
+    print(f"first frame, with compilation   {result.times.first('whole'):10.1f} s")
+    print(f"iterations                      {iterations:10.1f} a frame", end="\n\n")
     for path in result.files:
         print(path)
+    not_converged = sum(not bool(frame.result.converged) for frame in result.frames)
     if not_converged:
-        say(f"{not_converged} frames did not converge within solver.max_iterations; look at them in the overlay")
+        say(
+            f"warning: {not_converged} of {len(result.frames)} frames did not converge within "
+            "solver.max_iterations; look at them in the overlay"
+        )

@@ -8,6 +8,7 @@ are shared. `gradient="autodiff"` differentiates the plain formula instead.
 from functools import partial
 from typing import Literal
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -31,11 +32,12 @@ def pair_color_similarities(image: Sog, body: Sog, space: str, color_radius: Flo
 
 
 def overlaps(image: Sog, body: Sog, color_similarities: Pairs, exponent: Float[Array, ""]) -> Pairs:
-    """E_ij of Eq. 6 in square pixels; `body` is projected (2-D). Blobs that are not seen overlap nothing."""
+    """E_ij of Eq. 6 in square pixels; `body` is projected (2-D). Padding and blobs that are not seen overlap nothing."""
     variance_sum, squared_distance = _pair_geometry(image, body)
-    variance_product = (body.sigmas**2)[:, None] * (image.sigmas**2)[None, :]
+    body_variance = jnp.where(body.mask, body.sigmas, 0.0) ** 2
+    image_variance = jnp.where(image.mask, image.sigmas, 0.0) ** 2
+    variance_product = body_variance[:, None] * image_variance[None, :]
     amplitude = color_similarities * (2.0 * jnp.pi) * variance_product / variance_sum
-    amplitude = jnp.where(body.mask[:, None], amplitude, 0.0)
     return amplitude * jnp.exp(-exponent * squared_distance / variance_sum)
 
 
@@ -107,7 +109,7 @@ def _body_gradients(
     pull = sums[:, :2] - (body.means - origin[None, :]) * sums[:, 2:3]
     spread = jnp.sum(weights * squared_distance / variance_sum, axis=1)
     by_mean = 2.0 * exponent * pull
-    by_sigma = 2.0 * (sums[:, 3] / body.sigmas + exponent * spread * body.sigmas)
+    by_sigma = 2.0 * (sums[:, 3] / _safe_sigmas(body) + exponent * spread * body.sigmas)
     return by_mean, by_sigma
 
 
@@ -117,7 +119,8 @@ def _pull_back(capped, residuals, cotangent):
     plain = partial(_capped_overlap, capped)
     _, pull_back = jax.vjp(plain, image, body, color_similarities, exponent)
     by_image, by_body, by_similarity, by_exponent = pull_back(cotangent)
-    by_body = Sog(cotangent * by_mean, cotangent * by_sigma, by_body.colors, by_body.mask)
+    # Not `Sog(...)`: the cotangent of a mask is no array of truth values.
+    by_body = eqx.tree_at(lambda sog: (sog.means, sog.sigmas), by_body, (cotangent * by_mean, cotangent * by_sigma))
     return by_image, by_body, by_similarity, by_exponent
 
 
@@ -126,7 +129,12 @@ _capped_overlap_forward.defvjp(_value_and_residuals, _pull_back)
 
 def _pair_geometry(image: Sog, body: Sog) -> tuple[Pairs, Pairs]:
     """Sums of the variances and squared distances of the centres, for every pair."""
-    variance_sum = (body.sigmas**2)[:, None] + (image.sigmas**2)[None, :]
+    variance_sum = (_safe_sigmas(body) ** 2)[:, None] + (_safe_sigmas(image) ** 2)[None, :]
     dx = image.means[None, :, 0] - body.means[:, None, 0]
     dy = image.means[None, :, 1] - body.means[:, None, 1]
     return variance_sum, dx * dx + dy * dy
+
+
+def _safe_sigmas(sog: Sog) -> Float[Array, "blob"]:
+    """The sigmas, and 1 in the padding, where a 0 would divide by 0."""
+    return jnp.where(sog.mask, sog.sigmas, 1.0)

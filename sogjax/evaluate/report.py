@@ -62,15 +62,14 @@ class Evaluation:
         """Write the numbers, per marker and per frame too, as JSON."""
         write_json(path, self.as_dict())
 
-    def table(self) -> str:
-        """The numbers in millimetres as a plain-text table, with every marker and joint."""
+    def table(self, details: bool = True) -> str:
+        """The numbers in millimetres as a plain-text table, with every marker and joint unless told otherwise."""
         lines = [_ROW.format(self.name or "mm", "mean", "std", "median", "95 %", "max", "<50", "<100")]
         for title, points in (("markers", self.markers), ("joints", self.joints)):
             if points is not None:
                 lines.append(_summary_row(f"all {title}", summarize(points.errors)))
-                lines += [
-                    _summary_row(f"  {name}", summarize(points.errors[:, [k]])) for k, name in enumerate(points.names)
-                ]
+                rows = enumerate(points.names) if details else ()
+                lines += [_summary_row(f"  {name}", summarize(points.errors[:, [k]])) for k, name in rows]
         lines.append(f"{len(self.frames)} frames, {self.frames[0]} to {self.frames[-1]}; distances in mm")
         lines += [
             f"lost: {p.name} in frames {p.first_frame} to {p.last_frame}, {MM * p.mean:.0f} mm" for p in self.lost
@@ -105,9 +104,9 @@ class GroupEvaluation:
         """Write the numbers of all actors as JSON."""
         write_json(path, self.as_dict())
 
-    def table(self) -> str:
+    def table(self, details: bool = True) -> str:
         """The actors' tables below each other, then exchanged identities."""
-        lines = [evaluation.table() + "\n" for evaluation in self.evaluations.values()]
+        lines = [evaluation.table(details) for evaluation in self.evaluations.values()]
         lines += [
             f"swapped: {s.motion}'s motion follows {s.follows} in frames {s.first_frame} to {s.last_frame}"
             for s in self.swaps

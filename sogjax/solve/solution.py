@@ -1,7 +1,7 @@
 """What every solver takes and returns."""
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -48,6 +48,7 @@ class Solution(eqx.Module):
     """False: the solver gave up at its iteration cap, or met a value that is not finite."""
 
 
+@runtime_checkable
 class Solver(Protocol):
     """Maximises a smooth function from a start; pure, and usable under jit and vmap."""
 

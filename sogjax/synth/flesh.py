@@ -38,7 +38,8 @@ class Lump:
         axis = end - start
         length = axis @ axis
         along = np.clip(from_start @ axis / length, 0.0, 1.0) if length > 0.0 else np.zeros(len(points))
-        gap = np.linalg.norm(from_start - along[:, None] * axis, axis=1)
+        aside = from_start - along[:, None] * axis
+        gap = np.sqrt(np.einsum("ni,ni->n", aside, aside))
         distance = (gap - (self.radii[0] + along * (self.radii[1] - self.radii[0]))) * scale.min()
         return distance if self.floor is None else np.maximum(distance, self.floor - points[:, 2])
 

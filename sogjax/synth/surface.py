@@ -28,14 +28,15 @@ def surface_nets(
     vertices = lower + spacing * (cells + _edge_centres(corners))
     faces = _quads(values, cells)
     for _ in range(2):
-        vertices = _relaxed(vertices, faces, field)
+        vertices = _pulled(field, _evened(vertices, faces))
+    vertices = _pulled(field, vertices)
     return vertices, np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
 
 
-def gradient(field: Field, points: Points, step: float = 1e-3) -> Points:
-    """Central differences of the field."""
-    shifts = step * np.eye(3)
-    return np.stack([(field(points + s) - field(points - s)) / (2.0 * step) for s in shifts], -1)
+def gradient(field: Field, points: Points, step: float = 1e-4) -> Points:
+    """Slope of the field, by differences."""
+    here = field(points)
+    return np.stack([field(points + shift) - here for shift in step * np.eye(3)], -1) / step
 
 
 def _sample(field: Field, grid: Points, shape: Int[np.ndarray, "3"], spacing: float) -> np.ndarray:
@@ -93,14 +94,16 @@ def _quads(values: np.ndarray, cells: np.ndarray) -> Int[np.ndarray, "quad 4"]:
     return np.concatenate(quads)
 
 
-def _relaxed(vertices: Points, quads: Int[np.ndarray, "quad 4"], field: Field) -> Points:
-    """Move each vertex half-way to the mean of its neighbours, then back onto the surface."""
+def _evened(vertices: Points, quads: Int[np.ndarray, "quad 4"]) -> Points:
+    """Each vertex moved half-way to the mean of its neighbours."""
     total, count = np.zeros_like(vertices), np.zeros(len(vertices))
     for k in range(4):
         np.add.at(total, quads[:, k], vertices[quads[:, (k + 1) % 4]])
         np.add.at(count, quads[:, k], 1.0)
-    moved = 0.5 * (vertices + total / count[:, None])
-    for _ in range(2):
-        slope = gradient(field, moved)
-        moved = moved - slope * (field(moved) / np.maximum((slope**2).sum(-1), 0.05))[:, None]
-    return moved
+    return 0.5 * (vertices + total / count[:, None])
+
+
+def _pulled(field: Field, vertices: Points) -> Points:
+    """A Newton step onto the surface."""
+    slope = gradient(field, vertices)
+    return vertices - slope * (field(vertices) / np.maximum((slope**2).sum(-1), 0.05))[:, None]

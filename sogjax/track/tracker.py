@@ -171,17 +171,17 @@ def track(
 
 def first_capacities(tracker: Tracker, state: TrackState, cells: UInt8[Array, "camera rows columns 3"]) -> Capacities:
     """Capacities with headroom for what the first frame needs."""
-    capacity = capacity_for(int(_num_near(tracker, state, cells).max()) * HEADROOM)
-    counted = _num_matching(tracker, state, cells, Capacities(near=capacity, matching=CAPACITIES[0]))
-    return Capacities(near=capacity, matching=capacity_for(int(counted.max()) * HEADROOM))
+    near, matching = _counts(tracker, state, cells)
+    return Capacities(
+        near=capacity_for(int(near.max()) * HEADROOM), matching=capacity_for(int(matching.max()) * HEADROOM)
+    )
 
 
 @eqx.filter_jit
-def _num_near(tracker: Tracker, state: TrackState, cells: Array) -> Int[Array, "camera"]:
-    rgb = cells.astype(tracker.cameras.intrinsics.dtype) / 255.0
-    return tracker.reader.near_blobs(rgb, tracker.boxes(state), CAPACITIES[0])[1]
-
-
-@eqx.filter_jit
-def _num_matching(tracker: Tracker, state: TrackState, cells: Array, capacities: Capacities) -> Int[Array, "camera"]:
-    return tracker.views(cells, state, capacities)[2]
+def _counts(
+    tracker: Tracker, state: TrackState, cells: UInt8[Array, "camera rows columns 3"]
+) -> tuple[Int[Array, "camera"], Int[Array, "camera"]]:
+    """How many image blobs pass the first test and both tests, with room for all of them."""
+    everything = Capacities(near=capacity_for(tracker.reader.candidates.sigmas.shape[-1]), matching=CAPACITIES[0])
+    _, near, matching = tracker.views(cells, state, everything)
+    return near, matching

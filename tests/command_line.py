@@ -1,0 +1,48 @@
+"""The commands, run in this process, and recordings and actor files that are wrong in one place."""
+
+import yaml
+from small_recording import make_recording
+
+from sogjax.app.cli import main
+from sogjax.data.actor_file import named_body
+
+INITIAL_POSE = "pose: rest\nposition: [0.0, 0.0, 1.0]\nheading: 0.0\n"
+
+
+def trackable(folder, **changes):
+    """A recording that can be opened and has a rough pose; nobody is in its pictures."""
+    folder = make_recording(folder, **changes)
+    (folder / "initial_pose.yaml").write_text(INITIAL_POSE)
+    return folder
+
+
+def actor_file(path, change=None):
+    """The default body's file, or one with a change made to its content."""
+    if change is None:
+        path.write_bytes(named_body("human").read_bytes())
+        return path
+    content = yaml.safe_load(named_body("human").read_text())
+    change(content)
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+def refused(capsys, *arguments):
+    """The sentence with which a command line is refused: one line, exit status 2, nothing on standard output."""
+    status = main([str(argument) for argument in arguments])
+    out, err = capsys.readouterr()
+    assert status == 2
+    assert out == ""
+    lines = err.splitlines()
+    assert len(lines) == 1
+    assert lines[0].startswith("sogjax: ")
+    assert "Traceback" not in err
+    return lines[0]
+
+
+def done(capsys, *arguments):
+    """What a command line that does its work prints on standard output and standard error."""
+    status = main([str(argument) for argument in arguments])
+    out, err = capsys.readouterr()
+    assert status == 0, err
+    return out, err

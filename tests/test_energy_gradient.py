@@ -1,0 +1,192 @@
+"""The gradient that tracking climbs, against the closed form written with loops and against finite differences.
+
+Everything runs in double precision. Where the sum of Eq. 8 reaches the cap the energy has a kink, which no pose drawn
+here meets to within the step of the differences.
+"""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from body_cases import random_body, shipped
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rig_cases import ring_rig
+from sog_cases import floats, in_float64, random_views
+
+from sogjax.energy.analytic import energy_gradient
+from sogjax.energy.objective import EnergyWeights, History, energy, energy_terms
+from sogjax.energy.overlap import EXACT_EXPONENT, PRINTED_EXPONENT
+from sogjax.model.body import Attachments
+from sogjax.model.camera import project
+
+CLOSED_FORM = 1e-9
+DIFFERENCES = 2e-6
+STEP = 1e-6
+MODES = ["forward", "autodiff"]
+seeds = st.integers(0, 10_000)
+
+HUMAN = shipped("human")
+"""Loaded here, in single precision, since the loaded body is shared with other tests."""
+
+value_and_gradient = eqx.filter_jit(
+    lambda pose, body, views, history, weights: jax.value_and_grad(lambda p: energy(body, p, views, history, weights))(
+        pose
+    )
+)
+
+
+def small_body():
+    """A forest of joints with blobs that fill the pictures; two of the blobs are one and the same."""
+    body = random_body(4, joints=9, dofs=7, blobs=8)
+    joints, offsets = list(body.blobs.joints), np.array(body.blobs.offsets)
+    joints[1], offsets[1] = joints[0], offsets[0]
+    offsets[:, 2] += 1.0
+    blobs = Attachments(body.blobs.names, tuple(joints), jnp.asarray(offsets))
+    return in_float64(eqx.tree_at(lambda b: b.blobs, body, blobs))
+
+
+def case(body, seed, padding=5, count=60):
+    """Views of a body near its rest pose, and a pose with its history."""
+    rng = np.random.default_rng(seed)
+    rest = np.asarray(body.poses["rest"], float)
+    views = random_views(ring_rig(3).cameras, body, seed, count=count, padding=padding)
+    pose, previous, before = (floats(rest + rng.normal(size=rest.shape) * 0.3) for _ in range(3))
+    return pose, views, History(previous, before, jnp.asarray(True))
+
+
+def weights(mode="forward", capped=True, exponent=EXACT_EXPONENT):
+    values = {"limit_weight": floats(0.7), "acceleration_weight": floats(0.3), "exponent": floats(exponent)}
+    return EnergyWeights(**values, capped=capped, gradient=mode)
+
+
+def assert_gradient_is_right(body, pose, views, history, weights, differences=True):
+    value, gradient = value_and_gradient(pose, body, views, history, weights)
+    assert gradient.dtype == jnp.float64
+    largest = float(jnp.max(jnp.abs(gradient)))
+    assert largest > 0.0
+    expected = energy_gradient(body, np.asarray(pose), views, history, weights)
+    np.testing.assert_allclose(gradient, expected, rtol=CLOSED_FORM, atol=CLOSED_FORM * largest)
+    if differences:
+        at = lambda p: float(value_and_gradient(floats(p), body, views, history, weights)[0])
+        base = np.asarray(pose)
+        numeric = [(at(base + STEP * unit) - at(base - STEP * unit)) / (2 * STEP) for unit in np.eye(len(base))]
+        np.testing.assert_allclose(gradient, numeric, rtol=DIFFERENCES, atol=DIFFERENCES * largest)
+    return float(value), np.asarray(gradient)
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("capped", [True, False])
+@given(seed=seeds)
+@settings(deadline=None, max_examples=6)
+def test_random_poses_of_a_small_body(mode, capped, seed):
+    with jax.enable_x64(True):
+        body = small_body()
+        assert_gradient_is_right(body, *case(body, seed), weights(mode, capped))
+
+
+@pytest.mark.parametrize("mode", MODES)
+@given(seed=seeds)
+@settings(deadline=None, max_examples=3)
+def test_random_poses_of_the_human(mode, seed):
+    with jax.enable_x64(True):
+        body = in_float64(HUMAN)
+        assert_gradient_is_right(body, *case(body, seed), weights(mode))
+
+
+def test_the_human_at_rest_where_all_angles_are_zero():
+    with jax.enable_x64(True):
+        body = in_float64(HUMAN)
+        _, views, history = case(body, 1)
+        rest = jnp.zeros(body.skeleton.num_dofs)
+        assert_gradient_is_right(body, rest, views, history, weights())
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_zero_pose(mode):
+    with jax.enable_x64(True):
+        body = small_body()
+        pose, views, history = case(body, 2)
+        assert_gradient_is_right(body, jnp.zeros_like(pose), views, history, weights(mode))
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_the_printed_exponent(mode):
+    with jax.enable_x64(True):
+        body = small_body()
+        args = case(body, 3)
+        exact = assert_gradient_is_right(body, *args, weights(mode))
+        printed = assert_gradient_is_right(body, *args, weights(mode, exponent=PRINTED_EXPONENT))
+        assert printed[0] < exact[0]
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_body_and_image_blobs_in_the_same_place(mode):
+    """The distance of their centres is 0 (two blobs of `small_body` coincide as well)."""
+    with jax.enable_x64(True):
+        body = small_body()
+        pose, views, history = case(body, 5)
+        seen = jax.vmap(project, in_axes=(0, None))(views.cameras, body.posed_blobs(pose))
+        means = views.images.means.at[:, : body.num_blobs].set(seen.means)
+        views = eqx.tree_at(lambda v: v.images.means, views, means)
+        assert_gradient_is_right(body, pose, views, history, weights(mode))
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_blobs_behind_a_camera(mode):
+    """The first camera stands in the middle of the body."""
+    with jax.enable_x64(True):
+        body = small_body()
+        pose, views, history = case(body, 6)
+        centre = np.median(np.asarray(body.posed_blobs(pose).means), axis=0)
+        world = np.array(views.cameras.camera_from_world)
+        world[0, :3, 3] = -world[0, :3, :3] @ centre
+        views = eqx.tree_at(lambda v: v.cameras.camera_from_world, views, floats(world))
+        views = eqx.tree_at(lambda v: v.images.sigmas, views, views.images.sigmas.at[0].set(80.0))
+        inside = project(jax.tree.map(lambda leaf: leaf[0], views.cameras), body.posed_blobs(pose))
+        assert 0 < int(inside.mask.sum()) < body.num_blobs
+        assert_gradient_is_right(body, pose, views, history, weights(mode))
+
+
+def test_joints_beyond_their_limits():
+    with jax.enable_x64(True):
+        body = in_float64(HUMAN)
+        _, views, history = case(body, 7)
+        pose = floats(np.random.default_rng(7).normal(size=body.skeleton.num_dofs) * 0.9)
+        terms = energy_terms(body, pose, views, history, weights())
+        assert terms.limit_penalty > 0.5
+        assert_gradient_is_right(body, pose, views, history, weights())
+
+
+def test_without_a_history_nothing_is_known_of_the_acceleration():
+    with jax.enable_x64(True):
+        body = small_body()
+        pose, views, history = case(body, 8)
+        unknown = History(history.previous, history.before_previous, jnp.asarray(False))
+        value, gradient = assert_gradient_is_right(body, pose, views, unknown, weights())
+        free = EnergyWeights(limit_weight=floats(0.7), acceleration_weight=floats(0.0), exponent=floats(0.5))
+        other_value, other_gradient = value_and_gradient(pose, body, views, history, free)
+        np.testing.assert_allclose(value, other_value, rtol=1e-12)
+        np.testing.assert_allclose(gradient, other_gradient, rtol=1e-12)
+
+
+def test_padding_in_the_images_changes_nothing():
+    with jax.enable_x64(True):
+        body = small_body()
+        pose, views, history = case(body, 9, padding=0)
+        _, padded, _ = case(body, 9, padding=5)
+        value, gradient = value_and_gradient(pose, body, views, history, weights())
+        other_value, other_gradient = value_and_gradient(pose, body, padded, history, weights())
+        np.testing.assert_allclose(other_value, value, rtol=1e-12)
+        np.testing.assert_allclose(other_gradient, gradient, rtol=1e-10, atol=1e-14)
+
+
+def test_single_precision_is_near_enough():
+    body = HUMAN
+    pose, views, history = case(body, 10)
+    value, gradient = value_and_gradient(pose, body, views, history, weights())
+    assert gradient.dtype == jnp.float32
+    expected = energy_gradient(body, np.asarray(pose), views, history, weights())
+    np.testing.assert_allclose(gradient, expected, atol=1e-4 * np.abs(expected).max())
+    assert np.isfinite(value)
