@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from body_cases import random_body, shipped
+from body_cases import posed, random_body, shipped
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rig_cases import ring_rig
@@ -35,6 +35,8 @@ value_and_gradient = eqx.filter_jit(
         pose
     )
 )
+terms_of = eqx.filter_jit(energy_terms)
+seen_by_all = jax.jit(lambda cameras, body, pose: jax.vmap(project, (0, None))(cameras, body.posed_blobs(pose)))
 
 
 def small_body():
@@ -127,7 +129,7 @@ def test_body_and_image_blobs_in_the_same_place(mode):
     with jax.enable_x64(True):
         body = small_body()
         pose, views, history = case(body, 5)
-        seen = jax.vmap(project, in_axes=(0, None))(views.cameras, body.posed_blobs(pose))
+        seen = seen_by_all(views.cameras, body, pose)
         means = views.images.means.at[:, : body.num_blobs].set(seen.means)
         views = eqx.tree_at(lambda v: v.images.means, views, means)
         assert_gradient_is_right(body, pose, views, history, weights(mode))
@@ -139,13 +141,12 @@ def test_blobs_behind_a_camera(mode):
     with jax.enable_x64(True):
         body = small_body()
         pose, views, history = case(body, 6)
-        centre = np.median(np.asarray(body.posed_blobs(pose).means), axis=0)
+        centre = np.median(np.asarray(posed(body, pose)[0].means), axis=0)
         world = np.array(views.cameras.camera_from_world)
         world[0, :3, 3] = -world[0, :3, :3] @ centre
         views = eqx.tree_at(lambda v: v.cameras.camera_from_world, views, floats(world))
         views = eqx.tree_at(lambda v: v.images.sigmas, views, views.images.sigmas.at[0].set(80.0))
-        inside = project(jax.tree.map(lambda leaf: leaf[0], views.cameras), body.posed_blobs(pose))
-        assert 0 < int(inside.mask.sum()) < body.num_blobs
+        assert 0 < int(seen_by_all(views.cameras, body, pose).mask[0].sum()) < body.num_blobs
         assert_gradient_is_right(body, pose, views, history, weights(mode))
 
 
@@ -154,7 +155,7 @@ def test_joints_beyond_their_limits():
         body = in_float64(HUMAN)
         _, views, history = case(body, 7)
         pose = floats(np.random.default_rng(7).normal(size=body.skeleton.num_dofs) * 0.9)
-        terms = energy_terms(body, pose, views, history, weights())
+        terms = terms_of(body, pose, views, history, weights())
         assert terms.limit_penalty > 0.5
         assert_gradient_is_right(body, pose, views, history, weights())
 

@@ -16,7 +16,7 @@ from sogjax.synth.motions import motions_of
 
 NAMES = list(LANDMARKS)
 SINGLE = ["walk", "arms", "squat_kick", "cartwheel"]
-FPS = 40.0
+FPS = 30.0
 SECONDS = 3.4
 
 
@@ -47,7 +47,7 @@ def test_nobody_jumps(kind):
     assert speed.max() < 13.0  # the hands and feet of a cartwheel; metres a second
     # Without a jump half of the time means about half of the way.
     twice = np.linalg.norm(landmarks(kind)[2:] - landmarks(kind)[:-2], axis=-1) * FPS
-    assert speed.max() < 0.62 * twice.max()
+    assert speed.max() < 0.65 * twice.max()
 
 
 @pytest.mark.parametrize("kind", SINGLE)
@@ -87,9 +87,9 @@ def test_walking_feet_do_not_slide():
 def test_walking_gets_on_at_a_natural_speed_and_swings_the_arms():
     points = landmarks("walk")
     pelvis = points[:, NAMES.index("pelvis"), :2]
-    speed = np.linalg.norm(np.diff(pelvis[60:], axis=0), axis=1) * FPS
+    speed = np.linalg.norm(np.diff(pelvis[45:], axis=0), axis=1) * FPS
     assert 0.8 < speed.mean() < 1.5
-    hands = points[60:, NAMES.index("left_hand"), :2] - pelvis[60:]
+    hands = points[45:, NAMES.index("left_hand"), :2] - pelvis[45:]
     assert np.linalg.norm(hands, axis=1).max() > np.linalg.norm(hands, axis=1).min() + 0.1
 
 

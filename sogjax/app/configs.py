@@ -32,7 +32,7 @@ class ImagesConfig:
     """Pictures to Sums of Gaussians (Section 4.1) and culling (Section 6)."""
 
     depth: int = option(8, "levels of the quad-tree below its root, the smallest power of two that holds a picture")
-    color_tolerance: float = option(0.15, "[eps_col] a node splits above this standard deviation; < 0: always")
+    color_tolerance: float = option(0.1, "[eps_col] a node splits above this standard deviation; < 0: always")
     box_enlargement: float = option(0.15, "border around an actor's box, as a part of its size")
     use_plates: bool | None = option(
         None, "leave out image blobs that equal the empty background pictures; null: where every camera has one"
@@ -45,7 +45,7 @@ class EnergyConfig:
     """The energy (Eq. 10)."""
 
     limit_weight: float = option(1.0, "[w_l] weight of the joint limits, 1/rad^2")
-    acceleration_weight: float = option(0.05, "[w_a] weight of smooth motion, 1/rad^2")
+    acceleration_weight: float = option(0.01, "[w_a] weight of smooth motion, 1/rad^2")
     overlap_exponent: str = option("exact", "exact | printed: Eq. 6 with or without the 1/2 that Eq. 2 implies")
     capped: bool = option(True, "the cap of Eq. 8 against blobs that hide each other")
     gradient: str = option("forward", "forward: closed form beside the value | autodiff: plain reverse mode")

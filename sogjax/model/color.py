@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 Colors = Float[Array, "*batch 3"]
 BroadcastColors = Float[Array, "*#batch 3"]
 
-COLOR_RADIUS = {"hsv_cylinder": 0.3, "hsv_cone": 0.15, "hsv": 0.15, "rgb": 0.1, "lab": 0.2}
+COLOR_RADIUS = {"hsv_cylinder": 0.4, "hsv_cone": 0.15, "hsv": 0.15, "rgb": 0.1, "lab": 0.2}
 """The colour spaces, each with the eps_sim of Eq. 7 that suits its scale."""
 
 _WHITE_D65 = (0.95047, 1.0, 1.08883)

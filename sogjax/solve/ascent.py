@@ -76,7 +76,7 @@ class ConditionedAscent(eqx.Module):
             )
 
         end = jax.lax.while_loop(unfinished, climb, state)
-        return Solution(end.best_params, end.best_value, end.iteration, end.iteration + 1, end.converged)
+        return Solution(end.best_params, end.best_value, end.iteration, end.iteration + 1, end.converged & end.finite)
 
     def _next_step_sizes(self, state: AscentState, gradient: Params, first_sizes: Params) -> Params:
         """Eq. 12."""

@@ -13,11 +13,18 @@ from sogjax.solve.solution import Objective, Params, Scales, Solution
 
 Method = Literal["bfgs", "lbfgs", "nonlinear_cg"]
 
-_MINIMISERS: dict[str, Callable] = {
-    "bfgs": optx.BFGS,
-    "lbfgs": optx.LBFGS,
-    "nonlinear_cg": optx.NonlinearCG,
-}
+
+def _nonlinear_cg(rtol: float, atol: Float[Array, ""]) -> optx.NonlinearCG:
+    """Conjugate gradients whose step length is carried on, since nothing else tells them how far to go.
+
+    Optimistix's own line search starts every step at the length of the gradient, which shrinks towards the optimum:
+    it stops far from it.
+    """
+    search = optx.LinearTrustRegion(high_cutoff=0.6, low_cutoff=0.1, high_constant=2.0, low_constant=0.5)
+    return optx.NonlinearCG(rtol=rtol, atol=atol, search=search)
+
+
+_MINIMISERS: dict[str, Callable] = {"bfgs": optx.BFGS, "lbfgs": optx.LBFGS, "nonlinear_cg": _nonlinear_cg}
 
 
 class OptimistixSolver(eqx.Module):

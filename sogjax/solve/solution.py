@@ -31,7 +31,8 @@ class Scales(eqx.Module):
 
     def first_step_sizes(self, gradient: Params) -> Params:
         """sigma_0 of Eq. 11: the largest gradient of each kind makes a step of `first_steps`."""
-        same_kind = self.kinds[:, None] == jnp.arange(self.first_steps.shape[0])[None, :]
+        kinds = jnp.arange(self.first_steps.shape[0], dtype=self.kinds.dtype)
+        same_kind = self.kinds[:, None] == kinds[None, :]
         largest = jnp.max(jnp.where(same_kind, jnp.abs(gradient)[:, None], 0.0), axis=0)
         sizes = self.first_steps / jnp.where(largest > 0.0, largest, 1.0)
         return sizes[self.kinds]

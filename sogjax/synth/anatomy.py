@@ -40,7 +40,17 @@ def _parent_index(name: str) -> int:
     return INDEX[parent] if parent in INDEX else INDEX[f"{side}_{parent}"]
 
 
+def _levels() -> list[tuple[list[int], list[int]]]:
+    """The joints below the root, those of one depth together, and their parents."""
+    depth = [0] * len(PARENTS)
+    for joint, parent in enumerate(PARENTS):
+        depth[joint] = 0 if parent < 0 else depth[parent] + 1
+    groups = [[j for j, d in enumerate(depth) if d == level] for level in range(1, max(depth) + 1)]
+    return [(joints, [PARENTS[j] for j in joints]) for joints in groups]
+
+
 PARENTS = tuple(_parent_index(name) for name in JOINTS)
+_LEVELS = _levels()
 
 
 @dataclass(frozen=True)
@@ -89,14 +99,12 @@ class Anatomy:
 
     def world_from_joint(self, pose: Pose) -> Float[np.ndarray, "22 4 4"]:
         """Forward kinematics."""
-        frames = np.tile(np.eye(4), (len(JOINTS), 1, 1))
-        for joint, parent in enumerate(PARENTS):
-            if parent < 0:
-                frames[joint, :3, :3], frames[joint, :3, 3] = pose.rotations[joint], pose.position
-                continue
-            above = frames[parent]
-            frames[joint, :3, :3] = above[:3, :3] @ pose.rotations[joint]
-            frames[joint, :3, 3] = above[:3, :3] @ self.offsets[joint] + above[:3, 3]
+        frames = np.zeros((len(JOINTS), 4, 4))
+        frames[:, :3, :3], frames[:, 3, 3] = pose.rotations, 1.0
+        frames[:, :3, 3] = self.offsets
+        frames[0, :3, 3] = pose.position
+        for joints, parents in _LEVELS:
+            frames[joints] = frames[parents] @ frames[joints]
         return frames
 
 

@@ -10,7 +10,7 @@ from sogjax.errors import InputError
 from sogjax.synth.render import Progress, render_recording, silent
 from sogjax.synth.settings import SynthSettings
 
-SYNTH_VERSION = 1
+SYNTH_VERSION = 2
 """To be raised with every change that alters the pictures."""
 
 

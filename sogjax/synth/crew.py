@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
+from sogjax.errors import InputError
 from sogjax.synth.filming import film
 from sogjax.synth.settings import SynthSettings
 from sogjax.synth.stage import Stage
@@ -85,5 +86,7 @@ def _pictures(processes: Sequence["subprocess.Popen[str]"], done: "queue.Queue[s
             yield
         elif message == "end":
             ended += 1
+        elif message.startswith("refused "):
+            raise InputError(message.removeprefix("refused "))
         elif message.startswith("failed"):
             raise RuntimeError(f"a rendering process {message}")

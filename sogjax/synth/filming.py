@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 
+from sogjax.data.atomic import atomic_path
 from sogjax.data.video import VideoWriter
 from sogjax.synth.anatomy import Pose
 from sogjax.synth.exercises import EXAMPLE_POSES
@@ -87,7 +88,7 @@ def _rng(stage: Stage, camera: int, kind: int, number: int) -> np.random.Generat
 
 
 def _write_image(path: Path, image: UInt8[np.ndarray, "..."]) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
     parameters = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY] if path.suffix == ".jpg" else []
     encoded = cv2.imencode(path.suffix, image, parameters)[1]
-    path.write_bytes(encoded.tobytes())
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(encoded.tobytes())

@@ -8,6 +8,7 @@ import json
 import sys
 from pathlib import Path
 
+from sogjax.errors import InputError
 from sogjax.synth.filming import film
 from sogjax.synth.settings import SynthSettings
 from sogjax.synth.stage import stage_of
@@ -17,8 +18,11 @@ def main() -> None:
     """Read the order (settings, cameras, folder) as JSON, film, tell of every picture."""
     order = json.load(sys.stdin)
     stage = stage_of(SynthSettings(**order["settings"]))
-    for _ in film(stage, order["cameras"], Path(order["folder"])):
-        print("picture", flush=True)
+    try:
+        for _ in film(stage, order["cameras"], Path(order["folder"])):
+            print("picture", flush=True)
+    except InputError as error:  # a full disk
+        print("refused", " ".join(str(error).split()), flush=True)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.energy.overlap import pair_color_similarities
+from sogjax.errors import InputError
 from sogjax.images.quadtree import Candidates, keep_blobs, quadtree
 from sogjax.model.camera import Camera, project
 from sogjax.model.color import averaging_space, color_distance, convert, from_rgb
@@ -26,17 +27,22 @@ class Capacities(eqx.Module):
     near: int = eqx.field(static=True)
     matching: int = eqx.field(static=True)
 
-    def holding(self, near: int, matching: int, headroom: float = 1.0) -> "Capacities":
-        """These capacities, or where the counts do not fit, the next sizes that hold `headroom` times as many."""
-        return Capacities(
-            self.near if near <= self.near else capacity_for(near * headroom),
-            self.matching if matching <= self.matching else capacity_for(matching * headroom),
+    def hold(self, near: int, matching: int) -> bool:
+        """Whether there is room for so many image blobs."""
+        return near <= self.near and matching <= self.matching
+
+
+def capacity_for(count: int, headroom: float = 1.0) -> int:
+    """The smallest of `CAPACITIES` that holds `headroom` times `count` blobs, or at least `count`.
+
+    Raises:
+        InputError: none holds `count`.
+    """
+    if count > CAPACITIES[-1]:
+        raise InputError(
+            f"{count} image blobs in one picture: the largest capacity is {CAPACITIES[-1]}; lower images.depth"
         )
-
-
-def capacity_for(count: float) -> int:
-    """The smallest of `CAPACITIES` that holds `count` blobs; the largest where none does."""
-    return next((capacity for capacity in CAPACITIES if capacity >= count), CAPACITIES[-1])
+    return next((capacity for capacity in CAPACITIES if capacity >= headroom * count), CAPACITIES[-1])
 
 
 class ImageReader(eqx.Module):

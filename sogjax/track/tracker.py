@@ -11,7 +11,6 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int, UInt8
 
 from sogjax.energy.objective import EnergyTerms, EnergyWeights, History, Views, energy, energy_terms
-from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.color import from_rgb
@@ -155,15 +154,13 @@ def track(
             capacities = first_capacities(tracker, state, device_cells)
         while True:
             next_state, result = _step(tracker, state, device_cells, capacities)
-            needed = capacities.holding(int(result.num_near.max()), int(result.num_matching.max()), HEADROOM)
-            if needed == capacities:
+            near, matching = int(result.num_near.max()), int(result.num_matching.max())
+            if capacities.hold(near, matching):
                 break
-            if needed.near > CAPACITIES[-1] or int(result.num_near.max()) > CAPACITIES[-1]:
-                raise InputError(
-                    f"frame {index}: a picture has {int(result.num_near.max())} image blobs near the body, of which "
-                    f"{CAPACITIES[-1]} can be used; lower images.depth or raise images.color_tolerance"
-                )
-            capacities = needed
+            capacities = Capacities(
+                max(capacities.near, capacity_for(near, HEADROOM)),
+                max(capacities.matching, capacity_for(matching, HEADROOM)),
+            )
         state = next_state
         seconds = time.perf_counter() - begin
         yield TrackedFrame(index, jax.device_get(result), capacities, tracker.reader.color_space, seconds)
@@ -173,7 +170,7 @@ def first_capacities(tracker: Tracker, state: TrackState, cells: UInt8[Array, "c
     """Capacities with headroom for what the first frame needs."""
     near, matching = _counts(tracker, state, cells)
     return Capacities(
-        near=capacity_for(int(near.max()) * HEADROOM), matching=capacity_for(int(matching.max()) * HEADROOM)
+        near=capacity_for(int(near.max()), HEADROOM), matching=capacity_for(int(matching.max()), HEADROOM)
     )
 
 

@@ -1,0 +1,8 @@
+"""`python -m sogjax`, the same as the console script."""
+
+import sys
+
+from sogjax.app.cli import main
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,155 @@
+"""The commands end to end on a tiny recording, their help, and their exit statuses."""
+
+import json
+import logging
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import yaml
+from command_line import actor_file, done, refused, trackable
+from small_recording import write_video
+
+from sogjax.app.cli import main
+from sogjax.app.composition import SCHEMAS, composed
+from sogjax.app.configs import help_lines
+from sogjax.data.motion import load_motion
+from sogjax.synth import SynthSettings, render_recording
+
+LANDMARKS = ("pelvis", "chest", "neck", "left_elbow")
+FAST = ("solver.max_iterations=20", "images.depth=6")
+
+
+@pytest.fixture(scope="module")
+def rendered(tmp_path_factory):
+    """A rendered person, four cameras, four frames; its rough pose has the landmarks of the small actor."""
+    folder = tmp_path_factory.mktemp("rendered") / "person"
+    settings = SynthSettings(cameras=4, frames=4, width=160, height=120, example_poses=False, background=False)
+    render_recording(settings, folder)
+    rough = yaml.safe_load((folder / "initial_pose.yaml").read_text())
+    rough["landmarks"] = {name: rough["landmarks"][name] for name in LANDMARKS}
+    (folder / "initial_pose.yaml").write_text(yaml.safe_dump(rough))
+    return folder
+
+
+@pytest.fixture
+def plain_logging():
+    """Hydra sets up logging for a sweep; put it back, so that no file stays open."""
+    root = logging.getLogger()
+    before = list(root.handlers)
+    yield
+    for handler in [h for h in root.handlers if h not in before]:
+        root.removeHandler(handler)
+        handler.close()
+
+
+def test_from_a_recording_to_motion_and_pictures(capsys, tmp_path, monkeypatch, rendered, plain_logging):
+    monkeypatch.chdir(tmp_path)
+    actor = actor_file(tmp_path / "actor.yaml")
+    track = ("track", f"recording={rendered}", f"actor={actor}", *FAST)
+
+    out, _ = done(capsys, *track, "out=run", "start=1", "outputs.overlay_width=320")
+    names = ["config.yaml", "metrics.json", "motion.bvh", "motion.npz", "motion.rrd", "overlay.mp4"]
+    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == names
+    assert all((tmp_path / "run" / name).stat().st_size > 0 for name in names)
+    for name in names:
+        assert f"run/{name}" in out
+    assert "all markers" in out
+    assert re.search(r"^tracking step +[0-9.]+ frames/s$", out, re.MULTILINE)
+
+    motion = load_motion(tmp_path / "run" / "motion.npz")
+    np.testing.assert_array_equal(motion.frame, [1, 2, 3])
+    metrics = json.loads((tmp_path / "run" / "metrics.json").read_text())
+    printed = float(re.search(r"all markers +([0-9.]+)", out)[1])
+    assert metrics["all"]["mean_mm"] == pytest.approx(printed, abs=0.06)
+
+    again, _ = done(capsys, "evaluate", "motion=run/motion.npz", f"truth={rendered / 'ground_truth.npz'}", "out=e.json")
+    assert f"all markers{printed:17.1f}" in again
+    assert json.loads((tmp_path / "e.json").read_text())["all"] == metrics["all"]
+
+    done(capsys, "export", "motion=run/motion.npz", "to=walk.bvh")
+    assert (tmp_path / "walk.bvh").read_bytes() == (tmp_path / "run" / "motion.bvh").read_bytes()
+    done(capsys, "view", "motion=run/motion.npz", f"recording={rendered}", "out=walk.rrd")
+    assert (tmp_path / "walk.rrd").stat().st_size > 10_000
+
+    kept = yaml.safe_load((tmp_path / "run" / "config.yaml").read_text())
+    assert kept["solver"]["max_iterations"] == 20
+    assert kept["start"] == 1
+
+    light = ("outputs.overlay=false", "outputs.rerun=false", "stop=3")
+    table, _ = done(capsys, *track, "-m", "energy.limit_weight=0,1", *light)
+    rows = [line for line in table.splitlines() if line.startswith("energy.limit_weight=")]
+    assert [row.split()[0] for row in rows] == ["energy.limit_weight=0", "energy.limit_weight=1"]
+    assert all(np.isfinite([float(value) for value in row.split()[-7:-4]]).all() for row in rows)
+    assert len(list((tmp_path / "multirun").glob("*/*/motion.npz"))) == 2
+
+
+def test_one_member_of_a_sweep_fails_and_the_others_go_on(capsys, tmp_path, monkeypatch, rendered, plain_logging):
+    monkeypatch.chdir(tmp_path)
+    light = ("outputs.overlay=false", "outputs.rerun=false", "outputs.bvh=false", "start=3")
+    actor = f"actor={actor_file(tmp_path / 'actor.yaml')}"
+    status = main(["track", "-m", f"recording={rendered}", actor, *FAST, *light, "stop=9,4"])
+    out, err = capsys.readouterr()
+    assert status == 2
+    assert "settings" in out, err
+    failed, worked = (line for line in out.splitlines() if line.startswith("stop="))
+    assert "stop=9" in failed
+    assert "failed" in failed
+    assert "stop=4" in worked
+    assert err.startswith("sogjax: ")
+    assert "stop=9" in err
+
+
+def test_videos_of_different_length(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    recording = trackable(tmp_path / "walk")
+    write_video(recording / "videos" / "right.mp4", 1, frames=2)
+    light = ("outputs.overlay=false", "outputs.rerun=false")
+    _, err = done(capsys, "track", f"recording={recording}", f"actor={actor_file(tmp_path / 'a.yaml')}", *FAST, *light)
+    assert "left 4" in err
+    assert "right 2" in err
+    assert load_motion(tmp_path / "outputs" / "walk" / "motion.npz").num_frames == 2
+
+
+@pytest.mark.parametrize("command", SCHEMAS)
+def test_help_lists_every_option_with_its_default(capsys, command):
+    out, err = done(capsys, command, "--help")
+    assert err == ""
+    for key, default, text in help_lines(SCHEMAS[command]):
+        assert f"  {key}={default}\n" in out
+        assert text
+    assert all(len(line) < 120 for line in out.splitlines())
+
+
+def test_help_of_the_whole_names_every_command(capsys):
+    out, _ = done(capsys, "--help")
+    for command in SCHEMAS:
+        assert re.search(rf"^  {command} +\w+", out, re.MULTILINE)
+    assert main([]) == 2
+
+
+@pytest.mark.parametrize("command", SCHEMAS)
+def test_defaults_in_the_help_are_the_defaults_of_the_command(command):
+    required = [f"{key}=x" for key, default, _ in help_lines(SCHEMAS[command]) if default == "required"]
+    config = composed(command, required)
+    for key, default, _ in help_lines(SCHEMAS[command]):
+        value = config
+        for part in key.split("."):
+            value = getattr(value, part)
+        assert default in ("required", "null" if value is None else str(value))
+
+
+def test_an_unknown_command(capsys):
+    assert "track" in refused(capsys, "trak")
+
+
+def test_exit_status_of_the_program(tmp_path):
+    run = lambda *words: subprocess.run(
+        [sys.executable, "-m", "sogjax", *words], capture_output=True, text=True, cwd=tmp_path, check=False
+    )
+    wrong = run("track", "recording=nowhere")
+    assert (wrong.returncode, wrong.stdout) == (2, "")
+    assert wrong.stderr == "sogjax: nowhere: there is no such folder; give the folder of a recording\n"
+    assert run("--version").returncode == 0
