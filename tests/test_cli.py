@@ -66,7 +66,7 @@ def test_from_a_recording_to_motion_and_pictures(capsys, tmp_path, monkeypatch, 
     assert metrics["all"]["mean_mm"] == pytest.approx(printed, abs=0.06)
 
     again, _ = done(capsys, "evaluate", "motion=run/motion.npz", f"truth={rendered / 'ground_truth.npz'}", "out=e.json")
-    assert f"all markers{printed:17.1f}" in again
+    assert f"all markers{printed:21.1f}" in again
     assert json.loads((tmp_path / "e.json").read_text())["all"] == metrics["all"]
 
     done(capsys, "export", "motion=run/motion.npz", "to=walk.bvh")
@@ -82,7 +82,7 @@ def test_from_a_recording_to_motion_and_pictures(capsys, tmp_path, monkeypatch, 
     table, _ = done(capsys, *track, "-m", "energy.limit_weight=0,1", *light)
     rows = [line for line in table.splitlines() if line.startswith("energy.limit_weight=")]
     assert [row.split()[0] for row in rows] == ["energy.limit_weight=0", "energy.limit_weight=1"]
-    assert all(np.isfinite([float(value) for value in row.split()[-7:-4]]).all() for row in rows)
+    assert all(np.isfinite([float(value) for value in row.split()[-8:-5]]).all() for row in rows)
     assert len(list((tmp_path / "multirun").glob("*/*/motion.npz"))) == 2
 
 
@@ -98,8 +98,7 @@ def test_one_member_of_a_sweep_fails_and_the_others_go_on(capsys, tmp_path, monk
     assert "stop=9" in failed
     assert "failed" in failed
     assert "stop=4" in worked
-    assert err.startswith("sogjax: ")
-    assert "stop=9" in err
+    assert err.splitlines()[-1].startswith("sogjax: start=3 stop=9")
 
 
 def test_videos_of_different_length(capsys, tmp_path, monkeypatch):

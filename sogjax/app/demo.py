@@ -6,6 +6,7 @@ from pathlib import Path
 from sogjax.app.composition import composed
 from sogjax.app.configs import DemoConfig, TrackConfig
 from sogjax.app.outputs import results_folder
+from sogjax.app.overrides import quoted_value
 from sogjax.app.progress import progress
 from sogjax.app.recordings import say
 from sogjax.app.track import Run
@@ -36,7 +37,9 @@ def _run_in(config: DemoConfig, out: Path) -> Run:
     recording = cached_recording(settings, default_cache_dir(), progress)
     say(f"rendered recording: {recording}")
     rendered = time.perf_counter()
-    track_config: TrackConfig = composed("track", [f"recording={_quoted(recording)}", f"out={_quoted(out)}"])
+    track_config: TrackConfig = composed(
+        "track", [f"recording={quoted_value(str(recording))}", f"out={quoted_value(str(out))}"]
+    )
     track_config.outputs = config.outputs
     result = run_track(track_config)
     print(
@@ -44,9 +47,3 @@ def _run_in(config: DemoConfig, out: Path) -> Run:
         f"actor, tracking and outputs {time.perf_counter() - rendered:.1f} s"
     )
     return result
-
-
-def _quoted(path: Path) -> str:
-    """A path as Hydra's grammar takes it, whatever characters it has."""
-    escaped = str(path).replace("\\", "\\\\").replace("'", "\\'")
-    return f"'{escaped}'"

@@ -9,7 +9,7 @@ from sogjax.app.composition import SCHEMAS, composed, conf_dir, register_schemas
 from sogjax.app.overrides import plain_sentence, ready_for_hydra
 from sogjax.errors import InputError
 
-COLUMNS = ("mean mm", "std mm", "joints mm", "lost", "iterations", "not converged", "frames/s")
+COLUMNS = ("mean mm", "std mm", "joints mm", "lost", "swaps", "iterations", "not converged", "frames/s")
 CHECKED_MEMBERS = 100
 """Members of a sweep that are looked at before it begins."""
 
@@ -123,6 +123,7 @@ def row_numbers(result: Any) -> dict[str, float]:
         joints = [e.joints.errors for e in result.evaluation.evaluations.values() if e.joints is not None]
         if joints:
             numbers["joints mm"] = 1000.0 * float(np.nanmean(np.concatenate(joints, axis=1)))
+        numbers["swaps"] = len(result.evaluation.swaps)
         numbers["lost"] = sum(len(e.lost) for e in result.evaluation.evaluations.values())
     numbers["iterations"] = float(np.mean([frame.result.iterations for frame in result.frames]))
     numbers["not converged"] = sum(not bool(frame.result.converged) for frame in result.frames)
@@ -133,10 +134,10 @@ def row_numbers(result: Any) -> dict[str, float]:
 def table(rows: Sequence[tuple[str, dict[str, float] | str]]) -> str:
     """A plain-text table: what was set, and what came of it."""
     width = max(len("settings"), *(len(name) for name, _ in rows)) if rows else 8
-    lines = [f"{'settings':<{width}}" + "".join(f"{column:>15}" for column in COLUMNS)]
+    lines = [f"{'settings':<{width}}" + "".join(f"{column:>14}" for column in COLUMNS)]
     for name, numbers in rows:
         if isinstance(numbers, str):
             lines.append(f"{name:<{width}}   failed: {numbers}")
         else:
-            lines.append(f"{name:<{width}}" + "".join(f"{numbers[column]:>15.2f}" for column in COLUMNS))
+            lines.append(f"{name:<{width}}" + "".join(f"{numbers[column]:>14.2f}" for column in COLUMNS))
     return "\n".join(lines)

@@ -14,7 +14,7 @@ from sogjax.model.color import averaging_space, color_distance, convert, from_rg
 from sogjax.model.skeleton import Skeleton
 from sogjax.model.sog import Sog
 
-CAPACITIES = (256, 512, 1024, 2048, 4096, 8192, 16384, 32768, 65536)
+CAPACITIES = (256, 512, 768, 1024, 1536, 2048, 3072, 4096, 6144, 8192, 16384, 32768, 65536)
 """The sizes of padded image Sogs. Few, so that few programs are compiled."""
 
 BLOB_RADIUS = 3.0

@@ -26,7 +26,7 @@ from sogjax.track.culling import (
     union_boxes,
 )
 
-HEADROOM = 1.6
+HEADROOM = 1.4
 """Slots for image blobs, as a multiple of what the first frame needs."""
 
 

@@ -1,0 +1,73 @@
+"""How many frames a second are tracked, by stage?
+
+python benchmarks/track_speed.py [recording=FOLDER] [frames=60] [overrides=[solver=lbfgs,...]]
+
+Without a recording the demo's is used, rendered now if it is not there yet. The first frame, which compiles, is
+left out of every rate. `decode` is the time that tracking waits for pictures that threads decode ahead.
+"""
+
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from sogjax.app.configs import DemoConfig
+from sogjax.app.progress import progress
+from sogjax.app.script import machine_line, settings_from, track_folder
+from sogjax.app.sweep import row_numbers
+from sogjax.app.track import STAGES
+from sogjax.data.recording import open_recording
+from sogjax.data.video import read_frames
+from sogjax.synth import SynthSettings, cached_recording
+
+
+@dataclass
+class Settings:
+    """What is tracked, as `key=value` on the command line."""
+
+    recording: str | None = None
+    frames: int = 60
+    overrides: list[str] = field(default_factory=list)
+
+
+def main() -> None:
+    """Print the table."""
+    settings = settings_from(Settings)
+    folder = demo_recording() if settings.recording is None else Path(settings.recording)
+    recording = open_recording(folder)
+    frames = min(settings.frames, recording.num_frames)
+    result = track_folder(folder, [*settings.overrides, f"stop={frames}"])
+    numbers = row_numbers(result)
+    used = np.mean([np.asarray(frame.result.num_matching) for frame in result.frames])
+    width, height = recording.rig.image_size(recording.rig.names[0])
+    print(machine_line())
+    print(f"{recording.name}: {len(recording.rig.names)} cameras, {width}x{height}, {frames} frames")
+    print(f"{used:.0f} image blobs used a camera; {numbers['iterations']:.1f} iterations a frame")
+    print(f"markers {numbers['mean mm']:.1f} mm, std {numbers['std mm']:.1f} mm, {numbers['lost']:.0f} lost\n")
+    for stage, text in STAGES.items():
+        print(f"{text:<34}{result.times.frames_per_second(stage):10.1f} frames/s")
+    print(f"{'decoding alone':<34}{decoding_rate(folder, frames):10.1f} frames/s")
+    print(f"{'first frame, with compilation':<34}{result.times.first('whole'):10.1f} s")
+
+
+def demo_recording() -> Path:
+    """The recording that `sogjax demo` tracks."""
+    demo = DemoConfig()
+    settings = SynthSettings(
+        demo.motion, cameras=demo.cameras, frames=demo.frames, width=demo.width, height=demo.height, seed=demo.seed
+    )
+    return cached_recording(settings, progress=progress)
+
+
+def decoding_rate(folder: Path, frames: int) -> float:
+    """Multi-view frames a second when nothing else is done; opening the files is left out."""
+    images = read_frames(open_recording(folder), 0, frames)
+    next(images)
+    begin = time.perf_counter()
+    count = sum(1 for _ in images)
+    return count / (time.perf_counter() - begin) if count else float("nan")
+
+
+if __name__ == "__main__":
+    main()
