@@ -1,6 +1,6 @@
 """How many iterations does each solver need on a cartwheel, and does it keep the arms?
 
-python experiments/ascent.py [motion=cartwheel] [frames=60] [cameras=12] [seed=0]
+python experiments/ascent.py [motion=cartwheel] [frames=105] [cameras=12] [seed=0]
 
 The paper: 34.56 iterations a frame for the conditioned ascent, 65.38 for plain gradient ascent, which lost the arms
 in some frames. Iterations of the optimistix solvers count their line-search steps.
@@ -21,7 +21,7 @@ class Settings:
     """What is rendered, as `key=value` on the command line."""
 
     motion: str = "cartwheel"
-    frames: int = 60
+    frames: int = 105
     cameras: int = 12
     seed: int = 0
 

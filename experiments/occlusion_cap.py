@@ -1,6 +1,6 @@
 """What does the cap of Eq. 8 do on motions whose limbs hide the body?
 
-python experiments/occlusion_cap.py [motions=[arms,squat_kick]] [frames=60] [cameras=12] [seed=0]
+python experiments/occlusion_cap.py [motions=[arms,squat_kick]] [frames=120] [cameras=12] [seed=0]
 
 The paper's sequence fails without it: 229.09 mm (standard deviation 252.04) against 44.93 mm (27.16).
 """
@@ -18,7 +18,7 @@ class Settings:
     """What is rendered, as `key=value` on the command line."""
 
     motions: list[str] = field(default_factory=lambda: ["arms", "squat_kick"])
-    frames: int = 60
+    frames: int = 120
     cameras: int = 12
     seed: int = 0
 

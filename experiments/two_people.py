@@ -1,6 +1,6 @@
 """Are two people who pass each other closely tracked together without a swap, with many cameras and with few?
 
-python experiments/two_people.py [cameras=[12,4]] [frames=60] [seed=0]
+python experiments/two_people.py [cameras=[12,4]] [frames=90] [seed=0]
 
 Both people are rendered into one recording and are one energy (Eq. 8 caps the sum of both actors' blobs).
 """
@@ -18,7 +18,7 @@ class Settings:
     """What is rendered, as `key=value` on the command line."""
 
     cameras: list[int] = field(default_factory=lambda: [12, 4])
-    frames: int = 60
+    frames: int = 90
     seed: int = 0
 
 

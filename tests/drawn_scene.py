@@ -37,7 +37,7 @@ def standing(body, height, position=(0.0, 0.0)):
     return pose
 
 
-def draw(body, pose, rig, masks=False):
+def draw(body, pose, rig, masks=False, disc=DISC):
     """One BGR image a camera of the rig (or where the body is seen)."""
     blobs, _ = posed(body, jnp.asarray(pose, jnp.float32))
     means, sigmas, colors = (np.asarray(part, float) for part in (blobs.means, blobs.sigmas, blobs.colors))
@@ -47,7 +47,7 @@ def draw(body, pose, rig, masks=False):
         world = np.asarray(camera.camera_from_world, float)
         depth = means @ world[2, :3] + world[2, 3]
         pixels = opencv_pixels(rig, name, means)
-        radius = DISC * sigmas * float(camera.focal_length) / depth
+        radius = disc * sigmas * float(camera.focal_length) / depth
         image = np.full((height, width, 3), (0, 0, 0) if masks else BACKGROUND, np.uint8)
         for blob in np.argsort(-depth):
             color = (255, 255, 255) if masks else tuple(int(c) for c in np.rint(colors[blob, ::-1] * 255))

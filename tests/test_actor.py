@@ -24,6 +24,8 @@ from sogjax.model.body import Attachments
 COLOR = 0.02
 """A byte is 0.004; discs have edges."""
 TRUE_SCALE = 1.08
+FLESH = 1.5
+"""Radius of the flesh around a blob of sigma 1 in the example pictures, where blobs overlap."""
 COLORS = np.array([[0.9, 0.2, 0.1], [0.1, 0.7, 0.3], [0.2, 0.3, 0.9]])
 
 
@@ -33,8 +35,8 @@ def three_blobs(rig, apart=False):
     world = np.asarray(rig.camera("cam0").camera_from_world, float)
     eye = -world[:3, :3].T @ world[:3, 3]
     far = np.array([0.0, 0.0, 1.2])
-    near = far + 0.25 * (eye - far) if not apart else far + [0.0, 0.0, 0.5]
-    points = np.stack([far, near, far - [0.0, 0.0, 0.6]])
+    near = far + 0.25 * (eye - far) if not apart else far + np.array([0.0, 0.0, 0.5])
+    points = np.stack([far, near, far - np.array([0.0, 0.0, 0.6])])
     blobs = Attachments(("far", "near", "beside"), (5, 5, 5), jnp.asarray(points, jnp.float32))
     body = eqx.tree_at(lambda b: b.blobs, body, blobs)
     body = eqx.tree_at(lambda b: b.blob_sigmas, body, jnp.array([0.1, 0.12, 0.1]))
@@ -110,7 +112,8 @@ def write_example(folder, name, body, pose, rig, initial_pose=None, actor=None, 
     folder = folder / name
     folder.mkdir(parents=True)
     images, masks = {}, {}
-    drawn = zip(rig.names, draw(body, pose, rig), draw(body, pose, rig, masks=True), strict=True)
+    pictures = (draw(body, pose, rig, masks, disc=FLESH) for masks in (False, True))
+    drawn = zip(rig.names, *pictures, strict=True)
     for camera, image, mask in drawn:
         images[camera], masks[camera] = folder / f"{camera}.png", folder / f"{camera}.mask.png"
         assert cv2.imwrite(str(images[camera]), image)
@@ -150,7 +153,7 @@ def test_the_size_of_the_subject_is_found(made):
     actor, truth, _ = made
     base = size_of(shipped("dog"))
     assert abs(size_of(actor.body) - size_of(truth)) < 0.03 * size_of(truth)
-    assert abs(size_of(actor.body) / base - TRUE_SCALE) < abs(1.0 - TRUE_SCALE) / 2.0
+    assert abs(size_of(actor.body) / base - TRUE_SCALE) < (TRUE_SCALE - 1.0) / 2.0
 
 
 def test_the_poses_of_the_examples_are_found(made):

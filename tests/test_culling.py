@@ -31,9 +31,9 @@ CULLED = 2e-3
 """Part of the similarity that may be lost with the image blobs left out (tails of Gaussians beyond the box)."""
 
 similarity_of = eqx.filter_jit(
-    lambda body, pose, views, weights: energy_terms(
-        body, pose, views, History(pose, pose, jnp.asarray(False)), weights
-    ).similarity
+    lambda body, pose, views, weights: (
+        energy_terms(body, pose, views, History(pose, pose, jnp.asarray(False)), weights).similarity
+    )
 )
 
 
@@ -100,9 +100,7 @@ def test_blobs_of_the_plate_are_left_out(scene):
     plate = np.array(colors)
     corner = np.asarray(tracker.reader.candidates.means < jnp.array([[[80.0, 60.0]]])).all(axis=-1)
     plate[corner] += 1.0
-    with_plate = eqx.tree_at(
-        lambda r: r.plate_colors, all_cells, jnp.asarray(plate), is_leaf=lambda leaf: leaf is None
-    )
+    with_plate = eqx.tree_at(lambda r: r.plate_colors, all_cells, jnp.asarray(plate), is_leaf=lambda leaf: leaf is None)
     np.testing.assert_array_equal(leaves_of(with_plate, rgb)[1], np.asarray(leaves) & corner)
 
 

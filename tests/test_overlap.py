@@ -71,9 +71,7 @@ def test_the_exact_exponent_is_the_integral_and_the_printed_one_is_not():
     image, body = random_sog(0, 7), random_sog(1, 5)
     ones = jnp.ones((5, 7))
     expected = quadrature_matrix(image, body)
-    np.testing.assert_allclose(
-        overlaps(image, body, ones, jnp.asarray(EXACT_EXPONENT)), expected, rtol=1e-3, atol=1e-6
-    )
+    np.testing.assert_allclose(overlaps(image, body, ones, jnp.asarray(EXACT_EXPONENT)), expected, rtol=1e-3, atol=1e-6)
     printed = np.asarray(overlaps(image, body, ones, jnp.asarray(PRINTED_EXPONENT)))
     apart = expected > 1e-3
     assert (printed < 0.99 * expected)[apart].all()

@@ -63,7 +63,7 @@ def recursive_leaves(grid, cells, tolerance):
             is_leaf = seen >= 0.5 * pixels**2
         else:
             fits = left + pixels <= grid.width and top + pixels <= grid.height
-            is_leaf = fits and 0.0 <= tolerance and deviation <= tolerance
+            is_leaf = fits and tolerance >= 0.0 and deviation <= tolerance
         if is_leaf:
             centre = np.array([left, top]) + 0.5 * pixels - 0.5
             found.append([*centre, pixels / 2.0, *block.mean(axis=0)])
@@ -115,7 +115,7 @@ def test_a_plain_image_has_few_leaves_and_a_negative_tolerance_gives_one_a_cell(
 
 def test_single_cells_of_a_full_size_picture():
     """1296 x 972 pixels at depth 7: 81 x 61 cells of 16 pixels; the last row is covered by three quarters."""
-    grid, candidates = nodes(1296, 972, 7)
+    _, candidates = nodes(1296, 972, 7)
     cells = np.random.default_rng(0).random((61, 81, 3)).astype(np.float32)
     table = leaves_of(candidates, cells, -1.0)
     assert len(table) == 81 * 61

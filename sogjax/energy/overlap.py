@@ -32,7 +32,7 @@ def pair_color_similarities(image: Sog, body: Sog, space: str, color_radius: Flo
 
 
 def overlaps(image: Sog, body: Sog, color_similarities: Pairs, exponent: Float[Array, ""]) -> Pairs:
-    """E_ij of Eq. 6 in square pixels; `body` is projected (2-D). Padding and blobs that are not seen overlap nothing."""
+    """E_ij of Eq. 6 in square pixels; `body` is projected (2-D). Blobs masked out overlap nothing."""
     variance_sum, squared_distance = _pair_geometry(image, body)
     body_variance = jnp.where(body.mask, body.sigmas, 0.0) ** 2
     image_variance = jnp.where(image.mask, image.sigmas, 0.0) ** 2

@@ -1,7 +1,7 @@
 """Optimistix's minimisers behind the interface of the ascent: BFGS, L-BFGS and nonlinear conjugate gradients."""
 
 from collections.abc import Callable
-from typing import Literal
+from typing import Any, Literal
 
 import equinox as eqx
 import jax
@@ -14,7 +14,7 @@ from sogjax.solve.solution import Objective, Params, Scales, Solution
 Method = Literal["bfgs", "lbfgs", "nonlinear_cg"]
 
 
-def _nonlinear_cg(rtol: float, atol: Float[Array, ""]) -> optx.NonlinearCG:
+def _nonlinear_cg(rtol: Any, atol: Any) -> optx.NonlinearCG:
     """Conjugate gradients whose step length is carried on, since nothing else tells them how far to go.
 
     Optimistix's own line search starts every step at the length of the gradient, which shrinks towards the optimum:
