@@ -23,7 +23,8 @@ class Estimate(eqx.Module):
 
     poses: Float[Array, "pose dof"]
     shape_params: Float[Array, "shape"]
-    similarity: Float[Array, ""]
+    score: Float[Array, ""]
+    """The mean of Eq. 9 over the poses, less the limits' and the shape's penalties."""
     iterations: Array
 
 

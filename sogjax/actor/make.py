@@ -38,8 +38,8 @@ class MadeActor:
 
     body: Body
     example_poses: dict[str, Float[Array, "dof"]]
-    similarity: float
-    """Eq. 9 of the silhouettes, the mean over the example poses."""
+    score: float
+    """What was climbed: Eq. 9 of the silhouettes, the mean over the example poses, less the penalties."""
 
 
 def make_actor(
@@ -85,7 +85,7 @@ def make_actor(
     return MadeActor(
         actor,
         {example.name: pose for example, pose in zip(examples, estimate.poses, strict=True)},
-        float(estimate.similarity),
+        float(estimate.score),
     )
 
 

@@ -15,8 +15,11 @@ from sogjax.model.frames import axis_vector
 
 LANDMARK_NOISE = 0.03
 """Metres: what a landmark is expected to be off."""
-POSE_SPREAD = 1.5
-"""Radians: how far joint angles lie from the start pose, where the landmarks do not say."""
+POSE_SPREAD = 0.5
+"""Radians: how far joint angles lie from the start pose. Large against what landmarks say of most angles; it decides
+where they say next to nothing, as of the twist of a straight arm."""
+ROOT_SPREAD = 10.0
+"""Radians and metres: nothing is known of place and heading."""
 NUM_HEADINGS = 12
 MIN_LANDMARKS = 4
 
@@ -93,7 +96,7 @@ def fit_landmarks(
     start = placed(body, start, root_position(body, start) + np.asarray(centre - middle, float))
     headings = [None] if keep_heading else np.arange(NUM_HEADINGS) * 2.0 * np.pi / NUM_HEADINGS - np.pi
     starts = jnp.stack([start if h is None else turned(body, start, float(h), up) for h in headings])
-    fitted, costs = _fit_all(body, starts, indices, targets)
+    fitted, costs = _fit_all(body, starts, indices, targets, _spread(body))
     return fitted[jnp.argmin(jnp.where(jnp.isfinite(costs), costs, jnp.inf))]
 
 
@@ -121,9 +124,20 @@ def landmark_targets(
     return indices, jnp.array(list(landmarks.values()), body.landmarks.offsets.dtype)
 
 
+def _spread(body: Body) -> Float[Array, "dof"]:
+    """How far each degree of freedom may lie from the start pose."""
+    spread = jnp.full(body.skeleton.num_dofs, POSE_SPREAD, body.skeleton.offsets.dtype)
+    root = [dof for revolute in (False, True) for _, dof, _ in _root_dofs(body, revolute)]
+    return spread.at[jnp.array(root, int)].set(ROOT_SPREAD)
+
+
 @jax.jit
 def _fit_all(
-    body: Body, starts: Float[Array, "start dof"], indices: Array, targets: Float[Array, "landmark 3"]
+    body: Body,
+    starts: Float[Array, "start dof"],
+    indices: Array,
+    targets: Float[Array, "landmark 3"],
+    spread: Float[Array, "dof"],
 ) -> tuple[Float[Array, "start dof"], Float[Array, "start"]]:
     solver = optx.LevenbergMarquardt(rtol=1e-4, atol=1e-4)
     lower, upper = body.skeleton.joint_limits()
@@ -131,7 +145,7 @@ def _fit_all(
     def fit(start):
         def residuals(pose, _):
             distances = (body.posed_landmarks(pose)[indices] - targets) / LANDMARK_NOISE
-            prior = (pose - start) / POSE_SPREAD
+            prior = (pose - start) / spread
             params = body.skeleton.joint_params(pose)
             limits = jnp.maximum(lower - params, 0.0) + jnp.maximum(params - upper, 0.0)
             return distances, prior, 30.0 * limits
