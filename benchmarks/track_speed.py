@@ -14,7 +14,7 @@ import numpy as np
 
 from sogjax.app.configs import DemoConfig
 from sogjax.app.progress import progress
-from sogjax.app.script import machine_line, settings_from, track_folder
+from sogjax.app.script import machine_line, run_script, settings_from, track_folder
 from sogjax.app.sweep import row_numbers
 from sogjax.app.track import STAGES
 from sogjax.data.recording import open_recording
@@ -70,4 +70,4 @@ def decoding_rate(folder: Path, frames: int) -> float:
 
 
 if __name__ == "__main__":
-    main()
+    run_script(main)

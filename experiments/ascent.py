@@ -9,7 +9,7 @@ in some frames. Iterations of the optimistix solvers count their line-search ste
 import sys
 from dataclasses import dataclass
 
-from sogjax.app.script import machine_line, settings_from, track_rendered
+from sogjax.app.script import machine_line, run_script, settings_from, track_rendered
 from sogjax.app.sweep import row_numbers, table
 from sogjax.synth import SynthSettings
 
@@ -39,4 +39,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_script(main)

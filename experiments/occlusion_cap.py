@@ -8,7 +8,7 @@ The paper's sequence fails without it: 229.09 mm (standard deviation 252.04) aga
 import sys
 from dataclasses import dataclass, field
 
-from sogjax.app.script import machine_line, settings_from, track_rendered
+from sogjax.app.script import machine_line, run_script, settings_from, track_rendered
 from sogjax.app.sweep import row_numbers, table
 from sogjax.synth import SynthSettings
 
@@ -38,4 +38,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_script(main)

@@ -8,7 +8,7 @@ Both people are rendered into one recording and are one energy (Eq. 8 caps the s
 import sys
 from dataclasses import dataclass, field
 
-from sogjax.app.script import machine_line, settings_from, track_rendered
+from sogjax.app.script import machine_line, run_script, settings_from, track_rendered
 from sogjax.app.sweep import row_numbers, table
 from sogjax.synth import SynthSettings
 
@@ -35,4 +35,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_script(main)

@@ -1,7 +1,8 @@
 """An actor from a recording's example poses: a named body, scaled to the subject and coloured."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -30,6 +31,8 @@ from sogjax.model.frames import world_from_upright
 from sogjax.track.initial_pose import rough_pose
 
 Report = Callable[[str], None]
+Progress = Callable[[Iterable[Any], int, str], Iterable[Any]]
+"""Wraps items, of which there are so many, to show under a label how far the work is."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,7 @@ def make_actor(
     color_space: str,
     weights: EnergyWeights,
     report: Report = lambda _: None,
+    progress: Progress = lambda items, total, label: items,
 ) -> MadeActor:
     """Scale and colour a body after the example poses of one subject.
 
@@ -63,7 +67,8 @@ def make_actor(
     pictures = [load_pictures(recording, example) for example in examples]
     coarse = same_capacity([silhouette_views(posed, rig, body.num_blobs, COARSE_DEPTH) for posed in pictures])
     poses = []
-    for example, posed, views in zip(examples, pictures, coarse, strict=True):
+    triples = list(zip(examples, pictures, coarse, strict=True))
+    for example, posed, views in progress(triples, len(triples), "example poses"):
         report(f"pose of {example.name}")
         starts = _starts(upright, example, posed, rig, recording.up)
         poses.append(pose_from_silhouettes(upright, views, starts, weights)[0])

@@ -23,6 +23,8 @@ from sogjax.track.culling import ImageReader
 from sogjax.track.scales import pose_scales
 from sogjax.track.tracker import Tracker
 
+MAX_DEPTH = 12
+"""Of a quad-tree: one pixel of the largest pictures that a camera takes."""
 OPTIMISTIX_METHODS = ("bfgs", "lbfgs", "nonlinear_cg")
 
 
@@ -48,6 +50,17 @@ def at_least(key: str, value: float | int, bound: float | int) -> float | int:
     return value
 
 
+def between(key: str, value: float | int, low: float | int, high: float | int) -> float | int:
+    """The value, if it lies between the bounds.
+
+    Raises:
+        InputError: it does not.
+    """
+    if not low <= value <= high:
+        raise InputError(f"{key}={value}: must lie between {low:g} and {high:g}")
+    return value
+
+
 def check(config: TrackConfig) -> None:
     """Look at every setting before anything is done that takes time.
 
@@ -59,7 +72,10 @@ def check(config: TrackConfig) -> None:
     solver(config.solver)
     for key in ("first_angle", "first_translation", "largest_angle", "largest_translation"):
         at_least(f"solver.{key}", getattr(config.solver, key), 1e-6)
-    at_least("images.depth", config.images.depth, 1)
+    between("images.depth", config.images.depth, 1, MAX_DEPTH)
+    between("tracking.extrapolation", config.tracking.extrapolation, 0.0, 2.0)
+    if not np.isfinite(config.images.color_tolerance):
+        raise InputError(f"images.color_tolerance={config.images.color_tolerance}: must be a number")
     at_least("images.box_enlargement", config.images.box_enlargement, 0.0)
     at_least("images.plate_tolerance", config.images.plate_tolerance, 0.0)
     at_least("outputs.overlay_width", config.outputs.overlay_width, 64)
@@ -91,13 +107,14 @@ def solver(config: SolverConfig) -> Solver:
     method = one_of("solver.method", config.method, methods)
     at_least("solver.epsilon", config.epsilon, 0.0)
     at_least("solver.max_iterations", config.max_iterations, 1)
+    between("solver.min_iterations", config.min_iterations, 0, config.max_iterations)
     if method in OPTIMISTIX_METHODS:
         return OptimistixSolver(method, epsilon=config.epsilon, max_iterations=config.max_iterations)
     conditioned = method == "conditioned_ascent"
     return ConditionedAscent(
         epsilon=config.epsilon,
         grow=at_least("solver.grow", config.grow, 1.0) if conditioned else 1.0,
-        shrink=at_least("solver.shrink", config.shrink, 0.0) if conditioned else 1.0,
+        shrink=between("solver.shrink", config.shrink, 0.0, 1.0) if conditioned else 1.0,
         min_iterations=config.min_iterations,
         max_iterations=config.max_iterations,
     )
@@ -121,7 +138,6 @@ def device_cameras(recording: Recording) -> Camera:
 
 def cell_grids(recording: Recording, depth: int) -> tuple[CellGrid, ...]:
     """How the pictures of each camera are cut into cells."""
-    at_least("images.depth", depth, 1)
     sizes = np.asarray(recording.rig.cameras.image_size).astype(int)
     return tuple(CellGrid.from_depth(int(w), int(h), depth) for w, h in sizes)
 

@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def command_help(command: str) -> str:
     """Every option of a command with its default, unit and the paper's symbol."""
-    from sogjax.app.composition import SCHEMAS
+    from sogjax.app.composition import SCHEMAS, config_groups
     from sogjax.app.configs import help_lines
 
     schema = SCHEMAS[command]
@@ -53,6 +53,10 @@ def command_help(command: str) -> str:
     for key, default, text in help_lines(schema):
         lines += textwrap.wrap(f"{key}={default}", 118, initial_indent="  ")
         lines += textwrap.wrap(text, 110, initial_indent="        ", subsequent_indent="        ")
+    groups = config_groups(command)
+    if groups:
+        lines += ["", "sets of options by name, such as " + f"{next(iter(groups))}={next(iter(groups.values()))[0]}:"]
+        lines += [f"  {group}={' | '.join(names)}" for group, names in groups.items()]
     return "\n".join(lines)
 
 

@@ -36,6 +36,13 @@ def conf_dir() -> Path:
     return packaged if packaged.is_dir() else package.parent / "conf"
 
 
+def config_groups(command: str) -> dict[str, list[str]]:
+    """The config groups of a command and the choices of each: the YAML files of a folder of `conf/`."""
+    defaults = OmegaConf.to_container(OmegaConf.load(conf_dir() / f"{command}.yaml"))["defaults"]  # pyright: ignore
+    groups = [next(iter(entry)).lstrip("/") for entry in defaults if isinstance(entry, dict)]
+    return {group: sorted(path.stem for path in (conf_dir() / group).glob("*.yaml")) for group in groups}
+
+
 def register_schemas() -> None:
     """Make the schemas known to Hydra; the YAML files build on them."""
     store = ConfigStore.instance()

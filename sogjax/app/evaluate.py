@@ -32,7 +32,9 @@ def named_motions(paths: list[Path], truth: GroundTruth) -> dict[str, Motion]:
         InputError: a motion whose file name tells no subject of the truth.
     """
     if len(paths) == 1 and len(truth.subjects) < 2:
-        return {"actor": load_motion(paths[0])}
+        return {next(iter(truth.subjects), "actor"): load_motion(paths[0])}
+    if not truth.subjects:
+        raise InputError(f"motion={','.join(map(str, paths))}: the truth is that of one subject; give one motion")
     motions = {}
     for path in paths:
         name = path.stem.removeprefix("motion_")

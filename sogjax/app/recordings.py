@@ -12,6 +12,7 @@ import jax.numpy as jnp
 from sogjax.actor.make import make_actor, subjects_of
 from sogjax.app.build import color_space_and_radius, energy_weights
 from sogjax.app.configs import ColorConfig, EnergyConfig
+from sogjax.app.progress import progress
 from sogjax.data.actor_file import load_body, named_body
 from sogjax.data.initial_pose import load_initial_poses
 from sogjax.data.recording import Recording, open_recording
@@ -72,7 +73,9 @@ def actors_of(recording: Recording, files: Any, body: str, color: ColorConfig) -
         actors = [load_body(path) for path in file_list(files)]
         names = [actor.name for actor in actors]
         if len(set(names)) < len(names):
-            raise InputError(f"actor={files}: two actors are named {names[0]!r}; give each its own `name`")
+            raise InputError(
+                f"actor={files}: two actors are named {max(names, key=names.count)!r}; give each its own `name`"
+            )
         return actors, False
     space, _ = color_space_and_radius(color)
     cameras = recording.rig.names
@@ -88,7 +91,13 @@ def _made_actor(path: str, cameras: tuple[str, ...], body: str, subject: str | N
     label = "actor" if subject is None else f"actor {subject}"
     weights = energy_weights(EnergyConfig())
     return make_actor(
-        recording, body_named(body), subject, space, weights, report=lambda stage: say(f"{label}: {stage}")
+        recording,
+        body_named(body),
+        subject,
+        space,
+        weights,
+        report=lambda stage: say(f"{label}: {stage}"),
+        progress=progress,
     ).body
 
 

@@ -4,7 +4,7 @@ import datetime
 import os
 import platform
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -38,6 +38,21 @@ def settings_from(schema: type[Settings], words: Sequence[str] | None = None) ->
     except (OmegaConfBaseException, InputError) as error:
         known = " ".join(f"{key}={value}" for key, value in OmegaConf.structured(schema).items())
         print(f"{str(error).splitlines()[0]}; the settings and their defaults: {known}", file=sys.stderr)
+        sys.exit(2)
+
+
+def demo_recording_unless_given() -> None:
+    """Add the demo's recording, rendered now if it is not there yet, to a command line that names no recording."""
+    if not any(word.startswith("recording=") or word in ("-h", "--help") for word in sys.argv[1:]):
+        sys.argv.append(f"recording={quoted_value(str(cached_recording(SynthSettings(), progress=progress)))}")
+
+
+def run_script(main: Callable[[], None]) -> None:
+    """Run a script; wrong input is one sentence and exit status 2."""
+    try:
+        main()
+    except InputError as error:
+        print(f"sogjax: {error}", file=sys.stderr)
         sys.exit(2)
 
 

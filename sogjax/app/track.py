@@ -63,6 +63,8 @@ def track_recording(recording: Recording, bodies: list[Body], config: TrackConfi
     bodies = [upright(body, recording) for body in bodies]
     start = jnp.concatenate(first_poses(recording, bodies))
     first, last = frame_range(recording, config)
+    if first + recording.first_frame > 0:
+        say(f"warning: the rough pose of {recording.initial_poses} is taken for frame {first + recording.first_frame}")
     grids = build.cell_grids(recording, config.images.depth)
     tracker = build.tracker(recording, concatenate(bodies), grids, config)
     times = StageTimes()
@@ -126,7 +128,7 @@ STAGES = {
     "decode": "waiting for decoded pictures",
     "cells": "averaging pictures to cells",
     "step": "tracking step",
-    "whole": "whole, end to end",
+    "whole": "decoding to pose, together",
 }
 
 

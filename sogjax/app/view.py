@@ -10,6 +10,7 @@ from sogjax.app.recordings import file_list, opened
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.motion import load_motion
 from sogjax.data.video import read_frames
+from sogjax.errors import InputError
 from sogjax.view.frames import frame_range
 from sogjax.view.rerun import view_command, write_rerun
 
@@ -34,5 +35,7 @@ def run(config: ViewConfig) -> Path:
     )
     print(out)
     if config.out is None:
-        subprocess.run(view_command(out), check=False)
+        ended = subprocess.run(view_command(out), check=False)
+        if ended.returncode != 0:
+            raise InputError(f"the Rerun viewer could not be opened on {out}; write a file with out=FILE.rrd instead")
     return out

@@ -41,9 +41,6 @@ def load_initial_poses(path: Path, actors: Sequence[str]) -> dict[str, InitialPo
     for actor in actors:
         if actor not in poses:
             raise InputError(f"{path}: has no pose for the actor {actor!r}, only for: {', '.join(poses)}; add it")
-    for name in poses:
-        if name not in actors:
-            raise InputError(f"{path}: {name!r} is no actor; rename it to one of: {', '.join(actors)}")
     return {actor: poses[actor] for actor in actors}
 
 

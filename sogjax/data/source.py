@@ -1,5 +1,6 @@
 """The images of one camera, one after the other: a video, or a folder of numbered images."""
 
+import os
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
@@ -13,6 +14,10 @@ from jaxtyping import UInt8
 
 from sogjax.data.image_file import IMAGE_SUFFIXES, read_image
 from sogjax.errors import InputError
+
+# A file that does not open is told in our own sentence, without the codecs' own lines before it.
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 
 VIDEO_SUFFIXES = (".mp4", ".avi", ".mkv", ".mov")
 

@@ -21,7 +21,7 @@ class EnergyWeights(eqx.Module):
     """The constants of Eq. 6, 8 and 10. What is swept is an array; what changes the formula is static."""
 
     limit_weight: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=1.0)
-    acceleration_weight: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=0.05)
+    acceleration_weight: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=0.01)
     exponent: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=EXACT_EXPONENT)
     capped: bool = eqx.field(static=True, default=True)
     gradient: GradientMode = eqx.field(static=True, default="forward")

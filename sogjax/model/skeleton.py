@@ -38,6 +38,14 @@ class Skeleton(eqx.Module):
         """Number of pose parameters."""
         return len(self.dof_names)
 
+    @property
+    def trees(self) -> tuple[int, ...]:
+        """For every joint the number of its tree, which is an actor; trees are counted by their roots."""
+        numbers: list[int] = []
+        for parent in self.parents:
+            numbers.append(max(numbers, default=-1) + 1 if parent < 0 else numbers[parent])
+        return tuple(numbers)
+
     def joint_params(self, pose: Float[Array, "dof"]) -> Float[Array, "joint"]:
         """Lambda = M Theta (Eq. 1)."""
         return jnp.matmul(self.parameter_transform, pose, precision="highest")

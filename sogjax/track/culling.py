@@ -102,11 +102,7 @@ class ImageReader(eqx.Module):
 
 def actor_of_blobs(skeleton: Skeleton, blob_joints: tuple[int, ...]) -> Int[np.ndarray, "blob"]:
     """Number of the tree (the actor) that each blob belongs to."""
-    actors: list[int] = []
-    for joint, parent in enumerate(skeleton.parents):
-        actors.append(max(actors, default=-1) + 1 if parent < 0 else actors[parent])
-        del joint
-    return np.array([actors[joint] for joint in blob_joints], int)
+    return np.array([skeleton.trees[joint] for joint in blob_joints], int)
 
 
 def body_boxes(

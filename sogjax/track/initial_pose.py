@@ -20,6 +20,8 @@ POSE_SPREAD = 0.5
 where they say next to nothing, as of the twist of a straight arm."""
 ROOT_SPREAD = 10.0
 """Radians and metres: nothing is known of place and heading."""
+VERTICAL = 0.99
+"""Cosine above which an axis counts as vertical."""
 NUM_HEADINGS = 12
 MIN_LANDMARKS = 4
 
@@ -34,6 +36,10 @@ def rough_pose(body: Body, description: InitialPose, up: str) -> Float[Array, "d
     if description.position is not None:
         start = placed(body, start, np.asarray(description.position, float))
     if description.heading is not None:
+        if not _can_turn(body, up):
+            raise InputError(
+                f"heading: the body {body.name!r} has no degree of freedom about the vertical {up}; leave it out"
+            )
         start = turned(body, start, np.radians(description.heading), up)
     if description.landmarks:
         return fit_landmarks(body, up, start, description.landmarks, description.heading is not None)
@@ -73,9 +79,15 @@ def turned(body: Body, pose: Float[Array, "dof"], heading: float, up: str) -> Fl
     vertical = axis_vector(up)
     for joint, dof, weight in _root_dofs(body, revolute=True):
         along = float(np.asarray(body.skeleton.axes[joint], float) @ vertical)
-        if abs(along) > 0.99:
+        if abs(along) > VERTICAL:
             return pose.at[dof].set(heading * np.sign(along) / weight)
     return pose
+
+
+def _can_turn(body: Body, up: str) -> bool:
+    vertical = axis_vector(up)
+    axes = np.asarray(body.skeleton.axes, float)
+    return any(abs(float(axes[joint] @ vertical)) > VERTICAL for joint, _, _ in _root_dofs(body, revolute=True))
 
 
 def fit_landmarks(

@@ -27,7 +27,6 @@ def pose_scales(
 
 def _dof_kinds(skeleton: Skeleton) -> Int[np.ndarray, "dof"]:
     """2 x the number of the tree a degree of freedom moves, + 1 for translations."""
-    roots = np.cumsum([parent < 0 for parent in skeleton.parents]) - 1
     first_joint = np.argmax(np.asarray(skeleton.parameter_transform) != 0.0, axis=0)
     slides = ~np.asarray(skeleton.revolute)[first_joint]
-    return (2 * roots[first_joint] + slides).astype(np.int32)
+    return (2 * np.array(skeleton.trees)[first_joint] + slides).astype(np.int32)
