@@ -6,6 +6,7 @@ from sogjax.actor.make import make_actor
 from sogjax.app.build import color_space_and_radius, energy_weights
 from sogjax.app.configs import ActorConfig
 from sogjax.app.outputs import results_folder
+from sogjax.app.progress import progress
 from sogjax.app.recordings import body_named, opened, say
 from sogjax.data.actor_file import save_body
 from sogjax.errors import InputError
