@@ -36,7 +36,6 @@ def test_several_actors_are_a_mapping(path):
     [
         ("pose: rest", ["Ann", "Bob"], ("one actor", "Ann, Bob")),
         ("Ann: {pose: rest}", ["Ann", "Bob"], ("'Bob'",)),
-        ("Ann: {pose: rest}\nCarl: {pose: rest}", ["Ann"], ("'Carl'", "Ann")),
         ("", ["Ann"], ("empty",)),
         ("{}", ["Ann"], ("landmarks",)),
         ("- 1", ["Ann"], ("mapping",)),
@@ -59,3 +58,11 @@ def test_wrong_values_are_named(path, content, actors, words):
         load_initial_poses(path, actors)
     for word in (str(path), *words):
         assert word in str(error.value)
+
+
+def test_poses_of_others_are_left_out(tmp_path):
+    path = tmp_path / "initial_pose.yaml"
+    path.write_text("Ann: {pose: rest, heading: 3}\nCarl: {pose: sit}")
+    poses = load_initial_poses(path, ["Ann"])
+    assert set(poses) == {"Ann"}
+    assert poses["Ann"].heading == 3.0

@@ -25,10 +25,10 @@ class InitialPose:
 
 
 def load_initial_poses(path: Path, actors: Sequence[str]) -> dict[str, InitialPose]:
-    """The initial pose of each of `actors`; with one actor the file may be its pose alone.
+    """The initial pose of each of `actors`; with one actor the file may be its pose alone. Others are left out.
 
     Raises:
-        InputError: no such file, an actor is missing or unknown, or a value is wrong.
+        InputError: no such file, an actor is missing, or a value is wrong.
     """
     poses = read_initial_poses(path)
     if isinstance(poses, InitialPose):

@@ -18,10 +18,13 @@ from sogjax.model.sog import Sog
 
 
 class EnergyWeights(eqx.Module):
-    """The constants of Eq. 6, 8 and 10. What is swept is an array; what changes the formula is static."""
+    """The constants of Eq. 6, 8 and 10, by default those of the paper (the commands' are in their configs).
+
+    What is swept is an array; what changes the formula is static.
+    """
 
     limit_weight: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=1.0)
-    acceleration_weight: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=0.01)
+    acceleration_weight: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=0.05)
     exponent: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=EXACT_EXPONENT)
     capped: bool = eqx.field(static=True, default=True)
     gradient: GradientMode = eqx.field(static=True, default="forward")
