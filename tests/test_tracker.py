@@ -15,7 +15,7 @@ from sogjax.energy.objective import EnergyWeights
 from sogjax.model.body import concatenate, dof_slices
 from sogjax.solve import Solution
 from sogjax.track import tracker as tracker_module
-from sogjax.track.culling import Capacities
+from sogjax.track.culling import CAPACITIES, Capacities
 from sogjax.track.tracker import TrackState, track
 
 DEPTH, FINE_DEPTH = 6, 7
@@ -180,3 +180,14 @@ def test_two_actors_are_tracked_as_one_body():
     for body, part, way in zip(bodies, dof_slices(bodies), ways, strict=True):
         errors = [landmark_error(body, r.result.pose[part], pose) for r, pose in zip(results, way, strict=True)]
         assert max(errors) < 0.03
+
+
+def test_a_tree_with_more_nodes_than_the_largest_capacity_is_tracked():
+    # Few of its nodes are leaves near the body: only those need room.
+    body = in_colors(shipped("dog"))
+    rig = ring_rig(2, (256, 256), distance=1.6)
+    tracker = make_tracker(body, rig, 8)
+    assert tracker.reader.candidates.sigmas.shape[-1] > CAPACITIES[-1]
+    pose = standing(body, 0.4)
+    (result,) = track(tracker, jnp.asarray(pose), filmed(body, rig, [pose], 8))
+    assert 0 < int(result.result.num_near.max()) <= result.capacities.near < CAPACITIES[-1]

@@ -178,7 +178,8 @@ def first_capacities(tracker: Tracker, state: TrackState, cells: UInt8[Array, "c
 def _counts(
     tracker: Tracker, state: TrackState, cells: UInt8[Array, "camera rows columns 3"]
 ) -> tuple[Int[Array, "camera"], Int[Array, "camera"]]:
-    """How many image blobs pass the first test and both tests, with room for all of them."""
-    everything = Capacities(near=capacity_for(tracker.reader.candidates.sigmas.shape[-1]), matching=CAPACITIES[0])
+    """How many image blobs pass the first test and both tests, with as much room as there can be."""
+    num_candidates = tracker.reader.candidates.sigmas.shape[-1]
+    everything = Capacities(near=capacity_for(min(num_candidates, CAPACITIES[-1])), matching=CAPACITIES[0])
     _, near, matching = tracker.views(cells, state, everything)
     return near, matching
