@@ -1,23 +1,23 @@
-"""Overlap of a projected body with an image, both Sums of Gaussians (Eq. 5, 6, 8).
+"""Overlap of a projected body with images, both Sums of Gaussians (Eq. 5, 6, 8), over any layout of their pairs.
 
-Pair matrices have the layout (body blob, image blob). The gradient of `capped_overlap` is computed together with
-its value from the closed form, which costs little more than the value: its exponentials are the expensive part and
-are shared. `gradient="autodiff"` differentiates the plain formula instead.
+The gradient of `capped_overlap` is computed together with its value from the closed form, which costs little more than
+the value: its exponentials are the expensive part and are shared. `gradient="autodiff"` differentiates the plain
+formula instead.
 """
 
 from functools import partial
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from sogjax.energy.pairs import DensePairs, Pairs
 from sogjax.model.color import color_similarity
 from sogjax.model.sog import Sog
 
 GradientMode = Literal["forward", "autodiff"]
-Pairs = Float[Array, "body image"]
 
 EXACT_EXPONENT = 0.5
 """Eq. 6 as Eq. 2 implies it: exp(-|d|^2 / (2 (si^2 + sj^2)))."""
@@ -25,23 +25,33 @@ PRINTED_EXPONENT = 1.0
 """Eq. 6 as printed, without the 1/2."""
 
 
-def pair_color_similarities(image: Sog, body: Sog, space: str, color_radius: Float[Array, ""]) -> Pairs:
+class Pulls(NamedTuple):
+    """Value of Eq. 8 and how it changes with the projected body blobs, image blobs at the cap left out."""
+
+    value: Float[Array, "*camera"]
+    by_mean: Float[Array, "*camera body 2"]
+    by_sigma: Float[Array, "*camera body"]
+    stiffness: Float[Array, "*camera body"]
+    """2 k sum_i E_ij / (si^2 + sj^2): the curvature of the value by a mean where the weights E_ij are held fixed,
+    with its sign turned; the same in both directions of the image."""
+
+
+def pair_color_similarities(
+    image: Sog, body: Sog, space: str, color_radius: Float[Array, ""]
+) -> Float[Array, "body image"]:
     """d(c_i, c_j) of Eq. 7 for every pair; 0 where either blob is padding. Both Sogs' colours are in `space`."""
     similarities = color_similarity(image.colors[None, :, :], body.colors[:, None, :], space, color_radius)
     return jnp.where(image.mask[None, :] & body.mask[:, None], similarities, 0.0)
 
 
-def overlaps(image: Sog, body: Sog, color_similarities: Pairs, exponent: Float[Array, ""]) -> Pairs:
+def overlaps(
+    image: Sog, body: Sog, color_similarities: Float[Array, "body image"], exponent: Float[Array, ""]
+) -> Float[Array, "body image"]:
     """E_ij of Eq. 6 in square pixels; `body` is projected (2-D). Blobs masked out overlap nothing."""
-    variance_sum, squared_distance = _pair_geometry(image, body)
-    body_variance = jnp.where(body.mask, body.sigmas, 0.0) ** 2
-    image_variance = jnp.where(image.mask, image.sigmas, 0.0) ** 2
-    variance_product = body_variance[:, None] * image_variance[None, :]
-    amplitude = color_similarities * (2.0 * jnp.pi) * variance_product / variance_sum
-    return amplitude * jnp.exp(-exponent * squared_distance / variance_sum)
+    return _pair_overlaps(DensePairs.from_image(image, color_similarities), body, exponent).overlaps
 
 
-def self_overlaps(image: Sog) -> Float[Array, "image"]:
+def self_overlaps(image: Sog) -> Float[Array, "*camera image"]:
     """E_ii = pi sigma_i^2: the most that an image blob can contribute (Eq. 8)."""
     return jnp.pi * image.sigmas**2
 
@@ -49,92 +59,115 @@ def self_overlaps(image: Sog) -> Float[Array, "image"]:
 def capped_overlap(
     image: Sog,
     body: Sog,
-    color_similarities: Pairs,
+    color_similarities: Float[Array, "body image"],
     exponent: Float[Array, ""],
     *,
     capped: bool = True,
     gradient: GradientMode = "forward",
 ) -> Float[Array, ""]:
-    """Similarity of a projected body with one image (Eq. 8), in square pixels.
+    """Similarity of a projected body with one image (Eq. 8) over all pairs, in square pixels.
 
     The cap is a kink: the gradient is defined as 0 where the sum reaches it. `capped=False` gives Eq. 5, which
     counts body blobs that hide each other several times.
     """
+    pairs = DensePairs.from_image(image, color_similarities)
+    return overlap_of_pairs(pairs, self_overlaps(image), body, exponent, capped=capped, gradient=gradient)
+
+
+def overlap_of_pairs(
+    pairs: Pairs,
+    caps: Float[Array, "*camera image"],
+    body: Sog,
+    exponent: Float[Array, ""],
+    *,
+    capped: bool = True,
+    gradient: GradientMode = "forward",
+) -> Float[Array, "*camera"]:
+    """Eq. 8 over a layout of pairs; `caps` are the self overlaps of the image blobs."""
     if gradient == "autodiff":
-        return _capped_overlap(capped, image, body, color_similarities, exponent)
-    return _capped_overlap_forward(capped, image, body, color_similarities, exponent)
+        return _plain_overlap(capped, pairs, caps, body, exponent)
+    return _forward_overlap(capped, pairs, caps, body, exponent)
 
 
-def _capped_overlap(
-    capped: bool, image: Sog, body: Sog, color_similarities: Pairs, exponent: Float[Array, ""]
-) -> Float[Array, ""]:
-    total = jnp.sum(overlaps(image, body, color_similarities, exponent), axis=0)
-    return jnp.sum(_apply_cap(total, image, capped))
+def overlap_pulls(
+    pairs: Pairs, caps: Float[Array, "*camera image"], body: Sog, exponent: Float[Array, ""], *, capped: bool = True
+) -> Pulls:
+    """Eq. 8 with its derivatives by the projected body blobs, and its curvature for Gauss-Newton steps."""
+    pair = _pair_overlaps(pairs, body, exponent)
+    total = pairs.sum_over_body(pair.overlaps)
+    live = (total < caps) if capped else jnp.ones_like(total, dtype=bool)
+    weights = pairs.live_pairs(live, pair.overlaps / pair.variance_sum)
+    moments = pairs.moments(weights, body.means)
+    spread = pairs.sum_over_image(weights * (pair.squared_distance / pair.variance_sum))
+    return Pulls(
+        value=jnp.sum(_apply_cap(total, caps, capped), axis=-1),
+        by_mean=2.0 * exponent * moments.away,
+        by_sigma=2.0 * (moments.variance / _safe_sigmas(body) + exponent * spread * body.sigmas),
+        stiffness=2.0 * exponent * moments.weight,
+    )
 
 
-def _apply_cap(total: Float[Array, "image"], image: Sog, capped: bool) -> Float[Array, "image"]:
-    if not capped:
-        return total
-    caps = self_overlaps(image)
-    return jnp.where(total < caps, total, caps)
+class _PairOverlaps(NamedTuple):
+    """E_ij of Eq. 6 and what it is made of."""
+
+    overlaps: Array
+    dx: Array
+    dy: Array
+    squared_distance: Array
+    variance_sum: Array
+
+
+def _pair_overlaps(pairs: Pairs, body: Sog, exponent: Float[Array, ""]) -> _PairOverlaps:
+    """Eq. 6, the one place where it stands."""
+    variances = _safe_sigmas(body) ** 2
+    dx = pairs.x - pairs.of_body(body.means[..., 0])
+    dy = pairs.y - pairs.of_body(body.means[..., 1])
+    squared_distance = dx * dx + dy * dy
+    variance_sum = pairs.variances + pairs.of_body(variances)
+    amplitudes = pairs.amplitudes * pairs.of_body(jnp.where(body.mask, variances, 0.0)) / variance_sum
+    overlaps = amplitudes * jnp.exp(-exponent * squared_distance / variance_sum)
+    return _PairOverlaps(overlaps, dx, dy, squared_distance, variance_sum)
+
+
+def _plain_overlap(
+    capped: bool, pairs: Pairs, caps: Float[Array, "*camera image"], body: Sog, exponent: Float[Array, ""]
+) -> Float[Array, "*camera"]:
+    total = pairs.sum_over_body(_pair_overlaps(pairs, body, exponent).overlaps)
+    return jnp.sum(_apply_cap(total, caps, capped), axis=-1)
+
+
+def _apply_cap(
+    total: Float[Array, "*camera image"], caps: Float[Array, "*camera image"], capped: bool
+) -> Float[Array, "*camera image"]:
+    return jnp.where(total < caps, total, caps) if capped else total
 
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
-def _capped_overlap_forward(
-    capped: bool, image: Sog, body: Sog, color_similarities: Pairs, exponent: Float[Array, ""]
-) -> Float[Array, ""]:
-    return _capped_overlap(capped, image, body, color_similarities, exponent)
+def _forward_overlap(
+    capped: bool, pairs: Pairs, caps: Float[Array, "*camera image"], body: Sog, exponent: Float[Array, ""]
+) -> Float[Array, "*camera"]:
+    return _plain_overlap(capped, pairs, caps, body, exponent)
 
 
-def _value_and_residuals(capped, image, body, color_similarities, exponent):
-    pairs = overlaps(image, body, color_similarities, exponent)
-    total = jnp.sum(pairs, axis=0)
-    value = jnp.sum(_apply_cap(total, image, capped))
-    live = (total < self_overlaps(image)) if capped else jnp.ones_like(total, dtype=bool)
-    gradients = _body_gradients(image, body, jnp.where(live[None, :], pairs, 0.0), exponent)
-    return value, (gradients, image, body, color_similarities, exponent)
-
-
-def _body_gradients(
-    image: Sog, body: Sog, live_pairs: Pairs, exponent: Float[Array, ""]
-) -> tuple[Float[Array, "body 2"], Float[Array, "body"]]:
-    """Derivatives by the means and sigmas of the projected body blobs, from the pairs below the cap."""
-    variance_sum, squared_distance = _pair_geometry(image, body)
-    weights = live_pairs / variance_sum
-    # Sums over the image axis as one matrix product: sum_i w (mu_i - mu_j), sum_i w, sum_i w sigma_i^2.
-    origin = body.means[0]
-    centred = image.means - origin[None, :]
-    columns = jnp.concatenate([centred, jnp.ones_like(centred[:, :1]), (image.sigmas**2)[:, None]], axis=1)
-    sums = jnp.matmul(weights, columns, precision="highest")
-    pull = sums[:, :2] - (body.means - origin[None, :]) * sums[:, 2:3]
-    spread = jnp.sum(weights * squared_distance / variance_sum, axis=1)
-    by_mean = 2.0 * exponent * pull
-    by_sigma = 2.0 * (sums[:, 3] / _safe_sigmas(body) + exponent * spread * body.sigmas)
-    return by_mean, by_sigma
+def _value_and_residuals(capped, pairs, caps, body, exponent):
+    pulls = overlap_pulls(pairs, caps, body, exponent, capped=capped)
+    return pulls.value, (pulls.by_mean, pulls.by_sigma, pairs, caps, body, exponent)
 
 
 def _pull_back(capped, residuals, cotangent):
-    (by_mean, by_sigma), image, body, color_similarities, exponent = residuals
+    by_mean, by_sigma, pairs, caps, body, exponent = residuals
     # What nobody asks for (the gradient by the image, the colours) is dropped when the caller is compiled.
-    plain = partial(_capped_overlap, capped)
-    _, pull_back = jax.vjp(plain, image, body, color_similarities, exponent)
-    by_image, by_body, by_similarity, by_exponent = pull_back(cotangent)
+    _, pull_back = jax.vjp(partial(_plain_overlap, capped), pairs, caps, body, exponent)
+    by_pairs, by_caps, by_body, by_exponent = pull_back(cotangent)
     # Not `Sog(...)`: the cotangent of a mask is no array of truth values.
-    by_body = eqx.tree_at(lambda sog: (sog.means, sog.sigmas), by_body, (cotangent * by_mean, cotangent * by_sigma))
-    return by_image, by_body, by_similarity, by_exponent
+    by_means, by_sigmas = cotangent[..., None, None] * by_mean, cotangent[..., None] * by_sigma
+    by_body = eqx.tree_at(lambda sog: (sog.means, sog.sigmas), by_body, (by_means, by_sigmas))
+    return by_pairs, by_caps, by_body, by_exponent
 
 
-_capped_overlap_forward.defvjp(_value_and_residuals, _pull_back)
+_forward_overlap.defvjp(_value_and_residuals, _pull_back)
 
 
-def _pair_geometry(image: Sog, body: Sog) -> tuple[Pairs, Pairs]:
-    """Sums of the variances and squared distances of the centres, for every pair."""
-    variance_sum = (_safe_sigmas(body) ** 2)[:, None] + (_safe_sigmas(image) ** 2)[None, :]
-    dx = image.means[None, :, 0] - body.means[:, None, 0]
-    dy = image.means[None, :, 1] - body.means[:, None, 1]
-    return variance_sum, dx * dx + dy * dy
-
-
-def _safe_sigmas(sog: Sog) -> Float[Array, "blob"]:
+def _safe_sigmas(sog: Sog) -> Float[Array, "*camera blob"]:
     """The sigmas, and 1 in the padding, where a 0 would divide by 0."""
     return jnp.where(sog.mask, sog.sigmas, 1.0)

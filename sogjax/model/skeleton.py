@@ -3,9 +3,9 @@
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Bool, Float
 
-from sogjax.model.rotation import rigid_transform, rotation_about_axis
+from sogjax.model.kinematics import forward_kinematics, point_jacobian
 
 
 class Skeleton(eqx.Module):
@@ -61,29 +61,12 @@ class Skeleton(eqx.Module):
         return lower, upper
 
     def world_from_joint(self, pose: Float[Array, "dof"]) -> Float[Array, "joint 4 4"]:
-        """Forward kinematics: the frame of every joint in the world.
+        """Forward kinematics: the frame of every joint in the world."""
+        return forward_kinematics(self.parents, self.revolute, self.offsets, self.axes, self.joint_params(pose))
 
-        Transforms are composed by pointer doubling: round k joins each joint's chain of 2^k ancestors with the
-        next 2^k, so 61 joints in a chain of any shape take six batched products, however deep the tree is.
-        """
-        local = self._parent_from_joint(self.joint_params(pose))
-        transforms = jnp.concatenate([local, jnp.eye(4, dtype=local.dtype)[None]])
-        for ancestors in _doubled_ancestors(self.parents):
-            transforms = jnp.matmul(transforms[ancestors], transforms, precision="highest")
-        return transforms[:-1]
-
-    def _parent_from_joint(self, joint_params: Float[Array, "joint"]) -> Float[Array, "joint 4 4"]:
-        angles = jnp.where(self.revolute, joint_params, 0.0)
-        slides = jnp.where(self.revolute, 0.0, joint_params)
-        return rigid_transform(rotation_about_axis(self.axes, angles), self.offsets + slides[:, None] * self.axes)
-
-
-def _doubled_ancestors(parents: tuple[int, ...]) -> list[Int[np.ndarray, "joint_and_world"]]:
-    """For each round of pointer doubling the ancestor of every joint; the last slot is the world."""
-    world = len(parents)
-    ancestors = np.array([world if parent < 0 else parent for parent in parents] + [world])
-    rounds = []
-    while (ancestors != world).any():
-        rounds.append(ancestors)
-        ancestors = ancestors[ancestors]
-    return rounds
+    def point_jacobian(
+        self, world_from_joint: Float[Array, "joint 4 4"], joints: tuple[int, ...], points_world: Float[Array, "point 3"]
+    ) -> Float[Array, "point 3 dof"]:
+        """Derivatives by the pose of points fixed to `joints`, which lie at `points_world` (metres)."""
+        by_joint_param = point_jacobian(self.parents, self.revolute, self.axes, world_from_joint, joints, points_world)
+        return jnp.matmul(by_joint_param, self.parameter_transform, precision="highest")
