@@ -18,10 +18,10 @@ from sogjax.images.quadtree import Candidates, quadtree
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.color import COLOR_RADIUS, averaging_space, from_rgb
-from sogjax.solve import ConditionedAscent, OptimistixSolver, Scales, Solver
+from sogjax.solve import ConditionedAscent, GaussNewton, OptimistixSolver, Scales, Solver
 from sogjax.track.culling import ImageReader
 from sogjax.track.scales import pose_scales
-from sogjax.track.tracker import Tracker
+from sogjax.track.tracker import PairChoice, Tracker
 
 MAX_DEPTH = 12
 """Of a quad-tree: one pixel of the largest pictures that a camera takes."""
@@ -69,6 +69,7 @@ def check(config: TrackConfig) -> None:
     """
     color_space_and_radius(config.color)
     energy_weights(config.energy)
+    pair_choice(config.energy)
     solver(config.solver)
     for key in ("first_angle", "first_translation", "largest_angle", "largest_translation"):
         at_least(f"solver.{key}", getattr(config.solver, key), 1e-6)
@@ -101,15 +102,24 @@ def energy_weights(config: EnergyConfig) -> EnergyWeights:
     )
 
 
+def pair_choice(config: EnergyConfig) -> PairChoice:
+    """Which pairs of blobs are compared."""
+    return "sparse" if one_of("energy.pairs", config.pairs, ("dense", "sparse")) == "sparse" else "dense"
+
+
 def solver(config: SolverConfig) -> Solver:
     """The solver that a config names."""
-    methods = ("conditioned_ascent", "gradient_ascent", *OPTIMISTIX_METHODS)
+    methods = ("conditioned_ascent", "gradient_ascent", "gauss_newton", *OPTIMISTIX_METHODS)
     method = one_of("solver.method", config.method, methods)
     at_least("solver.epsilon", config.epsilon, 0.0)
     at_least("solver.max_iterations", config.max_iterations, 1)
     between("solver.min_iterations", config.min_iterations, 0, config.max_iterations)
     if method in OPTIMISTIX_METHODS:
         return OptimistixSolver(method, epsilon=config.epsilon, max_iterations=config.max_iterations)
+    if method == "gauss_newton":
+        return GaussNewton(
+            epsilon=config.epsilon, min_iterations=config.min_iterations, max_iterations=config.max_iterations
+        )
     conditioned = method == "conditioned_ascent"
     return ConditionedAscent(
         epsilon=config.epsilon,
@@ -165,6 +175,7 @@ def tracker(recording: Recording, body: Body, grids: tuple[CellGrid, ...], confi
         solver=solver(config.solver),
         scales=solver_scales(config.solver, body),
         extrapolation=config.tracking.extrapolation,
+        pairs=pair_choice(config.energy),
     )
 
 

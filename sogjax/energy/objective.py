@@ -3,14 +3,18 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 
+from sogjax.energy.neighbours import margins, near_pairs
 from sogjax.energy.overlap import (
     EXACT_EXPONENT,
     GradientMode,
     capped_overlap,
+    overlap_of_pairs,
     pair_color_similarities,
+    self_overlaps,
 )
+from sogjax.energy.pairs import SparsePairs
 from sogjax.energy.priors import acceleration_penalty, limit_penalty
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, project
@@ -39,6 +43,8 @@ class Views(eqx.Module):
     """d(c_i, c_j) of Eq. 7: it does not depend on the pose, so it is computed once a frame."""
     normalizers: Float[Array, "camera"]
     """E(K_l, K_l) of Eq. 9 over the whole image, before culling, in square pixels."""
+    pairs: SparsePairs | None = None
+    """The pairs that matter near some pose; None: all pairs are compared."""
 
     @classmethod
     def from_images(
@@ -53,6 +59,15 @@ class Views(eqx.Module):
         """Compare the colours of a body's blobs with every image; all colours are in `space`."""
         compare = lambda image: pair_color_similarities(image, body, space, color_radius)
         return cls(cameras, images, jax.vmap(compare)(images), normalizers)
+
+    def near(self, blobs: Sog, weights: "EnergyWeights", capacity: int) -> tuple["Views", Int[Array, ""]]:
+        """The same views with only the pairs that matter near `blobs` (world), and how many blocks those are."""
+        seen = jax.vmap(project, in_axes=(0, None))(self.cameras, blobs)
+        pairs, count = near_pairs(
+            self.images, self.color_similarities, seen, margins(self.cameras), weights.exponent, capacity
+        )
+        views = Views(self.cameras, self.images, self.color_similarities, self.normalizers, pairs)
+        return views, count
 
 
 class History(eqx.Module):
@@ -99,27 +114,59 @@ def view_similarity(
 
 def similarity(blobs: Sog, views: Views, weights: EnergyWeights) -> Float[Array, ""]:
     """E(Theta) of Eq. 9: the mean over the cameras of the normalised similarity."""
+    if views.pairs is not None:
+        return _sparse_similarity(blobs, views, views.pairs, weights)
     per_camera = jax.vmap(view_similarity, in_axes=(0, 0, 0, 0, None, None))
     return jnp.mean(
         per_camera(views.cameras, views.images, views.color_similarities, views.normalizers, blobs, weights)
     )
 
 
+def _sparse_similarity(blobs: Sog, views: Views, pairs: SparsePairs, weights: EnergyWeights) -> Float[Array, ""]:
+    """The same from the pairs that matter, of all cameras at once."""
+    seen = jax.vmap(project, in_axes=(0, None))(views.cameras, blobs)
+    per_camera = overlap_of_pairs(
+        pairs,
+        image_caps(views, pairs),
+        seen,
+        weights.exponent,
+        capped=weights.capped,
+        gradient=weights.gradient,
+    )
+    return jnp.mean(per_camera / views.normalizers)
+
+
+def image_caps(views: Views, pairs: SparsePairs) -> Float[Array, "camera image"]:
+    """Caps of Eq. 8 of the image blobs that pairs count, which fill whole blocks."""
+    extra = pairs.image_shape[1] - views.images.capacity
+    return jnp.pad(self_overlaps(views.images), ((0, 0), (0, extra)))
+
+
+def penalties(body: Body, pose: Float[Array, "dof"], history: History) -> tuple[Float[Array, ""], Float[Array, ""]]:
+    """E_lim and E_acc of Eq. 10, unweighted."""
+    lower, upper = body.skeleton.joint_limits()
+    limits = limit_penalty(body.skeleton.joint_params(pose), lower, upper)
+    acceleration = acceleration_penalty(pose, history.previous, history.before_previous)
+    return limits, jnp.where(history.known, acceleration, 0.0)
+
+
 def energy_terms(
     body: Body, pose: Float[Array, "dof"], views: Views, history: History, weights: EnergyWeights
 ) -> EnergyTerms:
     """Every term of Eq. 10 at a pose."""
-    lower, upper = body.skeleton.joint_limits()
-    limits = limit_penalty(body.skeleton.joint_params(pose), lower, upper)
-    acceleration = acceleration_penalty(pose, history.previous, history.before_previous)
-    acceleration = jnp.where(history.known, acceleration, 0.0)
+    limits, acceleration = penalties(body, pose, history)
     match = similarity(body.posed_blobs(pose), views, weights)
-    return EnergyTerms(
-        similarity=match,
-        limit_penalty=limits,
-        acceleration_penalty=acceleration,
-        energy=match - weights.limit_weight * limits - weights.acceleration_weight * acceleration,
-    )
+    penalty = weights.limit_weight * limits + weights.acceleration_weight * acceleration
+    return EnergyTerms(match, limits, acceleration, match - penalty)
+
+
+def terms_of_energy(
+    body: Body, pose: Float[Array, "dof"], energy: Float[Array, ""], history: History, weights: EnergyWeights
+) -> EnergyTerms:
+    """The terms of Eq. 10 at a pose whose energy is known: without looking at the pictures again."""
+    limits, acceleration = penalties(body, pose, history)
+    penalty = weights.limit_weight * limits + weights.acceleration_weight * acceleration
+    return EnergyTerms(energy + penalty, limits, acceleration, energy)
 
 
 def energy(

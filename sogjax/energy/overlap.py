@@ -32,8 +32,8 @@ class Pulls(NamedTuple):
     by_mean: Float[Array, "*camera body 2"]
     by_sigma: Float[Array, "*camera body"]
     stiffness: Float[Array, "*camera body"]
-    """2 k sum_i E_ij / (si^2 + sj^2): the curvature of the value by a mean where the weights E_ij are held fixed,
-    with its sign turned; the same in both directions of the image."""
+    """2 k sum_i E_ij / (si^2 + sj^2): the curvature of the value by a mean with its sign turned, where the weights
+    E_ij are held fixed; the same in both directions of the image."""
 
 
 def pair_color_similarities(

@@ -45,6 +45,17 @@ def project_points(camera: Camera, points_world: Float[Array, "n 3"]) -> tuple[F
     return pixels, depth
 
 
+def projection_jacobian(camera: Camera, points_world: Float[Array, "n 3"]) -> Float[Array, "n 2 3"]:
+    """Derivatives of the pixels of points by the points (pixels a metre); 0 for points nearer than `NEAR`."""
+    rotation = camera.camera_from_world[:3, :3]
+    points_camera = jnp.matmul(points_world, rotation.T, precision="highest") + camera.camera_from_world[None, :3, 3]
+    depth = points_camera[:, 2]
+    inverse = jnp.where(depth > NEAR, 1.0 / jnp.where(depth > NEAR, depth, 1.0), 0.0)
+    rays = points_camera[:, :2] * inverse[:, None]
+    by_ray = (rotation[None, :2, :] - rays[:, :, None] * rotation[None, 2:, :]) * inverse[:, None, None]
+    return jnp.einsum("ij,njk->nik", camera.intrinsics[:2, :2], by_ray, precision="highest")
+
+
 def project(camera: Camera, blobs: Sog) -> Sog:
     """Project a 3-D Sog into the image of one camera (Eq. 4): undistorted pixels.
 

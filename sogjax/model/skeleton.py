@@ -2,7 +2,6 @@
 
 import equinox as eqx
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from sogjax.model.kinematics import forward_kinematics, point_jacobian
@@ -65,7 +64,10 @@ class Skeleton(eqx.Module):
         return forward_kinematics(self.parents, self.revolute, self.offsets, self.axes, self.joint_params(pose))
 
     def point_jacobian(
-        self, world_from_joint: Float[Array, "joint 4 4"], joints: tuple[int, ...], points_world: Float[Array, "point 3"]
+        self,
+        world_from_joint: Float[Array, "joint 4 4"],
+        joints: tuple[int, ...],
+        points_world: Float[Array, "point 3"],
     ) -> Float[Array, "point 3 dof"]:
         """Derivatives by the pose of points fixed to `joints`, which lie at `points_world` (metres)."""
         by_joint_param = point_jacobian(self.parents, self.revolute, self.axes, world_from_joint, joints, points_world)

@@ -1,7 +1,17 @@
 """Solvers that maximise a smooth function; they know nothing of bodies and images."""
 
 from sogjax.solve.ascent import ConditionedAscent, gradient_ascent
+from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.solve.optimistix import OptimistixSolver
-from sogjax.solve.solution import Scales, Solution, Solver
+from sogjax.solve.solution import CurvedObjective, Scales, Solution, Solver
 
-__all__ = ["ConditionedAscent", "OptimistixSolver", "Scales", "Solution", "Solver", "gradient_ascent"]
+__all__ = [
+    "ConditionedAscent",
+    "CurvedObjective",
+    "GaussNewton",
+    "OptimistixSolver",
+    "Scales",
+    "Solution",
+    "Solver",
+    "gradient_ascent",
+]

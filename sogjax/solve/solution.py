@@ -1,7 +1,7 @@
 """What every solver takes and returns."""
 
 from collections.abc import Callable
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -9,6 +9,22 @@ from jaxtyping import Array, Bool, Float, Int
 
 Params = Float[Array, "param"]
 Objective = Callable[[Params], Float[Array, ""]]
+
+
+@runtime_checkable
+class CurvedObjective(Protocol):
+    """An objective that also gives a quadratic model of itself, for solvers that use curvature."""
+
+    def __call__(self, params: Params) -> Float[Array, ""]:
+        """The objective."""
+        ...
+
+    def quadratic(self, params: Params) -> Any:
+        """The model near `params`: value + gradient . d - d . curvature d / 2, with these three attributes.
+
+        The curvature is positive semi-definite.
+        """
+        ...
 
 
 class Scales(eqx.Module):

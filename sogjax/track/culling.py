@@ -1,5 +1,7 @@
 """Which image blobs can matter to a body: those near it and of its colours (Section 6)."""
 
+import math
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -21,15 +23,23 @@ BLOB_RADIUS = 3.0
 """Sigmas around a blob's centre that belong to the box of a body."""
 
 
+BLOCK_STEP = 1024
+"""Room for blocks of pairs comes in multiples of this."""
+
+
 class Capacities(eqx.Module):
-    """Slots for the image blobs of one camera that pass the first test (leaf, in the box) and both tests."""
+    """Slots for the image blobs of one camera that pass the first test (leaf, in the box) and both tests.
+
+    `blocks` are those of near pairs, for all cameras together, where not all pairs are compared.
+    """
 
     near: int = eqx.field(static=True)
     matching: int = eqx.field(static=True)
+    blocks: int = eqx.field(static=True, default=0)
 
-    def hold(self, near: int, matching: int) -> bool:
-        """Whether there is room for so many image blobs."""
-        return near <= self.near and matching <= self.matching
+    def hold(self, near: int, matching: int, blocks: int = 0) -> bool:
+        """Whether there is room for so many image blobs and blocks of pairs."""
+        return near <= self.near and matching <= self.matching and blocks <= self.blocks
 
 
 def capacity_for(count: int, headroom: float = 1.0) -> int:
@@ -43,6 +53,11 @@ def capacity_for(count: int, headroom: float = 1.0) -> int:
             f"{count} image blobs in one picture: the largest capacity is {CAPACITIES[-1]}; lower images.depth"
         )
     return next((capacity for capacity in CAPACITIES if capacity >= headroom * count), CAPACITIES[-1])
+
+
+def block_capacity(count: int, headroom: float = 1.0) -> int:
+    """Room for `headroom` times `count` blocks of pairs, at least for one step of them."""
+    return BLOCK_STEP * max(math.ceil(headroom * count / BLOCK_STEP), 1)
 
 
 class ImageReader(eqx.Module):
@@ -98,6 +113,15 @@ class ImageReader(eqx.Module):
             return kept, jnp.where(kept.mask[None, :], similarities[:, chosen], 0.0), count
 
         return jax.vmap(one_camera)(near)
+
+    def compared_blobs(
+        self, near: Sog, body: Sog
+    ) -> tuple[Sog, Float[Array, "camera body image"], Int[Array, "camera"]]:
+        """The near blobs in their places, those masked out that resemble no blob of the body; the same otherwise."""
+        compare = lambda image: pair_color_similarities(image, body, self.color_space, self.color_radius)
+        similarities = jax.vmap(compare)(near)
+        mask = near.mask & jnp.any(similarities > 0.0, axis=1)
+        return eqx.tree_at(lambda sog: sog.mask, near, mask), similarities, jnp.sum(mask, axis=1)
 
 
 def actor_of_blobs(skeleton: Skeleton, blob_joints: tuple[int, ...]) -> Int[np.ndarray, "blob"]:

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import Literal
 
 import equinox as eqx
 import jax
@@ -10,24 +11,31 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int, UInt8
 
-from sogjax.energy.objective import EnergyTerms, EnergyWeights, History, Views, energy, energy_terms
+from sogjax.energy.curvature import FrameEnergy
+from sogjax.energy.objective import EnergyTerms, EnergyWeights, History, Views, terms_of_energy
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.color import from_rgb
 from sogjax.model.sog import Sog
-from sogjax.solve import Scales, Solver
+from sogjax.solve import Scales, Solution, Solver
 from sogjax.track.culling import (
     CAPACITIES,
     Capacities,
     ImageReader,
     actor_of_blobs,
+    block_capacity,
     body_boxes,
     capacity_for,
     union_boxes,
 )
+from sogjax.track.rounds import solve_near
 
 HEADROOM = 1.4
 """Slots for image blobs, as a multiple of what the first frame needs."""
+BLOCK_HEADROOM = 1.25
+"""The same for blocks of pairs, whose number for all cameras together changes less."""
+
+PairChoice = Literal["dense", "sparse"]
 
 
 class TrackState(eqx.Module):
@@ -57,6 +65,8 @@ class FrameResult(eqx.Module):
     converged: Bool[Array, ""]
     num_near: Int[Array, "camera"]
     num_matching: Int[Array, "camera"]
+    num_blocks: Int[Array, ""]
+    """Blocks of near pairs; 0 where all pairs were compared."""
     images: Sog
     """The image blobs that were used, for each camera (working colour space)."""
 
@@ -73,6 +83,8 @@ class Tracker(eqx.Module):
     scales: Scales
     extrapolation: Float[Array, ""] = eqx.field(converter=jnp.asarray)
     """alpha of Section 5.3."""
+    pairs: PairChoice = eqx.field(static=True, default="dense")
+    """Whether all pairs of blobs are compared, or those near each other."""
 
     def predicted(self, state: TrackState) -> Float[Array, "dof"]:
         """Theta_0 of Section 5.3: linear extrapolation of the last two poses."""
@@ -94,7 +106,10 @@ class Tracker(eqx.Module):
         near, num_near = self.reader.near_blobs(rgb, self.boxes(state), capacities.near)
         body_colors = from_rgb(self.body.blob_colors, self.reader.color_space)
         body = eqx.tree_at(lambda sog: sog.colors, self.body.posed_blobs(state.previous), body_colors)
-        images, similarities, num_matching = self.reader.matching_blobs(near, body, capacities.matching)
+        if self.pairs == "sparse":
+            images, similarities, num_matching = self.reader.compared_blobs(near, body)
+        else:
+            images, similarities, num_matching = self.reader.matching_blobs(near, body, capacities.matching)
         return Views(self.cameras, images, similarities, self.normalizers), num_near, num_matching
 
     def step(
@@ -103,18 +118,26 @@ class Tracker(eqx.Module):
         """Find the pose of one frame from its cells (sRGB bytes)."""
         views, num_near, num_matching = self.views(cells, state, capacities)
         history = History(state.previous, state.before_previous, state.num_known == 2)
-        objective = lambda pose: energy(self.body, pose, views, history, self.weights)
-        solution = self.solver.maximize(objective, self.predicted(state), self.scales)
+        objective = FrameEnergy(self.body, views, history, self.weights)
+        solution, num_blocks = self._solved(objective, self.predicted(state), capacities)
         result = FrameResult(
             pose=solution.params,
-            terms=energy_terms(self.body, solution.params, views, history, self.weights),
+            terms=terms_of_energy(self.body, solution.params, solution.value, history, self.weights),
             iterations=solution.iterations,
             converged=solution.converged,
             num_near=num_near,
             num_matching=num_matching,
+            num_blocks=num_blocks,
             images=views.images,
         )
         return state.advanced(solution.params), result
+
+    def _solved(
+        self, objective: FrameEnergy, start: Float[Array, "dof"], capacities: Capacities
+    ) -> tuple[Solution, Int[Array, ""]]:
+        if self.pairs == "sparse":
+            return solve_near(self.solver, objective, start, self.scales, capacities.blocks)
+        return self.solver.maximize(objective, start, self.scales), jnp.asarray(0)
 
 
 _step = eqx.filter_jit(Tracker.step)
@@ -154,12 +177,14 @@ def track(
             capacities = first_capacities(tracker, state, device_cells)
         while True:
             next_state, result = _step(tracker, state, device_cells, capacities)
-            near, matching = int(result.num_near.max()), int(result.num_matching.max())
-            if capacities.hold(near, matching):
+            needed = jax.device_get((result.num_near, result.num_matching, result.num_blocks))
+            near, matching, blocks = (int(count.max()) for count in needed)
+            if capacities.hold(near, matching, blocks):
                 break
             capacities = Capacities(
                 max(capacities.near, capacity_for(near, HEADROOM)),
                 max(capacities.matching, capacity_for(matching, HEADROOM)),
+                max(capacities.blocks, block_capacity(blocks, BLOCK_HEADROOM)) if blocks else 0,
             )
         state = next_state
         seconds = time.perf_counter() - begin
@@ -169,9 +194,23 @@ def track(
 def first_capacities(tracker: Tracker, state: TrackState, cells: UInt8[Array, "camera rows columns 3"]) -> Capacities:
     """Capacities with headroom for what the first frame needs."""
     near, matching = _counts(tracker, state, cells)
-    return Capacities(
+    capacities = Capacities(
         near=capacity_for(int(near.max()), HEADROOM), matching=capacity_for(int(matching.max()), HEADROOM)
     )
+    if tracker.pairs == "dense":
+        return capacities
+    blocks = int(_num_blocks(tracker, state, cells, capacities))
+    return Capacities(capacities.near, capacities.near, block_capacity(blocks, BLOCK_HEADROOM))
+
+
+@eqx.filter_jit
+def _num_blocks(
+    tracker: Tracker, state: TrackState, cells: UInt8[Array, "camera rows columns 3"], capacities: Capacities
+) -> Int[Array, ""]:
+    """How many blocks of near pairs there are where the solver starts."""
+    views, _, _ = tracker.views(cells, state, capacities)
+    blobs = tracker.body.posed_blobs(tracker.predicted(state))
+    return views.near(blobs, tracker.weights, capacity=1)[1]
 
 
 @eqx.filter_jit

@@ -1,0 +1,120 @@
+"""Damped Gauss-Newton (Levenberg-Marquardt) ascent in one `lax.while_loop`."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int
+
+from sogjax.solve.solution import CurvedObjective, Objective, Params, Scales, Solution
+
+SMALLEST_CURVATURE = 1e-6
+"""Of the largest one, for parameters that nothing holds; both measured in the parameters' largest steps."""
+
+
+class QuadraticModel(eqx.Module):
+    """value + gradient . d - d . curvature d / 2, a model of the objective near some parameters."""
+
+    value: Float[Array, ""]
+    gradient: Params
+    curvature: Float[Array, "param param"]
+    """Positive semi-definite."""
+
+    @classmethod
+    def of(cls, objective: CurvedObjective, params: Params) -> "QuadraticModel":
+        """The model that an objective gives of itself."""
+        model = objective.quadratic(params)
+        return cls(model.value, model.gradient, model.curvature)
+
+    def finite(self) -> Bool[Array, ""]:
+        """Whether every number is finite."""
+        return jnp.isfinite(self.value) & jnp.all(jnp.isfinite(self.gradient)) & jnp.all(jnp.isfinite(self.curvature))
+
+    def step(self, damping: Float[Array, ""], bounds: Params) -> Params:
+        """The step to the maximum of the damped model, shortened as a whole where a part of it exceeds its bound."""
+        # In units of the bounds, so that angles and translations are alike.
+        curvature = self.curvature * bounds[:, None] * bounds[None, :]
+        diagonal = jnp.diag(curvature)
+        floor = jnp.maximum(SMALLEST_CURVATURE * jnp.max(diagonal), jnp.finfo(diagonal.dtype).tiny)
+        damped = curvature + jnp.diag(damping * diagonal + floor)
+        factor = jax.scipy.linalg.cho_factor(damped)
+        step = jax.scipy.linalg.cho_solve(factor, self.gradient * bounds)
+        return bounds * step / jnp.maximum(jnp.max(jnp.abs(step)), 1.0)
+
+    def expected_gain(self, step: Params) -> Float[Array, ""]:
+        """How far the model rises along a step."""
+        bend = jnp.matmul(self.curvature, step, precision="highest")
+        return jnp.sum(step * (self.gradient - 0.5 * bend))
+
+
+class GaussNewtonState(eqx.Module):
+    """State before an iteration: the best parameters so far, the model there, and the damping to try next."""
+
+    params: Params
+    model: QuadraticModel
+    damping: Float[Array, ""]
+    iteration: Int[Array, ""]
+    converged: Bool[Array, ""]
+    finite: Bool[Array, ""]
+
+
+class GaussNewton(eqx.Module):
+    """Steps to the maximum of the objective's own quadratic model, accepted only where the objective rises.
+
+    The damping (a part of the curvature of each parameter) is divided by `relax` after a step that gained what it was
+    expected to, and multiplied by `stiffen` after one that gained much less or was not taken. At least
+    `min_iterations` are made; then the ascent stops when a step is shorter than `epsilon`, taken or not.
+    """
+
+    epsilon: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=0.002)
+    first_damping: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=0.1)
+    smallest_damping: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=0.1)
+    relax: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=4.0)
+    stiffen: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=4.0)
+    min_iterations: Int[Array, ""] = eqx.field(converter=jnp.asarray, default=1)
+    max_iterations: Int[Array, ""] = eqx.field(converter=jnp.asarray, default=50)
+
+    def maximize(self, objective: Objective, start: Params, scales: Scales) -> Solution:
+        """Climb from `start`.
+
+        Raises:
+            TypeError: the objective gives no quadratic model of itself.
+        """
+        if not isinstance(objective, CurvedObjective):
+            raise TypeError("Gauss-Newton needs an objective with a method `quadratic` (CurvedObjective)")
+        model = QuadraticModel.of(objective, start)
+        state = GaussNewtonState(
+            params=start,
+            model=model,
+            damping=jnp.asarray(self.first_damping, start.dtype),
+            iteration=jnp.asarray(0),
+            converged=jnp.asarray(False),
+            finite=model.finite(),
+        )
+
+        def unfinished(state: GaussNewtonState) -> Bool[Array, ""]:
+            return ~state.converged & state.finite & (state.iteration < self.max_iterations)
+
+        def climb(state: GaussNewtonState) -> GaussNewtonState:
+            step = state.model.step(state.damping, scales.step_bounds)
+            tried = QuadraticModel.of(objective, state.params + step)
+            better = (tried.value > state.model.value) & tried.finite()
+            keep = lambda new, old: jnp.where(better, new, old)
+            small = jnp.linalg.norm(step) < self.epsilon
+            gain = (tried.value - state.model.value) / state.model.expected_gain(step)
+            return GaussNewtonState(
+                params=keep(state.params + step, state.params),
+                model=jax.tree.map(keep, tried, state.model),
+                damping=self._next_damping(state.damping, jnp.where(better, gain, -1.0)),
+                iteration=state.iteration + 1,
+                converged=small & (state.iteration + 1 >= self.min_iterations),
+                finite=jnp.all(jnp.isfinite(step)),
+            )
+
+        end = jax.lax.while_loop(unfinished, climb, state)
+        converged = end.converged & end.finite
+        return Solution(end.params, end.model.value, end.iteration, end.iteration + 1, converged)
+
+    def _next_damping(self, damping: Float[Array, ""], gain: Float[Array, ""]) -> Float[Array, ""]:
+        """Less where the objective rose by about as much as the model expected, more where by much less or not."""
+        factor = jnp.where(gain > 0.75, 1.0 / self.relax, jnp.where(gain > 0.25, 1.0, self.stiffen))
+        return jnp.maximum(damping * factor, self.smallest_damping)

@@ -1,0 +1,61 @@
+"""Solving a frame with lists of near pairs, which are made anew where the pose has left the place they are good for."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int
+
+from sogjax.energy.curvature import FrameEnergy
+from sogjax.energy.neighbours import displacement
+from sogjax.solve import Scales, Solution, Solver
+
+MAX_ROUNDS = 6
+
+
+class RoundsState(eqx.Module):
+    """State after some rounds: the solution of the last one, and where its lists were made."""
+
+    solution: Solution
+    round: Int[Array, ""]
+    num_blocks: Int[Array, ""]
+    """The most blocks of near pairs that a round needed."""
+    settled: Bool[Array, ""]
+    """The solution lies where the lists of its round hold."""
+
+
+def solve_near(
+    solver: Solver, objective: FrameEnergy, start: Float[Array, "dof"], scales: Scales, capacity: int
+) -> tuple[Solution, Int[Array, ""]]:
+    """The solution with only the pairs that matter, and how many blocks of them there were at most.
+
+    A round makes the lists at the pose that it starts from. Where it ends too far from there, the next round starts at
+    its end; a solution is converged only if it lies where its own lists hold. A count above `capacity` means that
+    blocks were cut off.
+    """
+    posed = objective.body.posed_blobs
+
+    def one_round(state: RoundsState) -> RoundsState:
+        before = posed(state.solution.params)
+        views, num_blocks = objective.views.near(before, objective.weights, capacity)
+        near = eqx.tree_at(lambda o: o.views, objective, views)
+        solution = solver.maximize(near, state.solution.params, scales)
+        moved = displacement(views.cameras, before, posed(solution.params))
+        return RoundsState(
+            solution=Solution(
+                params=solution.params,
+                value=solution.value,
+                iterations=state.solution.iterations + solution.iterations,
+                evaluations=state.solution.evaluations + solution.evaluations,
+                converged=solution.converged,
+            ),
+            round=state.round + 1,
+            num_blocks=jnp.maximum(state.num_blocks, num_blocks),
+            settled=moved <= 1.0,
+        )
+
+    none = jnp.asarray(0)
+    nothing = Solution(start, jnp.zeros((), start.dtype), none, none, jnp.asarray(False))
+    state = RoundsState(nothing, none, none, jnp.asarray(False))
+    end = jax.lax.while_loop(lambda state: ~state.settled & (state.round < MAX_ROUNDS), one_round, state)
+    solution = eqx.tree_at(lambda s: s.converged, end.solution, end.solution.converged & end.settled)
+    return solution, end.num_blocks
