@@ -1,70 +1,104 @@
-"""An actor from example poses (Section 5.2): all poses and one set of shape parameters, climbed together."""
+"""An actor from example poses (Section 5.2): all poses and one set of shape parameters, climbed together.
+
+First Eq. 9 on the binary colours of the silhouettes, which forgives a start that is far off; then the edges of the
+silhouettes themselves, which say exactly where limbs end.
+"""
+
+from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float, Int
 
+from sogjax.actor.coverage import Silhouettes
 from sogjax.actor.shape import ShapeModel
+from sogjax.actor.silhouette_fit import SilhouetteFit, fitted, scales_with_shape
 from sogjax.energy.objective import EnergyWeights, Views, similarity
 from sogjax.energy.priors import limit_penalty
 from sogjax.model.body import Body
 from sogjax.solve import ConditionedAscent, Scales
 from sogjax.track.scales import pose_scales
 
-SHAPE_SPREAD = 0.10
-"""Expected deviation of a group's scale factor from the whole body's (logarithm)."""
-SHAPE_WEIGHT = 0.00003
-"""Weight of one squared deviation of that size, in units of the similarity of Eq. 9."""
+SHAPE_WEIGHT = 3e-5
+"""Weight of the shape's prior in units of the similarity of Eq. 9."""
+CLIMB_ITERATIONS = 150
 
 
 class Estimate(eqx.Module):
-    """The poses of the example pictures and the shape parameters they share."""
+    """The poses of the example pictures, the shape parameters they share, and how sure both are."""
 
     poses: Float[Array, "pose dof"]
     shape_params: Float[Array, "shape"]
-    score: Float[Array, ""]
-    """The mean of Eq. 9 over the poses, less the limits' and the shape's penalties."""
-    iterations: Array
+    pose_deviations: Float[Array, "pose dof"]
+    """Standard deviations, radians and metres."""
+    shape_deviations: Float[Array, "shape"]
+    """Standard deviations of the logarithms of scale factors."""
+    mismatch: Float[Array, ""]
+    """What was minimised: the area where body and masks differ as a part of the masks' area, with the priors."""
+    iterations: Int[Array, ""]
+    converged: Bool[Array, ""]
 
 
 def estimate_shape(
     model: ShapeModel,
     poses: Float[Array, "pose dof"],
+    views: Views,
+    silhouettes: Silhouettes,
+    weights: EnergyWeights,
+) -> Estimate:
+    """The poses and the one shape that fit all masks best, from rough poses.
+
+    `views` and `silhouettes` have a leading axis for the poses.
+    """
+    scales = pose_scales(model.body.skeleton)
+    no_shape = jnp.zeros(model.num_shape_params, poses.dtype)
+    start = climbed_together(model, poses, no_shape, views, weights)
+    fit = SilhouetteFit(model, silhouettes)
+    solution = fitted(fit, start, scales)
+    poses_deviation, shape_deviation = fit.split(_deviations(fit, solution.params))
+    best_poses, shape = fit.split(solution.params)
+    return Estimate(
+        best_poses, shape, poses_deviation, shape_deviation, -solution.value, solution.iterations, solution.converged
+    )
+
+
+_deviations = eqx.filter_jit(SilhouetteFit.deviations)
+
+
+def climbed_together(
+    model: ShapeModel,
+    poses: Float[Array, "pose dof"],
     shape_params: Float[Array, "shape"],
     views: Views,
     weights: EnergyWeights,
-    max_iterations: int = 150,
-) -> Estimate:
-    """Climb the mean of Eq. 9 over the example poses, from rough poses and shape parameters.
-
-    `views` has a leading axis for the poses (`stack_views`).
-    """
-    scales = _scales(pose_scales(model.body.skeleton), poses.shape[0], shape_params.shape[0])
-    return _climb(model, poses, shape_params, views, weights, scales, max_iterations)
+    max_iterations: int = CLIMB_ITERATIONS,
+) -> Float[Array, "param"]:
+    """The mean of Eq. 9 over the example poses, climbed; the poses one after the other, then the shape."""
+    scales = scales_with_shape(pose_scales(model.body.skeleton), poses.shape[0], shape_params.shape[0])
+    start = jnp.concatenate([poses.reshape(-1), shape_params])
+    return _climb(model, start, poses.shape[0], views, weights, scales, max_iterations)
 
 
 @eqx.filter_jit
-def _climb(model, poses, shape_params, views, weights, scales, max_iterations) -> Estimate:
-    num_poses, num_dofs = poses.shape
+def _climb(
+    model: ShapeModel,
+    start: Float[Array, "param"],
+    num_poses: int,
+    views: Views,
+    weights: EnergyWeights,
+    scales: Scales,
+    max_iterations: Any,
+) -> Float[Array, "param"]:
+    num_pose_params = num_poses * model.body.skeleton.num_dofs
 
     def objective(params: Float[Array, "param"]) -> Float[Array, ""]:
-        poses = params[: num_poses * num_dofs].reshape(num_poses, num_dofs)
-        shape = params[num_poses * num_dofs :]
-        body = model.shaped(shape)
-        scores = jax.vmap(pose_score, in_axes=(None, 0, 0, None))(body, poses, views, weights)
-        unusual = jnp.sum((shape[1:] / SHAPE_SPREAD) ** 2)
-        return jnp.mean(scores) - SHAPE_WEIGHT * unusual
+        shape = params[num_pose_params:]
+        poses = params[:num_pose_params].reshape(num_poses, -1)
+        scores = jax.vmap(pose_score, in_axes=(None, 0, 0, None))(model.shaped(shape), poses, views, weights)
+        return jnp.mean(scores) - SHAPE_WEIGHT * jnp.sum((shape / model.spread) ** 2)
 
-    start = jnp.concatenate([poses.reshape(-1), shape_params])
-    solver = ConditionedAscent(max_iterations=max_iterations)
-    solution = solver.maximize(objective, start, scales)
-    return Estimate(
-        solution.params[: num_poses * num_dofs].reshape(num_poses, num_dofs),
-        solution.params[num_poses * num_dofs :],
-        solution.value,
-        solution.iterations,
-    )
+    return ConditionedAscent(max_iterations=max_iterations).maximize(objective, start, scales).params
 
 
 def pose_score(body: Body, pose: Float[Array, "dof"], views: Views, weights: EnergyWeights) -> Float[Array, ""]:
@@ -72,15 +106,3 @@ def pose_score(body: Body, pose: Float[Array, "dof"], views: Views, weights: Ene
     lower, upper = body.skeleton.joint_limits()
     limits = limit_penalty(body.skeleton.joint_params(pose), lower, upper)
     return similarity(body.posed_blobs(pose), views, weights) - weights.limit_weight * limits
-
-
-def _scales(pose: Scales, num_poses: int, num_shape_params: int) -> Scales:
-    """The pose's scales for every example pose, and one more kind for the shape parameters."""
-    num_kinds = pose.first_steps.shape[0]
-    return Scales(
-        kinds=jnp.concatenate(
-            [jnp.tile(pose.kinds, num_poses), jnp.full(num_shape_params, num_kinds, pose.kinds.dtype)]
-        ),
-        first_steps=jnp.append(pose.first_steps, 0.01),
-        largest_steps=jnp.append(pose.largest_steps, 0.05),
-    )

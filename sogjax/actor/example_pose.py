@@ -8,11 +8,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from sogjax.actor.silhouettes import body_centre
 from sogjax.energy.objective import EnergyWeights, History, Views, energy
 from sogjax.model.body import Body
 from sogjax.solve import ConditionedAscent, Scales
-from sogjax.track.initial_pose import placed, root_position, turned
+from sogjax.track.initial_pose import centred, turned
 from sogjax.track.scales import pose_scales
 
 NUM_HEADINGS = 16
@@ -33,17 +32,6 @@ def starts_at(
             for h in headings
         ]
     )
-
-
-def centred(body: Body, pose: Float[Array, "dof"], centre: Float[np.ndarray, "3"]) -> Float[Array, "dof"]:
-    """The pose moved so that the body's centre lies at a point (metres, world)."""
-    return placed(body, pose, root_position(body, pose) + centre - np.asarray(_centre_of(body, pose), float))
-
-
-@eqx.filter_jit
-def _centre_of(body: Body, pose: Float[Array, "dof"]) -> Float[Array, "3"]:
-    blobs = body.posed_blobs(pose)
-    return body_centre(blobs.means, blobs.sigmas)
 
 
 def pose_from_silhouettes(

@@ -6,12 +6,14 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from sogjax.actor.colors import ColoredView, back_projected_colors, camera_of, colored
-from sogjax.actor.estimate import estimate_shape
+from sogjax.actor.estimate import Estimate, estimate_shape
 from sogjax.actor.example_pose import pose_from_silhouettes, starts_at
 from sogjax.actor.shape import ShapeModel
+from sogjax.actor.silhouette_cells import silhouettes_of
 from sogjax.actor.silhouettes import (
     COARSE_DEPTH,
     FINE_DEPTH,
@@ -40,9 +42,36 @@ class MadeActor:
     """An actor in its own upright frame, and the poses of the example pictures in the recording's world."""
 
     body: Body
+    start: Body
+    """The body it was made from."""
+    upright_body: Body
+    """The actor as it stands in the recording's world; what the example poses are poses of."""
     example_poses: dict[str, Float[Array, "dof"]]
-    score: float
-    """What was climbed: Eq. 9 of the silhouettes, the mean over the example poses, less the penalties."""
+    pictures: tuple[PosedPictures, ...]
+    """Of the example poses, in their order."""
+    shape_model: ShapeModel
+    """How the shape parameters scale the upright starting body."""
+    estimate: Estimate
+
+    @property
+    def shape_names(self) -> tuple[str, ...]:
+        """Names of the shape parameters."""
+        return self.shape_model.names
+
+    @property
+    def shape_deviations(self) -> Float[np.ndarray, "shape"]:
+        """Standard deviations of the shape parameters (logarithms of scale factors)."""
+        return np.asarray(self.estimate.shape_deviations, float)
+
+    @property
+    def shape_priors(self) -> Float[np.ndarray, "shape"]:
+        """What these would be without pictures."""
+        return np.asarray(self.shape_model.spread, float)
+
+    @property
+    def pose_deviations(self) -> Float[np.ndarray, "pose dof"]:
+        """Standard deviations of the example poses (radians, metres)."""
+        return np.asarray(self.estimate.pose_deviations, float)
 
 
 def make_actor(
@@ -53,8 +82,9 @@ def make_actor(
     weights: EnergyWeights,
     report: Report = lambda _: None,
     progress: Progress = lambda items, total, label: items,
+    symmetric: bool = True,
 ) -> MadeActor:
-    """Scale and colour a body after the example poses of one subject.
+    """Scale and colour a body after the example poses of one subject; `symmetric`: left and right alike.
 
     Raises:
         InputError: no example poses of the subject, or pictures without masks.
@@ -63,7 +93,7 @@ def make_actor(
     rig = jax.tree.map(jnp.asarray, recording.rig.cameras)
     turn = world_from_upright(recording.up)
     upright = body.rotated(jnp.asarray(turn, body.blob_sigmas.dtype))
-    model = ShapeModel.from_body(upright)
+    model = ShapeModel.from_body(upright, symmetric)
     pictures = [load_pictures(recording, example) for example in examples]
     coarse = same_capacity([silhouette_views(posed, rig, body.num_blobs, COARSE_DEPTH) for posed in pictures])
     poses = []
@@ -74,8 +104,7 @@ def make_actor(
         poses.append(pose_from_silhouettes(upright, views, starts, weights)[0])
     report("shape")
     views = stack_views([silhouette_views(posed, rig, body.num_blobs, FINE_DEPTH) for posed in pictures])
-    no_shape = jnp.zeros(model.num_shape_params, body.blob_sigmas.dtype)
-    estimate = estimate_shape(model, jnp.stack(poses), no_shape, views, weights)
+    estimate = estimate_shape(model, jnp.stack(poses), views, silhouettes_of(pictures, rig), weights)
     shaped = model.shaped(estimate.shape_params)
     report("colours")
     shown = [
@@ -83,14 +112,15 @@ def make_actor(
         for posed, pose in zip(pictures, estimate.poses, strict=True)
         for camera, image in posed.images.items()
     ]
-    actor = colored(shaped, back_projected_colors(shaped, shown, color_space))
-    actor = actor.rotated(jnp.asarray(turn.T, body.blob_sigmas.dtype))
-    if subject is not None:
-        actor = replace(actor, name=subject)
+    actor = replace(colored(shaped, back_projected_colors(shaped, shown, color_space)), name=subject or body.name)
     return MadeActor(
-        actor,
-        {example.name: pose for example, pose in zip(examples, estimate.poses, strict=True)},
-        float(estimate.score),
+        body=actor.rotated(jnp.asarray(turn.T, body.blob_sigmas.dtype)),
+        start=body,
+        upright_body=actor,
+        example_poses={example.name: pose for example, pose in zip(examples, estimate.poses, strict=True)},
+        pictures=tuple(pictures),
+        shape_model=model,
+        estimate=estimate,
     )
 
 

@@ -1,11 +1,21 @@
 """Shape parameters: the lengths and sizes of a body that are scaled together (Section 5.2)."""
 
+from collections.abc import Sequence
+from dataclasses import fields
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from sogjax.model.body import Body
+from sogjax.model.body import Body, ShapeGroup
+
+LENGTH_SPREAD = 0.05
+"""Expected deviation of a bone's scale factor from the whole body's (logarithm): people's proportions are alike."""
+SIZE_SPREAD = 0.2
+"""The same for places across a bone and for sizes, which clothes change."""
+WHOLE_SPREAD = 1.0
+"""The same for the whole body: next to nothing is known."""
 
 
 class ShapeModel(eqx.Module):
@@ -20,11 +30,15 @@ class ShapeModel(eqx.Module):
     blob_groups: Float[Array, "blob shape"]
     sigma_groups: Float[Array, "blob shape"]
     landmark_groups: Float[Array, "landmark shape"]
+    names: tuple[str, ...] = eqx.field(static=True)
+    """Of the shape parameters."""
+    spread: Float[Array, "shape"]
+    """Expected deviation of each shape parameter from 0."""
 
     @classmethod
-    def from_body(cls, body: Body) -> "ShapeModel":
-        """Read the groups of a body."""
-        groups = body.shape_groups
+    def from_body(cls, body: Body, symmetric: bool = True) -> "ShapeModel":
+        """Read the groups of a body; without symmetry left and right have shape parameters of their own."""
+        groups = body.shape_groups if symmetric else _untied(body.shape_groups)
 
         def membership(names: tuple[str, ...], field: str) -> Array:
             """1 where a shape parameter scales a named item; the first one scales all."""
@@ -39,6 +53,11 @@ class ShapeModel(eqx.Module):
             membership(body.blobs.names, "blob_offsets"),
             membership(body.blobs.names, "blob_sigmas"),
             membership(body.landmarks.names, "landmark_offsets"),
+            ("whole_body", *(group.name for group in groups)),
+            jnp.asarray(
+                [WHOLE_SPREAD, *(LENGTH_SPREAD if group.joint_offsets else SIZE_SPREAD for group in groups)],
+                body.blob_sigmas.dtype,
+            ),
         )
 
     @property
@@ -60,3 +79,22 @@ class ShapeModel(eqx.Module):
                 body.landmarks.offsets * factors(self.landmark_groups)[:, None],
             ),
         )
+
+
+def _untied(groups: Sequence[ShapeGroup]) -> list[ShapeGroup]:
+    """The groups with what is named `left_...` and `right_...` apart; what is named neither stays with both."""
+    lists = [field.name for field in fields(ShapeGroup) if field.name != "name"]
+    parts: list[ShapeGroup] = []
+    for group in groups:
+        sides = {
+            side: {key: tuple(n for n in getattr(group, key) if n.startswith(side)) for key in lists}
+            for side in ("left_", "right_")
+        }
+        members = [name for key in lists for name in getattr(group, key)]
+        if all(name.startswith(("left_", "right_")) for name in members):
+            parts += [
+                ShapeGroup(f"{side}{group.name}", **of_side) for side, of_side in sides.items() if any(of_side.values())
+            ]
+        else:
+            parts.append(group)
+    return parts

@@ -157,9 +157,3 @@ def _padded(views: Views, capacity: int) -> Views:
     )
     similarities = jnp.pad(views.color_similarities, ((0, 0), (0, 0), (0, extra)))
     return Views(views.cameras, images, similarities, views.normalizers)
-
-
-def body_centre(blobs_means: Float[Array, "blob 3"], sigmas: Float[Array, "blob"]) -> Float[Array, "3"]:
-    """The centre of a body's blobs, weighted by the areas they cover in a picture."""
-    area = sigmas**2
-    return jnp.sum(blobs_means * area[:, None], axis=0) / jnp.sum(area)

@@ -26,7 +26,7 @@ def run(config: ActorConfig) -> Path:
     if out.is_dir():
         raise InputError(f"out={out}: is a folder; give the actor file to write, such as out={out / 'actor.yaml'}")
     with results_folder(out.parent):
-        made = make_actor(recording, body, config.subject, space, weights, say, progress)
+        made = make_actor(recording, body, config.subject, space, weights, say, progress, config.symmetric)
         save_body(out, made.body)
     print(out)
     return out

@@ -152,12 +152,15 @@ def cell_grids(recording: Recording, depth: int) -> tuple[CellGrid, ...]:
     return tuple(CellGrid.from_depth(int(w), int(h), depth) for w, h in sizes)
 
 
-def tracker(recording: Recording, body: Body, grids: tuple[CellGrid, ...], config: TrackConfig) -> Tracker:
-    """The tracker of a recording for a body that stands upright in its world."""
-    cameras = device_cameras(recording)
+def image_reader(recording: Recording, grids: tuple[CellGrid, ...], config: TrackConfig) -> ImageReader:
+    """What turns the cells of a frame into image blobs.
+
+    Raises:
+        InputError: plates are asked for, but a camera has none, or one of another size.
+    """
     space, radius = color_space_and_radius(config.color)
-    candidates = Candidates.from_grids(grids, cameras)
-    reader = ImageReader(
+    candidates = Candidates.from_grids(grids, device_cameras(recording))
+    return ImageReader(
         candidates=candidates,
         color_radius=radius,
         color_tolerance=config.images.color_tolerance,
@@ -166,11 +169,16 @@ def tracker(recording: Recording, body: Body, grids: tuple[CellGrid, ...], confi
         plate_colors=_plate_colors(recording, grids, candidates, space, config.images),
         plate_tolerance=at_least("images.plate_tolerance", config.images.plate_tolerance, 0.0),
     )
+
+
+def tracker(recording: Recording, body: Body, grids: tuple[CellGrid, ...], config: TrackConfig) -> Tracker:
+    """The tracker of a recording for a body that stands upright in its world."""
+    cameras = device_cameras(recording)
     return Tracker(
         body=body,
         cameras=cameras,
         normalizers=whole_image_overlap(cameras.image_size),
-        reader=reader,
+        reader=image_reader(recording, grids, config),
         weights=energy_weights(config.energy),
         solver=solver(config.solver),
         scales=solver_scales(config.solver, body),

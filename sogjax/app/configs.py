@@ -96,6 +96,9 @@ class TrackConfig:
     out: str = option("", "folder for the results; default: outputs/RECORDING")
     actor: Any = option(None, "actor file, or a list of them; null: made from the example poses")
     body: str = option("human", "body that actors are made from: human, dog, or a body file")
+    initial_pose: str | None = option(
+        None, "auto: search for it | file with a rough pose; null: the recording's initial_pose.yaml, else auto"
+    )
     start: int = option(0, "first frame to track, counted from the recording's first")
     stop: int | None = option(None, "frame before which to stop; null: the end")
     cameras: list[str] | None = option(None, "cameras to use; null: all")
@@ -114,6 +117,7 @@ class ActorConfig:
     recording: str = option(MISSING, "folder of the recording")
     out: str = option(MISSING, "actor file to write")
     subject: str | None = option(None, "which subject, where the recording has several")
+    symmetric: bool = option(True, "left and right limbs have the same lengths and sizes")
     body: str = option("human", "body to start from: human, dog, or a body file")
     cameras: list[str] | None = option(None, "cameras to use; null: all")
     color: ColorConfig = group(ColorConfig, "")

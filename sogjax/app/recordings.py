@@ -14,12 +14,10 @@ from sogjax.app.build import color_space_and_radius, energy_weights
 from sogjax.app.configs import ColorConfig, EnergyConfig
 from sogjax.app.progress import progress
 from sogjax.data.actor_file import load_body, named_body
-from sogjax.data.initial_pose import load_initial_poses
 from sogjax.data.recording import Recording, open_recording
 from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.model.frames import world_from_upright
-from sogjax.track.initial_pose import rough_pose
 
 
 def say(text: str) -> None:
@@ -104,34 +102,3 @@ def _made_actor(path: str, cameras: tuple[str, ...], body: str, subject: str | N
 def upright(body: Body, recording: Recording) -> Body:
     """A body that stands upright in the recording's world."""
     return body.rotated(jnp.asarray(world_from_upright(recording.up), body.blob_sigmas.dtype))
-
-
-def first_poses(recording: Recording, bodies: Sequence[Body]) -> list[Any]:
-    """The rough poses of frame 0, of bodies that stand upright in the recording's world.
-
-    Raises:
-        InputError: there is no initial_pose.yaml, or something in it is wrong.
-    """
-    path = check_initial_poses(recording)
-    descriptions = load_initial_poses(path, [body.name for body in bodies])
-    poses = []
-    for body in bodies:
-        try:
-            poses.append(rough_pose(body, descriptions[body.name], recording.up))
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from error
-    return poses
-
-
-def check_initial_poses(recording: Recording) -> Path:
-    """The file of the rough poses.
-
-    Raises:
-        InputError: there is none.
-    """
-    if recording.initial_poses is None:
-        raise InputError(
-            f"{recording.path}: no initial_pose.yaml; write the rough pose of frame 0 into it, by `position`, "
-            "`heading` and `pose`, or by `landmarks`"
-        )
-    return recording.initial_poses

@@ -12,9 +12,10 @@ from omegaconf import OmegaConf
 
 from sogjax.app import build
 from sogjax.app.configs import TrackConfig
+from sogjax.app.first_pose import first_poses, initial_pose_file
 from sogjax.app.outputs import results_folder, write_results
 from sogjax.app.progress import progress
-from sogjax.app.recordings import actors_of, check_initial_poses, first_poses, opened, say, upright
+from sogjax.app.recordings import actors_of, opened, say, upright
 from sogjax.app.timing import StageTimes
 from sogjax.data.motion import Motion, motion_from_poses
 from sogjax.data.recording import Recording
@@ -49,7 +50,7 @@ def run(config: TrackConfig) -> Run:
     build.check(config)
     recording = opened(config.recording, config.cameras)
     frame_range(recording, config)
-    check_initial_poses(recording)
+    initial_pose_file(recording, config)
     with results_folder(Path(config.out or f"outputs/{recording.name}")) as out:
         bodies, made = actors_of(recording, config.actor, config.body, config.color)
         result = track_recording(recording, bodies, config)
@@ -61,10 +62,8 @@ def run(config: TrackConfig) -> Run:
 def track_recording(recording: Recording, bodies: list[Body], config: TrackConfig) -> Run:
     """The motion of actors (in their own upright frames) in a recording."""
     bodies = [upright(body, recording) for body in bodies]
-    start = jnp.concatenate(first_poses(recording, bodies))
     first, last = frame_range(recording, config)
-    if first + recording.first_frame > 0:
-        say(f"warning: the rough pose of {recording.initial_poses} is taken for frame {first + recording.first_frame}")
+    start = jnp.concatenate(first_poses(recording, bodies, config, first))
     grids = build.cell_grids(recording, config.images.depth)
     tracker = build.tracker(recording, concatenate(bodies), grids, config)
     times = StageTimes()

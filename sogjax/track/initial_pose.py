@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -58,6 +59,19 @@ def placed(body: Body, pose: Float[Array, "dof"], position: Float[np.ndarray, "3
         offset = np.asarray(body.skeleton.offsets[joint], float)
         pose = pose.at[dof].set(float(axis @ (position - offset)) / weight)
     return pose
+
+
+def centred(body: Body, pose: Float[Array, "dof"], centre: Float[np.ndarray, "3"]) -> Float[Array, "dof"]:
+    """The pose moved so that the body's centre lies at a point (metres, world)."""
+    return placed(body, pose, root_position(body, pose) + centre - np.asarray(body_centre(body, pose), float))
+
+
+@eqx.filter_jit
+def body_centre(body: Body, pose: Float[Array, "dof"]) -> Float[Array, "3"]:
+    """The centre of a body's blobs (metres, world), weighted by the areas they cover in a picture."""
+    blobs = body.posed_blobs(pose)
+    area = blobs.sigmas**2
+    return jnp.sum(blobs.means * area[:, None], axis=0) / jnp.sum(area)
 
 
 def root_position(body: Body, pose: Float[Array, "dof"]) -> Float[np.ndarray, "3"]:

@@ -1,0 +1,129 @@
+"""How far a body covers a silhouette, cell by cell: the soft picture that a body of blobs throws.
+
+In the terms of Eq. 8: a cell of the picture is an image blob, and the body covers it where the sum of the overlaps
+reaches the cap. Eq. 9 counts that sum up to the cap, so it hardly tells where the edge of the body is; here the sum
+goes through a step at the cap, so that the edge of the body is held against the edge of the mask.
+"""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from sogjax.energy.overlap import EXACT_EXPONENT, overlaps, self_overlaps
+from sogjax.model.camera import Camera, project_points
+from sogjax.model.sog import Sog
+
+SHARPNESS = 4.0
+"""Power of the step: covered = t^4 / (1 + t^4) where the overlaps are t times the cap. At t = 1 the body's Gaussians
+sum up to a half, which is where a body file counts a picture as body."""
+SMALLEST = 1e-6
+
+
+class Silhouettes(eqx.Module):
+    """The masks of one pose as cells of equal size, for each camera; cameras without a mask have no cells."""
+
+    cameras: Camera
+    means: Float[Array, "*pose camera cell 2"]
+    """Centres in undistorted pixels."""
+    sigmas: Float[Array, "*pose camera cell"]
+    """Half the side of a cell, pixels."""
+    coverage: Float[Array, "*pose camera cell"]
+    """Part of the cell that the mask covers."""
+    mask: Bool[Array, "*pose camera cell"]
+
+
+class NormalEquations(NamedTuple):
+    """A sum of squares, half its gradient, and its Gauss-Newton matrix by some parameters."""
+
+    value: Float[Array, ""]
+    gradient: Float[Array, "param"]
+    matrix: Float[Array, "param param"]
+
+
+SeenBlob = Float[Array, "3"]
+"""Mean (undistorted pixels) and sigma (pixels) of a projected blob."""
+SpaceBlob = Float[Array, "4"]
+"""Mean and sigma (metres, world)."""
+
+
+def mismatch(blobs: Float[Array, "blob 4"], silhouettes: Silhouettes) -> Float[Array, ""]:
+    """Mean over the cameras of the squared difference of coverages, as a part of the mask's area.
+
+    `blobs` are means and sigmas in the world (metres).
+    """
+    per_camera = jax.vmap(_camera_mismatch, in_axes=(None, 0, 0, 0, 0, 0))
+    values = per_camera(blobs, *_by_camera(silhouettes))
+    return jnp.sum(values) / _num_seen(silhouettes)
+
+
+def mismatch_equations(
+    blobs: Float[Array, "blob 4"], jacobian: Float[Array, "blob 4 param"], silhouettes: Silhouettes
+) -> NormalEquations:
+    """`mismatch` with its derivatives, given those of the blobs."""
+    per_camera = jax.vmap(_camera_equations, in_axes=(None, None, 0, 0, 0, 0, 0))
+    parts = per_camera(blobs, jacobian, *_by_camera(silhouettes))
+    return jax.tree.map(lambda part: jnp.sum(part, axis=0) / _num_seen(silhouettes), parts)
+
+
+def _by_camera(silhouettes: Silhouettes) -> tuple[Camera, Array, Array, Array, Array]:
+    s = silhouettes
+    return s.cameras, s.means, s.sigmas, s.coverage, s.mask
+
+
+def _num_seen(silhouettes: Silhouettes) -> Float[Array, ""]:
+    seen = jnp.any(silhouettes.mask, axis=-1)
+    return jnp.maximum(jnp.sum(seen), 1).astype(silhouettes.sigmas.dtype)
+
+
+def _seen(camera: Camera, blob: SpaceBlob) -> SeenBlob:
+    """Eq. 4."""
+    pixels, depth = project_points(camera, blob[None, :3])
+    return jnp.append(pixels[0], blob[3] * camera.focal_length / depth[0])
+
+
+def _times_cap(seen: SeenBlob, mean: Float[Array, "2"], sigma: Float[Array, ""]) -> Float[Array, ""]:
+    """E_ij / E_ii of Eq. 6: how often one blob alone fills the cap of a cell."""
+    one = lambda mean, sigma: Sog.from_arrays(mean[None], sigma[None], jnp.zeros_like(mean[None]))
+    cell = one(mean, sigma)
+    same_color = jnp.ones((1, 1), sigma.dtype)
+    pair = overlaps(cell, one(seen[:2], seen[2]), same_color, jnp.asarray(EXACT_EXPONENT, sigma.dtype))
+    return pair[0, 0] / self_overlaps(cell)[0]
+
+
+def _covered(times_cap: Float[Array, ""]) -> Float[Array, ""]:
+    power = jnp.maximum(times_cap, SMALLEST) ** SHARPNESS
+    return power / (1.0 + power)
+
+
+def _cell_weights(coverage: Float[Array, "cell"], mask: Bool[Array, "cell"]) -> Float[Array, "cell"]:
+    area = jnp.maximum(jnp.sum(jnp.where(mask, coverage, 0.0)), 1.0)
+    return jnp.where(mask, 1.0, 0.0) / area
+
+
+def _camera_mismatch(blobs, camera, means, sigmas, coverage, mask) -> Float[Array, ""]:
+    seen = jax.vmap(_seen, in_axes=(None, 0))(camera, blobs)
+    over_blobs = jax.vmap(_times_cap, in_axes=(0, None, None))
+    times_cap = jax.vmap(lambda mean, sigma: jnp.sum(over_blobs(seen, mean, sigma)))(means, sigmas)
+    difference = jax.vmap(_covered)(times_cap) - coverage
+    return jnp.sum(_cell_weights(coverage, mask) * difference**2)
+
+
+def _camera_equations(blobs, jacobian, camera, means, sigmas, coverage, mask) -> NormalEquations:
+    """One camera's part: first by what is seen of the blobs, then by the parameters."""
+    seen = jax.vmap(_seen, in_axes=(None, 0))(camera, blobs)
+    pair = jax.value_and_grad(_times_cap)
+    over_cells = jax.vmap(pair, in_axes=(None, 0, 0))
+    parts, slopes = jax.vmap(over_cells, in_axes=(0, None, None))(seen, means, sigmas)
+    covered, steepness = jax.vmap(jax.value_and_grad(_covered))(jnp.sum(parts, axis=0))
+    weights = _cell_weights(coverage, mask)
+    by_seen = jnp.moveaxis(slopes * steepness[None, :, None], 2, 1).reshape(-1, means.shape[0])
+    projection = jax.vmap(jax.jacfwd(_seen, argnums=1), in_axes=(None, 0))(camera, blobs)
+    chain = jnp.einsum("bij,bjp->bip", projection, jacobian, precision="highest").reshape(-1, jacobian.shape[-1])
+    difference = covered - coverage
+    product = lambda a, b: jnp.matmul(a, b, precision="highest")
+    gradient = product(chain.T, product(by_seen, weights * difference))
+    matrix = product(chain.T, product(product(by_seen * weights[None, :], by_seen.T), chain))
+    return NormalEquations(jnp.sum(weights * difference**2), gradient, matrix)

@@ -1,0 +1,123 @@
+"""What the cameras see of a body in one frame at a chosen coarseness, without knowing where it is."""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int, UInt8
+
+from sogjax.energy.objective import Views, whole_image_overlap
+from sogjax.energy.overlap import EXACT_EXPONENT, overlaps, pair_color_similarities, self_overlaps
+from sogjax.model.body import Body
+from sogjax.model.camera import Camera, project
+from sogjax.model.color import from_rgb
+from sogjax.model.sog import Sog
+from sogjax.track.culling import CAPACITIES, ImageReader, actor_of_blobs, body_boxes, capacity_for, union_boxes
+
+Cells = UInt8[Array, "camera rows columns 3"]
+
+
+class FrameViews(eqx.Module):
+    """The pictures of one frame from coarse to fine, and the actors in them that were found already."""
+
+    cameras: Camera
+    readers: tuple[ImageReader, ...]
+    cells: tuple[Cells, ...]
+    found: tuple[Sog, ...] = ()
+    """Blobs in the world of actors that were found: what they cover is theirs."""
+
+    def with_found(self, body: Body, pose: Float[Array, "dof"]) -> "FrameViews":
+        """The same frame, with one more actor found."""
+        return FrameViews(self.cameras, self.readers, self.cells, (*self.found, body.posed_blobs(pose)))
+
+    def views(self, level: int, body: Body, poses: Float[Array, "start dof"] | None = None) -> Views:
+        """What is seen around some poses, or (None) anywhere, that resembles a body."""
+        reader, cells = self.readers[level], self.cells[level]
+        boxes = _everywhere(self.cameras) if poses is None else _boxes(body, poses, self.cameras, reader)
+        near, matching = _counts(reader, cells, boxes, body, CAPACITIES[-1])
+        capacities = capacity_for(int(near.max())), capacity_for(int(matching.max()))
+        images, similarities = _matching(reader, cells, boxes, body, *capacities)
+        for blobs in self.found:
+            similarities = similarities * _left_over(self.cameras, images, blobs)[:, None, :]
+        return Views(self.cameras, images, similarities, whole_image_overlap(self.cameras.image_size))
+
+
+def _everywhere(cameras: Camera) -> Float[Array, "camera 1 2 2"]:
+    far = 10.0 * jnp.max(cameras.image_size)
+    box = jnp.stack([jnp.stack([-far, -far]), jnp.stack([far, far])])
+    return jnp.broadcast_to(box, (cameras.image_size.shape[0], 1, 2, 2))
+
+
+@eqx.filter_jit
+def _boxes(
+    body: Body, poses: Float[Array, "start dof"], cameras: Camera, reader: ImageReader
+) -> Float[Array, "camera actor 2 2"]:
+    """Boxes around all the poses."""
+    actors = actor_of_blobs(body.skeleton, body.blobs.joints)
+
+    def around(pose: Float[Array, "dof"]) -> Float[Array, "camera actor 2 2"]:
+        over_cameras = jax.vmap(body_boxes, in_axes=(None, 0, None, None))
+        return over_cameras(body.posed_blobs(pose), cameras, actors, reader.box_enlargement)
+
+    boxes = jax.lax.map(around, poses)
+    whole = boxes[0]
+    for k in range(1, poses.shape[0]):
+        whole = union_boxes(whole, boxes[k])
+    return whole
+
+
+def _colored(reader: ImageReader, body: Body) -> Sog:
+    """The body's blobs in the working colour space; only their colours matter."""
+    blobs = body.posed_blobs(body.poses["rest"])
+    return eqx.tree_at(lambda sog: sog.colors, blobs, from_rgb(body.blob_colors, reader.color_space))
+
+
+def _near(reader: ImageReader, cells: Cells, boxes: Array, capacity: int) -> tuple[Sog, Int[Array, "camera"]]:
+    rgb = cells.astype(boxes.dtype) / 255.0
+    return reader.near_blobs(rgb, boxes, capacity)
+
+
+@eqx.filter_jit
+def _counts(reader: ImageReader, cells: Cells, boxes: Array, body: Body, largest: int) -> tuple[Array, Array]:
+    """How many image blobs of each camera lie in the boxes, and how many of these resemble the body."""
+    capacity = min(largest, reader.candidates.sigmas.shape[-1])
+    near, num_near = _near(reader, cells, boxes, capacity)
+    colored = _colored(reader, body)
+
+    def one_camera(image: Sog) -> Array:
+        one = lambda color: pair_color_similarities(
+            image,
+            Sog.from_arrays(colored.means[:1], colored.sigmas[:1], color[None]),
+            reader.color_space,
+            reader.color_radius,
+        )[0]
+        return jnp.sum(jnp.any(jax.lax.map(one, colored.colors) > 0.0, axis=0))
+
+    return num_near, jax.lax.map(one_camera, near)
+
+
+@eqx.filter_jit
+def _matching(
+    reader: ImageReader, cells: Cells, boxes: Array, body: Body, near_capacity: int, capacity: int
+) -> tuple[Sog, Float[Array, "camera body image"]]:
+    near, _ = _near(reader, cells, boxes, near_capacity)
+    images, similarities, _ = reader.matching_blobs(near, _colored(reader, body), capacity)
+    return images, similarities
+
+
+@eqx.filter_jit
+def _left_over(cameras: Camera, images: Sog, blobs: Sog) -> Float[Array, "camera image"]:
+    """The part of every image blob that blobs in the world do not cover."""
+
+    def one_camera(camera: Camera, image: Sog) -> Float[Array, "image"]:
+        same = jnp.ones((blobs.sigmas.shape[0], image.sigmas.shape[0]), image.sigmas.dtype)
+        covered = overlaps(image, project(camera, blobs), same, jnp.asarray(EXACT_EXPONENT, image.sigmas.dtype))
+        return jnp.maximum(1.0 - jnp.sum(covered, axis=0) / self_overlaps(image), 0.0)
+
+    return jax.vmap(one_camera)(cameras, images)
+
+
+def levels(depth: int) -> Sequence[int]:
+    """Depths of the quad-trees of a search, from coarse to fine."""
+    return (max(depth - 2, 1), max(depth - 1, 1), depth)

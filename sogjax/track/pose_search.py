@@ -1,0 +1,130 @@
+"""The pose of the first frame without a hint: places, headings and named poses tried at once, the best refined."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from sogjax.energy.objective import EnergyWeights, History, Views, energy
+from sogjax.model.body import Body
+from sogjax.model.camera import Camera
+from sogjax.solve import ConditionedAscent, Scales
+from sogjax.track.frame_views import FrameViews
+from sogjax.track.initial_pose import body_centre, centred, placed, root_position, turned
+from sogjax.track.place_search import Slices, best_places, possible_places, well_seen
+from sogjax.track.scales import pose_scales
+
+NUM_PLACES = 12
+NUM_HEADINGS = 12
+NUM_COARSE, COARSE_ITERATIONS = 48, 25
+"""Starts that are climbed a little way in the coarse picture."""
+NUM_MIDDLE, MIDDLE_ITERATIONS = 12, 50
+"""Starts that are climbed in the middle one."""
+NUM_FINE, FINE_ITERATIONS = 4, 120
+"""Starts that are climbed to the end in the fine one."""
+DIFFERENT = 0.1
+"""Metres, mean distance of the blobs: poses farther apart are different optima."""
+
+
+@dataclass(frozen=True)
+class FoundPose:
+    """The best pose of a search and how far the next different one is behind."""
+
+    pose: Float[Array, "dof"]
+    energy: float
+    margin: float
+    """(energy - energy of the next different optimum) / energy; 1 where there is no other."""
+
+
+def search_pose(body: Body, frame: FrameViews, weights: EnergyWeights, up: str) -> FoundPose:
+    """The pose of a body (upright in the world) that suits the pictures of one frame best."""
+    coarse = frame.views(0, body)
+    scales = pose_scales(body.skeleton)
+    starts = _starts(body, coarse, weights, up)
+    promise = _energies(body, starts, coarse, weights)
+    poses = starts[jnp.argsort(-promise)[:NUM_COARSE]]
+    energies = jnp.sort(-promise)[:NUM_COARSE]
+    for level, keep, iterations in (
+        (0, NUM_MIDDLE, COARSE_ITERATIONS),
+        (1, NUM_FINE, MIDDLE_ITERATIONS),
+        (2, NUM_FINE, FINE_ITERATIONS),
+    ):
+        views = coarse if level == 0 else frame.views(level, body, poses)
+        poses, energies = _climbed(body, poses, views, weights, scales, iterations)
+        energies = jnp.where(_well_seen(body, poses, views.cameras), energies, -jnp.inf)
+        best = _different(body, poses, energies, keep)
+        poses, energies = poses[best], energies[best]
+    margin = 1.0 if len(energies) < 2 else float((energies[0] - energies[1]) / jnp.abs(energies[0]))
+    return FoundPose(poses[0], float(energies[0]), margin)
+
+
+def search_poses(bodies: Sequence[Body], frame: FrameViews, weights: EnergyWeights, up: str) -> list[FoundPose]:
+    """The poses of several bodies in one frame: the surest is found first, and what it covers is its own."""
+    found: dict[int, FoundPose] = {}
+    while len(found) < len(bodies):
+        open_ones = [k for k in range(len(bodies)) if k not in found]
+        candidates = {k: search_pose(bodies[k], frame, weights, up) for k in open_ones}
+        surest = max(open_ones, key=lambda k: candidates[k].margin)
+        found[surest] = candidates[surest]
+        frame = frame.with_found(bodies[surest], found[surest].pose)
+    return [found[k] for k in range(len(bodies))]
+
+
+def _starts(body: Body, views: Views, weights: EnergyWeights, up: str) -> Float[Array, "start dof"]:
+    """Every named pose at every heading, at the most promising places."""
+    root = root_position(body, body.poses["rest"])
+    slices = Slices.from_body(body, root, up)
+    places = best_places(slices, views, possible_places(views.cameras, up), weights, NUM_PLACES)
+    headings = np.arange(NUM_HEADINGS) * 2.0 * np.pi / NUM_HEADINGS - np.pi
+    upright = [placed(body, body.poses["rest"], place) for place in places]
+    centres = [np.asarray(body_centre(body, pose), float) for pose in upright]
+    at_origin = [turned(body, pose, float(heading), up) for pose in body.poses.values() for heading in headings]
+    return jnp.stack([centred(body, pose, centre) for pose in at_origin for centre in centres])
+
+
+@eqx.filter_jit
+def _energies(body: Body, poses: Array, views: Views, weights: EnergyWeights) -> Float[Array, "start"]:
+    return jax.lax.map(lambda pose: _energy(body, pose, views, weights), poses, batch_size=8)
+
+
+@eqx.filter_jit
+def _climbed(
+    body: Body, poses: Array, views: Views, weights: EnergyWeights, scales: Scales, iterations: int
+) -> tuple[Float[Array, "start dof"], Float[Array, "start"]]:
+    solver = ConditionedAscent(max_iterations=iterations)
+
+    def climb(pose: Float[Array, "dof"]) -> tuple[Array, Array]:
+        solution = solver.maximize(lambda p: _energy(body, p, views, weights), pose, scales)
+        return solution.params, solution.value
+
+    return jax.lax.map(climb, poses, batch_size=4)
+
+
+@eqx.filter_jit
+def _well_seen(body: Body, poses: Array, cameras: Camera) -> Bool[Array, "start"]:
+    return well_seen(cameras, jax.lax.map(lambda pose: body_centre(body, pose), poses))
+
+
+def _energy(body: Body, pose: Float[Array, "dof"], views: Views, weights: EnergyWeights) -> Float[Array, ""]:
+    """Eq. 10 of a frame without history."""
+    return energy(body, pose, views, History(pose, pose, jnp.asarray(False)), weights)
+
+
+def _different(body: Body, poses: Array, energies: Array, count: int) -> np.ndarray:
+    """Which poses are the best `count` that lie `DIFFERENT` from each other, best first."""
+    means = np.asarray(_means(body, poses))
+    left, best = np.argsort(-np.asarray(energies)), []
+    while len(left) and len(best) < count:
+        best.append(left[0])
+        distances = np.linalg.norm(means[left] - means[left[0]], axis=-1).mean(axis=1)
+        left = left[distances >= DIFFERENT]
+    return np.array(best)
+
+
+@eqx.filter_jit
+def _means(body: Body, poses: Array) -> Float[Array, "start blob 3"]:
+    return jax.vmap(lambda pose: body.posed_blobs(pose).means)(poses)
