@@ -64,7 +64,7 @@ def make_actor(
     turn = world_from_upright(recording.up)
     upright = body.rotated(jnp.asarray(turn, body.blob_sigmas.dtype))
     model = ShapeModel.from_body(upright)
-    pictures = [load_pictures(recording, example) for example in examples]
+    pictures = [load_pictures(recording, e, report) for e in progress(examples, len(examples), "masks")]
     coarse = same_capacity([silhouette_views(posed, rig, body.num_blobs, COARSE_DEPTH) for posed in pictures])
     poses = []
     triples = list(zip(examples, pictures, coarse, strict=True))
