@@ -59,7 +59,7 @@ def make_actor(
     Raises:
         InputError: no example poses of the subject, or pictures without masks.
     """
-    examples = _examples_of(recording, subject)
+    examples = examples_of(recording, subject)
     rig = jax.tree.map(jnp.asarray, recording.rig.cameras)
     turn = world_from_upright(recording.up)
     upright = body.rotated(jnp.asarray(turn, body.blob_sigmas.dtype))
@@ -100,7 +100,12 @@ def subjects_of(recording: Recording) -> tuple[str | None, ...]:
     return tuple(names) or (None,)
 
 
-def _examples_of(recording: Recording, subject: str | None) -> list[ExamplePose]:
+def examples_of(recording: Recording, subject: str | None) -> list[ExamplePose]:
+    """The example poses of one subject.
+
+    Raises:
+        InputError: there are none, or several subjects and none is chosen.
+    """
     if not recording.example_poses:
         raise InputError(
             f"{recording.path}: no example poses to make an actor from; add example_poses/POSE/CAMERA.jpg "

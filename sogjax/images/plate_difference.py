@@ -18,8 +18,6 @@ EDGE_NOISE = 0.08
 """Noise beside edges of the plate, as a share of their contrast: a little misalignment and compression."""
 SHADOW_CORRELATION = 0.65
 """A darker place whose pattern is that of the plate to this degree is a shadow."""
-RIM = 4
-"""Pixels. The hard rim of a shadow looks like another colour in a band that is narrower than this."""
 PATTERN_WINDOW = 11
 """Pixels of the working picture; also how far a shadow's edge blurs the comparison."""
 SATURATED = (4.0, 250.0)
@@ -72,9 +70,7 @@ def plate_difference(
     change = _averaged((light - expected) ** 2 / variance)
     brightness = _brightness(light, expected, 1.0 / variance)
     unexplained = _unexplained(light, expected, brightness, variance)
-    one_by_one = _unexplained(light, expected, _brightness(light, expected, 1.0 / variance, 1), variance)
-    # one brightness for some pixels together tells more, but not at the rim of a shadow
-    different = opened(one_by_one > DIFFERENT, 3) | opened(unexplained > DIFFERENT, RIM)
+    different = opened(unexplained > DIFFERENT, 3)
     shadow = _keeps_pattern(light, expected, noise) & (brightness < 1.0) & ~different
     changed = opened(change > CHANGED, 3) & ~opened(shadow, 5)
     return Difference(small, change, unexplained, changed, different)
@@ -124,11 +120,10 @@ def _brightness(
     light: Float[np.ndarray, "rows columns 3"],
     expected: Float[np.ndarray, "rows columns 3"],
     weights: Float[np.ndarray, "rows columns 3"],
-    window: int = 3,
 ) -> Float[np.ndarray, "rows columns"]:
-    """Brightness of `window` pixels together, in units of the plate's."""
-    above = cv2.blur((light * expected * weights).sum(axis=-1), (window, window))
-    below = cv2.blur((expected * expected * weights).sum(axis=-1), (window, window))
+    """Brightness of each pixel and its neighbours together, in units of the plate's."""
+    above = cv2.blur((light * expected * weights).sum(axis=-1), (3, 3))
+    below = cv2.blur((expected * expected * weights).sum(axis=-1), (3, 3))
     return above / (below + 1e-6)
 
 
