@@ -200,6 +200,7 @@ WRONG = {
     "pose of unknown dof": (("poses", "out", "arround"), 1, r"poses.out.arround is 'arround', .*around"),
     "pose value": (("poses", "out", "along"), None, r"poses.out.along is empty, .*number"),
     "pose no mapping": (("poses", "out"), [1, 2, 3], r"poses.out is \[1, 2, 3\], .*mapping"),
+    "shape of unknown joint": (("shape", 0, "joint_offsets", 0), "trun", r"joint_offsets\[0\] is 'trun', .*turn"),
     "shape of unknown blob": (("shape", 0, "blob_offsets", 0), "lo", r"blob_offsets\[0\] is 'lo', .*low"),
     "shape twice": (("shape", 0, "blob_offsets"), ["low", "low"], r"shape\[0\].blob_offsets is .*every name once"),
     "shape unknown list": (("shape", 0, "sigmas"), ["low"], r"shape\[0\].sigmas is unknown"),

@@ -143,6 +143,73 @@ def test_example_pose_without_masks(capsys, recording):
     assert "mask" in refused[-1]
 
 
+def example_pose(recording, cameras=("left", "right"), masks=("left", "right")):
+    """An example pose with a white square on each mask."""
+    mask = np.zeros((48, 64, 3), np.uint8)
+    mask[10:40, 20:40] = 255
+    for camera in cameras:
+        write_image(recording / "example_poses" / "tpose" / f"{camera}.jpg", np.full((48, 64, 3), 90, np.uint8))
+    for camera in masks:
+        write_image(recording / "example_poses" / "tpose" / f"{camera}.mask.png", mask)
+    return recording / "example_poses" / "tpose"
+
+
+def mask_of_another_size(recording):
+    write_image(example_pose(recording) / "left.mask.png", np.zeros((24, 32), np.uint8))
+    return "left.mask.png", "32x24", "64x48"
+
+
+def empty_mask(recording):
+    write_image(example_pose(recording) / "right.mask.png", np.zeros((48, 64), np.uint8))
+    return "right.mask.png", "empty", "white"
+
+
+def full_mask(recording):
+    write_image(example_pose(recording) / "right.mask.png", np.full((48, 64), 255, np.uint8))
+    return "right.mask.png", "full", "white"
+
+
+def one_camera(recording):
+    return example_pose(recording, ("left",), ("left",)), "1 of the cameras", "at least two"
+
+
+def one_mask(recording):
+    return example_pose(recording, masks=("left",)), "1 pictures with a mask", "background", "right"
+
+
+def no_mask_and_no_plate(recording):
+    return example_pose(recording, masks=()), "0 pictures with a mask", "background", "left, right"
+
+
+def plates_without_difference(recording):
+    folder = example_pose(recording, masks=())
+    for camera in ("left", "right"):
+        write_image(recording / "background" / f"{camera}.jpg", np.full((48, 64, 3), 90, np.uint8))
+    return folder, "left, right", "no subject", "mask.png"
+
+
+@pytest.mark.parametrize("command", ["actor", "segment"])
+@pytest.mark.parametrize(
+    "change",
+    [
+        mask_of_another_size,
+        empty_mask,
+        full_mask,
+        one_camera,
+        one_mask,
+        no_mask_and_no_plate,
+        plates_without_difference,
+    ],
+)
+def test_an_example_pose_with_something_wrong(capsys, recording, command, change):
+    words = change(recording)
+    before = sorted(recording.parent.rglob("*"))
+    sentence = refused(capsys, command, f"recording={recording}", f"out={recording.parent / 'new' / 'actor.yaml'}")
+    for word in words:
+        assert str(word) in sentence
+    assert sorted(recording.parent.rglob("*")) == before
+
+
 def refused_track_lines(capsys, recording):
     """As `refused_track`, where the work has begun to report what it does."""
     from sogjax.app.cli import main
@@ -177,11 +244,28 @@ def nan_sigma(actor):
     return "blobs[1].sigma", "nan"
 
 
-@pytest.mark.parametrize("change", [unknown_parent, cycle, weight_for_unknown_joint, negative_sigma, nan_sigma])
+def shape_of_unknown_joint(actor):
+    actor["shape"] = [{"name": "trunk", "joint_offsets": ["neck", "waste"]}]
+    return "shape[0].joint_offsets[1]", "waste", "waist"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [unknown_parent, cycle, weight_for_unknown_joint, negative_sigma, nan_sigma, shape_of_unknown_joint],
+)
 def test_an_actor_file_with_something_wrong(capsys, recording, tmp_path, change):
     words = []
     path = actor_file(tmp_path / "actor.yaml", lambda content: words.extend(change(content)))
     refused_track(capsys, recording, f"actor={path}", words=(path, *words))
+
+
+def test_a_body_to_start_from_with_something_wrong(capsys, recording, tmp_path):
+    example_pose(recording)
+    words = []
+    path = actor_file(tmp_path / "body.yaml", lambda content: words.extend(shape_of_unknown_joint(content)))
+    sentence = refused(capsys, "actor", f"recording={recording}", f"body={path}", "out=new/actor.yaml")
+    for word in (path, *words):
+        assert str(word) in sentence
 
 
 @pytest.mark.parametrize(
@@ -267,6 +351,9 @@ def test_paths_with_any_characters(capsys, tmp_path):
         ("demo", "out=new", "cameras=0"),
         ("actor", "recording=RECORDING", "out=new/actor.yaml"),
         ("actor", "recording=RECORDING", "out=RECORDING"),
+        ("segment", "recording=RECORDING", "out=new"),
+        ("segment", "recording=RECORDING", "out=RECORDING/example_poses"),
+        ("segment", "recording=RECORDING", "out=new", "cameras=[nope]"),
         ("evaluate",),
         ("demo", "-m", "seed=1,2"),
         ("nonsense",),

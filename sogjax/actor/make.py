@@ -1,6 +1,6 @@
 """An actor from a recording's example poses: a named body, scaled to the subject and coloured."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,6 +14,7 @@ from sogjax.actor.estimate import Estimate, estimate_shape
 from sogjax.actor.example_pose import pose_from_silhouettes, starts_at
 from sogjax.actor.shape import ShapeModel
 from sogjax.actor.silhouette_cells import silhouettes_of
+from sogjax.actor.silhouette_iou import silhouette_iou
 from sogjax.actor.silhouettes import (
     COARSE_DEPTH,
     FINE_DEPTH,
@@ -35,6 +36,9 @@ from sogjax.track.initial_pose import rough_pose
 Report = Callable[[str], None]
 Progress = Callable[[Iterable[Any], int, str], Iterable[Any]]
 """Wraps items, of which there are so many, to show under a label how far the work is."""
+
+POSE_FOUND = 0.5
+"""Least IoU of masks and silhouettes, the mean over the cameras. Good fits have 0.8 to 0.9."""
 
 
 @dataclass(frozen=True)
@@ -89,12 +93,12 @@ def make_actor(
     Raises:
         InputError: no example poses of the subject, or pictures without masks.
     """
-    examples = _examples_of(recording, subject)
+    examples = examples_of(recording, subject)
     rig = jax.tree.map(jnp.asarray, recording.rig.cameras)
     turn = world_from_upright(recording.up)
     upright = body.rotated(jnp.asarray(turn, body.blob_sigmas.dtype))
     model = ShapeModel.from_body(upright, symmetric)
-    pictures = [load_pictures(recording, example) for example in examples]
+    pictures = [load_pictures(recording, e, report) for e in progress(examples, len(examples), "masks")]
     coarse = same_capacity([silhouette_views(posed, rig, body.num_blobs, COARSE_DEPTH) for posed in pictures])
     poses = []
     triples = list(zip(examples, pictures, coarse, strict=True))
@@ -106,6 +110,7 @@ def make_actor(
     views = stack_views([silhouette_views(posed, rig, body.num_blobs, FINE_DEPTH) for posed in pictures])
     estimate = estimate_shape(model, jnp.stack(poses), views, silhouettes_of(pictures, rig), weights)
     shaped = model.shaped(estimate.shape_params)
+    _check_fit(recording, shaped, estimate, pictures, rig)
     report("colours")
     shown = [
         ColoredView(camera_of(rig, camera), image, posed.masks[camera], pose)
@@ -124,13 +129,37 @@ def make_actor(
     )
 
 
+def _check_fit(
+    recording: Recording, body: Body, estimate: Estimate, pictures: Sequence[PosedPictures], rig: Camera
+) -> None:
+    """Refuse a fit in which a pose was not found.
+
+    Raises:
+        InputError: the silhouettes of the body and the masks of an example pose hardly overlap.
+    """
+    for posed, pose in zip(pictures, estimate.poses, strict=True):
+        overlap = float(np.mean([silhouette_iou(body, pose, camera_of(rig, k), m) for k, m in posed.masks.items()]))
+        if overlap < POSE_FOUND:
+            raise InputError(
+                f"{recording.path}: the pose of the example {posed.name!r} was not found: its masks and the body's "
+                f"silhouettes overlap by only {overlap:.2f} (IoU); look at the masks with `sogjax segment`, or give its "
+                f"rough pose in recording.yaml, as `example_poses: [{{name: {posed.name}, initial_pose: "
+                "{pose: ..., position: [x, y, z], heading: ...}}]`"
+            )
+
+
 def subjects_of(recording: Recording) -> tuple[str | None, ...]:
     """The subjects that the example poses show; (None,) where they name none."""
     names = dict.fromkeys(example.actor for example in recording.example_poses)
     return tuple(names) or (None,)
 
 
-def _examples_of(recording: Recording, subject: str | None) -> list[ExamplePose]:
+def examples_of(recording: Recording, subject: str | None) -> list[ExamplePose]:
+    """The example poses of one subject.
+
+    Raises:
+        InputError: there are none, or several subjects and none is chosen.
+    """
     if not recording.example_poses:
         raise InputError(
             f"{recording.path}: no example poses to make an actor from; add example_poses/POSE/CAMERA.jpg "

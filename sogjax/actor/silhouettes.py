@@ -1,6 +1,7 @@
 """Example poses as silhouettes: what Eq. 9 compares a body of unknown shape and pose with."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,7 +11,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, UInt8
 
-from sogjax.data.image_file import read_image, read_mask
+from sogjax.actor.example_masks import example_masks
+from sogjax.data.image_file import read_image
 from sogjax.data.recording import ExamplePose, Recording
 from sogjax.energy.objective import Views, whole_image_overlap
 from sogjax.errors import InputError
@@ -36,29 +38,38 @@ class PosedPictures:
     images: dict[int, UInt8[np.ndarray, "_h _w 3"]]
     """BGR."""
     masks: dict[int, Bool[np.ndarray, "_h _w"]]
+    warnings: tuple[str, ...] = ()
+    """What was noticed about the masks, one sentence each."""
 
 
-def load_pictures(recording: Recording, example: ExamplePose) -> PosedPictures:
-    """The pictures of an example pose that have masks.
+def load_pictures(
+    recording: Recording, example: ExamplePose, report: Callable[[str], None] = lambda _: None
+) -> PosedPictures:
+    """The pictures of an example pose that have masks, or for which masks can be made (`example_masks`).
 
     Raises:
-        InputError: fewer than two cameras have a picture with a mask; a mask that is empty or full; another size.
+        InputError: fewer than two cameras have a picture with a mask or a plate; a mask that is empty or full; a
+            picture of another size.
     """
-    names = [name for name in recording.rig.names if name in example.images and name in example.masks]
-    if len(names) < 2:
-        raise InputError(
-            f"{recording.path}: the example pose {example.name!r} has {len(names)} pictures with a mask; "
-            "give CAMERA.mask.png (white = subject) beside at least two pictures"
-        )
-    images: dict[int, np.ndarray] = {}
-    masks: dict[int, np.ndarray] = {}
-    for camera, name in enumerate(recording.rig.names):
-        if name not in names:
-            continue
-        images[camera], masks[camera] = read_image(example.images[name]), read_mask(example.masks[name])
-        _check_picture(example.images[name], images[camera], recording.rig.image_size(name))
-        _check_mask(example.masks[name], masks[camera])
-    return PosedPictures(example.name, images, masks)
+    images = load_images(recording, example)
+    masks = example_masks(recording, example, images)
+    for warning in masks.warnings:
+        report(f"warning: {warning}")
+    return PosedPictures(example.name, {k: images[k] for k in masks.masks}, masks.masks, masks.warnings)
+
+
+def load_images(recording: Recording, example: ExamplePose) -> dict[int, UInt8[np.ndarray, "_h _w 3"]]:
+    """All pictures (BGR) of an example pose, by camera (its index in the rig).
+
+    Raises:
+        InputError: a picture of another size than the calibration's.
+    """
+    cameras = [(k, name) for k, name in enumerate(recording.rig.names) if name in example.images]
+    with ThreadPoolExecutor() as pool:
+        images = list(pool.map(lambda camera: read_image(example.images[camera[1]]), cameras))
+    for (_, name), image in zip(cameras, images, strict=True):
+        _check_picture(example.images[name], image, recording.rig.image_size(name))
+    return {k: image for (k, _), image in zip(cameras, images, strict=True)}
 
 
 def _check_picture(path: Path, image: UInt8[np.ndarray, "_h _w 3"], size: tuple[int, int]) -> None:
@@ -68,11 +79,6 @@ def _check_picture(path: Path, image: UInt8[np.ndarray, "_h _w 3"], size: tuple[
             f"{path}: is {width}x{height} pixels, the calibration is for {size[0]}x{size[1]}; "
             "use pictures of the calibrated size"
         )
-
-
-def _check_mask(path: Path, mask: Bool[np.ndarray, "_h _w"]) -> None:
-    if mask.all() or not mask.any():
-        raise InputError(f"{path}: the mask is {'full' if mask.all() else 'empty'}; white must mark the subject")
 
 
 def silhouette_views(pictures: PosedPictures, rig: Camera, num_blobs: int, depth: int) -> Views:

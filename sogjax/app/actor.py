@@ -1,8 +1,9 @@
-"""`sogjax actor`: an actor file from the example poses of a recording."""
+"""`sogjax actor`: an actor file from the example poses of a recording, and a report beside it."""
 
 from pathlib import Path
 
 from sogjax.actor.make import make_actor
+from sogjax.app.actor_report import report_folder, write_actor_report
 from sogjax.app.build import color_space_and_radius, energy_weights
 from sogjax.app.configs import ActorConfig
 from sogjax.app.outputs import results_folder
@@ -13,7 +14,7 @@ from sogjax.errors import InputError
 
 
 def run(config: ActorConfig) -> Path:
-    """Make the actor and write its file.
+    """Make the actor and write its file and its report.
 
     Raises:
         InputError: anything wrong with the recording, its example poses or the body.
@@ -28,5 +29,11 @@ def run(config: ActorConfig) -> Path:
     with results_folder(out.parent):
         made = make_actor(recording, body, config.subject, space, weights, say, progress, config.symmetric)
         save_body(out, made.body)
+        folder = report_folder(out)
+        report = write_actor_report(folder, made, recording.rig)
+    print(f"silhouettes and masks agree to {report.mean_iou:.3f} (mean IoU)")
+    if report.warnings:
+        say(f"{len(report.warnings)} warnings: see {folder / 'report.md'}")
     print(out)
+    print(folder / "report.md")
     return out

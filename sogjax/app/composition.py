@@ -21,6 +21,7 @@ SCHEMAS: dict[str, type] = {
     "demo": configs.DemoConfig,
     "track": configs.TrackConfig,
     "actor": configs.ActorConfig,
+    "segment": configs.SegmentConfig,
     "evaluate": configs.EvaluateConfig,
     "synth": configs.SynthConfig,
     "view": configs.ViewConfig,

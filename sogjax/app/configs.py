@@ -125,6 +125,16 @@ class ActorConfig:
 
 
 @dataclass
+class SegmentConfig:
+    """Show the masks of the example poses: from files, else made from the empty background pictures."""
+
+    recording: str = option(MISSING, "folder of the recording")
+    out: str = option(MISSING, "folder for POSE/CAMERA.mask.png and one contact sheet a pose, POSE.png")
+    subject: str | None = option(None, "which subject, where the recording has several")
+    cameras: list[str] | None = option(None, "cameras to use; null: all")
+
+
+@dataclass
 class SynthConfig:
     """Render a recording with ground truth."""
 

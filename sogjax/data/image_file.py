@@ -1,4 +1,4 @@
-"""Reading single images and masks."""
+"""Reading single images and masks, and writing masks."""
 
 from pathlib import Path
 
@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, UInt8
 
+from sogjax.data.atomic import atomic_path
 from sogjax.errors import InputError
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
@@ -27,6 +28,16 @@ def read_mask(path: Path) -> Bool[np.ndarray, "height width"]:
         InputError: no such file, or no image.
     """
     return _decode(path, cv2.IMREAD_GRAYSCALE) > 127
+
+
+def write_mask(path: Path, mask: Bool[np.ndarray, "height width"]) -> None:
+    """Write a mask as PNG, white where it is true, in one piece or not at all.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(cv2.imencode(".png", mask.astype(np.uint8) * 255)[1].tobytes())
 
 
 def _decode(path: Path, flags: int) -> np.ndarray:

@@ -1,0 +1,120 @@
+"""The masks of an example pose: from files, else from pictures of the empty scene; blunders left out."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, UInt8
+
+from sogjax.data.image_file import read_image, read_mask
+from sogjax.data.recording import ExamplePose, Recording
+from sogjax.errors import InputError
+from sogjax.images.agreement import AGREEING, disagreeing_cameras, hull_coverage
+from sogjax.images.segmentation import masks_from_plates
+from sogjax.model.frames import axis_vector
+
+FROM_FILE, FROM_PLATE = "file", "plate"
+
+Mask = Bool[np.ndarray, "_h _w"]
+
+
+@dataclass(frozen=True)
+class ExampleMasks:
+    """The masks of one example pose by camera (its index in the rig), of the pictures' size."""
+
+    masks: dict[int, Mask]
+    origins: dict[int, str]
+    """`FROM_FILE` or `FROM_PLATE`, of masks that are left out too."""
+    left_out: dict[int, Mask]
+    """Masks that do not show what the others show."""
+    warnings: tuple[str, ...]
+    """One sentence each."""
+
+
+def example_masks(
+    recording: Recording, example: ExamplePose, images: Mapping[int, UInt8[np.ndarray, "_h _w 3"]]
+) -> ExampleMasks:
+    """Find the masks of one example pose; `images` has the pictures of all its cameras.
+
+    Raises:
+        InputError: fewer than two cameras have a picture with a mask or a plate; a mask that is empty or full.
+    """
+    names = recording.rig.names
+    files = {camera: _checked_mask(example.masks[names[camera]]) for camera in images if names[camera] in example.masks}
+    plates = {
+        camera: read_image(recording.background[names[camera]])
+        for camera in images
+        if camera not in files and names[camera] in recording.background
+    }
+    _check_count(recording, example, len(images), [*files, *plates])
+    cameras = {camera: recording.rig.camera(names[camera]) for camera in images}
+    made = masks_from_plates(images, plates, files, cameras, axis_vector(recording.up)) if plates else {}
+    found = dict(sorted({**files, **made}.items()))
+    _check_found(recording, example, list(found), [camera for camera in plates if camera not in made])
+    wrong = disagreeing_cameras(found, cameras)
+    masks = {camera: mask for camera, mask in found.items() if camera not in wrong}
+    warnings = [_unlike(example, names[camera], share) for camera, share in wrong.items()]
+    warnings += [_no_subject(recording, example, names[camera]) for camera in plates if camera not in made]
+    if len(masks) == 2 and (share := min(hull_coverage(masks, cameras).values())) < AGREEING:
+        pair = " and ".join(names[camera] for camera in masks)
+        warnings.append(
+            f"example pose {example.name!r}: the masks of {pair} agree only to {share:.0%}; look at them with "
+            "`sogjax segment` and replace the wrong one, or add a camera"
+        )
+    return ExampleMasks(
+        masks=masks,
+        origins={camera: FROM_FILE if camera in files else FROM_PLATE for camera in found},
+        left_out={camera: found[camera] for camera in wrong},
+        warnings=tuple(warnings),
+    )
+
+
+def _checked_mask(path: Path) -> Mask:
+    mask = read_mask(path)
+    if mask.all() or not mask.any():
+        raise InputError(f"{path}: the mask is {'full' if mask.all() else 'empty'}; white must mark the subject")
+    return mask
+
+
+def _check_count(recording: Recording, example: ExamplePose, num_images: int, usable: list[int]) -> None:
+    """Hold the number of cameras with a mask or a plate against the two that a pose needs."""
+    if len(usable) >= 2:
+        return
+    where = f"{recording.path / 'example_poses' / example.name}: the example pose {example.name!r}"
+    if num_images < 2:
+        raise InputError(
+            f"{where} has pictures of {num_images} of the cameras {', '.join(recording.rig.names)}; "
+            "give CAMERA.jpg of at least two, or remove the pose"
+        )
+    missing = [name for k, name in enumerate(recording.rig.names) if name in example.images and k not in usable]
+    raise InputError(
+        f"{where} has {len(usable)} pictures with a mask or an empty background picture, and at least two are "
+        f"needed; add CAMERA.mask.png (white = subject) beside the pictures, or the empty scene as "
+        f"{recording.path / 'background'}/CAMERA.jpg, for {', '.join(missing)}"
+    )
+
+
+def _check_found(recording: Recording, example: ExamplePose, found: list[int], failed: list[int]) -> None:
+    if len(found) >= 2:
+        return
+    names = ", ".join(recording.rig.names[camera] for camera in failed)
+    raise InputError(
+        f"{recording.path / 'example_poses' / example.name}: in the pictures of {names} no subject can be told from "
+        f"the empty scene in {recording.path / 'background'}; give CAMERA.mask.png (white = subject), or pictures of "
+        "the empty scene from the same places in the same light"
+    )
+
+
+def _unlike(example: ExamplePose, camera: str, share: float) -> str:
+    return (
+        f"example pose {example.name!r}: {camera} is left out, since its mask does not show what the other cameras "
+        f"show ({share:.0%} of it agrees); look at it with `sogjax segment`, and give {camera}.mask.png"
+    )
+
+
+def _no_subject(recording: Recording, example: ExamplePose, camera: str) -> str:
+    return (
+        f"example pose {example.name!r}: {camera} is left out, since no subject can be told from "
+        f"{recording.background[camera]}; give {camera}.mask.png"
+    )

@@ -1,0 +1,167 @@
+"""How good is an actor: silhouettes against masks, bone lengths, and what the pictures did not tell."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Array, Float
+
+from sogjax.actor.bones import bone_lengths
+from sogjax.actor.silhouette_iou import silhouette_iou
+from sogjax.actor.silhouettes import PosedPictures
+from sogjax.data.calibration import CameraRig
+from sogjax.model.body import Body
+
+UNDETERMINED = 0.7
+"""A shape parameter whose deviation is above this share of what was expected without pictures."""
+POORLY_SEEN_ANGLE, POORLY_SEEN_LENGTH = 0.35, 0.05
+"""Radians and metres: deviation of a degree of freedom in the pose that shows it best."""
+POOR_IOU = 0.75
+"""Mean IoU of a pose below which the pose, or a mask, is likely to be wrong."""
+
+
+@runtime_checkable
+class FinishedActor(Protocol):
+    """What the report needs of an actor that was made (`sogjax.actor.make.MadeActor`)."""
+
+    @property
+    def body(self) -> Body:
+        """The actor."""
+        ...
+
+    @property
+    def start(self) -> Body:
+        """The body before its sizes were estimated."""
+        ...
+
+    @property
+    def upright_body(self) -> Body:
+        """The actor in the recording's world, which `example_poses` refer to."""
+        ...
+
+    @property
+    def example_poses(self) -> Mapping[str, Float[Array, "dof"]]:
+        """By example pose."""
+        ...
+
+    @property
+    def pictures(self) -> Sequence[PosedPictures]:
+        """In the order of `example_poses`."""
+        ...
+
+    @property
+    def shape_names(self) -> Sequence[str]:
+        """Of the shape parameters (logarithms of scale factors)."""
+        ...
+
+    @property
+    def shape_deviations(self) -> Float[np.ndarray, "shape"]:
+        """Standard deviations of the shape parameters, with pictures."""
+        ...
+
+    @property
+    def shape_priors(self) -> Float[np.ndarray, "shape"]:
+        """Standard deviations of the shape parameters, without pictures."""
+        ...
+
+    @property
+    def pose_deviations(self) -> Float[np.ndarray, "pose dof"]:
+        """Standard deviations of the poses (radians, metres)."""
+        ...
+
+
+@dataclass(frozen=True)
+class BoneChange:
+    """One bone, in metres."""
+
+    name: str
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
+class ActorReport:
+    """The figures of one actor."""
+
+    name: str
+    ious: dict[str, dict[str, float]]
+    """Intersection over union by example pose and camera."""
+    bones: tuple[BoneChange, ...]
+    warnings: tuple[str, ...]
+    """One sentence each."""
+
+    @property
+    def mean_iou(self) -> float:
+        """Over all poses and cameras."""
+        return float(np.mean([value for cameras in self.ious.values() for value in cameras.values()]))
+
+    def pose_iou(self, pose: str) -> float:
+        """Mean over the cameras of a pose."""
+        return float(np.mean([*self.ious[pose].values()]))
+
+    def as_dict(self) -> dict[str, Any]:
+        """What the JSON file holds; lengths in metres."""
+        return {
+            "name": self.name,
+            "mean_iou": self.mean_iou,
+            "iou": self.ious,
+            "bones": [asdict(bone) for bone in self.bones],
+            "warnings": list(self.warnings),
+        }
+
+
+def actor_report(made: FinishedActor, rig: CameraRig) -> ActorReport:
+    """Hold the actor against its pictures."""
+    ious = {
+        posed.name: {
+            rig.names[camera]: silhouette_iou(made.upright_body, pose, rig.camera(rig.names[camera]), mask)
+            for camera, mask in posed.masks.items()
+        }
+        for posed, pose in zip(made.pictures, made.example_poses.values(), strict=True)
+    }
+    before, after = bone_lengths(made.start), bone_lengths(made.body)
+    bones = tuple(BoneChange(name, before[name], length) for name, length in after.items())
+    warnings = (
+        *(warning for posed in made.pictures for warning in posed.warnings),
+        *_poor_silhouettes(ious),
+        *_undetermined_sizes(made),
+        *_poorly_seen_dofs(made),
+    )
+    return ActorReport(made.body.name, ious, bones, warnings)
+
+
+def _poor_silhouettes(ious: Mapping[str, Mapping[str, float]]) -> list[str]:
+    means = {pose: float(np.mean([*cameras.values()])) for pose, cameras in ious.items()}
+    return [
+        f"example pose {pose!r}: the silhouettes agree with the masks only to {mean:.2f} (IoU); look at "
+        f"silhouettes_{pose}.png, and correct a mask or give the pose's `initial_pose` in recording.yaml"
+        for pose, mean in means.items()
+        if mean < POOR_IOU
+    ]
+
+
+def _undetermined_sizes(made: FinishedActor) -> list[str]:
+    rows = zip(made.shape_names, made.shape_deviations, made.shape_priors, strict=True)
+    return [
+        f"{name} was not determined by the pictures: kept near that of the body it started from "
+        f"(uncertain by {deviation:.0%}, without pictures {prior:.0%})"
+        for name, deviation, prior in rows
+        if not deviation <= UNDETERMINED * prior
+    ]
+
+
+def _poorly_seen_dofs(made: FinishedActor) -> list[str]:
+    skeleton = made.body.skeleton
+    used = np.asarray(skeleton.parameter_transform) != 0.0
+    slides = (used & ~np.asarray(skeleton.revolute)[:, None]).any(axis=0)
+    best = np.min(np.nan_to_num(made.pose_deviations, nan=np.inf), axis=0)
+    warnings = []
+    for name, deviation, slide in zip(skeleton.dof_names, best, slides, strict=True):
+        if deviation > (POORLY_SEEN_LENGTH if slide else POORLY_SEEN_ANGLE):
+            amount = f"{1000 * deviation:.0f} mm" if slide else f"{np.degrees(deviation):.0f} degrees"
+            warnings.append(
+                f"{name} was never seen well (uncertain by {amount} in the best pose): what turns with it may be off; "
+                "add an example pose in which it is bent or seen from the side"
+            )
+    return warnings

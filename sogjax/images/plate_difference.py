@@ -1,0 +1,149 @@
+"""Where a picture differs from the empty scene, told apart from where it is only in shadow or exposed otherwise."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+
+WORKING_SIZE = 648
+"""Pixels. Pictures are made smaller until their longer side is not above this: averaging takes noise out."""
+CHANGED = 8.0
+"""Squared differences to the plate above this, in units of the noise, are a change."""
+DIFFERENT = 4.5
+"""The same for what is left when the plate may be darker or a little brighter."""
+SHADOW_RANGE = (0.4, 1.1)
+"""Share of the plate's light that a shadow or reflected light leaves."""
+EDGE_NOISE = 0.08
+"""Noise beside edges of the plate, as a share of their contrast: a little misalignment and compression."""
+SHADOW_CORRELATION = 0.65
+"""A darker place whose pattern is that of the plate to this degree is a shadow."""
+PATTERN_WINDOW = 11
+"""Pixels of the working picture; also how far a shadow's edge blurs the comparison."""
+SATURATED = (4.0, 250.0)
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A picture beside its plate, at the working size."""
+
+    image: UInt8[np.ndarray, "rows columns 3"]
+    """BGR."""
+    change: Float[np.ndarray, "rows columns"]
+    """Mean squared difference, in units of the noise."""
+    unexplained: Float[np.ndarray, "rows columns"]
+    """What a shadow does not explain of it."""
+    changed: Bool[np.ndarray, "rows columns"]
+    """Subject or shadow: what is a shadow for sure, by its pattern, is left out."""
+    different: Bool[np.ndarray, "rows columns"]
+    """Subject: the colour is another one."""
+
+
+def working_size(width: int, height: int) -> tuple[int, int]:
+    """Width and height of the working picture."""
+    factor = min(1.0, WORKING_SIZE / max(width, height))
+    return round(factor * width), round(factor * height)
+
+
+def reduced_mask(mask: Bool[np.ndarray, "height width"]) -> Bool[np.ndarray, "rows columns"]:
+    """A mask at the working size."""
+    size = working_size(mask.shape[1], mask.shape[0])
+    return cv2.resize(mask.astype(np.float32), size, interpolation=cv2.INTER_AREA) > 0.5
+
+
+def plate_difference(
+    image: UInt8[np.ndarray, "height width 3"], plate: UInt8[np.ndarray, "height width 3"]
+) -> Difference:
+    """Hold a picture against the empty scene, seen by the same camera under an exposure that may differ.
+
+    A shadow is the plate, darker: Horprasert, Harwood and Davis, "A Statistical Approach for Real-time Robust
+    Background Subtraction and Shadow Detection" (1999). Where a brown trouser leg before a brown floor looks like one,
+    the pattern may tell: a shadow keeps the floor's.
+    """
+    size = working_size(image.shape[1], image.shape[0])
+    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    light = small.astype(np.float32)
+    expected = _same_exposure(light, cv2.resize(plate, size, interpolation=cv2.INTER_AREA).astype(np.float32))
+    noise = 1.48 * float(np.median(np.abs(light - expected))) + 0.7
+    contrast = cv2.morphologyEx(expected, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
+    variance = noise**2 + (EDGE_NOISE * contrast) ** 2
+    change = _averaged((light - expected) ** 2 / variance)
+    brightness = _brightness(light, expected, 1.0 / variance)
+    unexplained = _unexplained(light, expected, brightness, variance)
+    different = opened(unexplained > DIFFERENT, 3)
+    shadow = _keeps_pattern(light, expected, noise) & (brightness < 1.0) & ~different
+    changed = opened(change > CHANGED, 3) & ~opened(shadow, 5)
+    return Difference(small, change, unexplained, changed, different)
+
+
+def opened(mask: Bool[np.ndarray, "rows columns"], width: int) -> Bool[np.ndarray, "rows columns"]:
+    """Without what is narrower than `width` pixels."""
+    return cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, disc(width)) > 0
+
+
+def closed(mask: Bool[np.ndarray, "rows columns"], width: int) -> Bool[np.ndarray, "rows columns"]:
+    """Without gaps that are narrower than `width` pixels."""
+    return cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, disc(width)) > 0
+
+
+def disc(width: int) -> np.ndarray:
+    """A round element for OpenCV's morphology."""
+    return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (width, width))
+
+
+def _same_exposure(
+    light: Float[np.ndarray, "rows columns 3"], plate: Float[np.ndarray, "rows columns 3"]
+) -> Float[np.ndarray, "rows columns 3"]:
+    """The plate with the gain and offset of each channel that make it most like the picture's background."""
+    seen, empty = (part[::3, ::3].reshape(-1, 3).astype(float) for part in (light, plate))
+    low, high = SATURATED
+    usable = ((seen > low) & (seen < high) & (empty > low) & (empty < high)).all(axis=1)
+    gain, offset = np.ones(3), np.zeros(3)
+    for _ in range(4):
+        rest = np.abs(seen - gain * empty - offset).max(axis=1)
+        kept = usable & (rest <= max(3.0 * float(np.median(rest)), 4.0))
+        if kept.sum() < 100:
+            break
+        spread = np.maximum(empty[kept].var(axis=0), 1e-6)
+        middle_seen, middle_empty = seen[kept].mean(axis=0), empty[kept].mean(axis=0)
+        covariance = ((seen[kept] - middle_seen) * (empty[kept] - middle_empty)).mean(axis=0)
+        gain = np.where(spread > 1.0, np.clip(covariance / spread, 0.3, 3.0), 1.0)
+        offset = middle_seen - gain * middle_empty
+    return np.clip(gain * plate + offset, 0.0, 255.0).astype(np.float32)
+
+
+def _averaged(squares: Float[np.ndarray, "rows columns 3"]) -> Float[np.ndarray, "rows columns"]:
+    return cv2.blur(squares.mean(axis=-1), (3, 3))
+
+
+def _brightness(
+    light: Float[np.ndarray, "rows columns 3"],
+    expected: Float[np.ndarray, "rows columns 3"],
+    weights: Float[np.ndarray, "rows columns 3"],
+) -> Float[np.ndarray, "rows columns"]:
+    """Brightness of each pixel and its neighbours together, in units of the plate's."""
+    above = cv2.blur((light * expected * weights).sum(axis=-1), (3, 3))
+    below = cv2.blur((expected * expected * weights).sum(axis=-1), (3, 3))
+    return above / (below + 1e-6)
+
+
+def _unexplained(
+    light: Float[np.ndarray, "rows columns 3"],
+    expected: Float[np.ndarray, "rows columns 3"],
+    brightness: Float[np.ndarray, "rows columns"],
+    variance: Float[np.ndarray, "rows columns 3"],
+) -> Float[np.ndarray, "rows columns"]:
+    shaded = np.clip(brightness, *SHADOW_RANGE)[..., None] * expected
+    return _averaged((light - shaded) ** 2 / variance)
+
+
+def _keeps_pattern(
+    light: Float[np.ndarray, "rows columns 3"], expected: Float[np.ndarray, "rows columns 3"], noise: float
+) -> Bool[np.ndarray, "rows columns"]:
+    """Where the picture has the plate's pattern, and there is one."""
+    window = (PATTERN_WINDOW, PATTERN_WINDOW)
+    grey = [cv2.cvtColor(part, cv2.COLOR_BGR2GRAY) for part in (light, expected)]
+    seen, empty = (part - cv2.blur(part, window) for part in grey)
+    power, contrast = cv2.blur(seen * seen, window), cv2.blur(empty * empty, window)
+    correlation = cv2.blur(seen * empty, window) / np.sqrt(power * contrast + 1e-3)
+    return (correlation > SHADOW_CORRELATION) & (contrast > (2.0 * noise) ** 2)

@@ -1,0 +1,237 @@
+"""The actor's report: silhouettes against masks, bone lengths, what was not determined, and the files."""
+
+import json
+from dataclasses import dataclass, replace
+
+import cv2
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from body_cases import reference_frames, shipped
+from drawn_scene import DISC, draw, in_colors, moved, standing
+from rig_cases import opencv_pixels, ring_rig
+from tiny_body import make_body
+
+from sogjax.actor.bones import bone_lengths
+from sogjax.actor.report import actor_report
+from sogjax.actor.shape import ShapeModel
+from sogjax.actor.silhouette_iou import body_silhouette, overlap_ratio, silhouette_iou
+from sogjax.actor.silhouettes import PosedPictures
+from sogjax.app.actor_report import report_folder, write_actor_report
+from sogjax.model.body import Attachments, Body
+from sogjax.view.body_picture import BACKGROUND, body_picture
+from sogjax.view.silhouette_sheet import BOTH, ONLY_BODY, ONLY_MASK, SilhouetteView, silhouette_sheet
+
+SIGMA = 0.2
+HALF = np.sqrt(2.0 * np.log(2.0))
+"""Where a Gaussian of sigma 1 has fallen to a half."""
+
+
+def one_blob(place):
+    body = make_body()
+    blob = Attachments(("ball",), (5,), jnp.asarray([place], jnp.float32))
+    parts = lambda b: (b.blobs, b.blob_sigmas, b.blob_colors)
+    return eqx.tree_at(parts, body, (blob, jnp.array([SIGMA]), jnp.full((1, 3), 0.5)))
+
+
+def disc(rig, name, place, radius_metres):
+    camera, (width, height) = rig.camera(name), rig.image_size(name)
+    pose = np.asarray(camera.camera_from_world, float)
+    radius = radius_metres * float(camera.focal_length) / float((pose[:3, :3] @ place + pose[:3, 3])[2])
+    x, y = opencv_pixels(rig, name, [place])[0]
+    rows, columns = np.mgrid[:height, :width]
+    return (columns - x) ** 2 + (rows - y) ** 2 < radius**2
+
+
+def test_the_silhouette_of_one_blob_is_a_disc():
+    """Through a distorting lens too, where the disc's centre is OpenCV's."""
+    place = np.array([0.3, -0.2, 1.4])
+    body = one_blob(place)
+    for distortion in ((0.0,) * 5, (-0.2, 0.05, 1e-3, -2e-3, 0.01)):
+        rig = ring_rig(2, distortion=distortion)
+        for name in rig.names:
+            seen = body_silhouette(body, body.poses["rest"], rig.camera(name), (240, 320))
+            assert overlap_ratio(seen, disc(rig, name, place, HALF * SIGMA)) > 0.97
+
+
+@pytest.mark.parametrize("ratio", [0.7, 1.0, 1.5])
+def test_the_iou_of_two_discs_is_the_ratio_of_their_areas(ratio):
+    place = np.array([0.0, 0.0, 1.2])
+    rig = ring_rig(1, size=(1296, 972), distortion=(0.0,) * 5)  # larger than what is compared
+    found = silhouette_iou(
+        one_blob(place), make_body().poses["rest"], rig.camera("cam0"), disc(rig, "cam0", place, ratio * HALF * SIGMA)
+    )
+    assert abs(found - min(ratio, 1.0 / ratio) ** 2) < 0.02
+
+
+def test_a_body_behind_the_camera_has_no_silhouette():
+    rig = ring_rig(1)
+    body = one_blob(np.array([8.0, 3.0, 1.6]))
+    assert not body_silhouette(body, body.poses["rest"], rig.camera("cam0"), (120, 160)).any()
+
+
+def test_bones_of_a_body_made_by_hand():
+    found = bone_lengths(make_body())
+    expected = {
+        "root - spine bend": 0.2,
+        "spine bend - left shoulder": np.hypot(0.2, 0.3),
+        "left upper arm": 0.3,
+        "root - left hip": np.hypot(0.1, 0.05),
+    }
+    for bone, length in expected.items():
+        assert found[bone] == pytest.approx(length)
+
+
+def test_bones_of_the_human_body_keep_their_length_in_every_pose():
+    """Distances of joints by forward kinematics written a second time; arms have roll joints halfway."""
+    body = shipped("human")
+    frames = reference_frames(body.skeleton, np.random.default_rng(0).uniform(-1.0, 1.0, body.skeleton.num_dofs))
+    at = lambda name: frames[body.skeleton.names.index(name), :3, 3]
+    found = bone_lengths(body)
+    for side in ("left", "right"):
+        for bone, top, end in (
+            ("upper arm", "shoulder_roll", "elbow"),
+            ("forearm", "elbow", "wrist_bend"),
+            ("thigh", "hip_bend", "knee"),
+            ("shank", "knee", "ankle_bend"),
+        ):
+            length = np.linalg.norm(at(f"{side}_{top}") - at(f"{side}_{end}"))
+            assert found[f"{side} {bone}"] == pytest.approx(length, abs=1e-6)
+    assert found["hip width"] == pytest.approx(np.linalg.norm(at("left_hip_bend") - at("right_hip_bend")), abs=1e-6)
+    assert found["spine"] == pytest.approx(0.371, abs=2e-3)
+    assert min(found.values()) > 0.02
+
+
+@dataclass
+class Made:
+    """What the report needs of an actor."""
+
+    body: Body
+    start: Body
+    upright_body: Body
+    example_poses: dict
+    pictures: tuple
+    shape_names: tuple
+    shape_deviations: np.ndarray
+    shape_priors: np.ndarray
+    pose_deviations: np.ndarray
+
+
+RIG = ring_rig(3, (160, 120), distance=1.6)
+
+
+def made_dog():
+    start = shipped("dog")
+    model = ShapeModel.from_body(start)
+    shape = jnp.zeros(model.num_shape_params).at[0].set(np.log(1.1))
+    body = in_colors(model.shaped(shape))
+    poses = {"stand": standing(body, 1.2)}
+    poses["turned"] = moved(body, poses["stand"], {"root_yaw": 0.8})
+    pictures = []
+    for name, pose in poses.items():
+        images, masks = draw(body, pose, RIG), draw(body, pose, RIG, masks=True)
+        pictures.append(PosedPictures(name, dict(enumerate(images)), dict(enumerate(masks))))
+    dofs = body.skeleton.num_dofs
+    names = ("whole", *(group.name for group in body.shape_groups))
+    return Made(
+        body, start, body, {name: jnp.asarray(pose) for name, pose in poses.items()}, tuple(pictures), names,
+        np.full(len(names), 0.02), np.full(len(names), 0.1), np.full((2, dofs), 0.02),
+    )  # fmt: skip
+
+
+def test_a_good_actor_has_nothing_to_warn_of():
+    report = actor_report(made_dog(), RIG)
+    assert {pose: list(cameras) for pose, cameras in report.ious.items()} == {
+        pose: list(RIG.names) for pose in ("stand", "turned")
+    }
+    assert report.mean_iou > 0.85  # the masks were drawn as discs of 1.35 sigma, which nearly is the level of a half
+    assert DISC == 1.35
+    for bone in report.bones:
+        assert bone.after == pytest.approx(1.1 * bone.before, rel=1e-4)
+    assert report.warnings == ()
+
+
+def test_what_the_pictures_did_not_tell_is_said():
+    made = made_dog()
+    made.shape_deviations[3] = 0.09
+    elbow = list(made.body.skeleton.dof_names).index("root_yaw")
+    made.pose_deviations[:, elbow] = (0.5, 0.4)
+    place = list(made.body.skeleton.dof_names).index("root_x")
+    made.pose_deviations[0, place], made.pose_deviations[1, place] = np.nan, 0.2
+    once = list(made.body.skeleton.dof_names).index("root_roll")
+    made.pose_deviations[0, once] = 3.0
+    masks = {k: np.roll(mask, 40, axis=1) for k, mask in made.pictures[1].masks.items()}
+    made.pictures = (
+        replace(made.pictures[0], warnings=("example pose 'stand': cam1 is left out",)),
+        replace(made.pictures[1], masks=masks),
+    )
+    left_out, poor, size, first, second = sorted(actor_report(made, RIG).warnings, key=_kind)
+    assert left_out == "example pose 'stand': cam1 is left out"
+    assert "'turned'" in poor
+    assert "silhouettes_turned.png" in poor
+    assert size.startswith(f"{made.shape_names[3]} was not determined by the pictures: kept near")
+    assert {first.split()[0], second.split()[0]} == {"root_x", "root_yaw"}
+    assert "200 mm" in first + second
+    assert "23 degrees" in first + second
+
+
+def _kind(warning):
+    kinds = ("left out", "silhouettes agree", "not determined", "never seen well")
+    return next(k for k, words in enumerate(kinds) if words in warning)
+
+
+def test_the_files_of_the_report(tmp_path):
+    made = made_dog()
+    folder = report_folder(tmp_path / "rex.yaml")
+    assert folder == tmp_path / "rex_report"
+    report = write_actor_report(folder, made, RIG)
+    files = ["actor_report.json", "colors.png", "report.md", "silhouettes_stand.png", "silhouettes_turned.png"]
+    assert sorted(path.name for path in folder.iterdir()) == files
+    numbers = json.loads((folder / "actor_report.json").read_text())
+    assert numbers == json.loads(json.dumps(report.as_dict()))
+    assert numbers["mean_iou"] == pytest.approx(report.mean_iou)
+    page = (folder / "report.md").read_text()
+    for words in (
+        "# Actor dog",
+        "silhouettes_stand.png",
+        "colors.png",
+        "cam0 | cam1 | cam2",
+        "left upper arm",
+        "+10.0",
+    ):
+        assert words in page
+    for name in files:
+        if name.endswith(".png"):
+            assert cv2.imread(str(folder / name)).size > 10_000
+
+
+def test_colours_of_a_sheet_tell_mask_and_body_apart():
+    rows, columns = np.mgrid[:60, :80]
+    mask = (rows >= 20) & (rows < 40) & (columns >= 20) & (columns < 50)
+    body = (rows >= 20) & (rows < 40) & (columns >= 30) & (columns < 60)
+    image = np.full((120, 160, 3), 200, np.uint8)
+    sheet = silhouette_sheet([SilhouetteView("cam0", 0.5, image, mask, body)], "dog").astype(float)
+    painted = {
+        color: int((np.abs(sheet - (0.55 * 100 + 0.45 * np.array(color))) < 0.51).all(axis=-1).sum())
+        for color in (BOTH, ONLY_MASK, ONLY_BODY)
+    }
+    for color in (ONLY_MASK, ONLY_BODY):
+        assert painted[color] / painted[BOTH] == pytest.approx(0.5, abs=0.06)
+
+
+def test_the_picture_of_a_body_shows_left_and_front_where_they_belong():
+    """Three blobs above each other: left, right and in front of the middle."""
+    means = np.array([[0.0, 0.3, 1.0], [0.0, -0.3, 0.5], [0.4, 0.0, 0.0]])
+    colors = np.eye(3)
+    picture = body_picture(means, np.full(3, 0.05), colors).astype(int)
+    middle = lambda k: np.argwhere((np.abs(picture - 255 * np.eye(3, dtype=int)[2 - k]) < 3).all(-1))
+    red, green, blue = (middle(k) for k in range(3))
+    front = picture.shape[1] * 0.55
+    of_front = lambda points: points[points[:, 1] < front].mean(axis=0)
+    assert of_front(red)[1] > of_front(green)[1]  # the body's left is on the viewer's right
+    assert of_front(red)[0] < of_front(green)[0] < blue[:, 0].mean()
+    side = blue[blue[:, 1] > front]
+    others = red[red[:, 1] > front]
+    assert side[:, 1].mean() < others[:, 1].mean()  # seen from its left, it looks to the viewer's left
+    assert (picture[0, 0] == BACKGROUND).all()

@@ -1,0 +1,128 @@
+"""Masks of example poses: files before plates, wrong ones left out, and what is missing is said."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from body_cases import shipped
+from drawn_scene import draw, in_colors, standing
+from rig_cases import recording_of, ring_rig
+from test_segmentation import FLESH, iou, photo, scene
+
+from sogjax.actor.example_masks import FROM_FILE, FROM_PLATE, example_masks
+from sogjax.actor.silhouettes import load_images, load_pictures
+from sogjax.data.recording import ExamplePose
+from sogjax.errors import InputError
+
+RIG = ring_rig(4, (160, 120), distance=1.6)
+BODY = in_colors(shipped("dog"))
+POSE = standing(BODY, 1.15)
+TRUTH = draw(BODY, POSE, RIG, masks=True, disc=FLESH)
+DRAWN = draw(BODY, POSE, RIG, disc=FLESH)
+
+
+def write(path, image):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    assert cv2.imwrite(str(path), image)
+    return path
+
+
+def example_recording(folder, pictures=(0, 1, 2, 3), masks=(), plates=()):
+    """A dog before a patterned wall, with masks and plates of some of the cameras."""
+    images, files, background = {}, {}, {}
+    for k, name in enumerate(RIG.names):
+        empty = scene((160, 120), seed=k, contrast=10.0)
+        if k in pictures:
+            light = np.where(TRUTH[k][..., None], DRAWN[k], empty)
+            images[name] = write(folder / "example_poses" / "stand" / f"{name}.png", photo(light, k))
+        if k in masks:
+            mask = TRUTH[k].astype(np.uint8) * 255
+            files[name] = write(folder / "example_poses" / "stand" / f"{name}.mask.png", mask)
+        if k in plates:
+            background[name] = write(folder / "background" / f"{name}.png", photo(empty, 50 + k))
+    example = ExamplePose("stand", None, images, files, None)
+    return replace(recording_of(RIG, 1), path=folder, example_poses=(example,), background=background)
+
+
+def masks_of(recording):
+    example = recording.example_poses[0]
+    return example_masks(recording, example, load_images(recording, example))
+
+
+def test_files_come_before_plates(tmp_path):
+    found = masks_of(example_recording(tmp_path, masks=(0, 2), plates=(0, 1)))
+    assert found.origins == {0: FROM_FILE, 1: FROM_PLATE, 2: FROM_FILE}
+    assert list(found.masks) == [0, 1, 2]
+    np.testing.assert_array_equal(found.masks[0], TRUTH[0])
+    assert iou(found.masks[1], TRUTH[1]) > 0.85
+    assert found.warnings == ()
+
+
+def test_plates_alone_suffice(tmp_path):
+    recording = example_recording(tmp_path, plates=(0, 1, 2, 3))
+    pictures = load_pictures(recording, recording.example_poses[0])
+    assert list(pictures.masks) == [0, 1, 2, 3] == list(pictures.images)
+    for k, mask in pictures.masks.items():
+        assert iou(mask, TRUTH[k]) > 0.85
+
+
+def test_a_mask_of_something_else_is_left_out_and_said(tmp_path):
+    recording = example_recording(tmp_path, masks=(0, 1, 2, 3))
+    wrong = np.zeros((120, 160), np.uint8)
+    wrong[60:110, 5:40] = 255
+    write(recording.example_poses[0].masks["cam2"], wrong)
+    found = masks_of(recording)
+    assert list(found.masks) == [0, 1, 3]
+    np.testing.assert_array_equal(found.left_out[2], wrong > 0)
+    assert found.origins[2] == FROM_FILE
+    said = []
+    load_pictures(recording, recording.example_poses[0], said.append)
+    assert len(said) == 1
+    assert "'stand': cam2 is left out" in said[0]
+    assert "cam2.mask.png" in said[0]
+
+
+def test_two_masks_that_do_not_fit_are_said(tmp_path):
+    recording = example_recording(tmp_path, masks=(0, 1))
+    wrong = TRUTH[1].copy()
+    wrong[: np.nonzero(wrong)[0].mean().astype(int)] = False
+    write(recording.example_poses[0].masks["cam1"], wrong.astype(np.uint8) * 255)
+    found = masks_of(recording)
+    assert list(found.masks) == [0, 1]
+    assert "cam0 and cam1 agree only to" in found.warnings[0]
+
+
+def test_a_plate_that_is_not_empty_is_left_out_and_said(tmp_path):
+    recording = example_recording(tmp_path, masks=(0, 1), plates=(3,))
+    write(recording.background["cam3"], cv2.imread(str(recording.example_poses[0].images["cam3"])))
+    found = masks_of(recording)
+    assert list(found.masks) == [0, 1]
+    assert "cam3 is left out" in found.warnings[0]
+    assert str(recording.background["cam3"]) in found.warnings[0]
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({}, ("'stand' has 0 pictures with a mask", "CAMERA.mask.png", "background", "cam0, cam1, cam2, cam3")),
+        ({"masks": (1,)}, ("'stand' has 1 pictures with a mask", "for cam0, cam2, cam3")),
+        ({"pictures": (2,), "masks": (2,)}, ("'stand' has pictures of 1 of the cameras", "at least two")),
+    ],
+)
+def test_too_little_to_make_masks_from(tmp_path, given, words):
+    recording = example_recording(tmp_path, **given)
+    with pytest.raises(InputError) as refused:
+        masks_of(recording)
+    assert str(tmp_path / "example_poses" / "stand") in str(refused.value)
+    for word in words:
+        assert word in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_plates_from_which_no_subject_can_be_told(tmp_path):
+    recording = example_recording(tmp_path, plates=(0, 1))
+    for k in (0, 1):
+        write(recording.background[f"cam{k}"], cv2.imread(str(recording.example_poses[0].images[f"cam{k}"])))
+    with pytest.raises(InputError, match=r"in the pictures of cam0, cam1 no subject.*CAMERA\.mask\.png"):
+        masks_of(recording)

@@ -1,0 +1,66 @@
+"""`sogjax segment`: what it writes, and that nothing that was given is touched."""
+
+import cv2
+import numpy as np
+from command_line import done, refused
+from rig_cases import ring_rig
+
+from sogjax.data.image_file import read_mask
+from sogjax.synth import SynthSettings, render_recording
+from sogjax.view.contact_sheet import GREEN, TITLE_HEIGHT, Tile, contact_sheet
+
+
+def iou(a, b):
+    return (a & b).sum() / (a | b).sum()
+
+
+def test_masks_and_sheets_of_a_rendered_person(capsys, tmp_path):
+    """One camera keeps its mask, one has neither mask nor plate, the others' masks are made from plates."""
+    recording = tmp_path / "person"
+    render_recording(SynthSettings(cameras=4, frames=1, width=320, height=240, seed=2), recording)
+    poses = sorted(path.name for path in (recording / "example_poses").iterdir())
+    truth = {}
+    for pose in poses:
+        for camera in ("cam01", "cam02", "cam03"):
+            path = recording / "example_poses" / pose / f"{camera}.mask.png"
+            truth[pose, camera] = read_mask(path)
+            path.unlink()
+    (recording / "background" / "cam03.jpg").unlink()
+    before = {path: path.read_bytes() for path in recording.rglob("*") if path.is_file()}
+
+    out, err = done(capsys, "segment", f"recording={recording}", f"out={tmp_path / 'masks'}")
+    assert out.split() == [str(tmp_path / "masks" / f"{pose}.png") for pose in out_order(out)]
+    assert sorted(out_order(out)) == poses
+    assert "warning" not in err
+    for pose in poses:
+        written = sorted(path.name for path in (tmp_path / "masks" / pose).iterdir())
+        assert written == ["cam00.mask.png", "cam01.mask.png", "cam02.mask.png"]
+        for camera in ("cam01", "cam02"):
+            made = read_mask(tmp_path / "masks" / pose / f"{camera}.mask.png")
+            assert made.shape == truth[pose, camera].shape
+            assert iou(made, truth[pose, camera]) > 0.8
+        given = read_mask(recording / "example_poses" / pose / "cam00.mask.png")
+        np.testing.assert_array_equal(read_mask(tmp_path / "masks" / pose / "cam00.mask.png"), given)
+        assert cv2.imread(str(tmp_path / "masks" / f"{pose}.png")).shape[1] > 320
+    assert {path: path.read_bytes() for path in recording.rglob("*") if path.is_file()} == before
+
+    inside = recording / "example_poses"
+    assert str(inside) in refused(capsys, "segment", f"recording={recording}", f"out={inside}")
+
+
+def out_order(out):
+    return [line.rsplit("/", 1)[-1].removesuffix(".png") for line in out.split()]
+
+
+def test_a_sheet_shows_every_picture_with_its_mask_tinted():
+    names = ring_rig(3).names
+    image = np.full((90, 120, 3), 100, np.uint8)
+    mask = np.zeros((90, 120), bool)
+    mask[30:80, 40:90] = True
+    sheet = contact_sheet([Tile(image, [(mask, GREEN)], name) for name in names], "three")
+    assert sheet.shape[0] > TITLE_HEIGHT
+    tiles = sheet[TITLE_HEIGHT:].reshape(2, 90, 2, 120, 3).swapaxes(1, 2).reshape(4, 90, 120, 3)
+    for tile in tiles[:3]:
+        np.testing.assert_allclose(tile[55, 65], 0.55 * 100 + 0.45 * np.array(GREEN), atol=1)
+        np.testing.assert_array_equal(tile[85, 5], 100)
+    assert not tiles[3].any()
