@@ -70,10 +70,8 @@ def errors_of(motion: str, seed: int, settings: Settings) -> list[float]:
         distances = joint_errors(motion_of_one, of_body)
         assert distances is not None
         errors.append(float(np.nanmean(distances.errors)))
-        print(
-            f"{motion:<10} seed {seed} {body.name:<5} {1000.0 * errors[-1]:7.1f} mm, margin {100.0 * found.margin:5.1f} %",
-            flush=True,
-        )
+        line = f"{motion:<10} seed {seed} {body.name:<5} {1000.0 * errors[-1]:7.1f} mm"
+        print(f"{line}, margin {100.0 * found.margin:.1f} %", flush=True)
     return errors
 
 

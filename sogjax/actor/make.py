@@ -142,8 +142,8 @@ def _check_fit(
         if overlap < POSE_FOUND:
             raise InputError(
                 f"{recording.path}: the pose of the example {posed.name!r} was not found: its masks and the body's "
-                f"silhouettes overlap by only {overlap:.2f} (IoU); look at the masks with `sogjax segment`, or give its "
-                f"rough pose in recording.yaml, as `example_poses: [{{name: {posed.name}, initial_pose: "
+                f"silhouettes overlap by only {overlap:.2f} (IoU); look at the masks with `sogjax segment`, or give "
+                f"its rough pose in recording.yaml, as `example_poses: [{{name: {posed.name}, initial_pose: "
                 "{pose: ..., position: [x, y, z], heading: ...}}]`"
             )
 

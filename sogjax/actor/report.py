@@ -13,7 +13,7 @@ from sogjax.actor.silhouettes import PosedPictures
 from sogjax.data.calibration import CameraRig
 from sogjax.model.body import Body
 
-UNDETERMINED = 0.7
+UNDETERMINED = 0.95
 """A shape parameter whose deviation is above this share of what was expected without pictures."""
 POORLY_SEEN_ANGLE, POORLY_SEEN_LENGTH = 0.35, 0.05
 """Radians and metres: deviation of a degree of freedom in the pose that shows it best."""
