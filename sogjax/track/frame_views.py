@@ -15,6 +15,7 @@ from sogjax.model.color import from_rgb
 from sogjax.model.sog import Sog
 from sogjax.track.culling import CAPACITIES, ImageReader, actor_of_blobs, body_boxes, capacity_for, union_boxes
 
+SMALLEST_CAPACITY = 512
 Cells = UInt8[Array, "camera rows columns 3"]
 
 
@@ -32,15 +33,26 @@ class FrameViews(eqx.Module):
         return FrameViews(self.cameras, self.readers, self.cells, (*self.found, body.posed_blobs(pose)))
 
     def views(self, level: int, body: Body, poses: Float[Array, "start dof"] | None = None) -> Views:
-        """What is seen around some poses, or (None) anywhere, that resembles a body."""
+        """What is seen around some poses, or (None) anywhere.
+
+        Colour similarities are those above chance: less the mean similarity of the body blob's colour with the whole
+        frame. So a body gains nothing from covering pictures at random, however large it is in them, and a blob of the
+        background's colour has little say.
+        """
         reader, cells = self.readers[level], self.cells[level]
         boxes = _everywhere(self.cameras) if poses is None else _boxes(body, poses, self.cameras, reader)
-        near, matching = _counts(reader, cells, boxes, body, CAPACITIES[-1])
-        capacities = capacity_for(int(near.max())), capacity_for(int(matching.max()))
-        images, similarities = _matching(reader, cells, boxes, body, *capacities)
+        capacity = min(CAPACITIES[-1], reader.candidates.sigmas.shape[-1])
+        capacity = _capacity_for(int(_near(reader, cells, boxes, capacity)[1].max()))
+        chance = _chance(self.cameras, self.readers[0], self.cells[0], body)
+        images, similarities = _compared(reader, cells, boxes, body, chance, capacity)
         for blobs in self.found:
             similarities = similarities * _left_over(self.cameras, images, blobs)[:, None, :]
         return Views(self.cameras, images, similarities, whole_image_overlap(self.cameras.image_size))
+
+
+def _capacity_for(count: int) -> int:
+    """A power of two: few sizes, so that the levels of a search share their programs."""
+    return max(SMALLEST_CAPACITY, 1 << (capacity_for(count) - 1).bit_length())
 
 
 def _everywhere(cameras: Camera) -> Float[Array, "camera 1 2 2"]:
@@ -67,43 +79,36 @@ def _boxes(
     return whole
 
 
-def _colored(reader: ImageReader, body: Body) -> Sog:
-    """The body's blobs in the working colour space; only their colours matter."""
-    blobs = body.posed_blobs(body.poses["rest"])
-    return eqx.tree_at(lambda sog: sog.colors, blobs, from_rgb(body.blob_colors, reader.color_space))
-
-
+@eqx.filter_jit
 def _near(reader: ImageReader, cells: Cells, boxes: Array, capacity: int) -> tuple[Sog, Int[Array, "camera"]]:
     rgb = cells.astype(boxes.dtype) / 255.0
     return reader.near_blobs(rgb, boxes, capacity)
 
 
 @eqx.filter_jit
-def _counts(reader: ImageReader, cells: Cells, boxes: Array, body: Body, largest: int) -> tuple[Array, Array]:
-    """How many image blobs of each camera lie in the boxes, and how many of these resemble the body."""
-    capacity = min(largest, reader.candidates.sigmas.shape[-1])
-    near, num_near = _near(reader, cells, boxes, capacity)
-    colored = _colored(reader, body)
-
-    def one_camera(image: Sog) -> Array:
-        one = lambda color: pair_color_similarities(
-            image,
-            Sog.from_arrays(colored.means[:1], colored.sigmas[:1], color[None]),
-            reader.color_space,
-            reader.color_radius,
-        )[0]
-        return jnp.sum(jnp.any(jax.lax.map(one, colored.colors) > 0.0, axis=0))
-
-    return num_near, jax.lax.map(one_camera, near)
+def _chance(cameras: Camera, reader: ImageReader, cells: Cells, body: Body) -> Float[Array, "blob"]:
+    """Mean similarity of each body blob's colour with the pictures, by area."""
+    images, _ = _near(reader, cells, _everywhere(cameras), reader.candidates.sigmas.shape[-1])
+    areas = jnp.where(images.mask, (2.0 * images.sigmas) ** 2, 0.0)
+    resembled = jnp.einsum("cbi,ci->b", _similarities(reader, images, body), areas, precision="highest")
+    # Of the whole pictures: what equals an empty plate resembles nothing.
+    return resembled / jnp.sum(jnp.prod(cameras.image_size, axis=-1))
 
 
 @eqx.filter_jit
-def _matching(
-    reader: ImageReader, cells: Cells, boxes: Array, body: Body, near_capacity: int, capacity: int
+def _compared(
+    reader: ImageReader, cells: Cells, boxes: Array, body: Body, chance: Float[Array, "blob"], capacity: int
 ) -> tuple[Sog, Float[Array, "camera body image"]]:
-    near, _ = _near(reader, cells, boxes, near_capacity)
-    images, similarities, _ = reader.matching_blobs(near, _colored(reader, body), capacity)
-    return images, similarities
+    images, _ = _near(reader, cells, boxes, capacity)
+    above_chance = _similarities(reader, images, body) - chance[None, :, None]
+    return images, jnp.where(images.mask[:, None, :], above_chance, 0.0)
+
+
+def _similarities(reader: ImageReader, images: Sog, body: Body) -> Float[Array, "camera body image"]:
+    blobs = body.posed_blobs(body.poses["rest"])
+    colored = eqx.tree_at(lambda sog: sog.colors, blobs, from_rgb(body.blob_colors, reader.color_space))
+    compare = lambda image: pair_color_similarities(image, colored, reader.color_space, reader.color_radius)
+    return jax.lax.map(compare, images)
 
 
 @eqx.filter_jit

@@ -7,7 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.energy.objective import EnergyWeights, History, Views, energy
 from sogjax.model.body import Body
@@ -15,6 +15,7 @@ from sogjax.model.camera import Camera
 from sogjax.solve import ConditionedAscent, Scales
 from sogjax.track.frame_views import FrameViews
 from sogjax.track.initial_pose import body_centre, centred, placed, root_position, turned
+from sogjax.track.limbs import limbs, with_other_limb
 from sogjax.track.place_search import Slices, best_places, possible_places, well_seen
 from sogjax.track.scales import pose_scales
 
@@ -26,6 +27,10 @@ NUM_MIDDLE, MIDDLE_ITERATIONS = 12, 50
 """Starts that are climbed in the middle one."""
 NUM_FINE, FINE_ITERATIONS = 4, 120
 """Starts that are climbed to the end in the fine one."""
+AT_ONCE = 4
+"""Poses that are climbed in one call."""
+LIMB_ITERATIONS = 25
+"""For each pose in which one limb is tried another way."""
 DIFFERENT = 0.1
 """Metres, mean distance of the blobs: poses farther apart are different optima."""
 
@@ -58,8 +63,28 @@ def search_pose(body: Body, frame: FrameViews, weights: EnergyWeights, up: str) 
         energies = jnp.where(_well_seen(body, poses, views.cameras), energies, -jnp.inf)
         best = _different(body, poses, energies, keep)
         poses, energies = poses[best], energies[best]
+    pose, energy_ = _better_limbs(body, poses, views, weights, scales)
+    poses, energies = jnp.concatenate([pose[None], poses]), jnp.append(energy_, energies)
+    best = _different(body, poses, energies, NUM_FINE)
+    poses, energies = poses[best], energies[best]
     margin = 1.0 if len(energies) < 2 else float((energies[0] - energies[1]) / jnp.abs(energies[0]))
     return FoundPose(poses[0], float(energies[0]), margin)
+
+
+def _better_limbs(
+    body: Body, poses: Float[Array, "start dof"], views: Views, weights: EnergyWeights, scales: Scales
+) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
+    """The first of some poses with each limb in turn tried as in the named poses and in the others, then climbed.
+
+    A limb that lies before the trunk has an optimum of its own: what is right for the rest does not lead it out.
+    """
+    pose = poses[0]
+    for limb in limbs(body.skeleton):
+        variants = with_other_limb(body, pose, limb, poses[1:])
+        climbed, energies = _climbed(body, variants, views, weights, scales, LIMB_ITERATIONS)
+        pose = climbed[jnp.argmax(energies)]
+    climbed, energies = _climbed(body, pose[None], views, weights, scales, FINE_ITERATIONS)
+    return climbed[0], energies[0]
 
 
 def search_poses(bodies: Sequence[Body], frame: FrameViews, weights: EnergyWeights, up: str) -> list[FoundPose]:
@@ -91,9 +116,23 @@ def _energies(body: Body, poses: Array, views: Views, weights: EnergyWeights) ->
     return jax.lax.map(lambda pose: _energy(body, pose, views, weights), poses, batch_size=8)
 
 
-@eqx.filter_jit
 def _climbed(
     body: Body, poses: Array, views: Views, weights: EnergyWeights, scales: Scales, iterations: int
+) -> tuple[Float[Array, "start dof"], Float[Array, "start"]]:
+    """Every pose climbed and its energy; always the same number at once, so that one program serves all."""
+    count = poses.shape[0]
+    padded = jnp.concatenate([poses, jnp.tile(poses[-1], (-count % AT_ONCE, 1))])
+    parts = [
+        _climbed_together(body, padded[k : k + AT_ONCE], views, weights, scales, jnp.asarray(iterations))
+        for k in range(0, len(padded), AT_ONCE)
+    ]
+    climbed, energies = (jnp.concatenate(part)[:count] for part in zip(*parts, strict=True))
+    return climbed, energies
+
+
+@eqx.filter_jit
+def _climbed_together(
+    body: Body, poses: Array, views: Views, weights: EnergyWeights, scales: Scales, iterations: Int[Array, ""]
 ) -> tuple[Float[Array, "start dof"], Float[Array, "start"]]:
     solver = ConditionedAscent(max_iterations=iterations)
 
@@ -101,7 +140,7 @@ def _climbed(
         solution = solver.maximize(lambda p: _energy(body, p, views, weights), pose, scales)
         return solution.params, solution.value
 
-    return jax.lax.map(climb, poses, batch_size=4)
+    return jax.vmap(climb)(poses)
 
 
 @eqx.filter_jit
