@@ -129,7 +129,10 @@ def size_of(body):
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """A dog that is 8 % larger than the shipped one, in two poses: one with a hint, one that has to be found."""
+    """A dog that is 8 % larger than the shipped one, in two poses.
+
+    One has a hint that is 30 degrees and 10 cm off, the other has to be found.
+    """
     folder = tmp_path_factory.mktemp("example_poses")
     dog = shipped("dog")
     model = ShapeModel.from_body(dog)
@@ -139,7 +142,7 @@ def made(tmp_path_factory):
     stand = moved(truth, standing(truth, 1.1), {"root_yaw": 0.6})
     trot = np.array(truth.poses["trot_left"])
     trot = moved(truth, trot, {"root_x": 0.1, "root_z": 1.1 - float(trot[2]), "root_yaw": -1.0})
-    hint = InitialPose(pose="rest", position=(0.03, -0.02, 1.08), heading=30.0, landmarks={})
+    hint = InitialPose(pose="rest", position=(0.08, -0.06, 1.1), heading=np.degrees(0.6) - 30.0, landmarks={})
     examples = (
         write_example(folder, "stand", truth, stand, rig, hint),
         write_example(folder, "trot", truth, trot, rig),

@@ -16,7 +16,7 @@ from sogjax.model.sog import Sog
 from sogjax.track.culling import CAPACITIES, ImageReader, actor_of_blobs, body_boxes, capacity_for, union_boxes
 
 SMALLEST_CAPACITY = 512
-Cells = UInt8[Array, "camera rows columns 3"]
+Cells = UInt8[Array, "camera _rows _columns 3"]
 
 
 class FrameViews(eqx.Module):

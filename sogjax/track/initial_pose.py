@@ -63,7 +63,16 @@ def placed(body: Body, pose: Float[Array, "dof"], position: Float[np.ndarray, "3
 
 def centred(body: Body, pose: Float[Array, "dof"], centre: Float[np.ndarray, "3"]) -> Float[Array, "dof"]:
     """The pose moved so that the body's centre lies at a point (metres, world)."""
-    return placed(body, pose, root_position(body, pose) + centre - np.asarray(body_centre(body, pose), float))
+    step = jnp.asarray(centre - np.asarray(body_centre(body, pose), float), pose.dtype)
+    return pose + jnp.sum(shifts(body) * step[None, :], axis=1)
+
+
+def shifts(body: Body) -> Float[Array, "dof 3"]:
+    """What has to be added to a pose for each metre by which the whole body moves (world)."""
+    table = np.zeros((body.skeleton.num_dofs, 3))
+    for joint, dof, weight in _root_dofs(body, revolute=False):
+        table[dof] = np.asarray(body.skeleton.axes[joint], float) / weight
+    return jnp.asarray(table, body.skeleton.offsets.dtype)
 
 
 @eqx.filter_jit

@@ -14,15 +14,15 @@ from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.solve import ConditionedAscent, Scales
 from sogjax.track.frame_views import FrameViews
-from sogjax.track.initial_pose import body_centre, centred, placed, root_position, turned
+from sogjax.track.initial_pose import body_centre, placed, root_position, shifts, turned
 from sogjax.track.limbs import limbs, with_other_limb
 from sogjax.track.place_search import Slices, best_places, possible_places, well_seen
 from sogjax.track.scales import pose_scales
 
 NUM_PLACES = 12
 NUM_HEADINGS = 12
-NUM_COARSE, COARSE_ITERATIONS = 48, 25
-"""Starts that are climbed a little way in the coarse picture."""
+NUM_AT_PLACE, COARSE_ITERATIONS = 4, 25
+"""Starts at each place that are climbed a little way in the coarse picture."""
 NUM_MIDDLE, MIDDLE_ITERATIONS = 12, 50
 """Starts that are climbed in the middle one."""
 NUM_FINE, FINE_ITERATIONS = 4, 120
@@ -49,10 +49,8 @@ def search_pose(body: Body, frame: FrameViews, weights: EnergyWeights, up: str) 
     """The pose of a body (upright in the world) that suits the pictures of one frame best."""
     coarse = frame.views(0, body)
     scales = pose_scales(body.skeleton)
-    starts = _starts(body, coarse, weights, up)
-    promise = _energies(body, starts, coarse, weights)
-    poses = starts[jnp.argsort(-promise)[:NUM_COARSE]]
-    energies = jnp.sort(-promise)[:NUM_COARSE]
+    poses = _promising(body, _starts(body, coarse, weights, up), coarse, weights)
+    energies = jnp.zeros(poses.shape[0])
     for level, keep, iterations in (
         (0, NUM_MIDDLE, COARSE_ITERATIONS),
         (1, NUM_FINE, MIDDLE_ITERATIONS),
@@ -99,16 +97,33 @@ def search_poses(bodies: Sequence[Body], frame: FrameViews, weights: EnergyWeigh
     return [found[k] for k in range(len(bodies))]
 
 
-def _starts(body: Body, views: Views, weights: EnergyWeights, up: str) -> Float[Array, "start dof"]:
-    """Every named pose at every heading, at the most promising places."""
+def _promising(
+    body: Body, starts: Float[Array, "place start dof"], views: Views, weights: EnergyWeights
+) -> Float[Array, "promising dof"]:
+    """The best starts at each place: the best of all are often the same mistake many times."""
+    energies = _energies(body, starts.reshape(-1, starts.shape[-1]), views, weights).reshape(starts.shape[:2])
+    best = jnp.argsort(-energies, axis=1)[:, :NUM_AT_PLACE]
+    return jnp.take_along_axis(starts, best[:, :, None], axis=1).reshape(-1, starts.shape[-1])
+
+
+def _starts(body: Body, views: Views, weights: EnergyWeights, up: str) -> Float[Array, "place start dof"]:
+    """Every named pose at every heading, at each of the most promising places."""
     root = root_position(body, body.poses["rest"])
     slices = Slices.from_body(body, root, up)
     places = best_places(slices, views, possible_places(views.cameras, up), weights, NUM_PLACES)
     headings = np.arange(NUM_HEADINGS) * 2.0 * np.pi / NUM_HEADINGS - np.pi
-    upright = [placed(body, body.poses["rest"], place) for place in places]
-    centres = [np.asarray(body_centre(body, pose), float) for pose in upright]
-    at_origin = [turned(body, pose, float(heading), up) for pose in body.poses.values() for heading in headings]
-    return jnp.stack([centred(body, pose, centre) for pose in at_origin for centre in centres])
+    standing = jnp.stack([placed(body, body.poses["rest"], place) for place in places])
+    turned_poses = jnp.stack(
+        [turned(body, pose, float(heading), up) for pose in body.poses.values() for heading in headings]
+    )
+    steps = _centres(body, standing)[:, None, :] - _centres(body, turned_poses)[None, :, :]
+    moves = jnp.einsum("dk,psk->psd", shifts(body), steps, precision="highest")
+    return turned_poses[None, :, :] + moves
+
+
+@eqx.filter_jit
+def _centres(body: Body, poses: Float[Array, "start dof"]) -> Float[Array, "start 3"]:
+    return jax.vmap(lambda pose: body_centre(body, pose))(poses)
 
 
 @eqx.filter_jit
@@ -145,7 +160,7 @@ def _climbed_together(
 
 @eqx.filter_jit
 def _well_seen(body: Body, poses: Array, cameras: Camera) -> Bool[Array, "start"]:
-    return well_seen(cameras, jax.lax.map(lambda pose: body_centre(body, pose), poses))
+    return well_seen(cameras, _centres(body, poses))
 
 
 def _energy(body: Body, pose: Float[Array, "dof"], views: Views, weights: EnergyWeights) -> Float[Array, ""]:
