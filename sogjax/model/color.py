@@ -96,7 +96,8 @@ def _hsv_from_rgb(rgb: Colors) -> Colors:
         (green - blue) / safe,
         jnp.where(value == green, 2.0 + (blue - red) / safe, 4.0 + (red - green) / safe),
     )
-    hue = jnp.where(chroma > 0.0, jnp.mod(sextant / 6.0, 1.0), 0.0)
+    turns = sextant / 6.0
+    hue = jnp.where(chroma > 0.0, turns - jnp.floor(turns), 0.0)
     saturation = chroma / jnp.where(value > 0.0, value, 1.0)
     return jnp.stack([hue, saturation, value], -1)
 
