@@ -56,10 +56,9 @@ def near_pairs(
     near = jax.vmap(_near, in_axes=(0, 0, 0, 0, None))(images, color_similarities, seen, margin, exponent)
     in_block = near.reshape(-1, BLOCK).any(axis=1)
     chosen, count = chosen_indices(in_block, capacity)
-    real = jnp.arange(capacity) < count
+    real = jnp.arange(capacity, dtype=count.dtype) < count
     # Padding is spread over all places: sums into one and the same place would wait for each other.
     chosen = jnp.where(real, chosen, jnp.arange(capacity, dtype=chosen.dtype) % in_block.shape[0])
-    chosen = jax.lax.optimization_barrier(chosen)  # else it is computed again for every use of it
     blocks_per_image = num_images // BLOCK
     body_index = chosen // blocks_per_image  # counts the blobs of all cameras
     camera = body_index // num_bodies

@@ -164,7 +164,7 @@ def keep_blobs_of_planes(
 ) -> tuple[Sog, Int[Array, "capacity"], Int[Array, ""]]:
     """The same, of colours that lie channel by channel."""
     chosen, count = chosen_indices(keep, capacity)
-    mask = jnp.arange(capacity) < count
+    mask = jnp.arange(capacity, dtype=count.dtype) < count
     image = Sog(
         means=jnp.where(mask[:, None], means[chosen], 0.0),
         sigmas=jnp.where(mask, sigmas[chosen], 1.0),
