@@ -20,7 +20,7 @@ from sogjax.model.camera import Camera, undistort
 from sogjax.model.compaction import chosen_indices
 from sogjax.model.sog import Sog
 
-Planes = list[Float[Array, "rows columns"]]
+Planes = list[Float[Array, "_ _"]]
 """Channels of a picture, one array each: sums over a last axis of three are slow."""
 
 
