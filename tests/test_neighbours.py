@@ -13,7 +13,7 @@ from rig_cases import ring_rig
 from sog_cases import floats, random_views
 
 from sogjax.energy.curvature import FrameEnergy
-from sogjax.energy.neighbours import displacement
+from sogjax.energy.neighbours import MARGIN, displacement
 from sogjax.energy.objective import EnergyWeights, History, energy
 from sogjax.energy.pairs import BLOCK
 from sogjax.model.camera import project
@@ -105,7 +105,7 @@ def test_displacement_is_the_largest_motion_of_a_blob_in_its_picture():
     before, after = posed(HUMAN, REST)[0], posed(HUMAN, REST.at[0].add(0.03))[0]
     both = [jax.vmap(project, (0, None))(RIG.cameras, blobs).means for blobs in (before, after)]
     widths = np.asarray(RIG.cameras.image_size)[:, 0]
-    expected = np.max(np.linalg.norm(both[1] - both[0], axis=-1) / (0.01 * widths)[:, None])
+    expected = np.max(np.linalg.norm(both[1] - both[0], axis=-1) / (MARGIN * widths)[:, None])
     np.testing.assert_allclose(displacement(RIG.cameras, before, after), expected, rtol=1e-5)
 
 
@@ -118,7 +118,7 @@ def test_a_blob_that_comes_into_view_has_moved_too_far():
 
 
 def test_lists_are_made_anew_until_the_pose_lies_where_they_hold():
-    """From a start many margins away the end is that of all pairs."""
+    """From a start many margins away the value at the end is that of all pairs, and as high as with them."""
     body = random_body(4, joints=5, dofs=4, blobs=6)
     body = eqx.tree_at(lambda b: b.blobs.offsets, body, body.blobs.offsets + jnp.array([[0.0, 0.0, 1.0]]))
     rig = ring_rig(2)
@@ -133,4 +133,5 @@ def test_lists_are_made_anew_until_the_pose_lies_where_they_hold():
     assert float(moved(rig.cameras, body, start, sparse.params)) > 1.0
     assert sparse.converged
     assert 0 < count <= 64
-    np.testing.assert_allclose(sparse.value, dense.value, rtol=1e-3)
+    np.testing.assert_allclose(sparse.value, objective(sparse.params), rtol=AGREEMENT)
+    assert sparse.value > 0.99 * dense.value
