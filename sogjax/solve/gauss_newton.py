@@ -7,8 +7,9 @@ from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.solve.solution import CurvedObjective, Objective, Params, Scales, Solution
 
-SMALLEST_CURVATURE = 1e-6
-"""Of the largest one, for parameters that nothing holds; both measured in the parameters' largest steps."""
+COMMON_DAMPING = 3.0
+"""Damping of every parameter, in units of the mean curvature (measured in the parameters' largest steps), beside that
+by its own. Parameters of which the objective says next to nothing stay about where they are."""
 
 
 class QuadraticModel(eqx.Module):
@@ -34,8 +35,8 @@ class QuadraticModel(eqx.Module):
         # In units of the bounds, so that angles and translations are alike.
         curvature = self.curvature * bounds[:, None] * bounds[None, :]
         diagonal = jnp.diag(curvature)
-        floor = jnp.maximum(SMALLEST_CURVATURE * jnp.max(diagonal), jnp.finfo(diagonal.dtype).tiny)
-        damped = curvature + jnp.diag(damping * diagonal + floor)
+        held = jnp.maximum(diagonal + COMMON_DAMPING * jnp.mean(diagonal), jnp.finfo(diagonal.dtype).tiny)
+        damped = curvature + jnp.diag(damping * held)
         factor = jax.scipy.linalg.cho_factor(damped)
         step = jax.scipy.linalg.cho_solve(factor, self.gradient * bounds)
         return bounds * step / jnp.maximum(jnp.max(jnp.abs(step)), 1.0)
@@ -60,7 +61,7 @@ class GaussNewtonState(eqx.Module):
 class GaussNewton(eqx.Module):
     """Steps to the maximum of the objective's own quadratic model, accepted only where the objective rises.
 
-    The damping (a part of the curvature of each parameter) is divided by `relax` after a step that gained what it was
+    The damping (a part of the curvature) is divided by `relax` after a step that gained what it was
     expected to, and multiplied by `stiffen` after one that gained much less or was not taken. At least
     `min_iterations` are made; then the ascent stops when a step is shorter than `epsilon`, taken or not.
     """

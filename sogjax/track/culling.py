@@ -1,6 +1,7 @@
 """Which image blobs can matter to a body: those near it and of its colours (Section 6)."""
 
 import math
+from functools import partial
 
 import equinox as eqx
 import jax
@@ -10,9 +11,10 @@ from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.energy.overlap import pair_color_similarities
 from sogjax.errors import InputError
-from sogjax.images.quadtree import Candidates, keep_blobs, quadtree
+from sogjax.images.quadtree import Candidates, keep_blobs, keep_blobs_of_planes, quadtree_of_planes
+from sogjax.images.stages import computed_once
 from sogjax.model.camera import Camera, project
-from sogjax.model.color import averaging_space, color_distance, convert, from_rgb
+from sogjax.model.color import averaging_space, convert, from_rgb
 from sogjax.model.skeleton import Skeleton
 from sogjax.model.sog import Sog
 
@@ -80,12 +82,27 @@ class ImageReader(eqx.Module):
         self, cells: Float[Array, "camera rows columns 3"]
     ) -> tuple[Float[Array, "camera candidate 3"], Bool[Array, "camera candidate"]]:
         """Colours (averaging space) and leaves of the quad-trees of all cameras, from sRGB cells in 0..1."""
-        colors = from_rgb(cells, averaging_space(self.color_space))
-        colors, leaves = jax.vmap(quadtree, in_axes=(0, 0, None))(colors, self.candidates, self.color_tolerance)
+        planes, leaves = self._leaf_planes(cells)
+        return jnp.stack(planes, axis=-1), leaves
+
+    @property
+    def known(self) -> Bool[Array, ""]:
+        """True, but only when the program runs (see `computed_once`)."""
+        return ~jnp.isnan(self.color_tolerance)
+
+    def _leaf_planes(
+        self, cells: Float[Array, "camera rows columns 3"]
+    ) -> tuple[list[Float[Array, "camera candidate"]], Bool[Array, "camera candidate"]]:
+        """The same, the colours channel by channel."""
+        space = averaging_space(self.color_space)
+        converted = computed_once(self.known, partial(_color_planes, space=space), cells)
+        planes, leaves = jax.vmap(quadtree_of_planes, in_axes=(0, 0, None))(
+            converted, self.candidates, self.color_tolerance
+        )
         if self.plate_colors is not None:
-            distance = color_distance(colors, self.plate_colors, averaging_space(self.color_space))
-            leaves = leaves & (distance > self.plate_tolerance)
-        return colors, leaves
+            squared = sum((plane - self.plate_colors[..., k]) ** 2 for k, plane in enumerate(planes))
+            leaves = leaves & (squared > self.plate_tolerance**2)
+        return planes, leaves
 
     def near_blobs(
         self,
@@ -94,9 +111,9 @@ class ImageReader(eqx.Module):
         capacity: int,
     ) -> tuple[Sog, Int[Array, "camera"]]:
         """Image blobs inside the boxes, coloured in the working space, and how many there are for each camera."""
-        colors, leaves = self.leaves(cells)
+        colors, leaves = self._leaf_planes(cells)
         keep = leaves & jax.vmap(_in_boxes)(self.candidates.means, self.candidates.sigmas, boxes)
-        select = jax.vmap(keep_blobs, in_axes=(0, 0, 0, 0, None))
+        select = jax.vmap(keep_blobs_of_planes, in_axes=(0, 0, 0, 0, None))
         near, _, counts = select(self.candidates.means, self.candidates.sigmas, colors, keep, capacity)
         working = convert(near.colors, averaging_space(self.color_space), self.color_space)
         return eqx.tree_at(lambda sog: sog.colors, near, working), counts
@@ -119,9 +136,17 @@ class ImageReader(eqx.Module):
     ) -> tuple[Sog, Float[Array, "camera body image"], Int[Array, "camera"]]:
         """The near blobs in their places, those masked out that resemble no blob of the body; the same otherwise."""
         compare = lambda image: pair_color_similarities(image, body, self.color_space, self.color_radius)
-        similarities = jax.vmap(compare)(near)
+        similarities = computed_once(self.known, jax.vmap(compare), near)
         mask = near.mask & jnp.any(similarities > 0.0, axis=1)
         return eqx.tree_at(lambda sog: sog.mask, near, mask), similarities, jnp.sum(mask, axis=1)
+
+
+def _color_planes(
+    cells: Float[Array, "camera rows columns 3"], space: str
+) -> list[Float[Array, "camera rows columns"]]:
+    """SRGB cells in a colour space, channel by channel."""
+    colors = from_rgb(cells, space)
+    return [colors[..., k] for k in range(3)]
 
 
 def actor_of_blobs(skeleton: Skeleton, blob_joints: tuple[int, ...]) -> Int[np.ndarray, "blob"]:

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import equinox as eqx
@@ -13,6 +14,7 @@ from jaxtyping import Array, Bool, Float, Int, UInt8
 
 from sogjax.energy.curvature import FrameEnergy
 from sogjax.energy.objective import EnergyTerms, EnergyWeights, History, Views, terms_of_energy
+from sogjax.images.stages import computed_once
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.color import from_rgb
@@ -103,7 +105,8 @@ class Tracker(eqx.Module):
     ) -> tuple[Views, Int[Array, "camera"], Int[Array, "camera"]]:
         """What the cameras see, culled, and the counts that must be held against the capacities."""
         rgb = cells.astype(self.cameras.intrinsics.dtype) / 255.0
-        near, num_near = self.reader.near_blobs(rgb, self.boxes(state), capacities.near)
+        near_blobs = partial(self.reader.near_blobs, capacity=capacities.near)
+        near, num_near = computed_once(self.reader.known, near_blobs, rgb, self.boxes(state))
         body_colors = from_rgb(self.body.blob_colors, self.reader.color_space)
         body = eqx.tree_at(lambda sog: sog.colors, self.body.posed_blobs(state.previous), body_colors)
         if self.pairs == "sparse":

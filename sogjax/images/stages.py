@@ -1,0 +1,28 @@
+"""Keeping the stages of a computation apart where the compiler would compute one of them again and again."""
+
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool
+
+Arguments = ParamSpec("Arguments")
+Results = TypeVar("Results")
+
+
+def computed_once(
+    really: Bool[Array, ""],
+    function: Callable[Arguments, Results],
+    *arguments: Arguments.args,
+    **keywords: Arguments.kwargs,
+) -> Results:
+    """The results of a function, finished before anything that uses them begins; zeros unless `really`.
+
+    On a CPU, XLA fuses a chain of cheap operations into its last one, which then computes the whole chain anew for
+    every entry it reads; `optimization_barrier` is gone before that. A branch is not fused: the quad-trees of twelve
+    cameras take 2.2 ms in stages instead of 12. `really` must not be known when the program is compiled.
+    """
+    shapes = jax.eval_shape(function, *arguments, **keywords)
+    zeros = lambda *_: jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shapes)
+    return jax.lax.cond(really, lambda *a: function(*a, **keywords), zeros, *arguments)
