@@ -14,7 +14,6 @@ from sogjax.app.progress import progress
 from sogjax.app.timing import StageTimes
 from sogjax.data.recording import Recording
 from sogjax.data.stages import ahead
-from sogjax.data.video import read_prepared
 from sogjax.images.cells import CellGrid, padded_cells, stack_shape
 from sogjax.track.tracker import TrackedFrame, Tracker, track
 
@@ -44,6 +43,10 @@ class FrameDone(NamedTuple):
     pictures: list[Picture]
 
 
+PictureReader = Callable[[Recording, "Preparation", int, int], Iterator[list[Picture]]]
+"""Of a recording, what to make of each picture, the first frame and the one after the last."""
+
+
 @dataclass(frozen=True)
 class Preparation:
     """What the decoding threads make of each picture before they drop it."""
@@ -61,27 +64,21 @@ class Preparation:
 
 
 def tracked_frames(
-    recording: Recording,
-    tracker: Tracker,
-    start: Float[Array, "dof"],
-    frames: tuple[int, int],
-    prepare: Preparation,
-    times: StageTimes,
+    pictures: Iterator[list[Picture]], count: int, tracker: Tracker, start: Float[Array, "dof"], times: StageTimes
 ) -> Generator[FrameDone, None, None]:
-    """Track the frames from the first to before the last, while threads decode those that follow.
+    """Track `count` frames, while a thread takes the pictures of those that follow.
 
     Raises:
         InputError: a video ends early, or a picture has too many image blobs.
     """
-    first, last = frames
     waiting: deque[list[Picture]] = deque()
-    with closing(ahead(read_prepared(recording, prepare, first, last), FRAMES_AHEAD)) as decoded:
+    with closing(ahead(pictures, FRAMES_AHEAD)) as ready:
 
         def cells() -> Iterator[UInt8[np.ndarray, "camera rows columns 3"]]:
-            for pictures in progress(times.timed("decode", decoded), last - first, "tracking"):
-                waiting.append(pictures)
-                times.add("cells", sum(picture.seconds for picture in pictures))
-                yield np.stack([picture.cells for picture in pictures])
+            for frame in progress(times.timed("decode", ready), count, "tracking"):
+                waiting.append(frame)
+                times.add("cells", sum(picture.seconds for picture in frame))
+                yield np.stack([picture.cells for picture in frame])
 
         begin = time.perf_counter()
         for tracked in track(tracker, start, cells()):

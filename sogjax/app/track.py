@@ -15,7 +15,7 @@ from sogjax.app import build
 from sogjax.app.configs import OutputsConfig, TrackConfig
 from sogjax.app.first_pose import first_poses, initial_pose_file
 from sogjax.app.outputs import results_folder, write_results
-from sogjax.app.pipeline import tracked_frames
+from sogjax.app.pipeline import PictureReader, tracked_frames
 from sogjax.app.recordings import actors_of, opened, say, upright
 from sogjax.app.streams import Streams
 from sogjax.app.timing import StageTimes
@@ -23,6 +23,7 @@ from sogjax.data.motion import Motion
 from sogjax.data.motion_log import PER_FRAME
 from sogjax.data.recording import Recording
 from sogjax.data.stages import Behind
+from sogjax.data.video import read_prepared
 from sogjax.errors import InputError
 from sogjax.evaluate import GroupEvaluation
 from sogjax.model.body import Body, concatenate
@@ -87,7 +88,12 @@ def track_recording(recording: Recording, bodies: list[Body], config: TrackConfi
 
 @contextmanager
 def tracking(
-    recording: Recording, bodies: list[Body], config: TrackConfig, outputs: OutputsConfig, out: Path
+    recording: Recording,
+    bodies: list[Body],
+    config: TrackConfig,
+    outputs: OutputsConfig,
+    out: Path,
+    read: PictureReader = read_prepared,
 ) -> Iterator[Run]:
     """Track; within the block the motions are in files of `out` that go when it ends well."""
     bodies = [upright(body, recording) for body in bodies]
@@ -100,7 +106,8 @@ def tracking(
     used: list[float] = []
     try:
         with streams:
-            frames = tracked_frames(recording, tracker, start, (first, last), streams.preparation(grids), times)
+            pictures = read(recording, streams.preparation(grids), first, last)
+            frames = tracked_frames(pictures, last - first, tracker, start, times)
             with closing(frames), Behind(streams.consume, FRAMES_BEHIND) as behind:
                 for done in frames:
                     used.append(float(np.mean(done.tracked.result.num_matching)))

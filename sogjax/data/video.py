@@ -40,10 +40,12 @@ def read_prepared(
     prepare: Callable[[int, np.ndarray], Item],
     start: int = 0,
     stop: int | None = None,
+    workers: int | None = None,
 ) -> Iterator[list[Item]]:
     """The same, but what `prepare` makes of each image and the number of its camera.
 
-    The decoding threads do that, so a large image need not outlive the moment in which it was decoded.
+    The decoding threads do that, so a large image need not outlive the moment in which it was decoded. There are
+    `workers` of them, by default one for each core.
 
     Raises:
         InputError: a video ends early or changes its size.
@@ -51,19 +53,18 @@ def read_prepared(
     stop = recording.num_frames if stop is None else min(stop, recording.num_frames)
     if not 0 <= start <= stop:
         raise ValueError(f"frames {start} to {stop} are not in a recording of {recording.num_frames} frames")
-    return _decoded_ahead(recording, prepare, start, stop)
+    return _decoded_ahead(recording, prepare, start, stop, workers or os.cpu_count() or 1)
 
 
 def _decoded_ahead(
-    recording: Recording, prepare: Callable[[int, np.ndarray], Item], start: int, stop: int
+    recording: Recording, prepare: Callable[[int, np.ndarray], Item], start: int, stop: int, workers: int
 ) -> Iterator[list[Item]]:
     if start == stop:
         return
-    cores = os.cpu_count() or 1
     cameras = recording.rig.names
-    threads = max(1, cores // len(cameras))
+    threads = max(1, workers // len(cameras))
     with ExitStack() as stack:
-        pool = stack.enter_context(ThreadPoolExecutor(min(len(cameras), cores)))
+        pool = stack.enter_context(ThreadPoolExecutor(min(len(cameras), workers)))
         opened = [
             pool.submit(
                 open_source,
