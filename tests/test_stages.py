@@ -110,8 +110,13 @@ def test_an_error_of_the_consumer_is_raised_where_items_are_put():
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
 def test_what_was_put_before_an_error_is_still_consumed(error):
     taken = []
-    with pytest.raises(error), Behind(taken.extend, 4) as behind:
-        for k in range(4):
-            behind.put(k)
-        raise error
+
+    def put_and_fail():
+        with Behind(taken.extend, 4) as behind:
+            for k in range(4):
+                behind.put(k)
+            raise error
+
+    with pytest.raises(error):
+        put_and_fail()
     assert taken == [0, 1, 2, 3]
