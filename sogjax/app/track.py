@@ -1,16 +1,15 @@
 """`sogjax track`: from the videos of a recording to the motion of its actors."""
 
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import UInt8
 from omegaconf import OmegaConf
 
 from sogjax.app import build
+from sogjax.app.cells import cell_frames
 from sogjax.app.configs import TrackConfig
 from sogjax.app.first_pose import first_poses, initial_pose_file
 from sogjax.app.outputs import results_folder, write_results
@@ -19,10 +18,8 @@ from sogjax.app.recordings import actors_of, opened, say, upright
 from sogjax.app.timing import StageTimes
 from sogjax.data.motion import Motion, motion_from_poses
 from sogjax.data.recording import Recording
-from sogjax.data.video import read_frames
 from sogjax.errors import InputError
 from sogjax.evaluate import GroupEvaluation
-from sogjax.images.cells import stack_cells
 from sogjax.model.body import Body, concatenate, dof_slices
 from sogjax.track.tracker import TrackedFrame, track
 
@@ -68,17 +65,10 @@ def track_recording(recording: Recording, bodies: list[Body], config: TrackConfi
     tracker = build.tracker(recording, concatenate(bodies), grids, config)
     times = StageTimes()
 
-    def cells() -> Iterator[UInt8[np.ndarray, "camera rows columns 3"]]:
-        images = times.timed("decode", read_frames(recording, first, last))
-        for frame in progress(images, last - first, "tracking"):
-            begin = time.perf_counter()
-            stacked = stack_cells(frame, grids)
-            times.add("cells", time.perf_counter() - begin)
-            yield stacked
-
+    cells = cell_frames(recording, grids, config.images, (first, last), times)
     frames = []
     begin = time.perf_counter()
-    for frame in track(tracker, start, cells()):
+    for frame in track(tracker, start, progress(cells, last - first, "tracking")):
         frames.append(frame)
         times.add("whole", time.perf_counter() - begin)
         times.add("step", frame.seconds)
@@ -136,6 +126,8 @@ def say_results(result: Run) -> None:
     if result.evaluation is not None:
         print(result.evaluation.table(details=False), end="\n\n")
     for stage, text in STAGES.items():
+        if stage not in result.times.seconds:  # pictures that were kept are not decoded
+            continue
         print(f"{text:<32}{result.times.frames_per_second(stage):10.1f} frames/s")
     iterations = np.mean([int(frame.result.iterations) for frame in result.frames])
     print(f"first frame, with compilation   {result.times.first('whole'):10.1f} s")
