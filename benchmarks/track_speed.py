@@ -10,8 +10,6 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-
 from sogjax.app.configs import DemoConfig
 from sogjax.app.progress import progress
 from sogjax.app.script import machine_line, run_script, settings_from, track_folder
@@ -39,11 +37,10 @@ def main() -> None:
     frames = min(settings.frames, recording.num_frames)
     result = track_folder(folder, [*settings.overrides, f"stop={frames}"])
     numbers = row_numbers(result)
-    used = np.mean([np.asarray(frame.result.num_matching) for frame in result.frames])
     width, height = recording.rig.image_size(recording.rig.names[0])
     print(machine_line())
     print(f"{recording.name}: {len(recording.rig.names)} cameras, {width}x{height}, {frames} frames")
-    print(f"{used:.0f} image blobs used a camera; {numbers['iterations']:.1f} iterations a frame")
+    print(f"{result.image_blobs:.0f} image blobs used a camera; {numbers['iterations']:.1f} iterations a frame")
     print(f"markers {numbers['mean mm']:.1f} mm, std {numbers['std mm']:.1f} mm, {numbers['lost']:.0f} lost\n")
     for stage, text in STAGES.items():
         print(f"{text:<34}{result.times.frames_per_second(stage):10.1f} frames/s")

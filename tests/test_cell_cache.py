@@ -9,9 +9,9 @@ from command_line import actor_file, done, refused, trackable
 from small_recording import make_recording, write_images, write_video
 
 from sogjax.app.build import cell_grids
-from sogjax.app.cells import cell_frames, cells_of_clip, decoded_cells
+from sogjax.app.cells import cells_of, cells_of_clip, picture_reader
 from sogjax.app.configs import ImagesConfig
-from sogjax.app.timing import StageTimes
+from sogjax.app.pipeline import Preparation
 from sogjax.data.motion import load_motion
 from sogjax.data.recording import open_recording
 
@@ -25,10 +25,11 @@ def walk(tmp_path):
 
 def cells(folder, cache, frames=(0, 4), depth=DEPTH):
     """Cells of a recording, and how many frames had to be decoded for them."""
-    recording, times = open_recording(folder), StageTimes()
-    images = ImagesConfig(depth=depth, cache=None if cache is None else str(cache))
-    taken = [np.array(c) for c in cell_frames(recording, cell_grids(recording, depth), images, frames, times)]
-    return np.stack(taken), len(times.seconds.get("decode", []))
+    recording = open_recording(folder)
+    read = picture_reader(ImagesConfig(depth=depth, cache=None if cache is None else str(cache)))
+    taken = list(read(recording, Preparation(cell_grids(recording, depth)), *frames))
+    decoded = sum(any(picture.seconds > 0.0 for picture in pictures) for pictures in taken)
+    return np.stack([cells_of(pictures) for pictures in taken]), decoded
 
 
 def array_and_note(cache):
@@ -121,21 +122,30 @@ def test_damaged_cells_are_never_used(walk, tmp_path, capsys, damage):
 def test_an_interrupted_run_keeps_nothing(walk, tmp_path):
     cache = tmp_path / "cache"
     recording = open_recording(walk)
-    images = ImagesConfig(depth=DEPTH, cache=str(cache))
-    frames = cell_frames(recording, cell_grids(recording, DEPTH), images, (0, 4), StageTimes())
+    read = picture_reader(ImagesConfig(depth=DEPTH, cache=str(cache)))
+    frames = read(recording, Preparation(cell_grids(recording, DEPTH)), 0, 4)
     next(frames)
     assert isinstance(frames, Generator)
     frames.close()
     assert list(cache.iterdir()) == []
 
 
+def test_outputs_that_show_pictures_still_get_them(walk, tmp_path):
+    recording, cache = open_recording(walk), tmp_path / "cache"
+    kept, _ = cells(walk, cache)
+    shown = Preparation(cell_grids(recording, DEPTH), tile=lambda camera, image: image)
+    pictures = list(picture_reader(ImagesConfig(depth=DEPTH, cache=str(cache)))(recording, shown, 0, 4))
+    assert all(picture.tile is not None for frame in pictures for picture in frame)
+    np.testing.assert_array_equal(np.stack([cells_of(frame) for frame in pictures]), kept)
+
+
 def test_a_clip_is_the_stack_of_its_frames(walk, tmp_path):
     recording = open_recording(walk)
     grids = cell_grids(recording, DEPTH)
-    frames = list(decoded_cells(recording, grids, (1, 3), StageTimes()))
+    expected, _ = cells(walk, None, (1, 3))
     for cache in (None, str(tmp_path / "cache"), str(tmp_path / "cache")):
-        clip = cells_of_clip(recording, grids, ImagesConfig(depth=DEPTH, cache=cache), (1, 3), StageTimes())
-        np.testing.assert_array_equal(clip, np.stack(frames))
+        clip = cells_of_clip(recording, grids, ImagesConfig(depth=DEPTH, cache=cache), (1, 3))
+        np.testing.assert_array_equal(clip, expected)
     assert isinstance(clip, np.memmap)
 
 
@@ -147,7 +157,7 @@ def test_tracking_with_and_without_kept_cells_gives_one_motion(capsys, tmp_path,
     done(capsys, *words, "out=plain")
     done(capsys, *words, "images.cache=kept cells", "out=making")
     out, _ = done(capsys, *words, "images.cache=kept cells", "out=using")
-    assert "decoded pictures" not in out
+    assert "averaging pictures" not in out
     poses = [load_motion(tmp_path / name / "motion.npz").pose for name in ("plain", "making", "using")]
     np.testing.assert_array_equal(poses[0], poses[1])
     np.testing.assert_array_equal(poses[0], poses[2])

@@ -61,8 +61,8 @@ def test_bones_join_distinct_joints_and_reach_to_the_tips():
     assert bones.num_joints == 5
     assert len(bones.edges) == len(lines)
     for (a, b), side, (start, end, expected_side) in zip(bones.edges, bones.sides, lines, strict=True):
-        np.testing.assert_allclose(bones.points[:, a], start, atol=1e-6)
-        np.testing.assert_allclose(bones.points[:, b], end, atol=1e-6)
+        np.testing.assert_allclose(bones.points(motion)[:, a], start, atol=1e-6)
+        np.testing.assert_allclose(bones.points(motion)[:, b], end, atol=1e-6)
         assert side == expected_side
 
 

@@ -1,55 +1,56 @@
 """The cells of a recording's frames for a command: from the cache where there is one, else from the videos."""
 
-import time
 from collections.abc import Iterator
 
 import numpy as np
 
 from sogjax.app.configs import ImagesConfig
+from sogjax.app.pipeline import Picture, PictureReader, Preparation
 from sogjax.app.recordings import say
-from sogjax.app.timing import StageTimes
 from sogjax.data.cell_cache import Cells, CellsOfClip, cell_cache
 from sogjax.data.recording import Recording
-from sogjax.data.video import read_frames
-from sogjax.images.cells import CellGrid, stack_cells
+from sogjax.data.video import read_prepared
+from sogjax.images.cells import CellGrid
 
 
-def cell_frames(
-    recording: Recording,
-    grids: tuple[CellGrid, ...],
-    images: ImagesConfig,
-    frames: tuple[int, int],
-    times: StageTimes,
-) -> Iterator[Cells]:
-    """The cells of the frames from the first to before the last; decoded pictures are kept where a cache is wanted.
+def picture_reader(images: ImagesConfig) -> PictureReader:
+    """What reads the pictures of a recording: kept cells where they are enough, else the videos, whose cells are kept.
 
-    Raises:
-        InputError: a picture cannot be read, or the cache's folder cannot be written.
+    Reading raises an InputError where a picture cannot be read, or the cache's folder cannot be written.
     """
-    if images.cache is None:
-        return decoded_cells(recording, grids, frames, times)
-    cache = cell_cache(images.cache, recording, images.depth, say)
-    kept = cache.find(*frames)
-    return cache.kept(*frames, decoded_cells(recording, grids, frames, times)) if kept is None else iter(kept)
+    folder = images.cache
+    if folder is None:
+        return read_prepared
+
+    def read(recording: Recording, preparation: Preparation, first: int, last: int) -> Iterator[list[Picture]]:
+        cache = cell_cache(folder, recording, images.depth, say)
+        kept = cache.find(first, last)
+        if kept is not None and preparation.cells_only:
+            return pictures_of(kept)
+        decoded = read_prepared(recording, preparation, first, last)
+        return decoded if kept is not None else cache.kept(first, last, decoded, cells_of)
+
+    return read
 
 
-def decoded_cells(
-    recording: Recording, grids: tuple[CellGrid, ...], frames: tuple[int, int], times: StageTimes
-) -> Iterator[Cells]:
-    """The same from the videos."""
-    for pictures in times.timed("decode", read_frames(recording, *frames)):
-        begin = time.perf_counter()
-        stacked = stack_cells(pictures, grids)
-        times.add("cells", time.perf_counter() - begin)
-        yield stacked
+def pictures_of(clip: CellsOfClip) -> Iterator[list[Picture]]:
+    """Pictures of which nothing but cells is known."""
+    for cells in clip:
+        yield [Picture(np.asarray(of_camera), None, None, 0.0) for of_camera in cells]
+
+
+def cells_of(pictures: list[Picture]) -> Cells:
+    """The cells of all cameras."""
+    return np.stack([picture.cells for picture in pictures])
 
 
 def cells_of_clip(
-    recording: Recording, grids: tuple[CellGrid, ...], images: ImagesConfig, frames: tuple[int, int], times: StageTimes
+    recording: Recording, grids: tuple[CellGrid, ...], images: ImagesConfig, frames: tuple[int, int]
 ) -> CellsOfClip:
-    """All of them at once; memory-mapped where they were kept."""
+    """Those of all frames at once; memory-mapped where they are kept."""
     if images.cache is not None:
         kept = cell_cache(images.cache, recording, images.depth, say).find(*frames)
         if kept is not None:
             return kept
-    return np.stack(list(cell_frames(recording, grids, images, frames, times)))
+    read = picture_reader(images)
+    return np.stack([cells_of(pictures) for pictures in read(recording, Preparation(grids), *frames)])

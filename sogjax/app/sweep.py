@@ -125,8 +125,8 @@ def row_numbers(result: Any) -> dict[str, float]:
             numbers["joints mm"] = 1000.0 * float(np.nanmean(np.concatenate(joints, axis=1)))
         numbers["swaps"] = len(result.evaluation.swaps)
         numbers["lost"] = sum(len(e.lost) for e in result.evaluation.evaluations.values())
-    numbers["iterations"] = float(np.mean([frame.result.iterations for frame in result.frames]))
-    numbers["not converged"] = sum(not bool(frame.result.converged) for frame in result.frames)
+    numbers["iterations"] = float(np.mean(result.iterations))
+    numbers["not converged"] = int(np.sum(~result.converged))
     numbers["frames/s"] = result.times.frames_per_second("step")
     return numbers
 

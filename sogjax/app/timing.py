@@ -1,6 +1,7 @@
 """How long the stages of a run take, the first frames (which compile) apart."""
 
 import time
+from array import array
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import TypeVar
@@ -12,7 +13,7 @@ Item = TypeVar("Item")
 class StageTimes:
     """Seconds of every frame, by stage."""
 
-    seconds: dict[str, list[float]] = field(default_factory=dict)
+    seconds: dict[str, array] = field(default_factory=dict)
 
     def timed(self, stage: str, items: Iterable[Item]) -> Iterator[Item]:
         """The items; the time that each takes to come is noted."""
@@ -28,13 +29,13 @@ class StageTimes:
 
     def add(self, stage: str, seconds: float) -> None:
         """Note the time of one frame."""
-        self.seconds.setdefault(stage, []).append(seconds)
+        self.seconds.setdefault(stage, array("f")).append(seconds)
 
     def frames_per_second(self, stage: str, skipped: int = 1) -> float:
         """Rate of a stage without its first frames; NaN where there are no others."""
-        rest = self.seconds.get(stage, [])[skipped:]
+        rest = self.seconds.get(stage, array("f"))[skipped:]
         return len(rest) / sum(rest) if rest and sum(rest) > 0.0 else float("nan")
 
     def first(self, stage: str) -> float:
         """Seconds of the first frame, which compiles."""
-        return self.seconds.get(stage, [float("nan")])[0]
+        return self.seconds.get(stage, array("f", [float("nan")]))[0]

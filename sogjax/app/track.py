@@ -1,27 +1,37 @@
 """`sogjax track`: from the videos of a recording to the motion of its actors."""
 
-import time
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Bool, Float, Int
 from omegaconf import OmegaConf
 
 from sogjax.app import build
-from sogjax.app.cells import cell_frames
-from sogjax.app.configs import TrackConfig
+from sogjax.app.cells import picture_reader
+from sogjax.app.configs import OutputsConfig, TrackConfig
 from sogjax.app.first_pose import first_poses, initial_pose_file
 from sogjax.app.outputs import results_folder, write_results
-from sogjax.app.progress import progress
+from sogjax.app.pipeline import FrameTracker, PictureReader, tracked_frames
 from sogjax.app.recordings import actors_of, opened, say, upright
+from sogjax.app.streams import Streams
 from sogjax.app.timing import StageTimes
-from sogjax.data.motion import Motion, motion_from_poses
+from sogjax.data.motion import Motion
+from sogjax.data.motion_log import PER_FRAME
 from sogjax.data.recording import Recording
+from sogjax.data.stages import Behind
 from sogjax.errors import InputError
 from sogjax.evaluate import GroupEvaluation
-from sogjax.model.body import Body, concatenate, dof_slices
-from sogjax.track.tracker import TrackedFrame, track
+from sogjax.images.cells import CellGrid
+from sogjax.model.body import Body, concatenate
+from sogjax.track.tracker import Tracker, track
+
+FRAMES_BEHIND = 8
+"""Tracked frames that wait to be written."""
 
 
 @dataclass
@@ -32,10 +42,21 @@ class Run:
     bodies: list[Body]
     """The actors, upright in the recording's world."""
     motions: dict[str, Motion]
-    frames: list[TrackedFrame]
     times: StageTimes
+    image_blobs: float
+    """Used in a frame by a camera, on average."""
     evaluation: GroupEvaluation | None = None
     files: list[Path] = field(default_factory=list)
+
+    @property
+    def iterations(self) -> Int[np.ndarray, "frame"]:
+        """Of the solver, for all actors together."""
+        return next(iter(self.motions.values())).iterations
+
+    @property
+    def converged(self) -> Bool[np.ndarray, "frame"]:
+        """Whether the solver did, for all actors together."""
+        return next(iter(self.motions.values())).converged
 
 
 def run(config: TrackConfig) -> Run:
@@ -50,31 +71,87 @@ def run(config: TrackConfig) -> Run:
     initial_pose_file(recording, config)
     with results_folder(Path(config.out or f"outputs/{recording.name}")) as out:
         bodies, made = actors_of(recording, config.actor, config.body, config.color)
-        result = track_recording(recording, bodies, config)
-        write_results(result, out, config.outputs, OmegaConf.structured(config), bodies if made else [])
+        with tracking(recording, bodies, config, config.outputs, out) as result:
+            write_results(result, out, config.outputs, OmegaConf.structured(config), bodies if made else [])
     say_results(result)
     return result
 
 
 def track_recording(recording: Recording, bodies: list[Body], config: TrackConfig) -> Run:
-    """The motion of actors (in their own upright frames) in a recording."""
-    bodies = [upright(body, recording) for body in bodies]
-    first, last = frame_range(recording, config)
-    start = jnp.concatenate(first_poses(recording, bodies, config, first))
-    grids = build.cell_grids(recording, config.images.depth)
-    tracker = build.tracker(recording, concatenate(bodies), grids, config)
-    times = StageTimes()
+    """The motion of actors (in their own upright frames) in a recording; no files are written."""
+    nothing = OutputsConfig(overlay=False, rerun=False, bvh=False)
+    with TemporaryDirectory() as folder, tracking(recording, bodies, config, nothing, Path(folder)) as result:
+        motions = {
+            name: replace(motion, **{key: np.array(getattr(motion, key)) for key in PER_FRAME})
+            for name, motion in result.motions.items()
+        }
+        return replace(result, motions=motions)
 
-    cells = cell_frames(recording, grids, config.images, (first, last), times)
-    frames = []
-    begin = time.perf_counter()
-    for frame in track(tracker, start, progress(cells, last - first, "tracking")):
-        frames.append(frame)
-        times.add("whole", time.perf_counter() - begin)
-        times.add("step", frame.seconds)
-        begin = time.perf_counter()
-    motions = _motions(recording, bodies, frames, recording.first_frame + first)
-    return Run(recording, bodies, motions, frames, times)
+
+@dataclass(frozen=True)
+class Job:
+    """All that must be known before a recording is tracked."""
+
+    recording: Recording
+    bodies: list[Body]
+    """The actors, upright in the recording's world."""
+    frames: tuple[int, int]
+    """First and one after the last, counted from the recording's first."""
+    grids: tuple[CellGrid, ...]
+    tracker: Tracker
+    start: Float[Array, "dof"]
+    """The rough pose of the first frame."""
+
+    @classmethod
+    def from_config(cls, recording: Recording, bodies: list[Body], config: TrackConfig) -> "Job":
+        """To track actors (in their own upright frames) in a recording."""
+        bodies = [upright(body, recording) for body in bodies]
+        frames = frame_range(recording, config)
+        start = jnp.concatenate(first_poses(recording, bodies, config, frames[0]))
+        grids = build.cell_grids(recording, config.images.depth)
+        return cls(
+            recording, bodies, frames, grids, build.tracker(recording, concatenate(bodies), grids, config), start
+        )
+
+
+@contextmanager
+def tracking(
+    recording: Recording,
+    bodies: list[Body],
+    config: TrackConfig,
+    outputs: OutputsConfig,
+    out: Path,
+    read: PictureReader | None = None,
+) -> Iterator[Run]:
+    """Track; within the block the motions are in files of `out` that go when it ends well."""
+    job = Job.from_config(recording, bodies, config)
+    with doing(job, outputs, out, read or picture_reader(config.images)) as result:
+        yield result
+
+
+@contextmanager
+def doing(
+    job: Job, outputs: OutputsConfig, out: Path, read: PictureReader, follow: FrameTracker = track
+) -> Iterator[Run]:
+    """The same, with what reads the pictures and what tracks their cells."""
+    first, last = job.frames
+    times = StageTimes()
+    streams = Streams(out, job.recording, job.bodies, job.recording.first_frame + first, outputs, times)
+    used: list[float] = []
+    try:
+        with streams:
+            pictures = read(job.recording, streams.preparation(job.grids), first, last)
+            frames = tracked_frames(pictures, last - first, job.tracker, job.start, times, follow)
+            with closing(frames), Behind(streams.consume, FRAMES_BEHIND) as behind:
+                for done in frames:
+                    used.append(float(np.mean(done.tracked.result.num_matching)))
+                    behind.put(done)
+        motions = streams.motions(mapped=True)
+        yield Run(job.recording, job.bodies, motions, times, float(np.mean(used)), files=streams.files)
+        streams.remove_partial()
+    except BaseException:
+        streams.say_what_is_left()
+        raise
 
 
 def frame_range(recording: Recording, config: TrackConfig) -> tuple[int, int]:
@@ -92,31 +169,11 @@ def frame_range(recording: Recording, config: TrackConfig) -> tuple[int, int]:
     return config.start, last
 
 
-def _motions(
-    recording: Recording, bodies: list[Body], frames: list[TrackedFrame], first_frame: int
-) -> dict[str, Motion]:
-    """One motion an actor; similarity, energy and iterations are those of all actors together."""
-    poses = np.stack([np.asarray(frame.result.pose) for frame in frames])
-    of_frames = lambda choose, dtype: np.array([choose(frame.result) for frame in frames], dtype)
-    return {
-        body.name: motion_from_poses(
-            body,
-            jnp.asarray(poses[:, part]),
-            recording.fps,
-            frame=first_frame + np.arange(len(frames)),
-            similarity=of_frames(lambda r: r.terms.similarity, float),
-            energy=of_frames(lambda r: r.terms.energy, float),
-            iterations=of_frames(lambda r: r.iterations, int),
-            converged=of_frames(lambda r: r.converged, bool),
-        )
-        for body, part in zip(bodies, dof_slices(bodies), strict=True)
-    }
-
-
 STAGES = {
     "decode": "waiting for decoded pictures",
     "cells": "averaging pictures to cells",
     "step": "tracking step",
+    "outputs": "writing results",
     "whole": "decoding to pose, together",
 }
 
@@ -126,17 +183,16 @@ def say_results(result: Run) -> None:
     if result.evaluation is not None:
         print(result.evaluation.table(details=False), end="\n\n")
     for stage, text in STAGES.items():
-        if stage not in result.times.seconds:  # pictures that were kept are not decoded
-            continue
-        print(f"{text:<32}{result.times.frames_per_second(stage):10.1f} frames/s")
-    iterations = np.mean([int(frame.result.iterations) for frame in result.frames])
+        rate = result.times.frames_per_second(stage)
+        if not np.isnan(rate):  # kept cells take no time
+            print(f"{text:<32}{rate:10.1f} frames/s")
     print(f"first frame, with compilation   {result.times.first('whole'):10.1f} s")
-    print(f"iterations                      {iterations:10.1f} a frame", end="\n\n")
+    print(f"iterations                      {np.mean(result.iterations):10.1f} a frame", end="\n\n")
     for path in result.files:
         print(path)
-    not_converged = sum(not bool(frame.result.converged) for frame in result.frames)
+    not_converged = int(np.sum(~result.converged))
     if not_converged:
         say(
-            f"warning: {not_converged} of {len(result.frames)} frames did not converge within "
+            f"warning: {not_converged} of {len(result.converged)} frames did not converge within "
             "solver.max_iterations; look at them in the overlay"
         )

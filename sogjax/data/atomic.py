@@ -32,11 +32,23 @@ def atomic_path(path: Path) -> Iterator[Path]:
         reason = error.strerror or str(error)
         raise InputError(f"{path}: the folder {path.parent} cannot be written ({reason}); choose another") from error
     try:
-        yield temporary
-        temporary.replace(path)
+        with disk_trouble_told(path):
+            yield temporary
+            temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def disk_trouble_told(path: Path) -> Iterator[None]:
+    """A full or broken disk becomes one sentence about `path`.
+
+    Raises:
+        InputError: instead of the system's error.
+    """
+    try:
+        yield
     except OSError as error:
         if error.errno not in _DISK_TROUBLE:
             raise
         raise InputError(f"{path}: could not be written ({error.strerror}); choose another disk") from error
-    finally:
-        temporary.unlink(missing_ok=True)

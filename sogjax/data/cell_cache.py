@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from jaxtyping import UInt8
@@ -27,6 +27,7 @@ CELLS_VERSION = 1
 _CHUNK = 2**22
 
 Cells = UInt8[np.ndarray, "camera rows columns 3"]
+Frame = TypeVar("Frame")
 CellsOfClip = UInt8[np.ndarray, "frame camera rows columns 3"]
 
 
@@ -56,8 +57,10 @@ class CellCache:
                 return cells[first - begin : last - begin]
         return None
 
-    def kept(self, first: int, last: int, frames: Iterator[Cells]) -> Iterator[Cells]:
-        """The same frames; when the last one was taken, all of them are on disk.
+    def kept(
+        self, first: int, last: int, frames: Iterator[Frame], cells_of: Callable[[Frame], Cells]
+    ) -> Iterator[Frame]:
+        """The same frames; when the last one was taken, the cells of all of them are on disk.
 
         Raises:
             InputError: the folder cannot be written, or the disk is full.
@@ -66,7 +69,8 @@ class CellCache:
         array = self.folder / f"{self._prefix}-{begin}-{last - first}.npy"
         with atomic_path(array) as temporary, temporary.open("wb") as file:
             checksum, shape = 0, None
-            for cells in frames:
+            for frame in frames:
+                cells = cells_of(frame)
                 if shape is None:
                     shape = (last - first, *cells.shape)
                     header = {"descr": "|u1", "fortran_order": False, "shape": shape}
@@ -74,7 +78,7 @@ class CellCache:
                 content = np.ascontiguousarray(cells).tobytes()
                 checksum = zlib.crc32(content, checksum)
                 file.write(content)
-                yield cells
+                yield frame
         note = {"made_from": self._made_from, "first_frame": begin, "checksum": checksum}
         with atomic_path(array.with_suffix(".json")) as temporary:
             temporary.write_text(json.dumps(note, indent=1))

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int, Shaped
 
+from sogjax.data.array_log import read_log
 from sogjax.data.atomic import atomic_path
 from sogjax.data.npz_file import (
     bool_array,
@@ -23,6 +24,8 @@ from sogjax.errors import InputError
 from sogjax.model.body import Body
 
 FORMAT_VERSION = 1
+FRAMES_AT_ONCE = 8
+"""Joint frames and blobs are computed in blocks of so many frames, so that one program serves motions of any length."""
 
 
 @dataclass
@@ -74,23 +77,23 @@ def motion_from_poses(
     `iterations` 0 and `converged` true.
     """
     skeleton = body.skeleton
-    poses = jnp.asarray(poses, skeleton.offsets.dtype)
+    poses = np.asarray(poses, skeleton.offsets.dtype)
     count = poses.shape[0]
     frame = np.arange(count) if frame is None else frame
-    joint_params, world_from_joint, blob_means = _forward(body, poses)
+    joint_params, world_from_joint, blob_means = _forward_in_blocks(body, poses)
     unknown = np.full(count, np.nan)
     return Motion(
         fps=float(fps),
         frame=frame,
         time=frame / float(fps),
-        pose=np.asarray(poses),
+        pose=poses,
         dof_names=np.array(skeleton.dof_names, str),
-        joint_params=np.asarray(joint_params),
+        joint_params=joint_params,
         joint_param_names=np.array(skeleton.names, str),
         joint_names=np.array(skeleton.names, str),
         joint_parents=np.array(skeleton.parents, int),
-        world_from_joint=np.asarray(world_from_joint),
-        blob_means=np.asarray(blob_means),
+        world_from_joint=world_from_joint,
+        blob_means=blob_means,
         blob_joint=np.array(body.blobs.joints, int),
         blob_sigma=np.asarray(body.blob_sigmas),
         similarity=unknown if similarity is None else similarity,
@@ -109,12 +112,20 @@ def save_motion(path: Path, motion: Motion) -> None:
 
 
 def load_motion(path: Path) -> Motion:
-    """Read `motion.npz`.
+    """Read `motion.npz`, or the folder of a motion that is being written (`MotionLog`).
 
     Raises:
         InputError: no such file, no npz, another version, or an array missing, misshapen or not finite.
     """
-    arrays = read_npz(path)
+    return checked_motion(path, read_log(path) if path.is_dir() else read_npz(path))
+
+
+def checked_motion(path: Path, arrays: dict[str, np.ndarray]) -> Motion:
+    """The motion that the arrays of a file are.
+
+    Raises:
+        InputError: another version, or an array missing, misshapen or not finite.
+    """
     version = number(path, arrays, "format_version")
     if version != FORMAT_VERSION:
         raise InputError(f"{path}: has the format version {version:g}, not {FORMAT_VERSION}; track again")
@@ -148,6 +159,20 @@ def load_motion(path: Path) -> Motion:
     )
     _check(path, motion)
     return motion
+
+
+def _forward_in_blocks(
+    body: Body, poses: Float[np.ndarray, "frame dof"]
+) -> tuple[Float[np.ndarray, "frame joint"], Float[np.ndarray, "frame joint 4 4"], Float[np.ndarray, "frame blob 3"]]:
+    count = len(poses)
+    num_blocks = max(-(-count // FRAMES_AT_ONCE), 1)
+    padded = np.pad(poses, ((0, num_blocks * FRAMES_AT_ONCE - count), (0, 0)))
+    blocks = [
+        jax.device_get(_forward(body, jnp.asarray(padded[first : first + FRAMES_AT_ONCE])))
+        for first in range(0, len(padded), FRAMES_AT_ONCE)
+    ]
+    joint_params, world_from_joint, blob_means = (np.concatenate(parts)[:count] for parts in zip(*blocks, strict=True))
+    return joint_params, world_from_joint, blob_means
 
 
 @eqx.filter_jit

@@ -1,11 +1,12 @@
 """The images of a recording, time step by time step, and writing videos."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
+from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -17,7 +18,9 @@ from sogjax.data.recording import Recording
 from sogjax.data.source import Source, open_source
 from sogjax.errors import InputError
 
-__all__ = ["VideoWriter", "read_frames", "read_image", "read_mask"]
+__all__ = ["VideoWriter", "read_frames", "read_image", "read_mask", "read_prepared"]
+
+Item = TypeVar("Item")
 
 
 def read_frames(recording: Recording, start: int = 0, stop: int | None = None) -> Iterator[list[np.ndarray]]:
@@ -29,20 +32,39 @@ def read_frames(recording: Recording, start: int = 0, stop: int | None = None) -
     Raises:
         InputError: a video ends early or changes its size.
     """
+    return read_prepared(recording, lambda camera, image: image, start, stop)
+
+
+def read_prepared(
+    recording: Recording,
+    prepare: Callable[[int, np.ndarray], Item],
+    start: int = 0,
+    stop: int | None = None,
+    workers: int | None = None,
+) -> Iterator[list[Item]]:
+    """The same, but what `prepare` makes of each image and the number of its camera.
+
+    The decoding threads do that, so a large image need not outlive the moment in which it was decoded. There are
+    `workers` of them, by default one for each core.
+
+    Raises:
+        InputError: a video ends early or changes its size.
+    """
     stop = recording.num_frames if stop is None else min(stop, recording.num_frames)
     if not 0 <= start <= stop:
         raise ValueError(f"frames {start} to {stop} are not in a recording of {recording.num_frames} frames")
-    return _decoded_ahead(recording, start, stop)
+    return _decoded_ahead(recording, prepare, start, stop, workers or os.cpu_count() or 1)
 
 
-def _decoded_ahead(recording: Recording, start: int, stop: int) -> Iterator[list[np.ndarray]]:
+def _decoded_ahead(
+    recording: Recording, prepare: Callable[[int, np.ndarray], Item], start: int, stop: int, workers: int
+) -> Iterator[list[Item]]:
     if start == stop:
         return
-    cores = os.cpu_count() or 1
     cameras = recording.rig.names
-    threads = max(1, cores // len(cameras))
+    threads = max(1, workers // len(cameras))
     with ExitStack() as stack:
-        pool = stack.enter_context(ThreadPoolExecutor(min(len(cameras), cores)))
+        pool = stack.enter_context(ThreadPoolExecutor(min(len(cameras), workers)))
         opened = [
             pool.submit(
                 open_source,
@@ -54,13 +76,17 @@ def _decoded_ahead(recording: Recording, start: int, stop: int) -> Iterator[list
         ]
         stack.callback(_close_all, opened)
         sources = [future.result() for future in opened]
-        upcoming = [pool.submit(source.read) for source in sources]
+
+        def decoded(camera: int, frame: int) -> Item:
+            return prepare(camera, _checked(recording, cameras[camera], sources[camera].read(), frame))
+
+        decode = lambda frame: [pool.submit(decoded, camera, frame) for camera in range(len(cameras))]
+        upcoming = decode(start)
         stack.callback(lambda: wait(upcoming))
         for frame in range(start, stop):
             images = [future.result() for future in upcoming]
-            if frame + 1 < stop:
-                upcoming[:] = [pool.submit(source.read) for source in sources]
-            yield [_checked(recording, camera, image, frame) for camera, image in zip(cameras, images, strict=True)]
+            upcoming[:] = decode(frame + 1) if frame + 1 < stop else []
+            yield images
 
 
 def _close_all(opened: list[Future[Source]]) -> None:

@@ -67,11 +67,26 @@ def stack_cells(
     Raises:
         ValueError: an image whose size is not its grid's.
     """
-    rows, columns = max(grid.rows for grid in grids), max(grid.columns for grid in grids)
-    cells = np.zeros((len(grids), rows, columns, 3), np.uint8)
-    for k, (image, grid) in enumerate(zip(images, grids, strict=True)):
-        if image.shape[:2] != (grid.height, grid.width):
-            found = f"{image.shape[1]}x{image.shape[0]}"
-            raise ValueError(f"image {k} is {found} pixels, its grid is for {grid.width}x{grid.height}")
-        cells[k, : grid.rows, : grid.columns] = grid.averages(image)[..., ::-1]
+    shape = stack_shape(grids)
+    return np.stack([padded_cells(image, grid, shape) for image, grid in zip(images, grids, strict=True)])
+
+
+def stack_shape(grids: tuple[CellGrid, ...]) -> tuple[int, int]:
+    """Rows and columns of the largest grid."""
+    return max(grid.rows for grid in grids), max(grid.columns for grid in grids)
+
+
+def padded_cells(
+    image: UInt8[np.ndarray, "_height _width 3"], grid: CellGrid, shape: tuple[int, int]
+) -> UInt8[np.ndarray, "rows columns 3"]:
+    """RGB cells of one BGR image, padded to `shape`.
+
+    Raises:
+        ValueError: an image whose size is not its grid's.
+    """
+    if image.shape[:2] != (grid.height, grid.width):
+        found = f"{image.shape[1]}x{image.shape[0]}"
+        raise ValueError(f"an image is {found} pixels, its grid is for {grid.width}x{grid.height}")
+    cells = np.zeros((*shape, 3), np.uint8)
+    cells[: grid.rows, : grid.columns] = grid.averages(image)[..., ::-1]
     return cells

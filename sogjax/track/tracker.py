@@ -197,7 +197,15 @@ def track(
             capacities = larger_capacities(capacities, near, matching, blocks)
         state = next_state
         seconds = time.perf_counter() - begin
-        yield TrackedFrame(index, jax.device_get(result), capacities, tracker.reader.color_space, seconds)
+        yield TrackedFrame(index, on_host(result), capacities, tracker.reader.color_space, seconds)
+
+
+def on_host(result: FrameResult) -> FrameResult:
+    """The result with its small arrays on the host; the image blobs stay on the device until somebody needs them."""
+    images, leaves = jax.tree.structure(result.images), jax.tree.leaves(result)
+    small = len(leaves) - images.num_leaves  # `images` is the last field
+    host = jax.device_get(leaves[:small])
+    return jax.tree.unflatten(jax.tree.structure(result), [*host, *leaves[small:]])
 
 
 def larger_capacities(capacities: Capacities, near: int, matching: int, blocks: int) -> Capacities:

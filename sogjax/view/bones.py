@@ -28,16 +28,26 @@ _PALETTE = np.array(
 
 @dataclass(frozen=True)
 class Bones:
-    """Line segments of one motion."""
+    """Which lines of an actor to draw."""
 
-    points: Float[np.ndarray, "frame point 3"]
-    """Metres, world: the distinct joints, then the tips of the last ones."""
-    num_joints: int
-    """How many of the points are joints."""
+    joints: Int[np.ndarray, "joint"]
+    """The distinct joints."""
+    tips: Int[np.ndarray, "tip"]
+    """The blobs that the last joints point to."""
     edges: Int[np.ndarray, "edge 2"]
-    """From point to point."""
+    """From point to point: joints first, then tips."""
     sides: Int[np.ndarray, "edge"]
     """LEFT, MIDDLE or RIGHT of each edge."""
+
+    @property
+    def num_joints(self) -> int:
+        """How many of the points are joints."""
+        return len(self.joints)
+
+    def points(self, motion: Motion) -> Float[np.ndarray, "frame point 3"]:
+        """Metres, world: the distinct joints, then the tips of the last ones."""
+        parts = [motion.world_from_joint[:, self.joints][..., :3, 3], motion.blob_means[:, self.tips]]
+        return np.concatenate(parts, axis=1).astype(np.float32)
 
 
 def bones_from_motion(motion: Motion) -> Bones:
@@ -50,16 +60,11 @@ def bones_from_motion(motion: Motion) -> Bones:
     number = {joint: k for k, joint in enumerate(joints)}
     pairs = [(number[a], number[b]) for a, b in edges]
     pairs += [(number[joint], len(joints) + k) for k, (joint, _) in enumerate(tips)]
-    sides = sides_of(motion)[np.array([b for _, b in edges] + [joint for joint, _ in tips], int)]
-    points = [
-        motion.world_from_joint[:, joints][..., :3, 3],
-        motion.blob_means[:, [blob for _, blob in tips]],
-    ]
     return Bones(
-        points=np.concatenate(points, axis=1).astype(np.float32),
-        num_joints=len(joints),
+        joints=np.array(joints, int),
+        tips=np.array([blob for _, blob in tips], int),
         edges=np.array(pairs, int).reshape(-1, 2),
-        sides=sides,
+        sides=sides_of(motion)[np.array([b for _, b in edges] + [joint for joint, _ in tips], int)],
     )
 
 

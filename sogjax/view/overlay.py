@@ -16,7 +16,7 @@ from sogjax.errors import InputError
 from sogjax.view.bones import Bones, actor_palette, blob_palette, bones_from_motion
 from sogjax.view.frames import frame_range
 from sogjax.view.projection import picture_points
-from sogjax.view.tiles import Fit, grid_for
+from sogjax.view.tiles import Fit, grid_for, shrink
 
 SUBPIXEL_BITS = 4
 WIDTH = 1920
@@ -47,6 +47,7 @@ class Overlay:
         width: largest width of the grid in pixels.
         columns: tiles in a row; default as suits a wide screen.
         blobs: draw the blobs too, as circles of radius sigma.
+        bones: the lines of each actor; default those of its motion.
 
     Raises:
         InputError: a camera that the rig does not have, or none at all.
@@ -61,6 +62,7 @@ class Overlay:
         width: int = WIDTH,
         columns: int | None = None,
         blobs: bool = False,
+        bones: Sequence[Bones] | None = None,
     ) -> None:
         names = tuple(rig.names if cameras is None else cameras)
         unknown = [name for name in names if name not in rig.names]
@@ -72,7 +74,17 @@ class Overlay:
         sizes = [chosen.image_size(name) for name in names]
         self.grid = grid_for(sizes, width, columns)
         self.fits = [self.grid.fit(k, size) for k, size in enumerate(sizes)]
-        self.drawings = [_drawing(chosen, self.fits, m, actor, blobs) for actor, m in enumerate(motions)]
+        lines = [bones_from_motion(motion) for motion in motions] if bones is None else bones
+        self.drawings = [
+            _drawing(chosen, self.fits, motion, lines[actor], actor, blobs) for actor, motion in enumerate(motions)
+        ]
+
+    def tile(self, camera: int, image: np.ndarray) -> np.ndarray:
+        """A camera's picture at the size that the grid shows it in, which `draw` takes as well."""
+        if camera not in self.shown:
+            return image
+        fit = self.fits[self.shown.index(camera)]
+        return shrink(image, (fit.width, fit.height))
 
     def draw(self, images: Sequence[np.ndarray | None], frame: int) -> UInt8[np.ndarray, "h w 3"]:
         """The grid (BGR) of one frame of the recording.
@@ -150,10 +162,9 @@ def write_overlay(
             video.write(overlay.draw(images, frame))
 
 
-def _drawing(rig: CameraRig, fits: list[Fit], motion: Motion, actor: int, blobs: bool) -> _Drawing:
+def _drawing(rig: CameraRig, fits: list[Fit], motion: Motion, bones: Bones, actor: int, blobs: bool) -> _Drawing:
     """Project an actor, and scale to the tiles."""
-    bones = bones_from_motion(motion)
-    pixels, _ = picture_points(rig, bones.points)
+    pixels, _ = picture_points(rig, bones.points(motion))
     blob_pixels = blob_radii = None
     if blobs:
         blob_pixels, depths = picture_points(rig, motion.blob_means.astype(np.float32))

@@ -1,0 +1,77 @@
+"""Does the memory of a run stay flat, however long the recording is?
+
+python benchmarks/memory.py recording=FOLDER [actor=FILE] [frames=16] [repeats=[1,4]] [overrides=[...]]
+
+Tracks the first frames of a recording over and over, with all outputs (overlay, Rerun file with pictures), each length
+in a process of its own, and prints its largest resident memory. Poses are wrong where the frames begin again.
+"""
+
+import resource
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from sogjax.app.composition import composed
+from sogjax.app.overrides import quoted_value
+from sogjax.app.pipeline import Picture, Preparation
+from sogjax.app.recordings import actors_of, opened
+from sogjax.app.script import machine_line, run_script, settings_from
+from sogjax.app.track import tracking
+from sogjax.data.recording import Recording
+from sogjax.data.video import read_prepared
+
+MIB = 1024
+"""Kibibytes, in which the system counts."""
+
+
+@dataclass
+class Settings:
+    """What is tracked, as `key=value` on the command line."""
+
+    recording: str = "???"
+    actor: str | None = None
+    frames: int = 16
+    repeats: list[int] = field(default_factory=lambda: [1, 4])
+    overrides: list[str] = field(default_factory=lambda: ["solver.max_iterations=20"])
+
+
+def main() -> None:
+    """Print the table; with one number in `repeats`, only the memory of this process."""
+    settings = settings_from(Settings)
+    if len(settings.repeats) == 1:
+        track_repeatedly(settings, settings.repeats[0])
+        print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MIB)
+        return
+    print(machine_line())
+    for repeats in settings.repeats:
+        words = [word for word in sys.argv[1:] if not word.startswith("repeats=")]
+        command = [sys.executable, __file__, *words, f"repeats=[{repeats}]"]
+        done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
+        largest = float(done.stdout.split()[-1])
+        print(f"{settings.frames * repeats:6d} frames: at most {largest:6.0f} MiB resident", flush=True)
+
+
+def track_repeatedly(settings: Settings, repeats: int) -> None:
+    """The first frames of the recording so many times over, into a folder that is removed."""
+    words = [f"recording={quoted_value(settings.recording)}", *settings.overrides]
+    config = composed("track", [*words, *([f"actor={quoted_value(settings.actor)}"] if settings.actor else [])])
+    recording = opened(config.recording, config.cameras)
+    bodies, _ = actors_of(recording, config.actor, config.body, config.color)
+    longer = replace(recording, num_frames=repeats * settings.frames)
+
+    def again_and_again(recording: Recording, prepare: Preparation, first: int, last: int) -> Iterator[list[Picture]]:
+        for _ in range(repeats):
+            yield from read_prepared(recording, prepare, 0, last // repeats)
+
+    with (
+        TemporaryDirectory() as folder,
+        tracking(longer, bodies, config, config.outputs, Path(folder), again_and_again) as result,
+    ):
+        assert len(result.converged) == longer.num_frames
+
+
+if __name__ == "__main__":
+    run_script(main)

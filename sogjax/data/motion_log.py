@@ -1,0 +1,61 @@
+"""A motion that goes to disk while it is found."""
+
+import shutil
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+
+from sogjax.data.array_log import ArrayLog, read_log
+from sogjax.data.motion import FORMAT_VERSION, Motion
+
+PER_FRAME = (
+    "frame",
+    "time",
+    "pose",
+    "joint_params",
+    "world_from_joint",
+    "blob_means",
+    "similarity",
+    "energy",
+    "iterations",
+    "converged",
+)
+"""The fields of a `Motion` that have a row for each frame."""
+
+
+class MotionLog:
+    """The motion of one actor so far, in a folder that `load_motion` reads.
+
+    Raises:
+        InputError: the folder cannot be written, here or later.
+    """
+
+    def __init__(self, folder: Path):
+        self.folder = folder
+        self._log: ArrayLog | None = None
+
+    def append(self, motion: Motion) -> None:
+        """Write the frames that follow; the folder is made with the first ones."""
+        arrays = {entry.name: np.asarray(getattr(motion, entry.name)) for entry in fields(motion)}
+        rows = {name: arrays.pop(name) for name in PER_FRAME}
+        if self._log is None:
+            self._log = ArrayLog(self.folder, arrays | {"format_version": np.array(FORMAT_VERSION)}, rows)
+        else:
+            self._log.append(rows)
+
+    def motion(self, mapped: bool) -> Motion:
+        """All that was written; `mapped`: the arrays stay on disk, as long as the folder does."""
+        arrays = read_log(self.folder, mapped)
+        arrays["fps"] = float(arrays["fps"])  # pyright: ignore[reportArgumentType]
+        return Motion(**{entry.name: arrays[entry.name] for entry in fields(Motion)})  # pyright: ignore[reportArgumentType]
+
+    def close(self) -> None:
+        """Close the file; the folder stays."""
+        if self._log is not None:
+            self._log.close()
+
+    def remove(self) -> None:
+        """Remove the folder, when its motion has been written as a whole."""
+        self.close()
+        shutil.rmtree(self.folder, ignore_errors=True)

@@ -1,0 +1,57 @@
+"""A motion that grows on disk can be read at any moment, and is the same as the whole one."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from motion_cases import walking_motion
+
+from sogjax.data.array_log import ROWS
+from sogjax.data.motion import Motion, load_motion, save_motion
+from sogjax.data.motion_log import PER_FRAME, MotionLog
+from sogjax.errors import InputError
+
+
+def part(motion, frames):
+    return replace(motion, **{name: getattr(motion, name)[frames] for name in PER_FRAME})
+
+
+def assert_same(one, other):
+    for entry in fields(Motion):
+        np.testing.assert_array_equal(getattr(one, entry.name), getattr(other, entry.name), entry.name)
+
+
+def test_every_prefix_can_be_read_while_the_log_is_open(tmp_path):
+    motion, log = walking_motion(11), MotionLog(tmp_path / "motion.partial")
+    for first, stop in ((0, 4), (4, 5), (5, 11)):
+        log.append(part(motion, slice(first, stop)))
+        assert_same(load_motion(log.folder), part(motion, slice(0, stop)))
+    mapped = log.motion(mapped=True)
+    assert isinstance(mapped.pose.base if mapped.pose.base is not None else mapped.pose, np.memmap)
+    save_motion(tmp_path / "motion.npz", mapped)
+    assert_same(load_motion(tmp_path / "motion.npz"), motion)
+    log.remove()
+    assert [path.name for path in tmp_path.iterdir()] == ["motion.npz"]
+
+
+def test_rows_that_were_cut_off_in_the_middle_are_left_out(tmp_path):
+    """As after a loss of power: the header counts whole blocks only, and comes after them."""
+    motion, log = walking_motion(8), MotionLog(tmp_path / "motion.partial")
+    log.append(part(motion, slice(0, 6)))
+    log.close()
+    with (log.folder / ROWS).open("ab") as file:
+        file.write(b"half a row")
+    assert_same(load_motion(log.folder), part(motion, slice(0, 6)))
+
+
+def test_a_log_begins_anew(tmp_path):
+    for count in (9, 3):
+        log = MotionLog(tmp_path / "m")
+        log.append(walking_motion(count))
+        log.close()
+    assert load_motion(tmp_path / "m").num_frames == 3
+
+
+def test_a_folder_that_is_no_log_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"constant\.npz"):
+        load_motion(tmp_path)

@@ -1,0 +1,97 @@
+"""Files that grow with a run: where it ends early they are readable or absent, and no thread stays."""
+
+import threading
+
+import numpy as np
+import pytest
+from command_line import actor_file, trackable
+
+from sogjax.app import pipeline
+from sogjax.app.cli import main
+from sogjax.data.motion import load_motion
+from sogjax.errors import InputError
+from sogjax.view.overlay_video import OverlayVideo
+
+FRAMES, LAST_GOOD = 14, 10
+
+
+@pytest.fixture
+def command(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    recording = trackable(tmp_path / "walk", frames=FRAMES)
+    words = ("images.depth=4", "solver.max_iterations=2", "solver.min_iterations=1", "outputs.overlay_width=128")
+    return ["track", f"recording={recording}", f"actor={actor_file(tmp_path / 'a.yaml')}", *words]
+
+
+def interrupt_the_step(monkeypatch):
+    """Ctrl-C reaches the main thread, where the step runs."""
+    whole = pipeline.track
+
+    def track(*arguments):
+        for tracked in whole(*arguments):
+            if tracked.index == LAST_GOOD:
+                raise KeyboardInterrupt
+            yield tracked
+
+    monkeypatch.setattr(pipeline, "track", track)
+    return 130
+
+
+def break_a_video(monkeypatch):
+    """An error in a decoding thread."""
+    whole, calls = pipeline.padded_cells, []
+
+    def padded_cells(*arguments):
+        calls.append(1)
+        if len(calls) > 2 * LAST_GOOD:
+            raise InputError("right.mp4: ends early")
+        return whole(*arguments)
+
+    monkeypatch.setattr(pipeline, "padded_cells", padded_cells)
+    return 2
+
+
+def fill_the_disk(monkeypatch):
+    """An error in the writing thread, in its second block."""
+    whole, calls = OverlayVideo.write, []
+
+    def write(*arguments):
+        calls.append(1)
+        if len(calls) == 2:
+            raise InputError("overlay.mp4: could not be written (No space left on device)")
+        whole(*arguments)
+
+    monkeypatch.setattr(OverlayVideo, "write", write)
+    return 2
+
+
+@pytest.mark.parametrize("trouble", [interrupt_the_step, break_a_video, fill_the_disk])
+def test_an_early_end_leaves_the_motion_so_far(capsys, tmp_path, monkeypatch, command, trouble):
+    assert main([*command, "out=whole", "outputs.overlay=false", "outputs.rerun=false"]) == 0
+    capsys.readouterr()
+    threads = set(threading.enumerate())
+    status = trouble(monkeypatch)
+    assert main([*command, "out=run"]) == status
+    assert set(threading.enumerate()) == threads
+    assert [path.name for path in (tmp_path / "run").iterdir()] == ["motion.partial"]
+    so_far, complete = load_motion(tmp_path / "run" / "motion.partial"), load_motion(tmp_path / "whole" / "motion.npz")
+    assert so_far.num_frames >= 10
+    np.testing.assert_array_equal(so_far.pose, complete.pose[: so_far.num_frames])
+    err = capsys.readouterr().err
+    assert f"stopped after {so_far.num_frames} frames; their motion is in run/motion.partial" in err
+    assert "Traceback" not in err
+
+    monkeypatch.undo()
+    monkeypatch.chdir(tmp_path)
+    assert main([*command, "out=run"]) == 0
+    assert "motion.partial" not in [path.name for path in (tmp_path / "run").iterdir()]
+
+
+def test_an_error_in_the_first_frame_leaves_nothing(capsys, tmp_path, monkeypatch, command):
+    def padded_cells(*arguments):
+        raise InputError("right.mp4: ends early")
+
+    monkeypatch.setattr(pipeline, "padded_cells", padded_cells)
+    assert main([*command, "out=run"]) == 2
+    assert capsys.readouterr().err == "sogjax: right.mp4: ends early\n"
+    assert not (tmp_path / "run").exists()
