@@ -38,6 +38,9 @@ class ImagesConfig:
         None, "leave out image blobs that equal the empty background pictures; null: where every camera has one"
     )
     plate_tolerance: float = option(0.1, "colours nearer than this to the plate's are background")
+    cache: str | None = option(
+        None, "folder where averaged pictures are kept, so that later runs decode no video; null: none are kept"
+    )
 
 
 @dataclass

@@ -2,7 +2,7 @@
 
 import time
 from collections import deque
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -47,13 +47,28 @@ PictureReader = Callable[[Recording, "Preparation", int, int], Iterator[list[Pic
 """Of a recording, what to make of each picture, the first frame and the one after the last."""
 
 
+FrameTracker = Callable[
+    [Tracker, Float[Array, "dof"], Iterable[UInt8[np.ndarray, "_c _h _w 3"]]], Iterator[TrackedFrame]
+]
+"""What finds the poses of frames from their cells, one after the other, as `sogjax.track.tracker.track` does."""
+
+
+def nothing(camera: int, image: np.ndarray) -> None:
+    """Made of a picture that no output shows."""
+
+
 @dataclass(frozen=True)
 class Preparation:
     """What the decoding threads make of each picture before they drop it."""
 
     grids: tuple[CellGrid, ...]
-    tile: PictureMaker = lambda camera, image: None
-    jpeg: PictureMaker = lambda camera, image: None
+    tile: PictureMaker = nothing
+    jpeg: PictureMaker = nothing
+
+    @property
+    def cells_only(self) -> bool:
+        """Whether cells are all that is needed."""
+        return self.tile is nothing and self.jpeg is nothing
 
     def __call__(self, camera: int, image: np.ndarray) -> Picture:
         """The cells of a picture, and what outputs need of it."""
@@ -64,7 +79,12 @@ class Preparation:
 
 
 def tracked_frames(
-    pictures: Iterator[list[Picture]], count: int, tracker: Tracker, start: Float[Array, "dof"], times: StageTimes
+    pictures: Iterator[list[Picture]],
+    count: int,
+    tracker: Tracker,
+    start: Float[Array, "dof"],
+    times: StageTimes,
+    follow: FrameTracker = track,
 ) -> Generator[FrameDone, None, None]:
     """Track `count` frames, while a thread takes the pictures of those that follow.
 
@@ -81,7 +101,7 @@ def tracked_frames(
                 yield np.stack([picture.cells for picture in frame])
 
         begin = time.perf_counter()
-        for tracked in track(tracker, start, cells()):
+        for tracked in follow(tracker, start, cells()):
             times.add("step", tracked.seconds)
             times.add("whole", time.perf_counter() - begin)
             begin = time.perf_counter()

@@ -22,6 +22,7 @@ from sogjax.data.ground_truth import load_ground_truth
 from sogjax.errors import InputError
 from sogjax.evaluate import evaluate_motions
 from sogjax.synth import SynthSettings, cached_recording
+from sogjax.synth.cache import default_cache_dir
 
 Settings = TypeVar("Settings")
 
@@ -57,8 +58,12 @@ def run_script(main: Callable[[], None]) -> None:
 
 
 def track_rendered(settings: SynthSettings, overrides: Sequence[str] = ()) -> Run:
-    """Track a rendered recording, made now if it is not there yet, and evaluate it; no files are written."""
-    return track_folder(cached_recording(settings, progress=progress), overrides)
+    """Track a rendered recording, made now if it is not there yet, and evaluate it; no results are written.
+
+    Its averaged pictures are kept beside it, so that further runs do not decode them again.
+    """
+    cache = f"images.cache={quoted_value(str(default_cache_dir() / 'cells'))}"
+    return track_folder(cached_recording(settings, progress=progress), [cache, *overrides])
 
 
 def track_folder(folder: Path, overrides: Sequence[str] = ()) -> Run:

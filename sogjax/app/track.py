@@ -8,14 +8,15 @@ from tempfile import TemporaryDirectory
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Array, Bool, Float, Int
 from omegaconf import OmegaConf
 
 from sogjax.app import build
+from sogjax.app.cells import picture_reader
 from sogjax.app.configs import OutputsConfig, TrackConfig
 from sogjax.app.first_pose import first_poses, initial_pose_file
 from sogjax.app.outputs import results_folder, write_results
-from sogjax.app.pipeline import PictureReader, tracked_frames
+from sogjax.app.pipeline import FrameTracker, PictureReader, tracked_frames
 from sogjax.app.recordings import actors_of, opened, say, upright
 from sogjax.app.streams import Streams
 from sogjax.app.timing import StageTimes
@@ -23,10 +24,11 @@ from sogjax.data.motion import Motion
 from sogjax.data.motion_log import PER_FRAME
 from sogjax.data.recording import Recording
 from sogjax.data.stages import Behind
-from sogjax.data.video import read_prepared
 from sogjax.errors import InputError
 from sogjax.evaluate import GroupEvaluation
+from sogjax.images.cells import CellGrid
 from sogjax.model.body import Body, concatenate
+from sogjax.track.tracker import Tracker, track
 
 FRAMES_BEHIND = 8
 """Tracked frames that wait to be written."""
@@ -86,6 +88,32 @@ def track_recording(recording: Recording, bodies: list[Body], config: TrackConfi
         return replace(result, motions=motions)
 
 
+@dataclass(frozen=True)
+class Job:
+    """All that must be known before a recording is tracked."""
+
+    recording: Recording
+    bodies: list[Body]
+    """The actors, upright in the recording's world."""
+    frames: tuple[int, int]
+    """First and one after the last, counted from the recording's first."""
+    grids: tuple[CellGrid, ...]
+    tracker: Tracker
+    start: Float[Array, "dof"]
+    """The rough pose of the first frame."""
+
+    @classmethod
+    def from_config(cls, recording: Recording, bodies: list[Body], config: TrackConfig) -> "Job":
+        """To track actors (in their own upright frames) in a recording."""
+        bodies = [upright(body, recording) for body in bodies]
+        frames = frame_range(recording, config)
+        start = jnp.concatenate(first_poses(recording, bodies, config, frames[0]))
+        grids = build.cell_grids(recording, config.images.depth)
+        return cls(
+            recording, bodies, frames, grids, build.tracker(recording, concatenate(bodies), grids, config), start
+        )
+
+
 @contextmanager
 def tracking(
     recording: Recording,
@@ -93,27 +121,33 @@ def tracking(
     config: TrackConfig,
     outputs: OutputsConfig,
     out: Path,
-    read: PictureReader = read_prepared,
+    read: PictureReader | None = None,
 ) -> Iterator[Run]:
     """Track; within the block the motions are in files of `out` that go when it ends well."""
-    bodies = [upright(body, recording) for body in bodies]
-    first, last = frame_range(recording, config)
-    start = jnp.concatenate(first_poses(recording, bodies, config, first))
-    grids = build.cell_grids(recording, config.images.depth)
-    tracker = build.tracker(recording, concatenate(bodies), grids, config)
+    job = Job.from_config(recording, bodies, config)
+    with doing(job, outputs, out, read or picture_reader(config.images)) as result:
+        yield result
+
+
+@contextmanager
+def doing(
+    job: Job, outputs: OutputsConfig, out: Path, read: PictureReader, follow: FrameTracker = track
+) -> Iterator[Run]:
+    """The same, with what reads the pictures and what tracks their cells."""
+    first, last = job.frames
     times = StageTimes()
-    streams = Streams(out, recording, bodies, recording.first_frame + first, outputs, times)
+    streams = Streams(out, job.recording, job.bodies, job.recording.first_frame + first, outputs, times)
     used: list[float] = []
     try:
         with streams:
-            pictures = read(recording, streams.preparation(grids), first, last)
-            frames = tracked_frames(pictures, last - first, tracker, start, times)
+            pictures = read(job.recording, streams.preparation(job.grids), first, last)
+            frames = tracked_frames(pictures, last - first, job.tracker, job.start, times, follow)
             with closing(frames), Behind(streams.consume, FRAMES_BEHIND) as behind:
                 for done in frames:
                     used.append(float(np.mean(done.tracked.result.num_matching)))
                     behind.put(done)
         motions = streams.motions(mapped=True)
-        yield Run(recording, bodies, motions, times, float(np.mean(used)), files=streams.files)
+        yield Run(job.recording, job.bodies, motions, times, float(np.mean(used)), files=streams.files)
         streams.remove_partial()
     except BaseException:
         streams.say_what_is_left()
@@ -149,7 +183,9 @@ def say_results(result: Run) -> None:
     if result.evaluation is not None:
         print(result.evaluation.table(details=False), end="\n\n")
     for stage, text in STAGES.items():
-        print(f"{text:<32}{result.times.frames_per_second(stage):10.1f} frames/s")
+        rate = result.times.frames_per_second(stage)
+        if not np.isnan(rate):  # kept cells take no time
+            print(f"{text:<32}{rate:10.1f} frames/s")
     print(f"first frame, with compilation   {result.times.first('whole'):10.1f} s")
     print(f"iterations                      {np.mean(result.iterations):10.1f} a frame", end="\n\n")
     for path in result.files:

@@ -28,6 +28,7 @@ from sogjax.track.culling import (
     block_capacity,
     body_boxes,
     capacity_for,
+    common_boxes,
     union_boxes,
 )
 from sogjax.track.rounds import solve_near
@@ -87,6 +88,8 @@ class Tracker(eqx.Module):
     """alpha of Section 5.3."""
     pairs: PairChoice = eqx.field(static=True, default="dense")
     """Whether all pairs of blobs are compared, or those near each other."""
+    together: str | None = eqx.field(static=True, default=None)
+    """Name of a mapped axis whose trackers look into common boxes, so that what they see is computed once."""
 
     def predicted(self, state: TrackState) -> Float[Array, "dof"]:
         """Theta_0 of Section 5.3: linear extrapolation of the last two poses."""
@@ -98,7 +101,8 @@ class Tracker(eqx.Module):
         around = lambda pose: jax.vmap(body_boxes, in_axes=(None, 0, None, None))(
             self.body.posed_blobs(pose), self.cameras, actors, self.reader.box_enlargement
         )
-        return union_boxes(around(state.previous), around(self.predicted(state)))
+        boxes = union_boxes(around(state.previous), around(self.predicted(state)))
+        return boxes if self.together is None else common_boxes(boxes, self.together)
 
     def views(
         self, cells: UInt8[Array, "camera rows columns 3"], state: TrackState, capacities: Capacities
@@ -119,7 +123,16 @@ class Tracker(eqx.Module):
         self, state: TrackState, cells: UInt8[Array, "camera rows columns 3"], capacities: Capacities
     ) -> tuple[TrackState, FrameResult]:
         """Find the pose of one frame from its cells (sRGB bytes)."""
-        views, num_near, num_matching = self.views(cells, state, capacities)
+        return self.found(state, self.views(cells, state, capacities), capacities)
+
+    def found(
+        self,
+        state: TrackState,
+        seen: tuple[Views, Int[Array, "camera"], Int[Array, "camera"]],
+        capacities: Capacities,
+    ) -> tuple[TrackState, FrameResult]:
+        """Find the pose of one frame from what the cameras see of it."""
+        views, num_near, num_matching = seen
         history = History(state.previous, state.before_previous, state.num_known == 2)
         objective = FrameEnergy(self.body, views, history, self.weights)
         solution, num_blocks = self._solved(objective, self.predicted(state), capacities)
@@ -184,11 +197,7 @@ def track(
             near, matching, blocks = (int(count.max()) for count in needed)
             if capacities.hold(near, matching, blocks):
                 break
-            capacities = Capacities(
-                max(capacities.near, capacity_for(near, HEADROOM)),
-                max(capacities.matching, capacity_for(matching, HEADROOM)),
-                max(capacities.blocks, block_capacity(blocks, BLOCK_HEADROOM)) if blocks else 0,
-            )
+            capacities = larger_capacities(capacities, near, matching, blocks)
         state = next_state
         seconds = time.perf_counter() - begin
         yield TrackedFrame(index, on_host(result), capacities, tracker.reader.color_space, seconds)
@@ -200,6 +209,19 @@ def on_host(result: FrameResult) -> FrameResult:
     small = len(leaves) - images.num_leaves  # `images` is the last field
     host = jax.device_get(leaves[:small])
     return jax.tree.unflatten(jax.tree.structure(result), [*host, *leaves[small:]])
+
+
+def larger_capacities(capacities: Capacities, near: int, matching: int, blocks: int) -> Capacities:
+    """Capacities with headroom for so many image blobs and blocks of pairs, nowhere smaller than those given.
+
+    Raises:
+        InputError: more image blobs than the largest capacity.
+    """
+    return Capacities(
+        max(capacities.near, capacity_for(near, HEADROOM)),
+        max(capacities.matching, capacity_for(matching, HEADROOM)),
+        max(capacities.blocks, block_capacity(blocks, BLOCK_HEADROOM)) if blocks else capacities.blocks,
+    )
 
 
 def first_capacities(tracker: Tracker, state: TrackState, cells: UInt8[Array, "camera rows columns 3"]) -> Capacities:
