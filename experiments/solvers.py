@@ -59,7 +59,7 @@ def main() -> None:
 def row(name: str, solver: str, pairs: str, result: Run) -> str:
     """One line of the table."""
     numbers = row_numbers(result)
-    milliseconds = 1000.0 * np.array([frame.seconds for frame in result.frames[1:]])
+    milliseconds = 1000.0 * np.array(result.times.seconds["step"][1:])
     return ROW.format(
         name[:15],
         solver,

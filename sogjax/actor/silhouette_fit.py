@@ -122,7 +122,9 @@ def fitted(fit: SilhouetteFit, start: Float[Array, "param"], pose_scales: Scales
 
 @eqx.filter_jit
 def _fitted(fit: SilhouetteFit, start: Float[Array, "param"], scales: Scales) -> Solution:
-    solver = GaussNewton(epsilon=EPSILON, max_iterations=MAX_ITERATIONS, first_damping=0.1, smallest_damping=DAMPING)
+    solver = GaussNewton(
+        epsilon=EPSILON, max_iterations=MAX_ITERATIONS, first_damping=0.1, smallest_damping=DAMPING, common_damping=0.0
+    )
     return solver.maximize(fit, start, scales)
 
 

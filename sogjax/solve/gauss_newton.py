@@ -7,10 +7,6 @@ from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.solve.solution import CurvedObjective, Objective, Params, Scales, Solution
 
-COMMON_DAMPING = 3.0
-"""Damping of every parameter, in units of the mean curvature (measured in the parameters' largest steps), beside that
-by its own. Parameters of which the objective says next to nothing stay about where they are."""
-
 
 class QuadraticModel(eqx.Module):
     """value + gradient . d - d . curvature d / 2, a model of the objective near some parameters."""
@@ -30,12 +26,12 @@ class QuadraticModel(eqx.Module):
         """Whether every number is finite."""
         return jnp.isfinite(self.value) & jnp.all(jnp.isfinite(self.gradient)) & jnp.all(jnp.isfinite(self.curvature))
 
-    def step(self, damping: Float[Array, ""], bounds: Params) -> Params:
+    def step(self, damping: Float[Array, ""], common: Float[Array, ""], bounds: Params) -> Params:
         """The step to the maximum of the damped model, shortened as a whole where a part of it exceeds its bound."""
         # In units of the bounds, so that angles and translations are alike.
         curvature = self.curvature * bounds[:, None] * bounds[None, :]
         diagonal = jnp.diag(curvature)
-        held = jnp.maximum(diagonal + COMMON_DAMPING * jnp.mean(diagonal), jnp.finfo(diagonal.dtype).tiny)
+        held = jnp.maximum(diagonal + common * jnp.mean(diagonal), jnp.finfo(diagonal.dtype).tiny)
         damped = curvature + jnp.diag(damping * held)
         factor = jax.scipy.linalg.cho_factor(damped)
         step = jax.scipy.linalg.cho_solve(factor, self.gradient * bounds)
@@ -69,6 +65,9 @@ class GaussNewton(eqx.Module):
     epsilon: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=0.002)
     first_damping: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=0.1)
     smallest_damping: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=0.1)
+    common_damping: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=3.0)
+    """Damping of every parameter by the mean curvature (measured in the parameters' largest steps), beside that by its
+    own: parameters of which the objective says next to nothing stay about where they are."""
     relax: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=4.0)
     stiffen: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=4.0)
     min_iterations: Int[Array, ""] = eqx.field(converter=jnp.asarray, default=1)
@@ -96,7 +95,7 @@ class GaussNewton(eqx.Module):
             return ~state.converged & state.finite & (state.iteration < self.max_iterations)
 
         def climb(state: GaussNewtonState) -> GaussNewtonState:
-            step = state.model.step(state.damping, scales.step_bounds)
+            step = state.model.step(state.damping, self.common_damping, scales.step_bounds)
             tried = QuadraticModel.of(objective, state.params + step)
             better = (tried.value > state.model.value) & tried.finite()
             keep = lambda new, old: jnp.where(better, new, old)
