@@ -38,7 +38,7 @@ def _run_in(config: DemoConfig, out: Path) -> Run:
     say(f"rendered recording: {recording}")
     rendered = time.perf_counter()
     track_config: TrackConfig = composed(
-        "track", [f"recording={quoted_value(str(recording))}", f"out={quoted_value(str(out))}"]
+        "track", [f"recording={quoted_value(str(recording))}", f"out={quoted_value(str(out))}", "initial_pose=auto"]
     )
     track_config.outputs = config.outputs
     result = run_track(track_config)
