@@ -13,7 +13,7 @@ from rig_cases import ring_rig
 
 from sogjax.energy.objective import EnergyWeights
 from sogjax.model.body import concatenate, dof_slices
-from sogjax.solve import Solution
+from sogjax.solve import GaussNewton, Solution
 from sogjax.track import tracker as tracker_module
 from sogjax.track.culling import CAPACITIES, Capacities
 from sogjax.track.tracker import TrackState, track
@@ -136,6 +136,21 @@ def test_a_frame_that_needs_more_room_is_done_again(dog, monkeypatch):
         assert a.result.num_matching.tolist() == b.result.num_matching.tolist()
         np.testing.assert_allclose(a.result.pose, b.result.pose, atol=2e-3)
         np.testing.assert_allclose(a.result.terms.similarity, b.result.terms.similarity, rtol=1e-3)
+
+
+def test_near_pairs_are_tracked_by_gauss_newton_and_too_little_room_is_noticed(dog, monkeypatch):
+    """The motion is found as with all pairs, also where the lists begin with too little room."""
+    tracker, poses, frames = dog
+    tracker = replace(tracker, pairs="sparse", solver=GaussNewton())
+    start = jnp.asarray(poses[0])
+    room = tracker_module.first_capacities
+    too_small = lambda *arguments: replace(room(*arguments), blocks=40)
+    monkeypatch.setattr(tracker_module, "first_capacities", too_small)
+    results = list(track(tracker, start, frames))
+    errors = [landmark_error(tracker.body, r.result.pose, pose) for r, pose in zip(results, poses, strict=True)]
+    assert max(errors) < 0.02
+    assert all(40 < int(r.result.num_blocks) <= r.capacities.blocks for r in results)
+    assert all(r.result.converged for r in results)
 
 
 def test_the_next_pose_is_extrapolated(dog):

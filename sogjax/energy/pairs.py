@@ -11,6 +11,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from sogjax.model.sog import Sog
+from sogjax.model.stages import computed_once
 
 BLOCK = 8
 """Image blobs that follow each other in a Sog and are near a body blob, or not, together."""
@@ -98,7 +99,8 @@ class SparsePairs(eqx.Module):
     def sum_over_image(self, values: Slots) -> Float[Array, "camera body"]:
         """For each projected body blob the sum over its pairs."""
         zeros = jnp.zeros(self.body_shape[0] * self.body_shape[1], values.dtype)
-        sums = zeros.at[self.body_index].add(jnp.sum(values, axis=0), mode="promise_in_bounds")
+        block_sums = sum((values[slot] for slot in range(1, BLOCK)), values[0])  # quicker than a sum over an axis
+        sums = zeros.at[self.body_index].add(block_sums, mode="promise_in_bounds")
         return sums.reshape(self.body_shape)
 
     def moments(self, weights: Slots, means: Float[Array, "camera body 2"]) -> Moments:
@@ -109,7 +111,11 @@ class SparsePairs(eqx.Module):
 
     def live_pairs(self, live: Array, values: Slots) -> Slots:
         """The values of the pairs whose image blob is live, 0 elsewhere."""
-        return jnp.where(live.reshape(-1).at[self.image_index].get(mode="promise_in_bounds"), values, 0.0)
+        chosen = lambda live, values: jnp.where(
+            live.reshape(-1).at[self.image_index].get(mode="promise_in_bounds"), values, 0.0
+        )
+        really = self.variances[0, 0] > 0.0  # it always is
+        return computed_once(really, chosen, live, values)
 
 
 Pairs = DensePairs | SparsePairs

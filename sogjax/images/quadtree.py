@@ -15,10 +15,10 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.images.cells import CellGrid
-from sogjax.images.stages import computed_once
 from sogjax.model.camera import Camera, undistort
 from sogjax.model.compaction import chosen_indices
 from sogjax.model.sog import Sog
+from sogjax.model.stages import computed_once
 
 Planes = list[Float[Array, "_ _"]]
 """Channels of a picture, one array each: sums over a last axis of three are slow."""

@@ -14,11 +14,11 @@ from jaxtyping import Array, Bool, Float, Int, UInt8
 
 from sogjax.energy.curvature import FrameEnergy
 from sogjax.energy.objective import EnergyTerms, EnergyWeights, History, Views, terms_of_energy
-from sogjax.images.stages import computed_once
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.color import from_rgb
 from sogjax.model.sog import Sog
+from sogjax.model.stages import computed_once
 from sogjax.solve import Scales, Solution, Solver
 from sogjax.track.culling import (
     CAPACITIES,
