@@ -1,6 +1,7 @@
 """`sogjax track`: from the videos of a recording to the motion of its actors."""
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -26,7 +27,9 @@ from sogjax.data.stages import Behind
 from sogjax.data.video import read_prepared
 from sogjax.errors import InputError
 from sogjax.evaluate import GroupEvaluation
+from sogjax.images.cells import CellGrid, stack_shape
 from sogjax.model.body import Body, concatenate
+from sogjax.track.tracker import Tracker, compile_counts
 
 FRAMES_BEHIND = 8
 """Tracked frames that wait to be written."""
@@ -98,9 +101,11 @@ def tracking(
     """Track; within the block the motions are in files of `out` that go when it ends well."""
     bodies = [upright(body, recording) for body in bodies]
     first, last = frame_range(recording, config)
-    start = jnp.concatenate(first_poses(recording, bodies, config, first))
     grids = build.cell_grids(recording, config.images.depth)
-    tracker = build.tracker(recording, concatenate(bodies), grids, config)
+    with ThreadPoolExecutor(1) as beside:  # both compile for seconds
+        building = beside.submit(_tracker, recording, bodies, grids, config)
+        start = jnp.concatenate(first_poses(recording, bodies, config, first))
+        tracker = building.result()
     times = StageTimes()
     streams = Streams(out, recording, bodies, recording.first_frame + first, outputs, times)
     used: list[float] = []
@@ -118,6 +123,12 @@ def tracking(
     except BaseException:
         streams.say_what_is_left()
         raise
+
+
+def _tracker(recording: Recording, bodies: list[Body], grids: tuple[CellGrid, ...], config: TrackConfig) -> Tracker:
+    tracker = build.tracker(recording, concatenate(bodies), grids, config)
+    compile_counts(tracker, (len(grids), *stack_shape(grids), 3))
+    return tracker
 
 
 def frame_range(recording: Recording, config: TrackConfig) -> tuple[int, int]:
