@@ -2,26 +2,25 @@
 
 python benchmarks/memory.py recording=FOLDER [actor=FILE] [frames=16] [repeats=[1,4]] [overrides=[...]]
 
-Tracks the first frames of a recording over and over, with all outputs (overlay, Rerun file with pictures), each length
-in a process of its own, and prints its largest resident memory. Poses are wrong where the frames begin again.
+Tracks videos (mp4v) that show the first frames of a recording forwards and backwards in turn, with all outputs
+(overlay, Rerun file with pictures), each length in a process of its own, and prints its largest resident memory.
 """
 
 import resource
 import subprocess
 import sys
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from sogjax.app.composition import composed
 from sogjax.app.overrides import quoted_value
-from sogjax.app.pipeline import Picture, Preparation
 from sogjax.app.recordings import actors_of, opened
 from sogjax.app.script import machine_line, run_script, settings_from
 from sogjax.app.track import tracking
 from sogjax.data.recording import Recording
-from sogjax.data.video import read_prepared
+from sogjax.data.source import open_source
+from sogjax.data.video import VideoWriter
 
 MIB = 1024
 """Kibibytes, in which the system counts."""
@@ -55,22 +54,34 @@ def main() -> None:
 
 
 def track_repeatedly(settings: Settings, repeats: int) -> None:
-    """The first frames of the recording so many times over, into a folder that is removed."""
+    """The first frames of the recording forwards and backwards, so many times, into a folder that is removed."""
     words = [f"recording={quoted_value(settings.recording)}", *settings.overrides]
     config = composed("track", [*words, *([f"actor={quoted_value(settings.actor)}"] if settings.actor else [])])
     recording = opened(config.recording, config.cameras)
     bodies, _ = actors_of(recording, config.actor, config.body, config.color)
-    longer = replace(recording, num_frames=repeats * settings.frames)
+    with TemporaryDirectory() as folder:
+        longer = longer_recording(recording, settings.frames, repeats, Path(folder))
+        with tracking(longer, bodies, config, config.outputs, Path(folder)) as result:
+            assert len(result.converged) == longer.num_frames
 
-    def again_and_again(recording: Recording, prepare: Preparation, first: int, last: int) -> Iterator[list[Picture]]:
-        for _ in range(repeats):
-            yield from read_prepared(recording, prepare, 0, last // repeats)
 
-    with (
-        TemporaryDirectory() as folder,
-        tracking(longer, bodies, config, config.outputs, Path(folder), again_and_again) as result,
-    ):
-        assert len(result.converged) == longer.num_frames
+def longer_recording(recording: Recording, frames: int, repeats: int, folder: Path) -> Recording:
+    """Videos that show the first frames forwards and backwards in turn, so that the poses stay trackable."""
+    for camera in recording.rig.names:
+        source = open_source(recording.sources[camera], recording.first_frame + recording.frame_offset[camera])
+        images = [image for _ in range(frames) if (image := source.read()) is not None]
+        source.close()
+        with VideoWriter(folder / f"{camera}.mp4", recording.fps) as video:
+            for k in range(repeats):
+                for image in images[:: -1 if k % 2 else 1]:
+                    video.write(image)
+    return replace(
+        recording,
+        sources={camera: folder / f"{camera}.mp4" for camera in recording.rig.names},
+        frame_offset=dict.fromkeys(recording.rig.names, 0),
+        first_frame=0,
+        num_frames=frames * repeats,
+    )
 
 
 if __name__ == "__main__":

@@ -1,11 +1,12 @@
 """From config objects to the modules of the core: the only place where both are known."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, UInt8
 
 from sogjax.app.configs import ColorConfig, EnergyConfig, ImagesConfig, SolverConfig, TrackConfig
 from sogjax.data.image_file import read_image
@@ -208,7 +209,13 @@ def _plate_colors(
             f"{', '.join(missing)}; add it, or set images.use_plates=false"
         )
     images = [read_image(recording.background[name]) for name in recording.rig.names]
-    cells = jnp.asarray(stack_cells(images, grids), candidates.sigmas.dtype) / 255.0
-    colors = from_rgb(cells, averaging_space(space))
+    return _node_colors(jnp.asarray(stack_cells(images, grids)), candidates, space)
+
+
+@partial(jax.jit, static_argnames="space")
+def _node_colors(
+    cells: UInt8[Array, "camera rows columns 3"], candidates: Candidates, space: str
+) -> Float[Array, "camera candidate 3"]:
+    colors = from_rgb(cells.astype(candidates.sigmas.dtype) / 255.0, averaging_space(space))
     tolerance = jnp.asarray(0.0, colors.dtype)
     return jax.vmap(quadtree, in_axes=(0, 0, None))(colors, candidates, tolerance)[0]

@@ -11,6 +11,7 @@ USAGE = "usage: sogjax COMMAND [key=value ...] [-m for a sweep], sogjax COMMAND 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; 0: done, 2: the input was wrong (one sentence on standard error)."""
     arguments = list(sys.argv[1:] if arguments is None else arguments)
+    from sogjax.app.compilation_cache import use_compilation_cache
     from sogjax.app.composition import SCHEMAS, composed
     from sogjax.errors import InputError
 
@@ -29,6 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(command_help(command))
         return 0
     try:
+        use_compilation_cache()
         if any(word in ("-m", "--multirun") for word in overrides):
             from sogjax.app.sweep import run_sweep
 

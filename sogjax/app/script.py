@@ -12,6 +12,7 @@ import jax
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
+from sogjax.app.compilation_cache import use_compilation_cache
 from sogjax.app.composition import composed
 from sogjax.app.configs import TrackConfig
 from sogjax.app.overrides import quoted_value
@@ -51,6 +52,7 @@ def demo_recording_unless_given() -> None:
 def run_script(main: Callable[[], None]) -> None:
     """Run a script; wrong input is one sentence and exit status 2."""
     try:
+        use_compilation_cache()
         main()
     except InputError as error:
         print(f"sogjax: {error}", file=sys.stderr)

@@ -1,6 +1,7 @@
 """`sogjax track`: from the videos of a recording to the motion of its actors."""
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -26,9 +27,9 @@ from sogjax.data.recording import Recording
 from sogjax.data.stages import Behind
 from sogjax.errors import InputError
 from sogjax.evaluate import GroupEvaluation
-from sogjax.images.cells import CellGrid
+from sogjax.images.cells import CellGrid, stack_shape
 from sogjax.model.body import Body, concatenate
-from sogjax.track.tracker import Tracker, track
+from sogjax.track.tracker import Tracker, compile_counts, track
 
 FRAMES_BEHIND = 8
 """Tracked frames that wait to be written."""
@@ -107,11 +108,12 @@ class Job:
         """To track actors (in their own upright frames) in a recording."""
         bodies = [upright(body, recording) for body in bodies]
         frames = frame_range(recording, config)
-        start = jnp.concatenate(first_poses(recording, bodies, config, frames[0]))
         grids = build.cell_grids(recording, config.images.depth)
-        return cls(
-            recording, bodies, frames, grids, build.tracker(recording, concatenate(bodies), grids, config), start
-        )
+        with ThreadPoolExecutor(1) as beside:  # both compile for seconds
+            building = beside.submit(_tracker, recording, bodies, grids, config)
+            start = jnp.concatenate(first_poses(recording, bodies, config, frames[0]))
+            tracker = building.result()
+        return cls(recording, bodies, frames, grids, tracker, start)
 
 
 @contextmanager
@@ -152,6 +154,12 @@ def doing(
     except BaseException:
         streams.say_what_is_left()
         raise
+
+
+def _tracker(recording: Recording, bodies: list[Body], grids: tuple[CellGrid, ...], config: TrackConfig) -> Tracker:
+    tracker = build.tracker(recording, concatenate(bodies), grids, config)
+    compile_counts(tracker, (len(grids), *stack_shape(grids), 3))
+    return tracker
 
 
 def frame_range(recording: Recording, config: TrackConfig) -> tuple[int, int]:

@@ -236,6 +236,13 @@ def first_capacities(tracker: Tracker, state: TrackState, cells: UInt8[Array, "c
     return Capacities(capacities.near, capacities.near, block_capacity(blocks, BLOCK_HEADROOM))
 
 
+def compile_counts(tracker: Tracker, shape: tuple[int, ...]) -> None:
+    """Compile beforehand what `first_capacities` counts with, for cells of a shape, while other work goes on."""
+    body = tracker.body.skeleton
+    pose = jnp.zeros(body.num_dofs, body.offsets.dtype)
+    _counts(tracker, TrackState.from_pose(pose), jnp.zeros(shape, jnp.uint8))
+
+
 @eqx.filter_jit
 def _num_blocks(
     tracker: Tracker, state: TrackState, cells: UInt8[Array, "camera rows columns 3"], capacities: Capacities
