@@ -12,7 +12,7 @@ from jaxtyping import Array, Float, Int, UInt8
 
 from sogjax.energy.objective import Views
 from sogjax.track.culling import Capacities
-from sogjax.track.scan import ClipCells, ClipResult, with_room, without_images
+from sogjax.track.scan import ClipCells, with_room, without_images
 from sogjax.track.tracker import FrameResult, Tracker, TrackState, first_capacities
 
 Batching = Literal["one_by_one", "in_step"]
@@ -64,8 +64,8 @@ def track_many(
     cells: UInt8[np.ndarray, "frame camera rows columns 3"] | ClipCells,
     batching: Batching = "one_by_one",
     common_boxes: bool = True,
-) -> tuple[ClipResult, Capacities]:
-    """Track one clip with every tracker: results with a second axis of members, and the capacities that sufficed.
+) -> tuple[FrameResult, Capacities]:
+    """Track one clip with every tracker: stacked results (frame, member), and the capacities that sufficed.
 
     What no swept number enters is computed once a frame: the quad-trees, and with `common_boxes` also which image
     blobs are near the body and of its colours. Common boxes hold the bodies of all members, so that each member sees
@@ -86,7 +86,7 @@ def track_many(
 @eqx.filter_jit
 def _tracked(
     members: Members, starts: Float[Array, "member dof"], cells: ClipCells, capacities: Capacities, batching: Batching
-) -> ClipResult:
+) -> FrameResult:
     def found(swept: Tracker, shared: Tracker, state: TrackState, seen: Seen) -> tuple[TrackState, FrameResult]:
         state, result = eqx.combine(swept, shared).found(state, seen, capacities)
         return state, without_images(result)
@@ -100,8 +100,12 @@ def _tracked(
     def one_frame(states: TrackState, frame: Array) -> tuple[TrackState, FrameResult]:
         return jax.vmap(one_member, in_axes=(0, 0, None), axis_name=AXIS)(members.swept, states, frame)
 
-    _, results = jax.lax.scan(one_frame, jax.vmap(TrackState.from_pose)(starts), cells)
-    return ClipResult.from_frames(results)
+    return jax.lax.scan(one_frame, jax.vmap(TrackState.from_pose)(starts), cells)[1]
+
+
+def member(results: FrameResult, index: int) -> FrameResult:
+    """The clip of one of several trackers."""
+    return jax.tree.map(lambda leaf: leaf[:, index], results)
 
 
 def _common_capacities(
