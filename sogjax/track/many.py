@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int, UInt8
 
 from sogjax.energy.objective import Views
-from sogjax.track.culling import Capacities
+from sogjax.track.culling import Capacities, in_boxes
 from sogjax.track.scan import ClipCells, with_room, without_images
 from sogjax.track.tracker import FrameResult, Tracker, TrackState, first_capacities
 
@@ -68,9 +68,8 @@ def track_many(
     """Track one clip with every tracker: stacked results (frame, member), and the capacities that sufficed.
 
     What no swept number enters is computed once a frame: the quad-trees, and with `common_boxes` also which image
-    blobs are near the body and of its colours. Common boxes hold the bodies of all members, so that each member sees
-    some blobs more than it would alone, all of them too far away to matter; without them the numbers are those of the
-    trackers run one by one.
+    blobs are near the bodies of all members and of their colours, of which each member takes those in its own boxes. So
+    sums have other zeros in between; without common boxes the numbers are to the bit those of trackers run one by one.
 
     Raises:
         ValueError: the trackers differ in more than numbers.
@@ -94,13 +93,24 @@ def _tracked(
     each_found = found if batching == "in_step" else jax.custom_batching.sequential_vmap(found)
 
     def one_member(swept: Tracker, state: TrackState, frame: Array) -> tuple[TrackState, FrameResult]:
-        seen = members.of(swept).views(frame, state, capacities)
-        return each_found(swept, members.shared, state, seen)
+        tracker = members.of(swept)
+        seen = tracker.views(frame, state, capacities)
+        return each_found(swept, members.shared, state, in_own_boxes(tracker, state, seen))
 
     def one_frame(states: TrackState, frame: Array) -> tuple[TrackState, FrameResult]:
         return jax.vmap(one_member, in_axes=(0, 0, None), axis_name=AXIS)(members.swept, states, frame)
 
     return jax.lax.scan(one_frame, jax.vmap(TrackState.from_pose)(starts), cells)[1]
+
+
+def in_own_boxes(tracker: Tracker, state: TrackState, seen: Seen) -> Seen:
+    """What a tracker sees through common boxes, without the image blobs that are not in its own."""
+    if tracker.together is None:
+        return seen
+    views, *counts = seen
+    images = views.images
+    own = in_boxes(images, replace(tracker, together=None).boxes(state))
+    return eqx.tree_at(lambda v: v.images.mask, views, images.mask & own), counts[0], counts[1]
 
 
 def member(results: FrameResult, index: int) -> FrameResult:
