@@ -13,8 +13,8 @@ from rig_cases import ring_rig
 from sogjax.solve import ConditionedAscent, GaussNewton
 from sogjax.track import scan as scan_module
 from sogjax.track.culling import Capacities
-from sogjax.track.many import Members, same_program, track_many
-from sogjax.track.scan import track_clip
+from sogjax.track.many import Members, member, same_program, track_many
+from sogjax.track.scan import replayed, track_clip
 from sogjax.track.tracker import track
 
 DEPTH = 6
@@ -33,6 +33,11 @@ def dog():
     poses = [moved(body, standing(body, 1.1), {name: k * value for name, value in STEP.items()}) for k in range(5)]
     tracker = eqx.tree_at(lambda t: t.solver, make_tracker(body, rig, DEPTH), ConditionedAscent(max_iterations=25))
     return tracker, jnp.asarray(poses[0]), np.stack([cells_of(rig, draw(body, pose, rig), DEPTH) for pose in poses])
+
+
+def needed(clip):
+    """The room that a clip needed."""
+    return [int(np.max(count)) for count in (clip.num_near, clip.num_matching, clip.num_blocks)]
 
 
 def sparse(tracker):
@@ -63,7 +68,7 @@ def test_a_scanned_clip_is_the_clip_frame_by_frame(dog, kind):
     results = frame_by_frame(tracker, start, cells)
     clip, capacities = track_clip(tracker, start, cells)
     for k, result in enumerate(results):
-        np.testing.assert_allclose(clip.poses[k], result.pose, atol=ROUNDING)
+        np.testing.assert_allclose(clip.pose[k], result.pose, atol=ROUNDING)
         np.testing.assert_allclose(clip.terms.energy[k], result.terms.energy, rtol=1e-4)
         np.testing.assert_allclose(clip.terms.similarity[k], result.terms.similarity, rtol=1e-4)
         assert clip.iterations[k] == result.iterations
@@ -71,7 +76,17 @@ def test_a_scanned_clip_is_the_clip_frame_by_frame(dog, kind):
         np.testing.assert_array_equal(clip.num_near[k], result.num_near)
         np.testing.assert_array_equal(clip.num_matching[k], result.num_matching)
         assert clip.num_blocks[k] == result.num_blocks
-    assert capacities.hold(*clip.needed())
+    assert capacities.hold(*needed(clip))
+    for with_images in (True, False):
+        again = list(replayed(clip, capacities, 0.1, with_images)(tracker, start, cells))
+        assert [frame.index for frame in again] == list(range(len(cells)))
+        for frame, result in zip(again, results, strict=True):
+            np.testing.assert_allclose(frame.result.pose, result.pose, atol=ROUNDING)
+            blobs, expected = frame.result.images, result.images
+            assert blobs.mask.sum() == (expected.mask.sum() if with_images else 0)
+            np.testing.assert_allclose(
+                np.sum(blobs.sigmas * blobs.mask), np.sum(expected.sigmas * expected.mask) * with_images
+            )
 
 
 @pytest.mark.parametrize("kind", [lambda t: t, sparse], ids=["dense", "sparse"])
@@ -82,9 +97,9 @@ def test_a_clip_that_needs_more_room_is_tracked_again(dog, kind, monkeypatch):
     tight = Capacities(32, 32, 8)
     monkeypatch.setattr(scan_module, "first_capacities", lambda *_: tight)
     clip, capacities = track_clip(tracker, start, cells)
-    assert not tight.hold(*clip.needed())
-    assert capacities.hold(*clip.needed())
-    np.testing.assert_allclose(clip.poses, enough.poses, atol=ROUNDING)
+    assert not tight.hold(*needed(clip))
+    assert capacities.hold(*needed(clip))
+    np.testing.assert_allclose(clip.pose, enough.pose, atol=ROUNDING)
 
 
 def alone(trackers, start, cells):
@@ -98,13 +113,13 @@ def test_many_trackers_find_what_each_finds_alone(dog):
     assert np.abs(expected[:, 1:] - expected[:, :1]).max(axis=(0, 2)).min() > 10 * ROUNDING  # every number matters
     starts = jnp.stack([start] * len(trackers))
     own, capacities = track_many(trackers, starts, cells, common_boxes=False)
-    np.testing.assert_allclose(own.poses, expected, atol=ROUNDING)
-    assert capacities.hold(*own.needed())
+    np.testing.assert_allclose(own.pose, expected, atol=ROUNDING)
+    assert capacities.hold(*needed(own))
     clip, _ = track_clip(trackers[2], start, cells)
-    np.testing.assert_allclose(own.member(2).terms.energy, clip.terms.energy, rtol=1e-4)
-    np.testing.assert_array_equal(own.member(2).iterations, clip.iterations)
+    np.testing.assert_allclose(member(own, 2).terms.energy, clip.terms.energy, rtol=1e-4)
+    np.testing.assert_array_equal(member(own, 2).iterations, clip.iterations)
     common, _ = track_many(trackers, starts, cells)
-    np.testing.assert_allclose(common.poses, expected, atol=UNNOTICED)
+    np.testing.assert_allclose(common.pose, expected, atol=UNNOTICED)
     assert (np.asarray(common.num_near) >= np.asarray(own.num_near)).all()
 
 
@@ -112,7 +127,7 @@ def test_members_in_step_find_the_same(dog):
     tracker, start, cells = dog
     trackers = different(tracker)[:3]
     in_step, _ = track_many(trackers, jnp.stack([start] * 3), cells, "in_step", common_boxes=False)
-    np.testing.assert_allclose(in_step.poses, alone(trackers, start, cells), atol=UNNOTICED)
+    np.testing.assert_allclose(in_step.pose, alone(trackers, start, cells), atol=UNNOTICED)
 
 
 def test_many_sparse_gauss_newton_trackers(dog):
@@ -128,9 +143,9 @@ def test_many_sparse_gauss_newton_trackers(dog):
         [np.stack([r.pose for r in frame_by_frame(t, s, cells)]) for t, s in zip(trackers, starts, strict=True)], axis=1
     )
     many, _ = track_many(trackers, starts, cells, common_boxes=False)
-    np.testing.assert_allclose(many.poses, expected, atol=ROUNDING)
+    np.testing.assert_allclose(many.pose, expected, atol=ROUNDING)
     common, _ = track_many(trackers, starts, cells)
-    np.testing.assert_allclose(common.poses, expected, atol=UNNOTICED)
+    np.testing.assert_allclose(common.pose, expected, atol=UNNOTICED)
 
 
 def test_members_share_what_is_equal_and_refuse_what_one_program_cannot_serve(dog):

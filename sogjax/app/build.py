@@ -1,6 +1,7 @@
 """From config objects to the modules of the core: the only place where both are known."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import jax
@@ -72,6 +73,7 @@ def check(config: TrackConfig) -> None:
     energy_weights(config.energy)
     pair_choice(config.energy)
     solver(config.solver)
+    one_of("sweep", config.sweep, ("each", "vmapped"))
     for key in ("first_angle", "first_translation", "largest_angle", "largest_translation"):
         at_least(f"solver.{key}", getattr(config.solver, key), 1e-6)
     between("images.depth", config.images.depth, 1, MAX_DEPTH)
@@ -183,6 +185,26 @@ def tracker(recording: Recording, body: Body, grids: tuple[CellGrid, ...], confi
         weights=energy_weights(config.energy),
         solver=solver(config.solver),
         scales=solver_scales(config.solver, body),
+        extrapolation=config.tracking.extrapolation,
+        pairs=pair_choice(config.energy),
+    )
+
+
+def varied(tracker: Tracker, config: TrackConfig) -> Tracker:
+    """A tracker with the numbers of another config that looks at the same pictures in the same colours."""
+    reader = replace(
+        tracker.reader,
+        color_radius=color_space_and_radius(config.color)[1],
+        color_tolerance=config.images.color_tolerance,
+        box_enlargement=config.images.box_enlargement,
+        plate_tolerance=config.images.plate_tolerance,
+    )
+    return replace(
+        tracker,
+        reader=reader,
+        weights=energy_weights(config.energy),
+        solver=solver(config.solver),
+        scales=solver_scales(config.solver, tracker.body),
         extrapolation=config.tracking.extrapolation,
         pairs=pair_choice(config.energy),
     )

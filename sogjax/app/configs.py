@@ -105,6 +105,9 @@ class TrackConfig:
     start: int = option(0, "first frame to track, counted from the recording's first")
     stop: int | None = option(None, "frame before which to stop; null: the end")
     cameras: list[str] | None = option(None, "cameras to use; null: all")
+    sweep: str = option(
+        "each", "with -m: each: one run after the other | vmapped: numbers only, all in one compiled call"
+    )
     color: ColorConfig = group(ColorConfig, "")
     images: ImagesConfig = group(ImagesConfig, "")
     energy: EnergyConfig = group(EnergyConfig, "")

@@ -12,6 +12,7 @@ from sogjax.errors import InputError
 COLUMNS = ("mean mm", "std mm", "joints mm", "lost", "swaps", "iterations", "not converged", "frames/s")
 CHECKED_MEMBERS = 100
 """Members of a sweep that are looked at before it begins."""
+VMAPPED = "sweep=vmapped"
 
 
 def run_sweep(command: str, overrides: Sequence[str]) -> int:
@@ -24,7 +25,9 @@ def run_sweep(command: str, overrides: Sequence[str]) -> int:
         others = ", ".join(name for name in SCHEMAS if name != "track")
         raise InputError(f"{command} -m: only track can be swept, not {others}; leave -m out")
     words = ready_for_hydra(overrides, sweep=True)
-    _check_members(words)
+    members = _members(words)
+    if VMAPPED in words:
+        return _in_one_call(words, members)
     program = sys.argv
     sys.argv = ["sogjax track", "-m", *words]
     try:
@@ -33,8 +36,22 @@ def run_sweep(command: str, overrides: Sequence[str]) -> int:
         sys.argv = program
 
 
-def _check_members(words: Sequence[str]) -> None:
-    """Compose the members before Hydra makes their folders.
+def _in_one_call(words: Sequence[str], members: list[list[str]] | None) -> int:
+    """Run the members of a sweep in one compiled call.
+
+    Raises:
+        InputError: Hydra is told how to run them.
+    """
+    from sogjax.app.grid import run_grid
+
+    for word in words:
+        if word.lstrip("+~").startswith("hydra"):
+            raise InputError(f"{word}: Hydra's own settings do not count with {VMAPPED}; leave one of the two out")
+    return run_grid(members or [])
+
+
+def _members(words: Sequence[str]) -> list[list[str]] | None:
+    """The overrides of every member, composed before Hydra makes their folders; None: only Hydra knows them.
 
     Raises:
         InputError: a member that cannot be.
@@ -48,15 +65,19 @@ def _check_members(words: Sequence[str]) -> None:
         (members,) = BasicSweeper.split_arguments(OverridesParser.create().parse_overrides(own), None)
     except HydraException as error:
         if len(own) < len(words):  # another sweeper than Hydra's own may understand it
-            return
+            return None
         raise InputError(plain_sentence("track", SCHEMAS["track"], error)) from error
     for member in members[:CHECKED_MEMBERS]:
         composed("track", member)
+    return [list(member) for member in members]
 
 
 def sweep_main(task: Callable[[Any], Any]) -> int:
     """What an experiment's script ends with: run the task as `sys.argv` says; the exit status."""
+    words = [word for word in sys.argv[1:] if word not in ("-m", "--multirun")]
     try:
+        if task is track_task and VMAPPED in words and len(words) < len(sys.argv) - 1:
+            return run_sweep("track", words)
         return run_hydra(task)
     except InputError as error:
         print(f"sogjax: {error}", file=sys.stderr)

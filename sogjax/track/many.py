@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Array, Float, Int, UInt8
 
 from sogjax.energy.objective import Views
-from sogjax.track.culling import Capacities
-from sogjax.track.scan import ClipCells, ClipResult, with_room, without_images
+from sogjax.track.culling import Capacities, in_boxes
+from sogjax.track.scan import ClipCells, with_room, without_images
 from sogjax.track.tracker import FrameResult, Tracker, TrackState, first_capacities
 
 Batching = Literal["one_by_one", "in_step"]
@@ -64,13 +64,12 @@ def track_many(
     cells: UInt8[np.ndarray, "frame camera rows columns 3"] | ClipCells,
     batching: Batching = "one_by_one",
     common_boxes: bool = True,
-) -> tuple[ClipResult, Capacities]:
-    """Track one clip with every tracker: results with a second axis of members, and the capacities that sufficed.
+) -> tuple[FrameResult, Capacities]:
+    """Track one clip with every tracker: stacked results (frame, member), and the capacities that sufficed.
 
     What no swept number enters is computed once a frame: the quad-trees, and with `common_boxes` also which image
-    blobs are near the body and of its colours. Common boxes hold the bodies of all members, so that each member sees
-    some blobs more than it would alone, all of them too far away to matter; without them the numbers are those of the
-    trackers run one by one.
+    blobs are near the bodies of all members and of their colours, of which each member takes those in its own boxes. So
+    sums have other zeros in between; without common boxes the numbers are to the bit those of trackers run one by one.
 
     Raises:
         ValueError: the trackers differ in more than numbers.
@@ -86,7 +85,7 @@ def track_many(
 @eqx.filter_jit
 def _tracked(
     members: Members, starts: Float[Array, "member dof"], cells: ClipCells, capacities: Capacities, batching: Batching
-) -> ClipResult:
+) -> FrameResult:
     def found(swept: Tracker, shared: Tracker, state: TrackState, seen: Seen) -> tuple[TrackState, FrameResult]:
         state, result = eqx.combine(swept, shared).found(state, seen, capacities)
         return state, without_images(result)
@@ -94,14 +93,29 @@ def _tracked(
     each_found = found if batching == "in_step" else jax.custom_batching.sequential_vmap(found)
 
     def one_member(swept: Tracker, state: TrackState, frame: Array) -> tuple[TrackState, FrameResult]:
-        seen = members.of(swept).views(frame, state, capacities)
-        return each_found(swept, members.shared, state, seen)
+        tracker = members.of(swept)
+        seen = tracker.views(frame, state, capacities)
+        return each_found(swept, members.shared, state, in_own_boxes(tracker, state, seen))
 
     def one_frame(states: TrackState, frame: Array) -> tuple[TrackState, FrameResult]:
         return jax.vmap(one_member, in_axes=(0, 0, None), axis_name=AXIS)(members.swept, states, frame)
 
-    _, results = jax.lax.scan(one_frame, jax.vmap(TrackState.from_pose)(starts), cells)
-    return ClipResult.from_frames(results)
+    return jax.lax.scan(one_frame, jax.vmap(TrackState.from_pose)(starts), cells)[1]
+
+
+def in_own_boxes(tracker: Tracker, state: TrackState, seen: Seen) -> Seen:
+    """What a tracker sees through common boxes, without the image blobs that are not in its own."""
+    if tracker.together is None:
+        return seen
+    views, *counts = seen
+    images = views.images
+    own = in_boxes(images, replace(tracker, together=None).boxes(state))
+    return eqx.tree_at(lambda v: v.images.mask, views, images.mask & own), counts[0], counts[1]
+
+
+def member(results: FrameResult, index: int) -> FrameResult:
+    """The clip of one of several trackers."""
+    return jax.tree.map(lambda leaf: leaf[:, index], results)
 
 
 def _common_capacities(

@@ -4,71 +4,46 @@ The frame-by-frame tracker (`sogjax.track.tracker.track`) gives the same numbers
 and can be mapped over settings (`sogjax.track.many`).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int, UInt8
+from jaxtyping import Array, Float, UInt8
 
-from sogjax.energy.objective import EnergyTerms
+from sogjax.model.sog import Sog
 from sogjax.track.culling import Capacities
-from sogjax.track.tracker import FrameResult, Tracker, TrackState, first_capacities, larger_capacities
+from sogjax.track.tracker import (
+    FrameResult,
+    TrackedFrame,
+    Tracker,
+    TrackState,
+    first_capacities,
+    larger_capacities,
+)
 
 ClipCells = UInt8[Array, "frame camera rows columns 3"]
 
 
-class ClipResult(eqx.Module):
-    """What was found in the frames of a clip: a `FrameResult` without its image blobs, frame by frame."""
+def scanned(tracker: Tracker, start: Float[Array, "dof"], cells: ClipCells, capacities: Capacities) -> FrameResult:
+    """The results of all frames of a clip, stacked, tracked with fixed capacities.
 
-    poses: Float[Array, "frame *member dof"]
-    terms: EnergyTerms
-    """Their leading axes are those of the poses."""
-    iterations: Int[Array, "frame *member"]
-    converged: Bool[Array, "frame *member"]
-    num_near: Int[Array, "frame *member camera"]
-    num_matching: Int[Array, "frame *member camera"]
-    num_blocks: Int[Array, "frame *member"]
-
-    @classmethod
-    def from_frames(cls, results: FrameResult) -> "ClipResult":
-        """From the stacked results of all frames."""
-        return cls(
-            poses=results.pose,
-            terms=results.terms,
-            iterations=results.iterations,
-            converged=results.converged,
-            num_near=results.num_near,
-            num_matching=results.num_matching,
-            num_blocks=results.num_blocks,
-        )
-
-    def needed(self) -> tuple[int, int, int]:
-        """The most image blobs near the body, matching ones, and blocks of pairs in any frame."""
-        counts = jax.device_get((self.num_near, self.num_matching, self.num_blocks))
-        near, matching, blocks = (int(count.max()) for count in counts)
-        return near, matching, blocks
-
-    def member(self, index: int) -> "ClipResult":
-        """One of several trackers."""
-        return jax.tree.map(lambda leaf: leaf[:, index], self)
-
-
-def scanned(tracker: Tracker, start: Float[Array, "dof"], cells: ClipCells, capacities: Capacities) -> ClipResult:
-    """Track a clip with fixed capacities; whether they sufficed is for the caller to see in the counts."""
+    Whether these sufficed is for the caller to see in the counts. Image blobs are left out.
+    """
 
     def one_frame(state: TrackState, frame: UInt8[Array, "camera rows columns 3"]) -> tuple[TrackState, FrameResult]:
         state, result = tracker.step(state, frame, capacities)
         return state, without_images(result)
 
-    _, results = jax.lax.scan(one_frame, TrackState.from_pose(start), cells)
-    return ClipResult.from_frames(results)
+    return jax.lax.scan(one_frame, TrackState.from_pose(start), cells)[1]
 
 
 def without_images(result: FrameResult) -> FrameResult:
-    """The result of a frame without its image blobs, which nobody wants to keep for a whole clip."""
-    return eqx.tree_at(lambda r: r.images, result, None)
+    """The result of a frame with no image blobs in it, which nobody wants to keep for a whole clip."""
+    images = result.images
+    none = Sog(images.means[..., :0, :], images.sigmas[..., :0], images.colors[..., :0, :], images.mask[..., :0])
+    return eqx.tree_at(lambda r: r.images, result, none)
 
 
 _scanned = eqx.filter_jit(scanned)
@@ -76,8 +51,8 @@ _scanned = eqx.filter_jit(scanned)
 
 def track_clip(
     tracker: Tracker, start: Float[Array, "dof"], cells: UInt8[np.ndarray, "frame camera rows columns 3"] | ClipCells
-) -> tuple[ClipResult, Capacities]:
-    """Track all frames of a clip in one compiled call, and the capacities that sufficed.
+) -> tuple[FrameResult, Capacities]:
+    """The results of all frames of a clip, stacked, from one compiled call, and the capacities that sufficed.
 
     Capacities are those of the frame-by-frame tracker; where a frame needs more, the whole clip is tracked again with
     larger ones, so no blob is ever cut off unseen.
@@ -90,7 +65,7 @@ def track_clip(
     return with_room(lambda capacities: _scanned(tracker, start, on_device, capacities), first)
 
 
-def with_room(tracked: Callable[[Capacities], ClipResult], capacities: Capacities) -> tuple[ClipResult, Capacities]:
+def with_room(tracked: Callable[[Capacities], FrameResult], capacities: Capacities) -> tuple[FrameResult, Capacities]:
     """A clip tracked with ever larger capacities until nothing was cut off.
 
     Raises:
@@ -98,7 +73,41 @@ def with_room(tracked: Callable[[Capacities], ClipResult], capacities: Capacitie
     """
     while True:
         result = tracked(capacities)
-        needed = result.needed()
+        counts = jax.device_get((result.num_near, result.num_matching, result.num_blocks))
+        needed = [int(count.max()) for count in counts]
         if capacities.hold(*needed):
             return result, capacities
         capacities = larger_capacities(capacities, *needed)
+
+
+def replayed(
+    clip: FrameResult, capacities: Capacities, seconds: float, with_images: bool
+) -> Callable[
+    [Tracker, Float[Array, "dof"], Iterable[UInt8[np.ndarray, "camera rows columns 3"]]], Iterator[TrackedFrame]
+]:
+    """The results of a clip as from the tracker that goes frame by frame, in whose place it can be put.
+
+    Image blobs are found again where they are wanted. `seconds` is what a frame took.
+    """
+    results = jax.device_get(clip)
+
+    def follow(
+        tracker: Tracker, start: Float[Array, "dof"], frames: Iterable[UInt8[np.ndarray, "camera rows columns 3"]]
+    ) -> Iterator[TrackedFrame]:
+        state = TrackState.from_pose(start)
+        for index, cells in enumerate(frames):
+            result = jax.tree.map(lambda leaf, k=index: leaf[k], results)
+            if with_images:
+                images = _image_blobs(tracker, state, jnp.asarray(cells), capacities)
+                result = eqx.tree_at(lambda r: r.images, result, images)
+            yield TrackedFrame(index, result, capacities, tracker.reader.color_space, seconds)
+            state = state.advanced(jnp.asarray(result.pose))
+
+    return follow
+
+
+@eqx.filter_jit
+def _image_blobs(
+    tracker: Tracker, state: TrackState, cells: UInt8[Array, "camera rows columns 3"], capacities: Capacities
+) -> Sog:
+    return tracker.views(cells, state, capacities)[0].images

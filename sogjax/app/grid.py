@@ -1,0 +1,166 @@
+"""Sweeps in one compiled call (`sweep=vmapped`): every member tracks the same frames, with numbers of its own."""
+
+import datetime
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from omegaconf import OmegaConf
+
+from sogjax.app import build
+from sogjax.app.cells import cells_of_clip, pictures_of
+from sogjax.app.composition import composed
+from sogjax.app.configs import TrackConfig, help_lines
+from sogjax.app.first_pose import first_poses, initial_pose_file
+from sogjax.app.outputs import results_folder, write_results
+from sogjax.app.pipeline import Picture, PictureReader, Preparation
+from sogjax.app.recordings import actors_of, opened, say
+from sogjax.app.sweep import row_numbers, table
+from sogjax.app.track import Job, Run, doing, frame_range
+from sogjax.data.cell_cache import CellsOfClip
+from sogjax.data.recording import Recording
+from sogjax.data.video import read_prepared
+from sogjax.errors import InputError
+from sogjax.model.body import Body
+from sogjax.track.many import member, same_program, track_many
+from sogjax.track.scan import replayed
+
+NUMBERS = ("color.radius", "images.color_tolerance", "images.box_enlargement", "images.plate_tolerance")
+"""What may differ between members beside the energy, the solver and the prediction."""
+GROUPS = ("energy.", "solver.", "tracking.")
+
+
+def run_grid(members: Sequence[Sequence[str]]) -> int:
+    """Track with the overrides of every member, write the results of each, and print the table; the exit status.
+
+    Raises:
+        InputError: anything wrong with the recording, the actors or a config, or a setting that cannot be swept so.
+    """
+    from sogjax.app.sweep_callback import differing
+
+    configs = [composed("track", list(overrides)) for overrides in members]
+    for config in configs:
+        build.check(config)
+    check_numbers_only(configs)
+    recording = opened(configs[0].recording, configs[0].cameras)
+    frame_range(recording, configs[0])
+    initial_pose_file(recording, configs[0])
+    with results_folder(Path("multirun") / f"{datetime.datetime.now():%Y-%m-%d_%H-%M-%S}") as folder:
+        bodies, made = actors_of(recording, configs[0].actor, configs[0].body, configs[0].color)
+        rows = []
+        for number, run in enumerate(grid_runs(recording, bodies, configs, folder)):
+            config = replace(configs[number], out=str(folder / str(number)))
+            write_results(
+                run, folder / str(number), config.outputs, OmegaConf.structured(config), bodies if made else []
+            )
+            rows.append(row_numbers(run))
+    print(table(list(zip(differing(members), rows, strict=True))))
+    print(f"\n{folder}")
+    return 0
+
+
+def check_numbers_only(configs: Sequence[TrackConfig]) -> None:
+    """Refuse settings that change the pictures, the actors or the files.
+
+    Raises:
+        InputError: such a setting differs between the configs.
+    """
+    for key in differing_keys(configs):
+        if key not in NUMBERS and not key.startswith(GROUPS):
+            raise _refused(key, configs)
+
+
+def grid_runs(recording: Recording, bodies: list[Body], configs: Sequence[TrackConfig], folder: Path) -> Iterator[Run]:
+    """The run of every config, tracked in one call; the files that grow with a run lie in folders 0, 1, ...
+
+    Raises:
+        InputError: a setting differs that changes the program.
+    """
+    jobs = grid_jobs(recording, bodies, configs)
+    cells = cells_of_clip(recording, jobs[0].grids, configs[0].images, jobs[0].frames)
+    say(f"{len(jobs)} runs of {len(cells)} frames in one call")
+    begin = time.perf_counter()
+    starts = jnp.stack([job.start for job in jobs])
+    clips, capacities = track_many([job.tracker for job in jobs], starts, cells)
+    jax.block_until_ready(clips)
+    seconds = (time.perf_counter() - begin) / (len(jobs) * len(cells))
+    for number, (job, config) in enumerate(zip(jobs, configs, strict=True)):
+        follow = replayed(member(clips, number), capacities, seconds, config.outputs.rerun)
+        with (
+            results_folder(folder / str(number)) as out,
+            doing(job, config.outputs, out, reader_of(cells), follow) as run,
+        ):
+            yield run
+
+
+def grid_jobs(recording: Recording, bodies: list[Body], configs: Sequence[TrackConfig]) -> list[Job]:
+    """The jobs of configs that differ in numbers only; what does not depend on these is made once.
+
+    Raises:
+        InputError: a setting differs that changes the program.
+    """
+    first = Job.from_config(recording, bodies, configs[0])
+    starts = {_of_start(recording, configs[0]): first.start}
+    jobs = []
+    for config in configs:
+        tracker = build.varied(first.tracker, config)
+        if not same_program(tracker, first.tracker):
+            raise _refused(_key_of_program(first, configs[0], config), configs)
+        key = _of_start(recording, config)
+        if key not in starts:
+            starts[key] = jnp.concatenate(first_poses(recording, first.bodies, config, first.frames[0]))
+        jobs.append(replace(first, tracker=tracker, start=starts[key]))
+    return jobs
+
+
+def reader_of(cells: CellsOfClip) -> PictureReader:
+    """Reads a clip's cells from memory; where outputs show the pictures, these from the videos."""
+
+    def read(recording: Recording, preparation: Preparation, first: int, last: int) -> Iterator[list[Picture]]:
+        return pictures_of(cells) if preparation.cells_only else read_prepared(recording, preparation, first, last)
+
+    return read
+
+
+def differing_keys(configs: Sequence[TrackConfig]) -> list[str]:
+    """The settings that are not the same in all configs."""
+    keys = [key for key, _, _ in help_lines(TrackConfig)]
+    return [key for key in keys if any(value_of(c, key) != value_of(configs[0], key) for c in configs)]
+
+
+def value_of(config: TrackConfig, key: str) -> Any:
+    """The value of a setting such as `energy.limit_weight`."""
+    value = config
+    for part in key.split("."):
+        value = getattr(value, part)
+    return value
+
+
+def _of_start(recording: Recording, config: TrackConfig) -> str:
+    """What a first pose depends on beside the recording and the actors: nothing, where it comes from a file."""
+    if initial_pose_file(recording, config) is not None:
+        return ""
+    return str([asdict(part) for part in (config.color, config.images, config.energy)])
+
+
+def _key_of_program(first: Job, base: TrackConfig, config: TrackConfig) -> str:
+    """The setting because of which a config needs another program than the first one."""
+    tracker = build.varied(first.tracker, base)
+    for key in differing_keys([base, config]):
+        group, name = key.split(".")
+        changed = replace(base, **{group: replace(getattr(base, group), **{name: value_of(config, key)})})
+        if not same_program(build.varied(first.tracker, changed), tracker):
+            return key
+    return "solver.method"
+
+
+def _refused(key: str, configs: Sequence[TrackConfig]) -> InputError:
+    values = ",".join(dict.fromkeys(str(value_of(config, key)) for config in configs))
+    return InputError(
+        f"{key}={values}: cannot differ within one compiled call, which only numbers of the energy, the solver and the "
+        "prediction may; leave sweep=vmapped out, or sweep over it apart"
+    )

@@ -1,0 +1,100 @@
+"""`sogjax track -m ... sweep=vmapped`: the files and the table of the ordinary sweep, from one compiled call."""
+
+import logging
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from command_line import actor_file, done, refused, trackable
+
+from sogjax.data.motion import load_motion
+from sogjax.synth import SynthSettings, render_recording
+
+LANDMARKS = ("pelvis", "chest", "neck", "left_elbow")
+LIGHT = ("outputs.overlay=false", "outputs.rerun_images=false", "solver.max_iterations=12", "images.depth=5")
+SWEEP = ("energy.limit_weight=0,1", "solver.epsilon=0.002,0.02")
+
+
+@pytest.fixture(autouse=True)
+def plain_logging(tmp_path, monkeypatch):
+    """Hydra sets up logging for a sweep; put it back, so that no file stays open. Results go to a new folder."""
+    monkeypatch.chdir(tmp_path)
+    root = logging.getLogger()
+    before = list(root.handlers)
+    yield
+    for handler in [h for h in root.handlers if h not in before]:
+        root.removeHandler(handler)
+        handler.close()
+
+
+@pytest.fixture
+def recording(tmp_path):
+    """A rendered person, three cameras, three frames; its rough pose has the landmarks of the small actor."""
+    folder = tmp_path / "person"
+    settings = SynthSettings(cameras=3, frames=3, width=96, height=72, example_poses=False, background=False)
+    render_recording(settings, folder)
+    rough = yaml.safe_load((folder / "initial_pose.yaml").read_text())
+    rough["landmarks"] = {name: rough["landmarks"][name] for name in LANDMARKS}
+    (folder / "initial_pose.yaml").write_text(yaml.safe_dump(rough))
+    return folder
+
+
+def rows_of(table):
+    """Settings and numbers of a sweep's table, without the last column, which is a rate."""
+    lines = [line.split() for line in table.splitlines() if line.startswith("energy.limit_weight=")]
+    return [(line[:2], [float(value) for value in line[2:-1]]) for line in lines]
+
+
+def files_in(folder):
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*.*") if path.name != "multirun.yaml")
+
+
+def test_one_call_leaves_what_the_ordinary_sweep_leaves(capsys, tmp_path, recording):
+    words = (f"recording={recording}", f"actor={actor_file(tmp_path / 'a.yaml')}", *LIGHT, *SWEEP)
+    ordinary, _ = done(capsys, "track", "-m", *words)
+    Path("multirun").rename("ordinary")
+    once, _ = done(capsys, "track", "-m", *words, "sweep=vmapped")
+    (before,), (after,) = Path("ordinary").iterdir(), Path("multirun").iterdir()
+    expected = [name for name in files_in(before) if not name.endswith(".log")]
+    assert files_in(after) == expected
+    assert {f"{k}/{name}" for k in range(4) for name in ("motion.npz", "metrics.json", "motion.rrd")} < set(expected)
+    for k in range(4):
+        one, other = load_motion(before / str(k) / "motion.npz"), load_motion(after / str(k) / "motion.npz")
+        np.testing.assert_allclose(other.pose, one.pose, atol=2e-3)
+        np.testing.assert_allclose(other.energy, one.energy, rtol=1e-3)
+        np.testing.assert_array_equal(other.frame, one.frame)
+        configs = [yaml.safe_load((folder / str(k) / "config.yaml").read_text()) for folder in (before, after)]
+        assert [config.pop("sweep") for config in configs] == ["each", "vmapped"]
+        outs = [config.pop("out") for config in configs]
+        assert configs[0] == configs[1]
+        assert all(out.endswith(f"/{k}") for out in outs)
+    assert len(rows_of(once)) == 4
+    for (names, numbers), (same_names, same_numbers) in zip(rows_of(once), rows_of(ordinary), strict=True):
+        assert names == same_names
+        np.testing.assert_allclose(numbers, same_numbers, rtol=0.02, atol=0.5)
+
+
+@pytest.mark.parametrize(
+    ("override", "key"),
+    [
+        ("images.depth=4,5", "images.depth=4,5"),
+        ("start=0,1", "start=0,1"),
+        ("outputs.bvh=true,false", "outputs.bvh=True,False"),
+        ("energy.capped=true,false", "energy.capped=True,False"),
+        ("solver.method=lbfgs,conditioned_ascent", "solver.method=lbfgs,conditioned_ascent"),
+        ("color.space=rgb,lab", "color.space=rgb,lab"),
+        ("energy.pairs=sparse,dense", "energy.pairs=sparse,dense"),
+    ],
+)
+def test_what_is_no_number_of_one_program_is_refused(capsys, tmp_path, override, key):
+    words = (f"recording={trackable(tmp_path / 'walk')}", f"actor={actor_file(tmp_path / 'a.yaml')}", *LIGHT)
+    sentence = refused(capsys, "track", "-m", *words, "energy.limit_weight=1,2", override, "sweep=vmapped")
+    assert f"{key}: cannot differ within one compiled call" in sentence
+    assert not (tmp_path / "multirun").exists()
+
+
+def test_hydras_own_settings_and_unknown_ways_are_refused(capsys, tmp_path):
+    words = ("track", "-m", f"recording={tmp_path}", "energy.limit_weight=1,2")
+    assert "Hydra's own settings" in refused(capsys, *words, "sweep=vmapped", "hydra.sweep.dir=x")
+    assert "each, vmapped" in refused(capsys, "track", f"recording={trackable(tmp_path / 'walk')}", "sweep=batched")
