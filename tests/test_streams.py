@@ -7,6 +7,7 @@ import pytest
 from command_line import actor_file, trackable
 
 from sogjax.app import pipeline
+from sogjax.app import track as track_command
 from sogjax.app.cli import main
 from sogjax.data.motion import load_motion
 from sogjax.errors import InputError
@@ -25,15 +26,15 @@ def command(tmp_path, monkeypatch):
 
 def interrupt_the_step(monkeypatch):
     """Ctrl-C reaches the main thread, where the step runs."""
-    whole = pipeline.track
+    whole = track_command.tracked_frames
 
-    def track(*arguments):
-        for tracked in whole(*arguments):
-            if tracked.index == LAST_GOOD:
+    def tracked_frames(*arguments):
+        for done in whole(*arguments):
+            if done.tracked.index == LAST_GOOD:
                 raise KeyboardInterrupt
-            yield tracked
+            yield done
 
-    monkeypatch.setattr(pipeline, "track", track)
+    monkeypatch.setattr(track_command, "tracked_frames", tracked_frames)
     return 130
 
 

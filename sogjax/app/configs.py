@@ -51,7 +51,7 @@ class EnergyConfig:
     acceleration_weight: float = option(0.01, "[w_a] weight of smooth motion, 1/rad^2")
     overlap_exponent: str = option("exact", "exact | printed: Eq. 6 with or without the 1/2 that Eq. 2 implies")
     capped: bool = option(True, "the cap of Eq. 8 against blobs that hide each other")
-    pairs: str = option("dense", "dense: all pairs of blobs | sparse: those near each other, the same to 1e-4")
+    pairs: str = option("sparse", "dense: all pairs of blobs | sparse: those near each other, the same to 1e-4")
     gradient: str = option("forward", "forward: closed form beside the value | autodiff: plain reverse mode")
 
 
@@ -59,9 +59,7 @@ class EnergyConfig:
 class SolverConfig:
     """The solver (Eq. 11, 12)."""
 
-    method: str = option(
-        "conditioned_ascent", "conditioned_ascent | gradient_ascent | gauss_newton | bfgs | lbfgs | nonlinear_cg"
-    )
+    method: str = option("lbfgs", "conditioned_ascent | gradient_ascent | gauss_newton | bfgs | lbfgs | nonlinear_cg")
     epsilon: float = option(0.002, "[epsilon] stop when a step is shorter, rad and m")
     min_iterations: int = option(10, "[n_iter] iterations made at least")
     max_iterations: int = option(200, "iterations made at most")
