@@ -84,9 +84,8 @@ def test_a_scanned_clip_is_the_clip_frame_by_frame(dog, kind):
             np.testing.assert_allclose(frame.result.pose, result.pose, atol=ROUNDING)
             blobs, expected = frame.result.images, result.images
             assert blobs.mask.sum() == (expected.mask.sum() if with_images else 0)
-            np.testing.assert_allclose(
-                np.sum(blobs.sigmas * blobs.mask), np.sum(expected.sigmas * expected.mask) * with_images
-            )
+            sigmas = lambda sog: np.sum(np.asarray(sog.sigmas)[np.asarray(sog.mask)])
+            np.testing.assert_allclose(sigmas(blobs), sigmas(expected) * with_images, rtol=1e-5)
 
 
 @pytest.mark.parametrize("kind", [lambda t: t, sparse], ids=["dense", "sparse"])
@@ -124,8 +123,10 @@ def test_many_trackers_find_what_each_finds_alone(dog):
 
 
 def test_members_in_step_find_the_same(dog):
+    """With Gauss-Newton: the ascent's steps by signs of gradients magnify rounding."""
     tracker, start, cells = dog
     trackers = different(tracker)[:3]
+    trackers = [sparse(tracker) for tracker in trackers]
     in_step, _ = track_many(trackers, jnp.stack([start] * 3), cells, "in_step", common_boxes=False)
     np.testing.assert_allclose(in_step.pose, alone(trackers, start, cells), atol=UNNOTICED)
 

@@ -26,13 +26,14 @@ from sogjax.data.recording import Recording
 from sogjax.data.video import read_prepared
 from sogjax.errors import InputError
 from sogjax.model.body import Body
-from sogjax.solve import GaussNewton
 from sogjax.track.many import member, same_program, track_many
 from sogjax.track.scan import replayed
 
 NUMBERS = ("color.radius", "images.color_tolerance", "images.box_enlargement", "images.plate_tolerance")
 """What may differ between members beside the energy, the solver and the prediction."""
 GROUPS = ("energy.", "solver.", "tracking.")
+STEADY = ("gauss_newton", "lbfgs")
+"""Solvers that do not magnify rounding: members may look into common boxes, and still find what single runs find."""
 
 
 def run_grid(members: Sequence[Sequence[str]]) -> int:
@@ -86,8 +87,7 @@ def grid_runs(recording: Recording, bodies: list[Body], configs: Sequence[TrackC
     say(f"{len(jobs)} runs of {len(cells)} frames in one call")
     begin = time.perf_counter()
     starts = jnp.stack([job.start for job in jobs])
-    # The ascents magnify rounding: with common boxes their poses, and the table, would not be those of single runs.
-    common_boxes = isinstance(jobs[0].tracker.solver, GaussNewton)
+    common_boxes = configs[0].solver.method in STEADY
     clips, capacities = track_many([job.tracker for job in jobs], starts, cells, common_boxes=common_boxes)
     jax.block_until_ready(clips)
     seconds = (time.perf_counter() - begin) / (len(jobs) * len(cells))
