@@ -1,7 +1,6 @@
 """The commands end to end on a tiny recording, their help, and their exit statuses."""
 
 import json
-import logging
 import re
 import subprocess
 import sys
@@ -32,17 +31,6 @@ def rendered(tmp_path_factory):
     rough["landmarks"] = {name: rough["landmarks"][name] for name in LANDMARKS}
     (folder / "initial_pose.yaml").write_text(yaml.safe_dump(rough))
     return folder
-
-
-@pytest.fixture
-def plain_logging():
-    """Hydra sets up logging for a sweep; put it back, so that no file stays open."""
-    root = logging.getLogger()
-    before = list(root.handlers)
-    yield
-    for handler in [h for h in root.handlers if h not in before]:
-        root.removeHandler(handler)
-        handler.close()
 
 
 def test_from_a_recording_to_motion_and_pictures(capsys, tmp_path, monkeypatch, rendered, plain_logging):

@@ -1,6 +1,5 @@
 """`sogjax track -m ... sweep=vmapped`: the files and the table of the ordinary sweep, from one compiled call."""
 
-import logging
 from pathlib import Path
 
 import numpy as np
@@ -17,15 +16,9 @@ SWEEP = ("energy.limit_weight=0,1", "solver.epsilon=0.002,0.02")
 
 
 @pytest.fixture(autouse=True)
-def plain_logging(tmp_path, monkeypatch):
-    """Hydra sets up logging for a sweep; put it back, so that no file stays open. Results go to a new folder."""
+def new_folder(tmp_path, monkeypatch, plain_logging):
+    """Results go to a new folder."""
     monkeypatch.chdir(tmp_path)
-    root = logging.getLogger()
-    before = list(root.handlers)
-    yield
-    for handler in [h for h in root.handlers if h not in before]:
-        root.removeHandler(handler)
-        handler.close()
 
 
 @pytest.fixture

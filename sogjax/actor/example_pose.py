@@ -8,10 +8,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from sogjax.energy.objective import EnergyWeights, History, Views, energy
+from sogjax.energy.objective import EnergyWeights, Views
 from sogjax.model.body import Body
 from sogjax.solve import ConditionedAscent, Scales
 from sogjax.track.initial_pose import centred, turned
+from sogjax.track.pose_search import still_energy
 from sogjax.track.scales import pose_scales
 
 NUM_HEADINGS = 16
@@ -57,13 +58,9 @@ def pose_from_silhouettes(
     return max((refined(pose, FINE_ITERATIONS) for pose in candidates), key=lambda found: float(found[1]))
 
 
-def _no_history(pose: Float[Array, "dof"]) -> History:
-    return History(pose, pose, jnp.asarray(False))
-
-
 @eqx.filter_jit
 def _energies(body: Body, poses: Array, views: Views, weights: EnergyWeights) -> Float[Array, "start"]:
-    return jax.lax.map(lambda pose: energy(body, pose, views, _no_history(pose), weights), poses)
+    return jax.lax.map(lambda pose: still_energy(body, pose, views, weights), poses)
 
 
 @eqx.filter_jit
@@ -76,6 +73,6 @@ def _refined(
     max_iterations: Array,
 ) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
     solver = ConditionedAscent(max_iterations=max_iterations)
-    objective = lambda pose: energy(body, pose, views, _no_history(pose), weights)
+    objective = lambda pose: still_energy(body, pose, views, weights)
     solution = solver.maximize(objective, start, scales)
     return solution.params, solution.value

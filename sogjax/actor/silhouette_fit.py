@@ -1,7 +1,5 @@
 """All example poses and one shape, fitted to the edges of the masks by Gauss-Newton steps."""
 
-from typing import NamedTuple
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -9,6 +7,7 @@ from jaxtyping import Array, Float
 
 from sogjax.actor.coverage import Silhouettes, mismatch, mismatch_equations
 from sogjax.actor.shape import ShapeModel
+from sogjax.energy.curvature import QuadraticModel
 from sogjax.energy.priors import limit_penalty
 from sogjax.model.skeleton import Skeleton
 from sogjax.solve import GaussNewton, Scales, Solution
@@ -24,14 +23,6 @@ EPSILON = 0.02
 """Length of the step of some two hundred parameters (radians, metres, logarithms) below which the fit ends."""
 DAMPING = 1e-3
 """Least damping: the problem is well posed by its priors, and flat valleys want long steps."""
-
-
-class Quadratic(NamedTuple):
-    """An objective near some parameters: value + gradient . d - d . curvature d / 2."""
-
-    value: Float[Array, ""]
-    gradient: Float[Array, "param"]
-    curvature: Float[Array, "param param"]
 
 
 class SilhouetteFit(eqx.Module):
@@ -62,7 +53,7 @@ class SilhouetteFit(eqx.Module):
         penalties = jax.vmap(self._pose_penalty)(poses)
         return -jnp.mean(misses + penalties) - self._shape_penalty(shape)
 
-    def quadratic(self, params: Float[Array, "param"]) -> Quadratic:
+    def quadratic(self, params: Float[Array, "param"]) -> QuadraticModel:
         """Value, gradient, and a curvature that is positive semi-definite."""
         poses, shape = self.split(params)
         value, gradient, curvature = jax.lax.map(
@@ -74,7 +65,7 @@ class SilhouetteFit(eqx.Module):
         shared = curvature[:, :dofs, dofs:].reshape(-1, shape.shape[0])
         corner = jnp.mean(curvature[:, dofs:, dofs:], axis=0) + jax.hessian(self._shape_penalty)(shape)
         scale = 1.0 / self.num_poses
-        return Quadratic(
+        return QuadraticModel(
             -jnp.mean(value) - prior_value,
             -jnp.concatenate(
                 [scale * gradient[:, :dofs].reshape(-1), jnp.mean(gradient[:, dofs:], axis=0) + prior_slope]
@@ -82,14 +73,14 @@ class SilhouetteFit(eqx.Module):
             jnp.block([[scale * own, scale * shared], [scale * shared.T, corner]]),
         )
 
-    def _pose_equations(self, pose, shape, silhouettes) -> Quadratic:
+    def _pose_equations(self, pose, shape, silhouettes) -> QuadraticModel:
         """One pose's part of the cost (not the objective), by its degrees of freedom and the shape."""
         dofs = pose.shape[0]
         of_params = lambda params: _blobs(self.model, params[:dofs], params[dofs:])
         params = jnp.concatenate([pose, shape])
         parts = mismatch_equations(of_params(params), jax.jacfwd(of_params)(params), silhouettes)
         value, slope = jax.value_and_grad(self._pose_penalty)(pose)
-        return Quadratic(
+        return QuadraticModel(
             parts.value + value,
             (2.0 * parts.gradient).at[:dofs].add(slope),
             (2.0 * parts.matrix).at[:dofs, :dofs].add(jax.hessian(self._pose_penalty)(pose)),

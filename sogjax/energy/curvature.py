@@ -20,11 +20,11 @@ from sogjax.model.sog import Sog
 
 
 class QuadraticModel(NamedTuple):
-    """Value and gradient of an objective at a pose, and a curvature: value + gradient . d - d . curvature d / 2."""
+    """Value, gradient and curvature of an objective at some parameters: value + gradient . d - d . curvature d / 2."""
 
     value: Float[Array, ""]
-    gradient: Float[Array, "dof"]
-    curvature: Float[Array, "dof dof"]
+    gradient: Float[Array, "param"]
+    curvature: Float[Array, "param param"]
 
 
 class FrameEnergy(eqx.Module):

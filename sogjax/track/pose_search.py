@@ -128,7 +128,7 @@ def _centres(body: Body, poses: Float[Array, "start dof"]) -> Float[Array, "star
 
 @eqx.filter_jit
 def _energies(body: Body, poses: Array, views: Views, weights: EnergyWeights) -> Float[Array, "start"]:
-    return jax.lax.map(lambda pose: _energy(body, pose, views, weights), poses, batch_size=8)
+    return jax.lax.map(lambda pose: still_energy(body, pose, views, weights), poses, batch_size=8)
 
 
 def _climbed(
@@ -152,7 +152,7 @@ def _climbed_together(
     solver = ConditionedAscent(max_iterations=iterations)
 
     def climb(pose: Float[Array, "dof"]) -> tuple[Array, Array]:
-        solution = solver.maximize(lambda p: _energy(body, p, views, weights), pose, scales)
+        solution = solver.maximize(lambda p: still_energy(body, p, views, weights), pose, scales)
         return solution.params, solution.value
 
     return jax.vmap(climb)(poses)
@@ -163,7 +163,7 @@ def _well_seen(body: Body, poses: Array, cameras: Camera) -> Bool[Array, "start"
     return well_seen(cameras, _centres(body, poses))
 
 
-def _energy(body: Body, pose: Float[Array, "dof"], views: Views, weights: EnergyWeights) -> Float[Array, ""]:
+def still_energy(body: Body, pose: Float[Array, "dof"], views: Views, weights: EnergyWeights) -> Float[Array, ""]:
     """Eq. 10 of a frame without history."""
     return energy(body, pose, views, History(pose, pose, jnp.asarray(False)), weights)
 
