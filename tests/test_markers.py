@@ -34,10 +34,22 @@ def test_markers_fixed_to_the_body_have_no_error():
     assert found.compared_with == tuple(JOINTS[joint][0] for joint in ON)
 
 
-def test_a_marker_belongs_to_the_joint_of_the_closest_blob_centre():
+def test_a_marker_belongs_to_the_joint_of_the_closest_blob():
     motion = walking_motion()
     markers = motion.blob_means[:, [2, 5]] + [0.01, 0.0, 0.0]
     np.testing.assert_array_equal(attach_markers(motion, markers).joints, [5, 8])
+
+
+def test_a_marker_on_a_thigh_does_not_go_with_the_hand_before_it():
+    motion = walking_motion()
+    thigh, hand = 2, 5
+    motion.blob_sigma[:] = 0.01
+    motion.blob_sigma[thigh] = 0.08
+    motion.blob_sigma[hand] = 0.03
+    on_the_thigh = motion.blob_means[:, thigh] + [0.1, 0.0, 0.0]
+    motion.blob_means[0, hand] = on_the_thigh[0] + [0.07, 0.0, 0.0]
+    joints = attach_markers(motion, on_the_thigh[:, None]).joints
+    np.testing.assert_array_equal(joints, [motion.blob_joint[thigh]])
 
 
 def test_a_translation_of_the_truth_after_the_first_frame_is_the_error():

@@ -71,15 +71,17 @@ def common_frames(motion: Motion, truth: GroundTruth) -> tuple[Int[np.ndarray, "
 
 
 def attach_markers(motion: Motion, markers: Float[np.ndarray, "frame marker 3"]) -> VirtualMarkers:
-    """Attach each marker to the parent joint of its closest blob (Section 6).
+    """Attach each marker to the parent joint of its closest blob (Section 6), in the blob's own sigmas.
 
-    Done in the first frame that has the marker; `markers` has one row for each row of `motion`.
+    By bare distance, a marker on a thigh would go with the hand that hangs before it: the hand's blob is small and its
+    centre near. Done in the first frame that has the marker; `markers` has one row for each row of `motion`.
     """
     present = ~np.isnan(markers.sum(axis=2))
     first = present.argmax(axis=0)
     points = np.where(present.any(axis=0)[:, None], markers[first, np.arange(len(first))], 0.0)
     distances = np.linalg.norm(motion.blob_means[first] - points[:, None], axis=-1)
-    joints = np.asarray(motion.blob_joint, int)[distances.argmin(axis=1)]
+    closest = (distances / np.asarray(motion.blob_sigma, float)[None]).argmin(axis=1)
+    joints = np.asarray(motion.blob_joint, int)[closest]
     frames = np.asarray(motion.world_from_joint, float)[first, joints]
     offsets = np.einsum("mji,mj->mi", frames[:, :3, :3], points - frames[:, :3, 3])
     return VirtualMarkers(np.where(present.any(axis=0), joints, -1), offsets)
