@@ -189,10 +189,13 @@ class ViewConfig:
 
 @dataclass
 class ExportConfig:
-    """Write a motion in another format."""
+    """Write a motion, or a calibration, in another format."""
 
-    motion: str = option(MISSING, "motion.npz")
-    to: str = option(MISSING, "file to write; its ending says the format: .bvh .npz")
+    motion: str | None = option(None, "motion.npz")
+    calibration: str | None = option(None, "calibration file, or the folder of a recording; instead of a motion")
+    to: str = option(
+        MISSING, "file to write; its ending says the format: .bvh .npz; of a calibration: .toml .calibration"
+    )
     up: str = option("z", "vertical of the motion's world: x y z -x -y -z")
 
 
