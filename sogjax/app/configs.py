@@ -3,6 +3,7 @@
 Every field carries its help text; `--help` prints it. Symbols in brackets are the paper's.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
 
@@ -14,8 +15,8 @@ def option(default: Any, help_text: str) -> Any:
     return field(default=default, metadata={"help": help_text})
 
 
-def group(schema: type, help_text: str) -> Any:
-    """A config group."""
+def group(schema: Callable[[], Any], help_text: str) -> Any:
+    """A config group, or a list, made by a schema or function."""
     return field(default_factory=schema, metadata={"help": help_text})
 
 
@@ -166,6 +167,21 @@ class DemoConfig:
     height: int = option(486, "height of the pictures, px")
     seed: int = option(0, "person, clothes, room and noise")
     outputs: OutputsConfig = group(OutputsConfig, "")
+
+
+@dataclass
+class ReportConfig:
+    """Run the experiments of the paper's Section 6 and more, and write report.html and report.md; resumes."""
+
+    out: str = option("outputs/report", "folder for the report and its runs; a run that is there is not done again")
+    only: list[str] | None = option(None, "experiments, by their names in conf/experiment; null: all")
+    recordings: list[str] = group(
+        lambda: ["walk:0", "arms:0", "squat_kick:1", "cartwheel:1"],
+        "folders of recordings with ground truth, or MOTION:SEED of rendered ones",
+    )
+    frames: int = option(40, "frames of each recording to track, at most")
+    overrides: list[str] = group(lambda: [], "options of track, for all runs, such as [solver=gauss_newton]")
+    pictures: int = option(6, "worst frames to show")
 
 
 @dataclass

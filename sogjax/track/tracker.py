@@ -65,6 +65,8 @@ class FrameResult(eqx.Module):
     pose: Float[Array, "dof"]
     terms: EnergyTerms
     iterations: Int[Array, ""]
+    evaluations: Int[Array, ""]
+    """Of the energy, with its gradient."""
     converged: Bool[Array, ""]
     num_near: Int[Array, "camera"]
     num_matching: Int[Array, "camera"]
@@ -140,6 +142,7 @@ class Tracker(eqx.Module):
             pose=solution.params,
             terms=terms_of_energy(self.body, solution.params, solution.value, history, self.weights),
             iterations=solution.iterations,
+            evaluations=solution.evaluations,
             converged=solution.converged,
             num_near=num_near,
             num_matching=num_matching,
@@ -175,17 +178,18 @@ def track(
     tracker: Tracker,
     start: Float[Array, "dof"],
     frames: Iterable[UInt8[np.ndarray, "camera rows columns 3"]],
+    capacities: Capacities | None = None,
 ) -> Iterator[TrackedFrame]:
     """Track the frames one after the other from a rough pose of the first one.
 
-    The step is compiled once, with room for `HEADROOM` times the image blobs of the first frame; a frame that needs
-    more is done again with the next capacity (and compiles again), so no blob is ever cut off unseen.
+    The step is compiled once, with room for `HEADROOM` times the image blobs of the first frame, or with the given
+    capacities (of a run whose program can so serve this one); a frame that needs more is done again with the next
+    capacity (and compiles again), so no blob is ever cut off unseen.
 
     Raises:
         InputError: more image blobs than the largest capacity.
     """
     state = TrackState.from_pose(start)
-    capacities: Capacities | None = None
     for index, cells in enumerate(frames):
         begin = time.perf_counter()
         device_cells = jnp.asarray(cells)
