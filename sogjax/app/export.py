@@ -33,6 +33,6 @@ def _rig(path: Path) -> CameraRig:
 
 
 def _export_motion(config: ExportConfig, motion: Path, out: Path) -> None:
-    if config.up not in UP_AXES:
+    if config.up not in (None, *UP_AXES):
         raise InputError(f"up={config.up}: must be one of {', '.join(UP_AXES)}")
     export_motion(load_motion(motion), out, up=config.up)

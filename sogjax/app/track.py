@@ -16,7 +16,7 @@ from sogjax.app import build
 from sogjax.app.cells import picture_reader
 from sogjax.app.configs import OutputsConfig, TrackConfig
 from sogjax.app.first_pose import first_poses, initial_pose_file
-from sogjax.app.outputs import results_folder, write_results
+from sogjax.app.outputs import export_endings, results_folder, write_results
 from sogjax.app.pipeline import FrameTracker, PictureReader, tracked_frames
 from sogjax.app.recordings import actors_of, opened, say, upright
 from sogjax.app.streams import Streams
@@ -67,6 +67,7 @@ def run(config: TrackConfig) -> Run:
         InputError: anything wrong with the recording, the actors or the config.
     """
     build.check(config)
+    export_endings(config.outputs)
     recording = opened(config.recording, config.cameras)
     frame_range(recording, config)
     initial_pose_file(recording, config)
