@@ -88,6 +88,11 @@ class OutputsConfig:
     rerun: bool = option(True, "motion.rrd, for the Rerun viewer")
     rerun_images: bool = option(True, "put the pictures into motion.rrd")
     bvh: bool = option(True, "motion.bvh")
+    confidence: bool = option(True, "standard deviations of the pose and the joints, in motion.npz")
+    temperature: float = option(
+        1e-4,
+        "energy that counts as one unit of log-likelihood, for the standard deviations; by experiments/confidence.py",
+    )
 
 
 @dataclass
