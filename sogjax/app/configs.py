@@ -89,6 +89,11 @@ class OutputsConfig:
     rerun_images: bool = option(True, "put the pictures into motion.rrd")
     bvh: bool = option(True, "motion.bvh")
     formats: list[str] | None = option(None, "further formats of the motion, some of [trc,c3d,glb,csv]; null: none")
+    confidence: bool = option(True, "standard deviations of the pose and the joints, in motion.npz")
+    temperature: float = option(
+        1e-4,
+        "energy that counts as one unit of log-likelihood, for the standard deviations; by experiments/confidence.py",
+    )
 
 
 @dataclass
