@@ -1,15 +1,19 @@
 """Standard deviations held against true errors, and the temperature that makes them right."""
 
+import hashlib
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
+from sogjax import __version__
 from sogjax.app.composition import composed
 from sogjax.app.overrides import quoted_value
 from sogjax.app.streams import deviations_of
 from sogjax.app.study.source import Source
+from sogjax.data.atomic import atomic_path
 from sogjax.data.ground_truth import GroundTruth
 from sogjax.data.motion import Motion, motion_from_poses
 from sogjax.evaluate.markers import common_frames, joint_pairs
@@ -51,6 +55,23 @@ class SaidAndFound:
         """Of Spearman: whether what is said to be less sure is farther off."""
         ranks = lambda values: np.argsort(np.argsort(values)).astype(float)
         return float(np.corrcoef(ranks(self.said), ranks(self.found))[0, 1])
+
+
+def kept_said_and_found(source: Source, temperature: float, overrides: Sequence[str] = ()) -> SaidAndFound:
+    """The same, read where it was done before.
+
+    Raises:
+        InputError: the study's folder cannot be written.
+    """
+    what = json.dumps([__version__, source.identity, source.num_frames, temperature, list(overrides)])
+    path = source.folder / "confidence" / f"{hashlib.sha256(what.encode()).hexdigest()[:16]}.npz"
+    if path.is_file():
+        with np.load(path) as kept:
+            return SaidAndFound(kept["said"], kept["found"])
+    result = said_and_found(source, temperature, overrides)
+    with atomic_path(path) as temporary, temporary.open("wb") as file:
+        np.savez(file, said=result.said, found=result.found)
+    return result
 
 
 def said_and_found(source: Source, temperature: float, overrides: Sequence[str] = ()) -> SaidAndFound:
