@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from sogjax.app.configs import ExportConfig
+from sogjax.app.outputs import free_path
 from sogjax.data.export import export_motion
 from sogjax.data.motion import load_motion
 from sogjax.errors import InputError
@@ -13,11 +14,11 @@ def run(config: ExportConfig) -> Path:
     """Write the file.
 
     Raises:
-        InputError: a motion that does not open, or an ending that no writer knows.
+        InputError: a motion that does not open, or an ending that no writer knows, or a file that is there.
     """
     if config.up not in UP_AXES:
         raise InputError(f"up={config.up}: must be one of {', '.join(UP_AXES)}")
-    out = Path(config.to)
+    out = free_path("to", config.to, config.overwrite)
     export_motion(load_motion(Path(config.motion)), out, up=config.up)
     print(out)
     return out
