@@ -22,6 +22,7 @@ SCHEMAS: dict[str, type] = {
     "track": configs.TrackConfig,
     "actor": configs.ActorConfig,
     "segment": configs.SegmentConfig,
+    "report": configs.ReportConfig,
     "evaluate": configs.EvaluateConfig,
     "synth": configs.SynthConfig,
     "view": configs.ViewConfig,

@@ -3,6 +3,7 @@
 Every field carries its help text; `--help` prints it. Symbols in brackets are the paper's.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
 
@@ -16,8 +17,8 @@ def option(default: Any, help_text: str) -> Any:
     return field(default=default, metadata={"help": help_text})
 
 
-def group(schema: type, help_text: str) -> Any:
-    """A config group."""
+def group(schema: Callable[[], Any], help_text: str) -> Any:
+    """A config group, or a list, made by a schema or function."""
     return field(default_factory=schema, metadata={"help": help_text})
 
 
@@ -89,6 +90,7 @@ class OutputsConfig:
     rerun: bool = option(True, "motion.rrd, for the Rerun viewer")
     rerun_images: bool = option(True, "put the pictures into motion.rrd")
     bvh: bool = option(True, "motion.bvh")
+    formats: list[str] | None = option(None, "further formats of the motion, some of [trc,c3d,glb,csv]; null: none")
 
 
 @dataclass
@@ -178,6 +180,21 @@ class DemoConfig:
 
 
 @dataclass
+class ReportConfig:
+    """Run the experiments of the paper's Section 6 and more, and write report.html and report.md; resumes."""
+
+    out: str = option("outputs/report", "folder for the report and its runs; a run that is there is not done again")
+    only: list[str] | None = option(None, "experiments, by their names in conf/experiment; null: all")
+    recordings: list[str] = group(
+        lambda: ["walk:0", "arms:0", "squat_kick:1", "cartwheel:1"],
+        "folders of recordings with ground truth, or MOTION:SEED of rendered ones",
+    )
+    frames: int = option(40, "frames of each recording to track, at most")
+    overrides: list[str] = group(lambda: [], "options of track, for all runs, such as [solver=gauss_newton]")
+    pictures: int = option(6, "worst frames to show")
+
+
+@dataclass
 class EvaluateConfig:
     """Compare a motion with ground truth (Section 6)."""
 
@@ -200,10 +217,13 @@ class ViewConfig:
 
 @dataclass
 class ExportConfig:
-    """Write a motion in another format."""
+    """Write a motion, or a calibration, in another format."""
 
-    motion: str = option(MISSING, "motion.npz")
-    to: str = option(MISSING, "file to write; its ending says the format: .bvh .npz")
+    motion: str | None = option(None, "motion.npz")
+    calibration: str | None = option(None, "calibration file, or the folder of a recording; instead of a motion")
+    to: str = option(
+        MISSING, "file to write; its ending says the format: .bvh .npz; of a calibration: .toml .calibration"
+    )
     up: str = option("z", "vertical of the motion's world: x y z -x -y -z")
     overwrite: bool = option(False, OVERWRITE)
 

@@ -16,7 +16,7 @@ from sogjax.app.cells import cells_of_clip, pictures_of
 from sogjax.app.composition import composed
 from sogjax.app.configs import TrackConfig, help_lines
 from sogjax.app.first_pose import first_poses, initial_pose_file
-from sogjax.app.outputs import results_folder, write_results
+from sogjax.app.outputs import export_endings, results_folder, write_results
 from sogjax.app.pipeline import Picture, PictureReader, Preparation
 from sogjax.app.recordings import actors_of, opened, say
 from sogjax.app.run_folder import run_folder
@@ -48,6 +48,7 @@ def run_grid(members: Sequence[Sequence[str]]) -> int:
     configs = [composed("track", list(overrides)) for overrides in members]
     for config in configs:
         build.check(config)
+        export_endings(config.outputs)
     check_numbers_only(configs)
     recording = opened(configs[0].recording, configs[0].cameras)
     frame_range(recording, configs[0])

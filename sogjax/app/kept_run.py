@@ -29,7 +29,7 @@ from sogjax.track.tracker import FrameResult, TrackedFrame, TrackState
 FOLDER = "run.partial"
 NOTE, START, ACTOR = "run.json", "start.npz", "actor"
 TERMS = ("similarity", "limit_penalty", "acceleration_penalty", "energy")
-COLUMNS = ("pose", "iterations", "converged", "num_near", "num_matching", "num_blocks")
+COLUMNS = ("pose", "iterations", "evaluations", "converged", "num_near", "num_matching", "num_blocks")
 CAPACITY, CAPACITIES = "capacity_{}", ("near", "matching", "blocks")
 
 

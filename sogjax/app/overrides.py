@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from sogjax.app.configs import help_lines
 from sogjax.errors import InputError
 
-PATH_KEYS = ("recording", "out", "actor", "body", "motion", "truth", "to", "images.cache")
+PATH_KEYS = ("recording", "out", "actor", "body", "motion", "truth", "to", "calibration", "images.cache")
 """Options whose values are paths, which may hold characters that Hydra's grammar does not take unquoted."""
 
 _PLAIN = re.compile(r"[\w./\\:%+@?|-]*", re.ASCII)

@@ -11,6 +11,7 @@ from sogjax.app.kept_run import FOLDER, NOTE, KeptRun, read_note, write_note
 from sogjax.app.made_from import MadeFrom, difference
 from sogjax.app.outputs import results_folder
 from sogjax.app.recordings import say
+from sogjax.data.export import WRITERS
 from sogjax.errors import InputError
 
 try:
@@ -24,7 +25,7 @@ REPLACING_THEIR_OWN = ("demo",)
 PARTIAL = ("motion.partial", "motion_*.partial", FOLDER)
 RESULTS = (
     *PARTIAL,
-    *("motion.npz", "motion_*.npz", "motion.bvh", "motion_*.bvh"),
+    *(f"motion{name}{ending}" for name in ("", "_*") for ending in WRITERS),
     *("config.yaml", "metrics.json", "overlay.mp4", "motion.rrd", NOTE),
 )
 """Names of what a run leaves, beside the files that its note lists."""

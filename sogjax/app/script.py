@@ -81,14 +81,23 @@ def track_folder(folder: Path, overrides: Sequence[str] = ()) -> Run:
 
 def machine_line() -> str:
     """One line: processor, cores, versions, date, and the command that runs."""
+    return f"{machine_facts()}, {command_line()}"
+
+
+def machine_facts() -> str:
+    """Processor, cores, versions and date."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    program = Path(sys.argv[0])
-    folder = f"{program.parent.name}/" if program.suffix == ".py" else ""
-    command = " ".join([f"{folder}{program.name}", *sys.argv[1:]])
     return (
         f"{_processor()}, {cores} cores, {jax.default_backend()}, Python {platform.python_version()}, "
-        f"jax {jax.__version__}, {datetime.date.today()}, {command}"
+        f"jax {jax.__version__}, {datetime.date.today()}"
     )
+
+
+def command_line() -> str:
+    """The command that runs, without the folder of its program."""
+    program = Path(sys.argv[0])
+    folder = f"{program.parent.name}/" if program.suffix == ".py" else ""
+    return " ".join([f"{folder}{program.name}", *sys.argv[1:]])
 
 
 def _processor() -> str:

@@ -187,6 +187,7 @@ class Streams:
                 energy=np.array([result.terms.energy for result in results], float),
                 iterations=np.array([result.iterations for result in results], int),
                 converged=np.array([result.converged for result in results], bool),
+                up=self._recording.up,
             )
             for body, part in zip(self._bodies, dof_slices(self._bodies), strict=True)
         }

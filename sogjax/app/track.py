@@ -20,7 +20,7 @@ from sogjax.app.configs import OutputsConfig, TrackConfig
 from sogjax.app.first_pose import first_poses, initial_pose_file
 from sogjax.app.kept_run import KeptRun
 from sogjax.app.made_from import made_from
-from sogjax.app.outputs import evaluate, write_results
+from sogjax.app.outputs import evaluate, export_endings, write_results
 from sogjax.app.pipeline import FrameTracker, PictureReader, tracked_frames
 from sogjax.app.recordings import actors_of, file_list, opened, say, upright
 from sogjax.app.resumed import resumed
@@ -76,6 +76,7 @@ def run(config: TrackConfig, command: str = "track") -> Run:
             with results that are to stay.
     """
     build.check(config)
+    export_endings(config.outputs)
     recording = opened(config.recording, config.cameras)
     frame_range(recording, config)
     initial_pose_file(recording, config)

@@ -54,6 +54,7 @@ class MotionLog:
         """All that was written; `mapped`: the arrays stay on disk, as long as the folder does."""
         arrays = read_log(self.folder, mapped)
         arrays["fps"] = float(arrays["fps"])  # pyright: ignore[reportArgumentType]
+        arrays["up"] = str(arrays["up"])  # pyright: ignore[reportArgumentType]
         return Motion(**{entry.name: arrays[entry.name] for entry in fields(Motion)})  # pyright: ignore[reportArgumentType]
 
     def close(self) -> None:

@@ -101,6 +101,7 @@ def open_recording(path: Path) -> Recording:
     offsets = {camera: settings.frame_offset.get(camera, 0) for camera in cameras}
     with ThreadPoolExecutor() as pool:
         infos = dict(zip(cameras, pool.map(look_at_source, sources.values()), strict=True))
+    rig = rig.with_sizes({camera: info.size for camera, info in infos.items()})
     for camera in cameras:
         check_size(sources[camera], infos[camera].size, rig, camera)
     first, count, warnings = _frames(path, settings, infos, offsets)

@@ -20,7 +20,7 @@ from sogjax.model.sog import Sog
 GradientMode = Literal["forward", "autodiff"]
 
 EXACT_EXPONENT = 0.5
-"""Eq. 6 as Eq. 2 implies it: exp(-|d|^2 / (2 (si^2 + sj^2)))."""
+"""Eq. 6 as Eq. 2 implies it: `exp(-|d|^2 / (2 (si^2 + sj^2)))`."""
 PRINTED_EXPONENT = 1.0
 """Eq. 6 as printed, without the 1/2."""
 

@@ -65,6 +65,8 @@ class FrameResult(eqx.Module):
     pose: Float[Array, "dof"]
     terms: EnergyTerms
     iterations: Int[Array, ""]
+    evaluations: Int[Array, ""]
+    """Of the energy, with its gradient."""
     converged: Bool[Array, ""]
     num_near: Int[Array, "camera"]
     num_matching: Int[Array, "camera"]
@@ -156,6 +158,7 @@ class Tracker(eqx.Module):
             pose=solution.params,
             terms=terms_of_energy(self.body, solution.params, solution.value, history, self.weights),
             iterations=solution.iterations,
+            evaluations=solution.evaluations,
             converged=solution.converged,
             num_near=num_near,
             num_matching=num_matching,
@@ -214,9 +217,10 @@ def track(
 ) -> Iterator[TrackedFrame]:
     """Track the frames one after the other from a rough pose of the first one, or from where another run stopped.
 
-    The step is compiled once, with room for `HEADROOM` times the image blobs of the first frame; a frame that needs
-    more is done again with the next capacity (and compiles again), so no blob is ever cut off unseen. The capacities
-    that a run stopped with must be given to go on with it: sums of other lengths are rounded otherwise.
+    The step is compiled once, with room for `HEADROOM` times the image blobs of the first frame, or with the given
+    capacities (of a run whose program can so serve this one); a frame that needs more is done again with the next
+    capacity (and compiles again), so no blob is ever cut off unseen. Who goes on with a run gives the capacities that
+    it stopped with: sums of other lengths are rounded otherwise.
 
     Raises:
         InputError: more image blobs than the largest capacity.

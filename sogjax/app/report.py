@@ -1,0 +1,177 @@
+"""`sogjax report`: the experiments of the paper's Section 6, and more, as tables and charts beside its figures."""
+
+import csv
+import io
+import platform
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from omegaconf import OmegaConf
+
+from sogjax import __version__
+from sogjax.app.composition import composed
+from sogjax.app.configs import ReportConfig
+from sogjax.app.outputs import results_folder
+from sogjax.app.recordings import say
+from sogjax.app.script import machine_line
+from sogjax.app.study.document import Picture, Section, write_html, write_markdown
+from sogjax.app.study.experiment import Experiment, experiment_names
+from sogjax.app.study.pictures import experiment_chart, worst_frame
+from sogjax.app.study.record import RunRecord
+from sogjax.app.study.source import Source
+from sogjax.app.study.study import Study
+from sogjax.app.study.summary import RowSummary
+from sogjax.app.study.table import findings, markdown_table, recordings_table
+from sogjax.data.atomic import atomic_path
+from sogjax.errors import InputError
+
+TITLE = "Section 6 again"
+PACKAGES = ("sogjax", "jax", "jaxlib", "optimistix", "equinox", "numpy", "opencv-python-headless", "matplotlib")
+
+
+@dataclass(frozen=True)
+class Done:
+    """One run of the report."""
+
+    experiment: Experiment
+    row: str
+    source: Source
+    record: RunRecord
+
+
+def run(config: ReportConfig) -> list[Path]:
+    """Do the runs that are not there yet, and write the report; the files.
+
+    Raises:
+        InputError: an experiment or recording that is not there, or a folder that cannot be written.
+    """
+    experiments = [Experiment.named(name) for name in config.only or experiment_names()]
+    _check_matplotlib()
+    with results_folder(Path(config.out)) as out:
+        study = Study(out, config.recordings, config.frames, config.overrides)
+        begin = time.perf_counter()
+        done: list[Done] = []
+        sections = [_experiment_section(experiment, study, done) for experiment in experiments]
+        say(f"runs done or read in {time.perf_counter() - begin:.0f} s")
+        sections = [_about(config, done), *sections, _worst(done, config.pictures), _versions(config)]
+        write_html(out / "report.html", TITLE, sections)
+        files = [out / "report.html", *write_markdown(out / "report.md", TITLE, sections), _write_runs(out, done)]
+    print(*files, sep="\n")
+    return files
+
+
+def _experiment_section(experiment: Experiment, study: Study, done: list[Done]) -> Section:
+    """An experiment's tables, chart and findings; its runs are added to `done`."""
+    done += [Done(experiment, row, source, record) for row, source, record in study.records(experiment)]
+    rows = study.summary(experiment)
+    chart = experiment_chart(experiment, rows)
+    return Section(experiment.config.title, _parts(experiment, rows), [chart] if chart else [])
+
+
+def _parts(experiment: Experiment, rows: Sequence[RowSummary]) -> list[str]:
+    config = experiment.config
+    base = f" All rows: `{' '.join(config.base)}`." if config.base else ""
+    parts = [f"{config.question} (`python experiments/{experiment.name}.py`){base}", markdown_table(experiment, rows)]
+    if config.measure == "accuracy":
+        parts += ["Mean error on each recording, mm:", recordings_table(experiment, rows)]
+    if config.paper_note:
+        parts.append(f"The paper's figures: {config.paper_note}.")
+    said = findings(experiment, rows)
+    return [
+        *parts,
+        *(["\n".join(f"- {line}" for line in said)] if said else []),
+        *([config.remark] if config.remark else []),
+    ]
+
+
+def _about(config: ReportConfig, done: Sequence[Done]) -> Section:
+    seconds = sum({id(one.record): one.record.seconds for one in _different(done)}.values())
+    machines = dict.fromkeys(one.record.machine for one in done)
+    return Section(
+        "What was done",
+        [
+            f"`{machine_line()}`",
+            "- " + "\n- ".join(f"Runs on: {machine}" for machine in machines),
+            f"{len(list(_different(done)))} runs of at most {config.frames} frames, {seconds / 60.0:.0f} minutes in "
+            "all with compilation and actors. Errors are distances of markers to the truth in millimetres, mean +- "
+            "standard deviation over all markers, frames and recordings; a marker is lost for a stretch where it is "
+            "more than 200 mm off for five frames on end. Intervals are at 95 %, by bootstrap over recordings and "
+            "stretches of ten frames; a difference to the reference, taken in the same frames, whose interval holds "
+            "zero does not show. Few recordings make wide and rough intervals. The actor of a recording and its pose "
+            "in the first frame are the same for all runs. Times are the median of a tracking step from kept cells.",
+            "The paper's recordings are not ours: compare how numbers change, not how large they are.",
+        ],
+    )
+
+
+def _worst(done: Sequence[Done], count: int) -> Section:
+    """The frames with the largest errors, one an experiment at most."""
+    usable = [one for one in done if not one.record.failed and one.experiment.config.measure == "accuracy"]
+    ranked = sorted(usable, key=lambda one: -max(one.record.error_mm, default=0.0))
+    pictures: list[Picture] = []
+    seen: set[str] = set()
+    for one in ranked:
+        if one.experiment.name not in seen and len(pictures) < count:
+            seen.add(one.experiment.name)
+            pictures.append(worst_frame(f"{one.experiment.config.title}, {one.row}", one.source, one.record))
+    return Section("Worst frames", ["The frame with the largest mean error of an experiment's runs."], pictures)
+
+
+def _versions(config: ReportConfig) -> Section:
+    tree = OmegaConf.structured(composed("track", ["recording=RECORDING", *config.overrides]))
+    return Section(
+        "Configuration and versions",
+        [
+            "\n".join(f"- {name} {_version(name)}" for name in PACKAGES) + f"\n- Python {platform.python_version()}",
+            "What rows do not set is the default; `runs.csv` lists every run, and `runs/KEY.json` holds it.",
+            "```\n" + OmegaConf.to_yaml(tree).strip() + "\n```",
+        ],
+    )
+
+
+def _write_runs(out: Path, done: Sequence[Done]) -> Path:
+    """`runs.csv`: every row on every recording, with its overrides."""
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow(
+        ["experiment", "row", "recording", "overrides", "error mm", "ms a step", "seconds", "machine", "failed"]
+    )
+    for one in done:
+        numbers = [f"{value:.2f}" for value in (one.record.mean_mm, one.record.step_ms, one.record.seconds)]
+        words = " ".join(one.experiment.overrides(one.row))
+        writer.writerow(
+            [one.experiment.name, one.row, one.source.name, words, *numbers, one.record.machine, one.record.failed]
+        )
+    with atomic_path(out / "runs.csv") as temporary:
+        temporary.write_text(text.getvalue(), encoding="utf-8")
+    return out / "runs.csv"
+
+
+def _different(done: Sequence[Done]) -> Iterator[Done]:
+    """Each run once: several experiments may have a row in common."""
+    seen: set[str] = set()
+    for one in done:
+        plan = str(one.record.plan)
+        if plan not in seen:
+            seen.add(plan)
+            yield one
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return __version__ if package == "sogjax" else "not installed"
+
+
+def _check_matplotlib() -> None:
+    """Found out before the runs, not after.
+
+    Raises:
+        InputError: matplotlib is not installed.
+    """
+    if _version("matplotlib") == "not installed":
+        raise InputError("a report needs matplotlib; install it with pip install 'sogjax[report]'")

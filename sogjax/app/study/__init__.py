@@ -1,0 +1,1 @@
+"""Studies: experiments that are described in `conf/experiment/`, run over several recordings, and reported."""

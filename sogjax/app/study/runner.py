@@ -1,0 +1,151 @@
+"""One run of a study: from a source and a row of an experiment to a record."""
+
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, replace
+
+import numpy as np
+
+from sogjax.app import build
+from sogjax.app.composition import composed
+from sogjax.app.configs import TrackConfig
+from sogjax.app.overrides import quoted_value
+from sogjax.app.recordings import say
+from sogjax.app.script import machine_facts
+from sogjax.app.study.experiment import Experiment
+from sogjax.app.study.record import RunFolder, RunPlan, RunRecord
+from sogjax.app.study.source import Source
+from sogjax.app.timing import StageTimes
+from sogjax.app.track import track_recording
+from sogjax.data.motion import Motion, motion_from_poses
+from sogjax.errors import InputError
+from sogjax.evaluate import GroupEvaluation, evaluate_motions
+from sogjax.evaluate.metrics import mean_per_frame
+from sogjax.model.body import Body, dof_slices
+from sogjax.track.culling import Capacities
+from sogjax.track.tracker import FrameResult, track
+
+STAGES = ("decode", "step", "whole")
+
+
+def run_row(experiment: Experiment, row: str, source: Source, runs: RunFolder, common: Sequence[str] = ()) -> RunRecord:
+    """The record of a row on a recording: read where it was done before, else made now and kept.
+
+    A run that fails through its input is kept as failed, and the others go on.
+
+    Raises:
+        InputError: an override that cannot be; a recording without ground truth.
+    """
+    entry = experiment.config.rows[row]
+    words = [f"recording={quoted_value(str(source.path))}", *experiment.overrides(row, common)]
+    config: TrackConfig = composed("track", words)
+    build.check(config)
+    cameras = source.cameras(entry.cameras)
+    measure = experiment.config.measure
+    plan = RunPlan.of(source.identity, source.num_frames, cameras, entry.every, measure, config)
+    found = runs.find(plan)
+    if found is not None:
+        return found
+    say(f"{experiment.name} {row!r}: {source.name}")
+    record, begin = RunRecord(plan=asdict(plan), machine=machine_facts()), time.perf_counter()
+    try:
+        do = _accuracy if measure == "accuracy" else _speed
+        record = do(record, source, config, cameras, entry.every)
+    except InputError as error:
+        record = replace(record, failed=str(error))
+        say(f"failed: {error}")
+    record = replace(record, seconds=time.perf_counter() - begin)
+    runs.keep(plan, record)
+    return record
+
+
+def motions_of(record: RunRecord, bodies: Sequence[Body], fps: float) -> dict[str, Motion]:
+    """The motions of a run's actors, from the poses in its record."""
+    poses = np.asarray(record.pose, float)
+    return {
+        body.name: motion_from_poses(body, poses[:, part], fps, frame=record.frames)
+        for body, part in zip(bodies, dof_slices(bodies), strict=True)
+    }
+
+
+def _accuracy(
+    record: RunRecord, source: Source, config: TrackConfig, cameras: tuple[str, ...], every: int
+) -> RunRecord:
+    """Track from kept cells, from the start pose that all runs share."""
+    tracker = source.tracker(config, cameras)
+    cells = source.cells(config.images.depth, cameras, every)
+    kind = _program(config, cameras)
+    tracked = list(track(tracker, source.start, cells, _capacities.get(kind)))
+    _capacities[kind] = tracked[-1].capacities
+    results = [frame.result for frame in tracked]
+    frames = source.recording.first_frame + every * np.arange(len(cells))
+    record = replace(
+        record,
+        frame=frames.tolist(),
+        milliseconds=[round(1000.0 * frame.seconds, 3) for frame in tracked],
+        image_blobs=float(np.mean([result.num_matching for result in results])),
+        **_of_solver(results),
+    )
+    return _evaluated(record, source)
+
+
+_capacities: dict[tuple[object, ...], Capacities] = {}
+"""What sufficed for earlier runs of the process, by what the number of image blobs depends on: one program serves
+several recordings."""
+
+
+def _program(config: TrackConfig, cameras: tuple[str, ...]) -> tuple[object, ...]:
+    return (config.energy.pairs, *asdict(config.images).values(), *asdict(config.color).values(), len(cameras))
+
+
+def _of_solver(results: Sequence[FrameResult]) -> dict[str, list]:
+    return {
+        "iterations": [int(result.iterations) for result in results],
+        "evaluations": [int(result.evaluations) for result in results],
+        "converged": [bool(result.converged) for result in results],
+        "pose": [np.round(np.asarray(result.pose, float), 6).tolist() for result in results],
+    }
+
+
+def _speed(record: RunRecord, source: Source, config: TrackConfig, cameras: tuple[str, ...], every: int) -> RunRecord:
+    """Track from the videos, all stages beside each other, as `sogjax track` does; twice, the faster one counts."""
+    config = replace(config, stop=source.num_frames)
+    runs = [track_recording(source.seen_by(cameras), source.actors, config) for _ in range(2)]
+    best = max(runs, key=lambda run: run.times.frames_per_second("whole"))
+    motion = next(iter(best.motions.values()))
+    record = replace(
+        record,
+        frame=motion.frame.tolist(),
+        iterations=motion.iterations.tolist(),
+        converged=motion.converged.tolist(),
+        milliseconds=[1000.0 * seconds for seconds in best.times.seconds["step"]],
+        image_blobs=best.image_blobs,
+        rates=_rates(best.times),
+        pose=np.concatenate([motion.pose for motion in best.motions.values()], axis=1).tolist(),
+    )
+    return _evaluated(record, source)
+
+
+def _rates(times: StageTimes) -> dict[str, float]:
+    return {stage: times.frames_per_second(stage) for stage in STAGES}
+
+
+def _evaluated(record: RunRecord, source: Source) -> RunRecord:
+    """The record with its distances to the truth."""
+    motions = motions_of(record, source.bodies, source.recording.fps)
+    evaluation = evaluate_motions(motions, source.truth)
+    return replace(
+        record,
+        error_mm=_per_frame(evaluation, "markers"),
+        joint_error_mm=_per_frame(evaluation, "joints"),
+        std_mm=1000.0 * evaluation.summary.std,
+        lost=sum(len(part.lost) for part in evaluation.evaluations.values()),
+        swaps=len(evaluation.swaps),
+    )
+
+
+def _per_frame(evaluation: GroupEvaluation, kind: str) -> list[float]:
+    """Mean distance in every frame over the points of all actors, mm; of the joints where there are no markers."""
+    parts: Iterable = evaluation.evaluations.values()
+    errors = [points.errors for part in parts if (points := getattr(part, kind) or part.joints) is not None]
+    return np.round(1000.0 * mean_per_frame(np.concatenate(errors, axis=1)), 4).tolist()

@@ -1,0 +1,65 @@
+"""A study: some experiments over some recordings, every run of them done once."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from sogjax.app.study.experiment import Experiment
+from sogjax.app.study.record import RunFolder, RunRecord
+from sogjax.app.study.runner import run_row
+from sogjax.app.study.source import Source, source_named
+from sogjax.app.study.summary import RowSummary, summarized
+
+
+@dataclass(eq=False)
+class Study:
+    """Where its runs are kept, and what they are made on."""
+
+    folder: Path
+    recordings: Sequence[str]
+    """Folders with ground truth, or MOTION:SEED."""
+    frames: int
+    """Tracked of each recording, at most."""
+    overrides: Sequence[str] = ()
+    """Of the track config, for all runs."""
+
+    @cached_property
+    def runs(self) -> RunFolder:
+        """The records."""
+        return RunFolder(self.folder)
+
+    def __post_init__(self) -> None:
+        self._sources: dict[tuple[str, int], Source] = {}
+
+    def source(self, recording: str, actors: int = 1) -> Source:
+        """A recording, opened once.
+
+        Raises:
+            InputError: there is none of that name.
+        """
+        key = (recording, actors)
+        if key not in self._sources:
+            self._sources[key] = source_named(recording, self.frames, self.folder, actors)
+        return self._sources[key]
+
+    def sources_of(self, experiment: Experiment, row: str) -> list[Source]:
+        """The recordings that a row is tracked on."""
+        actors = experiment.config.rows[row].actors
+        if actors is not None and actors > 1:
+            return [self.source("pass:0", actors)]
+        return [self.source(name) for name in experiment.config.recordings or self.recordings]
+
+    def records(self, experiment: Experiment) -> Iterator[tuple[str, Source, RunRecord]]:
+        """Every run of an experiment as (row, recording, record), as they are done or read."""
+        for row in experiment.config.rows:
+            for source in self.sources_of(experiment, row):
+                yield row, source, run_row(experiment, row, source, self.runs, self.overrides)
+
+    def summary(self, experiment: Experiment) -> list[RowSummary]:
+        """The rows of an experiment; runs that are missing are done."""
+        rows: dict[str, dict[str, RunRecord]] = {}
+        for row, source, record in self.records(experiment):
+            rows.setdefault(row, {})[source.name] = record
+        papers = {name: (row.paper, row.paper_value) for name, row in experiment.config.rows.items()}
+        return summarized(rows, experiment.config.reference, papers)

@@ -1,0 +1,109 @@
+"""Charts of studies, drawn with matplotlib (the extra `report`): means with their intervals, calibration curves."""
+
+import io
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from sogjax.errors import InputError
+
+INK, PAPER, OTHERS = "#1f77b4", "#444444", "#b8c4d0"
+_SIZE = (7.2, 2.8)
+"""Inches."""
+_DPI = 90
+
+
+def mean_chart(
+    names: Sequence[str],
+    means: Sequence[float],
+    intervals: Sequence[tuple[float, float]],
+    *,
+    axis: str,
+    value: str,
+    members: Mapping[str, Sequence[float]] | None = None,
+    paper: Sequence[float | None] = (),
+) -> bytes:
+    """Means with their intervals beside the paper's figures, as a PNG.
+
+    Args:
+        names: of the rows, from left to right.
+        means: one a row.
+        intervals: low and high of each mean.
+        axis: what differs between the rows.
+        value: what the means are, with their unit.
+        members: further values, drawn faintly, such as the means on each recording.
+        paper: the paper's figures, in a panel of their own; None where it has none.
+    """
+    figure = _figure()
+    with_paper = any(number is not None for number in paper)
+    panels = figure.subplots(1, 2 if with_paper else 1, squeeze=False, width_ratios=[2, 1] if with_paper else [1])[0]
+    _draw_means(panels[0], means, intervals, members or {})
+    _finish(panels[0], names, axis, value, "here")
+    if with_paper:
+        present = [(name, number) for name, number in zip(names, paper, strict=True) if number is not None]
+        panels[1].plot(range(len(present)), [number for _, number in present], "s-", color=PAPER)
+        _finish(panels[1], [name for name, _ in present], axis, value, "the paper")
+    return _png(figure)
+
+
+def calibration_chart(
+    expected: Mapping[str, Float[np.ndarray, "bin"]], found: Mapping[str, Float[np.ndarray, "bin"]], title: str
+) -> bytes:
+    """What was expected against what was found, in millimetres from metres, by name (PNG)."""
+    figure = _figure((4.2, 3.6))
+    panel = figure.subplots()
+    top = 0.0
+    for name, values in expected.items():
+        panel.plot(1000.0 * values, 1000.0 * found[name], "o-", markersize=4, label=name)
+        top = max(top, 1000.0 * float(np.nanmax([values, found[name]])))
+    panel.plot([0.0, top], [0.0, top], "--", color=PAPER, linewidth=1)
+    panel.set(xlabel="standard deviation said, mm", ylabel="root mean square error, mm", title=title)
+    panel.legend(fontsize=8, frameon=False)
+    return _png(figure)
+
+
+def _draw_means(
+    panel: Any,
+    means: Sequence[float],
+    intervals: Sequence[tuple[float, float]],
+    members: Mapping[str, Sequence[float]],
+) -> None:
+    places = np.arange(len(means))
+    for values in members.values():
+        panel.plot(places, values, "-", color=OTHERS, linewidth=1)
+    middle, bounds = np.asarray(means, float), np.asarray(intervals, float)
+    spread = np.clip(np.stack([middle - bounds[:, 0], bounds[:, 1] - middle]), 0.0, None)
+    panel.errorbar(places, middle, yerr=np.nan_to_num(spread), fmt="o", color=INK, capsize=4)
+
+
+def _finish(panel: Any, names: Sequence[str], axis: str, value: str, title: str) -> None:
+    crowded = max((len(name) for name in names), default=0) * len(names) > 40
+    panel.set_xticks(range(len(names)), names, rotation=30 if crowded else 0, ha="right" if crowded else "center")
+    panel.set_xlabel(axis)
+    panel.set_ylabel(value)
+    panel.set_title(title, fontsize=9)
+    panel.set_ylim(bottom=0.0)
+    panel.grid(axis="y", color="#e4e4e4")
+
+
+def _figure(size: tuple[float, float] = _SIZE) -> Any:
+    """An empty figure that needs no display.
+
+    Raises:
+        InputError: matplotlib is not installed.
+    """
+    try:
+        from matplotlib import rc_context
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise InputError("charts need matplotlib; install it with pip install 'sogjax[report]'") from error
+    with rc_context({"font.size": 8}):
+        return Figure(figsize=size, dpi=_DPI, layout="constrained")
+
+
+def _png(figure: Any) -> bytes:
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png")
+    return stream.getvalue()

@@ -1,0 +1,29 @@
+"""What the pages of the documentation show is true of the program."""
+
+import re
+from pathlib import Path
+
+from sogjax.app.composition import composed
+from sogjax.data.actor_file import load_body
+
+GUIDE = Path(__file__).parents[1] / "docs" / "guide"
+
+
+def test_the_body_of_the_guide_is_one(tmp_path):
+    text = (GUIDE / "own_skeleton.md").read_text(encoding="utf-8")
+    path = tmp_path / "lamp.yaml"
+    path.write_text(re.findall(r"```yaml\n(.*?)```", text, re.S)[0])
+    body = load_body(path)
+    assert body.name == "lamp"
+    assert body.skeleton.dof_names == ("root_x", "root_y", "root_z", "root_yaw", "bow")
+    assert set(body.poses) == {"rest", "bowing"}
+
+
+def test_options_that_the_guide_names_exist():
+    pages = [path.read_text(encoding="utf-8") for path in GUIDE.glob("*.md")]
+    words = {
+        word for page in pages for word in re.findall(r"`((?:solver|energy|images|color|tracking)\.?\w*=\w+)`", page)
+    }
+    assert words
+    for word in words:
+        composed("track", ["recording=somewhere", word])
