@@ -5,6 +5,7 @@ from pathlib import Path
 import jax.numpy as jnp
 
 from sogjax.app.configs import ExportConfig
+from sogjax.app.outputs import free_path
 from sogjax.app.recordings import body_named
 from sogjax.data.calibration import CameraRig, load_calibration, save_calibration
 from sogjax.data.export import export_motion
@@ -20,9 +21,9 @@ def run(config: ExportConfig) -> Path:
     """Write the file.
 
     Raises:
-        InputError: a motion or calibration that does not open, or an ending that no writer knows.
+        InputError: a motion or calibration that does not open, an ending that no writer knows, or a file that is there.
     """
-    out = Path(config.to)
+    out = free_path("to", config.to, config.overwrite)
     if (config.motion is None) == (config.calibration is None):
         raise InputError("export needs motion=... or calibration=..., one of them (see sogjax export --help)")
     if config.calibration is not None:

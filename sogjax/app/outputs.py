@@ -57,6 +57,18 @@ def _make_writable(path: Path) -> None:
         raise InputError(f"{path}: cannot write there ({reason}); choose another folder with out=DIR") from error
 
 
+def free_path(key: str, value: str | Path, overwrite: bool) -> Path:
+    """The path of an output, if nothing is there yet or it may be replaced.
+
+    Raises:
+        InputError: something is there.
+    """
+    path = Path(value)
+    if path.exists() and not overwrite:
+        raise InputError(f"{key}={path}: is there already; choose another name, or give overwrite=true to replace it")
+    return path
+
+
 def export_endings(wanted: OutputsConfig) -> list[str]:
     """The file endings in which motions are written, beside motion.npz.
 
@@ -89,12 +101,15 @@ def write_results(result: Run, out: Path, wanted: OutputsConfig, config: Any, ma
     with atomic_path(out / "config.yaml") as temporary:
         temporary.write_text(OmegaConf.to_yaml(config))
     result.files.append(out / "config.yaml")
-    evaluate(result, out)
+    evaluate(result)
+    if result.evaluation is not None:
+        result.evaluation.to_json(out / "metrics.json")
+        result.files.append(out / "metrics.json")
     result.files += streamed
 
 
-def evaluate(result: Run, out: Path) -> None:
-    """Compare with the ground truth, where there is one, and write metrics.json."""
+def evaluate(result: Run) -> None:
+    """Compare with the ground truth, where there is one."""
     if result.recording.ground_truth is None:
         return
     truth = load_ground_truth(result.recording.ground_truth)
@@ -105,6 +120,3 @@ def evaluate(result: Run, out: Path) -> None:
         result.evaluation = evaluate_motions(result.motions, truth)
     except InputError as error:
         say(f"warning: nothing is compared: {error}")
-        return
-    result.evaluation.to_json(out / "metrics.json")
-    result.files.append(out / "metrics.json")
