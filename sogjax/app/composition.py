@@ -22,10 +22,12 @@ SCHEMAS: dict[str, type] = {
     "track": configs.TrackConfig,
     "actor": configs.ActorConfig,
     "segment": configs.SegmentConfig,
+    "check": configs.CheckConfig,
     "evaluate": configs.EvaluateConfig,
     "synth": configs.SynthConfig,
     "view": configs.ViewConfig,
     "export": configs.ExportConfig,
+    "doctor": configs.DoctorConfig,
 }
 """The commands and their schemas."""
 

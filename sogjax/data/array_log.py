@@ -10,7 +10,7 @@ from types import TracebackType
 import numpy as np
 
 from sogjax.data.atomic import atomic_path, disk_trouble_told
-from sogjax.data.npz_file import read_npz
+from sogjax.data.npz_file import check_npy, read_npz
 from sogjax.errors import InputError
 
 CONSTANT, ROWS = "constant.npz", "rows.npy"
@@ -78,6 +78,7 @@ def read_log(folder: Path, mapped: bool = False) -> Arrays:
     """
     constant = read_npz(folder / CONSTANT)
     path = folder / ROWS
+    check_npy(path)
     try:
         rows = np.load(path, mmap_mode="r" if mapped else None, allow_pickle=False)
         return constant | {name: rows[name] for name in rows.dtype.names or ()}
