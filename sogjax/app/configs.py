@@ -163,6 +163,19 @@ class SegmentConfig:
 
 
 @dataclass
+class CheckConfig:
+    """Look at a recording: calibration, synchronisation, exposure, files; say what is wrong and what to do."""
+
+    recording: str = option(MISSING, "folder of the recording")
+    out: str = option("", "folder for check.json and check.png, which are replaced; default: outputs/RECORDING/check")
+    start: int | None = option(None, "first frame to look at, counted from the recording's first; null: the middle")
+    frames: int = option(90, "frames to look at, at most; they should show somebody moving")
+    largest_offset: int = option(15, "time offsets between cameras are looked for up to so many frames")
+    write: bool = option(False, "write the time offsets that were found into recording.yaml, as frame_offset")
+    cameras: list[str] | None = option(None, "cameras to look at; null: all")
+
+
+@dataclass
 class SynthConfig:
     """Render a recording with ground truth."""
 
@@ -251,6 +264,13 @@ class ExportConfig:
 def option_key(name: str) -> str:
     """The key of a field on the command line: Python's own words stand in the schemas with a line after them."""
     return name.removesuffix("_")
+
+
+@dataclass
+class DoctorConfig:
+    """Look at the installation: versions, devices, extras, speed of the disk, and a test of five seconds."""
+
+    folder: str = option(".", "folder whose write speed is measured")
 
 
 def help_lines(schema: type, prefix: str = "") -> list[tuple[str, str, str]]:

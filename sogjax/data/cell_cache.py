@@ -110,7 +110,7 @@ class CellCache:
         if made_from != self._made_from:
             raise _UnusableError("was made from other files or settings")
         try:
-            cells = np.load(array, mmap_mode="r")
+            cells = np.load(array, mmap_mode="r", allow_pickle=False)
         except (OSError, ValueError, EOFError) as error:
             raise _UnusableError("is missing or cut short") from error
         if _checksum(array, cells.offset) != checksum:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from sogjax.data.calibration.rig import METRES_PER_UNIT
+from sogjax.data.file_names import objection
 from sogjax.data.initial_pose import InitialPose, parse_initial_pose
 from sogjax.data.yaml_entry import Entry, read_yaml
 from sogjax.model.frames import UP_AXES
@@ -61,7 +62,7 @@ def read_recording_settings(path: Path) -> RecordingSettings:
     given = {key: value for key, value in entries.items() if value.value is not None}
     return RecordingSettings(
         fps=_positive(given["fps"]) if "fps" in given else None,
-        calibration=given["calibration"].text() if "calibration" in given else None,
+        calibration=_file_name(given["calibration"]) if "calibration" in given else None,
         unit=given["unit"].choice(METRES_PER_UNIT, "a unit of length") if "unit" in given else None,
         up=given["up"].choice(UP_AXES, "an axis") if "up" in given else None,
         cameras=_camera_names(given["cameras"]) if "cameras" in given else None,
@@ -86,6 +87,14 @@ def _whole(entry: Entry) -> int:
     if isinstance(entry.value, bool) or not isinstance(entry.value, int):
         raise entry.error("a whole number of frames")
     return entry.value
+
+
+def _file_name(entry: Entry) -> str:
+    """A name that may become one of a file: it leads into no other folder."""
+    name = entry.text()
+    if (wanted := objection(name)) is not None:
+        raise entry.error(wanted)
+    return name
 
 
 def _camera_names(entry: Entry) -> tuple[str, ...]:
@@ -128,10 +137,10 @@ def _example(entry: Entry) -> ExampleSettings:
     fields = entry.fields(("name",), ("actor", "initial_pose"))
     given = {key: value for key, value in fields.items() if value.value is not None}
     name = fields["name"].text()
-    if Path(name).name != name:
+    if objection(name) is not None:
         raise fields["name"].error("the name of a folder in example_poses/")
     return ExampleSettings(
         name=name,
-        actor=given["actor"].text() if "actor" in given else None,
+        actor=_file_name(given["actor"]) if "actor" in given else None,
         initial_pose=parse_initial_pose(given["initial_pose"]) if "initial_pose" in given else None,
     )
