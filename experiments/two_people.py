@@ -9,7 +9,8 @@ import sys
 from dataclasses import dataclass, field
 
 from sogjax.app.script import machine_line, run_script, settings_from, track_rendered
-from sogjax.app.sweep import row_numbers, table
+from sogjax.app.sweep import row_numbers
+from sogjax.app.sweep_results import table
 from sogjax.synth import SynthSettings
 
 

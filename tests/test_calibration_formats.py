@@ -9,8 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from command_line import done, refused
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from damaged import FUZZ, damaged
+from hypothesis import given
 from small_recording import make_recording
 
 from sogjax.data.calibration import (
@@ -237,24 +237,6 @@ def test_large_nonsense_is_refused_at_once(tmp_path, content):
     assert time.perf_counter() - begin < 10.0
 
 
-def mutations(text):
-    """The text with up to four pieces cut out, doubled, or replaced by what parsers stumble over."""
-    words = ("", "nan", "-inf", "1e999", "9" * 5000, "{", "}", "[", "]", '"', "<", ">", "\n", "\0", "é", "- ", ":", "=")
-    piece = st.tuples(st.integers(0, len(text)), st.integers(0, 40), st.sampled_from(words), st.booleans())
-
-    def changed(pieces):
-        result = text
-        for start, length, word, again in pieces:
-            part = result[start : start + length]
-            result = result[:start] + (part + word + part if again else word) + result[start + length :]
-        return result
-
-    return st.lists(piece, min_size=1, max_size=4).map(changed)
-
-
-FUZZ = settings(max_examples=300, deadline=5000, suppress_health_check=list(HealthCheck))
-
-
 def only_input_errors(path, text):
     path.write_bytes(text.encode("utf-8", errors="surrogatepass"))
     try:
@@ -270,7 +252,7 @@ def only_input_errors(path, text):
 @pytest.mark.parametrize("kind", cases.TEXTS)
 def test_a_damaged_file_is_read_or_refused(tmp_path, kind):
     @FUZZ
-    @given(mutations(cases.TEXTS[kind]()))
+    @given(damaged(cases.TEXTS[kind]()))
     def fuzz(text):
         only_input_errors(tmp_path / "calibration.any", text)
 
@@ -282,7 +264,7 @@ def test_a_damaged_half_is_read_or_refused(tmp_path, half):
     cases.write(tmp_path, "EasyMocap")
 
     @FUZZ
-    @given(mutations((tmp_path / f"{half}.yml").read_text()))
+    @given(damaged((tmp_path / f"{half}.yml").read_text()))
     def fuzz(text):
         shutil.copy(tmp_path / "intri.yml", tmp_path / "whole.txt")
         only_input_errors(tmp_path / f"{half}.yml", text)

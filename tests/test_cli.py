@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+from keyword import iskeyword
 
 import numpy as np
 import pytest
@@ -125,7 +126,7 @@ def test_defaults_in_the_help_are_the_defaults_of_the_command(command):
     for key, default, _ in help_lines(SCHEMAS[command]):
         value = config
         for part in key.split("."):
-            value = getattr(value, part)
+            value = getattr(value, f"{part}_" if iskeyword(part) else part)
         assert default in ("required", "null" if value is None else str(value))
 
 

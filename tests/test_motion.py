@@ -1,5 +1,7 @@
 """Motions follow from the poses, survive their file, and are refused where they are wrong."""
 
+from dataclasses import replace
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -72,7 +74,27 @@ def test_no_frames_and_no_blobs_are_a_motion_too(tmp_path):
 def test_poses_on_the_device_are_as_good_as_numpys():
     motion = motion_from_poses(BODY, jnp.zeros((2, BODY.skeleton.num_dofs)), 25.0)
     assert isinstance(motion, Motion)
-    assert all(isinstance(value, np.ndarray | float | str) for value in vars(motion).values())
+    known = {name: value for name, value in vars(motion).items() if value is not None}
+    assert all(isinstance(value, np.ndarray | float | str) for value in known.values())
+    assert vars(motion).keys() - known.keys() == {"pose_std", "joint_std"}
+
+
+def test_standard_deviations_are_kept_and_files_without_them_are_read(tmp_path):
+    plain = motion_from_poses(BODY, np.zeros((3, BODY.skeleton.num_dofs)), 25.0)
+    assert "pose_std" not in np.load(_saved(tmp_path / "plain.npz", plain))
+    assert load_motion(tmp_path / "plain.npz").joint_std is None
+    deviations = np.linspace(0.0, 1.0, 3 * BODY.skeleton.num_dofs).reshape(3, -1)
+    sure = replace(plain, pose_std=deviations)
+    np.testing.assert_array_equal(load_motion(_saved(tmp_path / "sure.npz", sure)).pose_std, deviations)
+    arrays = dict(np.load(tmp_path / "sure.npz"))
+    np.savez(tmp_path / "wrong.npz", **arrays | {"pose_std": deviations[:, 1:]})
+    with pytest.raises(InputError, match="'pose_std' has the shape"):
+        load_motion(tmp_path / "wrong.npz")
+
+
+def _saved(path, motion):
+    save_motion(path, motion)
+    return path
 
 
 def with_nan(values):

@@ -8,17 +8,28 @@ from motion_cases import walking_motion
 
 from sogjax.data.array_log import ROWS
 from sogjax.data.motion import Motion, load_motion, save_motion
-from sogjax.data.motion_log import PER_FRAME, MotionLog
+from sogjax.data.motion_log import PER_FRAME, SOMETIMES_PER_FRAME, MotionLog
 from sogjax.errors import InputError
 
 
 def part(motion, frames):
-    return replace(motion, **{name: getattr(motion, name)[frames] for name in PER_FRAME})
+    rows = [name for name in (*PER_FRAME, *SOMETIMES_PER_FRAME) if getattr(motion, name) is not None]
+    return replace(motion, **{name: getattr(motion, name)[frames] for name in rows})
 
 
 def assert_same(one, other):
     for entry in fields(Motion):
         np.testing.assert_array_equal(getattr(one, entry.name), getattr(other, entry.name), entry.name)
+
+
+def test_standard_deviations_grow_with_the_motion(tmp_path):
+    motion = walking_motion(6)
+    motion = replace(motion, pose_std=0.1 + motion.pose**2, joint_std=np.abs(motion.pose))
+    log = MotionLog(tmp_path / "motion.partial")
+    for first, stop in ((0, 4), (4, 6)):
+        log.append(part(motion, slice(first, stop)))
+    assert_same(log.motion(mapped=False), motion)
+    log.remove()
 
 
 def test_every_prefix_can_be_read_while_the_log_is_open(tmp_path):

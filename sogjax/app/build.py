@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, UInt8
 
-from sogjax.app.configs import ColorConfig, EnergyConfig, ImagesConfig, SolverConfig, TrackConfig
+from sogjax.app.configs import ColorConfig, EnergyConfig, ImagesConfig, OutputsConfig, SolverConfig, TrackConfig
 from sogjax.data.recording import Recording
 from sogjax.data.video import read_still
 from sogjax.energy.objective import EnergyWeights, whole_image_overlap
@@ -21,6 +21,7 @@ from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.color import COLOR_RADIUS, averaging_space, from_rgb
 from sogjax.solve import ConditionedAscent, GaussNewton, OptimistixSolver, Scales, Solver
+from sogjax.track.confidence import Laplace
 from sogjax.track.culling import ImageReader
 from sogjax.track.scales import pose_scales
 from sogjax.track.tracker import PairChoice, Tracker
@@ -82,6 +83,7 @@ def check(config: TrackConfig) -> None:
         raise InputError(f"images.color_tolerance={config.images.color_tolerance}: must be a number")
     at_least("images.box_enlargement", config.images.box_enlargement, 0.0)
     at_least("images.plate_tolerance", config.images.plate_tolerance, 0.0)
+    confidence(config.outputs)
     at_least("outputs.overlay_width", config.outputs.overlay_width, 64)
 
 
@@ -187,7 +189,13 @@ def tracker(recording: Recording, body: Body, grids: tuple[CellGrid, ...], confi
         scales=solver_scales(config.solver, body),
         extrapolation=config.tracking.extrapolation,
         pairs=pair_choice(config.energy),
+        confidence=confidence(config.outputs),
     )
+
+
+def confidence(config: OutputsConfig) -> Laplace | None:
+    """How standard deviations are found; None: they are not wanted."""
+    return Laplace(at_least("outputs.temperature", config.temperature, 1e-12)) if config.confidence else None
 
 
 def varied(tracker: Tracker, config: TrackConfig) -> Tracker:
@@ -207,6 +215,7 @@ def varied(tracker: Tracker, config: TrackConfig) -> Tracker:
         scales=solver_scales(config.solver, tracker.body),
         extrapolation=config.tracking.extrapolation,
         pairs=pair_choice(config.energy),
+        confidence=confidence(config.outputs),
     )
 
 

@@ -91,6 +91,11 @@ class OutputsConfig:
     rerun_images: bool = option(True, "put the pictures into motion.rrd")
     bvh: bool = option(True, "motion.bvh")
     formats: list[str] | None = option(None, "further formats of the motion, some of [trc,c3d,glb,csv]; null: none")
+    confidence: bool = option(True, "standard deviations of the pose and the joints, in motion.npz")
+    temperature: float = option(
+        1e-4,
+        "energy that counts as one unit of log-likelihood, for the standard deviations; by experiments/confidence.py",
+    )
 
 
 @dataclass
@@ -133,6 +138,17 @@ class ActorConfig:
     overwrite: bool = option(False, OVERWRITE)
     color: ColorConfig = group(ColorConfig, "")
     energy: EnergyConfig = group(EnergyConfig, "")
+
+
+@dataclass
+class BodyConfig:
+    """Make a body file from the skeleton of another program."""
+
+    from_: str = option(MISSING, "skeleton: a .skeleton of Skeletool, or a .bvh, of which the hierarchy is read")
+    out: str = option(MISSING, "body file to write; for body= of the other commands, or to be edited first")
+    dof: str | None = option(None, "a .dof of Skeletool, whose degrees of freedom replace those of the .skeleton")
+    unit: str | None = option(None, "m | cm | mm: the file's lengths; null: mm of a .skeleton, m of a .bvh")
+    up: str = option("y", "vertical of the file's rest pose: x y z -x -y -z")
 
 
 @dataclass
@@ -219,13 +235,22 @@ class ViewConfig:
 class ExportConfig:
     """Write a motion, or a calibration, in another format."""
 
-    motion: str | None = option(None, "motion.npz")
+    motion: str | None = option(None, "motion.npz, or a .motion of Skeletool")
     calibration: str | None = option(None, "calibration file, or the folder of a recording; instead of a motion")
     to: str = option(
-        MISSING, "file to write; its ending says the format: .bvh .npz; of a calibration: .toml .calibration"
+        MISSING,
+        "file to write; its ending says the format: .bvh .trc .c3d .glb .csv .motion .npz; "
+        "of a calibration: .toml .calibration",
     )
-    up: str = option("z", "vertical of the motion's world: x y z -x -y -z")
+    up: str | None = option(None, "vertical of the motion's world: x y z -x -y -z; null: what the motion says")
+    actor: str | None = option(None, "actor or body file of the motion; only a .motion needs it, read or written")
+    fps: float | None = option(None, "frames per second; only a .motion that is read needs it")
     overwrite: bool = option(False, OVERWRITE)
+
+
+def option_key(name: str) -> str:
+    """The key of a field on the command line: Python's own words stand in the schemas with a line after them."""
+    return name.removesuffix("_")
 
 
 def help_lines(schema: type, prefix: str = "") -> list[tuple[str, str, str]]:
@@ -238,5 +263,5 @@ def help_lines(schema: type, prefix: str = "") -> list[tuple[str, str, str]]:
             lines += help_lines(type(default), f"{prefix}{entry.name}.")
         else:
             shown = "required" if default == MISSING else "null" if default is None else str(default)
-            lines.append((prefix + entry.name, shown, entry.metadata["help"]))
+            lines.append((prefix + option_key(entry.name), shown, entry.metadata["help"]))
     return lines

@@ -20,7 +20,8 @@ from sogjax.app.outputs import export_endings, results_folder, write_results
 from sogjax.app.pipeline import Picture, PictureReader, Preparation
 from sogjax.app.recordings import actors_of, opened, say
 from sogjax.app.run_folder import run_folder
-from sogjax.app.sweep import row_numbers, table
+from sogjax.app.sweep import row_numbers
+from sogjax.app.sweep_results import Member, finish_sweep
 from sogjax.app.track import Job, Run, doing, frame_range
 from sogjax.data.cell_cache import CellsOfClip
 from sogjax.data.recording import Recording
@@ -43,8 +44,6 @@ def run_grid(members: Sequence[Sequence[str]]) -> int:
     Raises:
         InputError: anything wrong with the recording, the actors or a config, or a setting that cannot be swept so.
     """
-    from sogjax.app.sweep_callback import differing
-
     configs = [composed("track", list(overrides)) for overrides in members]
     for config in configs:
         build.check(config)
@@ -63,9 +62,9 @@ def run_grid(members: Sequence[Sequence[str]]) -> int:
             write_results(
                 run, folder / str(number), config.outputs, OmegaConf.structured(config), bodies if made else []
             )
-            rows.append(row_numbers(run))
-    print(table(list(zip(differing(members), rows, strict=True))))
-    print(f"\n{folder}")
+            rows.append(Member(list(members[number]), row_numbers(run)))
+        finish_sweep(folder, rows)
+    print(folder)
     return 0
 
 

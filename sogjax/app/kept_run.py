@@ -23,12 +23,14 @@ from sogjax.energy.objective import EnergyTerms
 from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.model.sog import Sog
+from sogjax.track.confidence import Deviations
 from sogjax.track.culling import Capacities
 from sogjax.track.tracker import FrameResult, TrackedFrame, TrackState
 
 FOLDER = "run.partial"
 NOTE, START, ACTOR = "run.json", "start.npz", "actor"
 TERMS = ("similarity", "limit_penalty", "acceleration_penalty", "energy")
+DEVIATIONS = {"pose_std": "pose", "joint_std": "joints"}
 COLUMNS = ("pose", "iterations", "evaluations", "converged", "num_near", "num_matching", "num_blocks")
 CAPACITY, CAPACITIES = "capacity_{}", ("near", "matching", "blocks")
 
@@ -60,8 +62,10 @@ class Prefix:
     def result(self, frame: int, images: Sog) -> FrameResult:
         """What was found in one of them; image blobs are not kept."""
         values = {name: jnp.asarray(column[frame]) for name, column in self.rows.items()}
+        sure = {name: values[key] for key, name in DEVIATIONS.items() if key in values}
         return FrameResult(
             terms=EnergyTerms(**{name: values[name] for name in TERMS}),
+            deviations=Deviations(**sure) if sure else None,
             images=images,
             **{name: values[name] for name in COLUMNS},
         )
@@ -136,7 +140,7 @@ class KeptRun:
         if rows is None or not count:
             return None
         self.num_kept = count
-        return Prefix({name: rows[name][:count] for name in (*COLUMNS, *TERMS, *map(CAPACITY.format, CAPACITIES))})
+        return Prefix({name: column[:count] for name, column in rows.items()})
 
     def append(self, frames: Sequence[TrackedFrame]) -> None:
         """Keep what was found in the frames that follow."""
@@ -176,8 +180,10 @@ def _rows(frames: Sequence[TrackedFrame]) -> dict[str, np.ndarray]:
     results, terms = [frame.result for frame in frames], [frame.result.terms for frame in frames]
     column = lambda parts, name: np.stack([np.asarray(getattr(part, name)) for part in parts])
     capacity = lambda name: np.array([getattr(frame.capacities, name) for frame in frames])
+    sure = [result.deviations for result in results if result.deviations is not None]
     return (
         {name: column(results, name) for name in COLUMNS}
+        | {key: column(sure, name) for key, name in DEVIATIONS.items() if sure}
         | {name: column(terms, name) for name in TERMS}
         | {CAPACITY.format(name): capacity(name) for name in CAPACITIES}
     )

@@ -37,6 +37,8 @@ def made_from(recording: Recording, config: TrackConfig, given_actors: Sequence[
         "device": jax.default_backend(),
         "precision": str(jnp.asarray(0.0).dtype),
         **_settings(config, ""),
+        "outputs.confidence": config.outputs.confidence,
+        "outputs.temperature": config.outputs.temperature,
         **_of_recording(recording),
         "the actors": None if given_actors is None else [digest(actor) for actor in given_actors],
         "the rough pose": None if poses is None else hashlib.sha256(poses.read_bytes()).hexdigest(),

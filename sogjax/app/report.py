@@ -13,10 +13,11 @@ from omegaconf import OmegaConf
 
 from sogjax import __version__
 from sogjax.app.composition import composed
-from sogjax.app.configs import ReportConfig
+from sogjax.app.configs import OutputsConfig, ReportConfig
 from sogjax.app.outputs import results_folder
 from sogjax.app.recordings import say
 from sogjax.app.script import machine_line
+from sogjax.app.study.calibration import kept_said_and_found
 from sogjax.app.study.document import Picture, Section, write_html, write_markdown
 from sogjax.app.study.experiment import Experiment, experiment_names
 from sogjax.app.study.pictures import experiment_chart, worst_frame
@@ -27,8 +28,11 @@ from sogjax.app.study.summary import RowSummary
 from sogjax.app.study.table import findings, markdown_table, recordings_table
 from sogjax.data.atomic import atomic_path
 from sogjax.errors import InputError
+from sogjax.view.charts import calibration_chart
 
 TITLE = "Section 6 again"
+CONFIDENCE = "confidence"
+"""Beside the experiments of `conf/experiment/`: standard deviations against true errors."""
 PACKAGES = ("sogjax", "jax", "jaxlib", "optimistix", "equinox", "numpy", "opencv-python-headless", "matplotlib")
 
 
@@ -48,13 +52,15 @@ def run(config: ReportConfig) -> list[Path]:
     Raises:
         InputError: an experiment or recording that is not there, or a folder that cannot be written.
     """
-    experiments = [Experiment.named(name) for name in config.only or experiment_names()]
+    names = config.only or [*experiment_names(), CONFIDENCE]
+    experiments = [Experiment.named(name) for name in names if name != CONFIDENCE]
     _check_matplotlib()
     with results_folder(Path(config.out)) as out:
         study = Study(out, config.recordings, config.frames, config.overrides)
         begin = time.perf_counter()
         done: list[Done] = []
         sections = [_experiment_section(experiment, study, done) for experiment in experiments]
+        sections += [confidence_section(study)] if CONFIDENCE in names else []
         say(f"runs done or read in {time.perf_counter() - begin:.0f} s")
         sections = [_about(config, done), *sections, _worst(done, config.pictures), _versions(config)]
         write_html(out / "report.html", TITLE, sections)
@@ -85,6 +91,41 @@ def _parts(experiment: Experiment, rows: Sequence[RowSummary]) -> list[str]:
         *(["\n".join(f"- {line}" for line in said)] if said else []),
         *([config.remark] if config.remark else []),
     ]
+
+
+def confidence_section(study: Study) -> Section:
+    """Whether the standard deviations of the joints are right.
+
+    Raises:
+        InputError: a recording that is not there.
+    """
+    temperature = OutputsConfig().temperature
+    results = {
+        source.name: kept_said_and_found(source, temperature, study.overrides)
+        for source in map(study.source, study.recordings)
+    }
+    lines = ["| recording | found / said | below 1 deviation | below 2 | rank correlation |", "|---|---|---|---|---|"]
+    for name, result in results.items():
+        ratio = result.mean_square_ratio**0.5
+        lines.append(
+            f"| {name} | {ratio:.2f} | {result.within(1.0):.0%} | {result.within(2.0):.0%} "
+            f"| {result.rank_correlation:.2f} |"
+        )
+    bins = {name: result.binned() for name, result in results.items()}
+    said, found = ({name: pair[k] for name, pair in bins.items()} for k in (0, 1))
+    chart = calibration_chart(said, found, "Standard deviations of joints")
+    return Section(
+        "Confidence",
+        [
+            "Are the standard deviations of the joints right? (`python experiments/confidence.py`) They follow from "
+            f"the curvature of the energy with one temperature, `outputs.temperature={temperature:g}`, calibrated on "
+            "walk:0. Compared are joints of all frames, without each joint's mean offset in its own frame, which "
+            "belongs to the actor. 68 % and 95 % would be expected of a single coordinate, 61 % and 99 % of a distance "
+            "in space whose three coordinates are alike.",
+            "\n".join(lines),
+        ],
+        [Picture("confidence.png", chart, "What was said and what was found, in eight bins each")],
+    )
 
 
 def _about(config: ReportConfig, done: Sequence[Done]) -> Section:

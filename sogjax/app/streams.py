@@ -11,6 +11,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from sogjax.app.configs import OutputsConfig
 from sogjax.app.kept_run import KeptRun
@@ -24,8 +25,9 @@ from sogjax.data.motion_log import MotionLog
 from sogjax.data.recording import Recording
 from sogjax.errors import InputError
 from sogjax.images.cells import CellGrid
-from sogjax.model.body import Body, dof_slices
+from sogjax.model.body import Body, dof_slices, joint_slices
 from sogjax.model.color import to_rgb
+from sogjax.track.tracker import FrameResult
 
 PARTIAL = ".partial"
 """Ending of the folder with a motion that is not complete."""
@@ -177,6 +179,7 @@ class Streams:
         """One motion an actor; similarity, energy and iterations are those of all actors together."""
         results = [done.tracked.result for done in block]
         poses = np.stack([np.asarray(result.pose) for result in results])
+        pose_std, joint_std = deviations_of(results)
         return {
             body.name: motion_from_poses(
                 body,
@@ -188,8 +191,12 @@ class Streams:
                 iterations=np.array([result.iterations for result in results], int),
                 converged=np.array([result.converged for result in results], bool),
                 up=self._recording.up,
+                pose_std=None if pose_std is None else pose_std[:, part],
+                joint_std=None if joint_std is None else joint_std[:, joints],
             )
-            for body, part in zip(self._bodies, dof_slices(self._bodies), strict=True)
+            for body, part, joints in zip(
+                self._bodies, dof_slices(self._bodies), joint_slices(self._bodies), strict=True
+            )
         }
 
     def _write_rerun(self, block: list[FrameDone], motions: list[Motion], first: int) -> None:
@@ -201,6 +208,16 @@ class Streams:
         self._rerun.write(motions, penalties)
         for frame, done in enumerate(block, first):
             self._rerun.write_pictures(frame, _jpegs(done.pictures), image_blobs(done))
+
+
+def deviations_of(
+    results: Sequence[FrameResult],
+) -> tuple[Float[np.ndarray, "frame dof"] | None, Float[np.ndarray, "frame joint"] | None]:
+    """The standard deviations of all actors' poses and joints, where they were computed."""
+    parts = [result.deviations for result in results if result.deviations is not None]
+    if not parts:
+        return None, None
+    return np.stack([np.asarray(part.pose) for part in parts]), np.stack([np.asarray(part.joints) for part in parts])
 
 
 def _jpegs(pictures: list[Picture]) -> list[Any]:

@@ -1,5 +1,6 @@
 """Sweeps: `-m` runs every combination of the overrides and ends with a table."""
 
+import logging
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -7,9 +8,11 @@ from typing import Any
 
 from sogjax.app.composition import SCHEMAS, composed, conf_dir, register_schemas, to_object
 from sogjax.app.overrides import plain_sentence, ready_for_hydra
+from sogjax.app.sweep_results import COLUMNS, Failure, Numbers
 from sogjax.errors import InputError
 
-COLUMNS = ("mean mm", "std mm", "joints mm", "lost", "swaps", "iterations", "not converged", "frames/s")
+LOG = logging.getLogger(__name__)
+
 CHECKED_MEMBERS = 100
 """Members of a sweep that are looked at before it begins."""
 VMAPPED = "sweep=vmapped"
@@ -91,9 +94,14 @@ def run_hydra(task: Callable[[Any], Any]) -> int:
         InputError: an override that cannot be; or the only run has wrong input.
     """
     import hydra
+    from hydra.core.hydra_config import HydraConfig
     from hydra.errors import HydraException
+    from hydra.types import RunMode
     from omegaconf.errors import OmegaConfBaseException
 
+    from sogjax.app.sweep_callback import failures
+
+    failures.clear()
     register_schemas()
     wrong: list[str] = []
 
@@ -102,7 +110,13 @@ def run_hydra(task: Callable[[Any], Any]) -> int:
             return task(tree)
         except InputError as error:
             wrong.append(str(error))
-            return str(error)
+            return Failure(error)
+        except Exception as error:
+            if HydraConfig.get().mode != RunMode.MULTIRUN:
+                raise
+            LOG.exception("a member of the sweep failed")
+            wrong.append(f"{type(error).__name__}: {error}")
+            return Failure(wrong[-1])
 
     before = os.environ.get("HYDRA_FULL_ERROR")
     os.environ["HYDRA_FULL_ERROR"] = "1"  # errors come here instead of being printed with a traceback
@@ -115,12 +129,13 @@ def run_hydra(task: Callable[[Any], Any]) -> int:
             del os.environ["HYDRA_FULL_ERROR"]
         else:
             os.environ["HYDRA_FULL_ERROR"] = before
+    wrong = failures or wrong
     if wrong:
         raise InputError(wrong[0] if len(wrong) == 1 else f"{len(wrong)} runs failed; the first: {wrong[0]}")
     return 0
 
 
-def track_task(tree: Any) -> dict[str, float]:
+def track_task(tree: Any) -> Numbers:
     """One member of a sweep: track into the member's own folder; the numbers of its row."""
     from hydra.core.hydra_config import HydraConfig
     from hydra.types import RunMode
@@ -133,11 +148,11 @@ def track_task(tree: Any) -> dict[str, float]:
     return row_numbers(track.run(config))
 
 
-def row_numbers(result: Any) -> dict[str, float]:
+def row_numbers(result: Any) -> Numbers:
     """What a sweep's table shows of one run."""
     import numpy as np
 
-    numbers: dict[str, float] = dict.fromkeys(COLUMNS, float("nan"))
+    numbers = Numbers.fromkeys(COLUMNS, float("nan"))
     if result.evaluation is not None:
         summary = result.evaluation.summary
         numbers["mean mm"], numbers["std mm"] = 1000.0 * summary.mean, 1000.0 * summary.std
@@ -150,15 +165,3 @@ def row_numbers(result: Any) -> dict[str, float]:
     numbers["not converged"] = int(np.sum(~result.converged))
     numbers["frames/s"] = result.times.frames_per_second("step")
     return numbers
-
-
-def table(rows: Sequence[tuple[str, dict[str, float] | str]]) -> str:
-    """A plain-text table: what was set, and what came of it."""
-    width = max(len("settings"), *(len(name) for name, _ in rows)) if rows else 8
-    lines = [f"{'settings':<{width}}" + "".join(f"{column:>14}" for column in COLUMNS)]
-    for name, numbers in rows:
-        if isinstance(numbers, str):
-            lines.append(f"{name:<{width}}   failed: {numbers}")
-        else:
-            lines.append(f"{name:<{width}}" + "".join(f"{numbers[column]:>14.2f}" for column in COLUMNS))
-    return "\n".join(lines)

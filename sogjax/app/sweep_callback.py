@@ -1,35 +1,37 @@
 """Hydra callback that gathers the members of a sweep and prints their table at the end."""
 
-from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from hydra.core.utils import JobReturn, JobStatus
 from hydra.experimental.callback import Callback
+from hydra.types import RunMode
 
-from sogjax.app.sweep import table
+from sogjax.app.sweep_results import Failure, Member, finish_sweep, forget_results, keep_result, kept_results
+
+failures: list[str] = []
+"""Why members of the last sweep of this process failed, whatever process they ran in."""
 
 
 class SweepTable(Callback):
-    """One row for each member: what was overridden, and the numbers that the task returned."""
+    """Each member leaves a file in its folder, whichever process it runs in; the table is made of these."""
 
-    def __init__(self) -> None:
-        self.rows: list[tuple[list[str], dict[str, float] | str]] = []
+    def on_multirun_start(self, config: Any, **kwargs: Any) -> None:
+        """Forget what an earlier sweep left in the same folder."""
+        failures.clear()
+        forget_results(Path(config.hydra.sweep.dir))
 
     def on_job_end(self, config: Any, job_return: JobReturn, **kwargs: Any) -> None:
         """Keep the row of a member that ended."""
-        overrides = list(job_return.overrides or [])
-        if job_return.status == JobStatus.COMPLETED:
-            self.rows.append((overrides, job_return.return_value))
-        else:
-            self.rows.append((overrides, str(job_return._return_value)))
+        if config.hydra.mode != RunMode.MULTIRUN:
+            return
+        completed = job_return.status == JobStatus.COMPLETED
+        result = job_return.return_value if completed else Failure(job_return._return_value)
+        keep_result(Path(config.hydra.runtime.output_dir), Member(list(job_return.overrides or []), result))
 
     def on_multirun_end(self, config: Any, **kwargs: Any) -> None:
-        """Print the table."""
-        names = differing([overrides for overrides, _ in self.rows])
-        print(table([(name, numbers) for name, (_, numbers) in zip(names, self.rows, strict=True)]))
-
-
-def differing(members: Sequence[Sequence[str]]) -> list[str]:
-    """What tells the members of a sweep apart: the overrides that not all of them have."""
-    common = set.intersection(*(set(overrides) for overrides in members)) if members else set()
-    return [" ".join(text for text in overrides if text not in common) or "as configured" for overrides in members]
+        """Print the table; write the CSV and the plot."""
+        sweep = Path(config.hydra.sweep.dir)
+        members = kept_results(sweep)
+        failures.extend(member.result for member in members if isinstance(member.result, str))
+        finish_sweep(sweep, members)

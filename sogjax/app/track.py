@@ -27,8 +27,8 @@ from sogjax.app.resumed import resumed
 from sogjax.app.run_folder import RunFolder, run_folder
 from sogjax.app.streams import Streams, readable_frames
 from sogjax.app.timing import StageTimes
-from sogjax.data.motion import Motion, load_motion
-from sogjax.data.motion_log import PER_FRAME
+from sogjax.data.motion import Motion, arrays_of, load_motion
+from sogjax.data.motion_log import PER_FRAME, SOMETIMES_PER_FRAME
 from sogjax.data.recording import Recording
 from sogjax.data.stages import Behind
 from sogjax.errors import InputError
@@ -39,6 +39,7 @@ from sogjax.track.tracker import Tracker, compile_counts, track
 
 FRAMES_BEHIND = 8
 """Tracked frames that wait to be written."""
+_ROWS = (*PER_FRAME, *SOMETIMES_PER_FRAME)
 
 
 @dataclass
@@ -127,7 +128,7 @@ def track_recording(recording: Recording, bodies: list[Body], config: TrackConfi
     nothing = OutputsConfig(overlay=False, rerun=False, bvh=False)
     with TemporaryDirectory() as folder, tracking(recording, bodies, config, nothing, Path(folder)) as result:
         motions = {
-            name: replace(motion, **{key: np.array(getattr(motion, key)) for key in PER_FRAME})
+            name: replace(motion, **{key: np.array(rows) for key, rows in arrays_of(motion).items() if key in _ROWS})
             for name, motion in result.motions.items()
         }
         return replace(result, motions=motions)

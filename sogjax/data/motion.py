@@ -58,6 +58,10 @@ class Motion:
     converged: Bool[np.ndarray, "frame"]
     up: str = DEFAULT_UP
     """The world's vertical, one of `sogjax.model.frames.UP_AXES`."""
+    pose_std: Float[np.ndarray, "frame dof"] | None = None
+    """Standard deviation of each degree of freedom; None where it was not computed, as in `joint_std`."""
+    joint_std: Float[np.ndarray, "frame joint"] | None = None
+    """Root of the mean squared distance that each joint may be off, metres."""
 
     @property
     def num_frames(self) -> int:
@@ -76,6 +80,8 @@ def motion_from_poses(
     iterations: Int[np.ndarray, "frame"] | None = None,
     converged: Bool[np.ndarray, "frame"] | None = None,
     up: str = DEFAULT_UP,
+    pose_std: Float[np.ndarray, "frame dof"] | None = None,
+    joint_std: Float[np.ndarray, "frame joint"] | None = None,
 ) -> Motion:
     """The motion of `body`, which stands upright in a world with the vertical `up`, through `poses`.
 
@@ -107,15 +113,23 @@ def motion_from_poses(
         iterations=np.zeros(count, int) if iterations is None else iterations,
         converged=np.ones(count, bool) if converged is None else converged,
         up=up,
+        pose_std=pose_std,
+        joint_std=joint_std,
     )
 
 
 def save_motion(path: Path, motion: Motion) -> None:
     """Write `motion.npz`."""
-    arrays = {entry.name: np.asarray(getattr(motion, entry.name)) for entry in fields(motion)}
+    arrays = arrays_of(motion)
     arrays["format_version"] = np.array(FORMAT_VERSION)
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **arrays)  # pyright: ignore[reportArgumentType]
+
+
+def arrays_of(motion: Motion) -> dict[str, np.ndarray]:
+    """The fields of a motion by name, without those that it does not have."""
+    values = {entry.name: getattr(motion, entry.name) for entry in fields(motion)}
+    return {name: np.asarray(value) for name, value in values.items() if value is not None}
 
 
 def load_motion(path: Path) -> Motion:
@@ -164,9 +178,18 @@ def checked_motion(path: Path, arrays: dict[str, np.ndarray]) -> Motion:
         iterations=int_array(path, arrays, "iterations", (frames,)),
         converged=bool_array(path, arrays, "converged", (frames,)),
         up=str(text_array(path, arrays, "up", ())) if "up" in arrays else DEFAULT_UP,
+        pose_std=_if_there(path, arrays, "pose_std", (frames, len(dof_names))),
+        joint_std=_if_there(path, arrays, "joint_std", (frames, joints)),
     )
     _check(path, motion)
     return motion
+
+
+def _if_there(
+    path: Path, arrays: dict[str, np.ndarray], key: str, shape: tuple[int | None, ...]
+) -> Float[np.ndarray, "..."] | None:
+    """An array that a file need not have."""
+    return finite_array(path, arrays, key, shape) if key in arrays else None
 
 
 def _forward_in_blocks(

@@ -1,13 +1,12 @@
 """A motion that goes to disk while it is found."""
 
 import shutil
-from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 
 from sogjax.data.array_log import ArrayLog, read_log
-from sogjax.data.motion import FORMAT_VERSION, Motion
+from sogjax.data.motion import FORMAT_VERSION, Motion, arrays_of
 
 PER_FRAME = (
     "frame",
@@ -22,6 +21,8 @@ PER_FRAME = (
     "converged",
 )
 """The fields of a `Motion` that have a row for each frame."""
+SOMETIMES_PER_FRAME = ("pose_std", "joint_std")
+"""Further ones, which a motion need not have."""
 
 
 class MotionLog:
@@ -42,8 +43,8 @@ class MotionLog:
 
     def append(self, motion: Motion) -> None:
         """Write the frames that follow; the folder is made with the first ones."""
-        arrays = {entry.name: np.asarray(getattr(motion, entry.name)) for entry in fields(motion)}
-        rows = {name: arrays.pop(name) for name in PER_FRAME}
+        arrays = arrays_of(motion)
+        rows = {name: arrays.pop(name) for name in (*PER_FRAME, *SOMETIMES_PER_FRAME) if name in arrays}
         if self._log is None:
             constant = arrays | {"format_version": np.array(FORMAT_VERSION)}
             self._log = ArrayLog(self.folder, constant, rows, self._kept)
@@ -55,7 +56,8 @@ class MotionLog:
         arrays = read_log(self.folder, mapped)
         arrays["fps"] = float(arrays["fps"])  # pyright: ignore[reportArgumentType]
         arrays["up"] = str(arrays["up"])  # pyright: ignore[reportArgumentType]
-        return Motion(**{entry.name: arrays[entry.name] for entry in fields(Motion)})  # pyright: ignore[reportArgumentType]
+        arrays.pop("format_version")
+        return Motion(**arrays)  # pyright: ignore[reportArgumentType]
 
     def close(self) -> None:
         """Close the file; the folder stays."""

@@ -143,6 +143,11 @@ def dof_slices(bodies: Sequence[Body]) -> list[slice]:
     return _slices([body.skeleton.num_dofs for body in bodies])
 
 
+def joint_slices(bodies: Sequence[Body]) -> list[slice]:
+    """Where each body's joints lie in the concatenated model."""
+    return _slices([body.skeleton.num_joints for body in bodies])
+
+
 def _slices(counts: Sequence[int]) -> list[slice]:
     ends = np.cumsum(counts)
     return [slice(int(end) - count, int(end)) for end, count in zip(ends, counts, strict=True)]

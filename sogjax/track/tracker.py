@@ -20,6 +20,7 @@ from sogjax.model.color import from_rgb
 from sogjax.model.sog import Sog
 from sogjax.model.stages import computed_once
 from sogjax.solve import Scales, Solution, Solver
+from sogjax.track.confidence import Deviations, Laplace
 from sogjax.track.culling import (
     CAPACITIES,
     Capacities,
@@ -72,6 +73,8 @@ class FrameResult(eqx.Module):
     num_matching: Int[Array, "camera"]
     num_blocks: Int[Array, ""]
     """Blocks of near pairs; 0 where all pairs were compared."""
+    deviations: Deviations | None
+    """How sure the pose is; None: it was not asked for."""
     images: Sog
     """The image blobs that were used, for each camera (working colour space)."""
 
@@ -90,6 +93,8 @@ class Tracker(eqx.Module):
     """alpha of Section 5.3."""
     pairs: PairChoice = eqx.field(static=True, default="dense")
     """Whether all pairs of blobs are compared, or those near each other."""
+    confidence: Laplace | None = None
+    """How standard deviations are found; None: they are not."""
     together: str | None = eqx.field(static=True, default=None)
     """Name of a mapped axis whose trackers look into common boxes, so that what they see is computed once."""
 
@@ -154,6 +159,7 @@ class Tracker(eqx.Module):
         history = History(state.previous, state.before_previous, state.num_known == 2)
         objective = FrameEnergy(self.body, views, history, self.weights)
         solution, num_blocks = self._solved(objective, self.predicted(state), capacities)
+        deviations, num_blocks = self._deviations(objective, solution.params, capacities, num_blocks)
         result = FrameResult(
             pose=solution.params,
             terms=terms_of_energy(self.body, solution.params, solution.value, history, self.weights),
@@ -163,6 +169,7 @@ class Tracker(eqx.Module):
             num_near=num_near,
             num_matching=num_matching,
             num_blocks=num_blocks,
+            deviations=deviations,
             images=views.images,
         )
         return state.advanced(solution.params), result
@@ -173,6 +180,19 @@ class Tracker(eqx.Module):
         if self.pairs == "sparse":
             return solve_near(self.solver, objective, start, self.scales, capacities.blocks)
         return self.solver.maximize(objective, start, self.scales), jnp.asarray(0)
+
+    def _deviations(
+        self, objective: FrameEnergy, pose: Float[Array, "dof"], capacities: Capacities, num_blocks: Int[Array, ""]
+    ) -> tuple[Deviations | None, Int[Array, ""]]:
+        """How sure the pose is, from the pairs that are near there, and the most blocks of pairs so far."""
+        if self.confidence is None:
+            return None, num_blocks
+        if self.pairs == "sparse":
+            views, count = objective.views.near(self.body.posed_blobs(pose), self.weights, capacities.blocks)
+            objective = eqx.tree_at(lambda o: o.views, objective, views)
+            num_blocks = jnp.maximum(num_blocks, count)
+        curvature = objective.quadratic(pose).curvature
+        return self.confidence.deviations(self.body.skeleton, curvature, pose), num_blocks
 
 
 _step = eqx.filter_jit(Tracker.step)

@@ -25,7 +25,7 @@ class RunPlan:
     recording: str
     """The study's name of the recording, which for a rendered one holds its settings."""
     frames: int
-    cameras: tuple[str, ...]
+    cameras: list[str]
     every: int
     measure: str
     config: dict[str, Any]
@@ -38,7 +38,7 @@ class RunPlan:
         """A plan for a track config."""
         kept = {key: value for key, value in asdict(config).items() if key in _OF_THE_RESULT}
         kept["images"].pop("cache")
-        return cls(recording, frames, cameras, every, measure, kept)
+        return cls(recording, frames, list(cameras), every, measure, kept)
 
     @property
     def key(self) -> str:

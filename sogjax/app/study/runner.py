@@ -37,7 +37,11 @@ def run_row(experiment: Experiment, row: str, source: Source, runs: RunFolder, c
         InputError: an override that cannot be; a recording without ground truth.
     """
     entry = experiment.config.rows[row]
-    words = [f"recording={quoted_value(str(source.path))}", *experiment.overrides(row, common)]
+    words = [
+        f"recording={quoted_value(str(source.path))}",
+        "outputs.confidence=false",
+        *experiment.overrides(row, common),
+    ]
     config: TrackConfig = composed("track", words)
     build.check(config)
     cameras = source.cameras(entry.cameras)

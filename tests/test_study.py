@@ -1,0 +1,167 @@
+"""Studies: their files, that a run is done once, what a summary says, and the documents."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import actor_file
+
+from sogjax.app.build import check
+from sogjax.app.composition import composed
+from sogjax.app.configs import TrackConfig
+from sogjax.app.study.document import Picture, Section, write_html, write_markdown
+from sogjax.app.study.experiment import Experiment, ExperimentConfig, RowConfig, experiment_names
+from sogjax.app.study.record import RunFolder, RunPlan, RunRecord
+from sogjax.app.study.source import Source
+from sogjax.app.study.study import Study
+from sogjax.app.study.summary import pooled_std, summarized
+from sogjax.app.study.table import difference_words, findings, markdown_table
+from sogjax.errors import InputError
+from sogjax.synth import SynthSettings, render_recording
+
+SCRIPTS = Path(__file__).resolve().parents[1] / "experiments"
+SMALL = ("images.depth=5", "solver.max_iterations=12")
+
+
+@pytest.mark.parametrize("name", experiment_names())
+def test_every_experiment_can_be_composed_and_has_its_script(name):
+    experiment = Experiment.named(name)
+    for row in experiment.config.rows:
+        check(composed("track", ["recording=x", *experiment.overrides(row)]))
+    assert f'study_main("{name}")' in (SCRIPTS / f"{name}.py").read_text()
+
+
+def experiment(**rows):
+    config = ExperimentConfig(title="T", question="Q?", axis="x", reference="a", rows=rows)
+    return Experiment("small", config)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("title: T\nquestion: Q\naxis: x\nrows: {a: {}}", "has no reference"),
+        ("title: T\nquestion: Q\naxis: x\nreference: b\nrows: {a: {}}", "'b' is no row"),
+        ("title: T\nquestion: Q\naxis: x\nreference: a\nrows: {a: {every: 0}}", "must be 1 or more"),
+        ("title: T\nquestion: Q\naxis: x\nreference: a\nrows: {a: {sets: []}}", "sets"),
+        ("title: T\nquestion: Q\naxis: x\nreference: a\nmeasure: luck\nrows: {a: {}}", "luck"),
+    ],
+)
+def test_a_wrong_experiment_file_is_refused(tmp_path, text, words):
+    (tmp_path / "e.yaml").write_text(text)
+    with pytest.raises(InputError, match=re.escape(words)):
+        Experiment.from_file(tmp_path / "e.yaml")
+
+
+def test_the_key_of_a_run_knows_its_numbers_and_not_its_outputs():
+    base = RunPlan.of("walk", 9, ("a",), 1, "accuracy", TrackConfig())
+    same = TrackConfig(out="elsewhere", recording="there")
+    same.images.cache = "cells"
+    assert RunPlan.of("walk", 9, ("a",), 1, "accuracy", same).key == base.key
+    other = TrackConfig()
+    other.energy.limit_weight = 2.0
+    keys = {replace(base, every=2).key, replace(base, frames=8).key, replace(base, cameras=["b"]).key}
+    assert len(keys | {base.key, RunPlan.of("walk", 9, ("a",), 1, "accuracy", other).key}) == 5
+
+
+def record(errors, frames=None, **more):
+    frames = list(range(len(errors))) if frames is None else frames
+    return RunRecord({}, "here", frame=frames, error_mm=list(errors), joint_error_mm=list(errors), **more)
+
+
+def test_differences_are_taken_in_the_frames_that_both_runs_have():
+    slow, fast = record([9.0, 1.0, 9.0, 1.0]), record([2.0, 2.0], frames=[1, 3])
+    rows = summarized({"a": {"r": slow}, "b": {"r": fast}}, "a", {"a": ("", None), "b": ("", None)})
+    assert rows[0].difference is None
+    assert rows[1].difference.mean == pytest.approx(1.0)
+    assert rows[1].difference.shows
+    assert difference_words(rows[1]) == "+1.0 (+1.0 to +1.0)"
+
+
+def test_a_difference_within_the_spread_does_not_show_and_a_clear_one_does():
+    rng = np.random.default_rng(0)
+    base = {f"r{k}": record(rng.normal(20.0, 4.0, 40)) for k in range(4)}
+    shaken = {name: record(run.errors + rng.normal(0.0, 4.0, 40)) for name, run in base.items()}
+    worse = {name: record(run.errors + 5.0) for name, run in base.items()}
+    papers = dict.fromkeys("abc", ("", None))
+    rows = summarized({"a": base, "b": shaken, "c": worse}, "a", papers)
+    said = findings(experiment(a=RowConfig(), b=RowConfig(), c=RowConfig()), rows)
+    assert "Differences to 'a' that show: c." in said
+    assert "Differences to 'a' that do not show: b." in said
+
+
+def test_the_standard_deviation_of_all_distances_is_that_of_the_parts_together():
+    rng = np.random.default_rng(1)
+    parts = [rng.normal(mean, 3.0, (30, 7)) for mean in (10.0, 25.0)]
+    runs = [record(part.mean(axis=1), std_mm=float(part.std())) for part in parts]
+    assert pooled_std(runs) == pytest.approx(np.concatenate(parts).std())
+
+
+def test_a_failed_run_is_a_row_that_says_so():
+    rows = summarized({"a": {"r": record([], failed="no such thing")}}, "a", {"a": ("44 mm", 44.0)})
+    text = markdown_table(experiment(a=RowConfig(paper="44 mm")), rows)
+    assert "failed, a: r: no such thing" in text
+    assert findings(experiment(a=RowConfig()), rows) == []
+
+
+@pytest.fixture(scope="module")
+def source_folder(tmp_path_factory):
+    """A rendered person in small pictures, and an actor of few joints for it."""
+    folder = tmp_path_factory.mktemp("study")
+    settings = SynthSettings(cameras=3, frames=4, width=96, height=72, example_poses=False, background=False)
+    render_recording(settings, folder / "person")
+    (folder / "person" / "initial_pose.yaml").write_text("pose: rest\nposition: [0.0, 0.0, 1.0]\nheading: 0.0\n")
+    (folder / "actors" / "person").mkdir(parents=True)
+    actor_file(folder / "actors" / "person" / "0_puppet.yaml")
+    return folder
+
+
+def test_a_run_is_done_once_and_resumed_after_that(source_folder, monkeypatch, capsys):
+    rows = {"a": RowConfig(set=list(SMALL)), "b": RowConfig(set=list(SMALL), cameras=2, every=2)}
+    study = Study(source_folder, [str(source_folder / "person")], 4)
+    first = {row: run for row, _, run in study.records(experiment(**rows))}
+    assert [run.frame for run in first.values()] == [[0, 1, 2, 3], [0, 2]]
+    assert len(first["b"].plan["cameras"]) == 2
+    assert all(np.isfinite(run.errors).all() for run in first.values())
+    monkeypatch.setattr(Source, "cells", None)
+    again = {row: run for row, _, run in Study(source_folder, study.recordings, 4).records(experiment(**rows))}
+    assert again == first
+    assert len(list((source_folder / "runs").glob("*.json"))) == 2
+
+
+def test_a_run_that_fails_is_kept_and_the_others_go_on(source_folder):
+    rows = {"a": RowConfig(set=[*SMALL, "images.use_plates=true"]), "b": RowConfig(set=list(SMALL))}
+    study = Study(source_folder, [str(source_folder / "person")], 4)
+    records = {row: run for row, _, run in study.records(experiment(**rows))}
+    assert "background/ has no picture" in records["a"].failed
+    assert records["b"].failed == ""
+
+
+def test_a_broken_record_is_made_again(tmp_path):
+    runs, plan = RunFolder(tmp_path), RunPlan.of("walk", 9, (), 1, "accuracy", TrackConfig())
+    runs.keep(plan, record([1.0, float("nan")]))
+    np.testing.assert_array_equal(runs.find(plan).errors, [1.0, np.nan])
+    (tmp_path / "runs" / f"{plan.key}.json").write_text("{")
+    assert runs.find(plan) is None
+
+
+def test_a_study_without_its_recording_says_what_it_takes(tmp_path):
+    with pytest.raises(InputError, match="MOTION:SEED"):
+        Study(tmp_path, ["walk:first"], 4).source("walk:first")
+
+
+def test_documents_hold_the_same_and_html_needs_nothing_beside_it(tmp_path):
+    picture = Picture("p.png", b"\x89PNG", "a <picture>")
+    table = "| a | b |\n|---|---|\n| 1 & 2 | `x` |\n\nfailed, a: why"
+    sections = [Section("One", ["Text with `code`.", table, "- first\n- second", "```\na: <b>\n```"], [picture])]
+    files = write_markdown(tmp_path / "report.md", "Title", sections)
+    assert [path.name for path in files] == ["report.md", "p.png"]
+    assert "![a <picture>](report/p.png)" in files[0].read_text()
+    write_html(tmp_path / "report.html", "Title", sections)
+    page = (tmp_path / "report.html").read_text()
+    assert "<td>1 &amp; 2</td><td><code>x</code></td>" in page
+    assert "<p>failed, a: why</p>" in page
+    assert "<li>second</li>" in page
+    assert "a: &lt;b&gt;" in page
+    assert not re.search(r'(src|href)="(?!data:|#)', page)
