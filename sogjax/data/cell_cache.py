@@ -93,7 +93,8 @@ class CellCache:
     def _made_from(self) -> dict[str, Any]:
         """All that cells depend on."""
         cameras = self.recording.rig.names
-        return {
+        gains = {camera: list(self.recording.color_gains[camera]) for camera in sorted(self.recording.color_gains)}
+        return ({"color_gains": gains} if gains else {}) | {
             "version": CELLS_VERSION,
             "depth": self.depth,
             "frame_offset": {camera: self.recording.frame_offset[camera] for camera in cameras},

@@ -2,12 +2,17 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from sogjax.data.calibration.rig import METRES_PER_UNIT
+from sogjax.data.color_gains import ColorGains
 from sogjax.data.file_names import objection
 from sogjax.data.initial_pose import InitialPose, parse_initial_pose
 from sogjax.data.yaml_entry import Entry, read_yaml
 from sogjax.model.frames import UP_AXES
+
+LARGEST_GAIN = 8.0
+"""Of a camera's colours; a larger one is taken for a mistake."""
 
 _KEYS = (
     "fps",
@@ -20,6 +25,7 @@ _KEYS = (
     "last_frame",
     "fewest_cameras",
     "missing",
+    "color_gains",
     "example_poses",
 )
 
@@ -48,7 +54,14 @@ class RecordingSettings:
     fewest_cameras: int | None = None
     missing: dict[str, tuple[tuple[int, int], ...]] = field(default_factory=dict)
     """By camera the first and last frame of each while in which its pictures are not to be used."""
+    color_gains: dict[str, ColorGains] = field(default_factory=dict)
+    """By camera."""
     example_poses: tuple[ExampleSettings, ...] | None = None
+
+    @property
+    def by_camera(self) -> dict[str, dict[str, Any]]:
+        """What is given for cameras by their names, by key."""
+        return {"frame_offset": {**self.frame_offset}, "missing": {**self.missing}, "color_gains": {**self.color_gains}}
 
 
 def read_recording_settings(path: Path) -> RecordingSettings:
@@ -71,6 +84,7 @@ def read_recording_settings(path: Path) -> RecordingSettings:
         last_frame=_whole(given["last_frame"]) if "last_frame" in given else None,
         fewest_cameras=_count(given["fewest_cameras"]) if "fewest_cameras" in given else None,
         missing=_missing(given["missing"]) if "missing" in given else {},
+        color_gains=_gains(given["color_gains"]) if "color_gains" in given else {},
         example_poses=_examples(given["example_poses"]) if "example_poses" in given else None,
     )
 
@@ -106,6 +120,18 @@ def _camera_names(entry: Entry) -> tuple[str, ...]:
 
 def _offsets(entry: Entry) -> dict[str, int]:
     return {camera: _whole(offset) for camera, offset in entry.mapping().items()}
+
+
+def _gains(entry: Entry) -> dict[str, ColorGains]:
+    return {camera: _three_gains(gains) for camera, gains in entry.mapping().items()}
+
+
+def _three_gains(entry: Entry) -> ColorGains:
+    expected = f"three factors of red, green and blue light between {1 / LARGEST_GAIN:g} and {LARGEST_GAIN:g}"
+    gains = tuple(item.number(expected) for item in entry.items())
+    if len(gains) != 3 or not all(1 / LARGEST_GAIN <= gain <= LARGEST_GAIN for gain in gains):
+        raise entry.error(expected)
+    return gains[0], gains[1], gains[2]
 
 
 def _count(entry: Entry) -> int:

@@ -135,9 +135,20 @@ def _rgb_from_cone(cone: Colors) -> Colors:
     return _rgb_from_hsv(_hsv_from_cylinder(jnp.concatenate([chroma, value], -1)))
 
 
+def linear_light(rgb: Colors) -> Colors:
+    """How much light an sRGB colour (0..1) stands for, 0..1 (IEC 61966-2-1)."""
+    return jnp.where(rgb <= 0.04045, rgb / 12.92, ((jnp.maximum(rgb, 0.04045) + 0.055) / 1.055) ** 2.4)
+
+
+def from_linear_light(linear: Colors) -> Colors:
+    """The sRGB colour that stands for so much light; the inverse of `linear_light`."""
+    gamma = 1.055 * jnp.maximum(linear, 0.0031308) ** (1.0 / 2.4) - 0.055
+    return jnp.where(linear <= 0.0031308, 12.92 * linear, gamma)
+
+
 def _lab_from_rgb(rgb: Colors) -> Colors:
-    linear = jnp.where(rgb <= 0.04045, rgb / 12.92, ((jnp.maximum(rgb, 0.04045) + 0.055) / 1.055) ** 2.4)
-    xyz = jnp.einsum("ij,...j->...i", jnp.array(_XYZ_FROM_RGB, rgb.dtype), linear, precision="highest")
+    matrix = jnp.array(_XYZ_FROM_RGB, rgb.dtype)
+    xyz = jnp.einsum("ij,...j->...i", matrix, linear_light(rgb), precision="highest")
     ratio = xyz / jnp.array(_WHITE_D65, rgb.dtype).reshape((1,) * (rgb.ndim - 1) + (3,))
     knee = _LAB_KNEE
     f = jnp.where(ratio > knee**3, jnp.cbrt(jnp.maximum(ratio, knee**3)), ratio / (3.0 * knee**2) + 4.0 / 29.0)
@@ -152,6 +163,4 @@ def _rgb_from_lab(lab: Colors) -> Colors:
     ratio = jnp.where(f > knee, f**3, 3.0 * knee**2 * (f - 4.0 / 29.0))
     xyz = ratio * jnp.array(_WHITE_D65, lab.dtype).reshape((1,) * (lab.ndim - 1) + (3,))
     inverse = jnp.linalg.inv(jnp.array(_XYZ_FROM_RGB, lab.dtype))
-    linear = jnp.clip(jnp.einsum("ij,...j->...i", inverse, xyz, precision="highest"), 0.0, 1.0)
-    gamma = 1.055 * jnp.maximum(linear, 0.0031308) ** (1.0 / 2.4) - 0.055
-    return jnp.where(linear <= 0.0031308, 12.92 * linear, gamma)
+    return from_linear_light(jnp.clip(jnp.einsum("ij,...j->...i", inverse, xyz, precision="highest"), 0.0, 1.0))
