@@ -6,7 +6,16 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from sogjax.model.camera import NEAR, Camera, distort, project, project_points, undistort
+from sogjax.model.camera import (
+    MAX_FISHEYE_ANGLE,
+    NEAR,
+    Camera,
+    distort,
+    project,
+    project_points,
+    undistort,
+    undistorted_sizes,
+)
 from sogjax.model.sog import Sog
 
 PIXELS = 2e-3
@@ -105,3 +114,78 @@ def test_what_is_behind_the_camera_is_masked_and_has_no_gradient():
     assert np.isfinite(gradient).all()
     assert (gradient[:3] == 0.0).all()
     assert (gradient[3] != 0.0).any()
+
+
+FISHEYE = np.array([[420.0, 0.0, 640.0], [0.0, 415.0, 480.0], [0.0, 0.0, 1.0]])
+FISHEYE_LENSES = [(0.0, 0.0, 0.0, 0.0), (0.06, -0.03, 0.01, -0.002), (-0.03, 0.004, 0.0, 0.0)]
+
+
+def fisheye_camera(coefficients, fisheye=True):
+    return Camera(
+        intrinsics=jnp.asarray(FISHEYE),
+        camera_from_world=jnp.eye(4),
+        distortion=jnp.asarray(np.append(coefficients, 0.0)),
+        image_size=jnp.array([1280.0, 960.0]),
+        fisheye=jnp.array(fisheye),
+    )
+
+
+@pytest.mark.parametrize("lens", FISHEYE_LENSES)
+def test_fisheye_distortion_is_opencvs(lens):
+    """Angles up to 75 degrees from the axis, and the axis itself."""
+    rng = np.random.default_rng(2)
+    angles, turns = rng.uniform(0.0, 1.3, 60), rng.uniform(0.0, 2.0 * np.pi, 60)
+    rays = np.tan(angles)[:, None] * np.stack([np.cos(turns), np.sin(turns)], 1)
+    rays[0] = 0.0
+    camera = fisheye_camera(lens)
+    undistorted = rays * FISHEYE[[0, 1], [0, 1]] + FISHEYE[:2, 2]
+    recorded = cv2.fisheye.distortPoints(rays[:, None], FISHEYE, np.array(lens)).reshape(-1, 2)
+    np.testing.assert_allclose(distort(camera, jnp.asarray(undistorted)), recorded, atol=PIXELS)
+    inside = np.asarray(recorded)
+    expected = cv2.fisheye.undistortPoints(inside[:, None], FISHEYE, np.array(lens), P=FISHEYE).reshape(-1, 2)
+    found = np.asarray(undistort(camera, jnp.asarray(inside)))
+    np.testing.assert_allclose(found, expected, rtol=1e-4, atol=0.05)
+    np.testing.assert_allclose(distort(camera, jnp.asarray(found)), inside, atol=PIXELS)
+
+
+def test_fisheye_and_polynomial_cameras_in_one_stack():
+    one, other = fisheye_camera(FISHEYE_LENSES[1]), fisheye_camera((-0.2, 0.05, 0.001, -0.002), fisheye=False)
+    both = jax.tree.map(lambda *leaves: jnp.stack(leaves), one, other)
+    pixels = jnp.asarray(np.random.default_rng(3).uniform([300.0, 200.0], [1000.0, 700.0], (20, 2)))
+    for function in (distort, undistort):
+        stacked = jax.jit(jax.vmap(function, in_axes=(0, None)))(both, pixels)
+        np.testing.assert_allclose(stacked[0], function(one, pixels), atol=PIXELS)
+        plain = Camera(other.intrinsics, other.camera_from_world, other.distortion, other.image_size)
+        np.testing.assert_allclose(stacked[1], function(plain, pixels), atol=PIXELS)
+        gradients = jax.grad(lambda p, f=function: jnp.sum(jax.vmap(f, in_axes=(0, None))(both, p)))(pixels)
+        assert np.isfinite(gradients).all()
+
+
+def test_what_a_fisheye_lens_shows_beside_and_behind_stays_finite():
+    camera = fisheye_camera((0.0, 0.0, 0.0, 0.0))
+    far = jnp.array([[640.0 + 420.0 * 3.0, 480.0], [640.0, 480.0 - 415.0 * 1.6], [640.0, 480.0]])
+    found = np.asarray(undistort(camera, far))
+    rim = np.tan(MAX_FISHEYE_ANGLE)
+    np.testing.assert_allclose(
+        found, [[640.0 + 420.0 * rim, 480.0], [640.0, 480.0 - 415.0 * rim], [640.0, 480.0]], rtol=1e-4
+    )
+
+
+def test_sizes_grow_as_the_picture_does():
+    """Against finite differences in the middle, at 40 degrees, and bounded at the rim; polynomial lenses leave them."""
+    camera = fisheye_camera(FISHEYE_LENSES[1])
+    pixels = np.array([[640.0, 480.0], [640.0 + 300.0, 480.0], [640.0, 480.0 - 280.0], [640.0 + 610.0, 480.0]])
+    sizes = np.asarray(undistorted_sizes(camera, jnp.asarray(pixels), jnp.full(4, 8.0)))
+
+    def opencv(where):
+        return cv2.fisheye.undistortPoints(
+            where.reshape(-1, 1, 2), FISHEYE, np.array(FISHEYE_LENSES[1]), P=FISHEYE
+        ).reshape(-1, 2)
+
+    step = 0.5 * np.eye(2)
+    by_x, by_y = (opencv(pixels + s) - opencv(pixels - s) for s in step)
+    expected = 8.0 * np.sqrt(np.abs(by_x[:, 0] * by_y[:, 1] - by_x[:, 1] * by_y[:, 0]))
+    np.testing.assert_allclose(sizes[:3], expected[:3], rtol=1e-2)
+    assert 8.0 < sizes[3] <= 32.0
+    polynomial = make_camera((-0.2, 0.06, -0.001, 0.002, -0.01))
+    np.testing.assert_array_equal(undistorted_sizes(polynomial, jnp.asarray(pixels), jnp.full(4, 8.0)), np.full(4, 8.0))

@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+from keyword import iskeyword
 
 import numpy as np
 import pytest
@@ -38,8 +39,9 @@ def test_from_a_recording_to_motion_and_pictures(capsys, tmp_path, monkeypatch, 
     actor = actor_file(tmp_path / "actor.yaml")
     track = ("track", f"recording={rendered}", f"actor={actor}", *FAST)
 
-    out, _ = done(capsys, *track, "out=run", "start=1", "outputs.overlay_width=320")
-    names = ["config.yaml", "metrics.json", "motion.bvh", "motion.npz", "motion.rrd", "overlay.mp4"]
+    out, _ = done(capsys, *track, "out=run", "start=1", "outputs.overlay_width=320", "outputs.formats=[trc,glb]")
+    formats = ["motion.bvh", "motion.glb", "motion.npz", "motion.rrd", "motion.trc"]
+    names = ["config.yaml", "metrics.json", *formats, "overlay.mp4"]
     assert sorted(path.name for path in (tmp_path / "run").iterdir()) == names
     assert all((tmp_path / "run" / name).stat().st_size > 0 for name in names)
     for name in names:
@@ -124,7 +126,7 @@ def test_defaults_in_the_help_are_the_defaults_of_the_command(command):
     for key, default, _ in help_lines(SCHEMAS[command]):
         value = config
         for part in key.split("."):
-            value = getattr(value, part)
+            value = getattr(value, f"{part}_" if iskeyword(part) else part)
         assert default in ("required", "null" if value is None else str(value))
 
 

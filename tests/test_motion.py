@@ -75,7 +75,7 @@ def test_poses_on_the_device_are_as_good_as_numpys():
     motion = motion_from_poses(BODY, jnp.zeros((2, BODY.skeleton.num_dofs)), 25.0)
     assert isinstance(motion, Motion)
     known = {name: value for name, value in vars(motion).items() if value is not None}
-    assert all(isinstance(value, np.ndarray | float) for value in known.values())
+    assert all(isinstance(value, np.ndarray | float | str) for value in known.values())
     assert vars(motion).keys() - known.keys() == {"pose_std", "joint_std"}
 
 

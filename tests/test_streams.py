@@ -1,6 +1,7 @@
 """Files that grow with a run: where it ends early they are readable or absent, and no thread stays."""
 
 import threading
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ from command_line import actor_file, trackable
 from sogjax.app import pipeline
 from sogjax.app import track as track_command
 from sogjax.app.cli import main
-from sogjax.data.motion import load_motion
+from sogjax.data.motion import Motion, load_motion
+from sogjax.data.source import look_at_source
 from sogjax.errors import InputError
 from sogjax.view.overlay_video import OverlayVideo
 
@@ -74,7 +76,7 @@ def test_an_early_end_leaves_the_motion_so_far(capsys, tmp_path, monkeypatch, co
     status = trouble(monkeypatch)
     assert main([*command, "out=run"]) == status
     assert set(threading.enumerate()) == threads
-    assert [path.name for path in (tmp_path / "run").iterdir()] == ["motion.partial"]
+    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["motion.partial", "run.partial"]
     so_far, complete = load_motion(tmp_path / "run" / "motion.partial"), load_motion(tmp_path / "whole" / "motion.npz")
     assert so_far.num_frames >= 10
     np.testing.assert_array_equal(so_far.pose, complete.pose[: so_far.num_frames])
@@ -84,8 +86,18 @@ def test_an_early_end_leaves_the_motion_so_far(capsys, tmp_path, monkeypatch, co
 
     monkeypatch.undo()
     monkeypatch.chdir(tmp_path)
-    assert main([*command, "out=run"]) == 0
-    assert "motion.partial" not in [path.name for path in (tmp_path / "run").iterdir()]
+    assert main([*command, "out=run", "resume=true"]) == 0
+    assert_resumed(tmp_path / "run", complete)
+
+
+def assert_resumed(folder, whole):
+    """The end of the run is that of one that was never stopped, and its video and Rerun file show every frame."""
+    again = load_motion(folder / "motion.npz")
+    for entry in fields(Motion):
+        np.testing.assert_array_equal(getattr(again, entry.name), getattr(whole, entry.name), entry.name)
+    names = ["config.yaml", "motion.bvh", "motion.npz", "motion.rrd", "overlay.mp4", "run.json"]
+    assert sorted(path.name for path in folder.iterdir()) == names
+    assert look_at_source(folder / "overlay.mp4").num_frames == FRAMES
 
 
 def test_an_error_in_the_first_frame_leaves_nothing(capsys, tmp_path, monkeypatch, command):

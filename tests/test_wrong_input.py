@@ -273,6 +273,7 @@ def test_a_body_to_start_from_with_something_wrong(capsys, recording, tmp_path):
     [
         ("solver.method=foo", ("solver.method=foo", "conditioned_ascent", "bfgs")),
         ("solver=foo", ("solver=foo", "lbfgs")),
+        ("outputs.formats=[trc,fbx]", ("outputs.formats=fbx", "bvh, c3d, csv, glb, trc")),
         ("color.space=foo", ("color.space=foo", "hsv_cylinder")),
         ("color.radius=0", ("color.radius=0",)),
         ("energy.gradient=foo", ("energy.gradient=foo", "autodiff")),
@@ -289,6 +290,9 @@ def test_a_body_to_start_from_with_something_wrong(capsys, recording, tmp_path):
         ("body=lion", ("lion", "dog", "human")),
         ("cameras=[nope]", ("nope", "left, right")),
         ("cameras=left", ("cameras=left", "list")),
+        ("cameras=[]", ("cameras=[]", "at least one", "left, right")),
+        ("cameras=[left,left]", ("cameras=[left,left]", "once")),
+        ("energy.pairs=some", ("energy.pairs=some", "sparse")),
         ("start=4", ("start=4", "0 to 3")),
         ("start=-1", ("start=-1",)),
         ("stop=5", ("stop=5", "0 to 3")),

@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float
 
 from sogjax.actor.coverage import Silhouettes
 from sogjax.actor.silhouettes import PosedPictures
-from sogjax.model.camera import Camera, undistort
+from sogjax.model.camera import Camera, undistort, undistorted_sizes
 
 MAX_CELLS = 2048
 """For each camera."""
@@ -23,10 +23,11 @@ def silhouettes_of(pictures: Sequence[PosedPictures], rig: Camera) -> Silhouette
     poses = [_pose_cells(posed, int(rig.image_size.shape[0])) for posed in pictures]
     means, sigmas, coverage, mask = (np.stack(part) for part in zip(*poses, strict=True))
     dtype = rig.intrinsics.dtype
-    undistorted = jax.vmap(jax.vmap(undistort), in_axes=(None, 0))(rig, jnp.asarray(means, dtype))
-    cameras = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (len(pictures), *leaf.shape)), rig)
     as_dtype = lambda array: jnp.asarray(array, dtype)
-    return Silhouettes(cameras, undistorted, as_dtype(sigmas), as_dtype(coverage), jnp.asarray(mask))
+    undistorted = jax.vmap(jax.vmap(undistort), in_axes=(None, 0))(rig, as_dtype(means))
+    sigmas = jax.vmap(lambda *of_pose: jax.vmap(undistorted_sizes)(rig, *of_pose))(as_dtype(means), as_dtype(sigmas))
+    cameras = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (len(pictures), *leaf.shape)), rig)
+    return Silhouettes(cameras, undistorted, sigmas, as_dtype(coverage), jnp.asarray(mask))
 
 
 def _pose_cells(pictures: PosedPictures, num_cameras: int) -> tuple[np.ndarray, ...]:

@@ -6,7 +6,7 @@ from sogjax.actor.make import make_actor
 from sogjax.app.actor_report import report_folder, write_actor_report
 from sogjax.app.build import color_space_and_radius, energy_weights
 from sogjax.app.configs import ActorConfig
-from sogjax.app.outputs import results_folder
+from sogjax.app.outputs import free_path, results_folder
 from sogjax.app.progress import progress
 from sogjax.app.recordings import body_named, opened, say
 from sogjax.data.actor_file import save_body
@@ -17,7 +17,7 @@ def run(config: ActorConfig) -> Path:
     """Make the actor and write its file and its report.
 
     Raises:
-        InputError: anything wrong with the recording, its example poses or the body.
+        InputError: anything wrong with the recording, its example poses or the body, or an actor file that is there.
     """
     space, _ = color_space_and_radius(config.color)
     weights = energy_weights(config.energy)
@@ -26,6 +26,7 @@ def run(config: ActorConfig) -> Path:
     out = Path(config.out)
     if out.is_dir():
         raise InputError(f"out={out}: is a folder; give the actor file to write, such as out={out / 'actor.yaml'}")
+    free_path("out", out, config.overwrite)
     with results_folder(out.parent):
         made = make_actor(recording, body, config.subject, space, weights, say, progress, config.symmetric)
         save_body(out, made.body)

@@ -10,6 +10,7 @@ from sogjax.app.recordings import say
 from sogjax.data.cell_cache import Cells, CellsOfClip, cell_cache
 from sogjax.data.recording import Recording
 from sogjax.data.video import read_prepared
+from sogjax.errors import InputError
 from sogjax.images.cells import CellGrid
 
 
@@ -23,6 +24,9 @@ def picture_reader(images: ImagesConfig) -> PictureReader:
         return read_prepared
 
     def read(recording: Recording, preparation: Preparation, first: int, last: int) -> Iterator[list[Picture]]:
+        if not recording.complete:
+            say("images.cache: no cells are kept of a recording in which cameras are missing for a while")
+            return read_prepared(recording, preparation, first, last)
         cache = cell_cache(folder, recording, images.depth, say)
         kept = cache.find(first, last)
         if kept is not None and preparation.cells_only:
@@ -41,13 +45,21 @@ def pictures_of(clip: CellsOfClip) -> Iterator[list[Picture]]:
 
 def cells_of(pictures: list[Picture]) -> Cells:
     """The cells of all cameras."""
-    return np.stack([picture.cells for picture in pictures])
+    return np.stack([picture.cells for picture in pictures if picture.cells is not None])
 
 
 def cells_of_clip(
     recording: Recording, grids: tuple[CellGrid, ...], images: ImagesConfig, frames: tuple[int, int]
 ) -> CellsOfClip:
-    """Those of all frames at once; memory-mapped where they are kept."""
+    """Those of all frames at once; memory-mapped where they are kept.
+
+    Raises:
+        InputError: cameras are missing for a while.
+    """
+    if not recording.complete:
+        raise InputError(
+            f"{recording.path}: cameras are missing for a while, which sweep=vmapped does not know of; leave it out"
+        )
     if images.cache is not None:
         kept = cell_cache(images.cache, recording, images.depth, say).find(*frames)
         if kept is not None:

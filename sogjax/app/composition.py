@@ -21,6 +21,7 @@ SCHEMAS: dict[str, type] = {
     "demo": configs.DemoConfig,
     "track": configs.TrackConfig,
     "actor": configs.ActorConfig,
+    "body": configs.BodyConfig,
     "segment": configs.SegmentConfig,
     "report": configs.ReportConfig,
     "evaluate": configs.EvaluateConfig,
@@ -77,7 +78,7 @@ def to_object(command: str, tree: Any) -> Any:
     Raises:
         InputError: a required key that is missing, or a number that is none.
     """
-    missing = sorted(OmegaConf.missing_keys(tree))
+    missing = sorted(configs.option_key(key) for key in OmegaConf.missing_keys(tree))
     if missing:
         examples = " ".join(f"{key}=..." for key in missing)
         raise InputError(f"{command} needs {', '.join(missing)}; add {examples} (see sogjax {command} --help)")

@@ -9,6 +9,8 @@ from typing import Any
 
 from omegaconf import MISSING
 
+OVERWRITE = "replace what an earlier run wrote there"
+
 
 def option(default: Any, help_text: str) -> Any:
     """A config field with its default and the text that `--help` prints."""
@@ -88,6 +90,7 @@ class OutputsConfig:
     rerun: bool = option(True, "motion.rrd, for the Rerun viewer")
     rerun_images: bool = option(True, "put the pictures into motion.rrd")
     bvh: bool = option(True, "motion.bvh")
+    formats: list[str] | None = option(None, "further formats of the motion, some of [trc,c3d,glb,csv]; null: none")
     confidence: bool = option(True, "standard deviations of the pose and the joints, in motion.npz")
     temperature: float = option(
         1e-5,
@@ -109,6 +112,8 @@ class TrackConfig:
     start: int = option(0, "first frame to track, counted from the recording's first")
     stop: int | None = option(None, "frame before which to stop; null: the end")
     cameras: list[str] | None = option(None, "cameras to use; null: all")
+    resume: bool = option(False, "go on with the run that was stopped in this folder")
+    overwrite: bool = option(False, OVERWRITE)
     sweep: str = option(
         "each", "with -m: each: one run after the other | vmapped: numbers only, all in one compiled call"
     )
@@ -130,8 +135,20 @@ class ActorConfig:
     symmetric: bool = option(True, "left and right limbs have the same lengths and sizes")
     body: str = option("human", "body to start from: human, dog, or a body file")
     cameras: list[str] | None = option(None, "cameras to use; null: all")
+    overwrite: bool = option(False, OVERWRITE)
     color: ColorConfig = group(ColorConfig, "")
     energy: EnergyConfig = group(EnergyConfig, "")
+
+
+@dataclass
+class BodyConfig:
+    """Make a body file from the skeleton of another program."""
+
+    from_: str = option(MISSING, "skeleton: a .skeleton of Skeletool, or a .bvh, of which the hierarchy is read")
+    out: str = option(MISSING, "body file to write; for body= of the other commands, or to be edited first")
+    dof: str | None = option(None, "a .dof of Skeletool, whose degrees of freedom replace those of the .skeleton")
+    unit: str | None = option(None, "m | cm | mm: the file's lengths; null: mm of a .skeleton, m of a .bvh")
+    up: str = option("y", "vertical of the file's rest pose: x y z -x -y -z")
 
 
 @dataclass
@@ -142,13 +159,14 @@ class SegmentConfig:
     out: str = option(MISSING, "folder for POSE/CAMERA.mask.png and one contact sheet a pose, POSE.png")
     subject: str | None = option(None, "which subject, where the recording has several")
     cameras: list[str] | None = option(None, "cameras to use; null: all")
+    overwrite: bool = option(False, OVERWRITE)
 
 
 @dataclass
 class SynthConfig:
     """Render a recording with ground truth."""
 
-    out: str = option(MISSING, "folder to write; must not exist")
+    out: str = option(MISSING, "folder to write")
     motion: str = option("walk", "walk | arms | squat_kick | cartwheel | pass")
     actors: int = option(1, "number of people")
     cameras: int = option(12, "number of cameras in the ring")
@@ -158,19 +176,22 @@ class SynthConfig:
     frames: int = option(60, "number of frames")
     seed: int = option(0, "person, clothes, room and noise")
     noise: float = option(0.012, "standard deviation of the sensor noise, of full scale")
+    overwrite: bool = option(False, "replace a rendered recording that is there")
 
 
 @dataclass
 class DemoConfig:
     """Render a person, make the actor, track, evaluate: everything at once."""
 
-    out: str = option("outputs/demo", "folder for the results")
+    out: str = option("outputs/demo", "folder for the results; those of an earlier demo are replaced")
     motion: str = option("walk", "walk | arms | squat_kick | cartwheel")
     cameras: int = option(12, "number of cameras")
     frames: int = option(60, "number of frames")
     width: int = option(648, "width of the pictures, px")
     height: int = option(486, "height of the pictures, px")
     seed: int = option(0, "person, clothes, room and noise")
+    resume: bool = option(False, "go on with the demo that was stopped in this folder")
+    overwrite: bool = option(False, OVERWRITE)
     outputs: OutputsConfig = group(OutputsConfig, "")
 
 
@@ -197,6 +218,7 @@ class EvaluateConfig:
     motion: Any = option(MISSING, "motion.npz, or a list of them with several actors")
     truth: str = option(MISSING, "ground_truth.npz")
     out: str | None = option(None, "metrics.json to write; null: only print")
+    overwrite: bool = option(False, OVERWRITE)
 
 
 @dataclass
@@ -207,15 +229,29 @@ class ViewConfig:
     recording: str = option(MISSING, "folder of the recording")
     out: str | None = option(None, "motion.rrd to write; null: open the viewer")
     images: bool = option(True, "with the pictures")
+    overwrite: bool = option(False, OVERWRITE)
 
 
 @dataclass
 class ExportConfig:
-    """Write a motion in another format."""
+    """Write a motion, or a calibration, in another format."""
 
-    motion: str = option(MISSING, "motion.npz")
-    to: str = option(MISSING, "file to write; its ending says the format: .bvh .npz")
-    up: str = option("z", "vertical of the motion's world: x y z -x -y -z")
+    motion: str | None = option(None, "motion.npz, or a .motion of Skeletool")
+    calibration: str | None = option(None, "calibration file, or the folder of a recording; instead of a motion")
+    to: str = option(
+        MISSING,
+        "file to write; its ending says the format: .bvh .trc .c3d .glb .csv .motion .npz; "
+        "of a calibration: .toml .calibration",
+    )
+    up: str | None = option(None, "vertical of the motion's world: x y z -x -y -z; null: what the motion says")
+    actor: str | None = option(None, "actor or body file of the motion; only a .motion needs it, read or written")
+    fps: float | None = option(None, "frames per second; only a .motion that is read needs it")
+    overwrite: bool = option(False, OVERWRITE)
+
+
+def option_key(name: str) -> str:
+    """The key of a field on the command line: Python's own words stand in the schemas with a line after them."""
+    return name.removesuffix("_")
 
 
 def help_lines(schema: type, prefix: str = "") -> list[tuple[str, str, str]]:
@@ -228,5 +264,5 @@ def help_lines(schema: type, prefix: str = "") -> list[tuple[str, str, str]]:
             lines += help_lines(type(default), f"{prefix}{entry.name}.")
         else:
             shown = "required" if default == MISSING else "null" if default is None else str(default)
-            lines.append((prefix + entry.name, shown, entry.metadata["help"]))
+            lines.append((prefix + option_key(entry.name), shown, entry.metadata["help"]))
     return lines

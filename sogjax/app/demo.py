@@ -5,23 +5,27 @@ from pathlib import Path
 
 from sogjax.app.composition import composed
 from sogjax.app.configs import DemoConfig, TrackConfig
-from sogjax.app.outputs import results_folder
 from sogjax.app.overrides import quoted_value
 from sogjax.app.progress import progress
 from sogjax.app.recordings import say
+from sogjax.app.run_folder import run_folder
 from sogjax.app.track import Run
 from sogjax.app.track import run as run_track
 from sogjax.synth import SynthSettings, cached_recording, default_cache_dir
+
+COMMAND = "demo"
 
 
 def run(config: DemoConfig) -> Run:
     """Render the demo recording if it is not there, and track it.
 
     Raises:
-        InputError: a setting out of range, or a folder that cannot be written.
+        InputError: a setting out of range, a folder that cannot be written, or one with results that no demo made.
     """
-    with results_folder(Path(config.out)) as out:
-        return _run_in(config, out)
+    out = Path(config.out)
+    with run_folder(out, config.overwrite, config.resume, COMMAND):
+        pass  # found out before anything is rendered
+    return _run_in(config, out)
 
 
 def _run_in(config: DemoConfig, out: Path) -> Run:
@@ -41,7 +45,8 @@ def _run_in(config: DemoConfig, out: Path) -> Run:
         "track", [f"recording={quoted_value(str(recording))}", f"out={quoted_value(str(out))}", "initial_pose=auto"]
     )
     track_config.outputs = config.outputs
-    result = run_track(track_config)
+    track_config.overwrite, track_config.resume = config.overwrite, config.resume
+    result = run_track(track_config, COMMAND)
     print(
         f"rendering {rendered - begin:.1f} s (0 when it was there already), "
         f"actor, tracking and outputs {time.perf_counter() - rendered:.1f} s"

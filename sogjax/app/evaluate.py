@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from sogjax.app.configs import EvaluateConfig
+from sogjax.app.outputs import free_path
 from sogjax.app.recordings import file_list
 from sogjax.data.ground_truth import GroundTruth, load_ground_truth
 from sogjax.data.motion import Motion, load_motion
@@ -14,14 +15,15 @@ def run(config: EvaluateConfig) -> GroupEvaluation:
     """Print the table; write the JSON file where one is asked for.
 
     Raises:
-        InputError: files that do not open or do not fit together.
+        InputError: files that do not open or do not fit together, or a file for the metrics that is there.
     """
+    out = None if config.out is None else free_path("out", config.out, config.overwrite)
     truth = load_ground_truth(Path(config.truth))
     evaluation = evaluate_motions(named_motions(file_list(config.motion), truth), truth)
     print(evaluation.table())
-    if config.out is not None:
-        evaluation.to_json(Path(config.out))
-        print(config.out)
+    if out is not None:
+        evaluation.to_json(out)
+        print(out)
     return evaluation
 
 

@@ -1,23 +1,65 @@
-"""`sogjax export`: a motion in another format."""
+"""`sogjax export`: a motion or a calibration in another format."""
 
 from pathlib import Path
 
+import jax.numpy as jnp
+
 from sogjax.app.configs import ExportConfig
+from sogjax.app.outputs import free_path
+from sogjax.app.recordings import body_named
+from sogjax.data.calibration import CameraRig, load_calibration, save_calibration
 from sogjax.data.export import export_motion
-from sogjax.data.motion import load_motion
+from sogjax.data.motion import DEFAULT_UP, Motion, load_motion
+from sogjax.data.recording import open_recording
+from sogjax.data.skeletool_motion import read_skeletool_motion, write_skeletool_motion
 from sogjax.errors import InputError
-from sogjax.model.frames import UP_AXES
+from sogjax.model.body import Body
+from sogjax.model.frames import UP_AXES, world_from_upright
 
 
 def run(config: ExportConfig) -> Path:
     """Write the file.
 
     Raises:
-        InputError: a motion that does not open, or an ending that no writer knows.
+        InputError: a motion or calibration that does not open, an ending that no writer knows, or a file that is there.
     """
-    if config.up not in UP_AXES:
-        raise InputError(f"up={config.up}: must be one of {', '.join(UP_AXES)}")
-    out = Path(config.to)
-    export_motion(load_motion(Path(config.motion)), out, up=config.up)
+    out = free_path("to", config.to, config.overwrite)
+    if (config.motion is None) == (config.calibration is None):
+        raise InputError("export needs motion=... or calibration=..., one of them (see sogjax export --help)")
+    if config.calibration is not None:
+        save_calibration(out, _rig(Path(config.calibration)))
+    else:
+        _export_motion(config, Path(str(config.motion)), out)
     print(out)
     return out
+
+
+def _rig(path: Path) -> CameraRig:
+    return open_recording(path).rig if path.is_dir() else load_calibration(path)
+
+
+def _export_motion(config: ExportConfig, source: Path, out: Path) -> None:
+    if config.up not in (None, *UP_AXES):
+        raise InputError(f"up={config.up}: must be one of {', '.join(UP_AXES)}")
+    motion = _read_motion(config, source)
+    if out.suffix.lower() == ".motion":
+        write_skeletool_motion(out, motion, _actor(config, out))
+    else:
+        export_motion(motion, out, config.up)
+
+
+def _read_motion(config: ExportConfig, path: Path) -> Motion:
+    if path.suffix.lower() != ".motion":
+        return load_motion(path)
+    if config.fps is None or config.fps <= 0:
+        raise InputError(f"{path}: does not say its frame rate; add fps=..., a number over 0")
+    up = config.up or DEFAULT_UP
+    body = _actor(config, path)
+    turned = body.rotated(jnp.asarray(world_from_upright(up), body.blob_sigmas.dtype))
+    return read_skeletool_motion(path, turned, config.fps, up)
+
+
+def _actor(config: ExportConfig, path: Path) -> Body:
+    if config.actor is None:
+        raise InputError(f"{path}: does not say which joints it moves; add actor=..., its actor or body file")
+    return body_named(config.actor)

@@ -1,10 +1,12 @@
 """The poses of the actors in the first frame of a track: from a file, or searched for."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+import numpy as np
+from jaxtyping import Array, Float, UInt8
 
 from sogjax.app import build
 from sogjax.app.configs import TrackConfig
@@ -74,7 +76,7 @@ def searched_poses(recording: Recording, bodies: Sequence[Body], config: TrackCo
     Raises:
         InputError: the pictures show nothing of an actor's colours where cameras see it.
     """
-    pictures = next(iter(read_frames(recording, frame, frame + 1)))
+    recording, pictures = _seen(recording, frame)
     depths = levels(config.images.depth)
     grids = [build.cell_grids(recording, depth) for depth in depths]
     views = FrameViews(
@@ -90,6 +92,17 @@ def searched_poses(recording: Recording, bodies: Sequence[Body], config: TrackCo
             f"write {_remedy(recording)}, or begin with another frame (start=)"
         )
     return found
+
+
+def _seen(recording: Recording, frame: int) -> tuple[Recording, list[UInt8[np.ndarray, "_h _w 3"]]]:
+    """The recording with the cameras that have a frame, and their pictures of it."""
+    pictures = dict(zip(recording.rig.names, next(iter(read_frames(recording, frame, frame + 1))), strict=True))
+    present = {name: picture for name, picture in pictures.items() if picture is not None}
+    if not present:
+        raise InputError(f"{recording.path}: no camera has frame {frame + recording.first_frame}; begin later (start=)")
+    if len(present) == len(pictures):
+        return recording, list(present.values())
+    return replace(recording, rig=recording.rig.select(tuple(present))), list(present.values())
 
 
 def _remedy(recording: Recording) -> str:

@@ -16,9 +16,10 @@ from sogjax.app.cells import cells_of_clip, pictures_of
 from sogjax.app.composition import composed
 from sogjax.app.configs import TrackConfig, help_lines
 from sogjax.app.first_pose import first_poses, initial_pose_file
-from sogjax.app.outputs import results_folder, write_results
+from sogjax.app.outputs import export_endings, results_folder, write_results
 from sogjax.app.pipeline import Picture, PictureReader, Preparation
 from sogjax.app.recordings import actors_of, opened, say
+from sogjax.app.run_folder import run_folder
 from sogjax.app.sweep import row_numbers
 from sogjax.app.sweep_results import Member, finish_sweep
 from sogjax.app.track import Job, Run, doing, frame_range
@@ -46,10 +47,13 @@ def run_grid(members: Sequence[Sequence[str]]) -> int:
     configs = [composed("track", list(overrides)) for overrides in members]
     for config in configs:
         build.check(config)
+        export_endings(config.outputs)
     check_numbers_only(configs)
     recording = opened(configs[0].recording, configs[0].cameras)
     frame_range(recording, configs[0])
     initial_pose_file(recording, configs[0])
+    if configs[0].resume:
+        raise InputError("resume=true sweep=vmapped: a sweep in one call cannot go on; leave one of the two out")
     with results_folder(Path("multirun") / f"{datetime.datetime.now():%Y-%m-%d_%H-%M-%S}") as folder:
         bodies, made = actors_of(recording, configs[0].actor, configs[0].body, configs[0].color)
         rows = []
@@ -93,8 +97,8 @@ def grid_runs(recording: Recording, bodies: list[Body], configs: Sequence[TrackC
     for number, (job, config) in enumerate(zip(jobs, configs, strict=True)):
         follow = replayed(member(clips, number), capacities, seconds, config.outputs.rerun)
         with (
-            results_folder(folder / str(number)) as out,
-            doing(job, config.outputs, out, reader_of(cells), follow) as run,
+            run_folder(folder / str(number)) as own,
+            doing(job, config.outputs, own.path, reader_of(cells), follow) as run,
         ):
             yield run
 

@@ -15,7 +15,7 @@ from sogjax.app.recordings import say
 from sogjax.app.streams import file_name
 from sogjax.data.actor_file import save_body
 from sogjax.data.atomic import atomic_path
-from sogjax.data.export import export_motion
+from sogjax.data.export import WRITERS, export_motion, require_ezc3d
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.motion import save_motion
 from sogjax.errors import InputError
@@ -57,6 +57,34 @@ def _make_writable(path: Path) -> None:
         raise InputError(f"{path}: cannot write there ({reason}); choose another folder with out=DIR") from error
 
 
+def free_path(key: str, value: str | Path, overwrite: bool) -> Path:
+    """The path of an output, if nothing is there yet or it may be replaced.
+
+    Raises:
+        InputError: something is there.
+    """
+    path = Path(value)
+    if path.exists() and not overwrite:
+        raise InputError(f"{key}={path}: is there already; choose another name, or give overwrite=true to replace it")
+    return path
+
+
+def export_endings(wanted: OutputsConfig) -> list[str]:
+    """The file endings in which motions are written, beside motion.npz.
+
+    Raises:
+        InputError: a format that cannot be written.
+    """
+    formats = (["bvh"] if wanted.bvh else []) + (wanted.formats or [])
+    for name in formats:
+        if f".{name}" not in WRITERS or name == "npz":
+            known = ", ".join(sorted(ending[1:] for ending in WRITERS if ending != ".npz"))
+            raise InputError(f"outputs.formats={name}: no such format; use some of {known}")
+        if name == "c3d":
+            require_ezc3d("outputs.formats=c3d")
+    return [f".{name}" for name in dict.fromkeys(formats)]
+
+
 def write_results(result: Run, out: Path, wanted: OutputsConfig, config: Any, made_actors: Sequence[Body]) -> None:
     """Write what needs whole motions; each file appears under its name only when it is whole."""
     names = list(result.motions)
@@ -67,18 +95,21 @@ def write_results(result: Run, out: Path, wanted: OutputsConfig, config: Any, ma
     for name, motion in result.motions.items():
         result.files.append(out / file_name("motion", ".npz", name, len(names)))
         save_motion(result.files[-1], motion)
-        if wanted.bvh:
-            result.files.append(out / file_name("motion", ".bvh", name, len(names)))
-            export_motion(motion, result.files[-1], up=result.recording.up)
+        for ending in export_endings(wanted):
+            result.files.append(out / file_name("motion", ending, name, len(names)))
+            export_motion(motion, result.files[-1])
     with atomic_path(out / "config.yaml") as temporary:
         temporary.write_text(OmegaConf.to_yaml(config))
     result.files.append(out / "config.yaml")
-    evaluate(result, out)
+    evaluate(result)
+    if result.evaluation is not None:
+        result.evaluation.to_json(out / "metrics.json")
+        result.files.append(out / "metrics.json")
     result.files += streamed
 
 
-def evaluate(result: Run, out: Path) -> None:
-    """Compare with the ground truth, where there is one, and write metrics.json."""
+def evaluate(result: Run) -> None:
+    """Compare with the ground truth, where there is one."""
     if result.recording.ground_truth is None:
         return
     truth = load_ground_truth(result.recording.ground_truth)
@@ -89,6 +120,3 @@ def evaluate(result: Run, out: Path) -> None:
         result.evaluation = evaluate_motions(result.motions, truth)
     except InputError as error:
         say(f"warning: nothing is compared: {error}")
-        return
-    result.evaluation.to_json(out / "metrics.json")
-    result.files.append(out / "metrics.json")

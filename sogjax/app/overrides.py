@@ -3,11 +3,12 @@
 import difflib
 import re
 from collections.abc import Iterator, Sequence
+from keyword import iskeyword
 
 from sogjax.app.configs import help_lines
 from sogjax.errors import InputError
 
-PATH_KEYS = ("recording", "out", "actor", "body", "motion", "truth", "to", "images.cache")
+PATH_KEYS = ("recording", "out", "actor", "body", "motion", "truth", "to", "calibration", "from", "dof", "images.cache")
 """Options whose values are paths, which may hold characters that Hydra's grammar does not take unquoted."""
 
 _PLAIN = re.compile(r"[\w./\\:%+@?|-]*", re.ASCII)
@@ -28,7 +29,7 @@ def ready_for_hydra(words: Sequence[str], sweep: bool) -> list[str]:
     Raises:
         InputError: a word that is no `key=value`.
     """
-    return [_quoted(_checked(word, sweep)) for word in words]
+    return [_for_schema(_quoted(_checked(word, sweep))) for word in words]
 
 
 def _checked(word: str, sweep: bool) -> str:
@@ -44,6 +45,12 @@ def _checked(word: str, sweep: bool) -> str:
     if key[0] in "+~" and not for_hydra:
         raise InputError(f"{word}: nothing can be added to the options or taken from them; write key=value")
     return word
+
+
+def _for_schema(word: str) -> str:
+    """Keys that are words of Python have a line after them in the schemas."""
+    key, _, value = word.partition("=")
+    return f"{key}_={value}" if iskeyword(key) else word
 
 
 def _quoted(word: str) -> str:

@@ -2,7 +2,7 @@
 
 import time
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -14,8 +14,9 @@ from sogjax.app.progress import progress
 from sogjax.app.timing import StageTimes
 from sogjax.data.recording import Recording
 from sogjax.data.stages import ahead
+from sogjax.errors import InputError
 from sogjax.images.cells import CellGrid, padded_cells, stack_shape
-from sogjax.track.tracker import TrackedFrame, Tracker, track
+from sogjax.track.tracker import FrameCells, PartialCells, TrackedFrame, Tracker, track
 
 FRAMES_AHEAD = 3
 """Frames that wait for the tracking step, beside the one that is being decoded."""
@@ -27,7 +28,8 @@ PictureMaker = Callable[[int, np.ndarray], np.ndarray | bytes | None]
 class Picture(NamedTuple):
     """What is kept of one camera's picture."""
 
-    cells: UInt8[np.ndarray, "rows columns 3"]
+    cells: UInt8[np.ndarray, "rows columns 3"] | None
+    """None where the camera is missing."""
     tile: np.ndarray | bytes | None
     """For the overlay."""
     jpeg: np.ndarray | bytes | None
@@ -47,9 +49,7 @@ PictureReader = Callable[[Recording, "Preparation", int, int], Iterator[list[Pic
 """Of a recording, what to make of each picture, the first frame and the one after the last."""
 
 
-FrameTracker = Callable[
-    [Tracker, Float[Array, "dof"], Iterable[UInt8[np.ndarray, "_c _h _w 3"]]], Iterator[TrackedFrame]
-]
+FrameTracker = Callable[[Tracker, Float[Array, "dof"], Iterable[FrameCells]], Iterator[TrackedFrame]]
 """What finds the poses of frames from their cells, one after the other, as `sogjax.track.tracker.track` does."""
 
 
@@ -70,12 +70,28 @@ class Preparation:
         """Whether cells are all that is needed."""
         return self.tile is nothing and self.jpeg is nothing
 
-    def __call__(self, camera: int, image: np.ndarray) -> Picture:
-        """The cells of a picture, and what outputs need of it."""
+    def __call__(self, camera: int, image: np.ndarray | None) -> Picture:
+        """The cells of a picture, and what outputs need of it; nothing where there is none."""
+        if image is None:
+            return Picture(None, None, None, 0.0)
         begin = time.perf_counter()
         cells = padded_cells(image, self.grids[camera], stack_shape(self.grids))
         seconds = time.perf_counter() - begin
         return Picture(cells, self.tile(camera, image), self.jpeg(camera, image), seconds)
+
+
+def cells_of_frame(cells: Sequence[UInt8[np.ndarray, "rows columns 3"] | None]) -> FrameCells:
+    """The cells of all cameras; None: a camera is missing.
+
+    Raises:
+        InputError: all are.
+    """
+    some = next((of_camera for of_camera in cells if of_camera is not None), None)
+    if some is None:
+        raise InputError("a frame has no picture of any camera; track the frames before or behind it (start=, stop=)")
+    stacked = np.stack([np.zeros_like(some) if of_camera is None else of_camera for of_camera in cells])
+    present = np.array([of_camera is not None for of_camera in cells])
+    return stacked if present.all() else PartialCells(stacked, present)
 
 
 def tracked_frames(
@@ -94,15 +110,16 @@ def tracked_frames(
     waiting: deque[list[Picture]] = deque()
     with closing(ahead(pictures, FRAMES_AHEAD)) as ready:
 
-        def cells() -> Iterator[UInt8[np.ndarray, "camera rows columns 3"]]:
+        def cells() -> Iterator[FrameCells]:
             for frame in progress(times.timed("decode", ready), count, "tracking"):
                 waiting.append(frame)
                 times.add("cells", sum(picture.seconds for picture in frame))
-                yield np.stack([picture.cells for picture in frame])
+                yield cells_of_frame([picture.cells for picture in frame])
 
         begin = time.perf_counter()
         for tracked in follow(tracker, start, cells()):
-            times.add("step", tracked.seconds)
+            if tracked.seconds > 0.0:  # not where a frame was tracked before
+                times.add("step", tracked.seconds)
             times.add("whole", time.perf_counter() - begin)
             begin = time.perf_counter()
             yield FrameDone(tracked, waiting.popleft())

@@ -34,8 +34,11 @@ def opened(path: str, cameras: Sequence[str] | None = None) -> Recording:
     recording = open_recording(Path(path))
     for warning in recording.warnings:
         say(f"warning: {warning}")
-    if not cameras:
+    if cameras is None:
         return recording
+    if not cameras or len(set(cameras)) < len(cameras):
+        named = ", ".join(recording.rig.names)
+        raise InputError(f"cameras=[{','.join(cameras)}]: name at least one camera, each once; there are {named}")
     unknown = [name for name in cameras if name not in recording.rig.names]
     if unknown:
         raise InputError(

@@ -10,7 +10,7 @@ from sogjax.actor.example_masks import ExampleMasks, example_masks
 from sogjax.actor.make import examples_of
 from sogjax.actor.silhouettes import load_images
 from sogjax.app.configs import SegmentConfig
-from sogjax.app.outputs import results_folder
+from sogjax.app.outputs import free_path, results_folder
 from sogjax.app.progress import progress
 from sogjax.app.recordings import opened, say
 from sogjax.data.image_file import write_mask
@@ -24,19 +24,25 @@ def run(config: SegmentConfig) -> list[Path]:
     """Write the masks of every example pose, POSE/CAMERA.mask.png, and one contact sheet a pose.
 
     Raises:
-        InputError: anything wrong with the recording or its example poses, or a folder in which masks were given.
+        InputError: anything wrong with the recording or its example poses, a folder in which masks were given, or
+            masks that are there.
     """
     recording = opened(config.recording, config.cameras)
     examples = examples_of(recording, config.subject)
     out = Path(config.out)
     _check_apart(recording, out)
     sheets: list[Path] = []
+    for example in examples:
+        free_path("out", out / example.name, config.overwrite)
+        free_path("out", out / f"{example.name}.png", config.overwrite)
     with results_folder(out):
         for example in progress(examples, len(examples), "example poses"):
             images = load_images(recording, example)
             found = example_masks(recording, example, images)
             for warning in found.warnings:
                 say(f"warning: {warning}")
+            for older in (out / example.name).glob("*.mask.png"):
+                older.unlink()
             for camera, mask in found.masks.items():
                 write_mask(out / example.name / f"{recording.rig.names[camera]}.mask.png", mask)
             sheets.append(out / f"{example.name}.png")

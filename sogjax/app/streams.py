@@ -14,13 +14,16 @@ import numpy as np
 from jaxtyping import Float
 
 from sogjax.app.configs import OutputsConfig
+from sogjax.app.kept_run import KeptRun
 from sogjax.app.pipeline import FrameDone, Picture, Preparation
 from sogjax.app.recordings import say
 from sogjax.app.timing import StageTimes
+from sogjax.data.array_log import read_log
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.motion import FRAMES_AT_ONCE, Motion, motion_from_poses
 from sogjax.data.motion_log import MotionLog
 from sogjax.data.recording import Recording
+from sogjax.errors import InputError
 from sogjax.images.cells import CellGrid
 from sogjax.model.body import Body, dof_slices, joint_slices
 from sogjax.model.color import to_rgb
@@ -33,6 +36,22 @@ PARTIAL = ".partial"
 def file_name(stem: str, ending: str, actor: str, num_actors: int) -> str:
     """`motion.npz`, or with several actors `motion_NAME.npz`."""
     return f"{stem}{ending}" if num_actors == 1 else f"{stem}_{actor}{ending}"
+
+
+def partial_motions(folder: Path, bodies: Sequence[Body]) -> dict[str, Path]:
+    """The folders of the motions that are not complete, by actor."""
+    return {body.name: folder / file_name("motion", PARTIAL, body.name, len(bodies)) for body in bodies}
+
+
+def readable_frames(folder: Path, bodies: Sequence[Body]) -> int:
+    """How many frames of all motions an earlier process wrote."""
+    counts = []
+    for path in partial_motions(folder, bodies).values():
+        try:
+            counts.append(len(read_log(path, mapped=True)["frame"]))
+        except InputError:  # it was stopped before the first ones
+            counts.append(0)
+    return min(counts)
 
 
 class Streams:
@@ -48,6 +67,8 @@ class Streams:
         first_frame: of the motion, by the recording's own numbers.
         wanted: which files.
         times: takes the time of the stage `outputs`.
+        kept: where all that is found is kept, so that another process can go on.
+        num_kept: frames of the motion that an earlier process wrote.
     """
 
     def __init__(
@@ -58,12 +79,16 @@ class Streams:
         first_frame: int,
         wanted: OutputsConfig,
         times: StageTimes,
+        kept: KeptRun | None = None,
+        num_kept: int = 0,
     ):
         self._recording, self._bodies, self._wanted, self._times = recording, bodies, wanted, times
-        self._next_frame = self._first_frame = first_frame
-        name = lambda body: file_name("motion", PARTIAL, body.name, len(bodies))
-        self._logs = {body.name: MotionLog(folder / name(body)) for body in bodies}
-        self._folder = folder
+        self._first_frame, self._first_new = first_frame, first_frame + num_kept
+        self.num_skipped = 0 if wanted.overlay or wanted.rerun else num_kept
+        """Frames at the beginning that nothing is to be done with, as no output shows them."""
+        self._next_frame = first_frame + self.num_skipped
+        self._logs = {name: MotionLog(path, num_kept) for name, path in partial_motions(folder, bodies).items()}
+        self._folder, self._kept = folder, kept
         self._stack = ExitStack()
         self._overlay: Any = None
         self._rerun: Any = None
@@ -73,6 +98,8 @@ class Streams:
     def __enter__(self) -> "Streams":
         for log in self._logs.values():
             self._stack.callback(log.close)
+        if self._kept is not None:
+            self._stack.callback(self._kept.close)
         if self._wanted.overlay:
             from sogjax.view.overlay_video import OverlayVideo
 
@@ -122,18 +149,25 @@ class Streams:
         """Remove the growing motions, when they have been written under their final names."""
         for log in self._logs.values():
             log.remove()
+        if self._kept is not None:
+            self._kept.remove()
 
     def say_what_is_left(self) -> None:
         """After an error: where the frames so far are."""
-        count = self._next_frame - self._first_frame
-        if count:
-            folders = ", ".join(str(log.folder) for log in self._logs.values())
-            say(f"stopped after {count} frames; their motion is in {folders}")
+        count = max(self._next_frame, self._first_new) - self._first_frame
+        if not count:
+            return
+        folders = ", ".join(str(log.folder) for log in self._logs.values())
+        remedy = "" if self._kept is None else "; the same command with resume=true goes on from there"
+        say(f"stopped after {count} frames; their motion is in {folders}{remedy}")
 
     def _write(self, block: list[FrameDone]) -> None:
         motions = self._motions(block)
-        for name, motion in motions.items():
-            self._logs[name].append(motion)
+        if self._next_frame >= self._first_new:
+            for name, motion in motions.items():
+                self._logs[name].append(motion)
+            if self._kept is not None:
+                self._kept.append([done.tracked for done in block])
         first, self._next_frame = self._next_frame, self._next_frame + len(block)
         shown = list(motions.values())
         if self._overlay is not None:
@@ -156,6 +190,7 @@ class Streams:
                 energy=np.array([result.terms.energy for result in results], float),
                 iterations=np.array([result.iterations for result in results], int),
                 converged=np.array([result.converged for result in results], bool),
+                up=self._recording.up,
                 pose_std=None if pose_std is None else pose_std[:, part],
                 joint_std=None if joint_std is None else joint_std[:, joints],
             )

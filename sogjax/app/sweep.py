@@ -152,7 +152,7 @@ def row_numbers(result: Any) -> Numbers:
     """What a sweep's table shows of one run."""
     import numpy as np
 
-    numbers = Numbers.fromkeys(COLUMNS, float("nan"))
+    numbers = Numbers(dict.fromkeys(COLUMNS, float("nan")))
     if result.evaluation is not None:
         summary = result.evaluation.summary
         numbers["mean mm"], numbers["std mm"] = 1000.0 * summary.mean, 1000.0 * summary.std

@@ -5,6 +5,7 @@ import tempfile
 from pathlib import Path
 
 from sogjax.app.configs import ViewConfig
+from sogjax.app.outputs import free_path
 from sogjax.app.progress import progress
 from sogjax.app.recordings import file_list, opened
 from sogjax.data.ground_truth import load_ground_truth
@@ -19,11 +20,12 @@ def run(config: ViewConfig) -> Path:
     """Write the Rerun file, or open the viewer on it where no file is asked for.
 
     Raises:
-        InputError: files that do not open or do not fit together.
+        InputError: files that do not open or do not fit together, or a Rerun file that is there.
     """
+    asked = None if config.out is None else free_path("out", config.out, config.overwrite)
     recording = opened(config.recording)
     motions = [load_motion(path) for path in file_list(config.motion)]
-    out = Path(config.out) if config.out is not None else Path(tempfile.mkdtemp()) / "motion.rrd"
+    out = Path(tempfile.mkdtemp()) / "motion.rrd" if asked is None else asked
     first, stop = (number - recording.first_frame for number in frame_range(recording, motions))
     write_rerun(
         out,

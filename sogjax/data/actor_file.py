@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from sogjax.data import actor_rows
 from sogjax.data.actor_rows import WORLD, Row, filled_table, names, table
 from sogjax.data.atomic import atomic_path
-from sogjax.data.yaml_entry import read_yaml
+from sogjax.data.yaml_entry import Entry, read_yaml
 from sogjax.errors import InputError
 from sogjax.model.body import Attachments, Body
 from sogjax.model.color import COLOR_RADIUS, to_rgb
@@ -48,11 +48,22 @@ def load_body(path: Path) -> Body:
     Raises:
         InputError: the file is no such body; the message names the key, its value and what was expected.
     """
-    document = read_yaml(Path(path)).fields(
+    return body_from(read_yaml(Path(path)))
+
+
+def body_from(content: Entry, metres: float | None = None) -> Body:
+    """The body that the content of a body file describes; `metres` is its unit of length, where it names none.
+
+    Raises:
+        InputError: it describes none; the message names the key, its value and what was expected.
+    """
+    document = content.fields(
         ("name", "joints", "dofs", "blobs", "poses"), ("unit", "color_space", "landmarks", "shape")
     )
     name = actor_rows.plain_name(document["name"])
-    metres = METRES[document["unit"].choice(METRES, "a unit of length")] if "unit" in document else 1.0
+    metres = metres or 1.0
+    if "unit" in document:
+        metres = METRES[document["unit"].choice(METRES, "a unit of length")]
     space = document["color_space"].choice(COLOR_RADIUS, "a colour space") if "color_space" in document else "rgb"
     joint_rows = actor_rows.sorted_by_parent(
         filled_table(document["joints"], ("name", "parent", "offset", "axis", "kind"))

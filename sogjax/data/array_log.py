@@ -4,6 +4,8 @@ A folder with two files: `constant.npz` has what is known from the beginning, `r
 Rows are only ever appended; the header of `rows.npy`, whose length does not change, is brought up to date after them.
 """
 
+from contextlib import ExitStack
+from io import BytesIO
 from pathlib import Path
 from types import TracebackType
 
@@ -21,19 +23,31 @@ Arrays = dict[str, np.ndarray]
 class ArrayLog:
     """Writes such a folder, which is made, or begun anew; the file stays open until `close`.
 
+    Args:
+        folder: to write.
+        constant: what is known from the beginning.
+        first_rows: the rows to write first; they say the names, types and shapes of all.
+        kept: rows of a log that is there already, after which this one goes on; rows behind these are dropped.
+
     Raises:
         InputError: the folder cannot be written, here or later.
     """
 
-    def __init__(self, folder: Path, constant: Arrays, first_rows: Arrays):
-        with atomic_path(folder / CONSTANT) as temporary, temporary.open("wb") as file:
-            np.savez(file, **constant)  # pyright: ignore[reportArgumentType]
+    def __init__(self, folder: Path, constant: Arrays, first_rows: Arrays, kept: int = 0):
         self._path = folder / ROWS
         self._dtype = np.dtype([(name, rows.dtype, rows.shape[1:]) for name, rows in first_rows.items()])
-        self._count = 0
-        with disk_trouble_told(self._path):
-            self._file = self._path.open("wb")
-        self.append(first_rows)
+        self._count = kept
+        if not kept:
+            self._path.unlink(missing_ok=True)
+            with atomic_path(folder / CONSTANT) as temporary, temporary.open("wb") as file:
+                np.savez(file, **constant)  # pyright: ignore[reportArgumentType]
+        with ExitStack() as on_error, disk_trouble_told(self._path):
+            # Without a buffer nothing waits to be written when a disk is full or a process is killed.
+            self._file = on_error.enter_context(self._path.open("r+b" if kept else "wb", buffering=0))
+            self._first_row = self._write_header()
+            self._file.truncate(self._end)
+            self.append(first_rows)
+            on_error.pop_all()
 
     def append(self, rows: Arrays) -> None:
         """Write more rows, of the same names, types and shapes as the first ones."""
@@ -41,11 +55,8 @@ class ArrayLog:
         for name, values in rows.items():
             records[name] = values
         with disk_trouble_told(self._path):
-            if self._count == 0:
-                self._write_header()
-            self._file.seek(0, 2)
-            self._file.write(records.tobytes())
-            self._file.flush()
+            self._file.seek(self._end)
+            self._write(records.tobytes())
             self._count += len(records)
             self._write_header()
 
@@ -61,13 +72,27 @@ class ArrayLog:
     ) -> None:
         self.close()
 
-    def _write_header(self) -> None:
+    @property
+    def _end(self) -> int:
+        """Where the next row belongs, in bytes; what stands there was never counted."""
+        return self._first_row + self._count * self._dtype.itemsize
+
+    def _write_header(self) -> int:
+        """Say how many rows there are; returns where the first one begins."""
         described = np.lib.format.dtype_to_descr(self._dtype)
-        self._file.seek(0)
+        header = BytesIO()
         np.lib.format.write_array_header_1_0(
-            self._file, {"descr": described, "fortran_order": False, "shape": (self._count,)}
+            header, {"descr": described, "fortran_order": False, "shape": (self._count,)}
         )
-        self._file.flush()
+        self._file.seek(0)
+        self._write(header.getvalue())
+        return len(header.getvalue())
+
+    def _write(self, content: bytes) -> None:
+        """All of it: without a buffer, a call may write a part only."""
+        left = memoryview(content)
+        while left:
+            left = left[self._file.write(left) :]
 
 
 def read_log(folder: Path, mapped: bool = False) -> Arrays:
@@ -79,7 +104,21 @@ def read_log(folder: Path, mapped: bool = False) -> Arrays:
     constant = read_npz(folder / CONSTANT)
     path = folder / ROWS
     try:
-        rows = np.load(path, mmap_mode="r" if mapped else None, allow_pickle=False)
-        return constant | {name: rows[name] for name in rows.dtype.names or ()}
+        rows = _whole_rows(path, mapped)
     except (OSError, ValueError, EOFError) as error:
         raise InputError(f"{path}: is not readable ({error}); track again") from error
+    return constant | {name: rows[name] for name in rows.dtype.names or ()}
+
+
+def _whole_rows(path: Path, mapped: bool) -> np.ndarray:
+    """The rows that the header counts, less those that a loss of power took."""
+    with path.open("rb") as file:
+        np.lib.format.read_magic(file)
+        shape, _, dtype = np.lib.format.read_array_header_1_0(file)
+        begin = file.tell()
+    if dtype.hasobject or len(shape) != 1:
+        raise ValueError("it holds no rows of numbers")
+    count = min(shape[0], (path.stat().st_size - begin) // max(dtype.itemsize, 1))
+    if mapped and count:
+        return np.memmap(path, dtype, "r", begin, (count,))
+    return np.fromfile(path, dtype, count, offset=begin)

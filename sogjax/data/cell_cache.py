@@ -19,7 +19,7 @@ from jaxtyping import UInt8
 
 from sogjax.data.atomic import atomic_path
 from sogjax.data.recording import Recording
-from sogjax.data.source import numbered_images
+from sogjax.data.source import fingerprint
 from sogjax.errors import InputError
 
 CELLS_VERSION = 1
@@ -97,7 +97,7 @@ class CellCache:
             "version": CELLS_VERSION,
             "depth": self.depth,
             "frame_offset": {camera: self.recording.frame_offset[camera] for camera in cameras},
-            "files": {camera: _fingerprint(self.recording.sources[camera]) for camera in cameras},
+            "files": {camera: fingerprint(self.recording.sources[camera]) for camera in cameras},
         }
 
     def _checked(self, note: Path, array: Path) -> tuple[int, CellsOfClip]:
@@ -135,13 +135,6 @@ def cell_cache(folder: str, recording: Recording, depth: int, say: Callable[[str
         reason = error.strerror or str(error)
         raise InputError(f"images.cache={folder}: no folder can be made there ({reason}); choose another") from error
     return CellCache(path, recording, depth, say)
-
-
-def _fingerprint(source: Path) -> str:
-    """Of a video or a folder of images: names, sizes and times of last change of its files."""
-    files = numbered_images(source) if source.is_dir() else [source]
-    looked = [(file.name, (state := file.stat()).st_size, state.st_mtime_ns) for file in files]
-    return hashlib.sha256(json.dumps(looked).encode()).hexdigest()
 
 
 def _checksum(path: Path, offset: int) -> int:

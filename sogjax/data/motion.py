@@ -22,8 +22,11 @@ from sogjax.data.npz_file import (
 )
 from sogjax.errors import InputError
 from sogjax.model.body import Body
+from sogjax.model.frames import UP_AXES
 
 FORMAT_VERSION = 1
+DEFAULT_UP = "z"
+"""The vertical of a file that does not say it."""
 FRAMES_AT_ONCE = 8
 """Joint frames and blobs are computed in blocks of so many frames, so that one program serves motions of any length."""
 
@@ -53,6 +56,8 @@ class Motion:
     energy: Float[np.ndarray, "frame"]
     iterations: Int[np.ndarray, "frame"]
     converged: Bool[np.ndarray, "frame"]
+    up: str = DEFAULT_UP
+    """The world's vertical, one of `sogjax.model.frames.UP_AXES`."""
     pose_std: Float[np.ndarray, "frame dof"] | None = None
     """Standard deviation of each degree of freedom; None where it was not computed, as in `joint_std`."""
     joint_std: Float[np.ndarray, "frame joint"] | None = None
@@ -74,10 +79,11 @@ def motion_from_poses(
     energy: Float[np.ndarray, "frame"] | None = None,
     iterations: Int[np.ndarray, "frame"] | None = None,
     converged: Bool[np.ndarray, "frame"] | None = None,
+    up: str = DEFAULT_UP,
     pose_std: Float[np.ndarray, "frame dof"] | None = None,
     joint_std: Float[np.ndarray, "frame joint"] | None = None,
 ) -> Motion:
-    """The motion of `body` through `poses`.
+    """The motion of `body`, which stands upright in a world with the vertical `up`, through `poses`.
 
     `frame` counts from 0 where it is not given; without a solver's account `similarity` and `energy` are NaN,
     `iterations` 0 and `converged` true.
@@ -106,6 +112,7 @@ def motion_from_poses(
         energy=unknown if energy is None else energy,
         iterations=np.zeros(count, int) if iterations is None else iterations,
         converged=np.ones(count, bool) if converged is None else converged,
+        up=up,
         pose_std=pose_std,
         joint_std=joint_std,
     )
@@ -170,6 +177,7 @@ def checked_motion(path: Path, arrays: dict[str, np.ndarray]) -> Motion:
         energy=float_array(path, arrays, "energy", (frames,)),
         iterations=int_array(path, arrays, "iterations", (frames,)),
         converged=bool_array(path, arrays, "converged", (frames,)),
+        up=str(text_array(path, arrays, "up", ())) if "up" in arrays else DEFAULT_UP,
         pose_std=_if_there(path, arrays, "pose_std", (frames, len(dof_names))),
         joint_std=_if_there(path, arrays, "joint_std", (frames, joints)),
     )
@@ -213,6 +221,8 @@ def _forward(
 
 def _check(path: Path, motion: Motion) -> None:
     """Refuse indices that point nowhere, and what is no succession of rigid frames."""
+    if motion.up not in UP_AXES:
+        raise InputError(f"{path}: 'up' is {motion.up!r}; it should be one of {', '.join(UP_AXES)}")
     joints = np.arange(len(motion.joint_names))
     wrong = (motion.joint_parents < -1) | (motion.joint_parents >= joints)
     if wrong.any():

@@ -28,12 +28,17 @@ SOMETIMES_PER_FRAME = ("pose_std", "joint_std")
 class MotionLog:
     """The motion of one actor so far, in a folder that `load_motion` reads.
 
+    Args:
+        folder: of the log.
+        kept: frames of a log that is there already, after which this one goes on; 0: it begins anew.
+
     Raises:
         InputError: the folder cannot be written, here or later.
     """
 
-    def __init__(self, folder: Path):
+    def __init__(self, folder: Path, kept: int = 0):
         self.folder = folder
+        self._kept = kept
         self._log: ArrayLog | None = None
 
     def append(self, motion: Motion) -> None:
@@ -41,7 +46,8 @@ class MotionLog:
         arrays = arrays_of(motion)
         rows = {name: arrays.pop(name) for name in (*PER_FRAME, *SOMETIMES_PER_FRAME) if name in arrays}
         if self._log is None:
-            self._log = ArrayLog(self.folder, arrays | {"format_version": np.array(FORMAT_VERSION)}, rows)
+            constant = arrays | {"format_version": np.array(FORMAT_VERSION)}
+            self._log = ArrayLog(self.folder, constant, rows, self._kept)
         else:
             self._log.append(rows)
 
@@ -49,6 +55,7 @@ class MotionLog:
         """All that was written; `mapped`: the arrays stay on disk, as long as the folder does."""
         arrays = read_log(self.folder, mapped)
         arrays["fps"] = float(arrays["fps"])  # pyright: ignore[reportArgumentType]
+        arrays["up"] = str(arrays["up"])  # pyright: ignore[reportArgumentType]
         arrays.pop("format_version")
         return Motion(**arrays)  # pyright: ignore[reportArgumentType]
 

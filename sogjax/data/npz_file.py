@@ -1,6 +1,7 @@
 """Reading npz files that come from elsewhere: no pickles, bounded, one sentence where a key is wrong."""
 
 import zipfile
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,8 @@ from sogjax.errors import InputError
 
 MAX_BYTES = 4 * 2**30
 """Bytes that the arrays of one file may take in memory."""
+
+_UNREADABLE = (OSError, ValueError, zipfile.BadZipFile, zlib.error, EOFError, KeyError, MemoryError, RuntimeError)
 
 
 def read_npz(path: Path) -> dict[str, np.ndarray]:
@@ -29,7 +32,7 @@ def read_npz(path: Path) -> dict[str, np.ndarray]:
             return {key: arrays[key] for key in arrays.files}
     except InputError:
         raise
-    except (OSError, ValueError, zipfile.BadZipFile, EOFError, KeyError, MemoryError, RuntimeError) as error:
+    except _UNREADABLE as error:
         raise InputError(f"{path}: is not readable as npz without pickles ({error}); write it anew") from error
 
 

@@ -1,7 +1,7 @@
 """A recording: a folder with synchronised videos, their calibration, and what else is known of them."""
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,9 @@ __all__ = ["ExamplePose", "Recording", "open_recording"]
 
 FPS_TOLERANCE = 5e-4
 """Relative difference of two videos' frame rates that is taken for rounding (29.97 and 30 differ by 1e-3)."""
+
+LONGEST_GAP = 1.5
+"""Time between two images, in units of the usual one, beyond which the images do not come evenly."""
 
 FAR_CAMERA = 100.0
 """Metres from the origin at which a camera's place is suspected to be in other units."""
@@ -49,6 +52,27 @@ class Recording:
     ground_truth: Path | None
     warnings: tuple[str, ...]
     """One sentence each."""
+    num_images: dict[str, int] = field(default_factory=dict)
+    """By camera the number of its images; a camera without an entry has one for every frame."""
+    missing: dict[str, tuple[tuple[int, int], ...]] = field(default_factory=dict)
+    """By camera the first and last frame (its own numbers) of each while in which its pictures are not to be used."""
+    fewest_cameras: int | None = None
+    """Frames that so many cameras have are used; None: only those that all have."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether every camera has a picture of every frame."""
+        return self.fewest_cameras is None and not any(self.missing.get(name) for name in self.rig.names)
+
+    def has_image(self, camera: str, frame: int) -> bool:
+        """Whether a camera's file holds a frame, counted from the recording's first."""
+        number = self.first_frame + frame + self.frame_offset[camera]
+        return 0 <= number < self.num_images.get(camera, number + 1)
+
+    def is_missing(self, camera: str, frame: int) -> bool:
+        """Whether a camera's picture of a frame, counted from the recording's first, is not to be used."""
+        number = self.first_frame + frame
+        return any(first <= number <= last for first, last in self.missing.get(camera, ()))
 
 
 def open_recording(path: Path) -> Recording:
@@ -66,15 +90,18 @@ def open_recording(path: Path) -> Recording:
     cameras = _cameras(path, calibration, settings, calibrated.names, tuple(sources))
     rig = calibrated.select(cameras)
     sources = {camera: sources[camera] for camera in cameras}
-    for camera in settings.frame_offset:
+    for key, camera in [("frame_offset", c) for c in settings.frame_offset] + [
+        ("missing", c) for c in settings.missing
+    ]:
         if camera not in calibrated.names:
             raise InputError(
-                f"{path / 'recording.yaml'}: frame_offset: there is no camera {camera!r} in the calibration; "
+                f"{path / 'recording.yaml'}: {key}: there is no camera {camera!r} in the calibration; "
                 f"its cameras are: {', '.join(calibrated.names)}"
             )
     offsets = {camera: settings.frame_offset.get(camera, 0) for camera in cameras}
     with ThreadPoolExecutor() as pool:
         infos = dict(zip(cameras, pool.map(look_at_source, sources.values()), strict=True))
+    rig = rig.with_sizes({camera: info.size for camera, info in infos.items()})
     for camera in cameras:
         check_size(sources[camera], infos[camera].size, rig, camera)
     first, count, warnings = _frames(path, settings, infos, offsets)
@@ -92,7 +119,10 @@ def open_recording(path: Path) -> Recording:
         example_poses=find_example_poses(path / "example_poses", rig, calibrated.names, settings.example_poses),
         initial_poses=_initial_poses(path / "initial_pose.yaml"),
         ground_truth=_ground_truth(path / "ground_truth.npz"),
-        warnings=(*warnings, *_doubts(path, settings, rig)),
+        warnings=(*warnings, *_doubts(path, settings, rig), *_uneven(sources, infos)),
+        num_images={camera: infos[camera].num_frames for camera in cameras},
+        missing={camera: settings.missing[camera] for camera in cameras if camera in settings.missing},
+        fewest_cameras=settings.fewest_cameras,
     )
 
 
@@ -152,10 +182,11 @@ def _fps(path: Path, settings: RecordingSettings, infos: dict[str, SourceInfo]) 
 def _frames(
     path: Path, settings: RecordingSettings, infos: dict[str, SourceInfo], offsets: dict[str, int]
 ) -> tuple[int, int, tuple[str, ...]]:
-    """First frame and number of frames that all cameras have and recording.yaml asks for, and warnings."""
-    earliest = max(0, *(-offset for offset in offsets.values()))
+    """First frame and number of frames that enough cameras have and recording.yaml asks for, and warnings."""
+    needed = min(settings.fewest_cameras or len(infos), len(infos))
     ends = {camera: infos[camera].num_frames - offsets[camera] for camera in infos}
-    latest = min(ends.values()) - 1
+    earliest = max(0, sorted(-offset for offset in offsets.values())[needed - 1])
+    latest = sorted(ends.values(), reverse=True)[needed - 1] - 1
     if latest < earliest:
         lengths = ", ".join(f"{camera} {info.num_frames}" for camera, info in infos.items())
         raise InputError(
@@ -166,13 +197,20 @@ def _frames(
         if frame is not None and not earliest <= frame <= latest:
             raise InputError(
                 f"{path / 'recording.yaml'}: {key}: {frame} is out of range; "
-                f"the frames that all cameras have are {earliest} to {latest}"
+                f"the frames that {'all' if needed == len(infos) else needed} cameras have are {earliest} to {latest}"
             )
     first, last = earliest if first is None else first, latest if last is None else last
     if last < first:
         raise InputError(f"{path / 'recording.yaml'}: last_frame: {last} is before first_frame {first}; swap them")
     warnings = ()
-    if settings.last_frame is None and len(set(ends.values())) > 1:
+    if settings.fewest_cameras is not None:
+        spans = {camera: (max(first, -offsets[camera]), min(last, ends[camera] - 1)) for camera in infos}
+        partly = ", ".join(f"{c} {a} to {b}" for c, (a, b) in spans.items() if (a, b) != (first, last))
+        if partly:
+            warnings = (
+                f"{path}: frames {first} to {last} are used, of which some cameras have a part only ({partly})",
+            )
+    elif settings.last_frame is None and len(set(ends.values())) > 1:
         lengths = ", ".join(f"{camera} {info.num_frames}" for camera, info in infos.items())
         warnings = (f"{path}: the videos differ in length ({lengths} frames); frames {first} to {last} are used",)
     return first, last - first + 1, warnings
@@ -190,6 +228,17 @@ def _ground_truth(path: Path) -> Path | None:
         return None
     load_ground_truth(path)
     return path
+
+
+def _uneven(sources: dict[str, Path], infos: dict[str, SourceInfo]) -> list[str]:
+    """Sentences on videos whose images do not come at one rate."""
+    return [
+        f"{sources[camera]}: its images do not come evenly (up to {info.longest_gap:.1f} times the usual time lies "
+        "between two): the frame rate varies or images were dropped, and each counts as one frame; convert it to a "
+        "constant rate"
+        for camera, info in infos.items()
+        if info.longest_gap > LONGEST_GAP
+    ]
 
 
 def _doubts(path: Path, settings: RecordingSettings, rig: CameraRig) -> tuple[str, ...]:

@@ -17,6 +17,8 @@ _KEYS = (
     "frame_offset",
     "first_frame",
     "last_frame",
+    "fewest_cameras",
+    "missing",
     "example_poses",
 )
 
@@ -42,6 +44,9 @@ class RecordingSettings:
     frame_offset: dict[str, int] = field(default_factory=dict)
     first_frame: int | None = None
     last_frame: int | None = None
+    fewest_cameras: int | None = None
+    missing: dict[str, tuple[tuple[int, int], ...]] = field(default_factory=dict)
+    """By camera the first and last frame of each while in which its pictures are not to be used."""
     example_poses: tuple[ExampleSettings, ...] | None = None
 
 
@@ -63,6 +68,8 @@ def read_recording_settings(path: Path) -> RecordingSettings:
         frame_offset=_offsets(given["frame_offset"]) if "frame_offset" in given else {},
         first_frame=_whole(given["first_frame"]) if "first_frame" in given else None,
         last_frame=_whole(given["last_frame"]) if "last_frame" in given else None,
+        fewest_cameras=_count(given["fewest_cameras"]) if "fewest_cameras" in given else None,
+        missing=_missing(given["missing"]) if "missing" in given else {},
         example_poses=_examples(given["example_poses"]) if "example_poses" in given else None,
     )
 
@@ -90,6 +97,23 @@ def _camera_names(entry: Entry) -> tuple[str, ...]:
 
 def _offsets(entry: Entry) -> dict[str, int]:
     return {camera: _whole(offset) for camera, offset in entry.mapping().items()}
+
+
+def _count(entry: Entry) -> int:
+    if _whole(entry) < 1:
+        raise entry.error("a number of cameras, at least 1")
+    return _whole(entry)
+
+
+def _missing(entry: Entry) -> dict[str, tuple[tuple[int, int], ...]]:
+    return {camera: tuple(_span(span) for span in spans.items()) for camera, spans in entry.mapping().items()}
+
+
+def _span(entry: Entry) -> tuple[int, int]:
+    ends = tuple(_whole(end) for end in entry.items())
+    if len(ends) != 2 or ends[1] < ends[0]:
+        raise entry.error("the first and the last frame of a while, such as [120, 180]")
+    return ends[0], ends[1]
 
 
 def _examples(entry: Entry) -> tuple[ExampleSettings, ...]:

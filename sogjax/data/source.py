@@ -1,5 +1,7 @@
 """The images of one camera, one after the other: a video, or a folder of numbered images."""
 
+import hashlib
+import json
 import os
 import re
 from abc import ABC, abstractmethod
@@ -46,6 +48,8 @@ class SourceInfo:
     fps: float | None
     num_frames: int
     size: tuple[int, int]
+    longest_gap: float = 1.0
+    """The longest time between two images, in units of the middle one: 2 where one image is missing."""
 
 
 def find_sources(folder: Path) -> dict[str, Path]:
@@ -98,7 +102,8 @@ def look_at_source(path: Path) -> SourceInfo:
         return SourceInfo(None, len(numbered_images(path)), size)
     with _captured(path) as capture:
         fps, claimed = capture.get(cv2.CAP_PROP_FPS), int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
-    return SourceInfo(fps, _num_frames(path, claimed), size)
+    times = _packet_times(path) if path.stat().st_size < _COUNT_PACKETS_BELOW else None
+    return SourceInfo(fps, _num_frames(path, claimed, times), size, _longest_gap(times))
 
 
 def numbered_images(folder: Path) -> list[Path]:
@@ -124,6 +129,13 @@ def numbered_images(folder: Path) -> list[Path]:
         if number not in numbers:
             raise InputError(f"{folder}: the image number {number} is missing; number them without a gap")
     return [numbers[number] for number in sorted(numbers)]
+
+
+def fingerprint(source: Path) -> str:
+    """Of a video or a folder of images: names, sizes and times of last change of its files."""
+    files = numbered_images(source) if source.is_dir() else [source]
+    looked = [(file.name, (state := file.stat()).st_size, state.st_mtime_ns) for file in files]
+    return hashlib.sha256(json.dumps(looked).encode()).hexdigest()
 
 
 class _VideoFile(Source):
@@ -191,9 +203,9 @@ def _captured(path: Path, parameters: Sequence[int] = ()) -> Iterator[cv2.VideoC
         capture.release()
 
 
-def _num_frames(path: Path, claimed: int) -> int:
+def _num_frames(path: Path, claimed: int, times: Sequence[float] | None) -> int:
     """The number of frames; what the container claims is believed where its packets are as many."""
-    packets = _num_packets(path) if path.stat().st_size < _COUNT_PACKETS_BELOW else None
+    packets = None if times is None else len(times)
     if claimed > 0 and packets in (None, claimed):
         return claimed
     likely = min(count for count in (claimed, packets) if count is not None and count > 0)
@@ -209,13 +221,20 @@ def _num_frames(path: Path, claimed: int) -> int:
     return count
 
 
-def _num_packets(path: Path) -> int:
-    """The number of compressed packets in a video, which are read but not decoded."""
+def _packet_times(path: Path) -> list[float]:
+    """When the compressed packets of a video, which are read but not decoded, are to be shown; milliseconds."""
+    times = []
     with _captured(path, [cv2.CAP_PROP_FORMAT, -1]) as capture:
-        count = 0
         while capture.grab():
-            count += 1
-    return count
+            times.append(capture.get(cv2.CAP_PROP_POS_MSEC))
+    return times
+
+
+def _longest_gap(times: Sequence[float] | None) -> float:
+    """In units of the middle one; 1 where the times are not known."""
+    gaps = np.diff(np.sort(times or [0.0]))
+    middle = float(np.median(gaps)) if len(gaps) else 0.0
+    return float(gaps.max()) / middle if middle > 0.0 else 1.0
 
 
 def _visible(folder: Path) -> list[Path]:

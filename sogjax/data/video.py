@@ -6,7 +6,7 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
@@ -23,8 +23,8 @@ __all__ = ["VideoWriter", "read_frames", "read_image", "read_mask", "read_prepar
 Item = TypeVar("Item")
 
 
-def read_frames(recording: Recording, start: int = 0, stop: int | None = None) -> Iterator[list[np.ndarray]]:
-    """The images of each time step, BGR, in the order of the rig's cameras.
+def read_frames(recording: Recording, start: int = 0, stop: int | None = None) -> Iterator[list[Any]]:
+    """The images of each time step, BGR, in the order of the rig's cameras; None where a camera is missing.
 
     `start` and `stop` count from the recording's first frame. Threads decode the cameras, one time step
     ahead of the consumer; when the consumer stops, all files are closed.
@@ -37,12 +37,12 @@ def read_frames(recording: Recording, start: int = 0, stop: int | None = None) -
 
 def read_prepared(
     recording: Recording,
-    prepare: Callable[[int, np.ndarray], Item],
+    prepare: Callable[[int, Any], Item],
     start: int = 0,
     stop: int | None = None,
     workers: int | None = None,
 ) -> Iterator[list[Item]]:
-    """The same, but what `prepare` makes of each image and the number of its camera.
+    """The same, but what `prepare` makes of each image (None where a camera is missing) and the number of its camera.
 
     The decoding threads do that, so a large image need not outlive the moment in which it was decoded. There are
     `workers` of them, by default one for each core.
@@ -57,7 +57,7 @@ def read_prepared(
 
 
 def _decoded_ahead(
-    recording: Recording, prepare: Callable[[int, np.ndarray], Item], start: int, stop: int, workers: int
+    recording: Recording, prepare: Callable[[int, Any], Item], start: int, stop: int, workers: int
 ) -> Iterator[list[Item]]:
     if start == stop:
         return
@@ -69,7 +69,7 @@ def _decoded_ahead(
             pool.submit(
                 open_source,
                 recording.sources[camera],
-                recording.first_frame + start + recording.frame_offset[camera],
+                max(recording.first_frame + start + recording.frame_offset[camera], 0),
                 threads,
             )
             for camera in cameras
@@ -77,8 +77,16 @@ def _decoded_ahead(
         stack.callback(_close_all, opened)
         sources = [future.result() for future in opened]
 
+        ended: set[int] = set()
+
         def decoded(camera: int, frame: int) -> Item:
-            return prepare(camera, _checked(recording, cameras[camera], sources[camera].read(), frame))
+            name = cameras[camera]
+            if camera in ended or not recording.has_image(name, frame):
+                return prepare(camera, None)
+            image = _checked(recording, name, sources[camera].read(), frame)
+            if image is None:
+                ended.add(camera)  # what might still come would be images of other frames
+            return prepare(camera, None if recording.is_missing(name, frame) else image)
 
         decode = lambda frame: [pool.submit(decoded, camera, frame) for camera in range(len(cameras))]
         upcoming = decode(start)
@@ -96,8 +104,10 @@ def _close_all(opened: list[Future[Source]]) -> None:
             future.result().close()
 
 
-def _checked(recording: Recording, camera: str, image: np.ndarray | None, frame: int) -> np.ndarray:
+def _checked(recording: Recording, camera: str, image: np.ndarray | None, frame: int) -> np.ndarray | None:
     source, number = recording.sources[camera], recording.first_frame + frame
+    if image is None and recording.fewest_cameras is not None:
+        return None
     if image is None:
         raise InputError(
             f"{source}: ends before frame {number}, though its header promises more; "

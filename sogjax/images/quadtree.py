@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.images.cells import CellGrid
-from sogjax.model.camera import Camera, undistort
+from sogjax.model.camera import Camera, undistort, undistorted_sizes
 from sogjax.model.compaction import chosen_indices
 from sogjax.model.sog import Sog
 from sogjax.model.stages import computed_once
@@ -30,7 +30,7 @@ class Candidates(eqx.Module):
     means: Float[Array, "*camera candidate 2"]
     """Undistorted pixels."""
     sigmas: Float[Array, "*camera candidate"]
-    """Half the side of the node, in pixels (Section 4.1)."""
+    """Half the side of the node, in undistorted pixels (Section 4.1)."""
     inside: Bool[Array, "*camera candidate"]
     """The node may be a leaf: it lies inside the image (a cell: at least half of it)."""
     shape: tuple[int, int] = eqx.field(static=True)
@@ -47,13 +47,15 @@ class Candidates(eqx.Module):
         tables = [_node_table(grid, shape, num_levels) for grid in grids]
         means, sigmas, inside = (np.stack(parts) for parts in zip(*tables, strict=True))
         dtype = cameras.intrinsics.dtype
-        undistorted = _undistorted(cameras, jnp.asarray(means, dtype))
-        return cls(undistorted, jnp.asarray(sigmas, dtype), jnp.asarray(inside), shape, num_levels)
+        undistorted, sizes = _undistorted(cameras, jnp.asarray(means, dtype), jnp.asarray(sigmas, dtype))
+        return cls(undistorted, sizes, jnp.asarray(inside), shape, num_levels)
 
 
 @jax.jit
-def _undistorted(cameras: Camera, pixels: Float[Array, "camera n 2"]) -> Float[Array, "camera n 2"]:
-    return jax.vmap(undistort)(cameras, pixels)
+def _undistorted(
+    cameras: Camera, pixels: Float[Array, "camera n 2"], sizes: Float[Array, "camera n"]
+) -> tuple[Float[Array, "camera n 2"], Float[Array, "camera n"]]:
+    return jax.vmap(undistort)(cameras, pixels), jax.vmap(undistorted_sizes)(cameras, pixels, sizes)
 
 
 def _node_table(

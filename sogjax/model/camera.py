@@ -1,8 +1,9 @@
 """Pinhole cameras: projection of 3-D blobs (Eq. 4) and undistortion of image blob centres."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from sogjax.model.rotation import transform_points
 from sogjax.model.sog import Sog
@@ -11,6 +12,12 @@ NEAR = 0.05
 """Metres. A blob nearer to the camera plane than this, or behind it, is not seen."""
 
 UNDISTORT_ITERATIONS = 12
+
+MAX_FISHEYE_ANGLE = 1.45
+"""Radians from the optical axis (83 degrees). What a fisheye lens shows beyond lies here when it is undistorted: a
+pinhole picture ends at 90 degrees."""
+
+MAX_MAGNIFICATION = 4.0
 
 
 class Camera(eqx.Module):
@@ -23,9 +30,11 @@ class Camera(eqx.Module):
     intrinsics: Float[Array, "*camera 3 3"]
     camera_from_world: Float[Array, "*camera 4 4"]
     distortion: Float[Array, "*camera 5"]
-    """OpenCV's k1 k2 p1 p2 k3."""
+    """OpenCV's k1 k2 p1 p2 k3; of a fisheye lens k1 k2 k3 k4 and a 0."""
     image_size: Float[Array, "*camera 2"]
     """Width and height in pixels."""
+    fisheye: Bool[Array, "*camera"] | None = None
+    """Which cameras have OpenCV's fisheye model; None: none has, and nothing is computed for it."""
 
     @property
     def focal_length(self) -> Float[Array, "*camera"]:
@@ -73,17 +82,41 @@ def project(camera: Camera, blobs: Sog) -> Sog:
 
 
 def distort(camera: Camera, pixels: Float[Array, "n 2"]) -> Float[Array, "n 2"]:
-    """Where the lens puts undistorted `pixels` in the picture as recorded (OpenCV's model)."""
-    return _pixels_from_rays(camera, _distort_rays(camera.distortion, _rays_from_pixels(camera, pixels)))
+    """Where the lens puts undistorted `pixels` in the picture as recorded (OpenCV's models)."""
+    rays = _rays_from_pixels(camera, pixels)
+    distorted = _distort_rays(_polynomial(camera), rays)
+    if camera.fisheye is not None:
+        distorted = jnp.where(camera.fisheye, _fisheye_rays(camera.distortion, rays), distorted)
+    return _pixels_from_rays(camera, distorted)
 
 
 def undistort(camera: Camera, pixels: Float[Array, "n 2"]) -> Float[Array, "n 2"]:
-    """Undistorted pixels of `pixels` in the picture as recorded, by fixed-point iteration."""
+    """Undistorted pixels of `pixels` in the picture as recorded, by iteration."""
     distorted = _rays_from_pixels(camera, pixels)
-    rays = distorted
+    coefficients, rays = _polynomial(camera), distorted
     for _ in range(UNDISTORT_ITERATIONS):
-        rays = rays - (_distort_rays(camera.distortion, rays) - distorted)
+        rays = rays - (_distort_rays(coefficients, rays) - distorted)
+    if camera.fisheye is not None:
+        rays = jnp.where(camera.fisheye, _rays_of_fisheye(camera.distortion, distorted), rays)
     return _pixels_from_rays(camera, rays)
+
+
+def undistorted_sizes(camera: Camera, pixels: Float[Array, "n 2"], sizes: Float[Array, "n"]) -> Float[Array, "n"]:
+    """Lengths (pixels) around `pixels` of the picture as recorded, after `undistort`.
+
+    Polynomial distortion is weak and leaves them; a fisheye picture grows towards its border, by at most
+    `MAX_MAGNIFICATION`.
+    """
+    if camera.fisheye is None:
+        return sizes
+    x, y = jnp.eye(2, dtype=pixels.dtype)
+    moved = lambda direction: jax.jvp(
+        lambda where: undistort(camera, where), (pixels,), (jnp.broadcast_to(direction, pixels.shape),)
+    )[1]
+    by_x, by_y = moved(x), moved(y)
+    area = jnp.abs(by_x[:, 0] * by_y[:, 1] - by_x[:, 1] * by_y[:, 0])
+    growth = jnp.clip(jnp.sqrt(jnp.maximum(area, 1e-6)), 1.0 / MAX_MAGNIFICATION, MAX_MAGNIFICATION)
+    return jnp.where(camera.fisheye, sizes * growth, sizes)
 
 
 def _rays_from_pixels(camera: Camera, pixels: Float[Array, "n 2"]) -> Float[Array, "n 2"]:
@@ -94,6 +127,13 @@ def _rays_from_pixels(camera: Camera, pixels: Float[Array, "n 2"]) -> Float[Arra
 def _pixels_from_rays(camera: Camera, rays: Float[Array, "n 2"]) -> Float[Array, "n 2"]:
     focal = jnp.stack([camera.intrinsics[0, 0], camera.intrinsics[1, 1]])
     return rays * focal[None, :] + camera.intrinsics[None, :2, 2]
+
+
+def _polynomial(camera: Camera) -> Float[Array, "5"]:
+    """The coefficients of the polynomial model: 0 for a fisheye camera, so that this branch stays finite."""
+    if camera.fisheye is None:
+        return camera.distortion
+    return jnp.where(camera.fisheye, jnp.zeros_like(camera.distortion), camera.distortion)
 
 
 def _distort_rays(distortion: Float[Array, "5"], rays: Float[Array, "n 2"]) -> Float[Array, "n 2"]:
@@ -108,3 +148,31 @@ def _distort_rays(distortion: Float[Array, "5"], rays: Float[Array, "n 2"]) -> F
         ],
         axis=-1,
     )
+
+
+def _fisheye_rays(distortion: Float[Array, "5"], rays: Float[Array, "n 2"]) -> Float[Array, "n 2"]:
+    """A ray at the angle t from the axis goes to the radius t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8)."""
+    radius = _safe_lengths(rays)
+    return rays * (_fisheye_radius(distortion, jnp.arctan(radius)) / radius)[:, None]
+
+
+def _rays_of_fisheye(distortion: Float[Array, "5"], distorted: Float[Array, "n 2"]) -> Float[Array, "n 2"]:
+    """The inverse, by Newton's steps for the angle, which stays below `MAX_FISHEYE_ANGLE`."""
+    radius = _safe_lengths(distorted)
+    inside = lambda angle: jnp.clip(angle, 0.0, MAX_FISHEYE_ANGLE)
+    angle = inside(radius)
+    for _ in range(UNDISTORT_ITERATIONS):
+        value, slope = jax.jvp(lambda t: _fisheye_radius(distortion, t), (angle,), (jnp.ones_like(angle),))
+        angle = inside(angle - (value - radius) / jnp.where(jnp.abs(slope) > 1e-3, slope, 1e-3))
+    return distorted * (jnp.tan(angle) / radius)[:, None]
+
+
+def _fisheye_radius(distortion: Float[Array, "5"], angle: Float[Array, "n"]) -> Float[Array, "n"]:
+    k1, k2, k3, k4, _ = distortion
+    squared = angle * angle
+    return angle * (1.0 + squared * (k1 + squared * (k2 + squared * (k3 + squared * k4))))
+
+
+def _safe_lengths(rays: Float[Array, "n 2"]) -> Float[Array, "n"]:
+    """Lengths, not quite 0 on the axis, where the ratio of two of them still means something."""
+    return jnp.sqrt(jnp.sum(rays * rays, axis=1) + 1e-12)

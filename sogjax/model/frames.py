@@ -26,3 +26,8 @@ def axis_vector(axis: str) -> Float[np.ndarray, "3"]:
 def world_from_upright(up: str) -> Float[np.ndarray, "3 3"]:
     """The rotation from the upright frame (x forward, y left, z up) to a world whose vertical is `up`."""
     return np.stack([axis_vector(axis) for axis in _COLUMNS[up]], axis=1)
+
+
+def forward_axis(up: str) -> str:
+    """Which axis of a world with the vertical `up` an upright body looks along."""
+    return _COLUMNS[up][0]

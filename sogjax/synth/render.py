@@ -71,7 +71,8 @@ def render_recording(
 
 def _check_free(out: Path) -> None:
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise InputError(f"out={out}: is there already and not an empty folder; choose another or remove it")
+        remedy = "choose another, or give overwrite=true to replace it"
+        raise InputError(f"out={out}: is there already and not an empty folder; {remedy}")
 
 
 def _temporary_beside(out: Path) -> Path:

@@ -10,17 +10,19 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, UInt8
+from jaxtyping import Array, Bool, Float, UInt8
 
 from sogjax.model.sog import Sog
 from sogjax.track.culling import Capacities
 from sogjax.track.tracker import (
+    FrameCells,
     FrameResult,
     TrackedFrame,
     Tracker,
     TrackState,
     first_capacities,
     larger_capacities,
+    on_device,
 )
 
 ClipCells = UInt8[Array, "frame camera rows columns 3"]
@@ -82,23 +84,20 @@ def with_room(tracked: Callable[[Capacities], FrameResult], capacities: Capaciti
 
 def replayed(
     clip: FrameResult, capacities: Capacities, seconds: float, with_images: bool
-) -> Callable[
-    [Tracker, Float[Array, "dof"], Iterable[UInt8[np.ndarray, "camera rows columns 3"]]], Iterator[TrackedFrame]
-]:
+) -> Callable[[Tracker, Float[Array, "dof"], Iterable[FrameCells]], Iterator[TrackedFrame]]:
     """The results of a clip as from the tracker that goes frame by frame, in whose place it can be put.
 
     Image blobs are found again where they are wanted. `seconds` is what a frame took.
     """
     results = jax.device_get(clip)
 
-    def follow(
-        tracker: Tracker, start: Float[Array, "dof"], frames: Iterable[UInt8[np.ndarray, "camera rows columns 3"]]
-    ) -> Iterator[TrackedFrame]:
+    def follow(tracker: Tracker, start: Float[Array, "dof"], frames: Iterable[FrameCells]) -> Iterator[TrackedFrame]:
         state = TrackState.from_pose(start)
-        for index, cells in enumerate(frames):
+        for index, frame in enumerate(frames):
             result = jax.tree.map(lambda leaf, k=index: leaf[k], results)
             if with_images:
-                images = _image_blobs(tracker, state, jnp.asarray(cells), capacities)
+                cells, present = on_device(frame)
+                images = image_blobs(tracker, state, cells, capacities, present)
                 result = eqx.tree_at(lambda r: r.images, result, images)
             yield TrackedFrame(index, result, capacities, tracker.reader.color_space, seconds)
             state = state.advanced(jnp.asarray(result.pose))
@@ -107,7 +106,12 @@ def replayed(
 
 
 @eqx.filter_jit
-def _image_blobs(
-    tracker: Tracker, state: TrackState, cells: UInt8[Array, "camera rows columns 3"], capacities: Capacities
+def image_blobs(
+    tracker: Tracker,
+    state: TrackState,
+    cells: UInt8[Array, "camera rows columns 3"],
+    capacities: Capacities,
+    present: Bool[Array, "camera"] | None = None,
 ) -> Sog:
-    return tracker.views(cells, state, capacities)[0].images
+    """The image blobs of a frame that was tracked already; `present` as in `Tracker.views`."""
+    return tracker.views(cells, state, capacities, present)[0].images

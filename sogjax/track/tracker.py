@@ -4,7 +4,7 @@ import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import equinox as eqx
 import jax
@@ -112,25 +112,41 @@ class Tracker(eqx.Module):
         return boxes if self.together is None else common_boxes(boxes, self.together)
 
     def views(
-        self, cells: UInt8[Array, "camera rows columns 3"], state: TrackState, capacities: Capacities
+        self,
+        cells: UInt8[Array, "camera rows columns 3"],
+        state: TrackState,
+        capacities: Capacities,
+        present: Bool[Array, "camera"] | None = None,
     ) -> tuple[Views, Int[Array, "camera"], Int[Array, "camera"]]:
-        """What the cameras see, culled, and the counts that must be held against the capacities."""
+        """What the cameras see, culled, and the counts that must be held against the capacities.
+
+        A camera that is not `present` (None: all are) sees nothing, and the similarity is the mean over the others.
+        """
         rgb = cells.astype(self.cameras.intrinsics.dtype) / 255.0
         near_blobs = partial(self.reader.near_blobs, capacity=capacities.near)
         near, num_near = computed_once(self.reader.known, near_blobs, rgb, self.boxes(state))
+        normalizers = self.normalizers
+        if present is not None:
+            near = eqx.tree_at(lambda sog: sog.mask, near, near.mask & present[:, None])
+            num_near = jnp.where(present, num_near, 0)
+            normalizers = normalizers * jnp.mean(present, dtype=normalizers.dtype)
         body_colors = from_rgb(self.body.blob_colors, self.reader.color_space)
         body = eqx.tree_at(lambda sog: sog.colors, self.body.posed_blobs(state.previous), body_colors)
         if self.pairs == "sparse":
             images, similarities, num_matching = self.reader.compared_blobs(near, body)
         else:
             images, similarities, num_matching = self.reader.matching_blobs(near, body, capacities.matching)
-        return Views(self.cameras, images, similarities, self.normalizers), num_near, num_matching
+        return Views(self.cameras, images, similarities, normalizers), num_near, num_matching
 
     def step(
-        self, state: TrackState, cells: UInt8[Array, "camera rows columns 3"], capacities: Capacities
+        self,
+        state: TrackState,
+        cells: UInt8[Array, "camera rows columns 3"],
+        capacities: Capacities,
+        present: Bool[Array, "camera"] | None = None,
     ) -> tuple[TrackState, FrameResult]:
-        """Find the pose of one frame from its cells (sRGB bytes)."""
-        return self.found(state, self.views(cells, state, capacities), capacities)
+        """Find the pose of one frame from its cells (sRGB bytes); `present` as in `views`."""
+        return self.found(state, self.views(cells, state, capacities, present), capacities)
 
     def found(
         self,
@@ -182,6 +198,25 @@ class Tracker(eqx.Module):
 _step = eqx.filter_jit(Tracker.step)
 
 
+class PartialCells(NamedTuple):
+    """The cells of a frame of which some cameras have no picture."""
+
+    cells: UInt8[np.ndarray, "camera rows columns 3"]
+    present: Bool[np.ndarray, "camera"]
+
+
+FrameCells = UInt8[np.ndarray, "camera rows columns 3"] | PartialCells
+
+
+def on_device(
+    frame: FrameCells,
+) -> tuple[UInt8[Array, "camera rows columns 3"], Bool[Array, "camera"] | None]:
+    """The cells of a frame, and which cameras are present; None: all are."""
+    if isinstance(frame, PartialCells):
+        return jnp.asarray(frame.cells), jnp.asarray(frame.present)
+    return jnp.asarray(frame), None
+
+
 @dataclass
 class TrackedFrame:
     """The result of one frame, the capacities it was computed with, and how long that took."""
@@ -196,27 +231,28 @@ class TrackedFrame:
 
 def track(
     tracker: Tracker,
-    start: Float[Array, "dof"],
-    frames: Iterable[UInt8[np.ndarray, "camera rows columns 3"]],
+    start: Float[Array, "dof"] | TrackState,
+    frames: Iterable[FrameCells],
     capacities: Capacities | None = None,
 ) -> Iterator[TrackedFrame]:
-    """Track the frames one after the other from a rough pose of the first one.
+    """Track the frames one after the other from a rough pose of the first one, or from where another run stopped.
 
     The step is compiled once, with room for `HEADROOM` times the image blobs of the first frame, or with the given
     capacities (of a run whose program can so serve this one); a frame that needs more is done again with the next
-    capacity (and compiles again), so no blob is ever cut off unseen.
+    capacity (and compiles again), so no blob is ever cut off unseen. Who goes on with a run gives the capacities that
+    it stopped with: sums of other lengths are rounded otherwise.
 
     Raises:
         InputError: more image blobs than the largest capacity.
     """
-    state = TrackState.from_pose(start)
-    for index, cells in enumerate(frames):
+    state = start if isinstance(start, TrackState) else TrackState.from_pose(start)
+    for index, frame in enumerate(frames):
         begin = time.perf_counter()
-        device_cells = jnp.asarray(cells)
+        cells, present = on_device(frame)
         if capacities is None:
-            capacities = first_capacities(tracker, state, device_cells)
+            capacities = first_capacities(tracker, state, cells)
         while True:
-            next_state, result = _step(tracker, state, device_cells, capacities)
+            next_state, result = _step(tracker, state, cells, capacities, present)
             needed = jax.device_get((result.num_near, result.num_matching, result.num_blocks))
             near, matching, blocks = (int(count.max()) for count in needed)
             if capacities.hold(near, matching, blocks):

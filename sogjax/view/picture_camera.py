@@ -48,9 +48,13 @@ def picture_camera(rig: CameraRig, name: str, picture_width: int) -> PictureCame
     matrix[:2] *= scale[:, None]
     maps = None
     distortion = np.array(camera.distortion, float)
-    if distortion.any():
+    fisheye = camera.fisheye is not None and bool(camera.fisheye)
+    if distortion.any() or fisheye:
         centred = matrix - np.array([[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]])
-        x, y = cv2.initUndistortRectifyMap(centred, distortion, np.eye(3), centred, size, cv2.CV_16SC2)
+        make, coefficients = cv2.initUndistortRectifyMap, distortion
+        if fisheye:
+            make, coefficients = cv2.fisheye.initUndistortRectifyMap, distortion[:4]
+        x, y = make(centred, coefficients, np.eye(3), centred, size, cv2.CV_16SC2)
         maps = (x, y)
     pose = np.linalg.inv(np.array(camera.camera_from_world, float))
     return PictureCamera(name, matrix, pose, scale, size, maps)

@@ -22,7 +22,7 @@ def picture_points(
 
     A pixel is NaN behind a camera and far outside its picture, where a lens model means nothing.
     """
-    cameras = jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float32), rig.cameras)
+    cameras = jax.tree.map(lambda leaf: leaf if leaf.dtype == bool else leaf.astype(jnp.float32), rig.cameras)
     flat = points.reshape(-1, 3).astype(np.float32)
     pixels = np.empty((len(rig), len(flat), 2), np.float32)
     depths = np.empty((len(rig), len(flat)), np.float32)

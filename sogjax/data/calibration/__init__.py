@@ -4,12 +4,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from sogjax.data.calibration.easymocap import other_half, read_easymocap, recognises_easymocap
+from sogjax.data.calibration.panoptic import read_panoptic, recognises_panoptic
+from sogjax.data.calibration.qualisys import read_qualisys, recognises_qualisys
 from sogjax.data.calibration.rig import METRES_PER_UNIT, CameraEntry, CameraRig, rig_from_entries
+from sogjax.data.calibration.skeletool import read_skeletool, recognises_skeletool, write_skeletool
 from sogjax.data.calibration.toml import read_toml, recognises_toml, write_toml
 from sogjax.errors import InputError
 
 __all__ = [
     "FORMATS",
+    "WRITERS",
     "CalibrationFormat",
     "CameraEntry",
     "CameraRig",
@@ -18,6 +23,8 @@ __all__ = [
     "load_calibration",
     "read_toml",
     "rig_from_entries",
+    "save_calibration",
+    "write_skeletool",
     "write_toml",
 ]
 
@@ -31,16 +38,23 @@ class CalibrationFormat:
 
     name: str
     unit: str
-    """The unit of length that the format prescribes."""
+    """The unit of length that the format prescribes: m, cm or mm."""
     recognises: Callable[[str], bool]
     """Tells the format by the first 64 KiB of a file's text."""
     read: Callable[[Path, str], CameraRig]
-    """Reads a file whose lengths are in a unit of `METRES_PER_UNIT`."""
+    """Reads a file whose lengths are in the given unit."""
 
 
 FORMATS: tuple[CalibrationFormat, ...] = (
     CalibrationFormat("Anipose/Pose2Sim/FreeMoCap TOML", "m", recognises_toml, read_toml),
+    CalibrationFormat("OpenCV/EasyMocap YAML", "m", recognises_easymocap, read_easymocap),
+    CalibrationFormat("Skeletool .calibration", "mm", recognises_skeletool, read_skeletool),
+    CalibrationFormat("Qualisys .qca.txt", "mm", recognises_qualisys, read_qualisys),
+    CalibrationFormat("Panoptic JSON", "cm", recognises_panoptic, read_panoptic),
 )
+
+WRITERS: dict[str, Callable[[Path, CameraRig], None]] = {".toml": write_toml, ".calibration": write_skeletool}
+"""By file ending."""
 
 
 def load_calibration(path: Path, unit: str | None = None) -> CameraRig:
@@ -64,10 +78,31 @@ def load_calibration(path: Path, unit: str | None = None) -> CameraRig:
     return found.read(path, unit or found.unit)
 
 
+def save_calibration(path: Path, rig: CameraRig) -> None:
+    """Write the cameras in the format that the ending of `path` names.
+
+    Raises:
+        InputError: an ending that no writer knows, or what the format cannot hold.
+    """
+    writer = WRITERS.get(path.suffix.lower())
+    if writer is None:
+        raise InputError(f"{path}: no calibration is written with this ending; use one of: {' '.join(WRITERS)}")
+    writer(path, rig)
+
+
 def find_calibrations(folder: Path) -> list[Path]:
-    """The files in `folder` that some reader recognises or that are called `calibration.*`, sorted."""
+    """The files in `folder` that some reader recognises or that are called `calibration.*`, sorted.
+
+    Of a pair `intri.yml` and `extri.yml` only one is among them.
+    """
     files = sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))
-    return [path for path in files if path.stem == "calibration" or calibration_format(path) is not None]
+    found = {path: calibration_format(path) for path in files}
+    found = {path: known for path, known in found.items() if path.stem == "calibration" or known is not None}
+    kept: list[Path] = []
+    for path, known in found.items():
+        if not (known is not None and known.read is read_easymocap and other_half(path) in kept):
+            kept.append(path)
+    return kept
 
 
 def calibration_format(path: Path) -> CalibrationFormat | None:

@@ -1,9 +1,10 @@
 """The calibrated cameras of a recording, by name, and the checks that every calibration passes."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -17,6 +18,15 @@ ROTATION_TOLERANCE = 1e-3
 
 METRES_PER_UNIT = {"m": 1.0, "mm": 1e-3}
 """The units of length that `unit` may name."""
+
+METRES = METRES_PER_UNIT | {"cm": 1e-2}
+"""The same, and those that a format may prescribe."""
+
+LARGEST_SIDE = 100_000
+"""Pixels. No camera takes larger pictures."""
+
+
+_LARGEST = 1e12
 
 
 @dataclass(frozen=True)
@@ -36,9 +46,28 @@ class CameraRig:
         return jax.tree.map(lambda leaf: leaf[index], self.cameras)
 
     def image_size(self, name: str) -> tuple[int, int]:
-        """Width and height of a camera's images, in pixels."""
+        """Width and height of a camera's images, in pixels.
+
+        Raises:
+            InputError: the calibration did not say, and nothing else did.
+        """
         width, height = np.asarray(self.cameras.image_size)[self.names.index(name)]
+        if np.isnan(width):
+            raise InputError(f"camera {name!r}: the calibration does not say how large its images are; add their size")
         return int(width), int(height)
+
+    def is_fisheye(self, name: str) -> bool:
+        """Whether a camera has OpenCV's fisheye model."""
+        return self.cameras.fisheye is not None and bool(self.cameras.fisheye[self.names.index(name)])
+
+    def with_sizes(self, sizes: Mapping[str, tuple[int, int]]) -> "CameraRig":
+        """The rig with the image sizes that were not known yet."""
+        known = np.array(self.cameras.image_size)
+        for index, name in enumerate(self.names):
+            if np.isnan(known[index]).any() and name in sizes:
+                known[index] = sizes[name]
+        filled = jnp.asarray(known, self.cameras.image_size.dtype)
+        return CameraRig(self.names, eqx.tree_at(lambda cameras: cameras.image_size, self.cameras, filled))
 
     def select(self, names: Sequence[str]) -> "CameraRig":
         """The rig of `names`, in their order."""
@@ -56,8 +85,10 @@ class CameraEntry:
     """World to camera."""
     translation: Float[np.ndarray, "3"]
     distortion: Float[np.ndarray, "coefficient"]
-    """OpenCV's k1 k2 p1 p2 [k3]."""
-    size: tuple[int, int]
+    """OpenCV's k1 k2 p1 p2 [k3]; of a fisheye camera k1 k2 k3 k4."""
+    size: tuple[int, int] | None
+    """None where the file does not say."""
+    fisheye: bool = False
 
 
 def rig_from_entries(path: Path, entries: Sequence[CameraEntry]) -> CameraRig:
@@ -81,7 +112,8 @@ def rig_from_entries(path: Path, entries: Sequence[CameraEntry]) -> CameraRig:
             intrinsics=stack([entry.intrinsics for entry in entries]),
             camera_from_world=stack([_camera_from_world(entry) for entry in entries]),
             distortion=stack([_five_coefficients(entry) for entry in entries]),
-            image_size=stack([np.array(entry.size) for entry in entries]),
+            image_size=stack([np.array(entry.size or (np.nan, np.nan)) for entry in entries]),
+            fisheye=jnp.array([entry.fisheye for entry in entries]) if any(e.fisheye for e in entries) else None,
         ),
     )
 
@@ -95,10 +127,12 @@ def _check(path: Path, entry: CameraEntry) -> None:
         "distortion": entry.distortion,
     }
     for what, values in arrays.items():
-        if not np.isfinite(values).all():
+        if not (np.abs(values) < _LARGEST).all():  # NaN fails too
             raise InputError(f"{where}: its {what} {_text(values)} is not finite; calibrate it again")
-    if min(entry.size) <= 0:
-        raise InputError(f"{where}: its size {list(entry.size)} is not positive; give width and height in pixels")
+    if entry.size is not None and not 0 < min(entry.size) <= max(entry.size) <= LARGEST_SIDE:
+        raise InputError(
+            f"{where}: its size {list(entry.size)} is not positive or too large; give width and height in pixels"
+        )
     matrix = entry.intrinsics
     if min(matrix[0, 0], matrix[1, 1]) <= 0:
         focal = f"{matrix[0, 0]:g} and {matrix[1, 1]:g}"
@@ -114,6 +148,10 @@ def _check(path: Path, entry: CameraEntry) -> None:
         raise InputError(
             f"{where}: {_text(rotation)} is no rotation matrix (determinant {np.linalg.det(rotation):.3g}, "
             f"R R^T differs from 1 by {deviation:.3g}); calibrate it again or export it with more digits"
+        )
+    if entry.fisheye and len(entry.distortion) != 4:
+        raise InputError(
+            f"{where}: it has {len(entry.distortion)} distortion coefficients; a fisheye camera has k1 k2 k3 k4"
         )
     if len(entry.distortion) not in (4, 5):
         raise InputError(f"{where}: it has {len(entry.distortion)} distortion coefficients; give k1 k2 p1 p2 [k3]")

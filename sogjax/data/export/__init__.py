@@ -1,29 +1,59 @@
 """Writing motions in the formats of other programs: one writer a format, chosen by the file's ending."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from sogjax.data.export.bvh import write_bvh
+from sogjax.data.export.c3d import require_ezc3d, write_c3d
+from sogjax.data.export.csv import write_csv
+from sogjax.data.export.glb import write_glb
+from sogjax.data.export.trc import write_trc
 from sogjax.data.motion import Motion, save_motion
 from sogjax.errors import InputError
 
-__all__ = ["WRITERS", "export_motion", "write_bvh"]
+__all__ = [
+    "WRITERS",
+    "export_motion",
+    "motion_writer",
+    "require_ezc3d",
+    "write_bvh",
+    "write_c3d",
+    "write_csv",
+    "write_glb",
+    "write_trc",
+]
 
 WRITERS: dict[str, Callable[[Path, Motion, str], None]] = {
     ".bvh": write_bvh,
-    ".npz": lambda path, motion, up: save_motion(path, motion),
+    ".c3d": write_c3d,
+    ".csv": write_csv,
+    ".glb": write_glb,
+    ".npz": lambda path, motion, up: save_motion(path, replace(motion, up=up)),
+    ".trc": write_trc,
 }
 """By file ending: a function of the path, the motion, and the vertical of the motion's world."""
 
 
-def export_motion(motion: Motion, path: Path, up: str = "z") -> None:
-    """Write `motion`, whose world has the vertical `up`, in the format that the ending of `path` names.
+def motion_writer(path: Path) -> Callable[[Path, Motion, str], None]:
+    """What writes a motion in the format that the ending of `path` names.
 
     Raises:
-        InputError: an ending that no writer knows, or what the writer refuses.
+        InputError: an ending that no writer knows.
     """
     writer = WRITERS.get(path.suffix.lower())
     if writer is None:
         known = " ".join(sorted(WRITERS))
         raise InputError(f"{path}: no writer for the ending {path.suffix!r}; use one of: {known}")
-    writer(path, motion, up)
+    return writer
+
+
+def export_motion(motion: Motion, path: Path, up: str | None = None) -> None:
+    """Write `motion` in the format that the ending of `path` names.
+
+    `up` is the vertical of the motion's world, where it is not what the motion says.
+
+    Raises:
+        InputError: an ending that no writer knows, or what the writer refuses.
+    """
+    motion_writer(path)(path, motion, up or motion.up)

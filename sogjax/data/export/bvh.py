@@ -6,7 +6,6 @@ Y is up, +Z is where a body in its rest pose looks, lengths are metres unless as
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -14,17 +13,12 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from sogjax.data.atomic import atomic_path
+from sogjax.data.export.bones import CONSTANT, bone_frames, bones_of, frame_time, world_turn
 from sogjax.data.motion import Motion
-from sogjax.errors import InputError
-from sogjax.model.frames import world_from_upright
 
 PER_METRE = {"m": 1.0, "cm": 100.0}
 """The units of length that a BVH file may be written in; the file itself does not say which."""
 
-_SAME_PLACE = 1e-5
-"""Metres within which joints share their origin."""
-_CONSTANT = 1e-4
-"""Metres within which an offset counts as constant."""
 _SHORTEST_END = 0.01
 _DEFAULT_END = 0.05
 
@@ -45,7 +39,7 @@ class _Bone:
     @property
     def moves(self) -> bool:
         """Whether it needs position channels."""
-        return self.is_root or bool(np.ptp(self.positions, axis=0).max() > _CONSTANT)
+        return self.is_root or bool(np.ptp(self.positions, axis=0).max() > CONSTANT)
 
     @property
     def offset(self) -> Float[np.ndarray, "3"]:
@@ -64,7 +58,7 @@ def write_bvh(path: Path, motion: Motion, up: str = "z", unit: str = "m") -> Non
     """
     if unit not in PER_METRE:
         raise ValueError(f"no unit {unit!r}; use one of {', '.join(PER_METRE)}")
-    seconds = _frame_time(path, motion)
+    seconds = frame_time(path, motion)
     root = _root_bone(motion, up, PER_METRE[unit])
     bones = list(_depth_first(root))
     channels = [np.concatenate([bone.positions, bone.angles], 1) if bone.moves else bone.angles for bone in bones]
@@ -80,33 +74,16 @@ def write_bvh(path: Path, motion: Motion, up: str = "z", unit: str = "m") -> Non
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def _frame_time(path: Path, motion: Motion) -> float:
-    steps = np.unique(np.diff(motion.frame))
-    if motion.num_frames == 0:
-        raise InputError(f"{path}: the motion has no frames; export one that has")
-    if len(steps) > 1:
-        raise InputError(
-            f"{path}: BVH needs evenly spaced frames, but the motion's lie {steps[0]} to {steps[-1]} apart; "
-            "track it without gaps"
-        )
-    return float(steps[0] if len(steps) else 1) / motion.fps
-
-
 def _root_bone(motion: Motion, up: str, scale: float) -> _Bone:
     """The tree of bones, with lengths times `scale`."""
-    turn = world_from_upright("y") @ world_from_upright(up).T
-    transforms = motion.world_from_joint.astype(float)
-    rotations = turn @ transforms[..., :3, :3] @ turn.T
-    positions = transforms[..., :3, 3] @ turn.T
+    found = bones_of(motion)
+    rotations, positions = bone_frames(motion, found, up, "y")
+    turn = world_turn(up, "y")
     blobs = motion.blob_means.astype(float) @ turn.T
-    chains = _chains(motion)
-    names = _unique_names([[str(motion.joint_names[j]) for j in chain] for chain in chains])
-    chain_of = {joint: k for k, chain in enumerate(chains) for joint in chain}
     bones: list[_Bone] = []
-    for chain, name in zip(chains, names, strict=True):
-        last, above = chain[-1], int(motion.joint_parents[chain[0]])
-        position, rotation = positions[:, last], rotations[:, last]
-        attached = blobs[0, np.isin(motion.blob_joint, chain)] - position[0]
+    for index, (name, above) in enumerate(zip(found.names, found.parents, strict=True)):
+        position, rotation = positions[:, index], rotations[:, index]
+        attached = (blobs[0, np.isin(motion.blob_joint, found.chains[index])] - position[0]) @ rotation[0]
         if above >= 0:
             to_parent = np.swapaxes(rotations[:, above], -1, -2)
             position = np.einsum("tij,tj->ti", to_parent, position - positions[:, above])
@@ -116,47 +93,13 @@ def _root_bone(motion: Motion, up: str, scale: float) -> _Bone:
             is_root=above < 0,
             positions=position * scale,
             angles=_euler_angles(rotation),
-            end=_end(attached @ rotations[0, last], position[0]) * scale,
+            end=_end(attached, position[0]) * scale,
         )
         bones.append(bone)
         if above >= 0:
-            bones[chain_of[above]].children.append(bone)
+            bones[above].children.append(bone)
     roots = [bone for bone in bones if bone.is_root]
     return roots[0] if len(roots) == 1 else _common_root(roots)
-
-
-def _chains(motion: Motion) -> list[list[int]]:
-    """The joints that make one bone each, parents first.
-
-    A joint continues its parent's chain if it is the only child and does not leave the origin; also, in the
-    chain of the root, if it slides.
-    """
-    parents = motion.joint_parents
-    origins = motion.world_from_joint[..., :3, 3]
-    num_children = np.bincount(parents[parents >= 0], minlength=len(parents))
-    chains: list[list[int]] = []
-    chain_of: dict[int, list[int]] = {}
-    for joint, parent in enumerate(parents.tolist()):
-        continues = False
-        if parent >= 0 and num_children[parent] == 1:
-            apart = np.linalg.norm(origins[:, joint] - origins[:, parent], axis=-1).max()
-            at_root = parents[chain_of[parent][0]] < 0
-            continues = apart < _SAME_PLACE or bool(at_root and _slides(motion, joint))
-        if continues:
-            chain_of[joint] = chain_of[parent]
-            chain_of[joint].append(joint)
-        else:
-            chain_of[joint] = [joint]
-            chains.append(chain_of[joint])
-    return chains
-
-
-def _slides(motion: Motion, joint: int) -> bool:
-    """Whether the offset of a joint from its parent changes."""
-    parent = motion.world_from_joint[:, motion.joint_parents[joint]]
-    apart = motion.world_from_joint[:, joint, :3, 3] - parent[:, :3, 3]
-    offset = np.einsum("tji,tj->ti", parent[:, :3, :3], apart)
-    return bool(np.ptp(offset, axis=0).max() > _CONSTANT)
 
 
 def _euler_angles(rotation: Float[np.ndarray, "frame 3 3"]) -> Float[np.ndarray, "frame 3"]:
@@ -183,21 +126,6 @@ def _common_root(roots: list[_Bone]) -> _Bone:
     for root in roots:
         root.is_root = False
     return _Bone("world", True, still, still, np.zeros(3), roots)
-
-
-def _unique_names(chains: list[list[str]]) -> list[str]:
-    """For every chain the words with which all its joints' names begin, else its last joint's name."""
-    names: list[str] = []
-    for chain in chains:
-        columns = zip(*(name.split("_") for name in chain), strict=False)
-        words = [column[0] for column in takewhile(lambda column: len(set(column)) == 1, columns)]
-        name = "_".join("_".join(words or [chain[-1]]).split())
-        if name in names:
-            name = "_".join(chain[-1].split())
-        while name in names:
-            name += "_"
-        names.append(name)
-    return names
 
 
 def _depth_first(bone: _Bone) -> Iterator[_Bone]:

@@ -1,0 +1,132 @@
+"""Does a run that is killed at any moment go on to the very end that it would have had?
+
+python experiments/kill_and_resume.py kills=20
+
+tracks a small rendered walk, all outputs on, first pose searched for; kills the process (SIGKILL) at random moments of
+its life in its folder, goes on with resume=true, and compares every array of the end with a run that was left alone.
+"""
+
+import random
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass, fields
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from sogjax.app.script import machine_line, run_script, settings_from
+from sogjax.data.actor_file import named_body
+from sogjax.data.motion import Motion, load_motion
+from sogjax.data.source import look_at_source
+from sogjax.errors import InputError
+from sogjax.synth import SynthSettings, cached_recording
+
+PARTIAL = "motion.partial"
+
+
+@dataclass
+class Settings:
+    """Of the runs and the kills."""
+
+    kills: int = 20
+    seed: int = 0
+    frames: int = 40
+    cameras: int = 3
+    overlay: bool = True
+    made: bool = False
+    """Make the actor from example poses, too."""
+
+
+def main() -> None:
+    """Kill, go on, compare, and say how many frames every kill left."""
+    settings, chance = settings_from(Settings), random.Random(0)
+    chance.seed(settings.seed)
+    print(machine_line())
+    with TemporaryDirectory() as place:
+        command = tracking(settings)
+        alone = Path(place) / "alone"
+        started(command, alone).wait()  # compiled programs are kept from here on, where SOGJAX_COMPILATION_CACHE is set
+        begin = time.perf_counter()
+        started([*command, "overwrite=true"], alone).wait()
+        life = time.perf_counter() - begin
+        whole, left, folder, runs = load_motion(alone / "motion.npz"), [], Path(place) / "run_0", 1
+        while len(left) < settings.kills:
+            if killed(command, folder, chance.uniform(0.0, life)):
+                left.append(frames_left(folder))
+                print(f"kill {len(left)}: {left[-1]} frames readable", flush=True)
+                continue
+            check_same(folder, whole, settings)
+            folder, runs = Path(place) / f"run_{runs}", runs + 1
+        if started([*command, "resume=true"], folder).wait() != 0:
+            raise InputError(f"{folder}: the last run did not end well")
+        check_same(folder, whole, settings)
+    print(f"{settings.kills} kills in {runs} runs of {settings.frames} frames: every end is bit for bit the same")
+
+
+def tracking(settings: Settings) -> list[str]:
+    """The command line of the runs, without its folder."""
+    rendered = SynthSettings(
+        cameras=settings.cameras, frames=settings.frames, width=160, height=120, example_poses=settings.made
+    )
+    command = ["track", f"recording={cached_recording(rendered)}", "initial_pose=auto", "images.depth=6"]
+    command += [] if settings.made else [f"actor={named_body('human')}"]
+    return [*command, *(f"outputs.{name}={str(settings.overlay).lower()}" for name in ("overlay", "rerun"))]
+
+
+def started(command: list[str], folder: Path) -> subprocess.Popen:
+    """A run of its own process."""
+    words = [sys.executable, "-m", "sogjax", *command, f"out={folder}"]
+    return subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+
+
+def killed(command: list[str], folder: Path, after: float) -> bool:
+    """Go on in a folder and kill the process some seconds after it claimed it; False: it ended before."""
+    process = started([*command, "resume=true"], folder)
+    while process.poll() is None and not (folder / ".lock").exists():
+        time.sleep(0.02)
+    try:
+        _, said = process.communicate(timeout=after)
+    except subprocess.TimeoutExpired:
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
+        return True
+    if process.returncode != 0:
+        raise InputError(f"the run did not end well: {said}")
+    return False
+
+
+def frames_left(folder: Path) -> int:
+    """How many frames can be read."""
+    done = folder / "motion.npz"
+    if done.is_file():
+        return load_motion(done).num_frames
+    try:
+        return load_motion(folder / PARTIAL).num_frames
+    except InputError:
+        return 0
+
+
+def check_same(folder: Path, whole: Motion, settings: Settings) -> None:
+    """Compare a run that was gone on with.
+
+    Raises:
+        InputError: it has another end.
+    """
+    found = load_motion(folder / "motion.npz")
+    for entry in fields(Motion):
+        if not np.array_equal(getattr(found, entry.name), getattr(whole, entry.name)):
+            raise InputError(f"{folder}: {entry.name} differs from that of a run left alone")
+    if settings.overlay and look_at_source(folder / "overlay.mp4").num_frames != settings.frames:
+        raise InputError(f"{folder}: overlay.mp4 does not have all frames")
+    names = {path.name for path in folder.iterdir()}
+    if not {"run.json", "config.yaml", "motion.bvh"} <= names or any(
+        name.endswith((".partial", ".lock")) or ".tmp" in name for name in names
+    ):
+        raise InputError(f"{folder}: holds {', '.join(sorted(names))}")
+
+
+if __name__ == "__main__":
+    run_script(main)

@@ -1,0 +1,148 @@
+"""What is said to wrong input, and is anything left half-written?
+
+    python experiments/reliability.py [page=docs/reliability.md] [only=calibration]
+
+Every case of `bad_input_cases.py` damages a good workplace in one place and runs a command there. It passes where the
+exit status is 2, one sentence is said, and the files are afterwards what they were before. Then the readers of files
+are given thousands of damaged ones: only a sentence may come out.
+"""
+
+import contextlib
+import hashlib
+import io
+import os
+import shutil
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from bad_input_cases import cases
+from bad_inputs import BadInput, make_workplace
+from fuzzing import FuzzedReader, fuzz_readers
+
+from sogjax.app.cli import main as sogjax
+from sogjax.app.script import machine_line, run_script, settings_from
+from sogjax.data.atomic import atomic_path
+
+
+@dataclass
+class Settings:
+    """What is tried and where the page goes."""
+
+    page: str | None = None
+    only: str | None = None
+    """A family."""
+    mutations: int = 2000
+    """For each reader."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a command did about an input."""
+
+    case: BadInput
+    status: int | str
+    said: str
+    nothing_left: bool
+
+    @property
+    def good(self) -> bool:
+        """Refused with one sentence, and nothing changed."""
+        return self.status == 2 and self.nothing_left and len(self.said.splitlines()) == 1
+
+
+def main() -> None:
+    """Print what fails, and write the page."""
+    settings = settings_from(Settings)
+    outcomes = outcomes_of([case for case in cases() if settings.only in (None, case.family)])
+    fuzzed = fuzz_readers(settings.mutations) if settings.only is None else []
+    bad = [outcome for outcome in outcomes if not outcome.good]
+    for outcome in bad:
+        print(f"{outcome.case.family}: {outcome.case.what}: status {outcome.status}, {outcome.said!r}")
+        print(f"    nothing left: {outcome.nothing_left}")
+    crashes = [reader for reader in fuzzed if reader.crashes]
+    for reader in crashes:
+        print(f"{reader.name}: {reader.crashes[0]}")
+    print(f"{len(outcomes) - len(bad)} of {len(outcomes)} wrong inputs refused as they should be")
+    if settings.page is not None:
+        with atomic_path(Path(settings.page)) as temporary:
+            temporary.write_text(page(outcomes, fuzzed), encoding="utf-8")
+    sys.exit(1 if bad or crashes else 0)
+
+
+def outcomes_of(inputs: list[BadInput]) -> list[Outcome]:
+    """Each case in a fresh copy of the workplace."""
+    with tempfile.TemporaryDirectory() as place:
+        good = Path(place) / "good"
+        good.mkdir()
+        make_workplace(good)
+        return [outcome_of(case, good, Path(place) / "work") for case in inputs]
+
+
+def outcome_of(case: BadInput, good: Path, work: Path) -> Outcome:
+    """Damage a copy, run the command in it, and look at what is there afterwards."""
+    shutil.copytree(good, work)
+    case.damage(work)
+    before = contents(work)
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.chdir(work), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            status: int | str = sogjax(case.command)
+        except BaseException as error:
+            status = f"{type(error).__name__}: {error}"
+    nothing_left = contents(work) == before
+    shutil.rmtree(work)
+    said = err.getvalue().strip().replace(f"{os.path.realpath(work)}/", "").replace(f"{work}/", "")
+    return Outcome(case, status, said, nothing_left)
+
+
+def contents(folder: Path) -> dict[str, str]:
+    """Every file and folder with a digest of what is in it."""
+    digest = lambda path: hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else "folder"
+    return {str(path.relative_to(folder)): digest(path) for path in sorted(folder.rglob("*"))}
+
+
+def page(outcomes: list[Outcome], fuzzed: list[FuzzedReader]) -> str:
+    """The table, as Markdown."""
+    good = sum(outcome.good for outcome in outcomes)
+    lines = [
+        "# Reliability",
+        "",
+        f"Made by `python experiments/reliability.py page=docs/reliability.md` ({machine_line()}).",
+        "",
+        "## Wrong input",
+        "",
+        f"{good} of {len(outcomes)} wrong inputs were refused with exit status 2 and one sentence, and left every file "
+        "as it was.",
+        "",
+        "| family | what is wrong | command | what was said | status | files unchanged |",
+        "|---|---|---|---|---|---|",
+    ]
+    lines += [row(outcome) for outcome in outcomes]
+    lines += ["", "## Damaged files", ""]
+    lines += [
+        "Valid files with bytes changed, lines left out, doubled or exchanged, and numbers made extreme, given to the",
+        "readers. Only a sentence (`InputError`) or a result may come out.",
+        "",
+        "| reader | files | refused | read | other exceptions | seconds |",
+        "|---|---|---|---|---|---|",
+    ]
+    for r in fuzzed:
+        counts = (r.files, r.refused, r.files - r.refused - len(r.crashes), len(r.crashes))
+        lines.append(f"| {r.name} | {' | '.join(map(str, counts))} | {r.seconds:.1f} |")
+    return "\n".join(lines) + "\n"
+
+
+def row(outcome: Outcome) -> str:
+    """One line of the table of wrong inputs."""
+    said = outcome.said.replace("|", "\\|").replace("\n", " ").replace("<", "&lt;").replace("`", "'")
+    said = said if len(said) < 300 else said[:297] + "..."
+    left = "yes" if outcome.nothing_left else "NO"
+    command = outcome.case.command[0]
+    what = outcome.case.what.replace("|", "\\|")
+    return f"| {outcome.case.family} | {what} | {command} | {said} | {outcome.status} | {left} |"
+
+
+if __name__ == "__main__":
+    run_script(main)

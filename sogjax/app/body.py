@@ -1,0 +1,30 @@
+"""`sogjax body`: a body file from the skeleton of another program."""
+
+from pathlib import Path
+
+from sogjax.app.configs import BodyConfig
+from sogjax.data.actor_file import save_body
+from sogjax.data.calibration.rig import METRES
+from sogjax.data.skeletons import read_skeleton
+from sogjax.errors import InputError
+from sogjax.model.frames import UP_AXES
+
+
+def run(config: BodyConfig) -> Path:
+    """Read the skeleton, attach blobs where it has none, and write the body file.
+
+    Raises:
+        InputError: anything wrong with the file or the options.
+    """
+    if config.up not in UP_AXES:
+        raise InputError(f"up={config.up}: must be one of {', '.join(UP_AXES)}")
+    if config.unit not in (None, *METRES):
+        raise InputError(f"unit={config.unit}: must be one of {', '.join(METRES)}")
+    dof = None if config.dof is None else Path(config.dof)
+    body = read_skeleton(Path(config.from_), dof, config.unit, config.up)
+    out = Path(config.out)
+    save_body(out, body)
+    skeleton = body.skeleton
+    print(f"{skeleton.num_joints} joints, {skeleton.num_dofs} degrees of freedom, {body.num_blobs} blobs")
+    print(out)
+    return out

@@ -1,0 +1,213 @@
+"""Cameras that start late, end early or are left out for a while; videos that are turned or come unevenly."""
+
+import struct
+
+import numpy as np
+import pytest
+import yaml
+from command_line import actor_file, done, trackable
+from small_recording import SIZE, frame_of, make_recording, toml_camera, write_calibration, write_video
+
+from sogjax.app import pipeline
+from sogjax.app.cli import main
+from sogjax.data import video
+from sogjax.data.motion import load_motion
+from sogjax.data.recording import open_recording
+from sogjax.data.source import look_at_source
+from sogjax.data.video import read_frames
+from sogjax.errors import InputError
+from sogjax.synth import SynthSettings, render_recording
+
+LANDMARKS = ("pelvis", "chest", "neck", "left_elbow")
+LIGHT = ("outputs.overlay=false", "outputs.rerun=false", "outputs.bvh=false")
+
+
+def frames_seen(recording, *span):
+    """By time step and camera the number of the frame in the picture."""
+    numbers = lambda images: [None if image is None else frame_of(image) for image in images]
+    return [numbers(images) for images in read_frames(recording, *span)]
+
+
+def test_a_camera_that_starts_late_and_one_that_ends_early(tmp_path):
+    settings = "up: z\nfewest_cameras: 1\nframe_offset: {left: -2}\n"
+    folder = make_recording(tmp_path / "r", settings=settings, frames=5)  # left: 2 to 6, right: 0 to 4
+    recording = open_recording(folder)
+    assert (recording.first_frame, recording.num_frames) == (0, 7)
+    late, both, early = [[None, k] for k in (0, 1)], [[k - 2, k] for k in (2, 3, 4)], [[3, None], [4, None]]
+    assert frames_seen(recording) == late + both + early
+    assert frames_seen(recording, 4, 6) == (late + both + early)[4:6]
+    assert any("left 2 to 6" in warning and "right 0 to 4" in warning for warning in recording.warnings)
+
+
+def test_as_many_cameras_as_asked_for_have_every_frame(tmp_path):
+    settings = "up: z\nfewest_cameras: 2\nframe_offset: {a: -2, b: 1}\n"
+    recording = open_recording(make_recording(tmp_path / "r", ("a", "b", "c"), settings, frames=6))
+    assert (recording.first_frame, recording.num_frames) == (0, 6)  # a: 2 to 7, b: 0 to 4, c: 0 to 5
+    assert all(sum(number is not None for number in numbers) >= 2 for numbers in frames_seen(recording))
+
+
+def test_a_camera_that_is_left_out_for_a_while(tmp_path):
+    folder = make_recording(tmp_path / "r", settings="up: z\nmissing: {right: [[1, 2]]}\n")
+    expected = [[0, 0], [1, None], [2, None], [3, 3]]
+    assert frames_seen(open_recording(folder)) == expected
+
+
+def test_a_video_that_breaks_off_is_missing_from_there_on(tmp_path, monkeypatch):
+    """It is an error where every camera is needed."""
+    folder = make_recording(tmp_path / "r", settings="up: z\nfewest_cameras: 1\n")
+    opened = video.open_source
+
+    def breaking(path, start, threads):
+        source = opened(path, start, threads)
+        if path.stem == "right":
+            pictures = iter([source.read(), source.read(), None, source.read()])
+            source.read = lambda: next(pictures)
+        return source
+
+    monkeypatch.setattr(video, "open_source", breaking)
+    assert frames_seen(open_recording(folder)) == [[0, 0], [1, 1], [2, None], [3, None]]
+    (folder / "recording.yaml").write_text("up: z\n")
+    with pytest.raises(InputError, match="ends before frame 2"):
+        frames_seen(open_recording(folder))
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ("missing: {third: [[0, 1]]}", ("missing", "third", "left, right")),
+        ("missing: {left: [[2, 1]]}", ("missing.left[0]", "[2, 1]")),
+        ("missing: {left: [1, 2]}", ("missing.left[0]",)),
+        ("fewest_cameras: 0", ("fewest_cameras", "0")),
+    ],
+)
+def test_settings_with_something_wrong(tmp_path, settings, words):
+    folder = make_recording(tmp_path / "r", settings=f"up: z\n{settings}\n")
+    with pytest.raises(InputError) as error:
+        open_recording(folder)
+    assert all(word in str(error.value) for word in words)
+
+
+@pytest.fixture(scope="module")
+def rendered(tmp_path_factory):
+    """A rendered person, four cameras; its rough pose has the landmarks of the small actor."""
+    folder = tmp_path_factory.mktemp("rendered") / "person"
+    settings = SynthSettings(cameras=4, frames=12, width=160, height=120, example_poses=False, background=False)
+    render_recording(settings, folder)
+    rough = yaml.safe_load((folder / "initial_pose.yaml").read_text())
+    rough["landmarks"] = {name: rough["landmarks"][name] for name in LANDMARKS}
+    (folder / "initial_pose.yaml").write_text(yaml.safe_dump(rough))
+    return folder
+
+
+def tracked(capsys, rendered, tmp_path, name, *words):
+    actor = f"actor={actor_file(tmp_path / 'a.yaml')}"
+    words = (*words, "images.depth=5", "solver.max_iterations=20", *LIGHT)
+    _, err = done(capsys, "track", f"recording={rendered}", actor, f"out={tmp_path / name}", *words)
+    return load_motion(tmp_path / name / "motion.npz"), err
+
+
+def test_a_missing_camera_is_as_good_as_none(capsys, tmp_path, rendered):
+    """Poses and energies are those without that camera, whose share of the mean goes to the others."""
+    settings = yaml.safe_load((rendered / "recording.yaml").read_text())
+    write = lambda **more: (rendered / "recording.yaml").write_text(yaml.safe_dump(settings | more))
+    camera = open_recording(rendered).rig.names[1]
+    others = [name for name in open_recording(rendered).rig.names if name != camera]
+    without, _ = tracked(capsys, rendered, tmp_path, "without", f"cameras=[{','.join(others)}]")
+    every, _ = tracked(capsys, rendered, tmp_path, "every")
+    write(missing={camera: [[0, 99]]})
+    missing, err = tracked(capsys, rendered, tmp_path, "missing")
+    write(missing={camera: [[4, 6]]})
+    partly, _ = tracked(capsys, rendered, tmp_path, "partly")
+    write()
+    assert f"{camera} had no picture in 12 of 12 frames" in err
+    assert np.all(without.similarity > 0.0)
+    np.testing.assert_allclose(missing.similarity, without.similarity, rtol=2e-3)
+    np.testing.assert_allclose(missing.pose, without.pose, atol=5e-3)
+    np.testing.assert_array_equal(partly.pose[:4], every.pose[:4])
+    assert not np.array_equal(partly.pose[4:], every.pose[4:])
+
+
+def test_a_run_with_missing_cameras_goes_on(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    recording = trackable(tmp_path / "walk", frames=20)
+    (recording / "recording.yaml").write_text("up: z\nmissing: {left: [[3, 5], [9, 12]]}\n")
+    words = [f"recording={recording}", f"actor={actor_file(tmp_path / 'a.yaml')}", "images.depth=4"]
+    words += ["outputs.overlay_width=128", "solver.max_iterations=3", "solver.min_iterations=1"]
+    done(capsys, "track", *words, "out=whole")
+    whole, calls = pipeline.padded_cells, []
+
+    def padded_cells(*arguments):
+        calls.append(1)
+        if len(calls) > 28:
+            raise InputError("right.mp4: ends early")
+        return whole(*arguments)
+
+    with monkeypatch.context() as context:
+        context.setattr(pipeline, "padded_cells", padded_cells)
+        assert main(["track", *words, "out=run"]) == 2
+    done(capsys, "track", *words, "out=run", "resume=true")
+    one, two = (load_motion(tmp_path / name / "motion.npz") for name in ("run", "whole"))
+    np.testing.assert_array_equal(one.pose, two.pose)
+    assert look_at_source(tmp_path / "run" / "overlay.mp4").num_frames == 20
+
+
+def test_pictures_of_several_sizes_on_their_sides_and_upright(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    recording = trackable(tmp_path / "walk")
+    upright = SIZE[::-1]
+    write_calibration(recording, toml_camera("left"), toml_camera("right", size=str(list(upright))))
+    write_video(recording / "videos" / "right.mp4", 1, size=upright)
+    words = (f"recording={recording}", f"actor={actor_file(tmp_path / 'a.yaml')}", "images.depth=4", "out=run")
+    done(capsys, "track", *words, "outputs.overlay_width=128")
+    assert load_motion(tmp_path / "run" / "motion.npz").num_frames == 4
+
+
+def boxes(content, begin, end):
+    """Name, begin and end of the boxes of an mp4 file between two places."""
+    while begin < end:
+        size, name = struct.unpack(">I4s", content[begin : begin + 8])
+        yield name.decode("latin-1"), begin, begin + size
+        begin += size
+
+
+def box(content, *names):
+    """Begins and end of nested boxes, outermost first."""
+    begins, begin, end = [], 0, len(content)
+    for name in names:
+        begin, end = next((b, e) for n, b, e in boxes(content, begin + (8 if begins else 0), end) if n == name)
+        begins.append(begin)
+    return begins, end
+
+
+def test_a_video_that_says_it_is_turned(tmp_path):
+    """As telephones write them: the pictures come upright, and the calibration is held against that."""
+    folder = make_recording(tmp_path / "r")
+    path = folder / "videos" / "right.mp4"
+    content = bytearray(path.read_bytes())
+    _, end = box(content, "moov", "trak", "tkhd")
+    quarter = struct.pack(">9i", 0, 1 << 16, 0, -(1 << 16), 0, 0, SIZE[1] << 16, 0, 1 << 30)
+    content[end - 44 : end - 8] = quarter  # the matrix stands before width and height
+    path.write_bytes(content)
+    assert look_at_source(path).size == SIZE[::-1]
+    with pytest.raises(InputError, match="turn the images by 90 degrees"):
+        open_recording(folder)
+    write_calibration(folder, toml_camera("left"), toml_camera("right", size=str(list(SIZE[::-1]))))
+    assert next(iter(read_frames(open_recording(folder))))[1].shape == (SIZE[0], SIZE[1], 3)
+
+
+def test_a_video_whose_frames_do_not_come_evenly(tmp_path):
+    folder = make_recording(tmp_path / "r", settings="up: z\nfps: 25\n", frames=8)
+    assert not any("evenly" in warning for warning in open_recording(folder).warnings)
+    path = folder / "videos" / "right.mp4"
+    content = bytearray(path.read_bytes())
+    begins, end = box(content, "moov", "trak", "mdia", "minf", "stbl", "stts")
+    count, delta = struct.unpack(">II", content[end - 8 : end])
+    assert count == 8
+    for begin in begins:
+        (size,) = struct.unpack(">I", content[begin : begin + 4])
+        content[begin : begin + 4] = struct.pack(">I", size + 16)
+    content[begins[-1] + 12 : end] = struct.pack(">7I", 3, 4, delta, 1, 3 * delta, 3, delta)
+    path.write_bytes(content)
+    (warning,) = (text for text in open_recording(folder).warnings if "evenly" in text)
+    assert "right.mp4" in warning
+    assert "up to 3.0 times" in warning

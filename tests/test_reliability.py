@@ -1,0 +1,28 @@
+"""The script that makes the page on reliability: nearly every way in which an input can be wrong."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.append(str(Path(__file__).parents[1] / "experiments"))
+
+from bad_input_cases import cases
+from fuzzing import fuzz_readers
+from reliability import outcomes_of
+
+FAMILIES = sorted({case.family for case in cases()})
+
+
+def test_there_are_many_cases():
+    assert len(cases()) >= 60
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_wrong_input_is_refused_with_one_sentence_and_changes_nothing(family):
+    outcomes = outcomes_of([case for case in cases() if case.family == family])
+    assert [outcome for outcome in outcomes if not outcome.good] == []
+
+
+def test_damaged_files_never_end_in_a_traceback():
+    assert {reader.name: reader.crashes for reader in fuzz_readers(60) if reader.crashes} == {}

@@ -1,0 +1,157 @@
+"""Nothing is overwritten unasked, no two runs share a folder, nothing of an older run is left."""
+
+import subprocess
+import sys
+
+import pytest
+from command_line import actor_file, done, refused, trackable
+from motion_cases import walking_motion
+
+from sogjax.app.run_folder import LOCK, run_folder
+from sogjax.data.motion import load_motion, save_motion
+from sogjax.errors import InputError
+
+SMALL = (
+    *("images.depth=4", "solver.max_iterations=2", "solver.min_iterations=1"),
+    *("outputs.overlay=false", "outputs.rerun=false"),
+)
+
+
+@pytest.fixture
+def command(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    recording = trackable(tmp_path / "walk")
+    return ["track", f"recording={recording}", f"actor={actor_file(tmp_path / 'a.yaml')}", *SMALL, "out=run"]
+
+
+def contents(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def test_results_stay_unless_they_are_to_be_overwritten(capsys, tmp_path, command):
+    done(capsys, *command)
+    before = contents(tmp_path / "run")
+    sentence = refused(capsys, *command, "stop=2")
+    for word in ("run", "motion.npz", "out=DIR", "overwrite=true"):
+        assert word in sentence
+    assert contents(tmp_path / "run") == before
+    done(capsys, *command, "stop=2", "overwrite=true")
+    assert load_motion(tmp_path / "run" / "motion.npz").num_frames == 2
+
+
+def test_nothing_of_an_older_run_is_left_but_what_is_not_its_own(capsys, tmp_path, command):
+    done(capsys, *command)
+    run = tmp_path / "run"
+    for name in ("notes.txt", "overlay.mp4", "metrics.json", "motion_anna.npz", ".motion.0123abcd.tmp.npz"):
+        (run / name).write_text("older")
+    (run / "motion_anna.partial").mkdir()
+    done(capsys, *command, "outputs.bvh=false", "overwrite=true")
+    assert sorted(contents(run)) == ["config.yaml", "motion.npz", "notes.txt", "run.json"]
+
+
+def test_an_actor_that_an_older_run_made_and_this_one_reads(capsys, tmp_path, command):
+    """Its folder may be the one that is overwritten."""
+    done(capsys, *command)
+    run = tmp_path / "run"
+    note = run / "run.json"
+    note.write_text(note.read_text().replace('"files": [', '"files": [\n"actor.yaml",'))
+    actor_file(run / "actor.yaml")
+    done(capsys, *(word for word in command if not word.startswith("actor=")), "actor=run/actor.yaml", "overwrite=true")
+    assert (run / "actor.yaml").is_file()
+    note.write_text(note.read_text().replace('"files": [', '"files": [\n"actor.yaml",'))
+    done(capsys, *command, "overwrite=true")
+    assert not (run / "actor.yaml").exists()
+
+
+def test_names_in_a_note_lead_nowhere_else(capsys, tmp_path, command):
+    done(capsys, *command)
+    (tmp_path / "mine.txt").write_text("mine")
+    note = tmp_path / "run" / "run.json"
+    note.write_text(note.read_text().replace('"files": [', '"files": [\n"../mine.txt", 3,'))
+    done(capsys, *command, "overwrite=true")
+    assert (tmp_path / "mine.txt").read_text() == "mine"
+
+
+def test_two_runs_in_one_folder(capsys, tmp_path, command):
+    with run_folder(tmp_path / "run"):
+        sentence = refused(capsys, *command)
+        assert "another run (process " in sentence
+    done(capsys, *command)
+
+
+def test_the_lock_of_a_killed_process_blocks_nobody(capsys, tmp_path, command):
+    """Another process holds it first, then is killed; the file stays."""
+    hold = f"""
+import time
+from pathlib import Path
+from sogjax.app.run_folder import run_folder
+with run_folder(Path({str(tmp_path / "run")!r})):
+    print("held", flush=True)
+    time.sleep(600)
+"""
+    process = subprocess.Popen([sys.executable, "-c", hold], stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "held\n"
+    assert f"process {process.pid}" in refused(capsys, *command)
+    process.kill()
+    process.communicate()
+    assert (tmp_path / "run" / LOCK).exists()
+    done(capsys, *command)
+    assert not (tmp_path / "run" / LOCK).exists()
+
+
+def test_resume_and_overwrite_exclude_each_other(capsys, tmp_path, command):
+    assert "exclude each other" in refused(capsys, *command, "resume=true", "overwrite=true")
+
+
+def test_results_without_what_a_run_needs_to_go_on(capsys, tmp_path, command):
+    done(capsys, *command)
+    (tmp_path / "run" / "run.json").unlink()
+    assert "overwrite=true instead of resume=true" in refused(capsys, *command, "resume=true")
+
+
+def test_a_command_replaces_its_own_results_only(tmp_path):
+    with run_folder(tmp_path / "run") as folder:
+        folder.begin("demo", {})
+        folder.finish("demo", {}, [])
+        folder.kept.remove()
+    with run_folder(tmp_path / "run", command="demo") as folder:
+        folder.begin("demo", {})
+    with pytest.raises(InputError, match="resume=true to go on"), run_folder(tmp_path / "run", command="track"):
+        pass
+    with run_folder(tmp_path / "run", command="demo"):
+        pass
+
+
+def test_files_of_the_other_commands(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    save_motion(tmp_path / "motion.npz", walking_motion(4))
+    (tmp_path / "walk.bvh").write_text("mine")
+    for command in (
+        ("export", "motion=motion.npz", "to=walk.bvh"),
+        ("evaluate", "motion=motion.npz", "truth=t.npz", "out=walk.bvh"),
+        ("view", "motion=motion.npz", "recording=walk", "out=walk.bvh"),
+    ):
+        sentence = refused(capsys, *command)
+        assert "walk.bvh: is there already" in sentence
+        assert "overwrite=true" in sentence
+    assert (tmp_path / "walk.bvh").read_text() == "mine"
+    done(capsys, "export", "motion=motion.npz", "to=walk.bvh", "overwrite=true")
+    assert (tmp_path / "walk.bvh").read_text().startswith("HIERARCHY")
+
+
+def test_an_actor_file_that_is_there(capsys, tmp_path):
+    recording = trackable(tmp_path / "walk")
+    (tmp_path / "a.yaml").write_text("mine")
+    assert "is there already" in refused(capsys, "actor", f"recording={recording}", f"out={tmp_path / 'a.yaml'}")
+    assert (tmp_path / "a.yaml").read_text() == "mine"
+
+
+def test_a_rendered_recording_is_replaced_as_a_whole(capsys, tmp_path):
+    words = ("synth", f"out={tmp_path / 'r'}", "cameras=1", "frames=1", "width=64", "height=64", "noise=0")
+    done(capsys, *words)
+    assert "overwrite=true" in refused(capsys, *words)
+    done(capsys, *words, "frames=2", "overwrite=true")
+    assert [path.name for path in tmp_path.iterdir()] == ["r"]
+    (tmp_path / "r" / "actor.yaml").write_text("mine")
+    assert "actor.yaml" in refused(capsys, *words, "overwrite=true")
+    assert (tmp_path / "r" / "actor.yaml").read_text() == "mine"
