@@ -60,8 +60,8 @@ def run_row(
     say(f"{experiment.name} {row!r}: {source.name}")
     record, begin = RunRecord(plan=asdict(plan), machine=machine_facts()), time.perf_counter()
     try:
-        do = _accuracy if measure == "accuracy" else _speed
-        record = do(record, source, config, cameras, entry.every)
+        measured = _accuracy if measure == "accuracy" else _speed
+        record = measured(record, source, config, cameras, entry.every)
     except InputError as error:
         record = replace(record, failed=str(error))
         say(f"failed: {error}")

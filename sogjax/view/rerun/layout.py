@@ -49,7 +49,8 @@ def comparison_layout(
     for run in runs:
         own = f"/world/runs/{run}/**"
         contents = [own, "/world/truth/**"]
-        views = [rrb.Spatial3DView(origin="/world", contents=contents, name=run, eye_controls=eye)]
+        scene = rrb.Spatial3DView(origin="/world", contents=contents, name=run, eye_controls=eye)
+        views: list[rrb.Spatial3DView | rrb.Spatial2DView] = [scene]
         if with_pictures:
             views.append(rrb.Spatial2DView(origin=camera, contents=["$origin/picture", own], name=run))
         columns.append(rrb.Vertical(*views))
