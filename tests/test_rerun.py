@@ -1,6 +1,7 @@
 """The Rerun file, read back with Rerun's own reader."""
 
 from collections import defaultdict
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -11,7 +12,7 @@ from rig_cases import black, opencv_pixels, recording_of, ring_rig
 
 from sogjax.data.ground_truth import GroundTruth
 from sogjax.errors import InputError
-from sogjax.view.rerun import ImageBlobs, view_command, write_rerun
+from sogjax.view.rerun import ImageBlobs, view_command, write_comparison, write_iterations, write_rerun
 
 
 def read_back(path):
@@ -119,3 +120,38 @@ def test_the_viewer_listens_to_this_machine_only(tmp_path):
     command = view_command(tmp_path / "a.rrd", web=True)
     assert command[command.index("--bind") + 1] == "127.0.0.1"
     assert view_command(tmp_path / "a.rrd")[-2:] == ["--bind", "127.0.0.1"]
+
+
+def test_runs_lie_side_by_side_in_trees_of_their_own(tmp_path, motion):
+    other = walking_motion(6, first_frame=2, still=True)
+    errors = {"a=1": np.linspace(0.0, 0.1, 6), "a=2": np.linspace(0.1, 0.2, 6)}
+    path = tmp_path / "runs.rrd"
+    write_comparison(path, recording_of(ring_rig(), 10), {"a=1": [motion], "a=2": [other]}, errors=errors)
+    found = {entity.replace("\\", ""): columns for entity, columns in read_back(path).items()}
+    for name, shown in (("a=1", motion), ("a=2", other)):
+        blobs = found[f"/world/runs/{name}/actor_1/blobs"]["Ellipsoids3D:centers"]
+        np.testing.assert_allclose(blobs[-6:], shown.blob_means, atol=1e-6)
+        np.testing.assert_allclose(
+            np.ravel(found[f"/curves/errors/error_mm/{name}"]["Scalars:scalars"]), 1e3 * errors[name]
+        )
+    assert len(RrdReader(path).blueprints()) == 1
+
+
+def test_iterations_have_a_timeline_of_their_own(tmp_path, motion):
+    path = tmp_path / "iterations.rrd"
+    write_iterations(path, recording_of(ring_rig(), 10), motion, np.arange(6.0))
+    found = read_back(path)
+    blobs = found["/world/iterations/blobs"]
+    assert [n for n in blobs["iteration"] if n is not None] == list(range(6))
+    np.testing.assert_allclose([row for row in blobs["Ellipsoids3D:centers"] if row][-6:], motion.blob_means, atol=1e-6)
+    assert np.ravel(found["/curves/energy/energy"]["Scalars:scalars"]).tolist() == list(range(6))
+
+
+def test_deviations_are_balls_around_the_joints(tmp_path, motion):
+    sure = replace(motion, joint_std=np.full(motion.world_from_joint.shape[:2], 0.03))
+    write_rerun(tmp_path / "sure.rrd", recording_of(ring_rig(), 10), [sure], names=["ann"])
+    found = read_back(tmp_path / "sure.rrd")
+    radii = [row for row in found["/world/actors/ann/deviations"]["Points3D:radii"] if row]
+    assert len(radii) == 6
+    np.testing.assert_allclose(radii, 0.03, rtol=1e-6)
+    assert np.allclose(np.ravel(found["/curves/deviations/deviation_mm"]["Scalars:scalars"]), 30.0)

@@ -93,7 +93,7 @@ class OutputsConfig:
     formats: list[str] | None = option(None, "further formats of the motion, some of [trc,c3d,glb,csv]; null: none")
     confidence: bool = option(True, "standard deviations of the pose and the joints, in motion.npz")
     temperature: float = option(
-        1e-4,
+        1e-5,
         "energy that counts as one unit of log-likelihood, for the standard deviations; by experiments/confidence.py",
     )
 
@@ -221,6 +221,7 @@ class ReportConfig:
     frames: int = option(40, "frames of each recording to track, at most")
     overrides: list[str] = group(lambda: [], "options of track, for all runs, such as [solver=gauss_newton]")
     pictures: int = option(6, "worst frames to show")
+    do: bool = option(True, "do the runs that are missing; false: report on those that are there")
 
 
 @dataclass

@@ -56,7 +56,7 @@ def run(config: ReportConfig) -> list[Path]:
     experiments = [Experiment.named(name) for name in names if name != CONFIDENCE]
     _check_matplotlib()
     with results_folder(Path(config.out)) as out:
-        study = Study(out, config.recordings, config.frames, config.overrides)
+        study = Study(out, config.recordings, config.frames, config.overrides, config.do)
         begin = time.perf_counter()
         done: list[Done] = []
         sections = [_experiment_section(experiment, study, done) for experiment in experiments]
@@ -73,6 +73,7 @@ def _experiment_section(experiment: Experiment, study: Study, done: list[Done]) 
     """An experiment's tables, chart and findings; its runs are added to `done`."""
     done += [Done(experiment, row, source, record) for row, source, record in study.records(experiment)]
     rows = study.summary(experiment)
+    rows = [row for row in rows if row.by_recording or row.failed]
     chart = experiment_chart(experiment, rows)
     return Section(experiment.config.title, _parts(experiment, rows), [chart] if chart else [])
 

@@ -28,8 +28,15 @@ from sogjax.track.tracker import FrameResult, track
 STAGES = ("decode", "step", "whole")
 
 
-def run_row(experiment: Experiment, row: str, source: Source, runs: RunFolder, common: Sequence[str] = ()) -> RunRecord:
-    """The record of a row on a recording: read where it was done before, else made now and kept.
+def run_row(
+    experiment: Experiment,
+    row: str,
+    source: Source,
+    runs: RunFolder,
+    common: Sequence[str] = (),
+    do: bool = True,
+) -> RunRecord | None:
+    """The record of a row on a recording: read where it was done before, else made now and kept, or None.
 
     A run that fails through its input is kept as failed, and the others go on.
 
@@ -48,13 +55,13 @@ def run_row(experiment: Experiment, row: str, source: Source, runs: RunFolder, c
     measure = experiment.config.measure
     plan = RunPlan.of(source.identity, source.num_frames, cameras, entry.every, measure, config)
     found = runs.find(plan)
-    if found is not None:
+    if found is not None or not do:
         return found
     say(f"{experiment.name} {row!r}: {source.name}")
     record, begin = RunRecord(plan=asdict(plan), machine=machine_facts()), time.perf_counter()
     try:
-        do = _accuracy if measure == "accuracy" else _speed
-        record = do(record, source, config, cameras, entry.every)
+        measured = _accuracy if measure == "accuracy" else _speed
+        record = measured(record, source, config, cameras, entry.every)
     except InputError as error:
         record = replace(record, failed=str(error))
         say(f"failed: {error}")

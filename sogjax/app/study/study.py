@@ -23,6 +23,8 @@ class Study:
     """Tracked of each recording, at most."""
     overrides: Sequence[str] = ()
     """Of the track config, for all runs."""
+    do: bool = True
+    """Whether runs that are missing are done; else they are left out."""
 
     @cached_property
     def runs(self) -> RunFolder:
@@ -54,12 +56,14 @@ class Study:
         """Every run of an experiment as (row, recording, record), as they are done or read."""
         for row in experiment.config.rows:
             for source in self.sources_of(experiment, row):
-                yield row, source, run_row(experiment, row, source, self.runs, self.overrides)
+                record = run_row(experiment, row, source, self.runs, self.overrides, self.do)
+                if record is not None:
+                    yield row, source, record
 
     def summary(self, experiment: Experiment) -> list[RowSummary]:
-        """The rows of an experiment; runs that are missing are done."""
-        rows: dict[str, dict[str, RunRecord]] = {}
+        """The rows of an experiment."""
+        rows: dict[str, dict[str, RunRecord]] = {row: {} for row in experiment.config.rows}
         for row, source, record in self.records(experiment):
-            rows.setdefault(row, {})[source.name] = record
+            rows[row][source.name] = record
         papers = {name: (row.paper, row.paper_value) for name, row in experiment.config.rows.items()}
         return summarized(rows, experiment.config.reference, papers)

@@ -1,0 +1,88 @@
+"""What do the runs of an experiment, or of a sweep, look like side by side in Rerun?
+
+python experiments/side_by_side.py [experiment=solvers] [recording=walk:0] [frames=40] [to=side_by_side.rrd]
+python experiments/side_by_side.py sweep=multirun/DATE recording=FOLDER to=sweep.rrd
+
+Runs of an experiment that were done (in the folder `out`) are read, the others are made.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from sogjax.app.configs import ReportConfig
+from sogjax.app.script import run_script, settings_from
+from sogjax.app.study.experiment import Experiment
+from sogjax.app.study.runner import motions_of
+from sogjax.app.study.source import Source
+from sogjax.app.study.study import Study
+from sogjax.app.sweep_results import differing, kept_results
+from sogjax.data.motion import Motion, load_motion
+from sogjax.data.video import read_frames
+from sogjax.errors import InputError
+from sogjax.view.rerun import write_comparison
+
+
+@dataclass
+class Settings:
+    """What is shown, as `key=value` on the command line."""
+
+    experiment: str = "solvers"
+    sweep: str = ""
+    """Folder of a sweep, whose members are shown instead."""
+    recording: str = ReportConfig().recordings[0]
+    frames: int = ReportConfig().frames
+    out: str = ReportConfig().out
+    to: str = "side_by_side.rrd"
+
+
+def main() -> None:
+    """Write the file."""
+    settings = settings_from(Settings)
+    study = Study(Path(settings.out), [settings.recording], settings.frames)
+    source = study.source(settings.recording)
+    errors: dict[str, np.ndarray] = {}
+    if settings.sweep:
+        runs: Mapping[str, list[Motion]] = of_sweep(Path(settings.sweep))
+    else:
+        runs, errors = of_experiment(study, Experiment.named(settings.experiment), source)
+    count = max(int(motion.frame[-1]) for motions in runs.values() for motion in motions) + 1
+    pictures = read_frames(source.recording, 0, count - source.recording.first_frame)
+    truth = None if source.recording.ground_truth is None else source.truth
+    write_comparison(Path(settings.to), source.recording, runs, errors=errors, frames=pictures, truth=truth)
+    print(settings.to)
+
+
+def of_experiment(
+    study: Study, experiment: Experiment, source: Source
+) -> tuple[dict[str, list[Motion]], dict[str, np.ndarray]]:
+    """The motions of every row, and their errors in metres."""
+    records = {row: record for row, _, record in study.records(experiment) if not record.failed}
+    motions = {row: list(motions_of(r, source.bodies, source.recording.fps).values()) for row, r in records.items()}
+    return motions, {row: 1e-3 * record.errors for row, record in records.items()}
+
+
+def of_sweep(folder: Path) -> dict[str, list[Motion]]:
+    """The motions of every member that did not fail.
+
+    Raises:
+        InputError: there is none.
+    """
+    members = kept_results(folder)
+    names = differing([member.overrides for member in members])
+    paths = sorted(folder.glob("*/result.json"), key=lambda path: (len(path.parent.name), path.parent.name))
+    folders = [path.parent for path in paths]
+    runs = {
+        name: [load_motion(path) for path in sorted(place.glob("motion*.npz"))]
+        for name, place, member in zip(names, folders, members, strict=True)
+        if not isinstance(member.result, str)
+    }
+    if not runs:
+        raise InputError(f"{folder}: holds no member of a sweep that worked; give the folder that a sweep printed")
+    return runs
+
+
+if __name__ == "__main__":
+    run_script(main)

@@ -1,0 +1,47 @@
+"""The way of a solver through one frame: its best pose after every number of iterations."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int, UInt8
+
+from sogjax.solve import ConditionedAscent, GaussNewton
+from sogjax.track.culling import Capacities
+from sogjax.track.tracker import Tracker, TrackState
+
+
+def best_after(
+    tracker: Tracker,
+    state: TrackState,
+    cells: UInt8[Array, "camera rows columns 3"],
+    capacities: Capacities,
+    counts: Int[Array, "count"],
+) -> tuple[Float[Array, "count dof"], Float[Array, "count"]]:
+    """The best pose that the tracker's solver has seen after so many iterations of a frame, and its energy.
+
+    The frame is solved anew for every count: no solver has to know that it is watched.
+
+    Raises:
+        ValueError: a solver whose number of iterations is fixed when it is compiled.
+    """
+    if not isinstance(tracker.solver, ConditionedAscent | GaussNewton):
+        raise ValueError(f"{type(tracker.solver).__name__} cannot be watched; use the ascents or Gauss-Newton")
+    return _best_after(tracker, state, cells, capacities, counts)
+
+
+@eqx.filter_jit
+def _best_after(
+    tracker: Tracker,
+    state: TrackState,
+    cells: UInt8[Array, "camera rows columns 3"],
+    capacities: Capacities,
+    counts: Int[Array, "count"],
+) -> tuple[Float[Array, "count dof"], Float[Array, "count"]]:
+    seen = tracker.views(cells, state, capacities)
+
+    def after(count: Int[Array, ""]) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
+        stopped = eqx.tree_at(lambda t: t.solver.max_iterations, tracker, count)
+        _, result = stopped.found(state, seen, capacities)
+        return result.pose, result.terms.energy
+
+    return jax.lax.map(after, jnp.asarray(counts))

@@ -1,0 +1,73 @@
+"""Curves of a Rerun file: what was found in each frame, and in each iteration."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+import rerun as rr
+
+from sogjax.data.motion import Motion
+from sogjax.view.rerun.timelines import FRAME, ITERATION, time_columns
+
+_CURVE_COLORS = ((90, 170, 255), (255, 170, 60), (120, 220, 120), (255, 110, 120), (190, 140, 255), (240, 220, 90))
+_PLOTS = {
+    "errors": "Error, mm",
+    "energy": "Similarity and energy",
+    "penalties": "Penalties",
+    "iterations": "Iterations",
+    "deviations": "Mean standard deviation of joints, mm",
+}
+
+
+def own_curves(motion: Motion) -> dict[str, np.ndarray]:
+    """The curves of a motion; the mean standard deviation of its joints where that was computed."""
+    curves = {"similarity": motion.similarity, "energy": motion.energy, "iterations": motion.iterations}
+    if motion.joint_std is not None:
+        curves["deviation_mm"] = 1000.0 * np.mean(motion.joint_std, axis=1)
+    return curves
+
+
+def log_curve_looks(
+    stream: rr.RecordingStream, actor: str | None, curves: Mapping[str, np.ndarray], first_color: int
+) -> None:
+    """Titles and colours of curves."""
+    for k, name in enumerate(curves):
+        title, color = f"{name} {actor}" if actor else name, _CURVE_COLORS[(first_color + k) % len(_CURVE_COLORS)]
+        stream.log(_curve(name, actor), rr.SeriesLines(names=title, colors=color, widths=1.5), static=True)
+
+
+def log_curves(stream: rr.RecordingStream, motion: Motion, actor: str | None, curves: Mapping[str, np.ndarray]) -> None:
+    """The values of curves over a motion's frames."""
+    for name, values in curves.items():
+        scalars = rr.Scalars.columns(scalars=np.asarray(values, float))
+        stream.send_columns(_curve(name, actor), time_columns(motion), scalars)
+
+
+def log_traces(stream: rr.RecordingStream, motion: Motion, traces: Mapping[str, Sequence[np.ndarray]]) -> None:
+    """Curves over the iterations, one array for each of a motion's frames."""
+    for name, by_frame in traces.items():
+        counts = [len(values) for values in by_frame]
+        values = np.concatenate([np.asarray(values, float) for values in by_frame])
+        times = [
+            rr.TimeColumn(ITERATION, sequence=np.arange(len(values))),
+            rr.TimeColumn(FRAME, sequence=np.repeat(motion.frame, counts)),
+        ]
+        entity = f"/curves/trace/{name}"
+        stream.log(entity, rr.SeriesLines(names=name), static=True)
+        stream.send_columns(entity, times, rr.Scalars.columns(scalars=values))
+
+
+def plots_with(curves: Iterable[str]) -> dict[str, str]:
+    """Titles of the plots that have something to show of these curves."""
+    used = {_plot(name) for name in curves}
+    return {plot: title for plot, title in _PLOTS.items() if plot in used}
+
+
+def _curve(name: str, actor: str | None) -> str:
+    return f"/curves/{_plot(name)}/{name}" + (f"/{actor}" if actor else "")
+
+
+def _plot(curve: str) -> str:
+    """Which plot a curve belongs in."""
+    if "penalty" in curve:
+        return "penalties"
+    return {"iterations": "iterations", "deviation_mm": "deviations", "error_mm": "errors"}.get(curve, "energy")

@@ -1,0 +1,220 @@
+"""Everything of a tracked recording in one Rerun file."""
+
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
+from itertools import repeat
+from pathlib import Path
+from types import TracebackType
+from typing import NamedTuple
+
+import numpy as np
+import rerun as rr
+from jaxtyping import Float
+
+from sogjax.data.atomic import atomic_path
+from sogjax.data.ground_truth import GroundTruth
+from sogjax.data.motion import Motion
+from sogjax.data.recording import Recording
+from sogjax.view.bones import Bones, blob_palette, bones_from_motion
+from sogjax.view.frames import frame_range
+from sogjax.view.picture_camera import picture_camera
+from sogjax.view.rerun.curves import log_curve_looks, log_curves, log_traces, own_curves, plots_with
+from sogjax.view.rerun.layout import eye, tracking_layout
+from sogjax.view.rerun.scene import log_actor, log_cameras, log_deviations, log_look, log_markers, log_path
+from sogjax.view.rerun.timelines import FRAME, TIME, camera_entity, color_bytes
+
+APPLICATION = "sogjax"
+QUALITY = 80
+"""Of the JPEG pictures, 0 to 100."""
+
+
+class ImageBlobs(NamedTuple):
+    """The blobs of one picture: undistorted pixels of the picture as recorded, sRGB in 0..1."""
+
+    means: np.ndarray
+    sigmas: np.ndarray
+    colors: np.ndarray
+
+
+def write_rerun(
+    path: Path,
+    recording: Recording,
+    motions: Sequence[Motion],
+    *,
+    names: Sequence[str] | None = None,
+    frames: Iterable[Sequence[np.ndarray | None]] | None = None,
+    image_blobs: Iterable[Sequence[ImageBlobs | None]] | None = None,
+    blob_colors: Sequence[Float[np.ndarray, "_ 3"]] | None = None,
+    terms: Mapping[str, Float[np.ndarray, "frame"]] | None = None,
+    traces: Mapping[str, Sequence[np.ndarray]] | None = None,
+    truth: GroundTruth | None = None,
+    picture_width: int = 640,
+    quality: int = QUALITY,
+    progress: Callable[[Iterable[int], int, str], Iterable[int]] = lambda items, count, title: items,
+) -> None:
+    """Write cameras, pictures, bodies, markers and curves, with a layout that opens well.
+
+    Pictures are made smaller and freed of their lens distortion, so that everything in them lies as in 3-D.
+
+    Args:
+        path: the `.rrd` file, replaced as a whole.
+        recording: what was tracked.
+        motions: one for each actor.
+        names: the actors' names; default `actor`, `actor_2`, ...
+        frames: BGR pictures of all cameras, from the motions' first frame to their last; None: no pictures.
+        image_blobs: the pictures' blobs, in the same order.
+        blob_colors: sRGB in 0..1 of each actor's blobs; default by the side of the body.
+        terms: further curves by name over the first motion's frames, such as `limit_penalty`.
+        traces: curves by name over the iterations, one array for each of the first motion's frames.
+        truth: markers to show beside the bodies.
+        picture_width: largest width of the stored pictures in pixels.
+        quality: of the JPEG pictures, 0 to 100.
+        progress: wraps the frames' numbers to show how far it is: (numbers, count, title).
+    """
+    names = list(names) if names else ["actor", *(f"actor_{k + 2}" for k in range(len(motions) - 1))][: len(motions)]
+    first, stop = frame_range(recording, motions)
+    with RerunFile(path, recording, names, blob_colors=blob_colors, picture_width=picture_width) as file:
+        file.write(motions, terms or {})
+        if frames is not None or image_blobs is not None:
+            numbers = progress(range(first, stop), stop - first, "Rerun file")
+            for frame, pictures, blobs in zip(numbers, frames or repeat(()), image_blobs or repeat(()), strict=False):
+                file.write_pictures(frame, [file.jpeg(k, image, quality) for k, image in enumerate(pictures)], blobs)
+        file.write_traces(motions[0], traces or {})
+        file.write_markers(truth)
+
+
+class RerunFile:
+    """A Rerun file that is written as the motion comes, within a `with` block; it gets its name when it is whole.
+
+    Args:
+        path: the `.rrd` file, replaced as a whole.
+        recording: what is tracked.
+        names: the actors' names.
+        blob_colors: sRGB in 0..1 of each actor's blobs; default by the side of the body.
+        picture_width: largest width of the stored pictures in pixels.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        recording: Recording,
+        names: Sequence[str],
+        *,
+        blob_colors: Sequence[Float[np.ndarray, "_ 3"]] | None = None,
+        picture_width: int = 640,
+    ) -> None:
+        self._path, self._recording, self._names = Path(path), recording, list(names)
+        self._cameras = [picture_camera(recording.rig, name, picture_width) for name in recording.rig.names]
+        self._colors = None if blob_colors is None else [color_bytes(colors) for colors in blob_colors]
+        self._bones: list[Bones] = []
+        self._paths: list[list[np.ndarray]] = [[] for _ in names]
+        self._lowest, self._highest = np.full(3, np.inf), np.full(3, -np.inf)
+        self._frames = (0, 0)
+        self._with_blobs = False
+        self._plots: dict[str, str] = {}
+
+    def __enter__(self) -> "RerunFile":
+        self._files = ExitStack()
+        self._stream = rr.RecordingStream(APPLICATION)
+        self._stream.set_log_time_enabled(False)
+        self._stream.set_log_tick_enabled(False)
+        self._stream.save(self._files.enter_context(atomic_path(self._path)))
+        self._stream.send_recording_name(self._recording.name)
+        return self
+
+    def jpeg(self, camera: int, image: np.ndarray | None, quality: int = QUALITY) -> bytes | None:
+        """A camera's picture (BGR) as it is stored; thread-safe."""
+        return None if image is None else self._cameras[camera].jpeg(image, quality)
+
+    def write(self, motions: Sequence[Motion], terms: Mapping[str, Float[np.ndarray, "frame"]]) -> None:
+        """The bodies and curves of the frames that follow.
+
+        Args:
+            motions: one for each actor.
+            terms: further curves by name, over the first motion's frames.
+        """
+        if not self._bones:
+            self._begin(motions, terms)
+        for k, (name, motion) in enumerate(zip(self._names, motions, strict=True)):
+            self._paths[k].append(log_actor(self._stream, f"/world/actors/{name}", motion, self._bones[k]))
+            log_deviations(self._stream, f"/world/actors/{name}", motion, self._bones[k])
+            log_curves(self._stream, motion, self._curve_actor(name), own_curves(motion))
+            self._lowest = np.minimum(self._lowest, motion.blob_means.min(axis=(0, 1)))
+            self._highest = np.maximum(self._highest, motion.blob_means.max(axis=(0, 1)))
+        log_curves(self._stream, motions[0], None, terms)
+        first, stop = frame_range(self._recording, motions)
+        self._frames = (min(first, self._frames[0]) if self._frames[1] else first, stop)
+
+    def write_pictures(
+        self, frame: int, jpegs: Sequence[bytes | None], image_blobs: Sequence[ImageBlobs | None]
+    ) -> None:
+        """The pictures of all cameras, as `jpeg` makes them, and their blobs; either may be empty."""
+        self._with_blobs |= len(image_blobs) > 0
+        self._stream.set_time(FRAME, sequence=frame)
+        self._stream.set_time(TIME, duration=frame / self._recording.fps)
+        for camera, jpeg in zip(self._cameras, jpegs, strict=False):
+            if jpeg is not None:
+                encoded = rr.EncodedImage(contents=jpeg, media_type="image/jpeg")
+                self._stream.log(f"{camera_entity(camera.name)}/picture", encoded)
+        for camera, sog in zip(self._cameras, image_blobs, strict=False):
+            if sog is not None:
+                radii = np.asarray(sog.sigmas) * float(np.sqrt(camera.scale.prod()))
+                points = rr.Points2D(camera.pixels(np.asarray(sog.means)), radii=radii, colors=color_bytes(sog.colors))
+                self._stream.log(f"{camera_entity(camera.name)}/blobs", points)
+        self._stream.reset_time()
+
+    def write_traces(self, motion: Motion, traces: Mapping[str, Sequence[np.ndarray]]) -> None:
+        """Curves by name over the iterations, one array for each of the motion's frames."""
+        log_traces(self._stream, motion, traces)
+        self._plots |= {"trace": "Within frames (timeline: iteration)"} if traces else {}
+
+    def write_markers(self, truth: GroundTruth | None) -> None:
+        """True markers beside the bodies, over the frames that were written."""
+        if truth is not None and truth.markers is not None:
+            log_markers(self._stream, truth, self._frames)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        """Write what is known only at the end, or remove the file after an error."""
+        if error is not None:
+            self._stream.disconnect()
+            self._files.__exit__(kind, error, traceback)
+            return
+        with self._files:
+            if self._bones:
+                self._end()
+            self._stream.flush()
+            self._stream.disconnect()
+
+    def _end(self) -> None:
+        """What needs the whole motion: how cameras are shown, the roots' paths, the layout."""
+        middle, size = 0.5 * (self._lowest + self._highest), float(np.linalg.norm(self._highest - self._lowest))
+        log_cameras(self._stream, self._recording, self._cameras, middle)
+        for k, name in enumerate(self._names):
+            log_path(self._stream, f"/world/actors/{name}", np.concatenate(self._paths[k]), k)
+        view = eye(self._recording, middle, size)
+        self._stream.send_blueprint(tracking_layout(self._recording, self._names, self._with_blobs, self._plots, view))
+
+    def _begin(self, motions: Sequence[Motion], terms: Mapping[str, np.ndarray]) -> None:
+        """What stands once in the file: looks of bodies and curves."""
+        self._bones = [bones_from_motion(motion) for motion in motions]
+        self._plots = plots_with([*own_curves(motions[0]), *terms])
+        for k, (name, motion) in enumerate(zip(self._names, motions, strict=True)):
+            colors = blob_palette(motion, k) if self._colors is None else self._colors[k]
+            log_look(self._stream, f"/world/actors/{name}", motion, self._bones[k], k, colors)
+            log_curve_looks(self._stream, self._curve_actor(name), own_curves(motion), 3 * k)
+        log_curve_looks(self._stream, None, terms, 3 * len(motions))
+
+    def _curve_actor(self, name: str) -> str | None:
+        return name if len(self._names) > 1 else None
+
+
+def view_command(path: Path, web: bool = False) -> list[str]:
+    """The command that opens a Rerun file in a window, or serves it to a browser; reached from this machine only.
+
+    The window listens for further data too, on all of the machine's addresses unless told otherwise.
+    """
+    command = [sys.executable, "-m", "rerun", str(path), "--bind", "127.0.0.1"]
+    return [*command, "--serve-web"] if web else command
