@@ -62,10 +62,12 @@ class EnergyConfig:
 class SolverConfig:
     """The solver (Eq. 11, 12)."""
 
-    method: str = option("lbfgs", "conditioned_ascent | gradient_ascent | gauss_newton | bfgs | lbfgs | nonlinear_cg")
-    epsilon: float = option(0.002, "[epsilon] stop when a step is shorter, rad and m")
-    min_iterations: int = option(10, "[n_iter] iterations made at least")
-    max_iterations: int = option(200, "iterations made at most")
+    method: str = option(
+        "gauss_newton", "conditioned_ascent | gradient_ascent | gauss_newton | bfgs | lbfgs | nonlinear_cg"
+    )
+    epsilon: float = option(0.01, "[epsilon] stop when a step is shorter, rad and m; other solvers: 0.002")
+    min_iterations: int = option(1, "[n_iter] iterations made at least; other solvers: 10")
+    max_iterations: int = option(50, "iterations made at most; other solvers: 200")
     grow: float = option(1.2, "[mu+] growth of a step size while the gradient keeps its sign")
     shrink: float = option(0.5, "[mu-] shrinkage where it does not")
     first_angle: float = option(0.02, "[sigma_0] length of the first step of the angles, rad")
