@@ -130,7 +130,7 @@ def _cut(lines: Float[np.ndarray, "line 2 3"]) -> Float[np.ndarray, "line point 
 
 def _polyline(area: np.ndarray, pixels: Float[np.ndarray, "point 2"], color: tuple[int, int, int]) -> None:
     places = np.where(np.isfinite(pixels), np.clip(pixels, -1e4, 1e4), 0).round().astype(int).tolist()
-    seen: np.ndarray = np.asarray(np.isfinite(pixels)).all(axis=1)
+    seen = ~np.isnan(pixels.sum(axis=1))
     for k in np.flatnonzero(seen[:-1] & seen[1:]):
         cv2.line(area, tuple(places[k]), tuple(places[k + 1]), color, 1, cv2.LINE_AA)
 
