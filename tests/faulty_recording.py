@@ -95,15 +95,22 @@ def turned(folder, degrees=5.0):
 
 
 def _turned(rig, degrees):
-    cameras, poses = rig.cameras, np.array(rig.cameras.camera_from_world, float)
-    turn = np.eye(4)
-    turn[:3, :3] = cv2.Rodrigues(np.array([0.0, np.deg2rad(degrees), 0.0]))[0]
-    k = rig.names.index(WRONG)
-    poses[k] = turn @ poses[k]
-    changed = Camera(
-        cameras.intrinsics, cameras.camera_from_world.at[...].set(poses), cameras.distortion, cameras.image_size
-    )
-    return CameraRig(rig.names, changed)
+    turn = np.tile(np.eye(4), (len(rig), 1, 1))
+    turn[rig.names.index(WRONG), :3, :3] = cv2.Rodrigues(np.array([0.0, np.deg2rad(degrees), 0.0]))[0]
+    return moved(rig, turn)
+
+
+def looking_backwards(folder):
+    """Poses of cameras with OpenGL's axes: y up, z backwards."""
+    recalibrated(folder, lambda rig: moved(rig, np.diag([1.0, -1.0, -1.0, 1.0])))
+
+
+def moved(rig, changes):
+    """The rig with its poses changed, seen from the cameras."""
+    poses = changes @ np.array(rig.cameras.camera_from_world, float)
+    cameras = rig.cameras
+    changed = cameras.camera_from_world.at[...].set(poses)
+    return CameraRig(rig.names, Camera(cameras.intrinsics, changed, cameras.distortion, cameras.image_size))
 
 
 def exchanged_calibration(folder):

@@ -224,6 +224,14 @@ def test_inverse_poses_are_recognised(tmp_path):
     assert any("camera to world" in finding.cause for finding in found)
 
 
+def test_cameras_that_look_backwards_are_recognised(tmp_path):
+    recording = copied(tmp_path / "walk")
+    faulty.looking_backwards(recording)
+    rig = open_recording(recording).rig
+    (finding,) = camera_findings(rig, rig_geometry(rig, "z"), "z")
+    assert "OpenGL" in finding.cause
+
+
 def test_points_that_move_in_space_give_both_cameras_the_same_barcode():
     """Rays towards points of space, in two cameras anywhere: each plane through both holds the same points."""
     rng = np.random.default_rng(1)

@@ -83,7 +83,7 @@ def _say_machine() -> None:
 
 def _say_cache() -> None:
     """Where compiled programs are kept."""
-    folder = jax.config.read("jax_compilation_cache_dir")
+    folder = jax.config.values["jax_compilation_cache_dir"]
     if folder is None:
         _line("compiled programs", f"are not kept; set {VARIABLE}=FOLDER for quicker starts")
         return

@@ -20,8 +20,9 @@ UPRIGHT = 0.5
 """Cosine between the vertical and the pictures' upward direction, on average, below which `up` is doubted."""
 TOWARDS = 0.8
 """Cosine between a viewing direction and that to what all look at."""
-APART = 0.05
-"""Extent of a set-up in units of the distance to what is looked at, at least."""
+APART = 0.1
+"""Extent of a set-up in units of the cameras' distance from the origin, at least: inverse poses put all cameras near
+one place."""
 BELOW_FLOOR = 0.1
 """Camera heights, in units of the distance to what is looked at, that a rough zero of the floor explains."""
 
@@ -99,8 +100,10 @@ def nearest_point(
 
 def camera_findings(rig: CameraRig, geometry: RigGeometry, up: str) -> list[Finding]:
     """What is wrong with the calibration by itself, without a look at any picture."""
-    findings = [*_lenses(rig, geometry), *_places(geometry), *_directions(rig, geometry, up)]
-    findings += [*_vertical(geometry, up)]
+    turned = _directions(rig, geometry)
+    findings = [*_lenses(rig, geometry), *_places(geometry), *turned]
+    if not any(finding.severity == "warning" for finding in turned):
+        findings += _vertical(geometry, up)
     if not findings:
         low, high = geometry.heights.min(), geometry.heights.max()
         look = f", {geometry.scale:.2f} m from what they look at" if len(rig) > 1 else ""
@@ -144,7 +147,7 @@ def _places(geometry: RigGeometry) -> list[Finding]:
     return findings
 
 
-def _directions(rig: CameraRig, geometry: RigGeometry, up: str) -> list[Finding]:
+def _directions(rig: CameraRig, geometry: RigGeometry) -> list[Finding]:
     if len(rig) < 2:
         return []
     if not _converge(rig.cameras.camera_from_world) and _converge(_inverse(rig.cameras.camera_from_world)):
@@ -179,7 +182,7 @@ def _converge(poses: Shaped[Array | np.ndarray, "camera 4 4"]) -> bool:
     distances = np.linalg.norm(towards, axis=1)
     apart = np.linalg.norm(centres - centres.mean(axis=0), axis=1).max()
     aligned = np.einsum("ni,ni->n", towards, forwards) > TOWARDS * distances
-    return bool(aligned.all() and apart > APART * distances.max())
+    return bool(aligned.all() and apart > APART * np.median(np.linalg.norm(poses[:, :3, 3], axis=1)))
 
 
 def _vertical(geometry: RigGeometry, up: str) -> list[Finding]:

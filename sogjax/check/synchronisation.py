@@ -154,8 +154,9 @@ def synchrony_findings(
         findings.append(Finding("warning", "synchronisation", what, cause, remedy, (name,)))
     unsure = tuple(name for name, sure in zip(found.names, found.sure, strict=True) if not sure)
     if unsure:
-        what = f"time offsets of {listed(unsure)} could not be told: too little of the motion that others see"
-        findings.append(Finding("note", "synchronisation", what, cameras=unsure))
+        what = f"time offsets of {listed(unsure)} could not be told: what moves there is not what the others see"
+        cause = "little of the motion is in their pictures, or their calibration or names are wrong"
+        findings.append(Finding("note", "synchronisation", what, cause, cameras=unsure))
     if not late:
         what = f"{int(found.sure.sum()) - len(jumped)} of {len(found.names)} cameras are in step"
         findings.append(Finding("ok", "synchronisation", what))

@@ -130,10 +130,9 @@ def _cut(lines: Float[np.ndarray, "line 2 3"]) -> Float[np.ndarray, "line point 
 
 def _polyline(area: np.ndarray, pixels: Float[np.ndarray, "point 2"], color: tuple[int, int, int]) -> None:
     places = np.where(np.isfinite(pixels), np.clip(pixels, -1e4, 1e4), 0).round().astype(int).tolist()
-    seen = np.isfinite(pixels).all(axis=1).tolist()
-    for k in range(len(places) - 1):
-        if seen[k] and seen[k + 1]:
-            cv2.line(area, tuple(places[k]), tuple(places[k + 1]), color, 1, cv2.LINE_AA)
+    seen = ~np.isnan(pixels.sum(axis=1))
+    for k in np.flatnonzero(seen[:-1] & seen[1:]):
+        cv2.line(area, tuple(places[k]), tuple(places[k + 1]), color, 1, cv2.LINE_AA)
 
 
 def _dim(area: np.ndarray) -> None:
