@@ -14,6 +14,7 @@ from small_recording import SIZE, frame_of, make_recording, toml_camera, write_c
 
 from sogjax.app import pipeline
 from sogjax.app.cli import main
+from sogjax.check.clip import read_clip
 from sogjax.data import video
 from sogjax.data.motion import load_motion
 from sogjax.data.recording import open_recording
@@ -226,3 +227,10 @@ def test_a_video_whose_frames_do_not_come_evenly(tmp_path):
     (warning,) = (text for text in open_recording(folder).warnings if "evenly" in text)
     assert "right.mp4" in warning
     assert "up to 3.0 times" in warning
+
+
+def test_what_checks_look_at_is_black_where_a_camera_is_missing(tmp_path):
+    recording = open_recording(make_recording(tmp_path / "r", settings="up: z\nmissing: {right: [[1, 2]]}\n"))
+    clip = read_clip(recording, 0, 4, lambda items, count, label: iter(items))
+    assert [int(frame.max()) > 0 for frame in clip.grey[1]] == [True, False, False, True]
+    assert all(frame.max() > 0 for frame in clip.grey[0])

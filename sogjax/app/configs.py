@@ -151,6 +151,7 @@ class BodyConfig:
     dof: str | None = option(None, "a .dof of Skeletool, whose degrees of freedom replace those of the .skeleton")
     unit: str | None = option(None, "m | cm | mm: the file's lengths; null: mm of a .skeleton, m of a .bvh")
     up: str = option("y", "vertical of the file's rest pose: x y z -x -y -z")
+    overwrite: bool = option(False, OVERWRITE)
 
 
 @dataclass

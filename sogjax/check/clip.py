@@ -53,6 +53,12 @@ def working_picture(image: UInt8[np.ndarray, "_h _w 3"]) -> UInt8[np.ndarray, "_
     return cv2.resize(image, working_size(image.shape[1], image.shape[0]), interpolation=cv2.INTER_AREA)
 
 
+def picture_or_black(recording: Recording, camera: int, image: np.ndarray | None) -> UInt8[np.ndarray, "_h _w 3"]:
+    """A camera's picture; a black one where it is missing."""
+    width, height = recording.rig.image_size(recording.rig.names[camera])
+    return np.zeros((height, width, 3), np.uint8) if image is None else image
+
+
 def read_clip(recording: Recording, start: int, frames: int, progress: Progress) -> Clip:
     """At most `frames` frames from `start` on, which counts from the recording's first frame.
 
@@ -62,7 +68,7 @@ def read_clip(recording: Recording, start: int, frames: int, progress: Progress)
     stop = min(start + frames, recording.num_frames)
     count = stop - start
     wanted = {int(k) for k in np.linspace(0, count - 1, NUM_STILLS + 2)[1:-1]}
-    reduced = lambda camera, image: _reduced(image)
+    reduced = lambda camera, image: _reduced(picture_or_black(recording, camera, image))
     grey: list[list[np.ndarray]] = [[] for _ in recording.rig.names]
     stills: dict[int, tuple[np.ndarray, ...]] = {}
     for index, pictures in enumerate(progress(read_prepared(recording, reduced, start, stop), count, "reading")):

@@ -1,16 +1,16 @@
 """Where the subject is in the pictures: masks of example poses and of a few frames of the videos."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, UInt8
 
-from sogjax.check.clip import Clip, working_picture
-from sogjax.data.image_file import read_image, read_mask
+from sogjax.check.clip import Clip, picture_or_black, working_picture
+from sogjax.data.image_file import read_mask
 from sogjax.data.recording import ExamplePose, Recording
-from sogjax.data.video import read_prepared
+from sogjax.data.video import read_prepared, read_still
 from sogjax.images.plate_difference import plate_difference, reduced_mask
 from sogjax.images.segmentation import first_guess, is_subject
 
@@ -67,7 +67,7 @@ def plates_of(recording: Recording) -> dict[int, Picture]:
     """The pictures of the empty scene by camera (its index in the rig), at the working size."""
     names = recording.rig.names
     return {
-        camera: working_picture(read_image(recording.background[name]))
+        camera: working_picture(read_still(recording, name, recording.background[name]))
         for camera, name in enumerate(names)
         if name in recording.background
     }
@@ -77,7 +77,9 @@ def _example_moment(recording: Recording, example: ExamplePose, plates: Mapping[
     names = recording.rig.names
     shown = [camera for camera, name in enumerate(names) if name in example.images]
     with ThreadPoolExecutor() as pool:
-        pictures = dict(zip(shown, pool.map(lambda k: _example_picture(example, names[k]), shown), strict=True))
+        pictures = dict(
+            zip(shown, pool.map(lambda k: _example_picture(recording, example, names[k]), shown), strict=True)
+        )
         find = lambda k: _example_mask(example, names[k], pictures[k], plates.get(k))
         masks = dict(zip(shown, pool.map(find, shown), strict=True))
     return Moment(
@@ -85,8 +87,8 @@ def _example_moment(recording: Recording, example: ExamplePose, plates: Mapping[
     )
 
 
-def _example_picture(example: ExamplePose, name: str) -> Picture:
-    return working_picture(read_image(example.images[name]))
+def _example_picture(recording: Recording, example: ExamplePose, name: str) -> Picture:
+    return working_picture(read_still(recording, name, example.images[name]))
 
 
 def _example_mask(example: ExamplePose, name: str, picture: Picture, plate: Picture | None) -> Mask | None:
@@ -104,6 +106,10 @@ def _from_plate(picture: Picture, plate: Picture | None) -> Mask | None:
     return guess if is_subject(guess) else None
 
 
+def _at_working_size(recording: Recording) -> Callable[[int, np.ndarray | None], Picture]:
+    return lambda camera, image: working_picture(picture_or_black(recording, camera, image))
+
+
 def _stills_apart(clip: Clip, offsets: Sequence[int]) -> dict[int, tuple[Picture, ...]]:
     """The pictures as they belong together with other offsets, read again."""
     names = clip.recording.rig.names
@@ -113,6 +119,6 @@ def _stills_apart(clip: Clip, offsets: Sequence[int]) -> dict[int, tuple[Picture
     stills = {}
     for index in sorted({int(np.clip(k, border, max(clip.num_frames - 1 - border, border))) for k in clip.stills}):
         frame = clip.first + index
-        shown = next(read_prepared(recording, lambda camera, image: working_picture(image), frame, frame + 1))
+        shown = next(read_prepared(recording, _at_working_size(recording), frame, frame + 1))
         stills[index] = tuple(shown)
     return stills
