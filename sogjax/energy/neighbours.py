@@ -4,7 +4,6 @@ The lists are made at one pose and hold for every pose whose blobs are seen at m
 uses them looks at how far the blobs have moved (`displacement`) and makes them anew where that was too far.
 """
 
-import math
 from functools import partial, reduce
 
 import jax
@@ -64,7 +63,7 @@ def near_pairs(
     )
     chosen, count = computed_once(really, partial(chosen_indices, capacity=capacity * MEMBERS), flags.reshape(-1))
     tile, body_index, first, real = computed_once(
-        really, partial(_blocks_of, shape=flags.shape, num_bodies=num_bodies), chosen, count
+        really, partial(_blocks_of, tiles=flags.shape[1], members=flags.shape[2], num_bodies=num_bodies), chosen, count
     )
     slots = jnp.arange(TILE, dtype=chosen.dtype)[:, None]
     of_image = lambda values: _taken(values, tile[None, :] * TILE + slots)
@@ -77,16 +76,15 @@ def near_pairs(
 
 
 def _blocks_of(
-    chosen: Int[Array, "n"], count: Int[Array, ""], shape: tuple[int, int, int], num_bodies: int
+    chosen: Int[Array, "n"], count: Int[Array, ""], tiles: int, members: int, num_bodies: int
 ) -> tuple[Int[Array, "block"], Int[Array, "member block"], Int[Array, "member block"], Bool[Array, "member block"]]:
     """For every block its tile and its body blobs, both counted over all cameras, where each pair's colours begin.
 
     Last, which members are no padding.
     """
-    _, tiles, members = shape
     real = jnp.arange(chosen.shape[0], dtype=chosen.dtype) < count
     # Padding is spread over all places: sums into one and the same place would wait for each other.
-    chosen = jnp.where(real, chosen, jnp.arange(chosen.shape[0], dtype=chosen.dtype) % math.prod(shape))
+    chosen = jnp.where(real, chosen, jnp.arange(chosen.shape[0], dtype=chosen.dtype) % (tiles * members))
     chosen, real = chosen.reshape(-1, MEMBERS).T, real.reshape(-1, MEMBERS).T
     tile = chosen[0] // members
     body = chosen - tile[None, :] * members
@@ -94,6 +92,12 @@ def _blocks_of(
     camera = tile // tiles
     body_index = camera[None, :] * num_bodies + body
     return tile, body_index, (body_index * tiles + (tile - camera * tiles)[None, :]) * TILE, real
+
+
+def _flags(images: Sog, color_similarities: Array, seen: Sog, margin: Array, exponent: Array) -> Array:
+    """What `_near` and `_whole_blocks` say for all cameras."""
+    near = jax.vmap(_near, in_axes=(0, 0, 0, 0, None))(images, color_similarities, seen, margin, exponent)
+    return _whole_blocks(near)
 
 
 def _near(
