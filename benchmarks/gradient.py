@@ -2,7 +2,7 @@
 
 python benchmarks/gradient.py [cameras=12] [image_blobs=1024] [repeats=40]
 
-The body is the default one (63 blobs); the image blobs lie around it. All in float32, warm, the alternatives in turn.
+The body is the default one (63 blobs); the image blobs are cells about it. All in float32, warm, in turn.
 """
 
 import statistics
@@ -103,21 +103,33 @@ def flat(gradient: object) -> np.ndarray:
 
 
 def scattered_views(body: Body, settings: Settings) -> Views:
-    """A ring of cameras whose image blobs lie around the projected body, one in three of a matching colour."""
+    """A ring of cameras whose image blobs are the cells nearest to the projected body, in the order of a picture.
+
+    Cells are as large as lets their number cover the body and its surroundings. Body and picture wear three clothes,
+    each of which is alike in itself only.
+    """
     rng = np.random.default_rng(0)
     cameras = ring(settings.cameras)
     seen = jax.vmap(project, in_axes=(0, None))(cameras, body.posed_blobs(body.poses["rest"]))
-    chosen = rng.integers(0, body.num_blobs, (settings.cameras, settings.image_blobs))
-    centres = np.take_along_axis(np.asarray(seen.means), chosen[..., None], axis=1)
+    side = 8.0 * np.sqrt(1024.0 / settings.image_blobs)
+    x, y = np.meshgrid(np.arange(side / 2, 1296.0, side), np.arange(side / 2, 972.0, side))
+    cells = np.stack([x.ravel(), y.ravel()], axis=-1)
+    means, worn = [], []
+    for of_camera, sigmas in zip(np.asarray(seen.means, float), np.asarray(seen.sigmas, float), strict=True):
+        far = np.linalg.norm(cells[:, None, :] - of_camera[None], axis=-1) / sigmas
+        nearest = np.sort(np.argsort(far.min(axis=1), kind="stable")[: settings.image_blobs])
+        means.append(cells[nearest])
+        worn.append(far[nearest].argmin(axis=1))
     shape = (settings.cameras, settings.image_blobs)
     images = Sog(
-        means=jnp.asarray(centres + rng.normal(0.0, 20.0, (*shape, 2)), jnp.float32),
-        sigmas=jnp.asarray(rng.choice([4.0, 8.0], shape), jnp.float32),
+        means=jnp.asarray(np.stack(means), jnp.float32),
+        sigmas=jnp.full(shape, side / 2, jnp.float32),
         colors=jnp.zeros((*shape, 3), jnp.float32),
         mask=jnp.ones(shape, bool),
     )
-    pairs = (settings.cameras, body.num_blobs, settings.image_blobs)
-    similarities = np.where(rng.random(pairs) < 1 / 3, rng.random(pairs), 0.0)
+    clothes = lambda blobs: 3 * blobs // body.num_blobs
+    alike = clothes(np.stack(worn))[:, None, :] == clothes(np.arange(body.num_blobs))[None, :, None]
+    similarities = np.where(alike, rng.random(alike.shape), 0.0)
     normalizers = whole_image_overlap(cameras.image_size)
     return Views(cameras, images, jnp.asarray(similarities, jnp.float32), normalizers)
 

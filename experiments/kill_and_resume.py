@@ -3,7 +3,8 @@
 python experiments/kill_and_resume.py kills=20
 
 tracks a small rendered walk, all outputs on, first pose searched for; kills the process (SIGKILL) at random moments of
-its life in its folder, goes on with resume=true, and compares every array of the end with a run that was left alone.
+its life in its folder, every other time after it wrote its first frames; goes on with resume=true, and compares every
+array of the end with a run that was left alone.
 """
 
 import random
@@ -25,6 +26,8 @@ from sogjax.errors import InputError
 from sogjax.synth import SynthSettings, cached_recording
 
 PARTIAL = "motion.partial"
+LATE = 0.2
+"""Part of a run's life in which it is killed after it wrote frames."""
 
 
 @dataclass
@@ -54,7 +57,8 @@ def main() -> None:
         life = time.perf_counter() - begin
         whole, left, folder, runs = load_motion(alone / "motion.npz"), [], Path(place) / "run_0", 1
         while len(left) < settings.kills:
-            if killed(command, folder, chance.uniform(0.0, life)):
+            late = len(left) % 2 == 1
+            if killed(command, folder, chance.uniform(0.0, LATE * life if late else life), late):
                 left.append(frames_left(folder))
                 print(f"kill {len(left)}: {left[-1]} frames readable", flush=True)
                 continue
@@ -82,10 +86,11 @@ def started(command: list[str], folder: Path) -> subprocess.Popen:
     return subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
 
 
-def killed(command: list[str], folder: Path, after: float) -> bool:
-    """Go on in a folder and kill the process some seconds after it claimed it; False: it ended before."""
+def killed(command: list[str], folder: Path, after: float, late: bool) -> bool:
+    """Go on in a folder and kill the process some seconds after it claimed it, or wrote frames; False: it ended."""
+    before = frames_left(folder)
     process = started([*command, "resume=true"], folder)
-    while process.poll() is None and not (folder / ".lock").exists():
+    while process.poll() is None and not (frames_left(folder) > before if late else (folder / ".lock").exists()):
         time.sleep(0.02)
     try:
         _, said = process.communicate(timeout=after)

@@ -42,7 +42,7 @@ def test_from_a_recording_to_motion_and_pictures(capsys, tmp_path, monkeypatch, 
     out, _ = done(capsys, *track, "out=run", "start=1", "outputs.overlay_width=320", "outputs.formats=[trc,glb]")
     formats = ["motion.bvh", "motion.glb", "motion.npz", "motion.rrd", "motion.trc"]
     names = ["config.yaml", "metrics.json", *formats, "overlay.mp4"]
-    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == names
+    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == sorted([*names, "run.json"])
     assert all((tmp_path / "run" / name).stat().st_size > 0 for name in names)
     for name in names:
         assert f"run/{name}" in out

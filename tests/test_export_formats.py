@@ -16,7 +16,7 @@ from tiny_body import make_body, random_poses
 from sogjax.data.export import export_motion
 from sogjax.data.export.bones import bones_of
 from sogjax.data.motion import load_motion, motion_from_poses, save_motion
-from sogjax.data.motion_log import MotionLog
+from sogjax.data.motion_log import PER_FRAME, MotionLog
 from sogjax.errors import InputError
 
 BODY = make_body()
@@ -96,6 +96,14 @@ def test_c3d_without_ezc3d(motion, tmp_path, monkeypatch):
     with pytest.raises(InputError, match=r"walk\.c3d.*ezc3d.*sogjax\[export\]"):
         export_motion(motion, tmp_path / "walk.c3d")
     assert not (tmp_path / "walk.c3d").exists()
+
+
+def test_more_frames_than_c3d_can_count(motion, tmp_path):
+    rows = {name: getattr(motion, name) for name in PER_FRAME}
+    rows = {name: np.resize(values, (65_536, *values.shape[1:])) for name, values in rows.items()}
+    long = dataclasses.replace(motion, **rows | {"frame": np.arange(65_536)})
+    with pytest.raises(InputError, match=r"65535 frames.*65536.*\.trc"):
+        export_motion(long, tmp_path / "a.c3d")
 
 
 def values(gltf, index):

@@ -15,7 +15,7 @@ from sog_cases import floats, random_views
 from sogjax.energy.curvature import FrameEnergy
 from sogjax.energy.neighbours import MARGIN, displacement
 from sogjax.energy.objective import EnergyWeights, History, energy
-from sogjax.energy.pairs import BLOCK
+from sogjax.energy.pairs import TILE
 from sogjax.model.camera import project
 from sogjax.solve import ConditionedAscent
 from sogjax.track.rounds import solve_near
@@ -39,8 +39,16 @@ moved = eqx.filter_jit(lambda cameras, body, a, b: displacement(cameras, body.po
 
 
 def scene(seed):
-    """Views of the human about its rest pose, in colours of which many are alike; blobs do not fill whole blocks."""
-    return random_views(RIG.cameras, HUMAN, seed, count=300, padding=5, color_radius=0.5, sigmas=(1.0, 5.0))
+    """Views of the human about its rest pose, in colours of which many are alike; blobs do not fill whole tiles.
+
+    Image blobs that follow each other lie near each other, as those of a quad-tree do.
+    """
+    views = random_views(RIG.cameras, HUMAN, seed, count=300, padding=5, color_radius=0.5, sigmas=(1.0, 5.0))
+    means = views.images.means
+    order = jnp.lexsort((means[..., 0], jnp.floor(means[..., 1] / 30.0)), axis=-1)
+    images = jax.tree.map(lambda leaf: jax.vmap(lambda part, places: part[places])(leaf, order), views.images)
+    similarities = jnp.take_along_axis(views.color_similarities, order[:, None, :], axis=2)
+    return eqx.tree_at(lambda v: (v.images, v.color_similarities), views, (images, similarities))
 
 
 def towards(pose, change, size):
@@ -77,11 +85,12 @@ def test_lists_leave_out_far_pairs_and_no_near_one():
     pairs = sparse.pairs
     cameras, bodies, images = views.color_similarities.shape
     wide = pairs.image_shape[1]
-    assert wide % BLOCK == 0
+    assert wide % TILE == 0
     listed = np.zeros((cameras * bodies, cameras * wide), int)
     real = np.asarray(pairs.amplitudes) > 0.0
-    rows = np.broadcast_to(np.asarray(pairs.body_index)[None, :], real.shape)
-    np.add.at(listed, (rows[real], np.asarray(pairs.image_index)[real]), 1)
+    of_body = np.broadcast_to(np.asarray(pairs.body_index)[:, None, :], real.shape)
+    of_image = np.asarray(pairs.tile_index)[None, None, :] * TILE + np.arange(TILE)[None, :, None]
+    np.add.at(listed, (of_body[real], np.broadcast_to(of_image, real.shape)[real]), 1)
     assert listed.max() == 1
     for camera in range(cameras):
         away = np.asarray(views.images.means[camera])[None] - np.asarray(seen.means[camera])[:, None]

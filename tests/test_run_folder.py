@@ -128,6 +128,7 @@ def test_files_of_the_other_commands(capsys, tmp_path, monkeypatch):
     (tmp_path / "walk.bvh").write_text("mine")
     for command in (
         ("export", "motion=motion.npz", "to=walk.bvh"),
+        ("body", "from=other.bvh", "out=walk.bvh"),
         ("evaluate", "motion=motion.npz", "truth=t.npz", "out=walk.bvh"),
         ("view", "motion=motion.npz", "recording=walk", "out=walk.bvh"),
     ):

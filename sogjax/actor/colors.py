@@ -43,7 +43,7 @@ def back_projected_colors(body: Body, views: Sequence[ColoredView], color_space:
     """
     samples: list[list[np.ndarray]] = [[] for _ in range(body.num_blobs)]
     for view in views:
-        for blob, colors in enumerate(_samples(body, view)):
+        for blob, colors in enumerate(blob_samples(body, view)):
             samples[blob].append(colors)
     stacked = [np.concatenate(parts) for parts in samples]
     space = averaging_space(color_space)
@@ -54,7 +54,7 @@ def back_projected_colors(body: Body, views: Sequence[ColoredView], color_space:
     return _filled(body, np.asarray(to_rgb(jnp.asarray(means, jnp.float32), space), float), seen)
 
 
-def _samples(body: Body, view: ColoredView) -> list[Float[np.ndarray, "n 3"]]:
+def blob_samples(body: Body, view: ColoredView) -> list[Float[np.ndarray, "n 3"]]:
     """Colours (RGB, 0..1) that one picture shows of every blob; none where the blob is hidden."""
     pixels, visible = _sample_pixels(body, view)
     height, width = view.image.shape[:2]

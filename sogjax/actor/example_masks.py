@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, UInt8
 
-from sogjax.data.image_file import read_image, read_mask
+from sogjax.data.image_file import read_mask
 from sogjax.data.recording import ExamplePose, Recording
+from sogjax.data.video import read_still
 from sogjax.errors import InputError
 from sogjax.images.agreement import AGREEING, disagreeing_cameras, hull_coverage
 from sogjax.images.segmentation import masks_from_plates
@@ -43,7 +44,7 @@ def example_masks(
     names = recording.rig.names
     files = {camera: _checked_mask(example.masks[names[camera]]) for camera in images if names[camera] in example.masks}
     plates = {
-        camera: read_image(recording.background[names[camera]])
+        camera: read_still(recording, names[camera], recording.background[names[camera]])
         for camera in images
         if camera not in files and names[camera] in recording.background
     }

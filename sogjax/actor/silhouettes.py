@@ -12,8 +12,8 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, UInt8
 
 from sogjax.actor.example_masks import example_masks
-from sogjax.data.image_file import read_image
 from sogjax.data.recording import ExamplePose, Recording
+from sogjax.data.video import read_still
 from sogjax.energy.objective import Views, whole_image_overlap
 from sogjax.errors import InputError
 from sogjax.images.cells import CellGrid, stack_cells
@@ -66,7 +66,7 @@ def load_images(recording: Recording, example: ExamplePose) -> dict[int, UInt8[n
     """
     cameras = [(k, name) for k, name in enumerate(recording.rig.names) if name in example.images]
     with ThreadPoolExecutor() as pool:
-        images = list(pool.map(lambda camera: read_image(example.images[camera[1]]), cameras))
+        images = list(pool.map(lambda camera: read_still(recording, camera[1], example.images[camera[1]]), cameras))
     for (_, name), image in zip(cameras, images, strict=True):
         _check_picture(example.images[name], image, recording.rig.image_size(name))
     return {k: image for (k, _), image in zip(cameras, images, strict=True)}

@@ -2,7 +2,14 @@
 
 from pathlib import Path
 
-from sogjax.actor.make import make_actor
+import jax
+import jax.numpy as jnp
+import numpy as np
+import yaml
+
+from sogjax.actor.colors import ColoredView, camera_of
+from sogjax.actor.gains import estimated_gains
+from sogjax.actor.make import MadeActor, make_actor
 from sogjax.app.actor_report import report_folder, write_actor_report
 from sogjax.app.build import color_space_and_radius, energy_weights
 from sogjax.app.configs import ActorConfig
@@ -10,7 +17,12 @@ from sogjax.app.outputs import free_path, results_folder
 from sogjax.app.progress import progress
 from sogjax.app.recordings import body_named, opened, say
 from sogjax.data.actor_file import save_body
+from sogjax.data.atomic import atomic_path
+from sogjax.data.recording import Recording
 from sogjax.errors import InputError
+
+NOTICED = 0.15
+"""Logarithm of a camera's gain that is worth a word."""
 
 
 def run(config: ActorConfig) -> Path:
@@ -32,9 +44,34 @@ def run(config: ActorConfig) -> Path:
         save_body(out, made.body)
         folder = report_folder(out)
         report = write_actor_report(folder, made, recording.rig)
+    say_gains(recording, made, folder)
     print(f"silhouettes and masks agree to {report.mean_iou:.3f} (mean IoU)")
     if report.warnings:
         say(f"{len(report.warnings)} warnings: see {folder / 'report.md'}")
     print(out)
     print(folder / "report.md")
     return out
+
+
+def say_gains(recording: Recording, made: MadeActor, folder: Path) -> None:
+    """Write color_gains.yaml, and say so where cameras show the actor's colours differently."""
+    names, rig = recording.rig.names, jax.tree.map(jnp.asarray, recording.rig.cameras)
+    views: dict[int, list[ColoredView]] = {}
+    for posed, pose in zip(made.pictures, made.example_poses.values(), strict=True):
+        for camera, image in posed.images.items():
+            views.setdefault(camera, []).append(ColoredView(camera_of(rig, camera), image, posed.masks[camera], pose))
+    found = estimated_gains(made.upright_body, views)
+    total = {names[camera]: gains * recording.color_gains.get(names[camera], 1.0) for camera, gains in found.items()}
+    rounded = {name: [round(float(gain), 3) for gain in gains] for name, gains in total.items()}
+    with atomic_path(folder / "color_gains.yaml") as temporary:
+        temporary.write_text(yaml.safe_dump({"color_gains": rounded}, default_flow_style=None, sort_keys=False))
+    unlike = {names[camera]: gains for camera, gains in found.items() if np.abs(np.log(gains)).max() > NOTICED}
+    if unlike:
+        worst = max(unlike, key=lambda name: float(np.abs(np.log(unlike[name])).max()))
+        factors = " ".join(f"{gain:.2f}" for gain in unlike[worst])
+        say(
+            f"{len(unlike)} of {len(found)} cameras show the subject's colours in another light than the others do "
+            f"(most of all {worst}: red, green, blue would have to be multiplied by {factors}); if the cameras "
+            f"differ in exposure or white balance, copy color_gains of {folder / 'color_gains.yaml'} into "
+            "recording.yaml and make the actor again"
+        )

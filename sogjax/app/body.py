@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from sogjax.app.configs import BodyConfig
+from sogjax.app.outputs import free_path
 from sogjax.data.actor_file import save_body
 from sogjax.data.calibration.rig import METRES
 from sogjax.data.skeletons import read_skeleton
@@ -14,15 +15,15 @@ def run(config: BodyConfig) -> Path:
     """Read the skeleton, attach blobs where it has none, and write the body file.
 
     Raises:
-        InputError: anything wrong with the file or the options.
+        InputError: anything wrong with the file or the options, or a body file that is there.
     """
     if config.up not in UP_AXES:
         raise InputError(f"up={config.up}: must be one of {', '.join(UP_AXES)}")
     if config.unit not in (None, *METRES):
         raise InputError(f"unit={config.unit}: must be one of {', '.join(METRES)}")
+    out = free_path("out", config.out, config.overwrite)
     dof = None if config.dof is None else Path(config.dof)
     body = read_skeleton(Path(config.from_), dof, config.unit, config.up)
-    out = Path(config.out)
     save_body(out, body)
     skeleton = body.skeleton
     print(f"{skeleton.num_joints} joints, {skeleton.num_dofs} degrees of freedom, {body.num_blobs} blobs")

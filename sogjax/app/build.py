@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Array, Float, UInt8
 
 from sogjax.app.configs import ColorConfig, EnergyConfig, ImagesConfig, OutputsConfig, SolverConfig, TrackConfig
-from sogjax.data.image_file import read_image
 from sogjax.data.recording import Recording
+from sogjax.data.video import read_still
 from sogjax.energy.objective import EnergyWeights, whole_image_overlap
 from sogjax.energy.overlap import EXACT_EXPONENT, PRINTED_EXPONENT
 from sogjax.errors import InputError
@@ -239,7 +239,7 @@ def _plate_colors(
             f"{recording.path}: images.use_plates=true, but background/ has no picture of "
             f"{', '.join(missing)}; add it, or set images.use_plates=false"
         )
-    images = [read_image(recording.background[name]) for name in recording.rig.names]
+    images = [read_still(recording, name, recording.background[name]) for name in recording.rig.names]
     return _node_colors(jnp.asarray(stack_cells(images, grids)), candidates, space)
 
 

@@ -23,11 +23,13 @@ SCHEMAS: dict[str, type] = {
     "actor": configs.ActorConfig,
     "body": configs.BodyConfig,
     "segment": configs.SegmentConfig,
-    "report": configs.ReportConfig,
+    "check": configs.CheckConfig,
     "evaluate": configs.EvaluateConfig,
+    "report": configs.ReportConfig,
     "synth": configs.SynthConfig,
     "view": configs.ViewConfig,
     "export": configs.ExportConfig,
+    "doctor": configs.DoctorConfig,
 }
 """The commands and their schemas."""
 

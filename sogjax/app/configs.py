@@ -62,10 +62,12 @@ class EnergyConfig:
 class SolverConfig:
     """The solver (Eq. 11, 12)."""
 
-    method: str = option("lbfgs", "conditioned_ascent | gradient_ascent | gauss_newton | bfgs | lbfgs | nonlinear_cg")
-    epsilon: float = option(0.002, "[epsilon] stop when a step is shorter, rad and m")
-    min_iterations: int = option(10, "[n_iter] iterations made at least")
-    max_iterations: int = option(200, "iterations made at most")
+    method: str = option(
+        "gauss_newton", "conditioned_ascent | gradient_ascent | gauss_newton | bfgs | lbfgs | nonlinear_cg"
+    )
+    epsilon: float = option(0.01, "[epsilon] stop when a step is shorter, rad and m; other solvers: 0.002")
+    min_iterations: int = option(1, "[n_iter] iterations made at least; other solvers: 10")
+    max_iterations: int = option(50, "iterations made at most; other solvers: 200")
     grow: float = option(1.2, "[mu+] growth of a step size while the gradient keeps its sign")
     shrink: float = option(0.5, "[mu-] shrinkage where it does not")
     first_angle: float = option(0.02, "[sigma_0] length of the first step of the angles, rad")
@@ -151,6 +153,7 @@ class BodyConfig:
     dof: str | None = option(None, "a .dof of Skeletool, whose degrees of freedom replace those of the .skeleton")
     unit: str | None = option(None, "m | cm | mm: the file's lengths; null: mm of a .skeleton, m of a .bvh")
     up: str = option("y", "vertical of the file's rest pose: x y z -x -y -z")
+    overwrite: bool = option(False, OVERWRITE)
 
 
 @dataclass
@@ -162,6 +165,19 @@ class SegmentConfig:
     subject: str | None = option(None, "which subject, where the recording has several")
     cameras: list[str] | None = option(None, "cameras to use; null: all")
     overwrite: bool = option(False, OVERWRITE)
+
+
+@dataclass
+class CheckConfig:
+    """Look at a recording: calibration, synchronisation, exposure, files; say what is wrong and what to do."""
+
+    recording: str = option(MISSING, "folder of the recording")
+    out: str = option("", "folder for check.json and check.png, which are replaced; default: outputs/RECORDING/check")
+    start: int | None = option(None, "first frame to look at, counted from the recording's first; null: the middle")
+    frames: int = option(90, "frames to look at, at most; they should show somebody moving")
+    largest_offset: int = option(15, "time offsets between cameras are looked for up to so many frames")
+    write: bool = option(False, "write the time offsets that were found into recording.yaml, as frame_offset")
+    cameras: list[str] | None = option(None, "cameras to look at; null: all")
 
 
 @dataclass
@@ -255,6 +271,13 @@ class ExportConfig:
 def option_key(name: str) -> str:
     """The key of a field on the command line: Python's own words stand in the schemas with a line after them."""
     return name.removesuffix("_")
+
+
+@dataclass
+class DoctorConfig:
+    """Look at the installation: versions, devices, extras, speed of the disk, and a test of five seconds."""
+
+    folder: str = option(".", "folder whose write speed is measured")
 
 
 def help_lines(schema: type, prefix: str = "") -> list[tuple[str, str, str]]:

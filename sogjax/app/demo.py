@@ -5,6 +5,7 @@ from pathlib import Path
 
 from sogjax.app.composition import composed
 from sogjax.app.configs import DemoConfig, TrackConfig
+from sogjax.app.outputs import results_folder
 from sogjax.app.overrides import quoted_value
 from sogjax.app.progress import progress
 from sogjax.app.recordings import say
@@ -23,9 +24,10 @@ def run(config: DemoConfig) -> Run:
         InputError: a setting out of range, a folder that cannot be written, or one with results that no demo made.
     """
     out = Path(config.out)
-    with run_folder(out, config.overwrite, config.resume, COMMAND):
-        pass  # found out before anything is rendered
-    return _run_in(config, out)
+    with results_folder(out):
+        with run_folder(out, config.overwrite, config.resume, COMMAND):
+            pass  # found out before anything is rendered
+        return _run_in(config, out)
 
 
 def _run_in(config: DemoConfig, out: Path) -> Run:

@@ -84,6 +84,7 @@ def _of_recording(recording: Recording) -> MadeFrom:
         "frame_offset": {name: recording.frame_offset[name] for name in recording.rig.names},
         "fewest_cameras": recording.fewest_cameras,
         "missing": {name: [list(span) for span in spans] for name, spans in recording.missing.items()},
+        "color_gains": {name: list(gains) for name, gains in recording.color_gains.items()},
         "the calibration": digest(recording.rig.cameras),
         "the empty background pictures": {name: fingerprint(Path(p)) for name, p in recording.background.items()},
         **pictures,

@@ -5,6 +5,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 from jaxtyping import Float
 
+from sogjax.data.file_names import objection
 from sogjax.data.yaml_entry import Entry
 from sogjax.errors import InputError
 from sogjax.model.body import ShapeGroup
@@ -15,6 +16,9 @@ Row = dict[str, Entry]
 WORLD = "world"
 """The parent of a root joint."""
 
+MAX_ROWS = 2000
+"""Of a table: the transform of as many joints and degrees of freedom takes 32 MB."""
+
 MIN_SIGMA = 1e-6
 """Metres."""
 
@@ -24,7 +28,10 @@ UNIT_TOLERANCE = 1e-6
 
 def table(entry: Entry, required: Sequence[str], optional: Sequence[str] = ()) -> list[Row]:
     """The rows of a table; their names are unique and without the slash that `concatenate` puts in."""
-    rows = [item.fields(required, optional) for item in entry.items()]
+    items = entry.items()
+    if len(items) > MAX_ROWS:
+        raise InputError(f"{entry.path}: {entry.key} has {len(items)} rows, more than {MAX_ROWS}; leave some out")
+    rows = [item.fields(required, optional) for item in items]
     seen: set[str] = set()
     for row in rows:
         name = plain_name(row["name"])
@@ -50,8 +57,8 @@ def names(rows: list[Row]) -> tuple[str, ...]:
 def plain_name(entry: Entry) -> str:
     """A name without slashes: files are named after bodies, and `ACTOR/NAME` names the parts of several."""
     name = entry.text()
-    if "/" in name or "\\" in name:
-        raise entry.error("a name without slashes")
+    if (wanted := objection(name)) is not None:
+        raise entry.error(wanted)
     return name
 
 

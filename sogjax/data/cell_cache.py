@@ -93,7 +93,8 @@ class CellCache:
     def _made_from(self) -> dict[str, Any]:
         """All that cells depend on."""
         cameras = self.recording.rig.names
-        return {
+        gains = {camera: list(self.recording.color_gains[camera]) for camera in sorted(self.recording.color_gains)}
+        return ({"color_gains": gains} if gains else {}) | {
             "version": CELLS_VERSION,
             "depth": self.depth,
             "frame_offset": {camera: self.recording.frame_offset[camera] for camera in cameras},
@@ -110,7 +111,7 @@ class CellCache:
         if made_from != self._made_from:
             raise _UnusableError("was made from other files or settings")
         try:
-            cells = np.load(array, mmap_mode="r")
+            cells = np.load(array, mmap_mode="r", allow_pickle=False)
         except (OSError, ValueError, EOFError) as error:
             raise _UnusableError("is missing or cut short") from error
         if _checksum(array, cells.offset) != checksum:

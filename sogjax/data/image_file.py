@@ -10,6 +10,10 @@ from sogjax.data.atomic import atomic_path
 from sogjax.errors import InputError
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
+MAX_PIXELS = 2**27
+"""Of one picture. What its header claims is held against this before memory is taken for it."""
+MAX_BYTES = 2**29
+"""Of its file."""
 
 
 def read_image(path: Path) -> UInt8[np.ndarray, "height width 3"]:
@@ -42,10 +46,47 @@ def write_mask(path: Path, mask: Bool[np.ndarray, "height width"]) -> None:
 
 def _decode(path: Path, flags: int) -> np.ndarray:
     try:
-        image = cv2.imdecode(np.frombuffer(path.read_bytes(), np.uint8), flags)
+        content = _content(path)
+        width, height = claimed_size(content)
+        if width * height > MAX_PIXELS:
+            raise InputError(f"{path}: claims {width}x{height} pixels, more than {MAX_PIXELS}; make it smaller")
+        image = cv2.imdecode(np.frombuffer(content, np.uint8), flags)
     except (OSError, cv2.error) as error:
         reason = getattr(error, "strerror", None) or "it is empty or too large"
         raise InputError(f"{path}: cannot be read as an image ({reason}); replace it") from error
     if image is None:
         raise InputError(f"{path}: cannot be read as an image; replace it by a png or jpg that opens")
     return image
+
+
+def _content(path: Path) -> bytes:
+    if path.stat().st_size > MAX_BYTES:
+        raise InputError(f"{path}: has more than {MAX_BYTES} bytes, too many for a picture; make it smaller")
+    return path.read_bytes()
+
+
+def claimed_size(content: bytes) -> tuple[int, int]:
+    """Width and height as the header of a png or jpg says; (0, 0) where there is none, or another format."""
+    if content[:8] == b"\x89PNG\r\n\x1a\n" and len(content) >= 24:
+        return int.from_bytes(content[16:20], "big"), int.from_bytes(content[20:24], "big")
+    return _jpeg_size(content) if content[:2] == b"\xff\xd8" else (0, 0)
+
+
+def _jpeg_size(content: bytes) -> tuple[int, int]:
+    """The largest size in the frame headers (SOF0 to SOF15) of a jpg, passing from segment to segment."""
+    place, largest = 2, (0, 0)
+    while place + 9 <= len(content):
+        if content[place] != 0xFF:
+            place += 1
+            continue
+        marker = content[place + 1]
+        if marker == 0xFF or marker == 0x01 or 0xD0 <= marker <= 0xD8:
+            place += 1 if marker == 0xFF else 2
+            continue
+        if marker in (0xD9, 0xDA):
+            break
+        if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
+            height, width = (int.from_bytes(content[place + k : place + k + 2], "big") for k in (5, 7))
+            largest = max(largest, (width, height), key=lambda size: size[0] * size[1])
+        place += 2 + max(int.from_bytes(content[place + 2 : place + 4], "big"), 2)
+    return largest

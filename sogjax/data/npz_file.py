@@ -1,8 +1,11 @@
 """Reading npz files that come from elsewhere: no pickles, bounded, one sentence where a key is wrong."""
 
+import io
+import math
 import zipfile
 import zlib
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
@@ -26,14 +29,46 @@ def read_npz(path: Path) -> dict[str, np.ndarray]:
     try:
         with zipfile.ZipFile(path) as archive:
             size = sum(member.file_size for member in archive.infolist())
-        if size > MAX_BYTES:
-            raise InputError(f"{path}: holds {size} bytes of arrays, more than {MAX_BYTES}; cut it into parts")
+            if size > MAX_BYTES:
+                raise InputError(f"{path}: holds {size} bytes of arrays, more than {MAX_BYTES}; cut it into parts")
+            for member in archive.infolist():
+                with archive.open(member) as file:
+                    _check_claim(path, file, member.file_size)
         with np.load(path, allow_pickle=False) as arrays:
             return {key: arrays[key] for key in arrays.files}
     except InputError:
         raise
     except _UNREADABLE as error:
         raise InputError(f"{path}: is not readable as npz without pickles ({error}); write it anew") from error
+
+
+def check_npy(path: Path) -> None:
+    """Hold what the header of a npy file claims against the file's size, before memory is taken for it.
+
+    Raises:
+        InputError: no npy, pickled objects inside, or fewer bytes than claimed.
+    """
+    try:
+        with path.open("rb") as file:
+            _check_claim(path, file, path.stat().st_size)
+    except (OSError, ValueError, EOFError) as error:
+        raise InputError(f"{path}: is not readable as npy ({error}); write it anew") from error
+
+
+def _check_claim(path: Path, file: IO[bytes] | io.BufferedIOBase, size: int) -> None:
+    version = np.lib.format.read_magic(file)  # pyright: ignore[reportArgumentType]
+    read_header = {
+        (1, 0): np.lib.format.read_array_header_1_0,
+        (2, 0): np.lib.format.read_array_header_2_0,
+    }.get(version)
+    if read_header is None:
+        raise ValueError(f"npy version {version} is unknown")
+    shape, _, dtype = read_header(file)  # pyright: ignore[reportArgumentType]
+    if dtype.hasobject:
+        raise ValueError("it holds pickled objects")
+    claimed = math.prod(shape) * dtype.itemsize
+    if claimed > size:
+        raise InputError(f"{path}: claims {claimed} bytes of {dtype}, but holds {size}; write it anew")
 
 
 def float_array(

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from sogjax.data.calibration import CameraRig, find_calibrations, load_calibration
+from sogjax.data.color_gains import ColorGains
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.initial_pose import read_initial_poses
 from sogjax.data.recording_settings import RecordingSettings, read_recording_settings
@@ -56,6 +57,8 @@ class Recording:
     """By camera the number of its images; a camera without an entry has one for every frame."""
     missing: dict[str, tuple[tuple[int, int], ...]] = field(default_factory=dict)
     """By camera the first and last frame (its own numbers) of each while in which its pictures are not to be used."""
+    color_gains: dict[str, ColorGains] = field(default_factory=dict)
+    """By camera what its pictures are multiplied by; they are as recorded where there is no entry."""
     fewest_cameras: int | None = None
     """Frames that so many cameras have are used; None: only those that all have."""
 
@@ -90,12 +93,11 @@ def open_recording(path: Path) -> Recording:
     cameras = _cameras(path, calibration, settings, calibrated.names, tuple(sources))
     rig = calibrated.select(cameras)
     sources = {camera: sources[camera] for camera in cameras}
-    for key, camera in [("frame_offset", c) for c in settings.frame_offset] + [
-        ("missing", c) for c in settings.missing
-    ]:
-        if camera not in calibrated.names:
+    for key, by_camera in settings.by_camera.items():
+        strange = next((camera for camera in by_camera if camera not in calibrated.names), None)
+        if strange is not None:
             raise InputError(
-                f"{path / 'recording.yaml'}: {key}: there is no camera {camera!r} in the calibration; "
+                f"{path / 'recording.yaml'}: {key}: there is no camera {strange!r} in the calibration; "
                 f"its cameras are: {', '.join(calibrated.names)}"
             )
     offsets = {camera: settings.frame_offset.get(camera, 0) for camera in cameras}
@@ -122,6 +124,7 @@ def open_recording(path: Path) -> Recording:
         warnings=(*warnings, *_doubts(path, settings, rig), *_uneven(sources, infos)),
         num_images={camera: infos[camera].num_frames for camera in cameras},
         missing={camera: settings.missing[camera] for camera in cameras if camera in settings.missing},
+        color_gains={camera: settings.color_gains[camera] for camera in cameras if camera in settings.color_gains},
         fewest_cameras=settings.fewest_cameras,
     )
 

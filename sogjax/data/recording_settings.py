@@ -2,11 +2,17 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from sogjax.data.calibration.rig import METRES_PER_UNIT
+from sogjax.data.color_gains import ColorGains
+from sogjax.data.file_names import objection
 from sogjax.data.initial_pose import InitialPose, parse_initial_pose
 from sogjax.data.yaml_entry import Entry, read_yaml
 from sogjax.model.frames import UP_AXES
+
+LARGEST_GAIN = 8.0
+"""Of a camera's colours; a larger one is taken for a mistake."""
 
 _KEYS = (
     "fps",
@@ -19,6 +25,7 @@ _KEYS = (
     "last_frame",
     "fewest_cameras",
     "missing",
+    "color_gains",
     "example_poses",
 )
 
@@ -47,7 +54,14 @@ class RecordingSettings:
     fewest_cameras: int | None = None
     missing: dict[str, tuple[tuple[int, int], ...]] = field(default_factory=dict)
     """By camera the first and last frame of each while in which its pictures are not to be used."""
+    color_gains: dict[str, ColorGains] = field(default_factory=dict)
+    """By camera."""
     example_poses: tuple[ExampleSettings, ...] | None = None
+
+    @property
+    def by_camera(self) -> dict[str, dict[str, Any]]:
+        """What is given for cameras by their names, by key."""
+        return {"frame_offset": {**self.frame_offset}, "missing": {**self.missing}, "color_gains": {**self.color_gains}}
 
 
 def read_recording_settings(path: Path) -> RecordingSettings:
@@ -61,7 +75,7 @@ def read_recording_settings(path: Path) -> RecordingSettings:
     given = {key: value for key, value in entries.items() if value.value is not None}
     return RecordingSettings(
         fps=_positive(given["fps"]) if "fps" in given else None,
-        calibration=given["calibration"].text() if "calibration" in given else None,
+        calibration=_file_name(given["calibration"]) if "calibration" in given else None,
         unit=given["unit"].choice(METRES_PER_UNIT, "a unit of length") if "unit" in given else None,
         up=given["up"].choice(UP_AXES, "an axis") if "up" in given else None,
         cameras=_camera_names(given["cameras"]) if "cameras" in given else None,
@@ -70,6 +84,7 @@ def read_recording_settings(path: Path) -> RecordingSettings:
         last_frame=_whole(given["last_frame"]) if "last_frame" in given else None,
         fewest_cameras=_count(given["fewest_cameras"]) if "fewest_cameras" in given else None,
         missing=_missing(given["missing"]) if "missing" in given else {},
+        color_gains=_gains(given["color_gains"]) if "color_gains" in given else {},
         example_poses=_examples(given["example_poses"]) if "example_poses" in given else None,
     )
 
@@ -88,6 +103,14 @@ def _whole(entry: Entry) -> int:
     return entry.value
 
 
+def _file_name(entry: Entry) -> str:
+    """A name that may become one of a file: it leads into no other folder."""
+    name = entry.text()
+    if (wanted := objection(name)) is not None:
+        raise entry.error(wanted)
+    return name
+
+
 def _camera_names(entry: Entry) -> tuple[str, ...]:
     names = tuple(item.text() for item in entry.items())
     if not names or len(set(names)) < len(names):
@@ -97,6 +120,18 @@ def _camera_names(entry: Entry) -> tuple[str, ...]:
 
 def _offsets(entry: Entry) -> dict[str, int]:
     return {camera: _whole(offset) for camera, offset in entry.mapping().items()}
+
+
+def _gains(entry: Entry) -> dict[str, ColorGains]:
+    return {camera: _three_gains(gains) for camera, gains in entry.mapping().items()}
+
+
+def _three_gains(entry: Entry) -> ColorGains:
+    expected = f"three factors of red, green and blue light between {1 / LARGEST_GAIN:g} and {LARGEST_GAIN:g}"
+    gains = tuple(item.number(expected) for item in entry.items())
+    if len(gains) != 3 or not all(1 / LARGEST_GAIN <= gain <= LARGEST_GAIN for gain in gains):
+        raise entry.error(expected)
+    return gains[0], gains[1], gains[2]
 
 
 def _count(entry: Entry) -> int:
@@ -128,10 +163,10 @@ def _example(entry: Entry) -> ExampleSettings:
     fields = entry.fields(("name",), ("actor", "initial_pose"))
     given = {key: value for key, value in fields.items() if value.value is not None}
     name = fields["name"].text()
-    if Path(name).name != name:
+    if objection(name) is not None:
         raise fields["name"].error("the name of a folder in example_poses/")
     return ExampleSettings(
         name=name,
-        actor=given["actor"].text() if "actor" in given else None,
+        actor=_file_name(given["actor"]) if "actor" in given else None,
         initial_pose=parse_initial_pose(given["initial_pose"]) if "initial_pose" in given else None,
     )

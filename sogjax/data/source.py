@@ -12,9 +12,9 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Float, UInt8
 
-from sogjax.data.image_file import IMAGE_SUFFIXES, read_image
+from sogjax.data.image_file import IMAGE_SUFFIXES, MAX_PIXELS, read_image
 from sogjax.errors import InputError
 
 # A file that does not open is told in our own sentence, without the codecs' own lines before it.
@@ -106,6 +106,23 @@ def look_at_source(path: Path) -> SourceInfo:
     return SourceInfo(fps, _num_frames(path, claimed, times), size, _longest_gap(times))
 
 
+def frame_times(path: Path) -> Float[np.ndarray, "frame"] | None:
+    """When each frame of a video is to be shown, in seconds, as its file says, without decoding.
+
+    None for folders of images, and for files so large that reading them would take long.
+
+    Raises:
+        InputError: the video cannot be opened.
+    """
+    if path.is_dir() or path.stat().st_size >= _COUNT_PACKETS_BELOW:
+        return None
+    with _captured(path, [cv2.CAP_PROP_FORMAT, -1]) as capture:
+        times = []
+        while capture.grab():
+            times.append(1e-3 * capture.get(cv2.CAP_PROP_POS_MSEC))
+    return np.sort(np.array(times, float))
+
+
 def numbered_images(folder: Path) -> list[Path]:
     """The images of a folder in the order of the numbers at the end of their names.
 
@@ -191,6 +208,12 @@ def _capture(path: Path, parameters: Sequence[int] = ()) -> cv2.VideoCapture:
     capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG, list(parameters))
     if not capture.isOpened():
         raise InputError(f"{path}: does not open as a video; record or convert it again (H.264 in mp4 works)")
+    width, height = (int(capture.get(key)) for key in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
+    if width * height > MAX_PIXELS:
+        capture.release()
+        raise InputError(
+            f"{path}: claims {width}x{height} pixels, more than {MAX_PIXELS}; convert it to a smaller size"
+        )
     return capture
 
 

@@ -13,12 +13,13 @@ import numpy as np
 from jaxtyping import UInt8
 
 from sogjax.data.atomic import atomic_path
+from sogjax.data.color_gains import evened
 from sogjax.data.image_file import read_image, read_mask
 from sogjax.data.recording import Recording
 from sogjax.data.source import Source, open_source
 from sogjax.errors import InputError
 
-__all__ = ["VideoWriter", "read_frames", "read_image", "read_mask", "read_prepared"]
+__all__ = ["VideoWriter", "read_frames", "read_image", "read_mask", "read_prepared", "read_still"]
 
 Item = TypeVar("Item")
 
@@ -116,7 +117,16 @@ def _checked(recording: Recording, camera: str, image: np.ndarray | None, frame:
     size = (image.shape[1], image.shape[0])
     if size != recording.rig.image_size(camera):
         raise InputError(f"{source}: its frame {number} is {size[0]}x{size[1]}, unlike the first; convert it again")
-    return image
+    return evened(image, recording.color_gains.get(camera))
+
+
+def read_still(recording: Recording, camera: str, path: Path) -> UInt8[np.ndarray, "height width 3"]:
+    """A single picture of a camera, BGR, in the same colours as its frames.
+
+    Raises:
+        InputError: no such file, or no image.
+    """
+    return evened(read_image(path), recording.color_gains.get(camera))
 
 
 class VideoWriter:

@@ -4,14 +4,17 @@ The lists are made at one pose and hold for every pose whose blobs are seen at m
 uses them looks at how far the blobs have moved (`displacement`) and makes them anew where that was too far.
 """
 
+from functools import partial, reduce
+
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from sogjax.energy.pairs import BLOCK, SparsePairs, image_quantities
+from sogjax.energy.pairs import MEMBERS, TILE, SparsePairs, image_quantities
 from sogjax.model.camera import Camera, project
 from sogjax.model.compaction import chosen_indices
 from sogjax.model.sog import Sog
+from sogjax.model.stages import computed_once
 
 NEGLIGIBLE = 1e-4
 """Pairs are left out where the exponential of Eq. 6 is below this, even after a motion by the margin."""
@@ -51,25 +54,50 @@ def near_pairs(
 
     A count above `capacity` means that blocks were cut off: the caller must look at it and try a larger capacity.
     """
-    images, color_similarities = _whole_blocks(images, color_similarities)
+    images, color_similarities = _whole_tiles(images, color_similarities)
     num_cameras, num_bodies, num_images = color_similarities.shape
-    near = jax.vmap(_near, in_axes=(0, 0, 0, 0, None))(images, color_similarities, seen, margin, exponent)
-    in_block = near.reshape(-1, BLOCK).any(axis=1)
-    chosen, count = chosen_indices(in_block, capacity)
-    real = jnp.arange(capacity, dtype=count.dtype) < count
-    # Padding is spread over all places: sums into one and the same place would wait for each other.
-    chosen = jnp.where(real, chosen, jnp.arange(capacity, dtype=chosen.dtype) % in_block.shape[0])
-    blocks_per_image = num_images // BLOCK
-    body_index = chosen // blocks_per_image  # counts the blobs of all cameras
-    camera = body_index // num_bodies
-    first = camera * num_images + (chosen % blocks_per_image) * BLOCK
-    slots = jnp.arange(BLOCK, dtype=chosen.dtype)[:, None]
-    image_index = first[None, :] + slots
-    x, y, variances, scale = (_taken(values, image_index) for values in image_quantities(images))
-    similarities = _taken(color_similarities, chosen[None, :] * BLOCK + slots)
-    amplitudes = jnp.where(real[None, :], similarities * scale, 0.0)
+    really = margin[0] > 0.0  # it always is
+    near = jax.vmap(_near, in_axes=(0, 0, 0, 0, None))
+    flags = computed_once(
+        really, lambda *a: _whole_blocks(near(*a)), images, color_similarities, seen, margin, exponent
+    )
+    chosen, count = computed_once(really, partial(chosen_indices, capacity=capacity * MEMBERS), flags.reshape(-1))
+    tile, body_index, first, real = computed_once(
+        really, partial(_blocks_of, tiles=flags.shape[1], members=flags.shape[2], num_bodies=num_bodies), chosen, count
+    )
+    slots = jnp.arange(TILE, dtype=chosen.dtype)[:, None]
+    of_image = lambda values: _taken(values, tile[None, :] * TILE + slots)
+    x, y, variances, scale = map(of_image, image_quantities(images))
+    similarities = _taken(color_similarities, first[:, None, :] + slots[None, :, :])
+    amplitudes = jnp.where(real[:, None, :], similarities * scale[None], 0.0)
     image_shape, body_shape = (num_cameras, num_images), (num_cameras, num_bodies)
-    return SparsePairs(x, y, variances, amplitudes, image_index, body_index, image_shape, body_shape), count
+    pairs = SparsePairs(x[None], y[None], variances[None], amplitudes, tile, body_index, image_shape, body_shape)
+    return pairs, count // MEMBERS
+
+
+def _blocks_of(
+    chosen: Int[Array, "n"], count: Int[Array, ""], tiles: int, members: int, num_bodies: int
+) -> tuple[Int[Array, "block"], Int[Array, "member block"], Int[Array, "member block"], Bool[Array, "member block"]]:
+    """For every block its tile and its body blobs, both counted over all cameras, where each pair's colours begin.
+
+    Last, which members are no padding.
+    """
+    real = jnp.arange(chosen.shape[0], dtype=chosen.dtype) < count
+    # Padding is spread over all places: sums into one and the same place would wait for each other.
+    chosen = jnp.where(real, chosen, jnp.arange(chosen.shape[0], dtype=chosen.dtype) % (tiles * members))
+    chosen, real = chosen.reshape(-1, MEMBERS).T, real.reshape(-1, MEMBERS).T
+    tile = chosen[0] // members
+    body = chosen - tile[None, :] * members
+    real, body = real & (body < num_bodies), jnp.where(body < num_bodies, body, (tile[None, :] + body) % num_bodies)
+    camera = tile // tiles
+    body_index = camera[None, :] * num_bodies + body
+    return tile, body_index, (body_index * tiles + (tile - camera * tiles)[None, :]) * TILE, real
+
+
+def _flags(images: Sog, color_similarities: Array, seen: Sog, margin: Array, exponent: Array) -> Array:
+    """What `_near` and `_whole_blocks` say for all cameras."""
+    near = jax.vmap(_near, in_axes=(0, 0, 0, 0, None))(images, color_similarities, seen, margin, exponent)
+    return _whole_blocks(near)
 
 
 def _near(
@@ -78,24 +106,43 @@ def _near(
     seen: Sog,
     margin: Float[Array, ""],
     exponent: Float[Array, ""],
-) -> Bool[Array, "body image"]:
-    """Pairs of alike colours whose exponential may exceed `NEGLIGIBLE` within the margin."""
-    dx = image.means[None, :, 0] - seen.means[:, None, 0]
-    dy = image.means[None, :, 1] - seen.means[:, None, 1]
-    reach = jnp.sqrt((image.sigmas**2)[None, :] + (seen.sigmas**2)[:, None]) * jnp.sqrt(-jnp.log(NEGLIGIBLE) / exponent)
-    alike = (color_similarities != 0.0) & seen.mask[:, None]
-    return alike & (dx * dx + dy * dy < (reach + margin) ** 2)
+) -> Bool[Array, "tile body"]:
+    """Tiles and body blobs of alike colours, of which a pair's exponential may exceed `NEGLIGIBLE` within the margin.
+
+    A tile is taken for the box around its blobs with the size of its largest, so it counts too often, never too rarely.
+    """
+    by_slot = lambda values: [values[slot::TILE, None] for slot in range(TILE)]
+    real = by_slot(image.mask)
+    extreme = lambda values, choose, empty: reduce(
+        choose, [jnp.where(r, v, empty) for r, v in zip(real, by_slot(values), strict=True)]
+    )
+    x, y = image.means[:, 0], image.means[:, 1]
+    beyond = lambda axis, seen: jnp.maximum(
+        jnp.maximum(extreme(axis, jnp.minimum, jnp.inf) - seen, seen - extreme(axis, jnp.maximum, -jnp.inf)), 0.0
+    )
+    dx, dy = beyond(x, seen.means[None, :, 0]), beyond(y, seen.means[None, :, 1])
+    sigmas = extreme(image.sigmas, jnp.maximum, 0.0)
+    reach = jnp.sqrt((sigmas**2 + (seen.sigmas**2)[None, :]) * (-jnp.log(NEGLIGIBLE) / exponent))
+    alike = reduce(jnp.logical_or, [color_similarities[:, slot::TILE] != 0.0 for slot in range(TILE)]).T
+    return alike & seen.mask[None, :] & (dx * dx + dy * dy < (reach + margin) ** 2)
 
 
-def _taken(values: Array, index: Int[Array, "slot block"]) -> Float[Array, "slot block"]:
+def _whole_blocks(near: Bool[Array, "camera tile body"]) -> Bool[Array, "camera tile member"]:
+    """With as many members of padding behind the body blobs of each tile as fill its last block."""
+    missing = -jnp.sum(near, axis=-1, dtype=jnp.int32)[..., None] % MEMBERS
+    padding = jnp.arange(MEMBERS - 1, dtype=jnp.int32)[None, None, :] < missing
+    return jnp.concatenate([near, padding], axis=-1)
+
+
+def _taken(values: Array, index: Int[Array, "*slots block"]) -> Float[Array, "*slots block"]:
     return values.reshape(-1).at[index].get(mode="promise_in_bounds")
 
 
-def _whole_blocks(
+def _whole_tiles(
     images: Sog, color_similarities: Float[Array, "camera body image"]
 ) -> tuple[Sog, Float[Array, "camera body image2"]]:
-    """Padded so that the image blobs fill whole blocks."""
-    extra = -images.capacity % BLOCK
+    """Padded so that the image blobs fill whole tiles."""
+    extra = -images.capacity % TILE
     if extra == 0:
         return images, color_similarities
     at_end = lambda leaf, axis: jnp.pad(leaf, [(0, extra if k == axis else 0) for k in range(leaf.ndim)])

@@ -137,7 +137,7 @@ def _sparse_similarity(blobs: Sog, views: Views, pairs: SparsePairs, weights: En
 
 
 def image_caps(views: Views, pairs: SparsePairs) -> Float[Array, "camera image"]:
-    """Caps of Eq. 8 of the image blobs that pairs count, which fill whole blocks."""
+    """Caps of Eq. 8 of the image blobs that pairs count, which fill whole tiles."""
     extra = pairs.image_shape[1] - views.images.capacity
     return jnp.pad(self_overlaps(views.images), ((0, 0), (0, extra)))
 

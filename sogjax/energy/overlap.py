@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from sogjax.energy.pairs import DensePairs, Pairs
+from sogjax.energy.pairs import DensePairs, Disks, Pairs, separations
 from sogjax.model.color import color_similarity
 from sogjax.model.sog import Sog
 
@@ -48,7 +48,7 @@ def overlaps(
     image: Sog, body: Sog, color_similarities: Float[Array, "body image"], exponent: Float[Array, ""]
 ) -> Float[Array, "body image"]:
     """E_ij of Eq. 6 in square pixels; `body` is projected (2-D). Blobs masked out overlap nothing."""
-    return _pair_overlaps(DensePairs.from_image(image, color_similarities), body, exponent).overlaps
+    return _overlaps_and_weights(DensePairs.from_image(image, color_similarities), body, exponent)[0]
 
 
 def self_overlaps(image: Sog) -> Float[Array, "*camera image"]:
@@ -93,46 +93,37 @@ def overlap_pulls(
     pairs: Pairs, caps: Float[Array, "*camera image"], body: Sog, exponent: Float[Array, ""], *, capped: bool = True
 ) -> Pulls:
     """Eq. 8 with its derivatives by the projected body blobs, and its curvature for Gauss-Newton steps."""
-    pair = _pair_overlaps(pairs, body, exponent)
-    total = pairs.sum_over_body(pair.overlaps)
+    disks = _disks(body)
+    overlaps, weights = pairs.staged(_overlaps_and_weights, pairs, body, exponent)
+    total = pairs.sum_over_body(overlaps)
     live = (total < caps) if capped else jnp.ones_like(total, dtype=bool)
-    weights = pairs.live_pairs(live, pair.overlaps / pair.variance_sum)
-    moments = pairs.moments(weights, body.means)
-    spread = pairs.sum_over_image(weights * (pair.squared_distance / pair.variance_sum))
+    moments = pairs.moments(live, weights, disks)
     return Pulls(
         value=jnp.sum(_apply_cap(total, caps, capped), axis=-1),
         by_mean=2.0 * exponent * moments.away,
-        by_sigma=2.0 * (moments.variance / _safe_sigmas(body) + exponent * spread * body.sigmas),
+        by_sigma=2.0 * (moments.variance / _safe_sigmas(body) + exponent * moments.spread * body.sigmas),
         stiffness=2.0 * exponent * moments.weight,
     )
 
 
-class _PairOverlaps(NamedTuple):
-    """E_ij of Eq. 6 and what it is made of."""
+def _overlaps_and_weights(pairs: Pairs, body: Sog, exponent: Float[Array, ""]) -> tuple[Array, Array]:
+    """E_ij of Eq. 6, the one place where it stands, and E_ij / (si^2 + sj^2)."""
+    disks = _disks(body)
+    gaps = separations(pairs, disks)
+    inverse = 1.0 / gaps.variance_sum
+    amplitudes = pairs.amplitudes * pairs.of_body(jnp.where(body.mask, disks.variances, 0.0)) * inverse
+    overlaps = amplitudes * jnp.exp(-exponent * gaps.squared_distance * inverse)
+    return overlaps, overlaps * inverse
 
-    overlaps: Array
-    dx: Array
-    dy: Array
-    squared_distance: Array
-    variance_sum: Array
 
-
-def _pair_overlaps(pairs: Pairs, body: Sog, exponent: Float[Array, ""]) -> _PairOverlaps:
-    """Eq. 6, the one place where it stands."""
-    variances = _safe_sigmas(body) ** 2
-    dx = pairs.x - pairs.of_body(body.means[..., 0])
-    dy = pairs.y - pairs.of_body(body.means[..., 1])
-    squared_distance = dx * dx + dy * dy
-    variance_sum = pairs.variances + pairs.of_body(variances)
-    amplitudes = pairs.amplitudes * pairs.of_body(jnp.where(body.mask, variances, 0.0)) / variance_sum
-    overlaps = amplitudes * jnp.exp(-exponent * squared_distance / variance_sum)
-    return _PairOverlaps(overlaps, dx, dy, squared_distance, variance_sum)
+def _disks(body: Sog) -> Disks:
+    return Disks(body.means, _safe_sigmas(body) ** 2)
 
 
 def _plain_overlap(
     capped: bool, pairs: Pairs, caps: Float[Array, "*camera image"], body: Sog, exponent: Float[Array, ""]
 ) -> Float[Array, "*camera"]:
-    total = pairs.sum_over_body(_pair_overlaps(pairs, body, exponent).overlaps)
+    total = pairs.sum_over_body(pairs.staged(_overlaps_and_weights, pairs, body, exponent)[0])
     return jnp.sum(_apply_cap(total, caps, capped), axis=-1)
 
 

@@ -4,27 +4,51 @@ Either way the arrays of a pair layout broadcast to the shape of all its pairs, 
 once; what differs is how a quantity of body blobs is spread over the pairs, and how pairs are summed.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeVar
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.model.sog import Sog
 from sogjax.model.stages import computed_once
 
-BLOCK = 8
-"""Image blobs that follow each other in a Sog and are near a body blob, or not, together."""
+TILE = 8
+"""Image blobs that follow each other in a Sog and are compared with the same body blobs."""
+MEMBERS = 8
+"""Body blobs that are compared with a tile together."""
 
-Slots = Float[Array, "slot block"]
+Results = TypeVar("Results")
+Slots = Float[Array, "member slot block"]
+
+
+class Disks(NamedTuple):
+    """Where projected body blobs lie and how wide they are: pixels, pixels^2."""
+
+    means: Float[Array, "*camera body 2"]
+    variances: Float[Array, "*camera body"]
+
+
+class Separations(NamedTuple):
+    """For each pair mu_i - mu_j, its squared length, and sigma_i^2 + sigma_j^2."""
+
+    dx: Array
+    dy: Array
+    squared_distance: Array
+    variance_sum: Array
 
 
 class Moments(NamedTuple):
-    """For each body blob the sums over its pairs of w (mu_i - mu_j), of w, and of w sigma_i^2."""
+    """For each body blob the sums over its pairs of w (mu_i - mu_j), of w, of w sigma_i^2, and `spread`.
+
+    That is the sum of w |mu_i - mu_j|^2 / (sigma_i^2 + sigma_j^2).
+    """
 
     away: Float[Array, "*camera body 2"]
     weight: Float[Array, "*camera body"]
     variance: Float[Array, "*camera body"]
+    spread: Float[Array, "*camera body"]
 
 
 class DensePairs(eqx.Module):
@@ -52,73 +76,92 @@ class DensePairs(eqx.Module):
         """For each image blob the sum over its pairs."""
         return jnp.sum(values, axis=0)
 
-    def sum_over_image(self, values: Float[Array, "body image"]) -> Float[Array, "body"]:
-        """For each body blob the sum over its pairs."""
-        return jnp.sum(values, axis=1)
+    def staged(self, function: Callable[..., Results], *arguments: Any) -> Results:
+        """The results of a function over pairs, as the compiler likes it best."""
+        return function(*arguments)
 
-    def moments(self, weights: Float[Array, "body image"], means: Float[Array, "body 2"]) -> Moments:
-        """Weighted sums over the pairs of each body blob: one matrix product, quicker than sums along rows."""
-        origin = means[:1]
+    def moments(self, live: Bool[Array, "image"], weights: Float[Array, "body image"], body: Disks) -> Moments:
+        """Sums over the live pairs of each body blob: one matrix product where it can be, quicker than along rows."""
+        weights = jnp.where(live[None, :], weights, 0.0)
+        origin = body.means[:1]
         x, y = self.x[0] - origin[:, 0], self.y[0] - origin[:, 1]
         columns = jnp.stack([x, y, jnp.ones_like(x), self.variances[0]], axis=1)
         sums = jnp.matmul(weights, columns, precision="highest")
-        return Moments(sums[:, :2] - (means - origin) * sums[:, 2:3], sums[:, 2], sums[:, 3])
-
-    def live_pairs(self, live: Array, values: Float[Array, "body image"]) -> Float[Array, "body image"]:
-        """The values of the pairs whose image blob is live, 0 elsewhere."""
-        return jnp.where(live[None, :], values, 0.0)
+        gaps = separations(self, body)
+        spread = jnp.sum(weights * (gaps.squared_distance / gaps.variance_sum), axis=1)
+        return Moments(sums[:, :2] - (body.means - origin) * sums[:, 2:3], sums[:, 2], sums[:, 3], spread)
 
 
 class SparsePairs(eqx.Module):
-    """Blocks of pairs near each other, of all cameras together: each is one body blob with `BLOCK` image blobs.
+    """Blocks of pairs near each other, of all cameras: each is `MEMBERS` body blobs with one tile of image blobs.
 
-    Slots are the leading axis, so that every operation runs along the blocks. Blocks of padding have amplitude 0.
+    Blocks are the last axis, so that every operation runs along them; sums over members and slots are written out,
+    since XLA does not vectorise what it sums over an axis. Members of padding have amplitude 0.
     """
 
-    x: Slots
-    y: Slots
-    variances: Slots
+    x: Float[Array, "1 slot block"]
+    y: Float[Array, "1 slot block"]
+    variances: Float[Array, "1 slot block"]
     amplitudes: Slots
-    image_index: Int[Array, "slot block"]
-    """Into the image blobs of all cameras."""
-    body_index: Int[Array, "block"]
+    tile_index: Int[Array, "block"]
+    """Into the tiles of all cameras."""
+    body_index: Int[Array, "member block"]
     """Into the projected body blobs of all cameras."""
     image_shape: tuple[int, int] = eqx.field(static=True)
     body_shape: tuple[int, int] = eqx.field(static=True)
 
-    def of_body(self, values: Float[Array, "camera body"]) -> Float[Array, "1 block"]:
+    def of_body(self, values: Float[Array, "camera body"]) -> Float[Array, "member 1 block"]:
         """A quantity of the projected body blobs, spread over the pairs."""
-        return values.reshape(-1).at[self.body_index].get(mode="promise_in_bounds")[None, :]
+        return values.reshape(-1).at[self.body_index].get(mode="promise_in_bounds")[:, None, :]
+
+    def staged(self, function: Callable[..., Results], *arguments: Any) -> Results:
+        """The results of a function over pairs, finished before they are used."""
+        really = self.variances[0, 0, 0] > 0.0  # it always is
+        return computed_once(really, function, *arguments)
 
     def sum_over_body(self, values: Slots) -> Float[Array, "camera image"]:
         """For each image blob the sum over its pairs."""
-        zeros = jnp.zeros(self.image_shape[0] * self.image_shape[1], values.dtype)
-        sums = zeros.at[self.image_index.reshape(-1)].add(values.reshape(-1), mode="promise_in_bounds")
-        return sums.reshape(self.image_shape)
+        zeros = jnp.zeros((TILE, self.image_shape[0] * self.image_shape[1] // TILE), values.dtype)
+        added = self.staged(lambda values: _added(list(values)), values)
+        sums = zeros.at[:, self.tile_index].add(added, mode="promise_in_bounds")
+        return sums.T.reshape(self.image_shape)
 
-    def sum_over_image(self, values: Slots) -> Float[Array, "camera body"]:
-        """For each projected body blob the sum over its pairs."""
+    def moments(self, live: Bool[Array, "camera image"], weights: Slots, body: Disks) -> Moments:
+        """Sums over the live pairs of each body blob."""
+        counted = live.astype(weights.dtype).reshape(-1, TILE).T.at[:, self.tile_index].get(mode="promise_in_bounds")
+        sums = self.staged(_block_moments, self, counted, weights, body)
+        away_x, away_y, weight, variance, spread = map(self._sum_over_blocks, sums)
+        return Moments(jnp.stack([away_x, away_y], axis=-1), weight, variance, spread)
+
+    def _sum_over_blocks(self, values: Float[Array, "member block"]) -> Float[Array, "camera body"]:
+        """For each projected body blob the sum over its members of blocks."""
         zeros = jnp.zeros(self.body_shape[0] * self.body_shape[1], values.dtype)
-        block_sums = sum((values[slot] for slot in range(1, BLOCK)), values[0])  # quicker than a sum over an axis
-        sums = zeros.at[self.body_index].add(block_sums, mode="promise_in_bounds")
-        return sums.reshape(self.body_shape)
-
-    def moments(self, weights: Slots, means: Float[Array, "camera body 2"]) -> Moments:
-        """Weighted sums over the pairs of each body blob."""
-        away = [self.x - self.of_body(means[..., 0]), self.y - self.of_body(means[..., 1])]
-        away = jnp.stack([self.sum_over_image(weights * part) for part in away], axis=-1)
-        return Moments(away, self.sum_over_image(weights), self.sum_over_image(weights * self.variances))
-
-    def live_pairs(self, live: Array, values: Slots) -> Slots:
-        """The values of the pairs whose image blob is live, 0 elsewhere."""
-        chosen = lambda live, values: jnp.where(
-            live.reshape(-1).at[self.image_index].get(mode="promise_in_bounds"), values, 0.0
-        )
-        really = self.variances[0, 0] > 0.0  # it always is
-        return computed_once(really, chosen, live, values)
+        return zeros.at[self.body_index].add(values, mode="promise_in_bounds").reshape(self.body_shape)
 
 
 Pairs = DensePairs | SparsePairs
+
+
+def separations(pairs: Pairs, body: Disks) -> Separations:
+    """How far the blobs of each pair are apart, and how wide they are together."""
+    dx = pairs.x - pairs.of_body(body.means[..., 0])
+    dy = pairs.y - pairs.of_body(body.means[..., 1])
+    return Separations(dx, dy, dx * dx + dy * dy, pairs.variances + pairs.of_body(body.variances))
+
+
+def _block_moments(
+    pairs: SparsePairs, counted: Float[Array, "slot block"], weights: Slots, body: Disks
+) -> list[Float[Array, "member block"]]:
+    """The summands of `Moments` in each block, summed over its tile."""
+    gaps = separations(pairs, body)
+    weights = weights * counted[None, :, :]
+    relative = gaps.squared_distance / gaps.variance_sum
+    parts = (weights * gaps.dx, weights * gaps.dy, weights, weights * pairs.variances, weights * relative)
+    return [_added([part[:, slot] for slot in range(TILE)]) for part in parts]
+
+
+def _added(parts: list[Array]) -> Array:
+    return sum(parts[1:], parts[0])
 
 
 def image_quantities(image: Sog) -> tuple[Array, Array, Array, Array]:

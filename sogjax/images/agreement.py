@@ -45,13 +45,15 @@ def hull_coverage(masks: Mapping[int, Mask], cameras: Mapping[int, Camera]) -> d
     shrunk = {camera: resized(cameras[camera], (mask.shape[1], mask.shape[0])) for camera, mask in small.items()}
     cube = cube_around([*small.values()], [shrunk[camera] for camera in small])
     pixels = {camera: voxel_pixels(cube, shrunk[camera], mask.shape) for camera, mask in small.items()}
-    hull = np.all([pixels[camera].hits(_thick(mask, pixels[camera])) for camera, mask in small.items()], axis=0)
+    hull = np.all(
+        [pixels[camera].hits(widened_by_half_a_voxel(mask, pixels[camera])) for camera, mask in small.items()], axis=0
+    )
     return {
         camera: float((pixels[camera].silhouette_of(hull) & mask).sum() / max(mask.sum(), 1))
         for camera, mask in small.items()
     }
 
 
-def _thick(mask: Mask, pixels: VoxelPixels) -> Mask:
-    """Widened by half a voxel: a thin limb may lie between the centres of voxels."""
+def widened_by_half_a_voxel(mask: Mask, pixels: VoxelPixels) -> Mask:
+    """A thin limb may lie between the centres of voxels."""
     return cv2.dilate(mask.astype(np.uint8), disc(2 * (pixels.footprint // 2) + 1)) > 0

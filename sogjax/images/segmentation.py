@@ -52,11 +52,11 @@ def masks_from_plates(
         found = pool.map(lambda camera: plate_difference(images[camera], plates[camera]), plates)
         differences = dict(zip(plates, found, strict=True))
         guesses = {camera: first_guess(difference) for camera, difference in differences.items()}
-        guesses = {camera: guess for camera, guess in guesses.items() if _is_subject(guess)}
+        guesses = {camera: guess for camera, guess in guesses.items() if is_subject(guess)}
         guesses |= _seen_together({c: differences[c] for c in guesses}, guesses, known, cameras, up)
         cuts = pool.map(lambda camera: cut_out(differences[camera], guesses[camera]), guesses)
         sized = {camera: _enlarged(mask, images[camera]) for camera, mask in zip(guesses, cuts, strict=True)}
-    return {camera: mask for camera, mask in sized.items() if _is_subject(mask)}
+    return {camera: mask for camera, mask in sized.items() if is_subject(mask)}
 
 
 def first_guess(difference: Difference) -> Bool[np.ndarray, "rows columns"]:
@@ -123,7 +123,7 @@ def _seen_together(
     hull = misses <= (1 if len(subjects) >= MANY else 0)
     above_floor = without_floor(hull, up)
     better = {c: _confirmed(differences[c], pixels[c], hull, above_floor) for c in guesses}
-    return {camera: guess for camera, guess in better.items() if _is_subject(guess)}
+    return {camera: guess for camera, guess in better.items() if is_subject(guess)}
 
 
 def _confirmed(difference: Difference, pixels: VoxelPixels, hull: np.ndarray, above_floor: np.ndarray) -> Mask:
@@ -139,7 +139,8 @@ def _widened(mask: Mask, pixels: int) -> Mask:
     return cv2.dilate(mask.astype(np.uint8), disc(2 * pixels + 1)) > 0
 
 
-def _is_subject(mask: Mask) -> bool:
+def is_subject(mask: Mask) -> bool:
+    """Whether a region is neither next to nothing nor most of the picture."""
     return SMALLEST_SHARE < float(mask.mean()) < LARGEST_SHARE
 
 

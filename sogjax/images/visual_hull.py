@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 from scipy.ndimage import binary_opening
 
-from sogjax.model.camera import NEAR, Camera, distort, project_points
+from sogjax.model.camera import NEAR, Camera, distort, near_picture, project_points
 
 VOXELS = 64
 """Voxels along each side of the cube."""
@@ -119,8 +119,7 @@ def voxel_pixels(cube: Cube, camera: Camera, shape: tuple[int, int]) -> VoxelPix
 def _picture_pixels(camera: Camera, points: Float[Array, "n 3"]) -> tuple[Float[Array, "n 2"], Float[Array, "n"]]:
     """Pixels as recorded, and depths; far outside the picture, where a lens model folds back, the depth is 0."""
     pixels, depths = project_points(camera, points)
-    size = camera.image_size[None, :]
-    near = jnp.all((pixels > -0.5 * size) & (pixels < 1.5 * size), axis=1)
+    near = near_picture(camera, pixels, 0.5)
     return jnp.where(near[:, None], distort(camera, pixels), -1.0), jnp.where(near, depths, 0.0)
 
 

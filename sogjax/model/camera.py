@@ -90,6 +90,16 @@ def distort(camera: Camera, pixels: Float[Array, "n 2"]) -> Float[Array, "n 2"]:
     return _pixels_from_rays(camera, distorted)
 
 
+def near_picture(camera: Camera, pixels: Float[Array, "n 2"], margin: float) -> Bool[Array, "n"]:
+    """Whether `distort` means something for undistorted `pixels`: at most `margin` picture sizes outside.
+
+    Farther out the polynomial model folds back; the fisheye model does not.
+    """
+    size = camera.image_size[None, :]
+    near = jnp.all((pixels > -margin * size) & (pixels < (1.0 + margin) * size), axis=1)
+    return near if camera.fisheye is None else near | camera.fisheye
+
+
 def undistort(camera: Camera, pixels: Float[Array, "n 2"]) -> Float[Array, "n 2"]:
     """Undistorted pixels of `pixels` in the picture as recorded, by iteration."""
     distorted = _rays_from_pixels(camera, pixels)

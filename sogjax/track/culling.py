@@ -25,7 +25,7 @@ BLOB_RADIUS = 3.0
 """Sigmas around a blob's centre that belong to the box of a body."""
 
 
-BLOCK_STEP = 1024
+BLOCK_STEP = 128
 """Room for blocks of pairs comes in multiples of this."""
 
 

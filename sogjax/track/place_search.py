@@ -8,7 +8,7 @@ from jaxtyping import Array, Bool, Float
 
 from sogjax.energy.objective import EnergyWeights, Views, similarity
 from sogjax.model.body import Body
-from sogjax.model.camera import Camera, project_points
+from sogjax.model.camera import Camera, distort, project_points
 from sogjax.model.frames import axis_vector
 from sogjax.model.sog import Sog
 
@@ -90,6 +90,8 @@ def well_seen(cameras: Camera, points: Float[Array, "place 3"]) -> Bool[Array, "
 
     def inside(camera: Camera) -> Bool[Array, "place"]:
         pixels, depth = project_points(camera, points)
+        if camera.fisheye is not None:  # whose undistorted picture is much larger than the one it recorded
+            pixels = jnp.where(camera.fisheye, distort(camera, pixels), pixels)
         within = jnp.all((pixels > 0.0) & (pixels < camera.image_size[None, :]), axis=-1)
         return within & (depth > 0.0)
 

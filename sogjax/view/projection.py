@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from sogjax.data.calibration import CameraRig
-from sogjax.model.camera import NEAR, Camera, distort, project_points
+from sogjax.model.camera import NEAR, Camera, distort, near_picture, project_points
 
 POINTS_AT_ONCE = 8192
 """Every motion is projected in blocks of this size, so that the projection is compiled once for a rig."""
@@ -45,6 +45,5 @@ def _project(
 
 def _project_one(camera: Camera, points: Float[Array, "n 3"]) -> tuple[Float[Array, "n 2"], Float[Array, "n"]]:
     pixels, depth = project_points(camera, points)
-    size = camera.image_size[None, :]
-    near = jnp.all((pixels > -size) & (pixels < 2.0 * size), axis=1) & (depth > NEAR)
+    near = near_picture(camera, pixels, 1.0) & (depth > NEAR)
     return jnp.where(near[:, None], distort(camera, pixels), jnp.nan), depth

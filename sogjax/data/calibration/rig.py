@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from sogjax.data.file_names import objection
 from sogjax.errors import InputError
 from sogjax.model.camera import Camera
 
@@ -120,6 +121,10 @@ def rig_from_entries(path: Path, entries: Sequence[CameraEntry]) -> CameraRig:
 
 def _check(path: Path, entry: CameraEntry) -> None:
     where = f"{path}: camera {entry.name!r}"
+    if (wanted := objection(entry.name)) is not None:
+        raise InputError(
+            f"{path}: a camera is named {entry.name[:60]!r}; give it {wanted}, as files are named after it"
+        )
     arrays = {
         "intrinsic matrix": entry.intrinsics,
         "rotation": entry.rotation,

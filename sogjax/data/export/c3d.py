@@ -13,16 +13,23 @@ from sogjax.errors import InputError
 from sogjax.model.frames import forward_axis
 
 MILLIMETRES = 1000.0
+MAX_FRAMES = 65_535
+"""A C3D header counts no farther; more frames would be lost without a word."""
 
 
 def write_c3d(path: Path, motion: Motion, up: str = "z") -> None:
     """Write the origins of all bones; POINT:X_SCREEN and Y_SCREEN say which axes point forward and up.
 
     Raises:
-        InputError: ezc3d is not installed, no frames, unevenly spaced frames, or a path that cannot be written.
+        InputError: ezc3d is not installed; no frames, too many or uneven ones; or a path that cannot be written.
     """
     ezc3d = require_ezc3d(str(path))
     rate = 1.0 / frame_time(path, motion)
+    if motion.num_frames > MAX_FRAMES:
+        raise InputError(
+            f"{path}: C3D holds at most {MAX_FRAMES} frames, but the motion has {motion.num_frames}; "
+            "write .trc or .csv, or track it in parts"
+        )
     bones = bones_of(motion)
     _, positions = bone_frames(motion, bones, up, up)
     points = np.ones((4, len(bones.names), motion.num_frames))

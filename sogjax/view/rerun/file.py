@@ -212,6 +212,9 @@ class RerunFile:
 
 
 def view_command(path: Path, web: bool = False) -> list[str]:
-    """The command that opens a Rerun file in a window, or serves it to a browser of this machine only."""
-    command = [sys.executable, "-m", "rerun", str(path)]
-    return [*command, "--serve-web", "--bind", "127.0.0.1"] if web else command
+    """The command that opens a Rerun file in a window, or serves it to a browser; reached from this machine only.
+
+    The window listens for further data too, on all of the machine's addresses unless told otherwise.
+    """
+    command = [sys.executable, "-m", "rerun", str(path), "--bind", "127.0.0.1"]
+    return [*command, "--serve-web"] if web else command

@@ -1,0 +1,71 @@
+"""What only a process of its own shows: start-up, and the most memory that is resident.
+
+python benchmarks/processes.py import|first_frame|memory [ACTOR_FILE]
+"""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from quantities import Quantity
+
+MIB_IN_KIB = 1024.0
+
+
+def process_quantities(actor: Path) -> Iterator[Quantity]:
+    """Start-up and memory, each from a process that does nothing else; no compiled programs are kept."""
+    yield Quantity("start-up", "import sogjax", measured("import", actor), "s", target=1.0)
+    yield Quantity("start-up", "first tracked frame, cold", measured("first_frame", actor), "s", target=15.0)
+    yield Quantity("memory", "most resident, demo, all outputs", measured("memory", actor), "MiB", target=1536.0)
+
+
+def measured(what: str, actor: Path) -> float:
+    """The number that a process of its own prints."""
+    environment = {key: value for key, value in os.environ.items() if key != "SOGJAX_COMPILATION_CACHE"}
+    command = [sys.executable, __file__, what, str(actor)]
+    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, env=environment)
+    return float(json.loads(done.stdout.splitlines()[-1]))
+
+
+def import_seconds() -> float:
+    """What `import sogjax` takes when Python runs already."""
+    begin = time.perf_counter()
+    import sogjax  # noqa: F401
+
+    return time.perf_counter() - begin
+
+
+def first_frame_seconds(actor: str) -> float:
+    """From the start of the imports to the first pose, the actor being known."""
+    begin = time.perf_counter()
+    from track_speed import demo_recording
+
+    from sogjax.app.script import track_folder
+
+    track_folder(demo_recording(), [f"actor={actor}", "stop=1"])
+    return time.perf_counter() - begin
+
+
+def resident_mib(actor: str) -> float:
+    """After tracking the demo with all outputs."""
+    import resource
+
+    from track_speed import demo_recording
+
+    from sogjax.app import track
+    from sogjax.app.composition import composed
+
+    with TemporaryDirectory() as folder:
+        track.run(composed("track", [f"recording={demo_recording()}", f"actor={actor}", f"out={folder}/demo"]))
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MIB_IN_KIB
+
+
+if __name__ == "__main__":
+    kind, actor_file = sys.argv[1:]
+    numbers = {"import": lambda _: import_seconds(), "first_frame": first_frame_seconds, "memory": resident_mib}
+    print(json.dumps(numbers[kind](actor_file)))

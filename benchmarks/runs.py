@@ -1,0 +1,131 @@
+"""What tracking the demo costs: solvers, quad-trees, end to end against decoding alone, and sweeps."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from end_to_end import decoding_rate
+from quantities import Quantity, exponent, milliseconds
+from track_speed import demo_recording
+
+from sogjax.app import build
+from sogjax.app.cells import cells_of_clip
+from sogjax.app.composition import composed
+from sogjax.app.configs import TrackConfig
+from sogjax.app.overrides import quoted_value
+from sogjax.app.recordings import actors_of, opened
+from sogjax.app.track import Job, Run, track_recording
+from sogjax.data.ground_truth import load_ground_truth
+from sogjax.data.recording import Recording
+from sogjax.evaluate import evaluate_motions
+from sogjax.model.body import Body
+from sogjax.track.many import track_many
+from sogjax.track.scan import track_clip
+from sogjax.track.tracker import TrackState, first_capacities
+
+SOLVERS = ("gauss_newton", "lbfgs", "conditioned_ascent")
+FRAMES_OF_SWEEP = 8
+
+
+@dataclass
+class Scene:
+    """The demo's recording, and an actor that was made of it."""
+
+    folder: Path
+    recording: Recording
+    bodies: list[Body]
+    frames: int
+
+    @classmethod
+    def demo(cls, frames: int) -> "Scene":
+        """Render and estimate what is not there yet."""
+        folder = demo_recording()
+        recording = opened(str(folder))
+        config: TrackConfig = composed("track", [f"recording={quoted_value(str(folder))}"])
+        bodies, _ = actors_of(recording, config.actor, config.body, config.color)
+        return cls(folder, recording, bodies, min(frames, recording.num_frames))
+
+    def config(self, *overrides: str, frames: int | None = None) -> TrackConfig:
+        """The config of a run."""
+        words = [f"recording={quoted_value(str(self.folder))}", f"stop={frames or self.frames}", *overrides]
+        return composed("track", words)
+
+    def tracked(self, *overrides: str) -> Run:
+        """A run without files, evaluated."""
+        result = track_recording(self.recording, self.bodies, self.config(*overrides))
+        assert self.recording.ground_truth is not None
+        result.evaluation = evaluate_motions(result.motions, load_ground_truth(self.recording.ground_truth))
+        return result
+
+
+def solver_quantities(scene: Scene) -> Iterator[Quantity]:
+    """Every solver with near pairs, and the paper's with all pairs: iterations, energy, marker error, time."""
+    alternatives = {name: (f"solver={name}",) for name in SOLVERS}
+    alternatives["conditioned_ascent, all pairs"] = ("solver=conditioned_ascent", "energy.pairs=dense")
+    errors = {}
+    for name, words in alternatives.items():
+        result = scene.tracked(*words)
+        assert result.evaluation is not None
+        motion = next(iter(result.motions.values()))
+        errors[name] = 1000.0 * result.evaluation.summary.mean
+        rate = result.times.frames_per_second("step", skipped=3)
+        fastest = 1000.0 * float(np.min(result.times.seconds["step"][3:]))
+        yield Quantity("solver", f"{name}: iterations a frame", float(np.mean(result.iterations)), "count")
+        yield Quantity("solver", f"{name}: final energy x 1000", 1000.0 * float(np.mean(motion.energy)), "energy", True)
+        yield Quantity("solver", f"{name}: marker error", errors[name], "mm")
+        yield Quantity("solver", f"{name}: least step", fastest, "ms")
+        target = 60.0 if name == SOLVERS[0] else None
+        yield Quantity("solver", f"{name}: tracking step", rate, "frames/s", True, target)
+    worse = errors[SOLVERS[0]] - errors["conditioned_ascent, all pairs"]
+    yield Quantity("solver", "default's error over the paper's method's", worse, "mm", target=1.0)
+
+
+def stage_quantities(scene: Scene) -> Iterator[Quantity]:
+    """The stages of one step before the solver."""
+    job = Job.from_config(scene.recording, scene.bodies, scene.config())
+    grids, frames = job.grids, (0, 1)
+    cells = jnp.asarray(cells_of_clip(scene.recording, grids, scene.config().images, frames)[0])
+    state = TrackState.from_pose(job.start)
+    capacities = first_capacities(job.tracker, state, cells)
+    leaves = eqx.filter_jit(lambda reader, cells: reader.leaves(cells.astype(jnp.float32) / 255.0))
+    views = eqx.filter_jit(lambda tracker, state, cells: tracker.views(cells, state, capacities)[0])
+    near = eqx.filter_jit(
+        lambda tracker, state, views: views.near(
+            tracker.body.posed_blobs(state.previous), tracker.weights, capacities.blocks
+        )
+    )
+    seen = views(job.tracker, state, cells)
+    yield Quantity("stage", "quad-trees of 12 cameras", milliseconds(leaves, job.tracker.reader, cells), "ms")
+    yield Quantity("stage", "with choice of blobs and colours", milliseconds(views, job.tracker, state, cells), "ms")
+    yield Quantity("stage", "lists of near pairs", milliseconds(near, job.tracker, state, seen), "ms")
+
+
+def end_to_end_quantities(scene: Scene) -> Iterator[Quantity]:
+    """From the videos to the poses, against decoding alone, in turns."""
+    decoding, whole = [], []
+    for _ in range(3):
+        decoding.append(decoding_rate(scene.recording, scene.frames))
+        whole.append(scene.tracked().times.frames_per_second("whole", skipped=3))
+    yield Quantity("end to end", "decoding alone", max(decoding), "frames/s", True)
+    yield Quantity("end to end", "videos to poses", max(whole), "frames/s", True)
+    yield Quantity("end to end", "share of the decode-only rate", max(whole) / max(decoding), "ratio", True, 0.8)
+
+
+def sweep_quantities(scene: Scene) -> Iterator[Quantity]:
+    """Fifteen settings in one compiled call, in units of one run over the same cells."""
+    config = scene.config(frames=FRAMES_OF_SWEEP)
+    job = Job.from_config(scene.recording, scene.bodies, config)
+    cells = np.asarray(cells_of_clip(scene.recording, job.grids, config.images, job.frames))
+    weights = np.geomspace(0.003, 0.03, 15)
+    words = [f"energy.acceleration_weight={weight}" for weight in weights]
+    trackers = [build.varied(job.tracker, scene.config(word, frames=FRAMES_OF_SWEEP)) for word in words]
+    one = milliseconds(lambda: track_clip(job.tracker, job.start, cells)[0].pose, repeats=4)
+    sizes = (4, 15)
+    sweep = lambda count: track_many(trackers[:count], jnp.stack([job.start] * count), cells)[0].pose
+    costs = [milliseconds(lambda count=count: sweep(count), repeats=3) for count in sizes]
+    yield Quantity("sweep", "15 settings, in runs from kept cells", costs[-1] / one, "ratio", target=5.0)
+    name = f"exponent with settings, 1/{'/'.join(map(str, sizes))}"
+    yield Quantity("growth", name, exponent((1, *sizes), (one, *costs)), "exponent", target=1.0)

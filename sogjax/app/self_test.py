@@ -1,0 +1,115 @@
+"""Three laws that a sound installation keeps, tried in about five seconds: overlap, gradient, tracking step."""
+
+from collections.abc import Callable
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from sogjax.energy.objective import EnergyWeights, Views, similarity, whole_image_overlap
+from sogjax.energy.overlap import overlaps
+from sogjax.model.camera import Camera, project
+from sogjax.model.sog import Sog
+from sogjax.solve import OptimistixSolver, Scales
+
+OVERLAP_TOLERANCE = 1e-4
+"""Relative; float32."""
+GRADIENT_TOLERANCE = 0.02
+"""Relative to the central difference, whose own error is about a per cent in float32."""
+STEP = 0.004
+"""Metres, of the central difference."""
+DISPLACEMENT = (0.03, -0.02, 0.02)
+"""Metres by which the body is moved away, and from which the solver has to bring it back."""
+NUM_BLOBS = 20
+BACK = 0.003
+"""Metres from the true place that the solver may leave."""
+
+
+def overlap_is_the_integral() -> str | None:
+    """Eq. 6 against the sum of the two Gaussians' product over a fine grid."""
+    means, sigmas = np.array([[20.0, 22.0], [24.5, 19.0]]), np.array([3.0, 4.0])
+    blob = lambda k: Sog.from_arrays(jnp.asarray(means[k : k + 1]), jnp.asarray(sigmas[k : k + 1]), jnp.ones((1, 3)))
+    found = float(overlaps(blob(0), blob(1), jnp.ones((1, 1)), jnp.asarray(0.5))[0, 0])
+    grid = np.stack(np.meshgrid(np.arange(-20, 60, 0.25), np.arange(-20, 60, 0.25)), axis=-1)
+    squares = ((grid[:, :, None] - means) ** 2).sum(axis=-1)
+    integral = float(np.exp(-squares / (2.0 * sigmas**2)).prod(axis=-1).sum()) * 0.25**2
+    if abs(found - integral) > OVERLAP_TOLERANCE * integral:
+        return f"an overlap is {found:.6g}, the integral is {integral:.6g}"
+    return None
+
+
+def gradient_is_the_slope() -> str | None:
+    """The closed-form gradient of Eq. 9 by the place of a body against central differences."""
+    objective = _objective()
+    start = jnp.asarray(DISPLACEMENT)
+    value_and_gradient = jax.jit(jax.value_and_grad(objective))
+    gradient = np.asarray(value_and_gradient(start)[1], float)
+    slope = np.array(
+        [
+            float(value_and_gradient(start + STEP * e)[0]) - float(value_and_gradient(start - STEP * e)[0])
+            for e in jnp.eye(3)
+        ]
+    ) / (2.0 * STEP)
+    error = float(np.linalg.norm(gradient - slope) / np.linalg.norm(slope))
+    return f"a gradient is {100 * error:.1f} % off" if not error <= GRADIENT_TOLERANCE else None
+
+
+def body_finds_its_own_picture() -> str | None:
+    """A body that was moved away from its own pictures climbs back: nothing is more like a picture than itself."""
+    objective = _objective()
+    scales = Scales(jnp.array([0, 0, 0]), jnp.array([0.01]), jnp.array([0.05]))
+    solver = OptimistixSolver("lbfgs", epsilon=1e-4, max_iterations=100)
+    climb = eqx.filter_jit(lambda start: solver.maximize(objective, start, scales))
+    place = np.asarray(climb(jnp.asarray(DISPLACEMENT)).params, float)
+    away = float(np.linalg.norm(place))
+    return f"a tracking step ends {1000 * away:.1f} mm from the optimum" if not away <= BACK else None
+
+
+LAWS: dict[str, Callable[[], str | None]] = {
+    "overlap": overlap_is_the_integral,
+    "gradient": gradient_is_the_slope,
+    "tracking step": body_finds_its_own_picture,
+}
+"""Each gives a complaint, or None where it holds."""
+
+
+def _objective() -> Callable[[Float[Array, "3"]], Float[Array, ""]]:
+    """Similarity of a body with pictures of itself at the origin, by how far it is moved."""
+    cameras = jax.tree.map(lambda *leaves: jnp.stack(leaves), *[_camera(angle) for angle in (0.0, 1.6, 3.5)])
+    blobs = _blobs()
+    views = eqx.filter_jit(_own_views)(cameras, blobs)
+    weights = EnergyWeights(capped=False)
+
+    def objective(shift: Float[Array, "3"]) -> Float[Array, ""]:
+        moved = eqx.tree_at(lambda sog: sog.means, blobs, blobs.means + shift[None, :])
+        return similarity(moved, views, weights)
+
+    return objective
+
+
+def _own_views(cameras: Camera, blobs: Sog) -> Views:
+    """Cameras whose pictures show the blobs themselves."""
+    images = jax.vmap(project, in_axes=(0, None))(cameras, blobs)
+    normalizers = whole_image_overlap(cameras.image_size)
+    return Views.from_images(cameras, images, blobs, normalizers, "rgb", jnp.asarray(0.3))
+
+
+def _blobs() -> Sog:
+    """A subject of a person's size, each blob in a colour of its own, so that it fits its own picture only."""
+    rng = np.random.default_rng(0)
+    means = rng.uniform([-0.3, -0.3, -0.8], [0.3, 0.3, 0.8], (NUM_BLOBS, 3))
+    colors = rng.random((NUM_BLOBS, 3))
+    return Sog.from_arrays(jnp.asarray(means), jnp.full(NUM_BLOBS, 0.08), jnp.asarray(colors))
+
+
+def _camera(angle: float) -> Camera:
+    """A camera 3 m from the origin that looks at it."""
+    forward = -np.array([np.cos(angle), np.sin(angle), 0.0])
+    down = np.array([0.0, 0.0, -1.0])
+    pose = np.eye(4)
+    pose[:3, :3] = np.stack([np.cross(down, forward), down, forward])
+    pose[2, 3] = 3.0
+    matrix = np.array([[500.0, 0.0, 319.5], [0.0, 500.0, 239.5], [0.0, 0.0, 1.0]])
+    return Camera(jnp.asarray(matrix), jnp.asarray(pose), jnp.zeros(5), jnp.asarray([640.0, 480.0]))

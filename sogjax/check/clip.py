@@ -1,0 +1,86 @@
+"""A short stretch of a recording, read once at reduced size: what the checks of pictures look at."""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from jaxtyping import UInt8
+
+from sogjax.data.recording import Recording
+from sogjax.data.video import read_prepared
+from sogjax.images.plate_difference import working_size
+
+SMALL = 320
+"""Pixels of the longer side of the grey pictures."""
+NUM_STILLS = 2
+
+Progress = Callable[[Iterable[Any], int, str], Iterator[Any]]
+"""Wraps an iterable, given its length and a label, and yields the same."""
+
+
+@dataclass(frozen=True)
+class Clip:
+    """Consecutive frames of all cameras, in the order of the rig."""
+
+    recording: Recording
+    first: int
+    """The recording's frame that is the first one here, counted from the recording's first."""
+    grey: tuple[UInt8[np.ndarray, "frame _h _w"], ...]
+    """By camera, the longer side `SMALL` pixels."""
+    stills: dict[int, tuple[UInt8[np.ndarray, "_y _x 3"], ...]]
+    """By frame of this clip, a few pictures (BGR) of all cameras at the working size of masks."""
+
+    @property
+    def num_frames(self) -> int:
+        """Frames that were read."""
+        return len(self.grey[0])
+
+    def frame_number(self, index: int) -> int:
+        """The recording's number of a frame of this clip."""
+        return self.recording.first_frame + self.first + index
+
+
+def small_size(width: int, height: int) -> tuple[int, int]:
+    """Width and height of the grey pictures."""
+    factor = min(1.0, SMALL / max(width, height))
+    return max(1, round(factor * width)), max(1, round(factor * height))
+
+
+def working_picture(image: UInt8[np.ndarray, "_h _w 3"]) -> UInt8[np.ndarray, "_y _x 3"]:
+    """A picture at the working size of masks."""
+    return cv2.resize(image, working_size(image.shape[1], image.shape[0]), interpolation=cv2.INTER_AREA)
+
+
+def picture_or_black(recording: Recording, camera: int, image: np.ndarray | None) -> UInt8[np.ndarray, "_h _w 3"]:
+    """A camera's picture; a black one where it is missing."""
+    width, height = recording.rig.image_size(recording.rig.names[camera])
+    return np.zeros((height, width, 3), np.uint8) if image is None else image
+
+
+def read_clip(recording: Recording, start: int, frames: int, progress: Progress) -> Clip:
+    """At most `frames` frames from `start` on, which counts from the recording's first frame.
+
+    Raises:
+        InputError: a video that ends early or changes its size.
+    """
+    stop = min(start + frames, recording.num_frames)
+    count = stop - start
+    wanted = {int(k) for k in np.linspace(0, count - 1, NUM_STILLS + 2)[1:-1]}
+    reduced = lambda camera, image: _reduced(picture_or_black(recording, camera, image))
+    grey: list[list[np.ndarray]] = [[] for _ in recording.rig.names]
+    stills: dict[int, tuple[np.ndarray, ...]] = {}
+    for index, pictures in enumerate(progress(read_prepared(recording, reduced, start, stop), count, "reading")):
+        for camera, (small, _) in enumerate(pictures):
+            grey[camera].append(small)
+        if index in wanted:
+            stills[index] = tuple(still for _, still in pictures)
+    return Clip(recording, start, tuple(np.stack(pictures) for pictures in grey), stills)
+
+
+def _reduced(image: UInt8[np.ndarray, "_h _w 3"]) -> tuple[np.ndarray, np.ndarray]:
+    """A picture small and grey, and in colour at the working size of masks."""
+    still = working_picture(image)
+    small = cv2.resize(still, small_size(image.shape[1], image.shape[0]), interpolation=cv2.INTER_AREA)
+    return cv2.cvtColor(small, cv2.COLOR_BGR2GRAY), still

@@ -1,0 +1,47 @@
+"""What a check of a recording says: one finding for each thing that was looked at or noticed."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+SEVERITIES = ("ok", "note", "warning", "error")
+"""From harmless to fatal: `ok` was looked at and is right, `error` keeps a recording from being opened."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was noticed, in one or two sentences."""
+
+    severity: str
+    """One of `SEVERITIES`."""
+    topic: str
+    """What was looked at: files, cameras, unit, vertical, calibration, frames, synchronisation, exposure."""
+    what: str
+    cause: str = ""
+    """The likely one; empty where nothing is wrong."""
+    remedy: str = ""
+    cameras: tuple[str, ...] = ()
+    """Whom it concerns; empty where it is the whole recording."""
+
+    def sentence(self) -> str:
+        """The finding in one or two sentences."""
+        parts = [self.what]
+        if self.cause:
+            parts.append(f"likely cause: {self.cause}")
+        if self.remedy:
+            parts.append(f"remedy: {self.remedy}")
+        return "; ".join(parts)
+
+    def line(self) -> str:
+        """The finding as a line for a terminal."""
+        return f"{self.severity:<8} {self.topic:<16} {self.sentence()}"
+
+
+def worst_first(findings: Iterable[Finding]) -> list[Finding]:
+    """The findings by severity, those of equal severity in their order."""
+    return sorted(findings, key=lambda finding: -SEVERITIES.index(finding.severity))
+
+
+def listed(names: Iterable[str], most: int = 6) -> str:
+    """Names as they may stand in a sentence, shortened where they are many."""
+    names = list(names)
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

@@ -1,0 +1,134 @@
+"""Numbers of frames, frame rates, and frames that were dropped or stand twice."""
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Float
+
+from sogjax.check.clip import Clip
+from sogjax.check.findings import Finding, listed
+from sogjax.check.jumps import Jump
+from sogjax.data.recording import Recording
+from sogjax.data.source import SourceInfo, frame_times, look_at_source
+
+GAP = 1.5
+"""A pause between two frames of a file, in units of the usual one, from which on a frame is missing."""
+UNEVEN = 0.2
+"""Share of the usual pause by which most pauses may vary before the rate is called variable."""
+SAME = 0.05
+"""Two frames are one where they differ by less than this share of what they usually differ by in that video,"""
+ELSEWHERE = 0.3
+"""while those of most other cameras differ by more than this share."""
+LEAST_DIFFERENCE = 0.02
+"""Grey values; where frames usually differ by less, nothing can be told."""
+MOST_LISTED = 5
+
+
+@dataclass(frozen=True)
+class SourceFrames:
+    """What the file of one camera says of its frames."""
+
+    info: SourceInfo
+    gaps: tuple[int, ...]
+    """Frames of the file after which others are missing by its time stamps."""
+    uneven: bool
+    """Whether its rate varies."""
+
+
+def source_frames(recording: Recording) -> dict[str, SourceFrames]:
+    """By camera what its file says of its frames."""
+    with ThreadPoolExecutor() as pool:
+        found = pool.map(lambda name: _source_frames(recording, name), recording.rig.names)
+        return dict(zip(recording.rig.names, found, strict=True))
+
+
+def _source_frames(recording: Recording, name: str) -> SourceFrames:
+    path = recording.sources[name]
+    times = frame_times(path)
+    if times is None or len(times) < 4:
+        return SourceFrames(look_at_source(path), (), False)
+    pauses = np.diff(times)
+    usual = max(float(np.median(pauses)), 1e-9)
+    gaps = tuple(int(k) for k in np.flatnonzero(pauses > GAP * usual))
+    uneven = float(np.percentile(np.abs(pauses - usual), 75)) > UNEVEN * usual
+    return SourceFrames(look_at_source(path), gaps, uneven)
+
+
+def source_findings(recording: Recording, sources: dict[str, SourceFrames]) -> list[Finding]:
+    """What the files say of numbers of frames, rates and missing frames."""
+    counts = {name: source.info.num_frames for name, source in sources.items()}
+    findings = []
+    if len(set(counts.values())) > 1:
+        shown = listed((f"{name} {count}" for name, count in counts.items()), 12)
+        cause = "cameras that were started or stopped apart, or that lost frames"
+        remedy = "look at the findings on synchronisation; set first_frame and last_frame to what all have"
+        findings.append(
+            Finding("note", "frames", f"the cameras have different numbers of frames: {shown}", cause, remedy)
+        )
+    for name, source in sources.items():
+        if source.uneven:
+            what = f"the time stamps of {name} are uneven"
+            remedy = "convert it to a constant rate (ffmpeg -vsync cfr), or record so"
+            findings.append(Finding("warning", "frames", what, "a variable frame rate, as of phones", remedy, (name,)))
+        elif source.gaps:
+            what = f"{name} lacks frames by its time stamps, after frame {_places(source.gaps)}"
+            cause, remedy = "frames dropped while recording", "use the stretches between them, or record again"
+            findings.append(Finding("warning", "frames", what, cause, remedy, (name,)))
+    if not findings:
+        what = f"{recording.num_frames} frames of {len(sources)} cameras at {recording.fps:g} a second"
+        findings.append(Finding("ok", "frames", what))
+    return findings
+
+
+def repeated_frames(clip: Clip) -> dict[int, list[int]]:
+    """By camera the frames of the clip that repeat the one before, while other cameras' do not."""
+    shares = np.stack([_shares(grey) for grey in clip.grey])
+    found = {}
+    for camera in range(len(shares)):
+        others = np.delete(shares, camera, axis=0)
+        moving = np.median(others, axis=0) > ELSEWHERE if len(others) else np.ones(shares.shape[1], bool)
+        twice = np.flatnonzero((shares[camera] < SAME) & moving) + 1
+        if len(twice):
+            found[camera] = [int(k) for k in twice]
+    return found
+
+
+def _shares(grey: np.ndarray) -> Float[np.ndarray, "step"]:
+    """How much each frame differs from the one before, in units of the median."""
+    steps = [float(np.abs(b.astype(np.int16) - a).mean()) for a, b in pairwise(grey)]
+    usual = float(np.median(steps)) if steps else 0.0
+    return np.array(steps) / usual if usual > LEAST_DIFFERENCE else np.ones(len(steps))
+
+
+def repeat_findings(clip: Clip, repeated: dict[int, list[int]]) -> list[Finding]:
+    """What repeated frames mean."""
+    findings = []
+    for camera, frames in repeated.items():
+        name = clip.recording.rig.names[camera]
+        what = f"{name} shows the same picture twice, at frame {_places([clip.frame_number(k) for k in frames])}"
+        cause = "a frame that was lost and filled with the one before, or a converted frame rate"
+        remedy = "copy the original files again without conversion, or track the stretches between"
+        findings.append(Finding("warning", "frames", what, cause, remedy, (name,)))
+    return findings
+
+
+def jump_findings(clip: Clip, jumps: dict[int, Jump]) -> list[Finding]:
+    """What jumps of one camera's time against the others' mean."""
+    findings = []
+    span = f"{clip.frame_number(0)} and {clip.frame_number(clip.num_frames - 1)}"
+    for camera, jump in jumps.items():
+        name = clip.recording.rig.names[camera]
+        count = f"{abs(jump.frames)} frame{'s' * (abs(jump.frames) > 1)}"
+        lost = jump.frames > 0
+        what = f"{name} seems to have {'lost' if lost else 'gained'} {count} against the others between frames {span}"
+        cause = "a frame dropped while recording or copying" if lost else "a frame that was repeated"
+        remedy = "track the stretches before and after apart, each with its own frame_offset, or record again"
+        findings.append(Finding("note", "frames", what, cause, remedy, (name,)))
+    return findings
+
+
+def _places(numbers: Sequence[int]) -> str:
+    return listed((str(number) for number in numbers), MOST_LISTED)

@@ -1,0 +1,58 @@
+"""What keeps a recording from being opened: every file is looked at by itself, so that all of it is said at once."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+from sogjax.check.findings import Finding
+from sogjax.data.calibration import CameraRig, find_calibrations, load_calibration
+from sogjax.data.ground_truth import load_ground_truth
+from sogjax.data.initial_pose import read_initial_poses
+from sogjax.data.recording_settings import RecordingSettings, read_recording_settings
+from sogjax.data.source import find_sources, look_at_source
+from sogjax.data.stills import check_size, find_background, find_example_poses
+from sogjax.errors import InputError
+
+Value = TypeVar("Value")
+
+
+def opening_problems(path: Path, first: InputError) -> list[Finding]:
+    """One finding for each file that is wrong; `first` is what opening the recording complained of."""
+    said: list[str] = []
+
+    def tried(look: Callable[[], Value]) -> Value | None:
+        try:
+            return look()
+        except InputError as error:
+            said.append(str(error))
+            return None
+
+    settings = tried(lambda: read_recording_settings(path / "recording.yaml")) or RecordingSettings()
+    rig = tried(lambda: _rig(path, settings))
+    sources = tried(lambda: find_sources(path)) or {}
+    for camera, source in sources.items():
+        info = tried(lambda source=source: look_at_source(source))
+        if info is not None and rig is not None and camera in rig.names:
+            tried(lambda camera=camera, source=source, info=info: check_size(source, info.size, rig, camera))
+    if rig is not None:
+        tried(lambda: find_background(path / "background", rig, rig.names))
+        tried(lambda: find_example_poses(path / "example_poses", rig, rig.names, settings.example_poses))
+    for name, read in (("initial_pose.yaml", read_initial_poses), ("ground_truth.npz", load_ground_truth)):
+        if (path / name).exists():
+            tried(lambda name=name, read=read: read(path / name))
+    if str(first) not in said:
+        said.insert(0, str(first))
+    return [_finding(sentence) for sentence in said]
+
+
+def _rig(path: Path, settings: RecordingSettings) -> CameraRig | None:
+    """The cameras, where it is clear which calibration counts; the recording's own opening complains otherwise."""
+    named = [path / settings.calibration] if settings.calibration else find_calibrations(path)
+    return load_calibration(named[0], settings.unit) if len(named) == 1 else None
+
+
+def _finding(sentence: str) -> Finding:
+    if "is no rotation matrix (determinant -1" in sentence:
+        cause = "a mirrored world: axes that changed between left-handed and right-handed"
+        return Finding("error", "calibration", sentence, cause, "export the calibration for right-handed axes")
+    return Finding("error", "files", sentence)

@@ -1,0 +1,114 @@
+"""How large the subject is by the calibration, and where it stands: that tells units, the vertical and the floor."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from sogjax.check.agreement import MomentHull
+from sogjax.check.cameras import RigGeometry
+from sogjax.check.findings import Finding
+from sogjax.model.camera import NEAR, distort, project_points
+from sogjax.model.frames import axis_vector
+
+PERSON = (1.2, 2.6)
+"""Metres: heights of people, raised arms included."""
+SUBJECTS = (0.25, 4.0)
+"""Metres: what is outside of this is no subject of a usual size, but another unit."""
+DISTANCES = (0.4, 40.0)
+"""Metres from cameras to what they look at."""
+EXPECTED_HEIGHT, EXPECTED_DISTANCE = 1.7, 4.0
+FLOOR = 0.25
+"""Metres that the lowest point of the subject may be from 0 along the vertical."""
+OUTLIERS = 0.1
+"""Per cent of a silhouette's pixels at either end that are not counted."""
+REACH, SAMPLES = 1.0, 201
+"""Half of the vertical line on which heights are read off, in units of the subject's size, and points on it."""
+
+_UNITS = {"millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254, "feet": 0.3048, "metres": 1.0}
+
+
+@dataclass(frozen=True)
+class SubjectSize:
+    """Extent of the subject along the vertical, in metres by the calibration as it is read."""
+
+    height: float
+    lowest: float
+
+
+def subject_size(hulls: Sequence[MomentHull], good: Sequence[int], scale: float, up: str) -> SubjectSize | None:
+    """The median over moments and over the cameras that agree; `scale` (metres) is the hulls' unit of length."""
+    shown = [(hull, camera) for hull in hulls for camera in hull.masks if camera in good]
+    ends = [both for hull, camera in shown if (both := _ends(hull, camera, axis_vector(up))) is not None]
+    if not ends:
+        return None
+    low, high = np.median(ends, axis=0) * scale
+    return SubjectSize(float(high - low), float(low))
+
+
+def _ends(hull: MomentHull, camera: int, axis: Float[np.ndarray, "3"]) -> tuple[float, float] | None:
+    """Lowest and highest point of a silhouette on the vertical line through the subject's middle.
+
+    The visual hull itself is no measure: with few cameras it reaches beyond head and feet.
+    """
+    seen, mask = hull.cameras[camera], hull.masks[camera]
+    heights = np.linspace(-REACH, REACH, SAMPLES) * hull.cube.size
+    line = hull.cube.centre + heights[:, None] * axis
+    points, depths = project_points(seen, jnp.asarray(line, seen.intrinsics.dtype))
+    usable = np.asarray(depths) > NEAR
+    pixels = np.asarray(distort(seen, points), float)[usable]
+    if len(pixels) < 2:
+        return None
+    direction = pixels[-1] - pixels[0]
+    along = pixels @ direction
+    order = np.argsort(along)
+    silhouette = np.argwhere(mask)[:, ::-1] @ direction
+    base = float(hull.cube.centre @ axis)
+    low, high = np.interp(np.percentile(silhouette, [OUTLIERS, 100.0 - OUTLIERS]), along[order], heights[usable][order])
+    return base + float(low), base + float(high)
+
+
+def scale_findings(size: SubjectSize | None, geometry: RigGeometry, unit: str | None) -> list[Finding]:
+    """Whether the unit of length is right, and where the floor is; `unit` as recording.yaml gives it."""
+    if size is None:
+        return _by_distance(geometry, unit)
+    shown = f"the subject is {_length(size.height)} tall by the calibration"
+    low, high = SUBJECTS
+    if not low <= size.height <= high:
+        return [_wrong_unit(f"{shown}, a person about {EXPECTED_HEIGHT} m", EXPECTED_HEIGHT / size.height, unit)]
+    findings = []
+    if PERSON[0] <= size.height <= PERSON[1]:
+        findings.append(Finding("ok", "unit", shown))
+    else:
+        cause = "a subject that is no grown person, masks of a part of it, or a unit that is off"
+        findings.append(Finding("note", "unit", shown, cause, "measure something in the scene, and compare"))
+    if abs(size.lowest) > FLOOR:
+        what = f"the lowest point of the subject is at {size.lowest:.2f} m along the vertical, not near 0"
+        cause = "a world whose zero is not on the floor, a wrong `up`, or a subject off the floor"
+        findings.append(Finding("note", "vertical", what, cause, "nothing, if it is meant; else level the calibration"))
+    return findings
+
+
+def _by_distance(geometry: RigGeometry, unit: str | None) -> list[Finding]:
+    """Without a subject, the distance to what the cameras look at must do."""
+    if len(geometry.names) < 2:
+        return []
+    shown = f"the cameras are {_length(geometry.scale)} from what they look at"
+    if DISTANCES[0] <= geometry.scale <= DISTANCES[1]:
+        return [Finding("ok", "unit", f"{shown}, which is plausible; there is no silhouette to measure")]
+    return [_wrong_unit(f"{shown}, usual are 2 to 8 m", EXPECTED_DISTANCE / geometry.scale, unit)]
+
+
+def _wrong_unit(what: str, factor: float, unit: str | None) -> Finding:
+    """`factor`: what lengths must be multiplied with to be as expected."""
+    given = {"mm": 1e-3}.get(unit or "m", 1.0)
+    likely = min(_UNITS, key=lambda name: abs(np.log(_UNITS[name] / (factor * given))))
+    words = {"millimetres": "`unit: mm`", "metres": "`unit: m`"}
+    remedy = f"write {words[likely]} into recording.yaml" if likely in words else "convert the translations to metres"
+    return Finding("warning", "unit", what, f"a calibration in {likely}", remedy)
+
+
+def _length(metres: float) -> str:
+    return f"{metres:.2f} m" if metres >= 0.1 else f"{1000 * metres:.3g} mm"

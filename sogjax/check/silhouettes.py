@@ -1,0 +1,124 @@
+"""Where the subject is in the pictures: masks of example poses and of a few frames of the videos."""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, UInt8
+
+from sogjax.check.clip import Clip, picture_or_black, working_picture
+from sogjax.data.image_file import read_mask
+from sogjax.data.recording import ExamplePose, Recording
+from sogjax.data.video import read_prepared, read_still
+from sogjax.images.plate_difference import plate_difference, reduced_mask
+from sogjax.images.segmentation import first_guess, is_subject
+
+MOST_POSES = 2
+
+Mask = Bool[np.ndarray, "_h _w"]
+Picture = UInt8[np.ndarray, "_h _w 3"]
+
+
+@dataclass(frozen=True)
+class Moment:
+    """One moment as all cameras show it, at the working size of masks."""
+
+    label: str
+    filmed: bool
+    """From the videos; else photographed as an example pose."""
+    pictures: dict[int, Picture]
+    """By camera (its index in the rig), BGR."""
+    masks: dict[int, Mask]
+    """By camera; absent where the subject could not be told."""
+
+
+def example_moments(recording: Recording) -> list[Moment]:
+    """The first few example poses, with their masks, or masks made from the empty background pictures."""
+    plates = plates_of(recording)
+    return [_example_moment(recording, example, plates) for example in recording.example_poses[:MOST_POSES]]
+
+
+def video_moments(clip: Clip, offsets: Sequence[int]) -> list[Moment]:
+    """A few frames of the videos, each camera `offsets` frames later, with masks where there are plates.
+
+    Raises:
+        InputError: a video that ends early.
+    """
+    recording = clip.recording
+    plates = plates_of(recording)
+    stills = clip.stills if not any(offsets) else _stills_apart(clip, offsets)
+    with ThreadPoolExecutor() as pool:
+        moments = []
+        for index, pictures in stills.items():
+            masks = pool.map(lambda k, shown=pictures: _from_plate(shown[k], plates.get(k)), range(len(pictures)))
+            found = {camera: mask for camera, mask in enumerate(masks) if mask is not None}
+            label = f"frame {clip.frame_number(index)}"
+            moments.append(Moment(label, True, dict(enumerate(pictures)), found))
+    return moments
+
+
+def without_masks_of(moment: Moment, cameras: Collection[int]) -> Moment:
+    """A moment without the masks of some cameras, whose pictures show another place than their plates."""
+    return replace(moment, masks={camera: mask for camera, mask in moment.masks.items() if camera not in cameras})
+
+
+def plates_of(recording: Recording) -> dict[int, Picture]:
+    """The pictures of the empty scene by camera (its index in the rig), at the working size."""
+    names = recording.rig.names
+    return {
+        camera: working_picture(read_still(recording, name, recording.background[name]))
+        for camera, name in enumerate(names)
+        if name in recording.background
+    }
+
+
+def _example_moment(recording: Recording, example: ExamplePose, plates: Mapping[int, Picture]) -> Moment:
+    names = recording.rig.names
+    shown = [camera for camera, name in enumerate(names) if name in example.images]
+    with ThreadPoolExecutor() as pool:
+        pictures = dict(
+            zip(shown, pool.map(lambda k: _example_picture(recording, example, names[k]), shown), strict=True)
+        )
+        find = lambda k: _example_mask(example, names[k], pictures[k], plates.get(k))
+        masks = dict(zip(shown, pool.map(find, shown), strict=True))
+    return Moment(
+        f"example pose {example.name}", False, pictures, {k: mask for k, mask in masks.items() if mask is not None}
+    )
+
+
+def _example_picture(recording: Recording, example: ExamplePose, name: str) -> Picture:
+    return working_picture(read_still(recording, name, example.images[name]))
+
+
+def _example_mask(example: ExamplePose, name: str, picture: Picture, plate: Picture | None) -> Mask | None:
+    if name not in example.masks:
+        return _from_plate(picture, plate)
+    mask = reduced_mask(read_mask(example.masks[name]))
+    return mask if mask.any() and not mask.all() else None
+
+
+def _from_plate(picture: Picture, plate: Picture | None) -> Mask | None:
+    """What differs from the empty scene; None where there is no plate or no subject."""
+    if plate is None:
+        return None
+    guess = first_guess(plate_difference(picture, plate))
+    return guess if is_subject(guess) else None
+
+
+def _at_working_size(recording: Recording) -> Callable[[int, np.ndarray | None], Picture]:
+    return lambda camera, image: working_picture(picture_or_black(recording, camera, image))
+
+
+def _stills_apart(clip: Clip, offsets: Sequence[int]) -> dict[int, tuple[Picture, ...]]:
+    """The pictures as they belong together with other offsets, read again."""
+    names = clip.recording.rig.names
+    moved = {name: clip.recording.frame_offset[name] + int(more) for name, more in zip(names, offsets, strict=True)}
+    recording = replace(clip.recording, frame_offset=moved)
+    border = int(np.abs(offsets).max())
+    stills = {}
+    for index in sorted({int(np.clip(k, border, max(clip.num_frames - 1 - border, border))) for k in clip.stills}):
+        frame = clip.first + index
+        shown = next(read_prepared(recording, _at_working_size(recording), frame, frame + 1))
+        stills[index] = tuple(shown)
+    return stills

@@ -1,0 +1,163 @@
+"""Time offsets between cameras, from what moves; and frames that one camera lost or repeated on the way."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from sogjax.check.findings import Finding, listed
+from sogjax.check.motion import PairCodes, lag_curve
+
+ALIKE = 0.4
+"""Correlation of two cameras' motion from which on its lag counts."""
+SURE_MARGIN = 0.03
+"""By so much the mean correlation of a camera with the others must fall away from its offset."""
+SURE_MEAN = 0.35
+"""Mean correlation at the offset, weighted, below which an offset is not believed."""
+FEWEST_STEPS = 8
+REFITS = 10
+
+
+@dataclass(frozen=True)
+class Synchrony:
+    """Offsets of the cameras' files, in frames, beyond those that the recording knows already."""
+
+    names: tuple[str, ...]
+    offsets: Int[np.ndarray, "camera"]
+    """Frame t of a camera is frame t + offset of its file; the most frequent one is 0."""
+    sure: Bool[np.ndarray, "camera"]
+    alike: Float[np.ndarray, "camera"]
+    """Mean correlation of a camera's motion with the others', at these offsets."""
+    margins: Float[np.ndarray, "camera"]
+    """How far that falls at any other offset but the neighbouring ones."""
+    sharpness: Float[np.ndarray, "camera"]
+    """How far that falls at the neighbouring ones."""
+
+    def of(self, camera: int) -> int:
+        """The offset of a camera, 0 where it is not sure."""
+        return int(self.offsets[camera]) if self.sure[camera] else 0
+
+
+def synchrony(names: tuple[str, ...], codes: PairCodes, steps: int, largest: int) -> Synchrony:
+    """Offsets of at most `largest` frames between the cameras, by least squares over all pairs."""
+    count = len(names)
+    most = min(largest, steps // 3)
+    curves = {pair: lag_curve(*both, most) for pair, both in codes.items()} if steps >= FEWEST_STEPS else {}
+    offsets = _refined(_least_squares(curves, count, most), curves, most)
+    offsets = offsets - int(np.bincount(offsets - offsets.min()).argmax()) - offsets.min()
+    alike, margins, sharpness = _support(offsets, curves, most)
+    sure = (alike > SURE_MEAN) & (margins > SURE_MARGIN)
+    return Synchrony(names, offsets, sure, alike, margins, sharpness)
+
+
+def _least_squares(curves: Mapping[tuple[int, int], np.ndarray], count: int, most: int) -> Int[np.ndarray, "camera"]:
+    """Offsets that explain the best lags of the pairs, those that fit badly weighted down (Huber)."""
+    kept = {pair: curve for pair, curve in curves.items() if curve.max() > ALIKE}
+    if not kept:
+        return np.zeros(count, int)
+    rows = np.zeros((len(kept), count))
+    for k, (a, b) in enumerate(kept):
+        rows[k, a], rows[k, b] = 1.0, -1.0
+    lags = np.array([int(curve.argmax()) - most for curve in kept.values()], float)
+    trust = np.array([float(curve.max()) ** 2 for curve in kept.values()])
+    weights = trust
+    offsets = np.zeros(count)
+    for _ in range(REFITS):
+        root = np.sqrt(weights)[:, None]
+        offsets = np.linalg.lstsq(root * rows, root[:, 0] * lags, rcond=1e-9)[0]
+        offsets = offsets - np.median(offsets)
+        weights = trust / np.maximum(np.abs(rows @ offsets - lags), 0.5)
+    return np.rint(offsets).astype(int)
+
+
+def _refined(
+    offsets: Int[np.ndarray, "camera"], curves: Mapping[tuple[int, int], np.ndarray], most: int
+) -> Int[np.ndarray, "camera"]:
+    """One camera after the other moved to where its motion is most like the others'."""
+    offsets = offsets.copy()
+    for _ in range(REFITS):
+        before = offsets.copy()
+        for camera in range(len(offsets)):
+            scores = _scores(camera, offsets, curves, most)
+            if scores is not None:
+                offsets[camera] = int(scores.argmax()) + int(np.median(offsets)) - most
+        if (offsets == before).all():
+            break
+    return offsets
+
+
+def _scores(
+    camera: int, offsets: Int[np.ndarray, "camera"], curves: Mapping[tuple[int, int], np.ndarray], most: int
+) -> Float[np.ndarray, "lag"] | None:
+    """Mean correlation with the others if the camera's offset were the median + lag, for lags -most to most.
+
+    Pairs count by how alike they can be at all; a camera that sees the subject from elsewhere says little.
+    """
+    middle = int(np.median(offsets))
+    total, weight = np.zeros(2 * most + 1), 1e-9
+    for (a, b), curve in curves.items():
+        if camera not in (a, b):
+            continue
+        other, sign = (b, 1) if camera == a else (a, -1)
+        lags = sign * (middle + np.arange(-most, most + 1) - offsets[other])
+        trust = max(float(curve.max()), 0.0) ** 2
+        inside = np.abs(lags) <= most
+        values = np.where(inside, curve[np.clip(lags, -most, most) + most], curve.min())
+        total += trust * values
+        weight += trust
+    return total / weight if weight > 1e-6 else None
+
+
+def _support(
+    offsets: Int[np.ndarray, "camera"], curves: Mapping[tuple[int, int], np.ndarray], most: int
+) -> tuple[Float[np.ndarray, "camera"], Float[np.ndarray, "camera"], Float[np.ndarray, "camera"]]:
+    """The mean correlation at each camera's offset, and how far it falls elsewhere and beside it."""
+    alike, margins, sharpness = np.zeros(len(offsets)), np.zeros(len(offsets)), np.zeros(len(offsets))
+    for camera in range(len(offsets)):
+        scores = _scores(camera, offsets, curves, most)
+        place = int(offsets[camera] - int(np.median(offsets))) + most
+        if scores is None or not 0 <= place < len(scores):
+            continue
+        near = [k for k in range(place - 1, place + 2) if 0 <= k < len(scores)]
+        elsewhere = np.delete(scores, near)
+        alike[camera] = scores[place]
+        margins[camera] = scores[place] - elsewhere.max() if len(elsewhere) else 0.0
+        sharpness[camera] = scores[place] - max(scores[k] for k in near if k != place)
+    return alike, margins, sharpness
+
+
+def synchrony_findings(
+    found: Synchrony, known: Mapping[str, int], moving: bool, jumped: Collection[int] = ()
+) -> list[Finding]:
+    """What the offsets mean.
+
+    Args:
+        found: the offsets.
+        known: those that the recording has already.
+        moving: whether anything moves.
+        jumped: cameras whose offset changes on the way, so that no number mends it.
+    """
+    if len(found.names) < 2:
+        return []
+    if not moving or not found.sure.any():
+        what = "time offsets cannot be estimated: hardly anything moves that several cameras see"
+        return [Finding("note", "synchronisation", what, "", "record a clap or a jump at the beginning")]
+    findings = []
+    late = [k for k in np.flatnonzero(found.sure) if found.offsets[k] != 0 and k not in jumped]
+    for k in late:
+        name, offset = found.names[k], int(found.offsets[k])
+        when = "later" if offset > 0 else "earlier"
+        what = f"{name} shows everything {abs(offset)} frame{'s' * (abs(offset) > 1)} {when} than the others"
+        remedy = f"write `frame_offset: {{{name}: {known[name] + offset}}}` into recording.yaml, or add write=true"
+        cause = "cameras that were not started or triggered together"
+        findings.append(Finding("warning", "synchronisation", what, cause, remedy, (name,)))
+    unsure = tuple(name for name, sure in zip(found.names, found.sure, strict=True) if not sure)
+    if unsure:
+        what = f"time offsets of {listed(unsure)} could not be told: what moves there is not what the others see"
+        cause = "little of the motion is in their pictures, or their calibration or names are wrong"
+        findings.append(Finding("note", "synchronisation", what, cause, cameras=unsure))
+    if not late:
+        what = f"{int(found.sure.sum()) - len(jumped)} of {len(found.names)} cameras are in step"
+        findings.append(Finding("ok", "synchronisation", what))
+    return findings

@@ -1,0 +1,17 @@
+"""Names that stand in files and become names of files: none of them may lead out of its folder."""
+
+MAX_BYTES = 100
+"""Of a name; file systems take 255, and prefixes and endings are added."""
+
+
+def objection(name: str) -> str | None:
+    """Why a name cannot be the name of a file in any folder, on any system; None where it can."""
+    if "/" in name or "\\" in name:
+        return "a name without slashes"
+    if not name.isprintable():
+        return "a name of printable characters"
+    if name.startswith(".") or name != name.strip():
+        return "a name that begins with no dot and has no space at its ends"
+    if len(name.encode(errors="replace")) > MAX_BYTES:
+        return f"a name of at most {MAX_BYTES} bytes"
+    return None

@@ -1,0 +1,61 @@
+"""Writing `frame_offset` into a recording.yaml and leaving everything else in it as it stands."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import yaml
+
+from sogjax.data.atomic import atomic_path
+from sogjax.data.recording_settings import read_recording_settings
+from sogjax.errors import InputError
+
+KEY = "frame_offset"
+
+
+def write_frame_offsets(path: Path, offsets: Mapping[str, int]) -> Path | None:
+    """Put `frame_offset` into `path`, in place of an older one; comments and other keys stay.
+
+    Returns:
+        Where the file as it was is kept, None where there was none.
+
+    Raises:
+        InputError: a file that is no recording.yaml, or a folder that cannot be written.
+    """
+    line = f"{KEY}: {{{', '.join(f'{json.dumps(name)}: {int(offset)}' for name, offset in offsets.items())}}}"
+    if not path.exists():
+        _write(path, line + "\n")
+        return None
+    read_recording_settings(path)
+    before = path.read_text(encoding="utf-8-sig")
+    kept = _free_name(path)
+    _write(kept, before)
+    _write(path, _replaced(path, before, line))
+    return kept
+
+
+def _replaced(path: Path, text: str, line: str) -> str:
+    """The text with the line in place of the old entry, or at its end."""
+    root = yaml.compose(text, Loader=yaml.SafeLoader)
+    if root is None:
+        return text + ("" if text.endswith("\n") or not text else "\n") + line + "\n"
+    if root.flow_style:
+        raise InputError(f"{path}: is written in braces; write `{line}` into it by hand")
+    for key, value in root.value:
+        if key.value == KEY:
+            block = isinstance(value, yaml.MappingNode) and not value.flow_style  # it ends where the next key begins
+            return text[: key.start_mark.index] + line + ("\n" if block else "") + text[value.end_mark.index :]
+    return text[: root.end_mark.index].rstrip("\n") + "\n" + line + "\n" + text[root.end_mark.index :]
+
+
+def _write(path: Path, text: str) -> None:
+    with atomic_path(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def _free_name(path: Path) -> Path:
+    """A name beside the file that is not taken."""
+    number = 1
+    while (kept := path.with_name(f"{path.name}.{number}.old")).exists():
+        number += 1
+    return kept

@@ -1,0 +1,259 @@
+"""`sogjax check`: a rendered recording has nothing wrong; each fault put into it is found, and named."""
+
+import json
+
+import cv2
+import faulty_recording as faulty
+import numpy as np
+import pytest
+import yaml
+from command_line import done, refused
+from faulty_recording import OTHER, WRONG, copied
+from rig_cases import ring_rig
+from small_recording import make_recording, shared_recording, toml_camera, write_calibration
+
+from sogjax.check.agreement import smallest_shift
+from sogjax.check.cameras import camera_findings, nearest_point, rig_geometry
+from sogjax.check.examination import examined
+from sogjax.check.motion import CameraMotion, barcodes, correlation, lag_curve
+from sogjax.check.synchronisation import synchrony
+from sogjax.data.offsets_file import write_frame_offsets
+from sogjax.data.recording import open_recording
+from sogjax.data.recording_settings import read_recording_settings
+from sogjax.errors import InputError
+
+
+def looked_at(folder, change=None):
+    """What a check finds after a change was made to a copy of the recording."""
+    copied(folder)
+    if change is not None:
+        change(folder)
+    return examined(open_recording(folder), 0, 40, 8, lambda items, count, label: iter(items))
+
+
+def warnings(found, topic=None):
+    """The warnings, of one topic or of all."""
+    return [f for f in found.findings if f.severity == "warning" and topic in (None, f.topic)]
+
+
+def test_a_sound_recording_has_no_warning(tmp_path):
+    found = looked_at(tmp_path / "walk")
+    assert {finding.severity for finding in found.findings} == {"ok"}
+    topics = {finding.topic for finding in found.findings}
+    assert topics == {"files", "cameras", "frames", "synchronisation", "calibration", "unit", "exposure"}
+    truth = np.load(tmp_path / "walk" / "ground_truth.npz")
+    standing = np.ptp(truth["markers"][..., 2], axis=1).mean()
+    assert found.numbers["subject"]["height"] == pytest.approx(standing, rel=0.15)
+    assert not found.offsets
+    json.dumps(found.numbers)
+
+
+def test_a_camera_that_started_three_frames_late(tmp_path):
+    found = looked_at(tmp_path / "walk", faulty.started_late)
+    (finding,) = warnings(found)
+    assert finding.topic == "synchronisation"
+    assert finding.cameras == (WRONG,)
+    assert found.offsets == {f"cam{k:02d}": -3 * (f"cam{k:02d}" == WRONG) for k in range(6)}
+
+
+def test_exchanged_videos(tmp_path):
+    found = looked_at(tmp_path / "walk", faulty.exchanged_videos)
+    assert [finding.cameras for finding in warnings(found, "files")] == [(WRONG, OTHER)]
+    assert len(warnings(found)) == 1
+
+
+def test_exchanged_calibrations(tmp_path):
+    found = looked_at(tmp_path / "walk", faulty.exchanged_calibration)
+    assert (WRONG, OTHER) in [tuple(sorted(finding.cameras)) for finding in warnings(found, "calibration")]
+
+
+def test_a_camera_that_was_turned_by_five_degrees(tmp_path):
+    found = looked_at(tmp_path / "walk", faulty.turned)
+    assert {finding.cameras for finding in warnings(found)} == {(WRONG,)}
+    assert {finding.topic for finding in warnings(found)} == {"calibration"}
+    assert found.numbers["silhouettes"][WRONG]["away"] == pytest.approx(5.0, abs=0.7)
+
+
+def test_a_mirrored_world(tmp_path):
+    found = looked_at(tmp_path / "walk", faulty.mirrored)
+    assert ["mirrored" in finding.what for finding in warnings(found)] == [True]
+
+
+def test_millimetres_taken_for_metres(tmp_path):
+    found = looked_at(tmp_path / "walk", faulty.in_millimetres)
+    (finding,) = warnings(found)
+    assert finding.topic == "unit"
+    assert "unit: mm" in finding.remedy
+    assert found.numbers["subject"]["height"] == pytest.approx(1700, rel=0.15)
+
+
+def test_a_wrong_vertical(tmp_path):
+    found = looked_at(tmp_path / "walk", faulty.wrong_vertical)
+    assert ["`up: z`" in finding.remedy for finding in warnings(found)] == [True]
+
+
+def test_a_frame_that_stands_twice(tmp_path):
+    found = looked_at(tmp_path / "walk", faulty.frame_repeated)
+    assert [(finding.topic, finding.cameras) for finding in warnings(found)] == [("frames", (WRONG,))]
+    assert found.numbers["repeated_frames"] == {WRONG: [20]}
+
+
+def test_a_frame_that_was_lost(tmp_path):
+    found = looked_at(tmp_path / "walk", faulty.frame_lost)
+    notes = [finding for finding in found.findings if finding.severity == "note" and finding.topic == "frames"]
+    assert any(f"{WRONG} 39" in finding.what for finding in notes)
+    assert any("lost 1 frame" in finding.what and finding.cameras == (WRONG,) for finding in notes)
+    assert not found.offsets
+
+
+def test_a_camera_exposed_otherwise(tmp_path):
+    found = looked_at(tmp_path / "walk", faulty.darkened)
+    assert {(finding.topic, finding.cameras) for finding in warnings(found)} == {("exposure", (WRONG,))}
+
+
+@pytest.mark.parametrize("name", ["real_tpose"])
+def test_nearly_still_pictures_give_no_offsets(name):
+    path = shared_recording(name)
+    if path is None:
+        pytest.skip("the recording is not there")
+    found = examined(open_recording(path), 0, 11, 8, lambda items, count, label: iter(items))
+    assert not warnings(found)
+    assert not found.offsets
+    assert any("cannot be estimated" in finding.what for finding in found.findings)
+
+
+def test_the_command_writes_numbers_and_picture_and_offsets_only_when_asked(capsys, tmp_path):
+    recording = copied(tmp_path / "walk")
+    faulty.started_late(recording)
+    settings = recording / "recording.yaml"
+    before = "# measured by hand\n" + settings.read_text()
+    settings.write_text(before)
+    out, _ = done(capsys, "check", f"recording={recording}", f"out={tmp_path / 'out'}", "frames=30")
+    assert f'frame_offset: {{"{WRONG}": -3}}' in out.splitlines()
+    assert settings.read_text() == before
+    assert json.loads((tmp_path / "out" / "check.json").read_text())["synchronisation"][WRONG]["offset"] == -3
+    assert cv2.imread(str(tmp_path / "out" / "check.png")).shape[1] == 960
+
+    _, err = done(capsys, "check", f"recording={recording}", f"out={tmp_path / 'out'}", "frames=30", "write=true")
+    assert ".old" in err
+    assert settings.read_text().startswith("# measured by hand")
+    assert yaml.safe_load(settings.read_text()) == {**yaml.safe_load(before), "frame_offset": {WRONG: -3}}
+    assert (recording / "recording.yaml.1.old").read_text() == before
+
+
+def test_every_file_that_is_wrong_is_named(capsys, tmp_path):
+    recording = make_recording(tmp_path / "two")
+    (recording / "videos" / "left.mp4").write_bytes(b"no video" * 100)
+    (recording / "initial_pose.yaml").write_text("pose: [1]\n")
+    from sogjax.app.cli import main
+
+    assert main(["check", f"recording={recording}", f"out={tmp_path / 'out'}"]) == 2
+    out, err = capsys.readouterr()
+    assert "left.mp4" in err
+    assert ["left.mp4" in line or "initial_pose.yaml" in line for line in out.splitlines()] == [True, True]
+    assert all(line.startswith("error") for line in out.splitlines())
+    assert not (tmp_path / "out").exists()
+
+
+def test_options_out_of_range_are_refused(capsys, tmp_path):
+    recording = make_recording(tmp_path / "two")
+    for word in ("frames=0", "largest_offset=-1", "start=4", "cameras=[third]"):
+        assert word.partition("=")[2].strip("[]") in refused(capsys, "check", f"recording={recording}", word)
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("", 'frame_offset: {"a": 2}\n'),
+        ("fps: 30\n", 'fps: 30\nframe_offset: {"a": 2}\n'),
+        ("frame_offset:\n  a: 1\n  b: 3\nfps: 30 # so\n", 'frame_offset: {"a": 2}\nfps: 30 # so\n'),
+        ("fps: 30\nframe_offset: {a: 1} # old\n", 'fps: 30\nframe_offset: {"a": 2} # old\n'),
+    ],
+)
+def test_offsets_are_put_into_the_file_and_the_rest_stays(tmp_path, before, after):
+    path = tmp_path / "recording.yaml"
+    path.write_text(before)
+    write_frame_offsets(path, {"a": 2})
+    assert read_recording_settings(path).frame_offset == {"a": 2}
+    assert [line for line in path.read_text().splitlines() if line] == after.splitlines()
+
+
+def test_a_recording_written_in_braces_is_left_alone(tmp_path):
+    path = tmp_path / "recording.yaml"
+    path.write_text("{fps: 30}\n")
+    with pytest.raises(InputError, match="braces"):
+        write_frame_offsets(path, {"a": 2})
+    assert path.read_text() == "{fps: 30}\n"
+
+
+def test_places_heights_and_fields_of_view_of_a_ring():
+    rig = ring_rig(4, distance=3.0)
+    geometry = rig_geometry(rig, "z")
+    for name, centre, forward in zip(rig.names, geometry.centres, geometry.forwards, strict=True):
+        pose = np.asarray(rig.camera(name).camera_from_world, float)
+        np.testing.assert_allclose(pose @ np.append(centre, 1.0), [0, 0, 0, 1], atol=1e-5)
+        np.testing.assert_allclose(pose[:3, :3] @ forward, [0, 0, 1], atol=1e-5)
+    half = np.deg2rad(geometry.fields[0, 0]) / 2
+    matrix = np.asarray(rig.camera(rig.names[0]).intrinsics, float)
+    assert np.tan(half) * matrix[0, 0] == pytest.approx(160)
+    np.testing.assert_allclose(geometry.baselines[0, 1], np.linalg.norm(geometry.centres[0] - geometry.centres[1]))
+
+
+def test_the_point_nearest_to_rays_is_where_they_meet():
+    rng = np.random.default_rng(0)
+    meeting, directions = rng.normal(size=3), rng.normal(size=(5, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    centres = meeting - directions * rng.uniform(1, 4, (5, 1))
+    np.testing.assert_allclose(nearest_point(centres, directions), meeting, atol=1e-9)
+
+
+def test_inverse_poses_are_recognised(tmp_path):
+    tables = []
+    for k, angle in enumerate((0.0, 2.0, 4.0)):
+        centre = np.array([4 * np.cos(angle), 4 * np.sin(angle), 1.5])
+        forward = -centre / np.linalg.norm(centre)
+        right = np.cross(forward, [0, 0, 1.0])
+        right /= np.linalg.norm(right)
+        world_from_camera = np.stack([right, np.cross(forward, right), forward], axis=1)
+        vector = cv2.Rodrigues(world_from_camera)[0].ravel().tolist()
+        tables.append(toml_camera(f"c{k}", rotation=str(vector), translation=str(centre.tolist())))
+    from sogjax.data.calibration import load_calibration
+
+    rig = load_calibration(write_calibration(tmp_path, *tables))
+    found = camera_findings(rig, rig_geometry(rig, "z"), "z")
+    assert any("camera to world" in finding.cause for finding in found)
+
+
+def test_cameras_that_look_backwards_are_recognised(tmp_path):
+    recording = copied(tmp_path / "walk")
+    faulty.looking_backwards(recording)
+    rig = open_recording(recording).rig
+    (finding,) = camera_findings(rig, rig_geometry(rig, "z"), "z")
+    assert "OpenGL" in finding.cause
+
+
+def test_points_that_move_in_space_give_both_cameras_the_same_barcode():
+    """Rays towards points of space, in two cameras anywhere: each plane through both holds the same points."""
+    rng = np.random.default_rng(1)
+    points = rng.uniform(-0.5, 0.5, (400, 3))
+    energy = rng.random((30, 400)).astype(np.float32)
+    motions = []
+    for centre in (np.array([4.0, 0.0, 1.0]), np.array([0.5, -4.0, 2.0])):
+        rays = points - centre
+        rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+        motions.append(CameraMotion(energy, (20, 20), rays, centre))
+    first, second = barcodes(*motions)
+    assert correlation(first, second) == pytest.approx(1.0, abs=0.05)
+    late = np.roll(second, -4, axis=0)  # the second camera shows what happens four steps earlier in its file
+    assert int(lag_curve(first, late, 8).argmax()) - 8 == 4
+    found = synchrony(("a", "b", "c"), {(0, 1): (first, late), (0, 2): (first, second), (1, 2): (late, second)}, 30, 8)
+    assert found.offsets.tolist() == [0, -4, 0]
+    assert found.sure.all()
+
+
+def test_the_smallest_shift_brings_a_mask_into_a_larger_region():
+    region, mask = np.zeros((120, 160), bool), np.zeros((120, 160), bool)
+    region[30:90, 60:100] = True
+    mask[40:80, 70:90] = True
+    assert smallest_shift(mask, region) == 0.0
+    assert smallest_shift(np.roll(mask, 30, axis=1), region) == pytest.approx(20.0, abs=3.0)
