@@ -93,7 +93,9 @@ class OutputsConfig:
     rerun_images: bool = option(True, "put the pictures into motion.rrd")
     bvh: bool = option(True, "motion.bvh")
     formats: list[str] | None = option(None, "further formats of the motion, some of [trc,c3d,glb,csv]; null: none")
-    confidence: bool = option(True, "standard deviations of the pose and the joints, in motion.npz")
+    confidence: bool = option(
+        False, "standard deviations of the pose and the joints, in motion.npz; rough, see experiments/confidence.py"
+    )
     temperature: float = option(
         1e-5,
         "energy that counts as one unit of log-likelihood, for the standard deviations; by experiments/confidence.py",
@@ -224,6 +226,7 @@ class ReportConfig:
     frames: int = option(40, "frames of each recording to track, at most")
     overrides: list[str] = group(lambda: [], "options of track, for all runs, such as [solver=gauss_newton]")
     pictures: int = option(6, "worst frames to show")
+    note: str = option("", "a sentence for the beginning of the report, such as what else the machine did")
     do: bool = option(True, "do the runs that are missing; false: report on those that are there")
 
 

@@ -124,6 +124,8 @@ def confidence_section(study: Study) -> Section:
             "belongs to the actor. 68 % and 95 % would be expected of a single coordinate, 61 % and 99 % of a distance "
             "in space whose three coordinates are alike.",
             "\n".join(lines),
+            "A ratio over 1 says that the deviations are too small there, a rank correlation near 0 that they do not "
+            "tell which joints are farther off.",
         ],
         [Picture("confidence.png", chart, "What was said and what was found, in eight bins each")],
     )
@@ -136,6 +138,7 @@ def _about(config: ReportConfig, done: Sequence[Done]) -> Section:
         "What was done",
         [
             f"`{machine_line()}`",
+            *([config.note] if config.note else []),
             "- " + "\n- ".join(f"Runs on: {machine}" for machine in machines),
             f"{len(list(_different(done)))} runs of at most {config.frames} frames, {seconds / 60.0:.0f} minutes in "
             "all with compilation and actors. Errors are distances of markers to the truth in millimetres, mean +- "
