@@ -42,7 +42,7 @@ class Separations(NamedTuple):
 class Moments(NamedTuple):
     """For each body blob the sums over its pairs of w (mu_i - mu_j), of w, of w sigma_i^2, and `spread`.
 
-    That is the sum of w |mu_i - mu_j|^2 / (sigma_i^2 + sigma_j^2).
+    That is the sum of `w |mu_i - mu_j|^2 / (sigma_i^2 + sigma_j^2)`.
     """
 
     away: Float[Array, "*camera body 2"]
