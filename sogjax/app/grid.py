@@ -3,6 +3,7 @@
 import datetime
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from sogjax.app.composition import composed
 from sogjax.app.configs import TrackConfig, help_lines
 from sogjax.app.first_pose import first_poses, initial_pose_file
 from sogjax.app.outputs import results_folder, write_results
-from sogjax.app.pipeline import Picture, PictureReader, Preparation
+from sogjax.app.pipeline import FrameTracker, Picture, PictureReader, Preparation
 from sogjax.app.recordings import actors_of, opened, say
 from sogjax.app.sweep import row_numbers, table
 from sogjax.app.track import Job, Run, doing, frame_range
@@ -53,16 +54,26 @@ def run_grid(members: Sequence[Sequence[str]]) -> int:
     initial_pose_file(recording, configs[0])
     with results_folder(Path("multirun") / f"{datetime.datetime.now():%Y-%m-%d_%H-%M-%S}") as folder:
         bodies, made = actors_of(recording, configs[0].actor, configs[0].body, configs[0].color)
-        rows = []
-        for number, run in enumerate(grid_runs(recording, bodies, configs, folder)):
-            config = replace(configs[number], out=str(folder / str(number)))
-            write_results(
-                run, folder / str(number), config.outputs, OmegaConf.structured(config), bodies if made else []
+        rows = [
+            _row(running, replace(config, out=str(folder / str(number))), bodies if made else [])
+            for number, (config, running) in enumerate(
+                zip(configs, grid_runs(recording, bodies, configs, folder), strict=True)
             )
-            rows.append(row_numbers(run))
+        ]
     print(table(list(zip(differing(members), rows, strict=True))))
     print(f"\n{folder}")
-    return 0
+    return 2 if any(isinstance(row, str) for row in rows) else 0
+
+
+def _row(running: AbstractContextManager[Run], config: TrackConfig, made: list[Body]) -> dict[str, float] | str:
+    """Write the results of a member; its row of the table: its numbers, or why it failed."""
+    try:
+        with running as run:
+            write_results(run, Path(config.out), config.outputs, OmegaConf.structured(config), made)
+            return row_numbers(run)
+    except InputError as error:
+        say(f"{config.out}: {error}")
+        return str(error)
 
 
 def check_numbers_only(configs: Sequence[TrackConfig]) -> None:
@@ -76,8 +87,12 @@ def check_numbers_only(configs: Sequence[TrackConfig]) -> None:
             raise _refused(key, configs)
 
 
-def grid_runs(recording: Recording, bodies: list[Body], configs: Sequence[TrackConfig], folder: Path) -> Iterator[Run]:
-    """The run of every config, tracked in one call; the files that grow with a run lie in folders 0, 1, ...
+def grid_runs(
+    recording: Recording, bodies: list[Body], configs: Sequence[TrackConfig], folder: Path
+) -> Iterator[AbstractContextManager[Run]]:
+    """The run of every config, tracked in one call, each to be entered while its results are written.
+
+    The files that grow with a run lie in folders 0, 1, ...
 
     Raises:
         InputError: a setting differs that changes the program.
@@ -93,11 +108,13 @@ def grid_runs(recording: Recording, bodies: list[Body], configs: Sequence[TrackC
     seconds = (time.perf_counter() - begin) / (len(jobs) * len(cells))
     for number, (job, config) in enumerate(zip(jobs, configs, strict=True)):
         follow = replayed(member(clips, number), capacities, seconds, config.outputs.rerun)
-        with (
-            results_folder(folder / str(number)) as out,
-            doing(job, config.outputs, out, reader_of(cells), follow) as run,
-        ):
-            yield run
+        yield _one_run(job, config, folder / str(number), reader_of(cells), follow)
+
+
+@contextmanager
+def _one_run(job: Job, config: TrackConfig, folder: Path, read: PictureReader, follow: FrameTracker) -> Iterator[Run]:
+    with results_folder(folder) as out, doing(job, config.outputs, out, read, follow) as run:
+        yield run
 
 
 def grid_jobs(recording: Recording, bodies: list[Body], configs: Sequence[TrackConfig]) -> list[Job]:
