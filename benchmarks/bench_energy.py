@@ -1,6 +1,6 @@
 """The energy's costs under pytest-benchmark.
 
-pip install -e '.[bench]' && pytest -p benchmark -o addopts= benchmarks/bench_energy.py
+pip install -e '.[bench]' && pytest -o addopts= benchmarks/bench_energy.py
 """
 
 import equinox as eqx

@@ -1,6 +1,6 @@
 """What only a process of its own shows: start-up, and the most memory that is resident.
 
-python benchmarks/processes.py import|first_frame|memory [ACTOR_FILE]
+python benchmarks/processes.py first_frame|memory ACTOR_FILE
 """
 
 import json
@@ -15,6 +15,8 @@ from tempfile import TemporaryDirectory
 from quantities import Quantity
 
 MIB_IN_KIB = 1024.0
+IMPORT = "import time; begin = time.perf_counter(); import sogjax; print(time.perf_counter() - begin)"
+"""A program of its own, in which nothing is imported yet."""
 
 
 def process_quantities(actor: Path) -> Iterator[Quantity]:
@@ -28,16 +30,10 @@ def measured(what: str, actor: Path) -> float:
     """The number that a process of its own prints."""
     environment = {key: value for key, value in os.environ.items() if key != "SOGJAX_COMPILATION_CACHE"}
     command = [sys.executable, __file__, what, str(actor)]
+    if what == "import":
+        command = [sys.executable, "-c", IMPORT]
     done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, env=environment)
     return float(json.loads(done.stdout.splitlines()[-1]))
-
-
-def import_seconds() -> float:
-    """What `import sogjax` takes when Python runs already."""
-    begin = time.perf_counter()
-    import sogjax  # noqa: F401
-
-    return time.perf_counter() - begin
 
 
 def first_frame_seconds(actor: str) -> float:
@@ -67,5 +63,5 @@ def resident_mib(actor: str) -> float:
 
 if __name__ == "__main__":
     kind, actor_file = sys.argv[1:]
-    numbers = {"import": lambda _: import_seconds(), "first_frame": first_frame_seconds, "memory": resident_mib}
+    numbers = {"first_frame": first_frame_seconds, "memory": resident_mib}
     print(json.dumps(numbers[kind](actor_file)))

@@ -63,7 +63,7 @@ class Scene:
 
 def solver_quantities(scene: Scene) -> Iterator[Quantity]:
     """Every solver with near pairs, and the paper's with all pairs: iterations, energy, marker error, time."""
-    alternatives = {name: (f"solver={name}",) for name in SOLVERS}
+    alternatives: dict[str, tuple[str, ...]] = {name: (f"solver={name}",) for name in SOLVERS}
     alternatives["conditioned_ascent, all pairs"] = ("solver=conditioned_ascent", "energy.pairs=dense")
     errors = {}
     for name, words in alternatives.items():

@@ -7,7 +7,10 @@ import pytest
 import yaml
 from command_line import actor_file, done, refused, trackable
 
+from sogjax.app import grid
+from sogjax.app.cli import main
 from sogjax.data.motion import load_motion
+from sogjax.errors import InputError
 from sogjax.synth import SynthSettings, render_recording
 
 LANDMARKS = ("pelvis", "chest", "neck", "left_elbow")
@@ -91,3 +94,20 @@ def test_hydras_own_settings_and_unknown_ways_are_refused(capsys, tmp_path):
     words = ("track", "-m", f"recording={tmp_path}", "energy.limit_weight=1,2")
     assert "Hydra's own settings" in refused(capsys, *words, "sweep=vmapped", "hydra.sweep.dir=x")
     assert "each, vmapped" in refused(capsys, "track", f"recording={trackable(tmp_path / 'walk')}", "sweep=batched")
+
+
+def test_a_member_that_fails_is_a_row_and_the_others_go_on(capsys, tmp_path, recording, monkeypatch):
+    write = grid.write_results
+
+    def fails_for_the_first(run, out, *rest):
+        if out.name == "0":
+            raise InputError("the disk is full")
+        write(run, out, *rest)
+
+    monkeypatch.setattr(grid, "write_results", fails_for_the_first)
+    words = (f"recording={recording}", f"actor={actor_file(tmp_path / 'a.yaml')}", *LIGHT, "outputs.rerun=false")
+    assert main(["track", "-m", *words, "energy.limit_weight=0,1", "sweep=vmapped"]) == 2
+    first, second = (line for line in capsys.readouterr().out.splitlines() if line.startswith("energy.limit_weight="))
+    assert "failed: the disk is full" in first
+    assert "failed" not in second
+    assert load_motion(next(Path("multirun").iterdir()) / "1" / "motion.npz").num_frames == 3

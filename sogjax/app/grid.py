@@ -3,6 +3,7 @@
 import datetime
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -17,11 +18,11 @@ from sogjax.app.composition import composed
 from sogjax.app.configs import TrackConfig, help_lines
 from sogjax.app.first_pose import first_poses, initial_pose_file
 from sogjax.app.outputs import export_endings, results_folder, write_results
-from sogjax.app.pipeline import Picture, PictureReader, Preparation
+from sogjax.app.pipeline import FrameTracker, Picture, PictureReader, Preparation
 from sogjax.app.recordings import actors_of, opened, say
 from sogjax.app.run_folder import run_folder
 from sogjax.app.sweep import row_numbers
-from sogjax.app.sweep_results import Member, finish_sweep
+from sogjax.app.sweep_results import Failure, Member, Numbers, finish_sweep
 from sogjax.app.track import Job, Run, doing, frame_range
 from sogjax.data.cell_cache import CellsOfClip
 from sogjax.data.recording import Recording
@@ -56,16 +57,26 @@ def run_grid(members: Sequence[Sequence[str]]) -> int:
         raise InputError("resume=true sweep=vmapped: a sweep in one call cannot go on; leave one of the two out")
     with results_folder(Path("multirun") / f"{datetime.datetime.now():%Y-%m-%d_%H-%M-%S}") as folder:
         bodies, made = actors_of(recording, configs[0].actor, configs[0].body, configs[0].color)
-        rows = []
-        for number, run in enumerate(grid_runs(recording, bodies, configs, folder)):
-            config = replace(configs[number], out=str(folder / str(number)))
-            write_results(
-                run, folder / str(number), config.outputs, OmegaConf.structured(config), bodies if made else []
+        rows = [
+            _row(running, replace(config, out=str(folder / str(number))), bodies if made else [])
+            for number, (config, running) in enumerate(
+                zip(configs, grid_runs(recording, bodies, configs, folder), strict=True)
             )
-            rows.append(Member(list(members[number]), row_numbers(run)))
-        finish_sweep(folder, rows)
+        ]
+        finish_sweep(folder, [Member(list(words), row) for words, row in zip(members, rows, strict=True)])
     print(folder)
-    return 0
+    return 2 if any(isinstance(row, Failure) for row in rows) else 0
+
+
+def _row(running: AbstractContextManager[Run], config: TrackConfig, made: list[Body]) -> Numbers | Failure:
+    """Write the results of a member; its row of the table: its numbers, or why it failed."""
+    try:
+        with running as run:
+            write_results(run, Path(config.out), config.outputs, OmegaConf.structured(config), made)
+            return row_numbers(run)
+    except InputError as error:
+        say(f"{config.out}: {error}")
+        return Failure(error)
 
 
 def check_numbers_only(configs: Sequence[TrackConfig]) -> None:
@@ -79,8 +90,12 @@ def check_numbers_only(configs: Sequence[TrackConfig]) -> None:
             raise _refused(key, configs)
 
 
-def grid_runs(recording: Recording, bodies: list[Body], configs: Sequence[TrackConfig], folder: Path) -> Iterator[Run]:
-    """The run of every config, tracked in one call; the files that grow with a run lie in folders 0, 1, ...
+def grid_runs(
+    recording: Recording, bodies: list[Body], configs: Sequence[TrackConfig], folder: Path
+) -> Iterator[AbstractContextManager[Run]]:
+    """The run of every config, tracked in one call, each to be entered while its results are written.
+
+    The files that grow with a run lie in folders 0, 1, ...
 
     Raises:
         InputError: a setting differs that changes the program.
@@ -96,11 +111,13 @@ def grid_runs(recording: Recording, bodies: list[Body], configs: Sequence[TrackC
     seconds = (time.perf_counter() - begin) / (len(jobs) * len(cells))
     for number, (job, config) in enumerate(zip(jobs, configs, strict=True)):
         follow = replayed(member(clips, number), capacities, seconds, config.outputs.rerun)
-        with (
-            run_folder(folder / str(number)) as own,
-            doing(job, config.outputs, own.path, reader_of(cells), follow) as run,
-        ):
-            yield run
+        yield _one_run(job, config, folder / str(number), reader_of(cells), follow)
+
+
+@contextmanager
+def _one_run(job: Job, config: TrackConfig, folder: Path, read: PictureReader, follow: FrameTracker) -> Iterator[Run]:
+    with run_folder(folder) as own, doing(job, config.outputs, own.path, read, follow) as run:
+        yield run
 
 
 def grid_jobs(recording: Recording, bodies: list[Body], configs: Sequence[TrackConfig]) -> list[Job]:

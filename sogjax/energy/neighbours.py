@@ -57,10 +57,7 @@ def near_pairs(
     images, color_similarities = _whole_tiles(images, color_similarities)
     num_cameras, num_bodies, num_images = color_similarities.shape
     really = margin[0] > 0.0  # it always is
-    near = jax.vmap(_near, in_axes=(0, 0, 0, 0, None))
-    flags = computed_once(
-        really, lambda *a: _whole_blocks(near(*a)), images, color_similarities, seen, margin, exponent
-    )
+    flags = computed_once(really, _flags, images, color_similarities, seen, margin, exponent)
     chosen, count = computed_once(really, partial(chosen_indices, capacity=capacity * MEMBERS), flags.reshape(-1))
     tile, body_index, first, real = computed_once(
         really, partial(_blocks_of, tiles=flags.shape[1], members=flags.shape[2], num_bodies=num_bodies), chosen, count

@@ -26,7 +26,7 @@ class Section:
 
     title: str
     parts: Sequence[str] = ()
-    """Paragraphs, lists (lines that begin with `- `), tables (lines that begin with `|`), code between lines of three backticks."""
+    """Paragraphs, lists (lines that begin with `- `), tables (with `|`), code between lines of three backticks."""
     pictures: Sequence[Picture] = field(default=())
 
 
