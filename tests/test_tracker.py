@@ -144,12 +144,12 @@ def test_near_pairs_are_tracked_by_gauss_newton_and_too_little_room_is_noticed(d
     tracker = replace(tracker, pairs="sparse", solver=GaussNewton())
     start = jnp.asarray(poses[0])
     room = tracker_module.first_capacities
-    too_small = lambda *arguments: replace(room(*arguments), blocks=40)
+    too_small = lambda *arguments: replace(room(*arguments), blocks=4)
     monkeypatch.setattr(tracker_module, "first_capacities", too_small)
     results = list(track(tracker, start, frames))
     errors = [landmark_error(tracker.body, r.result.pose, pose) for r, pose in zip(results, poses, strict=True)]
     assert max(errors) < 0.02
-    assert all(40 < int(r.result.num_blocks) <= r.capacities.blocks for r in results)
+    assert all(4 < int(r.result.num_blocks) <= r.capacities.blocks for r in results)
     assert all(r.result.converged for r in results)
 
 
