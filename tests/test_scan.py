@@ -19,7 +19,7 @@ from sogjax.track.tracker import track
 
 DEPTH = 6
 STEP = {"root_x": 0.01, "root_yaw": 0.03, "left_front_swing": 0.05, "tail_side": 0.05}
-ROUNDING = 2e-5
+ROUNDING = 5e-5
 """Radians and metres: what float32 does to a pose when the order of sums changes."""
 UNNOTICED = 2e-3
 """What blobs outside a member's own boxes may do, as much as the solver's epsilon."""

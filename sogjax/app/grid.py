@@ -17,12 +17,13 @@ from sogjax.app.cells import cells_of_clip, pictures_of
 from sogjax.app.composition import composed
 from sogjax.app.configs import TrackConfig, help_lines
 from sogjax.app.first_pose import first_poses, initial_pose_file
+from sogjax.app.made_from import MadeFrom, made_from
 from sogjax.app.outputs import export_endings, results_folder, write_results
 from sogjax.app.pipeline import FrameTracker, Picture, PictureReader, Preparation
 from sogjax.app.recordings import actors_of, opened, say
 from sogjax.app.run_folder import run_folder
 from sogjax.app.sweep import row_numbers
-from sogjax.app.sweep_results import Failure, Member, Numbers, finish_sweep
+from sogjax.app.sweep_results import Failure, Member, Numbers, finish_sweep, keep_result
 from sogjax.app.track import Job, Run, doing, frame_range
 from sogjax.data.cell_cache import CellsOfClip
 from sogjax.data.recording import Recording
@@ -57,15 +58,15 @@ def run_grid(members: Sequence[Sequence[str]]) -> int:
         raise InputError("resume=true sweep=vmapped: a sweep in one call cannot go on; leave one of the two out")
     with results_folder(Path("multirun") / f"{datetime.datetime.now():%Y-%m-%d_%H-%M-%S}") as folder:
         bodies, made = actors_of(recording, configs[0].actor, configs[0].body, configs[0].color)
-        rows = [
-            _row(running, replace(config, out=str(folder / str(number))), bodies if made else [])
-            for number, (config, running) in enumerate(
-                zip(configs, grid_runs(recording, bodies, configs, folder), strict=True)
-            )
-        ]
-        finish_sweep(folder, [Member(list(words), row) for words, row in zip(members, rows, strict=True)])
+        done = []
+        for number, running in enumerate(grid_runs(recording, bodies, configs, folder)):
+            own = folder / str(number)
+            row = _row(running, replace(configs[number], out=str(own)), bodies if made else [])
+            done.append(Member(list(members[number]), row))
+            keep_result(own, done[-1])
+        finish_sweep(folder, done)
     print(folder)
-    return 2 if any(isinstance(row, Failure) for row in rows) else 0
+    return 2 if any(isinstance(member.result, Failure) for member in done) else 0
 
 
 def _row(running: AbstractContextManager[Run], config: TrackConfig, made: list[Body]) -> Numbers | Failure:
@@ -109,15 +110,20 @@ def grid_runs(
     clips, capacities = track_many([job.tracker for job in jobs], starts, cells, common_boxes=common_boxes)
     jax.block_until_ready(clips)
     seconds = (time.perf_counter() - begin) / (len(jobs) * len(cells))
+    given = None if configs[0].actor is None else bodies
     for number, (job, config) in enumerate(zip(jobs, configs, strict=True)):
         follow = replayed(member(clips, number), capacities, seconds, config.outputs.rerun)
-        yield _one_run(job, config, folder / str(number), reader_of(cells), follow)
+        origin = made_from(recording, config, given)
+        yield _one_run(job, config, folder / str(number), origin, reader_of(cells), follow)
 
 
 @contextmanager
-def _one_run(job: Job, config: TrackConfig, folder: Path, read: PictureReader, follow: FrameTracker) -> Iterator[Run]:
+def _one_run(
+    job: Job, config: TrackConfig, folder: Path, origin: MadeFrom, read: PictureReader, follow: FrameTracker
+) -> Iterator[Run]:
     with run_folder(folder) as own, doing(job, config.outputs, own.path, read, follow) as run:
         yield run
+        own.finish("track", origin, run.files)
 
 
 def grid_jobs(recording: Recording, bodies: list[Body], configs: Sequence[TrackConfig]) -> list[Job]:

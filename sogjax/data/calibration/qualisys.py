@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 from jaxtyping import Float
 
-from sogjax.data.calibration.rig import METRES, CameraEntry, CameraRig, rig_from_entries
+from sogjax.data.calibration.rig import LARGEST, METRES, CameraEntry, CameraRig, rig_from_entries
 from sogjax.errors import InputError
 
 SUBPIXELS = 64.0
@@ -113,9 +113,12 @@ def _number(where: str, element: ElementTree.Element, key: str, otherwise: float
     if text is None and otherwise is not None:
         return otherwise
     try:
-        return float(text or "")
+        value = float(text or "")
     except ValueError:
-        raise InputError(f"{where}: {key} = {(text or '')[:60]!r} is not a number; correct it") from None
+        value = float("nan")
+    if not abs(value) <= LARGEST:
+        raise InputError(f"{where}: {key} = {(text or '')[:60]!r} is not a number below 1e12; correct it")
+    return value
 
 
 def _tidy(rotation: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:

@@ -27,7 +27,7 @@ LARGEST_SIDE = 100_000
 """Pixels. No camera takes larger pictures."""
 
 
-_LARGEST = 1e12
+LARGEST = 1e12
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ def _check(path: Path, entry: CameraEntry) -> None:
         "distortion": entry.distortion,
     }
     for what, values in arrays.items():
-        if not (np.abs(values) < _LARGEST).all():  # NaN fails too
+        if not (np.abs(values) < LARGEST).all():  # NaN fails too
             raise InputError(f"{where}: its {what} {_text(values)} is not finite; calibrate it again")
     if entry.size is not None and not 0 < min(entry.size) <= max(entry.size) <= LARGEST_SIDE:
         raise InputError(
