@@ -71,7 +71,7 @@ def say_gains(recording: Recording, made: MadeActor, folder: Path) -> None:
         factors = " ".join(f"{gain:.2f}" for gain in unlike[worst])
         say(
             f"{len(unlike)} of {len(found)} cameras show the subject's colours in another light than the others do "
-            f"(most of all {worst}: red, green, blue would have to be multiplied by {factors}); if the cameras "
-            f"differ in exposure or white balance, copy color_gains of {folder / 'color_gains.yaml'} into "
-            "recording.yaml and make the actor again"
+            f"(most of all {worst}: red, green, blue would have to be multiplied by {factors}); that may be "
+            "shading; if the cameras differ in exposure or white balance, copy color_gains of "
+            f"{folder / 'color_gains.yaml'} into recording.yaml and make the actor again"
         )

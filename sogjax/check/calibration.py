@@ -40,8 +40,8 @@ def calibration_findings(
                 told.add(finding.what.split(" (")[0])
                 findings.append(finding)
     if not compared:
-        what = "the calibration cannot be held against silhouettes: there are no masks and no background pictures"
-        remedy = "add pictures of the empty scene as background/CAMERA.jpg"
+        what = "the calibration cannot be held against silhouettes: those of at least three cameras are needed"
+        remedy = "add masks, or pictures of the empty scene as background/CAMERA.jpg, of more cameras"
         return [Finding("note", "calibration", what, "", remedy)], {}
     if not findings:
         lowest = min(fits.values(), key=lambda fit: fit.coverage).coverage

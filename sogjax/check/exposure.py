@@ -65,6 +65,8 @@ def exposure_findings(names: tuple[str, ...], found: Exposure, label: str) -> li
     of = "the subject" if found.of_subject else "its pictures as a whole"
     findings = []
     for name, gains, brightness in zip(names, found.gains, found.brightness, strict=True):
+        if np.isnan(gains).any():
+            continue
         balance = gains[[0, 2]] / gains[1]
         if not 1.0 / (wider * BRIGHTER) <= brightness <= wider * BRIGHTER:
             what = f"{name} shows {of} at {brightness:.2f} times the values of the median camera ({label})"

@@ -63,7 +63,7 @@ def _camera_motion(rig: CameraRig, name: str, grey: UInt8[np.ndarray, "frame h w
     small = np.empty((len(energy), *shape), np.float32)
     for k, step in enumerate(energy):
         small[k] = cv2.resize(step, shape[::-1], interpolation=cv2.INTER_AREA)
-    return CameraMotion(np.sqrt(small).reshape(len(small), -1), shape, *world_rays(rig, name, shape))
+    return CameraMotion(np.sqrt(small).reshape(len(small), shape[0] * shape[1]), shape, *world_rays(rig, name, shape))
 
 
 def with_rig(motions: Sequence[CameraMotion], rig: CameraRig) -> list[CameraMotion]:

@@ -33,7 +33,8 @@ def place_findings(
     likeness = place_likeness(references, filmed)
     findings, paired = [], set()
     for camera, row in likeness.items():
-        if row[camera] >= SAME or camera in paired:
+        black = not filmed.pictures[camera].any()  # the camera is missing there
+        if row[camera] >= SAME or camera in paired or black:
             continue
         other = max(row, key=row.__getitem__)
         label = references[camera][0]

@@ -123,7 +123,7 @@ def _support(
         elsewhere = np.delete(scores, near)
         alike[camera] = scores[place]
         margins[camera] = scores[place] - elsewhere.max() if len(elsewhere) else 0.0
-        sharpness[camera] = scores[place] - max(scores[k] for k in near if k != place)
+        sharpness[camera] = scores[place] - max((scores[k] for k in near if k != place), default=0.0)
     return alike, margins, sharpness
 
 

@@ -71,6 +71,8 @@ class Evaluation:
                 rows = enumerate(points.names) if details else ()
                 lines += [_summary_row(f"  {name}", summarize(points.errors[:, [k]])) for k, name in rows]
         lines.append(f"{len(self.frames)} frames, {self.frames[0]} to {self.frames[-1]}; distances in mm")
+        if self.markers is not None:
+            lines.append("markers are attached in their first frame: a wrong first pose shows in the joints only")
         lines += [
             f"lost: {p.name} in frames {p.first_frame} to {p.last_frame}, {MM * p.mean:.0f} mm" for p in self.lost
         ]
