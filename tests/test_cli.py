@@ -10,15 +10,14 @@ import numpy as np
 import pytest
 import yaml
 from command_line import actor_file, done, refused, trackable
+from rendered_person import rendered_person
 from small_recording import write_video
 
 from sogjax.app.cli import main
 from sogjax.app.composition import SCHEMAS, composed
 from sogjax.app.configs import help_lines
 from sogjax.data.motion import load_motion
-from sogjax.synth import SynthSettings, render_recording
 
-LANDMARKS = ("pelvis", "chest", "neck", "left_elbow")
 FAST = ("solver.max_iterations=20", "images.depth=6")
 
 
@@ -26,12 +25,7 @@ FAST = ("solver.max_iterations=20", "images.depth=6")
 def rendered(tmp_path_factory):
     """A rendered person, four cameras, four frames; its rough pose has the landmarks of the small actor."""
     folder = tmp_path_factory.mktemp("rendered") / "person"
-    settings = SynthSettings(cameras=4, frames=4, width=160, height=120, example_poses=False, background=False)
-    render_recording(settings, folder)
-    rough = yaml.safe_load((folder / "initial_pose.yaml").read_text())
-    rough["landmarks"] = {name: rough["landmarks"][name] for name in LANDMARKS}
-    (folder / "initial_pose.yaml").write_text(yaml.safe_dump(rough))
-    return folder
+    return rendered_person(folder, cameras=4, frames=4, width=160, height=120)
 
 
 def test_from_a_recording_to_motion_and_pictures(capsys, tmp_path, monkeypatch, rendered, plain_logging):

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 import yaml
 from command_line import actor_file, done, refused, trackable
+from rendered_person import rendered_person
 
 from sogjax.app import grid
 from sogjax.app.cli import main
 from sogjax.data.motion import load_motion
 from sogjax.errors import InputError
-from sogjax.synth import SynthSettings, render_recording
 
-LANDMARKS = ("pelvis", "chest", "neck", "left_elbow")
 LIGHT = ("outputs.overlay=false", "outputs.rerun_images=false", "solver.max_iterations=12", "images.depth=5")
 SWEEP = ("energy.limit_weight=0,1", "solver.epsilon=0.002,0.02")
 
@@ -28,12 +27,7 @@ def new_folder(tmp_path, monkeypatch, plain_logging):
 def recording(tmp_path):
     """A rendered person, three cameras, three frames; its rough pose has the landmarks of the small actor."""
     folder = tmp_path / "person"
-    settings = SynthSettings(cameras=3, frames=3, width=96, height=72, example_poses=False, background=False)
-    render_recording(settings, folder)
-    rough = yaml.safe_load((folder / "initial_pose.yaml").read_text())
-    rough["landmarks"] = {name: rough["landmarks"][name] for name in LANDMARKS}
-    (folder / "initial_pose.yaml").write_text(yaml.safe_dump(rough))
-    return folder
+    return rendered_person(folder, cameras=3, frames=3, width=96, height=72)
 
 
 def rows_of(table):

@@ -9,6 +9,7 @@ import yaml
 from body_cases import shipped
 from command_line import actor_file, done, trackable
 from drawn_scene import cells_of, draw, in_colors, make_tracker, moved, standing
+from rendered_person import rendered_person
 from rig_cases import ring_rig
 from small_recording import SIZE, frame_of, make_recording, toml_camera, write_calibration, write_video
 
@@ -22,10 +23,8 @@ from sogjax.data.source import look_at_source
 from sogjax.data.video import read_frames
 from sogjax.errors import InputError
 from sogjax.solve import GaussNewton
-from sogjax.synth import SynthSettings, render_recording
 from sogjax.track.tracker import PartialCells, track
 
-LANDMARKS = ("pelvis", "chest", "neck", "left_elbow")
 LIGHT = ("outputs.overlay=false", "outputs.rerun=false", "outputs.bvh=false")
 
 
@@ -98,12 +97,7 @@ def test_settings_with_something_wrong(tmp_path, settings, words):
 def rendered(tmp_path_factory):
     """A rendered person, four cameras; its rough pose has the landmarks of the small actor."""
     folder = tmp_path_factory.mktemp("rendered") / "person"
-    settings = SynthSettings(cameras=4, frames=4, width=160, height=120, example_poses=False, background=False)
-    render_recording(settings, folder)
-    rough = yaml.safe_load((folder / "initial_pose.yaml").read_text())
-    rough["landmarks"] = {name: rough["landmarks"][name] for name in LANDMARKS}
-    (folder / "initial_pose.yaml").write_text(yaml.safe_dump(rough))
-    return folder
+    return rendered_person(folder, cameras=4, frames=4, width=160, height=120)
 
 
 def tracked(capsys, rendered, tmp_path, name, *words):

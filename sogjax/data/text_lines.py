@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from sogjax.data.bounded_file import read_bounded
 from sogjax.errors import InputError
 
 LARGEST = 1e9
@@ -92,13 +93,6 @@ def read_text(path: Path, max_bytes: int) -> str:
         InputError: it cannot be read, has more than `max_bytes` or is no text.
     """
     try:
-        with path.open("rb") as file:
-            content = file.read(max_bytes + 1)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from error
-    if len(content) > max_bytes:
-        raise InputError(f"{path}: has more than {max_bytes} bytes; give a file of its kind")
-    try:
-        return content.decode("utf-8-sig")
+        return read_bounded(path, max_bytes).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: is no text ({error.reason}); give a file of its kind") from error

@@ -11,6 +11,7 @@ import yaml
 from yaml.composer import ComposerError
 from yaml.constructor import ConstructorError
 
+from sogjax.data.bounded_file import read_bounded
 from sogjax.errors import InputError
 
 MAX_BYTES = 1_000_000
@@ -109,13 +110,7 @@ def read_yaml(path: Path) -> Entry:
     Raises:
         InputError: the file cannot be read, is too large or is no such YAML.
     """
-    try:
-        with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from error
-    if len(content) > MAX_BYTES:
-        raise InputError(f"{path}: is larger than {MAX_BYTES} bytes; give a file written for this purpose")
+    content = read_bounded(path, MAX_BYTES)
     try:
         return Entry(path, "", yaml.load(content, Loader=_StrictLoader))
     except yaml.MarkedYAMLError as error:

@@ -10,6 +10,7 @@ from sogjax.track.culling import Capacities
 from sogjax.track.tracker import Tracker, TrackState
 
 
+@eqx.filter_jit
 def best_after(
     tracker: Tracker,
     state: TrackState,
@@ -26,17 +27,6 @@ def best_after(
     """
     if not isinstance(tracker.solver, ConditionedAscent | GaussNewton):
         raise ValueError(f"{type(tracker.solver).__name__} cannot be watched; use the ascents or Gauss-Newton")
-    return _best_after(tracker, state, cells, capacities, counts)
-
-
-@eqx.filter_jit
-def _best_after(
-    tracker: Tracker,
-    state: TrackState,
-    cells: UInt8[Array, "camera rows columns 3"],
-    capacities: Capacities,
-    counts: Int[Array, "count"],
-) -> tuple[Float[Array, "count dof"], Float[Array, "count"]]:
     seen = tracker.views(cells, state, capacities)
 
     def after(count: Int[Array, ""]) -> tuple[Float[Array, "dof"], Float[Array, ""]]:

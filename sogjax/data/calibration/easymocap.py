@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from sogjax.data.bounded_file import read_bounded
 from sogjax.data.calibration.rig import METRES, CameraEntry, CameraRig, rig_from_entries
 from sogjax.errors import InputError
 
@@ -117,14 +118,7 @@ def _matrix(where: str, content: Content, key: str, count: int | None = None) ->
 
 
 def _text(path: Path) -> str:
-    try:
-        with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); check the file") from error
-    if len(content) > MAX_BYTES:
-        raise InputError(f"{path}: has more than {MAX_BYTES} bytes, too many for a calibration; give the right file")
-    return content.decode("utf-8-sig", errors="replace").replace("\r\n", "\n")
+    return read_bounded(path, MAX_BYTES).decode("utf-8-sig", errors="replace").replace("\r\n", "\n")
 
 
 def _content(path: Path, text: str) -> Content:
