@@ -63,8 +63,8 @@ def test_a_video_that_breaks_off_is_missing_from_there_on(tmp_path, monkeypatch)
     folder = make_recording(tmp_path / "r", settings="up: z\nfewest_cameras: 1\n")
     opened = video.open_source
 
-    def breaking(path, start, threads):
-        source = opened(path, start, threads)
+    def breaking(path, *rest):
+        source = opened(path, *rest)
         if path.stem == "right":
             pictures = iter([source.read(), source.read(), None, source.read()])
             source.read = lambda: next(pictures)
@@ -205,22 +205,57 @@ def test_a_video_that_says_it_is_turned(tmp_path):
     assert next(iter(read_frames(open_recording(folder))))[1].shape == (SIZE[0], SIZE[1], 3)
 
 
-def test_a_video_whose_frames_do_not_come_evenly(tmp_path):
-    folder = make_recording(tmp_path / "r", settings="up: z\nfps: 25\n", frames=8)
-    assert not any("evenly" in warning for warning in open_recording(folder).warnings)
-    path = folder / "videos" / "right.mp4"
+def come_at(path, durations):
+    """Write into an mp4 how many frames long each of its images is shown, all but the last."""
     content = bytearray(path.read_bytes())
     begins, end = box(content, "moov", "trak", "mdia", "minf", "stbl", "stts")
     count, delta = struct.unpack(">II", content[end - 8 : end])
-    assert count == 8
+    assert count == len(durations) + 1
     for begin in begins:
         (size,) = struct.unpack(">I", content[begin : begin + 4])
-        content[begin : begin + 4] = struct.pack(">I", size + 16)
-    content[begins[-1] + 12 : end] = struct.pack(">7I", 3, 4, delta, 1, 3 * delta, 3, delta)
-    path.write_bytes(content)
+        content[begin : begin + 4] = struct.pack(">I", size + 8 * (count - 1))
+    entries = [number for duration in (*durations, 1) for number in (1, int(duration * delta))]
+    content[begins[-1] + 12 : end] = struct.pack(f">{1 + 2 * count}I", count, *entries)
+    path.write_bytes(content.replace(b"edts", b"free"))  # the list of edits would end it at its former length
+
+
+def test_a_video_whose_frames_do_not_come_evenly(tmp_path):
+    folder = make_recording(tmp_path / "r", settings="up: z\nfps: 25\n", frames=8)
+    assert not any("evenly" in warning for warning in open_recording(folder).warnings)
+    come_at(folder / "videos" / "right.mp4", (1, 1, 1, 1, 3, 1, 1))
     (warning,) = (text for text in open_recording(folder).warnings if "evenly" in text)
     assert "right.mp4" in warning
     assert "up to 3.0 times" in warning
+    assert frames_seen(open_recording(folder)) == [[k, k] for k in range(8)]
+
+
+@pytest.mark.parametrize(
+    ("fewest", "right", "says"),
+    [
+        ("", [0, 1, 2, 3, 4, 4, 5, 5], "the nearest one is taken"),
+        ("fewest_cameras: 1\n", [0, 1, 2, 3, 4, None, None, 5, 6, 7], "the camera is missing there"),
+    ],
+)
+def test_time_stamps_are_gone_by_where_asked_for(tmp_path, fewest, right, says):
+    """Two images of the right camera were lost after its fifth; the left one has no image after its eighth."""
+    folder = make_recording(tmp_path / "r", settings=f"up: z\nfps: 25\ntime_stamps: true\n{fewest}", frames=8)
+    come_at(folder / "videos" / "right.mp4", (1, 1, 1, 1, 3, 1, 1))
+    recording = open_recording(folder)
+    left = [*range(8), None, None][: len(right)]
+    assert frames_seen(recording) == [list(pair) for pair in zip(left, right, strict=True)]
+    assert frames_seen(recording, 5) == frames_seen(recording)[5:]
+    assert any("no image of 2 of its 10 frames" in warning and says in warning for warning in recording.warnings)
+
+
+def test_time_stamps_of_another_rate(tmp_path):
+    """A camera of half the rate shows each image twice, and an offset counts frames of the common rate."""
+    folder = make_recording(tmp_path / "r", settings="up: z\nfps: 25\ntime_stamps: true\n", frames=4)
+    come_at(folder / "videos" / "right.mp4", (2, 2, 2))
+    recording = open_recording(folder)
+    assert [pair[0] for pair in frames_seen(recording)] == [0, 1, 2, 3]
+    assert [pair[1] for pair in frames_seen(recording)] in ([0, 0, 1, 1], [0, 1, 1, 2])
+    (folder / "recording.yaml").write_text("up: z\nfps: 25\ntime_stamps: true\nframe_offset: {right: 2}\n")
+    assert [pair[1] for pair in frames_seen(open_recording(folder))][::2] == [1, 2]
 
 
 def test_what_checks_look_at_is_black_where_a_camera_is_missing(tmp_path):

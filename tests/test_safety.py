@@ -180,9 +180,9 @@ def test_an_actor_with_too_many_joints_is_refused(tmp_path):
 
 
 def test_a_video_that_claims_too_many_pixels_is_refused(tmp_path, monkeypatch):
-    from sogjax.data import source
+    from sogjax.data import video_file
 
     recording = make_recording(tmp_path / "walk")
-    monkeypatch.setattr(source, "MAX_PIXELS", 64 * 48 - 1)
+    monkeypatch.setattr(video_file, "MAX_PIXELS", 64 * 48 - 1)
     with pytest.raises(InputError, match="64x48 pixels"):
         open_recording(recording)

@@ -22,7 +22,7 @@ from small_recording import (
     write_video,
 )
 
-from sogjax.data import source
+from sogjax.data import image_folder
 from sogjax.data.recording import open_recording
 from sogjax.data.video import VideoWriter, read_frames, read_image, read_mask
 from sogjax.errors import InputError
@@ -83,7 +83,7 @@ def test_decoding_runs_ahead_of_the_consumer_in_other_threads(tmp_path, monkeypa
         read_by.append(threading.get_ident())
         return read_image(path)
 
-    monkeypatch.setattr(source, "read_image", spy)
+    monkeypatch.setattr(image_folder, "read_image", spy)
     frames = read_frames(recording)
     next(frames)
     for _ in range(200):

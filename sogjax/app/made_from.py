@@ -83,6 +83,7 @@ def _of_recording(recording: Recording) -> MadeFrom:
         "number of frames": recording.num_frames,
         "frame_offset": {name: recording.frame_offset[name] for name in recording.rig.names},
         "fewest_cameras": recording.fewest_cameras,
+        "time_stamps": bool(recording.picked),
         "missing": {name: [list(span) for span in spans] for name, spans in recording.missing.items()},
         "color_gains": {name: list(gains) for name, gains in recording.color_gains.items()},
         "the calibration": digest(recording.rig.cameras),

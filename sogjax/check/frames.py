@@ -12,7 +12,7 @@ from sogjax.check.clip import Clip
 from sogjax.check.findings import Finding, listed
 from sogjax.check.jumps import Jump
 from sogjax.data.recording import Recording
-from sogjax.data.source import SourceInfo, frame_times, look_at_source
+from sogjax.data.source import SourceInfo, look_at_source
 
 GAP = 1.5
 """A pause between two frames of a file, in units of the usual one, from which on a frame is missing."""
@@ -46,15 +46,15 @@ def source_frames(recording: Recording) -> dict[str, SourceFrames]:
 
 
 def _source_frames(recording: Recording, name: str) -> SourceFrames:
-    path = recording.sources[name]
-    times = frame_times(path)
+    info = look_at_source(recording.sources[name])
+    times = info.times
     if times is None or len(times) < 4:
-        return SourceFrames(look_at_source(path), (), False)
+        return SourceFrames(info, (), False)
     pauses = np.diff(times)
     usual = max(float(np.median(pauses)), 1e-9)
     gaps = tuple(int(k) for k in np.flatnonzero(pauses > GAP * usual))
     uneven = float(np.percentile(np.abs(pauses - usual), 75)) > UNEVEN * usual
-    return SourceFrames(look_at_source(path), gaps, uneven)
+    return SourceFrames(info, gaps, uneven)
 
 
 def source_findings(recording: Recording, sources: dict[str, SourceFrames]) -> list[Finding]:
@@ -71,11 +71,11 @@ def source_findings(recording: Recording, sources: dict[str, SourceFrames]) -> l
     for name, source in sources.items():
         if source.uneven:
             what = f"the time stamps of {name} are uneven"
-            remedy = "convert it to a constant rate (ffmpeg -vsync cfr), or record so"
+            remedy = "write `time_stamps: true` into recording.yaml, or record at a constant rate"
             findings.append(Finding("warning", "frames", what, "a variable frame rate, as of phones", remedy, (name,)))
         elif source.gaps:
             what = f"{name} lacks frames by its time stamps, after frame {_places(source.gaps)}"
-            cause, remedy = "frames dropped while recording", "use the stretches between them, or record again"
+            cause, remedy = "frames dropped while recording", "write `time_stamps: true` into recording.yaml"
             findings.append(Finding("warning", "frames", what, cause, remedy, (name,)))
     if not findings:
         what = f"{recording.num_frames} frames of {len(sources)} cameras at {recording.fps:g} a second"

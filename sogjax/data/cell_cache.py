@@ -94,7 +94,8 @@ class CellCache:
         """All that cells depend on."""
         cameras = self.recording.rig.names
         gains = {camera: list(self.recording.color_gains[camera]) for camera in sorted(self.recording.color_gains)}
-        return ({"color_gains": gains} if gains else {}) | {
+        optional = {"color_gains": gains, "picked": {camera: list(n) for camera, n in self.recording.picked.items()}}
+        return {key: value for key, value in optional.items() if value} | {
             "version": CELLS_VERSION,
             "depth": self.depth,
             "frame_offset": {camera: self.recording.frame_offset[camera] for camera in cameras},

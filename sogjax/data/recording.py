@@ -10,18 +10,13 @@ from sogjax.data.calibration import CameraRig, find_calibrations, load_calibrati
 from sogjax.data.color_gains import ColorGains
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.initial_pose import read_initial_poses
+from sogjax.data.recording_frames import TimedImages, frame_rate, frames_in_common, images_by_time, uneven
 from sogjax.data.recording_settings import RecordingSettings, read_recording_settings
-from sogjax.data.source import SourceInfo, find_sources, look_at_source
+from sogjax.data.source import find_sources, look_at_source
 from sogjax.data.stills import ExamplePose, check_size, find_background, find_example_poses
 from sogjax.errors import InputError
 
 __all__ = ["ExamplePose", "Recording", "open_recording"]
-
-FPS_TOLERANCE = 5e-4
-"""Relative difference of two videos' frame rates that is taken for rounding (29.97 and 30 differ by 1e-3)."""
-
-LONGEST_GAP = 1.5
-"""Time between two images, in units of the usual one, beyond which the images do not come evenly."""
 
 FAR_CAMERA = 100.0
 """Metres from the origin at which a camera's place is suspected to be in other units."""
@@ -55,6 +50,9 @@ class Recording:
     """One sentence each."""
     num_images: dict[str, int] = field(default_factory=dict)
     """By camera the number of its images; a camera without an entry has one for every frame."""
+    picked: dict[str, tuple[int, ...]] = field(default_factory=dict)
+    """By camera the image of its file that each of its frames is, where time stamps were asked for; else frame k is
+    image k."""
     missing: dict[str, tuple[tuple[int, int], ...]] = field(default_factory=dict)
     """By camera the first and last frame (its own numbers) of each while in which its pictures are not to be used."""
     color_gains: dict[str, ColorGains] = field(default_factory=dict)
@@ -106,12 +104,15 @@ def open_recording(path: Path) -> Recording:
     rig = rig.with_sizes({camera: info.size for camera, info in infos.items()})
     for camera in cameras:
         check_size(sources[camera], infos[camera].size, rig, camera)
-    first, count, warnings = _frames(path, settings, infos, offsets)
+    fps = frame_rate(path, settings, infos)
+    timed = images_by_time(sources, infos, fps) if settings.time_stamps else {}
+    counts = {camera: len(timed[camera].picked) if camera in timed else infos[camera].num_frames for camera in cameras}
+    first, count, warnings = frames_in_common(path, settings, counts, offsets)
     return Recording(
         path=path,
         name=path.resolve().name,
         rig=rig,
-        fps=_fps(path, settings, infos),
+        fps=fps,
         up=settings.up or DEFAULT_UP,
         first_frame=first,
         num_frames=count,
@@ -121,9 +122,10 @@ def open_recording(path: Path) -> Recording:
         example_poses=find_example_poses(path / "example_poses", rig, calibrated.names, settings.example_poses),
         initial_poses=_initial_poses(path / "initial_pose.yaml"),
         ground_truth=_ground_truth(path / "ground_truth.npz"),
-        warnings=(*warnings, *_doubts(path, settings, rig), *_uneven(sources, infos)),
-        num_images={camera: infos[camera].num_frames for camera in cameras},
-        missing={camera: settings.missing[camera] for camera in cameras if camera in settings.missing},
+        warnings=(*warnings, *_doubts(path, settings, rig), *uneven(sources, infos, timed, settings.fewest_cameras)),
+        num_images=counts,
+        picked={camera: images.picked for camera, images in timed.items()},
+        missing=_missing(settings, cameras, timed, offsets),
         color_gains={camera: settings.color_gains[camera] for camera in cameras if camera in settings.color_gains},
         fewest_cameras=settings.fewest_cameras,
     )
@@ -167,56 +169,16 @@ def _cameras(
     return wanted
 
 
-def _fps(path: Path, settings: RecordingSettings, infos: dict[str, SourceInfo]) -> float:
-    if settings.fps is not None:
-        return settings.fps
-    rates = {camera: info.fps for camera, info in infos.items() if info.fps is not None and info.fps > 0}
-    if not rates:
-        raise InputError(f"{path}: images do not say their frame rate; write `fps:` into recording.yaml")
-    slow, fast = min(rates, key=rates.__getitem__), max(rates, key=rates.__getitem__)
-    if rates[fast] - rates[slow] > FPS_TOLERANCE * rates[fast]:
-        raise InputError(
-            f"{path}: the videos differ in frame rate ({slow} {rates[slow]:g}, {fast} {rates[fast]:g}); "
-            "convert them to one, or write `fps:` into recording.yaml if only the files' headers are wrong"
-        )
-    return float(np.median(list(rates.values())))
-
-
-def _frames(
-    path: Path, settings: RecordingSettings, infos: dict[str, SourceInfo], offsets: dict[str, int]
-) -> tuple[int, int, tuple[str, ...]]:
-    """First frame and number of frames that enough cameras have and recording.yaml asks for, and warnings."""
-    needed = min(settings.fewest_cameras or len(infos), len(infos))
-    ends = {camera: infos[camera].num_frames - offsets[camera] for camera in infos}
-    earliest = max(0, sorted(-offset for offset in offsets.values())[needed - 1])
-    latest = sorted(ends.values(), reverse=True)[needed - 1] - 1
-    if latest < earliest:
-        lengths = ", ".join(f"{camera} {info.num_frames}" for camera, info in infos.items())
-        raise InputError(
-            f"{path}: the videos have no frame in common ({lengths} frames); correct `frame_offset:` or the videos"
-        )
-    first, last = settings.first_frame, settings.last_frame
-    for key, frame in (("first_frame", first), ("last_frame", last)):
-        if frame is not None and not earliest <= frame <= latest:
-            raise InputError(
-                f"{path / 'recording.yaml'}: {key}: {frame} is out of range; "
-                f"the frames that {'all' if needed == len(infos) else needed} cameras have are {earliest} to {latest}"
-            )
-    first, last = earliest if first is None else first, latest if last is None else last
-    if last < first:
-        raise InputError(f"{path / 'recording.yaml'}: last_frame: {last} is before first_frame {first}; swap them")
-    warnings = ()
+def _missing(
+    settings: RecordingSettings, cameras: tuple[str, ...], timed: dict[str, TimedImages], offsets: dict[str, int]
+) -> dict[str, tuple[tuple[int, int], ...]]:
+    """What recording.yaml leaves out and, where cameras may be missing, frames whose own image was lost."""
+    missing = {camera: settings.missing[camera] for camera in cameras if camera in settings.missing}
     if settings.fewest_cameras is not None:
-        spans = {camera: (max(first, -offsets[camera]), min(last, ends[camera] - 1)) for camera in infos}
-        partly = ", ".join(f"{c} {a} to {b}" for c, (a, b) in spans.items() if (a, b) != (first, last))
-        if partly:
-            warnings = (
-                f"{path}: frames {first} to {last} are used, of which some cameras have a part only ({partly})",
-            )
-    elif settings.last_frame is None and len(set(ends.values())) > 1:
-        lengths = ", ".join(f"{camera} {info.num_frames}" for camera, info in infos.items())
-        warnings = (f"{path}: the videos differ in length ({lengths} frames); frames {first} to {last} are used",)
-    return first, last - first + 1, warnings
+        for camera, images in timed.items():
+            lost = tuple((frame - offsets[camera], frame - offsets[camera]) for frame in images.lost)
+            missing |= {camera: missing.get(camera, ()) + lost} if lost else {}
+    return missing
 
 
 def _initial_poses(path: Path) -> Path | None:
@@ -231,17 +193,6 @@ def _ground_truth(path: Path) -> Path | None:
         return None
     load_ground_truth(path)
     return path
-
-
-def _uneven(sources: dict[str, Path], infos: dict[str, SourceInfo]) -> list[str]:
-    """Sentences on videos whose images do not come at one rate."""
-    return [
-        f"{sources[camera]}: its images do not come evenly (up to {info.longest_gap:.1f} times the usual time lies "
-        "between two): the frame rate varies or images were dropped, and each counts as one frame; convert it to a "
-        "constant rate"
-        for camera, info in infos.items()
-        if info.longest_gap > LONGEST_GAP
-    ]
 
 
 def _doubts(path: Path, settings: RecordingSettings, rig: CameraRig) -> tuple[str, ...]:

@@ -23,6 +23,7 @@ _KEYS = (
     "frame_offset",
     "first_frame",
     "last_frame",
+    "time_stamps",
     "fewest_cameras",
     "missing",
     "color_gains",
@@ -51,6 +52,8 @@ class RecordingSettings:
     frame_offset: dict[str, int] = field(default_factory=dict)
     first_frame: int | None = None
     last_frame: int | None = None
+    time_stamps: bool = False
+    """Whether images are taken by their times in the video files, not counted."""
     fewest_cameras: int | None = None
     missing: dict[str, tuple[tuple[int, int], ...]] = field(default_factory=dict)
     """By camera the first and last frame of each while in which its pictures are not to be used."""
@@ -82,6 +85,7 @@ def read_recording_settings(path: Path) -> RecordingSettings:
         frame_offset=_offsets(given["frame_offset"]) if "frame_offset" in given else {},
         first_frame=_whole(given["first_frame"]) if "first_frame" in given else None,
         last_frame=_whole(given["last_frame"]) if "last_frame" in given else None,
+        time_stamps=_yes_or_no(given["time_stamps"]) if "time_stamps" in given else False,
         fewest_cameras=_count(given["fewest_cameras"]) if "fewest_cameras" in given else None,
         missing=_missing(given["missing"]) if "missing" in given else {},
         color_gains=_gains(given["color_gains"]) if "color_gains" in given else {},
@@ -100,6 +104,12 @@ def _positive(entry: Entry) -> float:
 def _whole(entry: Entry) -> int:
     if isinstance(entry.value, bool) or not isinstance(entry.value, int):
         raise entry.error("a whole number of frames")
+    return entry.value
+
+
+def _yes_or_no(entry: Entry) -> bool:
+    if not isinstance(entry.value, bool):
+        raise entry.error("true or false")
     return entry.value
 
 

@@ -15,8 +15,9 @@ from jaxtyping import UInt8
 from sogjax.data.atomic import atomic_path
 from sogjax.data.color_gains import evened
 from sogjax.data.image_file import read_image, read_mask
+from sogjax.data.image_stream import ImageStream
 from sogjax.data.recording import Recording
-from sogjax.data.source import Source, open_source
+from sogjax.data.source import open_source
 from sogjax.errors import InputError
 
 __all__ = ["VideoWriter", "read_frames", "read_image", "read_mask", "read_prepared", "read_still"]
@@ -72,6 +73,7 @@ def _decoded_ahead(
                 recording.sources[camera],
                 max(recording.first_frame + start + recording.frame_offset[camera], 0),
                 threads,
+                recording.picked.get(camera),
             )
             for camera in cameras
         ]
@@ -98,7 +100,7 @@ def _decoded_ahead(
             yield images
 
 
-def _close_all(opened: list[Future[Source]]) -> None:
+def _close_all(opened: list[Future[ImageStream]]) -> None:
     wait(opened)
     for future in opened:
         if future.exception() is None:
