@@ -220,7 +220,7 @@ class ReportConfig:
     out: str = option("outputs/report", "folder for the report and its runs; a run that is there is not done again")
     only: list[str] | None = option(None, "experiments, by their names in conf/experiment; null: all")
     recordings: list[str] = group(
-        lambda: ["walk:0", "arms:0", "squat_kick:1", "cartwheel:1"],
+        lambda: [f"{motion}:{seed}" for motion in ("walk", "arms", "squat_kick", "cartwheel") for seed in (0, 1)],
         "folders of recordings with ground truth, or MOTION:SEED of rendered ones",
     )
     frames: int = option(40, "frames of each recording to track, at most")

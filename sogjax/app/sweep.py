@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from sogjax.app.compiled_programs import forget_programs_if_many
 from sogjax.app.composition import SCHEMAS, composed, conf_dir, register_schemas, to_object
 from sogjax.app.overrides import plain_sentence, ready_for_hydra
 from sogjax.app.sweep_results import COLUMNS, Failure, Numbers
@@ -106,6 +107,7 @@ def run_hydra(task: Callable[[Any], Any]) -> int:
     wrong: list[str] = []
 
     def member(tree: Any) -> Any:
+        forget_programs_if_many()
         try:
             return task(tree)
         except InputError as error:

@@ -103,8 +103,8 @@ class Overlay:
             for drawing in self.drawings:
                 if frame in drawing.row_of:
                     _draw_actor(area, drawing, k, drawing.row_of[frame])
-            _write(area, self.names[k], (6, 14))
-        _write(canvas, f"frame {frame}", (6, height - 8))
+            write_label(area, self.names[k], (6, 14))
+        write_label(canvas, f"frame {frame}", (6, height - 8))
         return canvas
 
 
@@ -230,7 +230,7 @@ def _bgr(rgb: UInt8[np.ndarray, "3"]) -> tuple[int, int, int]:
     return blue, green, red
 
 
-def _write(area: np.ndarray, text: str, corner: tuple[int, int]) -> None:
+def write_label(area: np.ndarray, text: str, corner: tuple[int, int]) -> None:
     """Small white text on a dark rim, readable on any picture."""
     for color, thick in (((0, 0, 0), 3), ((255, 255, 255), 1)):
         cv2.putText(area, text, corner, cv2.FONT_HERSHEY_SIMPLEX, 0.42, color, thick, cv2.LINE_AA)

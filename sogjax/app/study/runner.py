@@ -7,6 +7,7 @@ from dataclasses import asdict, replace
 import numpy as np
 
 from sogjax.app import build
+from sogjax.app.compiled_programs import forget_programs_if_many
 from sogjax.app.composition import composed
 from sogjax.app.configs import TrackConfig
 from sogjax.app.overrides import quoted_value
@@ -58,6 +59,7 @@ def run_row(
     if found is not None or not do:
         return found
     say(f"{experiment.name} {row!r}: {source.name}")
+    forget_programs_if_many()
     record, begin = RunRecord(plan=asdict(plan), machine=machine_facts()), time.perf_counter()
     try:
         measured = _accuracy if measure == "accuracy" else _speed
