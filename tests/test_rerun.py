@@ -124,11 +124,11 @@ def test_the_viewer_listens_to_this_machine_only(tmp_path):
 
 def test_runs_lie_side_by_side_in_trees_of_their_own(tmp_path, motion):
     other = walking_motion(6, first_frame=2, still=True)
-    errors = {"a=1": np.linspace(0.0, 0.1, 6), "a=2": np.linspace(0.1, 0.2, 6)}
+    errors = {"a=1": np.linspace(0.0, 0.1, 6), "a=2 m/s": np.linspace(0.1, 0.2, 6)}
     path = tmp_path / "runs.rrd"
-    write_comparison(path, recording_of(ring_rig(), 10), {"a=1": [motion], "a=2": [other]}, errors=errors)
+    write_comparison(path, recording_of(ring_rig(), 10), {"a=1": [motion], "a=2 m/s": [other]}, errors=errors)
     found = {entity.replace("\\", ""): columns for entity, columns in read_back(path).items()}
-    for name, shown in (("a=1", motion), ("a=2", other)):
+    for name, shown in (("a=1", motion), ("a=2 m/s", other)):
         blobs = found[f"/world/runs/{name}/actor_1/blobs"]["Ellipsoids3D:centers"]
         np.testing.assert_allclose(blobs[-6:], shown.blob_means, atol=1e-6)
         np.testing.assert_allclose(

@@ -7,7 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optimistix as optx
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.solve.solution import Objective, Params, Scales, Solution
 
@@ -37,7 +37,7 @@ class OptimistixSolver(eqx.Module):
 
     method: Method = eqx.field(static=True, default="bfgs")
     epsilon: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=0.002)
-    max_iterations: int = eqx.field(static=True, default=200)
+    max_iterations: Int[Array, ""] = eqx.field(converter=jnp.asarray, default=200)
 
     def maximize(self, objective: Objective, start: Params, scales: Scales) -> Solution:
         """Minimise the negative objective from `start`; line-search steps count as iterations."""
@@ -48,10 +48,11 @@ class OptimistixSolver(eqx.Module):
         gain = jnp.where(largest > 0.0, largest, 1.0)
         cost = _linearizable(lambda z: (first_value - objective(start + z * units)) / gain)
         tolerance = self.epsilon / jnp.max(units)
-        solver = optx.BestSoFarMinimiser(_MINIMISERS[self.method](rtol=0.0, atol=tolerance))
-        result = optx.minimise(
-            lambda z, _: cost(z), solver, jnp.zeros_like(start), max_steps=self.max_iterations, throw=False
+        best_of = optx.BestSoFarMinimiser(_MINIMISERS[self.method](rtol=0.0, atol=tolerance))
+        solver = _Bounded(
+            minimiser=best_of, most=self.max_iterations, rtol=best_of.rtol, atol=best_of.atol, norm=best_of.norm
         )
+        result = optx.minimise(lambda z, _: cost(z), solver, jnp.zeros_like(start), max_steps=None, throw=False)
         params = start + result.value * units
         value = objective(params)
         usable = jnp.isfinite(value) & (value >= first_value)
@@ -63,6 +64,39 @@ class OptimistixSolver(eqx.Module):
             evaluations=steps + 2,
             converged=(result.result == optx.RESULTS.successful) & usable,
         )
+
+
+class _Bounded(optx.AbstractMinimiser):
+    """A minimiser that stops after some steps, a number that need not be known when it is compiled."""
+
+    minimiser: optx.AbstractMinimiser
+    most: Int[Array, ""]
+    rtol: Any
+    atol: Any
+    norm: Any
+
+    def init(
+        self, fn: Any, y: Any, args: Any, options: Any, f_struct: Any, aux_struct: Any, tags: Any
+    ) -> tuple[Any, Int[Array, ""]]:
+        return self.minimiser.init(fn, y, args, options, f_struct, aux_struct, tags), jnp.asarray(0)
+
+    def step(self, fn: Any, y: Any, args: Any, options: Any, state: Any, tags: Any) -> tuple[Any, Any, Any]:
+        inner, count = state
+        y, inner, aux = self.minimiser.step(fn, y, args, options, inner, tags)
+        return y, (inner, count + 1), aux
+
+    def terminate(
+        self, fn: Any, y: Any, args: Any, options: Any, state: Any, tags: Any
+    ) -> tuple[Bool[Array, ""], optx.RESULTS]:
+        inner, count = state
+        done, result = self.minimiser.terminate(fn, y, args, options, inner, tags)
+        full = ~done & (count >= self.most)
+        return done | full, optx.RESULTS.where(full, optx.RESULTS.nonlinear_max_steps_reached, result)
+
+    def postprocess(
+        self, fn: Any, y: Any, aux: Any, args: Any, options: Any, state: Any, tags: Any, result: Any
+    ) -> tuple[Any, Any, dict[str, Any]]:
+        return self.minimiser.postprocess(fn, y, aux, args, options, state[0], tags, result)
 
 
 def _linearizable(function: Callable[[Params], Float[Array, ""]]) -> Callable[[Params], Float[Array, ""]]:

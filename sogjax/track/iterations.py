@@ -5,7 +5,6 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, UInt8
 
-from sogjax.solve import ConditionedAscent, GaussNewton
 from sogjax.track.culling import Capacities
 from sogjax.track.tracker import Tracker, TrackState
 
@@ -21,12 +20,7 @@ def best_after(
     """The best pose that the tracker's solver has seen after so many iterations of a frame, and its energy.
 
     The frame is solved anew for every count: no solver has to know that it is watched.
-
-    Raises:
-        ValueError: a solver whose number of iterations is fixed when it is compiled.
     """
-    if not isinstance(tracker.solver, ConditionedAscent | GaussNewton):
-        raise ValueError(f"{type(tracker.solver).__name__} cannot be watched; use the ascents or Gauss-Newton")
     seen = tracker.views(cells, state, capacities)
 
     def after(count: Int[Array, ""]) -> tuple[Float[Array, "dof"], Float[Array, ""]]:

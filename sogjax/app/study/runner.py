@@ -73,10 +73,11 @@ def run_row(
 
 
 def motions_of(record: RunRecord, bodies: Sequence[Body], fps: float) -> dict[str, Motion]:
-    """The motions of a run's actors, from the poses in its record."""
+    """The motions of a run's actors, from the poses and the solver's account in its record."""
     poses = np.asarray(record.pose, float)
+    iterations = np.asarray(record.iterations, int)
     return {
-        body.name: motion_from_poses(body, poses[:, part], fps, frame=record.frames)
+        body.name: motion_from_poses(body, poses[:, part], fps, frame=record.frames, iterations=iterations)
         for body, part in zip(bodies, dof_slices(bodies), strict=True)
     }
 

@@ -16,8 +16,8 @@ from sogjax.view.frames import frame_range
 from sogjax.view.picture_camera import PictureCamera, picture_camera
 from sogjax.view.rerun.curves import log_curve_looks, log_curves, own_curves, plots_with
 from sogjax.view.rerun.layout import comparison_layout, eye
+from sogjax.view.rerun.names import FRAME, TIME, camera_entity, run_entity
 from sogjax.view.rerun.scene import log_actor, log_cameras, log_look, log_markers
-from sogjax.view.rerun.timelines import FRAME, TIME, camera_entity
 
 PICTURE_WIDTH = 480
 
@@ -85,7 +85,7 @@ def _log_run(
 ) -> None:
     """The bodies and curves of one run."""
     for k, motion in enumerate(actors):
-        entity, bones = f"/world/runs/{name}/actor_{k + 1}", bones_from_motion(motion)
+        entity, bones = f"{run_entity(name)}/actor_{k + 1}", bones_from_motion(motion)
         log_look(stream, entity, motion, bones, number, blob_palette(motion, number))
         log_actor(stream, entity, motion, bones)
     curves = own_curves(actors[0]) | ({} if errors is None else {"error_mm": 1000.0 * errors})

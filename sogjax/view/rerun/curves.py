@@ -6,7 +6,7 @@ import numpy as np
 import rerun as rr
 
 from sogjax.data.motion import Motion
-from sogjax.view.rerun.timelines import FRAME, ITERATION, time_columns
+from sogjax.view.rerun.names import FRAME, ITERATION, entity_part, time_columns
 
 _CURVE_COLORS = ((90, 170, 255), (255, 170, 60), (120, 220, 120), (255, 110, 120), (190, 140, 255), (240, 220, 90))
 _PLOTS = {
@@ -19,11 +19,11 @@ _PLOTS = {
 
 
 def own_curves(motion: Motion) -> dict[str, np.ndarray]:
-    """The curves of a motion; the mean standard deviation of its joints where that was computed."""
+    """The curves of a motion that are known; the mean standard deviation of its joints where that was computed."""
     curves = {"similarity": motion.similarity, "energy": motion.energy, "iterations": motion.iterations}
     if motion.joint_std is not None:
         curves["deviation_mm"] = 1000.0 * np.mean(motion.joint_std, axis=1)
-    return curves
+    return {name: values for name, values in curves.items() if np.isfinite(values).any()}
 
 
 def log_curve_looks(
@@ -63,7 +63,7 @@ def plots_with(curves: Iterable[str]) -> dict[str, str]:
 
 
 def _curve(name: str, actor: str | None) -> str:
-    return f"/curves/{_plot(name)}/{name}" + (f"/{actor}" if actor else "")
+    return f"/curves/{_plot(name)}/{name}" + (f"/{entity_part(actor)}" if actor else "")
 
 
 def _plot(curve: str) -> str:

@@ -21,8 +21,8 @@ from sogjax.view.frames import frame_range
 from sogjax.view.picture_camera import picture_camera
 from sogjax.view.rerun.curves import log_curve_looks, log_curves, log_traces, own_curves, plots_with
 from sogjax.view.rerun.layout import eye, tracking_layout
+from sogjax.view.rerun.names import FRAME, TIME, actor_entity, camera_entity, color_bytes
 from sogjax.view.rerun.scene import log_actor, log_cameras, log_deviations, log_look, log_markers, log_path
-from sogjax.view.rerun.timelines import FRAME, TIME, camera_entity, color_bytes
 
 APPLICATION = "sogjax"
 QUALITY = 80
@@ -137,8 +137,8 @@ class RerunFile:
         if not self._bones:
             self._begin(motions, terms)
         for k, (name, motion) in enumerate(zip(self._names, motions, strict=True)):
-            self._paths[k].append(log_actor(self._stream, f"/world/actors/{name}", motion, self._bones[k]))
-            log_deviations(self._stream, f"/world/actors/{name}", motion, self._bones[k])
+            self._paths[k].append(log_actor(self._stream, actor_entity(name), motion, self._bones[k]))
+            log_deviations(self._stream, actor_entity(name), motion, self._bones[k])
             log_curves(self._stream, motion, self._curve_actor(name), own_curves(motion))
             self._lowest = np.minimum(self._lowest, motion.blob_means.min(axis=(0, 1)))
             self._highest = np.maximum(self._highest, motion.blob_means.max(axis=(0, 1)))
@@ -193,7 +193,7 @@ class RerunFile:
         middle, size = 0.5 * (self._lowest + self._highest), float(np.linalg.norm(self._highest - self._lowest))
         log_cameras(self._stream, self._recording, self._cameras, middle)
         for k, name in enumerate(self._names):
-            log_path(self._stream, f"/world/actors/{name}", np.concatenate(self._paths[k]), k)
+            log_path(self._stream, actor_entity(name), np.concatenate(self._paths[k]), k)
         view = eye(self._recording, middle, size)
         self._stream.send_blueprint(tracking_layout(self._recording, self._names, self._with_blobs, self._plots, view))
 
@@ -203,7 +203,7 @@ class RerunFile:
         self._plots = plots_with([*own_curves(motions[0]), *terms])
         for k, (name, motion) in enumerate(zip(self._names, motions, strict=True)):
             colors = blob_palette(motion, k) if self._colors is None else self._colors[k]
-            log_look(self._stream, f"/world/actors/{name}", motion, self._bones[k], k, colors)
+            log_look(self._stream, actor_entity(name), motion, self._bones[k], k, colors)
             log_curve_looks(self._stream, self._curve_actor(name), own_curves(motion), 3 * k)
         log_curve_looks(self._stream, None, terms, 3 * len(motions))
 

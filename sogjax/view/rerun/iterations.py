@@ -12,8 +12,8 @@ from sogjax.data.recording import Recording
 from sogjax.view.bones import blob_palette, bones_from_motion
 from sogjax.view.picture_camera import picture_camera
 from sogjax.view.rerun.layout import eye, iterations_layout
+from sogjax.view.rerun.names import ITERATION, camera_entity
 from sogjax.view.rerun.scene import log_cameras, log_look, log_skeletons
-from sogjax.view.rerun.timelines import ITERATION, camera_entity
 
 
 def write_iterations(

@@ -7,7 +7,7 @@ import rerun.blueprint as rrb
 
 from sogjax.data.recording import Recording
 from sogjax.model.frames import world_from_upright
-from sogjax.view.rerun.timelines import FRAME, ITERATION, camera_entity
+from sogjax.view.rerun.names import FRAME, ITERATION, actor_entity, camera_entity, run_entity
 
 CAMERAS_SHOWN = 4
 
@@ -17,7 +17,7 @@ def tracking_layout(
 ) -> rrb.Blueprint:
     """A large 3-D view, a few cameras beside it, the curves below."""
     shown = spread(recording.rig.names, CAMERAS_SHOWN // 2 if with_blobs else CAMERAS_SHOWN)
-    skeletons = [f"/world/actors/{name}/skeleton" for name in names]
+    skeletons = [f"{actor_entity(name)}/skeleton" for name in names]
     views = []
     for name in shown:
         origin = camera_entity(name)
@@ -47,7 +47,7 @@ def comparison_layout(
     camera = camera_entity(recording.rig.names[0])
     columns = []
     for run in runs:
-        own = f"/world/runs/{run}/**"
+        own = f"{run_entity(run)}/**"
         contents = [own, "/world/truth/**"]
         scene = rrb.Spatial3DView(origin="/world", contents=contents, name=run, eye_controls=eye)
         views: list[rrb.Spatial3DView | rrb.Spatial2DView] = [scene]

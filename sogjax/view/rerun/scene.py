@@ -8,7 +8,7 @@ from sogjax.data.motion import Motion
 from sogjax.data.recording import Recording
 from sogjax.view.bones import Bones, actor_palette
 from sogjax.view.picture_camera import PictureCamera
-from sogjax.view.rerun.timelines import FRAME, TIME, camera_entity, time_columns
+from sogjax.view.rerun.names import FRAME, TIME, camera_entity, time_columns
 
 
 def log_cameras(

@@ -1,4 +1,4 @@
-"""Names in a Rerun file: its timelines and the entities of cameras."""
+"""Names in a Rerun file: its timelines, and the entities of cameras, actors and runs."""
 
 import numpy as np
 import rerun as rr
@@ -11,7 +11,22 @@ FRAME, TIME, ITERATION = "frame", "time", "iteration"
 
 def camera_entity(camera: str) -> str:
     """The entity of a camera."""
-    return f"/world/cameras/{camera}"
+    return f"/world/cameras/{entity_part(camera)}"
+
+
+def actor_entity(actor: str) -> str:
+    """The entity of an actor."""
+    return f"/world/actors/{entity_part(actor)}"
+
+
+def run_entity(run: str) -> str:
+    """The entity of one run of several."""
+    return f"/world/runs/{entity_part(run)}"
+
+
+def entity_part(name: str) -> str:
+    """Any name as one part of an entity's path."""
+    return rr.escape_entity_path_part(name)
 
 
 def time_columns(motion: Motion) -> list[rr.TimeColumn]:

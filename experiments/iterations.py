@@ -1,0 +1,77 @@
+"""What way does a solver take within a frame?
+
+python experiments/iterations.py [recording=walk:0] [frame=20] [options=[solver=lbfgs]] [to=iterations.rrd]
+
+Tracks up to the frame, prints the energy and how far blobs moved after each of the iterations there, and writes
+them for Rerun: the skeleton on a timeline of iterations, and every joint's way as a line.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+
+from sogjax.app.composition import composed
+from sogjax.app.configs import ReportConfig, TrackConfig
+from sogjax.app.overrides import quoted_value
+from sogjax.app.script import machine_line, run_script, settings_from
+from sogjax.app.study.source import Source, source_named
+from sogjax.data.motion import Motion, motion_from_poses
+from sogjax.data.video import read_frames
+from sogjax.errors import InputError
+from sogjax.track.iterations import best_after
+from sogjax.track.tracker import TrackState, track
+from sogjax.view.rerun import write_iterations
+
+
+@dataclass
+class Settings:
+    """What is tracked, as `key=value` on the command line."""
+
+    recording: str = ReportConfig().recordings[0]
+    frame: int = 20
+    """Counted from the recording's first."""
+    options: list[str] = field(default_factory=list)
+    """Of track."""
+    out: str = ReportConfig().out
+    """Where actors and cells are kept."""
+    to: str = "iterations.rrd"
+
+
+def main() -> None:
+    """Print a line for each iteration, and write the file."""
+    settings = settings_from(Settings)
+    source = source_named(settings.recording, settings.frame + 1, Path(settings.out))
+    if not 0 < settings.frame < source.num_frames or len(source.bodies) > 1:
+        raise InputError(
+            f"frame={settings.frame}: choose one of 1 to {source.num_frames - 1}, of a recording of one person"
+        )
+    steps, energies = watched(source, settings.options, settings.frame)
+    print(machine_line())
+    previous = steps.blob_means[0]
+    for number, (energy, blobs) in enumerate(zip(energies, steps.blob_means, strict=True)):
+        moved = 1000.0 * float(np.linalg.norm(blobs - previous, axis=-1).max())
+        print(f"iteration {number:3}   energy {energy:.6f}   a blob moved by up to {moved:6.1f} mm")
+        previous = blobs
+    pictures = next(iter(read_frames(source.recording, settings.frame, settings.frame + 1)))
+    write_iterations(Path(settings.to), source.recording, steps, energies, pictures)
+    print(settings.to)
+
+
+def watched(source: Source, options: list[str], frame: int) -> tuple[Motion, np.ndarray]:
+    """The poses after 0, 1, 2, ... iterations in a frame, as a motion, and their energies."""
+    config: TrackConfig = composed("track", [f"recording={quoted_value(str(source.path))}", *options])
+    cameras = source.cameras(None)
+    tracker, cells = source.tracker(config, cameras), source.cells(config.images.depth, cameras, 1)
+    state = TrackState.from_pose(source.start)
+    tracked = list(track(tracker, state, cells[: frame + 1]))
+    for done in tracked[:-1]:
+        state = state.advanced(jnp.asarray(done.result.pose))
+    counts = jnp.arange(int(tracked[-1].result.iterations) + 1)
+    poses, energies = best_after(tracker, state, jnp.asarray(cells[frame]), tracked[-1].capacities, counts)
+    return motion_from_poses(source.bodies[0], np.asarray(poses), source.recording.fps), np.asarray(energies)
+
+
+if __name__ == "__main__":
+    run_script(main)
