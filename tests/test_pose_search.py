@@ -17,7 +17,7 @@ from sogjax.track.culling import ImageReader
 from sogjax.track.frame_views import FrameViews, levels
 from sogjax.track.limbs import limbs, with_other_limb
 from sogjax.track.place_search import nearest_point, possible_places, well_seen
-from sogjax.track.pose_search import search_pose, search_poses
+from sogjax.track.pose_search import search_pose, search_poses, strain
 
 RIG = ring_rig(4, (320, 240), distance=2.5)
 WEIGHTS = EnergyWeights(limit_weight=1.0, acceleration_weight=0.0)
@@ -105,3 +105,14 @@ def test_variants_differ_in_one_limb_only_and_are_all_different():
     np.testing.assert_array_equal(variants[0], pose)
     apart = np.abs(variants[:, None, limb] - variants[None, :, limb]).max(-1)
     assert np.all(apart[~np.eye(len(variants), dtype=bool)] > 1e-3)
+
+
+def test_strain_counts_joints_near_the_end_of_their_range():
+    human = shipped("human")
+    at = lambda **values: float(strain(human.skeleton, jnp.asarray(moved(human, human.poses["rest"], values))))
+    assert at() == 0.0
+    assert at(root_x=50.0, root_yaw=9.0, left_elbow=0.0, left_hip_bend=1.2) == 0.0
+    np.testing.assert_allclose(at(left_hip_twist=-0.9, right_hip_twist=0.9), 2.0, atol=1e-5)
+    np.testing.assert_allclose(at(spine_twist=0.85), 0.25, atol=1e-5)
+    np.testing.assert_allclose(at(spine_twist=5.0), 1.0, atol=1e-5)
+    assert at(left_elbow=-0.1) == 0.0  # its range ends a little behind straight, which is no strain

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import equinox as eqx
 import jax
@@ -12,6 +13,7 @@ from jaxtyping import Array, Bool, Float, Int
 from sogjax.energy.objective import EnergyWeights, History, Views, energy
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
+from sogjax.model.skeleton import Skeleton
 from sogjax.solve import ConditionedAscent, Scales
 from sogjax.track.frame_views import FrameViews
 from sogjax.track.initial_pose import body_centre, placed, root_position, shifts, turned
@@ -31,6 +33,11 @@ AT_ONCE = 4
 """Poses that are climbed in one call."""
 LIMB_ITERATIONS = 25
 """For each pose in which one limb is tried another way."""
+STRAIN_COST = 0.005
+"""Share of the energy that each joint at the end of its range costs. Two legs of one colour may be exchanged with
+hardly a difference in the pictures, but not without twisting the pelvis and the hips."""
+STRAINED, NARROWEST = 0.7, 0.5
+"""Part of a joint's range, from the rest pose, where strain begins; radians, the least range that is counted."""
 DIFFERENT = 0.1
 """Metres, mean distance of the blobs: poses farther apart are different optima."""
 
@@ -42,7 +49,7 @@ class FoundPose:
     pose: Float[Array, "dof"]
     energy: float
     margin: float
-    """(energy - energy of the next different optimum) / energy; 1 where there is no other."""
+    """(energy - energy of the next different optimum) / energy, less what strains cost; 1 where there is no other."""
 
 
 def search_pose(body: Body, frame: FrameViews, weights: EnergyWeights, up: str) -> FoundPose:
@@ -61,12 +68,19 @@ def search_pose(body: Body, frame: FrameViews, weights: EnergyWeights, up: str) 
         energies = jnp.where(_well_seen(body, poses, views.cameras), energies, -jnp.inf)
         best = _different(body, poses, energies, keep)
         poses, energies = poses[best], energies[best]
-    pose, energy_ = _better_limbs(body, poses, views, weights, scales)
-    poses, energies = jnp.concatenate([pose[None], poses]), jnp.append(energy_, energies)
-    best = _different(body, poses, energies, NUM_FINE)
-    poses, energies = poses[best], energies[best]
-    margin = 1.0 if len(energies) < 2 else float((energies[0] - energies[1]) / jnp.abs(energies[0]))
-    return FoundPose(poses[0], float(energies[0]), margin)
+    better = [_better_limbs(body, jnp.roll(poses, -k, axis=0), views, weights, scales) for k in range(len(poses))]
+    poses, energies = (jnp.stack(parts) for parts in zip(*better, strict=True))
+    likely = energies - STRAIN_COST * jnp.abs(energies) * jax.vmap(partial(strain, body.skeleton))(poses)
+    best = _different(body, poses, likely, NUM_FINE)
+    margin = 1.0 if len(best) < 2 else float((likely[best[0]] - likely[best[1]]) / jnp.abs(likely[best[0]]))
+    return FoundPose(poses[best[0]], float(energies[best[0]]), margin)
+
+
+def strain(skeleton: Skeleton, pose: Float[Array, "dof"]) -> Float[Array, ""]:
+    """How many joints are near the end of their range: each counts from 0 at `STRAINED` of it to 1 at the end."""
+    bound = jnp.where(pose < 0.0, -skeleton.dof_lower, skeleton.dof_upper)
+    part = jnp.abs(pose) / jnp.maximum(bound, NARROWEST)
+    return jnp.sum((jnp.clip(part - STRAINED, 0.0, 1.0 - STRAINED) / (1.0 - STRAINED)) ** 2)
 
 
 def _better_limbs(
