@@ -15,9 +15,10 @@ from sogjax.app import build
 from sogjax.app.cells import cells_of_clip
 from sogjax.app.composition import composed
 from sogjax.app.configs import TrackConfig
+from sogjax.app.job import Job, Run
 from sogjax.app.overrides import quoted_value
 from sogjax.app.recordings import actors_of, opened
-from sogjax.app.track import Job, Run, track_recording
+from sogjax.app.track import track_recording
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.recording import Recording
 from sogjax.evaluate import evaluate_motions

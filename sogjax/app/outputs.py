@@ -23,7 +23,7 @@ from sogjax.evaluate import evaluate_motions
 from sogjax.model.body import Body
 
 if TYPE_CHECKING:
-    from sogjax.app.track import Run
+    from sogjax.app.job import Run
 
 
 @contextmanager

@@ -15,10 +15,11 @@ from omegaconf.errors import OmegaConfBaseException
 from sogjax.app.compilation_cache import use_compilation_cache
 from sogjax.app.composition import composed
 from sogjax.app.configs import TrackConfig
+from sogjax.app.job import Run
 from sogjax.app.overrides import quoted_value
 from sogjax.app.progress import progress
 from sogjax.app.recordings import actors_of, opened
-from sogjax.app.track import Run, track_recording
+from sogjax.app.track import track_recording
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.errors import InputError
 from sogjax.evaluate import evaluate_motions
