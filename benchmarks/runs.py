@@ -23,9 +23,10 @@ from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.recording import Recording
 from sogjax.evaluate import evaluate_motions
 from sogjax.model.body import Body
+from sogjax.track.frame import TrackState
 from sogjax.track.many import track_many
 from sogjax.track.scan import track_clip
-from sogjax.track.tracker import TrackState, first_capacities
+from sogjax.track.tracker import first_capacities
 
 SOLVERS = ("gauss_newton", "lbfgs", "conditioned_ascent")
 FRAMES_OF_SWEEP = 8

@@ -23,7 +23,8 @@ from sogjax.data.source import look_at_source
 from sogjax.data.video import read_frames
 from sogjax.errors import InputError
 from sogjax.solve import GaussNewton
-from sogjax.track.tracker import PartialCells, track
+from sogjax.track.frame import PartialCells
+from sogjax.track.tracker import track
 
 LIGHT = ("outputs.overlay=false", "outputs.rerun=false", "outputs.bvh=false")
 

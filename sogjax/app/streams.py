@@ -27,7 +27,7 @@ from sogjax.errors import InputError
 from sogjax.images.cells import CellGrid
 from sogjax.model.body import Body, dof_slices, joint_slices
 from sogjax.model.color import to_rgb
-from sogjax.track.tracker import FrameResult
+from sogjax.track.frame import FrameResult
 
 PARTIAL = ".partial"
 """Ending of the folder with a motion that is not complete."""

@@ -7,7 +7,8 @@ from jaxtyping import Array, Float, Int, UInt8
 
 from sogjax.solve import ConditionedAscent, GaussNewton
 from sogjax.track.culling import Capacities
-from sogjax.track.tracker import Tracker, TrackState
+from sogjax.track.frame import TrackState
+from sogjax.track.tracker import Tracker
 
 
 @eqx.filter_jit
