@@ -90,25 +90,12 @@ def track_recording(recording: Recording, bodies: list[Body], config: TrackConfi
         return replace(result, motions=motions)
 
 
-STAGES = {
-    "decode": "waiting for decoded pictures",
-    "cells": "averaging pictures to cells",
-    "step": "tracking step",
-    "outputs": "writing results",
-    "whole": "decoding to pose, together",
-}
-
-
 def say_results(result: Run) -> None:
     """The tables on standard output, then the files."""
     if result.evaluation is not None:
         print(result.evaluation.table(details=False), end="\n\n")
-    for stage, text in STAGES.items():
-        rate = result.times.frames_per_second(stage)
-        if not np.isnan(rate):  # kept cells take no time
-            print(f"{text:<32}{rate:10.1f} frames/s")
-    if not np.isnan(first := result.times.first("whole")):
-        print(f"first frame, with compilation   {first:10.1f} s")
+    if table := result.times.table():
+        print(table)
     print(f"iterations                      {np.mean(result.iterations):10.1f} a frame", end="\n\n")
     for path in result.files:
         print(path)
