@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from sogjax.app.configs import EvaluateConfig
-from sogjax.app.outputs import free_path
+from sogjax.app.outputs import actor_name, free_path
 from sogjax.app.recordings import file_list
 from sogjax.data.ground_truth import GroundTruth, load_ground_truth
 from sogjax.data.motion import Motion, load_motion
@@ -34,7 +34,8 @@ def named_motions(paths: list[Path], truth: GroundTruth) -> dict[str, Motion]:
         InputError: a motion whose file name tells no subject of the truth.
     """
     if len(paths) == 1 and len(truth.subjects) < 2:
-        return {next(iter(truth.subjects), "actor"): load_motion(paths[0])}
+        motion = load_motion(paths[0])
+        return {next(iter(truth.subjects), actor_name(paths[0], motion)): motion}
     if not truth.subjects:
         raise InputError(f"motion={','.join(map(str, paths))}: the truth is that of one subject; give one motion")
     motions = {}

@@ -13,7 +13,7 @@ from sogjax.app.configs import OutputsConfig, TrackConfig
 from sogjax.app.first_pose import initial_pose_file
 from sogjax.app.job import Run, frame_range, tracking
 from sogjax.app.made_from import made_from
-from sogjax.app.outputs import evaluate, export_endings, write_results
+from sogjax.app.outputs import actor_name, evaluate, export_endings, write_results
 from sogjax.app.recordings import actors_of, file_list, opened, say
 from sogjax.app.run_folder import RunFolder, run_folder
 from sogjax.app.timing import StageTimes
@@ -71,10 +71,9 @@ def _ended(folder: RunFolder, recording: Recording) -> Run:
     """A run that ended before."""
     say(f"{folder.path}: the run has ended already; nothing is left to do")
     files = [folder.path / name for name in folder.note["files"]]
-    motions = [path for path in files if path.suffix == ".npz"]
-    name = lambda path: "actor" if len(motions) == 1 else path.stem.removeprefix("motion_")
-    loaded = {name(path): load_motion(path) for path in motions}
-    result = Run(recording, [], loaded, StageTimes(), float("nan"), files=files)
+    loaded = {path: load_motion(path) for path in files if path.suffix == ".npz"}
+    motions = {actor_name(path, motion): motion for path, motion in loaded.items()}
+    result = Run(recording, [], motions, StageTimes(), float("nan"), files=files)
     evaluate(result)
     return result
 
