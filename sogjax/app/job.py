@@ -47,7 +47,7 @@ class Run:
     """Used in a frame by a camera, on average."""
     evaluation: GroupEvaluation | None = None
     missing: dict[str, int] = field(default_factory=dict)
-    """Frames in which a camera had no picture, by camera; those that were tracked now."""
+    """Frames of the motion in which a camera had no picture, by camera."""
     files: list[Path] = field(default_factory=list)
 
     @property
@@ -128,7 +128,7 @@ def doing(
         say(f"{out}: {num_kept} of {last - first} frames are there; the run goes on behind them")
         follow = resumed(prefix, shown=not streams.num_skipped, with_images=outputs.rerun)
     used: list[float] = []
-    missing: Counter[str] = Counter()
+    missing = Counter(job.recording.num_missing(range(first, first + streams.num_skipped)))
     try:
         with streams:
             count = last - first - streams.num_skipped

@@ -73,7 +73,9 @@ def _ended(folder: RunFolder, recording: Recording) -> Run:
     files = [folder.path / name for name in folder.note["files"]]
     loaded = {path: load_motion(path) for path in files if path.suffix == ".npz"}
     motions = {actor_name(path, motion): motion for path, motion in loaded.items()}
-    result = Run(recording, [], motions, StageTimes(), float("nan"), files=files)
+    frames = next(iter(motions.values())).frame - recording.first_frame
+    missing = recording.num_missing(frames.tolist())
+    result = Run(recording, [], motions, StageTimes(), float("nan"), files=files, missing=missing)
     evaluate(result)
     return result
 

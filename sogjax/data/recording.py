@@ -1,5 +1,6 @@
 """A recording: a folder with synchronised videos, their calibration, and what else is known of them."""
 
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -74,6 +75,13 @@ class Recording:
         """Whether a camera's picture of a frame, counted from the recording's first, is not to be used."""
         number = self.first_frame + frame
         return any(first <= number <= last for first, last in self.missing.get(camera, ()))
+
+    def num_missing(self, frames: Iterable[int]) -> dict[str, int]:
+        """By camera how many of the frames (as in `has_image`) it has no picture of; none where it has all."""
+        shown = lambda camera, frame: self.has_image(camera, frame) and not self.is_missing(camera, frame)
+        frames = [] if self.complete else list(frames)
+        counts = {camera: sum(not shown(camera, frame) for frame in frames) for camera in self.rig.names}
+        return {camera: count for camera, count in counts.items() if count}
 
 
 def open_recording(path: Path) -> Recording:
