@@ -48,6 +48,8 @@ def run(config: ActorConfig) -> Path:
     print(f"silhouettes and masks agree to {report.mean_iou:.3f} (mean IoU)")
     if report.warnings:
         say(f"{len(report.warnings)} warnings: see {folder / 'report.md'}")
+    for note in report.notes:
+        say(f"note: {note}")
     print(out)
     print(folder / "report.md")
     return out
