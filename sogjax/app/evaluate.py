@@ -37,7 +37,7 @@ def truth_file(path: Path) -> Path:
         return path
     if not (path / "ground_truth.npz").is_file():
         raise InputError(
-            f"truth={path}: this folder holds no ground_truth.npz; give that file, or the folder of a recording with one"
+            f"truth={path}: this folder holds no ground_truth.npz; give that file, or a recording that has one"
         )
     return path / "ground_truth.npz"
 
