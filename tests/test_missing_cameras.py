@@ -263,8 +263,10 @@ def test_time_stamps_of_another_rate(tmp_path):
     assert [pair[1] for pair in frames_seen(open_recording(folder))][::2] == [1, 2]
 
 
-def test_what_checks_look_at_is_black_where_a_camera_is_missing(tmp_path):
+def test_checks_know_where_a_camera_is_missing(tmp_path):
     recording = open_recording(make_recording(tmp_path / "r", settings="up: z\nmissing: {right: [[1, 2]]}\n"))
     clip = read_clip(recording, 0, 4, lambda items, count, label: iter(items))
-    assert [int(frame.max()) > 0 for frame in clip.grey[1]] == [True, False, False, True]
-    assert all(frame.max() > 0 for frame in clip.grey[0])
+    assert clip.present.tolist() == [[True] * 4, [True, False, False, True]]
+    for pictures, present in zip(clip.grey, clip.present, strict=True):
+        assert [bool(picture.any()) for picture in pictures] == present.tolist()
+    assert {index: list(pictures) for index, pictures in clip.stills.items()} == {1: [0], 2: [0]}

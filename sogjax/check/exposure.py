@@ -96,12 +96,12 @@ def _finding(name: str, what: str, cause: str) -> Finding:
 
 
 def change_findings(
-    names: tuple[str, ...], references: Mapping[int, tuple[str, Picture]], filmed: Moment
+    names: tuple[str, ...], references: Mapping[int, tuple[str, Picture]], filmed: Mapping[int, Picture]
 ) -> list[Finding]:
-    """Cameras whose videos are exposed otherwise than a still picture that they took of the same place."""
+    """Cameras whose videos (a picture of each) are exposed otherwise than a still that they took of the same place."""
     findings = []
     for camera, (label, picture) in references.items():
-        gains = same_place_gains(picture, filmed.pictures[camera])
+        gains = same_place_gains(picture, filmed[camera]) if camera in filmed else None
         if gains is None:
             continue
         low, high = float(gains.min()), float(gains.max())

@@ -8,12 +8,13 @@ other's where a calibration is wrong.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import cv2
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Bool, Float, UInt8
 
 from sogjax.check.clip import Clip
 from sogjax.data.calibration import CameraRig
@@ -24,6 +25,8 @@ BLUR = 1.5
 """Pixels; takes noise and coding artefacts out."""
 NOISE_FACTOR, NOISE_FLOOR = 4.0, 1.0
 """Differences of grey values count above this many medians of a picture's differences, and above this value."""
+FEWEST_COMMON = 5
+"""Steps that two cameras must both see, for their motion to be compared."""
 TAILS = 0.01
 """Share of the motion at either end that the pencil of planes need not hold."""
 
@@ -37,32 +40,54 @@ class CameraMotion:
     """What moves in one camera's pictures."""
 
     energy: Float[np.ndarray, "step pixel"]
-    """How much each pixel changes from a frame to the next: roots of grey values, 0 for noise."""
+    """How much each pixel changes from a frame to the next: roots of grey values, 0 for noise.
+
+    NaN in steps from or to a frame in which the camera is missing.
+    """
     shape: tuple[int, int]
     """Rows and columns of the pixels."""
     rays: Float[np.ndarray, "pixel 3"]
     """The pixels' directions in the world, unit vectors."""
     centre: Float[np.ndarray, "3"]
 
+    @cached_property
+    def total(self) -> Float[np.ndarray, "pixel"]:
+        """How much each pixel changes in all the steps that are seen."""
+        return np.nansum(self.energy, axis=0)
+
+    @property
+    def num_seen(self) -> int:
+        """Steps in which the camera is not missing."""
+        return int((~np.isnan(self.energy[:, 0])).sum())
+
+    @property
+    def mean(self) -> float:
+        """How much a pixel changes in a step on average."""
+        return float(self.total.mean()) / max(self.num_seen, 1)
+
     @property
     def direction(self) -> Float[np.ndarray, "3"]:
         """The mean direction of what moves."""
-        mean = self.energy.sum(axis=0) @ self.rays
+        mean = self.total @ self.rays
         return mean / max(float(np.linalg.norm(mean)), 1e-12)
 
 
 def motion_of(clip: Clip) -> list[CameraMotion]:
     """What moves in each camera of a clip."""
     rig = clip.recording.rig
-    return [_camera_motion(rig, name, grey) for name, grey in zip(rig.names, clip.grey, strict=True)]
+    rows = zip(rig.names, clip.grey, clip.present, strict=True)
+    return [_camera_motion(rig, name, grey, present) for name, grey, present in rows]
 
 
-def _camera_motion(rig: CameraRig, name: str, grey: UInt8[np.ndarray, "frame h w"]) -> CameraMotion:
+def _camera_motion(
+    rig: CameraRig, name: str, grey: UInt8[np.ndarray, "frame h w"], present: Bool[np.ndarray, "frame"]
+) -> CameraMotion:
     energy = frame_differences(grey)
     shape = (max(1, grey.shape[1] // 2), max(1, grey.shape[2] // 2))
     small = np.empty((len(energy), *shape), np.float32)
     for k, step in enumerate(energy):
         small[k] = cv2.resize(step, shape[::-1], interpolation=cv2.INTER_AREA)
+    small[~(present[1:] & present[:-1])] = np.nan
     return CameraMotion(np.sqrt(small).reshape(len(small), shape[0] * shape[1]), shape, *world_rays(rig, name, shape))
 
 
@@ -103,8 +128,11 @@ def world_rays(
 def barcodes(
     first: CameraMotion, second: CameraMotion
 ) -> tuple[Float[np.ndarray, "step plane"], Float[np.ndarray, "_step plane"]] | None:
-    """How much moves in each plane through two cameras, at each step, seen by either; None where nothing moves."""
-    if not (first.energy.any() and second.energy.any()):
+    """How much moves in each plane through two cameras, at each step, seen by either; None where nothing moves.
+
+    NaN in steps in which a camera is missing.
+    """
+    if not (first.total.any() and second.total.any()):
         return None
     baseline = second.centre - first.centre
     axis = baseline / max(float(np.linalg.norm(baseline)), 1e-12)
@@ -116,11 +144,11 @@ def barcodes(
     towards = towards / length
     across = np.cross(axis, towards)
     angles = [np.arctan2(motion.rays @ across, motion.rays @ towards) for motion in (first, second)]
-    ranges = [_range(motion.energy.sum(axis=0), angle) for motion, angle in zip((first, second), angles, strict=True)]
+    ranges = [_range(motion.total, angle) for motion, angle in zip((first, second), angles, strict=True)]
     low, high = min(low for low, _ in ranges), max(high for _, high in ranges)
     return (
-        _binned(first.energy, angles[0], low, high),
-        _binned(second.energy, angles[1], low, high),
+        _binned(first, angles[0], low, high),
+        _binned(second, angles[1], low, high),
     )
 
 
@@ -140,17 +168,21 @@ def _range(weights: Float[np.ndarray, "pixel"], angles: Float[np.ndarray, "pixel
 
 
 def _binned(
-    energy: Float[np.ndarray, "step pixel"], angles: Float[np.ndarray, "pixel"], low: float, high: float
+    motion: CameraMotion, angles: Float[np.ndarray, "pixel"], low: float, high: float
 ) -> Float[np.ndarray, "step plane"]:
     number = np.floor((angles - low) / (high - low) * NUM_PLANES).astype(int)
-    used = np.flatnonzero((number >= 0) & (number < NUM_PLANES) & energy.any(axis=0))
+    used = np.flatnonzero((number >= 0) & (number < NUM_PLANES) & (motion.total > 0.0))
     chosen = np.zeros((len(used), NUM_PLANES), np.float32)
     chosen[np.arange(len(used)), number[used]] = 1.0
-    return energy[:, used] @ chosen
+    return motion.energy[:, used] @ chosen
 
 
 def correlation(a: Float[np.ndarray, "step plane"], b: Float[np.ndarray, "_step plane"]) -> float:
-    """Normalised correlation over time and planes, the mean of each plane taken off."""
+    """Normalised correlation over time and planes, the mean of each plane taken off; 0 where little is seen by both."""
+    both = ~(np.isnan(a).any(axis=1) | np.isnan(b).any(axis=1))
+    if both.sum() < FEWEST_COMMON:
+        return 0.0
+    a, b = a[both], b[both]
     a, b = a - a.mean(axis=0), b - b.mean(axis=0)
     return float((a * b).sum() / np.sqrt(float((a * a).sum()) * float((b * b).sum()) + 1e-12))
 
