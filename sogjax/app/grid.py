@@ -30,6 +30,7 @@ from sogjax.data.recording import Recording
 from sogjax.data.video import read_prepared
 from sogjax.errors import InputError
 from sogjax.model.body import Body
+from sogjax.sentences import counted
 from sogjax.track.many import member, same_program, track_many
 from sogjax.track.scan import replayed
 
@@ -103,7 +104,7 @@ def grid_runs(
     """
     jobs = grid_jobs(recording, bodies, configs)
     cells = cells_of_clip(recording, jobs[0].grids, configs[0].images, jobs[0].frames)
-    say(f"{len(jobs)} runs of {len(cells)} frames in one call")
+    say(f"{counted(len(jobs), 'run')} of {counted(len(cells), 'frame')} in one call")
     begin = time.perf_counter()
     starts = jnp.stack([job.start for job in jobs])
     common_boxes = configs[0].solver.method in STEADY

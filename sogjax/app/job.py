@@ -28,6 +28,7 @@ from sogjax.errors import InputError
 from sogjax.evaluate import GroupEvaluation
 from sogjax.images.cells import CellGrid, stack_shape
 from sogjax.model.body import Body, concatenate
+from sogjax.sentences import counted
 from sogjax.track.tracker import Tracker, compile_counts, track
 
 FRAMES_BEHIND = 8
@@ -125,7 +126,7 @@ def doing(
     num_kept = 0 if prefix is None else prefix.num_frames
     streams = Streams(out, job.recording, job.bodies, job.recording.first_frame + first, outputs, times, kept, num_kept)
     if prefix is not None:
-        say(f"{out}: {num_kept} of {last - first} frames are there; the run goes on behind them")
+        say(f"{out}: {num_kept} of {counted(last - first, 'frame')} are there; the run goes on behind them")
         follow = resumed(prefix, shown=not streams.num_skipped, with_images=outputs.rerun)
     used: list[float] = []
     missing = Counter(job.recording.num_missing(range(first, first + streams.num_skipped)))

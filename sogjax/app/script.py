@@ -23,6 +23,7 @@ from sogjax.app.track import track_recording
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.errors import InputError
 from sogjax.evaluate import evaluate_motions
+from sogjax.sentences import counted
 from sogjax.synth import SynthSettings, cached_recording
 from sogjax.synth.cache import default_cache_dir
 
@@ -87,9 +88,9 @@ def machine_line() -> str:
 
 def machine_facts() -> str:
     """Processor, cores, versions and date."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return (
-        f"{_processor()}, {cores} cores, {jax.default_backend()}, Python {platform.python_version()}, "
+        f"{_processor()}, {counted(cores, 'core')}, {jax.default_backend()}, Python {platform.python_version()}, "
         f"jax {jax.__version__}, {datetime.date.today()}"
     )
 

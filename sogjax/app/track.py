@@ -21,6 +21,7 @@ from sogjax.data.motion import arrays_of, load_motion
 from sogjax.data.motion_log import PER_FRAME, SOMETIMES_PER_FRAME
 from sogjax.data.recording import Recording
 from sogjax.model.body import Body
+from sogjax.sentences import counted
 
 _ROWS = (*PER_FRAME, *SOMETIMES_PER_FRAME)
 
@@ -100,11 +101,12 @@ def say_results(result: Run) -> None:
     print(f"iterations                      {np.mean(result.iterations):10.1f} a frame", end="\n\n")
     for path in result.files:
         print(path)
+    frames = counted(len(result.converged), "frame")
     for camera, count in result.missing.items():
-        say(f"warning: {camera} had no picture in {count} of {len(result.converged)} frames; the others were used")
+        say(f"warning: {camera} had no picture in {count} of {frames}; the others were used")
     not_converged = int(np.sum(~result.converged))
     if not_converged:
         say(
-            f"warning: {not_converged} of {len(result.converged)} frames did not converge within "
+            f"warning: {not_converged} of {frames} did not converge within "
             "solver.max_iterations; look at them in the overlay"
         )

@@ -173,6 +173,6 @@ def synchrony_findings(
         cause = "little of the motion is in their pictures, or their calibration or names are wrong"
         findings.append(Finding("note", "synchronisation", what, cause, cameras=unsure))
     if not late:
-        what = f"{int(found.sure.sum()) - len(jumped)} of {len(found.names)} cameras are in step"
+        what = f"in step: {int(found.sure.sum()) - len(jumped)} of {counted(len(found.names), 'camera')}"
         findings.append(Finding("ok", "synchronisation", what))
     return findings
