@@ -14,10 +14,11 @@ from rig_cases import ring_rig
 from small_recording import make_recording, shared_recording, toml_camera, write_calibration
 
 from sogjax.check.agreement import smallest_shift
+from sogjax.check.barcodes import barcodes, correlation, lag_curve
 from sogjax.check.cameras import camera_findings, nearest_point, rig_geometry
 from sogjax.check.examination import examined
 from sogjax.check.exposure import exposure, exposure_findings
-from sogjax.check.motion import CameraMotion, barcodes, correlation, lag_curve
+from sogjax.check.motion import CameraMotion
 from sogjax.check.silhouettes import Moment
 from sogjax.check.synchronisation import synchrony
 from sogjax.data.offsets_file import write_frame_offsets

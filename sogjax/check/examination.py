@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from sogjax.check.agreement import hulls_of
+from sogjax.check.barcodes import pair_barcodes
 from sogjax.check.calibration import calibration_findings
 from sogjax.check.cameras import RigGeometry, camera_findings, rig_geometry
 from sogjax.check.clip import Clip, Progress, black_picture, read_clip
@@ -22,7 +23,7 @@ from sogjax.check.frames import (
 )
 from sogjax.check.hypotheses import unit_rig
 from sogjax.check.jumps import Jump, find_jumps
-from sogjax.check.motion import motion_of, pair_barcodes, with_rig
+from sogjax.check.motion import motion_of, with_rig
 from sogjax.check.places import place_findings, references_of
 from sogjax.check.scale import scale_findings, subject_size
 from sogjax.check.silhouettes import Moment, example_moments, plates_of, video_moments, without_masks_of

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from sogjax.check.barcodes import PairCodes, lag_curve
 from sogjax.check.findings import Finding, listed
-from sogjax.check.motion import PairCodes, lag_curve
 from sogjax.sentences import counted
 
 ALIKE = 0.4
