@@ -14,10 +14,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from sogjax.app.composition import composed
+from sogjax.app.job import tracking
 from sogjax.app.overrides import quoted_value
 from sogjax.app.recordings import actors_of, opened
 from sogjax.app.script import machine_line, run_script, settings_from
-from sogjax.app.track import tracking
 from sogjax.data.recording import Recording
 from sogjax.data.source import open_source
 from sogjax.data.video import VideoWriter

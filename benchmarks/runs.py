@@ -15,16 +15,18 @@ from sogjax.app import build
 from sogjax.app.cells import cells_of_clip
 from sogjax.app.composition import composed
 from sogjax.app.configs import TrackConfig
+from sogjax.app.job import Job, Run
 from sogjax.app.overrides import quoted_value
 from sogjax.app.recordings import actors_of, opened
-from sogjax.app.track import Job, Run, track_recording
+from sogjax.app.track import track_recording
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.recording import Recording
 from sogjax.evaluate import evaluate_motions
 from sogjax.model.body import Body
+from sogjax.track.frame import TrackState
 from sogjax.track.many import track_many
 from sogjax.track.scan import track_clip
-from sogjax.track.tracker import TrackState, first_capacities
+from sogjax.track.tracker import first_capacities
 
 SOLVERS = ("gauss_newton", "lbfgs", "conditioned_ascent")
 FRAMES_OF_SWEEP = 8

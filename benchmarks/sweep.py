@@ -22,12 +22,12 @@ from sogjax.app import build
 from sogjax.app.cells import cells_of, cells_of_clip
 from sogjax.app.composition import composed
 from sogjax.app.configs import ImagesConfig
+from sogjax.app.job import Job
 from sogjax.app.overrides import quoted_value
 from sogjax.app.pipeline import Preparation
 from sogjax.app.progress import progress
 from sogjax.app.recordings import actors_of, opened
 from sogjax.app.script import machine_line, run_script, settings_from
-from sogjax.app.track import Job
 from sogjax.data.video import read_prepared
 from sogjax.synth import SynthSettings, cached_recording
 from sogjax.track.many import track_many

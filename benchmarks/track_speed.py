@@ -3,7 +3,7 @@
 python benchmarks/track_speed.py [recording=FOLDER] [frames=60] [overrides=[solver=lbfgs,...]]
 
 Without a recording the demo's is used, rendered now if it is not there yet. The first frame, which compiles, is
-left out of every rate. `decode` is the time that tracking waits for pictures that threads decode ahead.
+left out of every rate. What is waited for are pictures that threads decode ahead.
 """
 
 import time
@@ -14,7 +14,6 @@ from sogjax.app.configs import DemoConfig
 from sogjax.app.progress import progress
 from sogjax.app.script import machine_line, run_script, settings_from, track_folder
 from sogjax.app.sweep import row_numbers
-from sogjax.app.track import STAGES
 from sogjax.data.recording import open_recording
 from sogjax.data.video import read_frames
 from sogjax.synth import SynthSettings, cached_recording
@@ -42,10 +41,8 @@ def main() -> None:
     print(f"{recording.name}: {len(recording.rig.names)} cameras, {width}x{height}, {frames} frames")
     print(f"{result.image_blobs:.0f} image blobs used a camera; {numbers['iterations']:.1f} iterations a frame")
     print(f"markers {numbers['mean mm']:.1f} mm, std {numbers['std mm']:.1f} mm, {numbers['lost']:.0f} lost\n")
-    for stage, text in STAGES.items():
-        print(f"{text:<34}{result.times.frames_per_second(stage):10.1f} frames/s")
-    print(f"{'decoding alone':<34}{decoding_rate(folder, frames):10.1f} frames/s")
-    print(f"{'first frame, with compilation':<34}{result.times.first('whole'):10.1f} s")
+    print(result.times.table())
+    print(f"{'decoding alone':<32}{decoding_rate(folder, frames):10.1f} frames/s")
 
 
 def demo_recording() -> Path:

@@ -18,7 +18,7 @@ from sogjax.actor.report import actor_report
 from sogjax.actor.shape import ShapeModel
 from sogjax.actor.silhouette_iou import body_silhouette, overlap_ratio, silhouette_iou
 from sogjax.actor.silhouettes import PosedPictures
-from sogjax.app.actor_report import report_folder, write_actor_report
+from sogjax.app.actor_report import report_folder, report_page, write_actor_report
 from sogjax.model.body import Attachments, Body
 from sogjax.view.body_picture import BACKGROUND, body_picture
 from sogjax.view.silhouette_sheet import BOTH, ONLY_BODY, ONLY_MASK, SilhouetteView, silhouette_sheet
@@ -149,12 +149,13 @@ def test_a_good_actor_has_nothing_to_warn_of():
     assert DISC == 1.35
     for bone in report.bones:
         assert bone.after == pytest.approx(1.1 * bone.before, rel=1e-4)
-    assert report.warnings == ()
+    assert report.warnings == report.notes == ()
+    assert "## Notes" not in report_page(report)
 
 
 def test_what_the_pictures_did_not_tell_is_said():
     made = made_dog()
-    made.shape_deviations[3] = 0.099
+    made.shape_deviations[3], made.shape_deviations[5] = 0.099, np.nan
     elbow = list(made.body.skeleton.dof_names).index("root_yaw")
     made.pose_deviations[:, elbow] = (0.5, 0.4)
     place = list(made.body.skeleton.dof_names).index("root_x")
@@ -166,18 +167,23 @@ def test_what_the_pictures_did_not_tell_is_said():
         replace(made.pictures[0], warnings=("example pose 'stand': cam1 is left out",)),
         replace(made.pictures[1], masks=masks),
     )
-    left_out, poor, size, first, second = sorted(actor_report(made, RIG).warnings, key=_kind)
+    report = actor_report(made, RIG)
+    left_out, poor, first, second = sorted(report.warnings, key=_kind)
     assert left_out == "example pose 'stand': cam1 is left out"
     assert "'turned'" in poor
     assert "silhouettes_turned.png" in poor
-    assert size.startswith(f"{made.shape_names[3]} was not determined by the pictures: kept near")
+    (sizes,) = report.notes
+    assert all(f"{made.shape_names[k]} (by " in sizes for k in (3, 5))
+    assert sizes.count("(by ") == 2
+    assert "by 10%, without pictures 10%" in sizes
+    assert f"## Notes\n\n- {sizes}" in report_page(report)
     assert {first.split()[0], second.split()[0]} == {"root_x", "root_yaw"}
     assert "200 mm" in first + second
     assert "23 degrees" in first + second
 
 
 def _kind(warning):
-    kinds = ("left out", "silhouettes agree", "not determined", "never seen well")
+    kinds = ("left out", "silhouettes agree", "never seen well")
     return next(k for k, words in enumerate(kinds) if words in warning)
 
 

@@ -1,6 +1,7 @@
 """`sogjax check`: a rendered recording has nothing wrong; each fault put into it is found, and named."""
 
 import json
+from dataclasses import replace
 
 import cv2
 import faulty_recording as faulty
@@ -13,9 +14,12 @@ from rig_cases import ring_rig
 from small_recording import make_recording, shared_recording, toml_camera, write_calibration
 
 from sogjax.check.agreement import smallest_shift
+from sogjax.check.barcodes import barcodes, correlation, lag_curve
 from sogjax.check.cameras import camera_findings, nearest_point, rig_geometry
 from sogjax.check.examination import examined
-from sogjax.check.motion import CameraMotion, barcodes, correlation, lag_curve
+from sogjax.check.exposure import exposure, exposure_findings
+from sogjax.check.motion import CameraMotion
+from sogjax.check.silhouettes import Moment
 from sogjax.check.synchronisation import synchrony
 from sogjax.data.offsets_file import write_frame_offsets
 from sogjax.data.recording import open_recording
@@ -109,6 +113,76 @@ def test_a_frame_that_was_lost(tmp_path):
 def test_a_camera_exposed_otherwise(tmp_path):
     found = looked_at(tmp_path / "walk", faulty.darkened)
     assert {(finding.topic, finding.cameras) for finding in warnings(found)} == {("exposure", (WRONG,))}
+
+
+def left_out(folder, camera, *spans):
+    """A camera whose pictures are not to be used in some frames."""
+    path = folder / "recording.yaml"
+    path.write_text(yaml.safe_dump(yaml.safe_load(path.read_text()) | {"missing": {camera: [list(s) for s in spans]}}))
+
+
+def test_missing_pictures_are_left_out_of_every_comparison(tmp_path):
+    """A late start, a gap that holds both stills, and nothing is wrong; in a shorter one offsets are sure as ever."""
+    found = looked_at(tmp_path / "walk", lambda folder: left_out(folder, WRONG, (0, 1), (13, 26)))
+    assert not warnings(found)
+    assert not found.offsets
+    assert found.numbers["repeated_frames"] == {}
+    assert any(f.topic == "frames" and f"{WRONG} in 16" in f.what for f in found.findings)
+    assert not found.pictures[int(WRONG[-2:])].any()
+
+    def late(folder):
+        faulty.started_late(folder)
+        left_out(folder, OTHER, (12, 16))
+
+    found = looked_at(tmp_path / "late", late)
+    assert [(finding.topic, finding.cameras) for finding in warnings(found)] == [("synchronisation", (WRONG,))]
+    assert {name: offset for name, offset in found.offsets.items() if offset} == {WRONG: -3}
+    assert found.numbers["synchronisation"][OTHER]["sure"]
+
+
+def test_a_camera_with_hardly_a_picture_is_not_said_to_be_out_of_step(tmp_path):
+    found = looked_at(tmp_path / "walk", lambda folder: left_out(folder, WRONG, (4, 39)))
+    assert not warnings(found)
+    assert not [finding for finding in found.findings if finding.severity == "note" and finding.topic != "frames"]
+
+
+def test_steps_that_one_camera_has_not_seen_do_not_count():
+    rng = np.random.default_rng(2)
+    a, b = rng.random((30, 8)), rng.random((30, 8))
+    b[:20] += a[:20]
+    gone = rng.permutation(30)[:12]
+    partly = b.copy()
+    partly[gone] = np.nan
+    rest = np.delete(np.arange(30), gone)
+    assert correlation(a, partly) == pytest.approx(correlation(a[rest], b[rest]))
+    partly[rest[4:]] = np.nan
+    assert correlation(a, partly) == 0.0
+
+
+def test_a_clip_that_is_too_short_is_said_to_be_so(tmp_path):
+    """One frame of those that are there, and all of a recording that has few."""
+    recording = open_recording(copied(tmp_path / "walk"))
+    for have, frames, words in ((recording, 8, "give frames=9"), (replace(recording, num_frames=1), 9, "record more")):
+        told = examined(have, 0, frames, 8, lambda items, count, label: iter(items)).findings
+        (note,) = (finding for finding in told if finding.topic == "synchronisation")
+        assert f"too short, {min(have.num_frames, frames)} frame" in note.what
+        assert "of 9 needed" in note.what
+        assert words in note.remedy
+
+
+def test_exposure_compares_those_whose_subject_is_known():
+    """Four cameras show the same subject before walls of other brightness; where it is in the last one is not known."""
+    mask = np.zeros((20, 30), bool)
+    mask[5:15, 10:20] = True
+    levels, walls = (100, 100, 60, 100), (10, 200, 90, 240)
+    pictures = {k: np.where(mask[..., None], level, wall).astype(np.uint8) + np.zeros((20, 30, 3), np.uint8)
+                for k, (level, wall) in enumerate(zip(levels, walls, strict=True))}  # fmt: skip
+    found = exposure([Moment("one", False, pictures, dict.fromkeys(range(3), mask))], 4)
+    assert found.of_subject
+    np.testing.assert_allclose(found.gains, [[1.0] * 3, [1.0] * 3, [0.6] * 3, [np.nan] * 3])
+    (finding,) = exposure_findings(("a", "b", "c", "d"), found, "example poses")
+    assert finding.cameras == ("c",)
+    assert not exposure([Moment("one", False, pictures, dict.fromkeys(range(2), mask))], 4).of_subject
 
 
 @pytest.mark.parametrize("name", ["real_tpose"])

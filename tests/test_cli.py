@@ -51,6 +51,13 @@ def test_from_a_recording_to_motion_and_pictures(capsys, tmp_path, monkeypatch, 
 
     again, _ = done(capsys, "evaluate", "motion=run/motion.npz", f"truth={rendered / 'ground_truth.npz'}", "out=e.json")
     assert f"all markers{printed:21.1f}" in again
+    assert done(capsys, "evaluate", "motion=run/motion.npz", f"truth={rendered}")[0] == again.removesuffix("e.json\n")
+    sentence = refused(capsys, "evaluate", "motion=run/motion.npz", "truth=run")
+    assert "truth=run: this folder holds no ground_truth.npz" in sentence
+    formats = ("outputs.overlay_width=320", "outputs.formats=[trc,glb]")
+    ended, _ = done(capsys, *track, "out=run", "start=1", *formats, "resume=true")
+    titles = [re.search(r"^(\w+) +mean ", text, re.MULTILINE) for text in (out, again, ended)]
+    assert [title and title[1] for title in titles] == ["puppet"] * 3
     assert json.loads((tmp_path / "e.json").read_text())["all"] == metrics["all"]
 
     done(capsys, "export", "motion=run/motion.npz", "to=walk.bvh")

@@ -25,7 +25,7 @@ from sogjax.track.culling import (
     capacity_for,
     union_boxes,
 )
-from sogjax.track.tracker import TrackState
+from sogjax.track.frame import TrackState
 
 CULLED = 2e-3
 """Part of the similarity that may be lost with the image blobs left out (tails of Gaussians beyond the box)."""

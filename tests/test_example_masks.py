@@ -106,7 +106,7 @@ def test_a_plate_that_is_not_empty_is_left_out_and_said(tmp_path):
     ("given", "words"),
     [
         ({}, ("'stand' has 0 pictures with a mask", "CAMERA.mask.png", "background", "cam0, cam1, cam2, cam3")),
-        ({"masks": (1,)}, ("'stand' has 1 pictures with a mask", "for cam0, cam2, cam3")),
+        ({"masks": (1,)}, ("'stand' has 1 picture with a mask", "for cam0, cam2, cam3")),
         ({"pictures": (2,), "masks": (2,)}, ("'stand' has pictures of 1 of the cameras", "at least two")),
     ],
 )

@@ -109,7 +109,7 @@ THREE = {"pelvis": (0.0, 0.0, 1.0), "neck": (0.0, 0.0, 1.5), "head_top": (0.0, 0
         (describe("sprint", (0.0, 0.0, 1.0)), "unknown pose 'sprint'.*tpose"),
         (describe({"left_wing": 0.1}, (0.0, 0.0, 1.0)), "unknown degree of freedom 'left_wing'.*left_elbow"),
         (describe(landmarks=THREE | {"left_antenna": (0.0, 0.0, 2.0)}), "unknown landmark left_antenna.*left_elbow"),
-        (describe(landmarks=THREE), "3 landmarks are too few.*at least 4"),
+        (describe(landmarks=THREE), "3 landmarks cannot fit.*at least 4"),
         (describe("rest"), "neither `position` nor `landmarks`"),
     ],
 )

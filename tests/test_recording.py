@@ -343,3 +343,20 @@ def test_the_recordings_to_develop_with(name, cameras, frames, fps, size):
     assert recording.warnings == ()
     mask = cv2.imread(str(next(iter(recording.example_poses[0].masks.values()))), cv2.IMREAD_GRAYSCALE)
     assert mask.shape == (size[1], size[0])
+
+
+def test_a_video_under_another_name_than_its_camera(folder):
+    (folder / "videos" / "right.mp4").rename(folder / "videos" / "rigth.mp4")
+    refused(folder, "rigth.mp4", "calibration.toml", "'right' has no video", "rename the video to right.mp4")
+    settings(folder, "up: z\ncameras: [left, right]\n")
+    refused(folder, "rigth.mp4", "'right' has no video")
+    settings(folder, "up: z\ncameras: [left, rigth]\n")
+    refused(folder, "has no camera 'rigth'")
+    write_video(folder / "videos" / "door.mp4")
+    settings(folder, "up: z\n")
+    refused(folder, "has no video of the camera 'right'")
+
+
+@pytest.mark.parametrize("inside", ["videos", "videos/left.mp4", "calibration.toml"])
+def test_something_inside_of_a_recording_in_its_place(folder, inside):
+    refused(folder / inside, str(folder / inside), f"give the folder of the recording, {folder.resolve()}")

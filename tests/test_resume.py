@@ -15,7 +15,7 @@ import pytest
 from command_line import actor_file, done, refused, trackable
 from small_recording import write_video
 
-from sogjax.app import kept_run, streams
+from sogjax.app import job, kept_run, streams
 from sogjax.app import track as track_command
 from sogjax.app.cli import main
 from sogjax.app.configs import ColorConfig
@@ -41,7 +41,7 @@ def command(recording, tmp_path):
 
 def stop_after(monkeypatch, frames):
     """As Ctrl-C while a frame is tracked."""
-    whole, seen = track_command.tracked_frames, []
+    whole, seen = job.tracked_frames, []
 
     def tracked_frames(*arguments):
         for found in whole(*arguments):
@@ -50,7 +50,7 @@ def stop_after(monkeypatch, frames):
             seen.append(found)
             yield found
 
-    monkeypatch.setattr(track_command, "tracked_frames", tracked_frames)
+    monkeypatch.setattr(job, "tracked_frames", tracked_frames)
 
 
 def assert_same(folder, other, name="motion.npz"):
@@ -114,7 +114,7 @@ def test_a_searched_pose_and_a_made_actor_are_kept(capsys, tmp_path, monkeypatch
         main([*words, "out=run"])
     never = lambda *_: pytest.fail("looked for again")
     monkeypatch.setattr(track_command, "actors_of", never)
-    monkeypatch.setattr(track_command, "first_poses", never)
+    monkeypatch.setattr(job, "first_poses", never)
     done(capsys, *words, "out=run", "resume=true")
     assert_same(tmp_path / "run", tmp_path / "whole")
     assert (tmp_path / "run" / "actor.yaml").read_bytes() == (tmp_path / "whole" / "actor.yaml").read_bytes()

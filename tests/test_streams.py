@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from command_line import actor_file, trackable
 
-from sogjax.app import pipeline
-from sogjax.app import track as track_command
+from sogjax.app import job, pipeline
 from sogjax.app.cli import main
 from sogjax.data.motion import Motion, load_motion
 from sogjax.data.source import look_at_source
@@ -28,7 +27,7 @@ def command(tmp_path, monkeypatch):
 
 def interrupt_the_step(monkeypatch):
     """Ctrl-C reaches the main thread, where the step runs."""
-    whole = track_command.tracked_frames
+    whole = job.tracked_frames
 
     def tracked_frames(*arguments):
         for done in whole(*arguments):
@@ -36,7 +35,7 @@ def interrupt_the_step(monkeypatch):
                 raise KeyboardInterrupt
             yield done
 
-    monkeypatch.setattr(track_command, "tracked_frames", tracked_frames)
+    monkeypatch.setattr(job, "tracked_frames", tracked_frames)
     return 130
 
 

@@ -16,7 +16,8 @@ from sogjax.model.body import concatenate, dof_slices
 from sogjax.solve import GaussNewton, Solution
 from sogjax.track import tracker as tracker_module
 from sogjax.track.culling import CAPACITIES, Capacities
-from sogjax.track.tracker import TrackState, track
+from sogjax.track.frame import TrackState
+from sogjax.track.tracker import track
 
 DEPTH, FINE_DEPTH = 6, 7
 """Cells of 4 and 2 pixels: an arm at 3 m is 5 pixels wide."""

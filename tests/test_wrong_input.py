@@ -174,7 +174,7 @@ def one_camera(recording):
 
 
 def one_mask(recording):
-    return example_pose(recording, masks=("left",)), "1 pictures with a mask", "background", "right"
+    return example_pose(recording, masks=("left",)), "1 picture with a mask", "background", "right"
 
 
 def no_mask_and_no_plate(recording):

@@ -14,6 +14,7 @@ from sogjax.errors import InputError
 from sogjax.images.agreement import AGREEING, disagreeing_cameras, hull_coverage
 from sogjax.images.segmentation import masks_from_plates
 from sogjax.model.frames import axis_vector
+from sogjax.sentences import counted
 
 FROM_FILE, FROM_PLATE = "file", "plate"
 
@@ -90,8 +91,8 @@ def _check_count(recording: Recording, example: ExamplePose, num_images: int, us
         )
     missing = [name for k, name in enumerate(recording.rig.names) if name in example.images and k not in usable]
     raise InputError(
-        f"{where} has {len(usable)} pictures with a mask or an empty background picture, and at least two are "
-        f"needed; add CAMERA.mask.png (white = subject) beside the pictures, or the empty scene as "
+        f"{where} has {counted(len(usable), 'picture')} with a mask or an empty background picture, and at least two "
+        f"are needed; add CAMERA.mask.png (white = subject) beside the pictures, or the empty scene as "
         f"{recording.path / 'background'}/CAMERA.jpg, for {', '.join(missing)}"
     )
 

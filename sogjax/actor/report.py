@@ -90,6 +90,8 @@ class ActorReport:
     bones: tuple[BoneChange, ...]
     warnings: tuple[str, ...]
     """One sentence each."""
+    notes: tuple[str, ...] = ()
+    """The same, of what is usual."""
 
     @property
     def mean_iou(self) -> float:
@@ -108,6 +110,7 @@ class ActorReport:
             "iou": self.ious,
             "bones": [asdict(bone) for bone in self.bones],
             "warnings": list(self.warnings),
+            "notes": list(self.notes),
         }
 
 
@@ -125,10 +128,9 @@ def actor_report(made: FinishedActor, rig: CameraRig) -> ActorReport:
     warnings = (
         *(warning for posed in made.pictures for warning in posed.warnings),
         *_poor_silhouettes(ious),
-        *_undetermined_sizes(made),
         *_poorly_seen_dofs(made),
     )
-    return ActorReport(made.body.name, ious, bones, warnings)
+    return ActorReport(made.body.name, ious, bones, warnings, _undetermined_sizes(made))
 
 
 def _poor_silhouettes(ious: Mapping[str, Mapping[str, float]]) -> list[str]:
@@ -141,14 +143,16 @@ def _poor_silhouettes(ious: Mapping[str, Mapping[str, float]]) -> list[str]:
     ]
 
 
-def _undetermined_sizes(made: FinishedActor) -> list[str]:
+def _undetermined_sizes(made: FinishedActor) -> tuple[str, ...]:
+    """One sentence on all of them: a few hidden or small parts are so with most recordings."""
     rows = zip(made.shape_names, made.shape_deviations, made.shape_priors, strict=True)
-    return [
-        f"{name} was not determined by the pictures: kept near that of the body it started from "
-        f"(uncertain by {deviation:.0%}, without pictures {prior:.0%})"
+    found = [
+        f"{name} (by {deviation:.0%}, without pictures {prior:.0%})"
         for name, deviation, prior in rows
         if not deviation <= UNDETERMINED * prior
     ]
+    kept = "were not determined by the pictures, and are kept near those of the body it started from"
+    return (f"some sizes {kept}; they are uncertain: {', '.join(found)}",) if found else ()
 
 
 def _poorly_seen_dofs(made: FinishedActor) -> list[str]:

@@ -20,6 +20,7 @@ from sogjax.data.actor_file import save_body
 from sogjax.data.atomic import atomic_path
 from sogjax.data.recording import Recording
 from sogjax.errors import InputError
+from sogjax.sentences import counted
 
 NOTICED = 0.15
 """Logarithm of a camera's gain that is worth a word."""
@@ -47,7 +48,9 @@ def run(config: ActorConfig) -> Path:
     say_gains(recording, made, folder)
     print(f"silhouettes and masks agree to {report.mean_iou:.3f} (mean IoU)")
     if report.warnings:
-        say(f"{len(report.warnings)} warnings: see {folder / 'report.md'}")
+        say(f"{counted(len(report.warnings), 'warning')}: see {folder / 'report.md'}")
+    for note in report.notes:
+        say(f"note: {note}")
     print(out)
     print(folder / "report.md")
     return out
@@ -70,8 +73,8 @@ def say_gains(recording: Recording, made: MadeActor, folder: Path) -> None:
         worst = max(unlike, key=lambda name: float(np.abs(np.log(unlike[name])).max()))
         factors = " ".join(f"{gain:.2f}" for gain in unlike[worst])
         say(
-            f"{len(unlike)} of {len(found)} cameras show the subject's colours in another light than the others do "
-            f"(most of all {worst}: red, green, blue would have to be multiplied by {factors}); that may be "
-            "shading; if the cameras differ in exposure or white balance, copy color_gains of "
+            f"in {len(unlike)} of {counted(len(found), 'camera')} the subject's colours stand in another light than "
+            f"in the others (most of all {worst}: red, green, blue would have to be multiplied by {factors}); that may "
+            "be shading; if the cameras differ in exposure or white balance, copy color_gains of "
             f"{folder / 'color_gains.yaml'} into recording.yaml and make the actor again"
         )

@@ -46,6 +46,7 @@ def report_page(report: ActorReport) -> str:
         f"Silhouettes of the body agree with the masks to {report.mean_iou:.2f} on average (intersection over union).",
         "## Warnings",
         "\n".join(f"- {warning}" for warning in report.warnings) or "None.",
+        *(("## Notes", "\n".join(f"- {note}" for note in report.notes)) if report.notes else ()),
         "## Silhouettes",
         _table(["pose", "mean", *cameras], rows),
         f"In the pictures, {LEGEND}.",

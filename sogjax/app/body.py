@@ -9,6 +9,7 @@ from sogjax.data.calibration.rig import METRES
 from sogjax.data.skeletons import read_skeleton
 from sogjax.errors import InputError
 from sogjax.model.frames import UP_AXES
+from sogjax.sentences import counted
 
 
 def run(config: BodyConfig) -> Path:
@@ -26,6 +27,7 @@ def run(config: BodyConfig) -> Path:
     body = read_skeleton(Path(config.from_), dof, config.unit, config.up)
     save_body(out, body)
     skeleton = body.skeleton
-    print(f"{skeleton.num_joints} joints, {skeleton.num_dofs} degrees of freedom, {body.num_blobs} blobs")
+    dofs = counted(skeleton.num_dofs, "degree of freedom", "degrees of freedom")
+    print(f"{counted(skeleton.num_joints, 'joint')}, {dofs}, {counted(body.num_blobs, 'blob')}")
     print(out)
     return out

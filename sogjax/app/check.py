@@ -16,6 +16,7 @@ from sogjax.data.atomic import atomic_path
 from sogjax.data.offsets_file import write_frame_offsets
 from sogjax.data.recording import Recording, open_recording
 from sogjax.errors import InputError
+from sogjax.sentences import counted
 from sogjax.view.plots import write_png
 from sogjax.view.room import room_sheet
 
@@ -39,7 +40,8 @@ def run(config: CheckConfig) -> list[Finding]:
         print(finding.line())
     _offer_offsets(config, recording, found)
     counts = [(sum(f.severity == kind for f in found.findings), kind) for kind in reversed(SEVERITIES)]
-    say(", ".join(f"{count} {kind}" for count, kind in counts if count) + f"; see {out / 'check.png'}")
+    shown = [counted(count, kind, "ok" if kind == "ok" else None) for count, kind in counts if count]
+    say(", ".join(shown) + f"; see {out / 'check.png'}")
     return found.findings
 
 

@@ -235,7 +235,7 @@ class EvaluateConfig:
     """Compare a motion with ground truth (Section 6)."""
 
     motion: Any = option(MISSING, "motion.npz, or a list of them with several actors")
-    truth: str = option(MISSING, "ground_truth.npz")
+    truth: str = option(MISSING, "ground_truth.npz, or the folder of a recording that has one")
     out: str | None = option(None, "metrics.json to write; null: only print")
     overwrite: bool = option(False, OVERWRITE)
 

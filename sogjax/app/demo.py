@@ -5,12 +5,12 @@ from pathlib import Path
 
 from sogjax.app.composition import composed
 from sogjax.app.configs import DemoConfig, TrackConfig
+from sogjax.app.job import Run
 from sogjax.app.outputs import results_folder
 from sogjax.app.overrides import quoted_value
 from sogjax.app.progress import progress
 from sogjax.app.recordings import say
 from sogjax.app.run_folder import run_folder
-from sogjax.app.track import Run
 from sogjax.app.track import run as run_track
 from sogjax.synth import SynthSettings, cached_recording, default_cache_dir
 

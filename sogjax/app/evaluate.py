@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from sogjax.app.configs import EvaluateConfig
-from sogjax.app.outputs import free_path
+from sogjax.app.outputs import actor_name, free_path
 from sogjax.app.recordings import file_list
 from sogjax.data.ground_truth import GroundTruth, load_ground_truth
 from sogjax.data.motion import Motion, load_motion
@@ -18,13 +18,28 @@ def run(config: EvaluateConfig) -> GroupEvaluation:
         InputError: files that do not open or do not fit together, or a file for the metrics that is there.
     """
     out = None if config.out is None else free_path("out", config.out, config.overwrite)
-    truth = load_ground_truth(Path(config.truth))
+    truth = load_ground_truth(truth_file(Path(config.truth)))
     evaluation = evaluate_motions(named_motions(file_list(config.motion), truth), truth)
     print(evaluation.table())
     if out is not None:
         evaluation.to_json(out)
         print(out)
     return evaluation
+
+
+def truth_file(path: Path) -> Path:
+    """The file of a truth, which may be given as the folder of its recording.
+
+    Raises:
+        InputError: a folder that holds none.
+    """
+    if not path.is_dir():
+        return path
+    if not (path / "ground_truth.npz").is_file():
+        raise InputError(
+            f"truth={path}: this folder holds no ground_truth.npz; give that file, or a recording that has one"
+        )
+    return path / "ground_truth.npz"
 
 
 def named_motions(paths: list[Path], truth: GroundTruth) -> dict[str, Motion]:
@@ -34,7 +49,8 @@ def named_motions(paths: list[Path], truth: GroundTruth) -> dict[str, Motion]:
         InputError: a motion whose file name tells no subject of the truth.
     """
     if len(paths) == 1 and len(truth.subjects) < 2:
-        return {next(iter(truth.subjects), "actor"): load_motion(paths[0])}
+        motion = load_motion(paths[0])
+        return {next(iter(truth.subjects), actor_name(paths[0], motion)): motion}
     if not truth.subjects:
         raise InputError(f"motion={','.join(map(str, paths))}: the truth is that of one subject; give one motion")
     motions = {}

@@ -17,6 +17,7 @@ from sogjax.app.cells import cells_of_clip, pictures_of
 from sogjax.app.composition import composed
 from sogjax.app.configs import TrackConfig, help_lines
 from sogjax.app.first_pose import first_poses, initial_pose_file
+from sogjax.app.job import Job, Run, doing, frame_range
 from sogjax.app.made_from import MadeFrom, made_from
 from sogjax.app.outputs import export_endings, results_folder, write_results
 from sogjax.app.pipeline import FrameTracker, Picture, PictureReader, Preparation
@@ -24,12 +25,12 @@ from sogjax.app.recordings import actors_of, opened, say
 from sogjax.app.run_folder import run_folder
 from sogjax.app.sweep import row_numbers
 from sogjax.app.sweep_results import Failure, Member, Numbers, finish_sweep, keep_result
-from sogjax.app.track import Job, Run, doing, frame_range
 from sogjax.data.cell_cache import CellsOfClip
 from sogjax.data.recording import Recording
 from sogjax.data.video import read_prepared
 from sogjax.errors import InputError
 from sogjax.model.body import Body
+from sogjax.sentences import counted
 from sogjax.track.many import member, same_program, track_many
 from sogjax.track.scan import replayed
 
@@ -103,7 +104,7 @@ def grid_runs(
     """
     jobs = grid_jobs(recording, bodies, configs)
     cells = cells_of_clip(recording, jobs[0].grids, configs[0].images, jobs[0].frames)
-    say(f"{len(jobs)} runs of {len(cells)} frames in one call")
+    say(f"{counted(len(jobs), 'run')} of {counted(len(cells), 'frame')} in one call")
     begin = time.perf_counter()
     starts = jnp.stack([job.start for job in jobs])
     common_boxes = configs[0].solver.method in STEADY

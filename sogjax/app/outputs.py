@@ -17,13 +17,13 @@ from sogjax.data.actor_file import save_body
 from sogjax.data.atomic import atomic_path
 from sogjax.data.export import WRITERS, export_motion, require_ezc3d
 from sogjax.data.ground_truth import load_ground_truth
-from sogjax.data.motion import save_motion
+from sogjax.data.motion import Motion, save_motion
 from sogjax.errors import InputError
 from sogjax.evaluate import evaluate_motions
 from sogjax.model.body import Body
 
 if TYPE_CHECKING:
-    from sogjax.app.track import Run
+    from sogjax.app.job import Run
 
 
 @contextmanager
@@ -106,6 +106,11 @@ def write_results(result: Run, out: Path, wanted: OutputsConfig, config: Any, ma
         result.evaluation.to_json(out / "metrics.json")
         result.files.append(out / "metrics.json")
     result.files += streamed
+
+
+def actor_name(path: Path, motion: Motion) -> str:
+    """Whose motion a file holds: what it says itself, else what its name says, as `motion_NAME.npz` does."""
+    return motion.actor or path.stem.removeprefix("motion").removeprefix("_") or "actor"
 
 
 def evaluate(result: Run) -> None:

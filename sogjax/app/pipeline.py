@@ -16,7 +16,8 @@ from sogjax.data.recording import Recording
 from sogjax.data.stages import ahead
 from sogjax.errors import InputError
 from sogjax.images.cells import CellGrid, padded_cells, stack_shape
-from sogjax.track.tracker import FrameCells, PartialCells, TrackedFrame, Tracker, track
+from sogjax.track.frame import FrameCells, PartialCells, TrackedFrame
+from sogjax.track.tracker import Tracker, track
 
 FRAMES_AHEAD = 3
 """Frames that wait for the tracking step, beside the one that is being decoded."""

@@ -10,8 +10,9 @@ from jaxtyping import Array, Float
 from sogjax.app.kept_run import Prefix
 from sogjax.app.pipeline import FrameTracker
 from sogjax.model.sog import Sog
+from sogjax.track.frame import FrameCells, TrackedFrame, TrackState, on_device
 from sogjax.track.scan import image_blobs
-from sogjax.track.tracker import FrameCells, TrackedFrame, Tracker, TrackState, on_device, track
+from sogjax.track.tracker import Tracker, track
 
 Frames = Iterable[FrameCells]
 

@@ -15,13 +15,15 @@ from omegaconf.errors import OmegaConfBaseException
 from sogjax.app.compilation_cache import use_compilation_cache
 from sogjax.app.composition import composed
 from sogjax.app.configs import TrackConfig
+from sogjax.app.job import Run
 from sogjax.app.overrides import quoted_value
 from sogjax.app.progress import progress
 from sogjax.app.recordings import actors_of, opened
-from sogjax.app.track import Run, track_recording
+from sogjax.app.track import track_recording
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.errors import InputError
 from sogjax.evaluate import evaluate_motions
+from sogjax.sentences import counted
 from sogjax.synth import SynthSettings, cached_recording
 from sogjax.synth.cache import default_cache_dir
 
@@ -86,9 +88,9 @@ def machine_line() -> str:
 
 def machine_facts() -> str:
     """Processor, cores, versions and date."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return (
-        f"{_processor()}, {cores} cores, {jax.default_backend()}, Python {platform.python_version()}, "
+        f"{_processor()}, {counted(cores, 'core')}, {jax.default_backend()}, Python {platform.python_version()}, "
         f"jax {jax.__version__}, {datetime.date.today()}"
     )
 

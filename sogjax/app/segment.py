@@ -16,6 +16,7 @@ from sogjax.app.recordings import opened, say
 from sogjax.data.image_file import write_mask
 from sogjax.data.recording import ExamplePose, Recording
 from sogjax.errors import InputError
+from sogjax.sentences import counted
 from sogjax.view.contact_sheet import GREEN, RED, Tile, contact_sheet
 from sogjax.view.plots import write_png
 
@@ -68,7 +69,7 @@ def mask_sheet(
             tiles.append(Tile(image, [(found.left_out[camera], RED)], f"{name}: {origin}, left out"))
         else:
             tiles.append(Tile(image, [], f"{name}: no mask"))
-    return contact_sheet(tiles, f"{recording.name}, {example.name}: {len(found.masks)} masks")
+    return contact_sheet(tiles, f"{recording.name}, {example.name}: {counted(len(found.masks), 'mask')}")
 
 
 def _check_apart(recording: Recording, out: Path) -> None:

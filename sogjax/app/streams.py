@@ -27,7 +27,8 @@ from sogjax.errors import InputError
 from sogjax.images.cells import CellGrid
 from sogjax.model.body import Body, dof_slices, joint_slices
 from sogjax.model.color import to_rgb
-from sogjax.track.tracker import FrameResult
+from sogjax.sentences import counted
+from sogjax.track.frame import FrameResult
 
 PARTIAL = ".partial"
 """Ending of the folder with a motion that is not complete."""
@@ -159,7 +160,7 @@ class Streams:
             return
         folders = ", ".join(str(log.folder) for log in self._logs.values())
         remedy = "" if self._kept is None else "; the same command with resume=true goes on from there"
-        say(f"stopped after {count} frames; their motion is in {folders}{remedy}")
+        say(f"stopped after {counted(count, 'frame')}; their motion is in {folders}{remedy}")
 
     def _write(self, block: list[FrameDone]) -> None:
         motions = self._motions(block)

@@ -1,5 +1,6 @@
 """How long the stages of a run take, the first frames (which compile) apart."""
 
+import math
 import time
 from array import array
 from collections.abc import Iterable, Iterator
@@ -7,6 +8,18 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 Item = TypeVar("Item")
+
+STAGES = {
+    "decode": "waiting for decoded pictures",
+    "cells": "averaging pictures to cells",
+    "step": "tracking step",
+    "outputs": "writing results",
+    "whole": "decoding to pose, together",
+}
+WAITING = ("decode",)
+"""Stages that are no work, so that a rate of theirs says nothing."""
+LEAST_SHARE = 0.01
+"""Of the time of all stages together, that a stage takes to be worth a line."""
 
 
 @dataclass
@@ -35,6 +48,23 @@ class StageTimes:
         """Rate of a stage without its first frames; NaN where there are no others."""
         rest = self.seconds.get(stage, array("f"))[skipped:]
         return len(rest) / sum(rest) if rest and sum(rest) > 0.0 else float("nan")
+
+    def total(self, stage: str, skipped: int = 1) -> float:
+        """Seconds of a stage without its first frames."""
+        return float(sum(self.seconds.get(stage, array("f"))[skipped:]))
+
+    def table(self) -> str:
+        """A line for each stage that takes time: its rate, or the seconds that were waited; the first frame's time."""
+        lines, least = [], LEAST_SHARE * self.total("whole")
+        for stage, text in STAGES.items():
+            total, rate = self.total(stage), self.frames_per_second(stage)
+            if total > least:
+                lines.append(
+                    f"{text:<32}{total:10.1f} s in all" if stage in WAITING else f"{text:<32}{rate:10.1f} frames/s"
+                )
+        if not math.isnan(first := self.first("whole")):
+            lines.append(f"{'first frame, with compilation':<32}{first:10.1f} s")
+        return "\n".join(lines)
 
     def first(self, stage: str) -> float:
         """Seconds of the first frame, which compiles."""

@@ -1,6 +1,8 @@
 """`sogjax view`: a motion in Rerun."""
 
+import os
 import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
@@ -15,13 +17,18 @@ from sogjax.errors import InputError
 from sogjax.view.frames import frame_range
 from sogjax.view.rerun import view_command, write_rerun
 
+DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")
+"""Variables of the environment of which one names the display to open windows on, where there is one."""
+
 
 def run(config: ViewConfig) -> Path:
     """Write the Rerun file, or open the viewer on it where no file is asked for.
 
     Raises:
-        InputError: files that do not open or do not fit together, or a Rerun file that is there.
+        InputError: files that do not open or do not fit together, a Rerun file that is there, or no viewer.
     """
+    if config.out is None:
+        _require_display()
     asked = None if config.out is None else free_path("out", config.out, config.overwrite)
     recording = opened(config.recording)
     motions = [load_motion(path) for path in file_list(config.motion)]
@@ -37,7 +44,25 @@ def run(config: ViewConfig) -> Path:
     )
     print(out)
     if config.out is None:
-        ended = subprocess.run(view_command(out), check=False)
-        if ended.returncode != 0:
-            raise InputError(f"the Rerun viewer could not be opened on {out}; write a file with out=FILE.rrd instead")
+        _open_viewer(out)
     return out
+
+
+def _require_display() -> None:
+    """Raise where no window can be opened; only Linux says so beforehand."""
+    if sys.platform == "linux" and not any(os.environ.get(name) for name in DISPLAYS):
+        raise InputError(
+            "out=null: there is no display to open the Rerun viewer on; write a file with out=FILE.rrd, and open it "
+            "with `rerun FILE.rrd` where there is one"
+        )
+
+
+def _open_viewer(path: Path) -> None:
+    """Open the viewer and wait until it is closed; what it says itself is shown only as the reason of a failure."""
+    ended = subprocess.run(view_command(path), check=False, stderr=subprocess.PIPE, text=True, errors="replace")
+    if ended.returncode != 0:
+        said = ended.stderr.strip().splitlines()
+        reason = f" ({said[-1].strip()})" if said else ""
+        raise InputError(
+            f"the Rerun viewer could not be opened on {path}{reason}; write a file with out=FILE.rrd instead"
+        )

@@ -9,6 +9,7 @@ from jaxtyping import Array, Float, Shaped
 from sogjax.check.findings import Finding, listed
 from sogjax.data.calibration import CameraRig
 from sogjax.model.frames import UP_AXES, axis_vector
+from sogjax.sentences import counted
 
 NARROW, WIDE = 8.0, 150.0
 """Degrees: fields of view outside of this range are taken for mistakes."""
@@ -107,7 +108,7 @@ def camera_findings(rig: CameraRig, geometry: RigGeometry, up: str) -> list[Find
     if not findings:
         low, high = geometry.heights.min(), geometry.heights.max()
         look = f", {geometry.scale:.2f} m from what they look at" if len(rig) > 1 else ""
-        what = f"{len(rig)} cameras at heights of {low:.2f} to {high:.2f} m{look}"
+        what = f"{counted(len(rig), 'camera')} at heights of {low:.2f} to {high:.2f} m{look}"
         findings.append(Finding("ok", "cameras", what))
     return findings
 

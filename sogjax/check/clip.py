@@ -6,7 +6,7 @@ from typing import Any
 
 import cv2
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Bool, UInt8
 
 from sogjax.data.recording import Recording
 from sogjax.data.video import read_prepared
@@ -28,9 +28,11 @@ class Clip:
     first: int
     """The recording's frame that is the first one here, counted from the recording's first."""
     grey: tuple[UInt8[np.ndarray, "frame _h _w"], ...]
-    """By camera, the longer side `SMALL` pixels."""
-    stills: dict[int, tuple[UInt8[np.ndarray, "_y _x 3"], ...]]
-    """By frame of this clip, a few pictures (BGR) of all cameras at the working size of masks."""
+    """By camera, the longer side `SMALL` pixels; black where the camera is missing."""
+    present: Bool[np.ndarray, "camera frame"]
+    """Where it is not, so that there is something to look at."""
+    stills: dict[int, dict[int, UInt8[np.ndarray, "_y _x 3"]]]
+    """By frame of this clip and by camera that is present, a few pictures (BGR) at the working size of masks."""
 
     @property
     def num_frames(self) -> int:
@@ -53,10 +55,10 @@ def working_picture(image: UInt8[np.ndarray, "_h _w 3"]) -> UInt8[np.ndarray, "_
     return cv2.resize(image, working_size(image.shape[1], image.shape[0]), interpolation=cv2.INTER_AREA)
 
 
-def picture_or_black(recording: Recording, camera: int, image: np.ndarray | None) -> UInt8[np.ndarray, "_h _w 3"]:
-    """A camera's picture; a black one where it is missing."""
+def black_picture(recording: Recording, camera: int) -> UInt8[np.ndarray, "_y _x 3"]:
+    """What stands for the picture of a camera that is missing, at the working size of masks."""
     width, height = recording.rig.image_size(recording.rig.names[camera])
-    return np.zeros((height, width, 3), np.uint8) if image is None else image
+    return working_picture(np.zeros((height, width, 3), np.uint8))
 
 
 def read_clip(recording: Recording, start: int, frames: int, progress: Progress) -> Clip:
@@ -68,19 +70,23 @@ def read_clip(recording: Recording, start: int, frames: int, progress: Progress)
     stop = min(start + frames, recording.num_frames)
     count = stop - start
     wanted = {int(k) for k in np.linspace(0, count - 1, NUM_STILLS + 2)[1:-1]}
-    reduced = lambda camera, image: _reduced(picture_or_black(recording, camera, image))
-    grey: list[list[np.ndarray]] = [[] for _ in recording.rig.names]
-    stills: dict[int, tuple[np.ndarray, ...]] = {}
-    for index, pictures in enumerate(progress(read_prepared(recording, reduced, start, stop), count, "reading")):
-        for camera, (small, _) in enumerate(pictures):
-            grey[camera].append(small)
+    sizes = [small_size(*recording.rig.image_size(name)) for name in recording.rig.names]
+    grey = tuple(np.zeros((count, height, width), np.uint8) for width, height in sizes)
+    present = np.zeros((len(sizes), count), bool)
+    stills: dict[int, dict[int, np.ndarray]] = {}
+    for index, pictures in enumerate(progress(read_prepared(recording, _reduced, start, stop), count, "reading")):
+        found = {camera: both for camera, both in enumerate(pictures) if both is not None}
+        for camera, (small, _) in found.items():
+            grey[camera][index], present[camera, index] = small, True
         if index in wanted:
-            stills[index] = tuple(still for _, still in pictures)
-    return Clip(recording, start, tuple(np.stack(pictures) for pictures in grey), stills)
+            stills[index] = {camera: still for camera, (_, still) in found.items()}
+    return Clip(recording, start, grey, present, stills)
 
 
-def _reduced(image: UInt8[np.ndarray, "_h _w 3"]) -> tuple[np.ndarray, np.ndarray]:
-    """A picture small and grey, and in colour at the working size of masks."""
+def _reduced(camera: int, image: UInt8[np.ndarray, "_h _w 3"] | None) -> tuple[np.ndarray, np.ndarray] | None:
+    """A picture small and grey, and in colour at the working size of masks; None where the camera is missing."""
+    if image is None:
+        return None
     still = working_picture(image)
     small = cv2.resize(still, small_size(image.shape[1], image.shape[0]), interpolation=cv2.INTER_AREA)
     return cv2.cvtColor(small, cv2.COLOR_BGR2GRAY), still

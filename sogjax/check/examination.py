@@ -7,19 +7,27 @@ from typing import Any
 import numpy as np
 
 from sogjax.check.agreement import hulls_of
+from sogjax.check.barcodes import pair_barcodes
 from sogjax.check.calibration import calibration_findings
 from sogjax.check.cameras import RigGeometry, camera_findings, rig_geometry
-from sogjax.check.clip import Clip, Progress, read_clip
+from sogjax.check.clip import Clip, Progress, black_picture, read_clip
 from sogjax.check.exposure import change_findings, exposure, exposure_findings
 from sogjax.check.findings import Finding, worst_first
-from sogjax.check.frames import jump_findings, repeat_findings, repeated_frames, source_findings, source_frames
+from sogjax.check.frames import (
+    jump_findings,
+    missing_findings,
+    repeat_findings,
+    repeated_frames,
+    source_findings,
+    source_frames,
+)
 from sogjax.check.hypotheses import unit_rig
 from sogjax.check.jumps import Jump, find_jumps
-from sogjax.check.motion import motion_of, pair_barcodes, with_rig
+from sogjax.check.motion import motion_of, with_rig
 from sogjax.check.places import place_findings, references_of
 from sogjax.check.scale import scale_findings, subject_size
 from sogjax.check.silhouettes import Moment, example_moments, plates_of, video_moments, without_masks_of
-from sogjax.check.synchronisation import Synchrony, synchrony, synchrony_findings
+from sogjax.check.synchronisation import FEWEST_STEPS, Synchrony, synchrony, synchrony_findings, too_short
 from sogjax.data.calibration import CameraRig
 from sogjax.data.recording import Recording
 from sogjax.data.recording_settings import read_recording_settings
@@ -67,18 +75,19 @@ def examined(recording: Recording, start: int, frames: int, largest_offset: int,
 
     clip = read_clip(recording, start, frames, progress)
     repeated = repeated_frames(clip)
-    findings += repeat_findings(clip, repeated)
+    findings += [*missing_findings(clip), *repeat_findings(clip, repeated)]
     found, jumps, told = _times(clip, relative, largest_offset)
     findings += told
     offsets = [0 if camera in jumps else found.of(camera) for camera in range(len(names))]
 
     photographed, filmed = example_moments(recording), video_moments(clip, offsets)
     references = references_of(plates_of(recording), photographed[0] if photographed else None)
-    places = place_findings(names, references, filmed[0])
+    shown = {camera: picture for moment in reversed(filmed) for camera, picture in moment.pictures.items()}
+    places = place_findings(names, references, shown)
     elsewhere = {names.index(name) for finding in places for name in finding.cameras}
     filmed = [without_masks_of(moment, elsewhere) for moment in filmed]
     findings += places
-    findings += change_findings(names, {k: both for k, both in references.items() if k not in elsewhere}, filmed[0])
+    findings += change_findings(names, {k: both for k, both in references.items() if k not in elsewhere}, shown)
     said, fits = calibration_findings(relative, photographed, filmed)
     findings += said
     good = [camera for camera in range(len(names)) if camera not in fits or not fits[camera].is_wrong]
@@ -102,7 +111,7 @@ def examined(recording: Recording, start: int, frames: int, largest_offset: int,
         "findings": [asdict(finding) for finding in worst_first(findings)],
     }
     total = {name: recording.frame_offset[name] + offset for name, offset in zip(names, offsets, strict=True)}
-    pictures = tuple(filmed[0].pictures[camera] for camera in range(len(names)))
+    pictures = tuple(shown[k] if k in shown else black_picture(recording, k) for k in range(len(names)))
     return Examination(worst_first(findings), numbers, geometry, pictures, total if any(offsets) else {})
 
 
@@ -110,11 +119,14 @@ def _times(clip: Clip, relative: CameraRig, largest_offset: int) -> tuple[Synchr
     """Offsets between the cameras, jumps in the time of one, and what both mean."""
     names, steps = clip.recording.rig.names, clip.num_frames - 1
     motions = with_rig(motion_of(clip), relative)
-    moving = sum(float(motion.energy.mean()) > STILL for motion in motions if motion.energy.size) >= FEWEST_MOVING
+    moving = sum(motion.mean > STILL for motion in motions) >= FEWEST_MOVING
     codes = pair_barcodes(motions)
     found = synchrony(names, codes, steps, largest_offset)
     jumps = find_jumps(codes, steps, found)
-    told = synchrony_findings(found, clip.recording.frame_offset, moving, jumps)
+    if steps < FEWEST_STEPS:
+        return found, jumps, [too_short(clip.num_frames, clip.recording.num_frames)] if len(names) > 1 else []
+    away = [camera for camera, motion in enumerate(motions) if motion.num_seen < FEWEST_STEPS]
+    told = synchrony_findings(found, clip.recording.frame_offset, moving, jumps, away)
     return found, jumps, [*told, *jump_findings(clip, jumps)]
 
 

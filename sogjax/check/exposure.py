@@ -15,6 +15,8 @@ TINTED = 1.2
 """The same for red or blue against green."""
 ROOM_FACTOR = 1.25
 """Both thresholds are so much wider where whole pictures are compared: cameras see different parts of a room."""
+FEWEST = 3
+"""Of two cameras that differ, none can be told wrong."""
 CHANGED = 1.2
 """Ratio of values between a camera's pictures, from which on its exposure is said to have changed."""
 SATURATED = (5, 250)
@@ -40,26 +42,32 @@ class Exposure:
 
 
 def exposure(moments: Sequence[Moment], count: int) -> Exposure:
-    """The gains of `count` cameras, from the subject where all are known to show it, else from whole pictures."""
-    of_subject = bool(moments) and all(len(moment.masks) == len(moment.pictures) == count for moment in moments)
+    """The gains of `count` cameras, from the subject where enough are known to show it, else from whole pictures."""
+    fewest = min(FEWEST, count)
+    of_subject = any(len(moment.masks) >= fewest for moment in moments)
     by_moment = [_colors(moment, count, of_subject) for moment in moments]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        relative = [np.log(colors) - np.nanmedian(np.log(colors), axis=0) for colors in by_moment]
-    gains = np.exp(np.mean(relative, axis=0)) if relative else np.full((count, 3), np.nan)
-    return Exposure(gains, of_subject)
+    relative = [c - np.nanmedian(c, axis=0) for c in by_moment if np.isfinite(c[:, 0]).sum() >= fewest]
+    if not relative:
+        return Exposure(np.full((count, 3), np.nan), of_subject)
+    known = np.isfinite(relative).sum(axis=0)
+    mean = np.nansum(relative, axis=0) / np.maximum(known, 1)
+    return Exposure(np.exp(np.where(known > 0, mean, np.nan)), of_subject)
 
 
 def _colors(moment: Moment, count: int, of_subject: bool) -> Float[np.ndarray, "camera 3"]:
+    """The logarithms of mean blue, green and red; NaN where a camera does not show it."""
     colors = np.full((count, 3), np.nan)
-    for camera, picture in moment.pictures.items():
+    for camera in moment.masks if of_subject else moment.pictures:
+        picture = moment.pictures[camera]
         pixels = picture[moment.masks[camera]] if of_subject else picture.reshape(-1, 3)
-        colors[camera] = np.maximum(pixels.mean(axis=0), 1.0)
+        colors[camera] = np.log(np.maximum(pixels.mean(axis=0), 1.0))
     return colors
 
 
 def exposure_findings(names: tuple[str, ...], found: Exposure, label: str) -> list[Finding]:
     """Cameras that show things brighter, darker or in other colours than the others."""
-    if len(names) < 3 or np.isnan(found.gains).all():
+    known = int((~np.isnan(found.gains).any(axis=1)).sum())
+    if known < FEWEST:
         return []
     wider = 1.0 if found.of_subject else ROOM_FACTOR
     of = "the subject" if found.of_subject else "its pictures as a whole"
@@ -76,7 +84,8 @@ def exposure_findings(names: tuple[str, ...], found: Exposure, label: str) -> li
             findings.append(_finding(name, what, "another white balance"))
     if not findings:
         spread = float(np.nanmax(found.brightness) / np.nanmin(found.brightness))
-        what = f"the cameras show {of if found.of_subject else 'their pictures'} alike"
+        who = "the cameras" if known == len(names) else f"the {known} of {len(names)} cameras that could be compared"
+        what = f"{who} show {of if found.of_subject else 'their pictures'} alike"
         findings.append(Finding("ok", "exposure", f"{what}, brightest to darkest {spread:.2f} ({label})"))
     return findings
 
@@ -87,12 +96,12 @@ def _finding(name: str, what: str, cause: str) -> Finding:
 
 
 def change_findings(
-    names: tuple[str, ...], references: Mapping[int, tuple[str, Picture]], filmed: Moment
+    names: tuple[str, ...], references: Mapping[int, tuple[str, Picture]], filmed: Mapping[int, Picture]
 ) -> list[Finding]:
-    """Cameras whose videos are exposed otherwise than a still picture that they took of the same place."""
+    """Cameras whose videos (a picture of each) are exposed otherwise than a still that they took of the same place."""
     findings = []
     for camera, (label, picture) in references.items():
-        gains = same_place_gains(picture, filmed.pictures[camera])
+        gains = same_place_gains(picture, filmed[camera]) if camera in filmed else None
         if gains is None:
             continue
         low, high = float(gains.min()), float(gains.max())

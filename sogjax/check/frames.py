@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from sogjax.check.clip import Clip
 from sogjax.check.findings import Finding, listed
 from sogjax.check.jumps import Jump
 from sogjax.data.recording import Recording
 from sogjax.data.source import SourceInfo, look_at_source
+from sogjax.sentences import counted
 
 GAP = 1.5
 """A pause between two frames of a file, in units of the usual one, from which on a frame is missing."""
@@ -78,29 +79,48 @@ def source_findings(recording: Recording, sources: dict[str, SourceFrames]) -> l
             cause, remedy = "frames dropped while recording", "write `time_stamps: true` into recording.yaml"
             findings.append(Finding("warning", "frames", what, cause, remedy, (name,)))
     if not findings:
-        what = f"{recording.num_frames} frames of {len(sources)} cameras at {recording.fps:g} a second"
-        findings.append(Finding("ok", "frames", what))
+        frames, cameras = counted(recording.num_frames, "frame"), counted(len(sources), "camera")
+        findings.append(Finding("ok", "frames", f"{frames} of {cameras} at {recording.fps:g} a second"))
     return findings
 
 
 def repeated_frames(clip: Clip) -> dict[int, list[int]]:
     """By camera the frames of the clip that repeat the one before, while other cameras' do not."""
-    shares = np.stack([_shares(grey) for grey in clip.grey])
+    shares = np.stack([_shares(grey, present) for grey, present in zip(clip.grey, clip.present, strict=True)])
     found = {}
     for camera in range(len(shares)):
         others = np.delete(shares, camera, axis=0)
-        moving = np.median(others, axis=0) > ELSEWHERE if len(others) else np.ones(shares.shape[1], bool)
+        moving = _median(others) > ELSEWHERE if len(others) else np.ones(shares.shape[1], bool)
         twice = np.flatnonzero((shares[camera] < SAME) & moving) + 1
         if len(twice):
             found[camera] = [int(k) for k in twice]
     return found
 
 
-def _shares(grey: np.ndarray) -> Float[np.ndarray, "step"]:
-    """How much each frame differs from the one before, in units of the median."""
-    steps = [float(np.abs(b.astype(np.int16) - a).mean()) for a, b in pairwise(grey)]
-    usual = float(np.median(steps)) if steps else 0.0
-    return np.array(steps) / usual if usual > LEAST_DIFFERENCE else np.ones(len(steps))
+def _shares(grey: np.ndarray, present: Bool[np.ndarray, "frame"]) -> Float[np.ndarray, "step"]:
+    """How much each frame differs from the one before, in units of the median; NaN where one of them is missing."""
+    steps = np.array([float(np.abs(b.astype(np.int16) - a).mean()) for a, b in pairwise(grey)])
+    seen = present[1:] & present[:-1]
+    usual = float(np.median(steps[seen])) if seen.any() else 0.0
+    return np.where(seen, steps / usual if usual > LEAST_DIFFERENCE else 1.0, np.nan)
+
+
+def _median(shares: Float[np.ndarray, "camera step"]) -> Float[np.ndarray, "step"]:
+    """Over the cameras that are not missing; 0 where all are."""
+    seen = ~np.isnan(shares)
+    return np.nanmedian(np.where(seen.any(axis=0), shares, 0.0), axis=0)
+
+
+def missing_findings(clip: Clip) -> list[Finding]:
+    """Cameras that have no picture in some of the frames, which were left out where they are compared."""
+    missing = (~clip.present).sum(axis=1)
+    names = tuple(name for name, count in zip(clip.recording.rig.names, missing, strict=True) if count)
+    if not names:
+        return []
+    shown = listed(f"{name} in {count}" for name, count in zip(names, missing[missing > 0], strict=True))
+    what = f"cameras are missing in some of the {counted(clip.num_frames, 'frame')} looked at: {shown}"
+    cause = "a late start, an early end, or what recording.yaml leaves out"
+    return [Finding("note", "frames", what, cause, "look at other frames with start=, if it is not meant", names)]
 
 
 def repeat_findings(clip: Clip, repeated: dict[int, list[int]]) -> list[Finding]:
@@ -121,7 +141,7 @@ def jump_findings(clip: Clip, jumps: dict[int, Jump]) -> list[Finding]:
     span = f"{clip.frame_number(0)} and {clip.frame_number(clip.num_frames - 1)}"
     for camera, jump in jumps.items():
         name = clip.recording.rig.names[camera]
-        count = f"{abs(jump.frames)} frame{'s' * (abs(jump.frames) > 1)}"
+        count = counted(abs(jump.frames), "frame")
         lost = jump.frames > 0
         what = f"{name} seems to have {'lost' if lost else 'gained'} {count} against the others between frames {span}"
         cause = "a frame dropped while recording or copying" if lost else "a frame that was repeated"

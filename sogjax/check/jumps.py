@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sogjax.check.motion import PairCodes
+from sogjax.check.barcodes import PairCodes
 from sogjax.check.synchronisation import Synchrony, synchrony
 
 LARGEST = 3

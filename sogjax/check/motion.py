@@ -1,35 +1,22 @@
-"""What moves, seen along epipolar lines: the same planes of space hold the same motion in two cameras.
-
-All points of a plane through two cameras lie on one line in each of their pictures. How much moves on the lines of a
-pencil of such planes, over time, is a "motion barcode" that both cameras share, whatever they see otherwise (Pundik
-and Moses, ECCV 2010; Kasten, Ben-Artzi, Peleg and Werman, ECCV 2016). It shifts with time offsets, and is unlike the
-other's where a calibration is wrong.
-"""
+"""How much moves in each camera's pictures, from a frame to the next, and along which rays."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from functools import cached_property
 
 import cv2
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Bool, Float, UInt8
 
 from sogjax.check.clip import Clip
 from sogjax.data.calibration import CameraRig
 from sogjax.model.camera import undistort
 
-NUM_PLANES = 64
 BLUR = 1.5
 """Pixels; takes noise and coding artefacts out."""
 NOISE_FACTOR, NOISE_FLOOR = 4.0, 1.0
 """Differences of grey values count above this many medians of a picture's differences, and above this value."""
-TAILS = 0.01
-"""Share of the motion at either end that the pencil of planes need not hold."""
-
-
-PairCodes = dict[tuple[int, int], tuple[Float[np.ndarray, "step plane"], Float[np.ndarray, "step plane"]]]
-"""By pair of cameras how much moves in each plane through both, at each step, as either sees it."""
 
 
 @dataclass(frozen=True)
@@ -37,32 +24,54 @@ class CameraMotion:
     """What moves in one camera's pictures."""
 
     energy: Float[np.ndarray, "step pixel"]
-    """How much each pixel changes from a frame to the next: roots of grey values, 0 for noise."""
+    """How much each pixel changes from a frame to the next: roots of grey values, 0 for noise.
+
+    NaN in steps from or to a frame in which the camera is missing.
+    """
     shape: tuple[int, int]
     """Rows and columns of the pixels."""
     rays: Float[np.ndarray, "pixel 3"]
     """The pixels' directions in the world, unit vectors."""
     centre: Float[np.ndarray, "3"]
 
+    @cached_property
+    def total(self) -> Float[np.ndarray, "pixel"]:
+        """How much each pixel changes in all the steps that are seen."""
+        return np.nansum(self.energy, axis=0)
+
+    @property
+    def num_seen(self) -> int:
+        """Steps in which the camera is not missing."""
+        return int((~np.isnan(self.energy[:, 0])).sum())
+
+    @property
+    def mean(self) -> float:
+        """How much a pixel changes in a step on average."""
+        return float(self.total.mean()) / max(self.num_seen, 1)
+
     @property
     def direction(self) -> Float[np.ndarray, "3"]:
         """The mean direction of what moves."""
-        mean = self.energy.sum(axis=0) @ self.rays
+        mean = self.total @ self.rays
         return mean / max(float(np.linalg.norm(mean)), 1e-12)
 
 
 def motion_of(clip: Clip) -> list[CameraMotion]:
     """What moves in each camera of a clip."""
     rig = clip.recording.rig
-    return [_camera_motion(rig, name, grey) for name, grey in zip(rig.names, clip.grey, strict=True)]
+    rows = zip(rig.names, clip.grey, clip.present, strict=True)
+    return [_camera_motion(rig, name, grey, present) for name, grey, present in rows]
 
 
-def _camera_motion(rig: CameraRig, name: str, grey: UInt8[np.ndarray, "frame h w"]) -> CameraMotion:
+def _camera_motion(
+    rig: CameraRig, name: str, grey: UInt8[np.ndarray, "frame h w"], present: Bool[np.ndarray, "frame"]
+) -> CameraMotion:
     energy = frame_differences(grey)
     shape = (max(1, grey.shape[1] // 2), max(1, grey.shape[2] // 2))
     small = np.empty((len(energy), *shape), np.float32)
     for k, step in enumerate(energy):
         small[k] = cv2.resize(step, shape[::-1], interpolation=cv2.INTER_AREA)
+    small[~(present[1:] & present[:-1])] = np.nan
     return CameraMotion(np.sqrt(small).reshape(len(small), shape[0] * shape[1]), shape, *world_rays(rig, name, shape))
 
 
@@ -98,73 +107,3 @@ def world_rays(
     local = np.concatenate([plane, np.ones((len(plane), 1))], axis=1)
     rays = local @ pose[:3, :3]
     return rays / np.linalg.norm(rays, axis=1, keepdims=True), -pose[:3, :3].T @ pose[:3, 3]
-
-
-def barcodes(
-    first: CameraMotion, second: CameraMotion
-) -> tuple[Float[np.ndarray, "step plane"], Float[np.ndarray, "_step plane"]] | None:
-    """How much moves in each plane through two cameras, at each step, seen by either; None where nothing moves."""
-    if not (first.energy.any() and second.energy.any()):
-        return None
-    baseline = second.centre - first.centre
-    axis = baseline / max(float(np.linalg.norm(baseline)), 1e-12)
-    towards = first.direction + second.direction
-    towards = towards - (towards @ axis) * axis
-    length = float(np.linalg.norm(towards))
-    if length < 1e-3:
-        return None
-    towards = towards / length
-    across = np.cross(axis, towards)
-    angles = [np.arctan2(motion.rays @ across, motion.rays @ towards) for motion in (first, second)]
-    ranges = [_range(motion.energy.sum(axis=0), angle) for motion, angle in zip((first, second), angles, strict=True)]
-    low, high = min(low for low, _ in ranges), max(high for _, high in ranges)
-    return (
-        _binned(first.energy, angles[0], low, high),
-        _binned(second.energy, angles[1], low, high),
-    )
-
-
-def pair_barcodes(motions: Sequence[CameraMotion]) -> PairCodes:
-    """The barcodes of all pairs of cameras that see something move."""
-    pairs = combinations(range(len(motions)), 2)
-    codes = {(a, b): barcodes(motions[a], motions[b]) for a, b in pairs}
-    return {pair: both for pair, both in codes.items() if both is not None}
-
-
-def _range(weights: Float[np.ndarray, "pixel"], angles: Float[np.ndarray, "pixel"]) -> tuple[float, float]:
-    order = np.argsort(angles)
-    share = np.cumsum(weights[order], dtype=float) / weights.sum(dtype=float)
-    ends = np.searchsorted(share, [TAILS, 1.0 - TAILS])
-    low, high = angles[order][np.minimum(ends, len(order) - 1)]
-    return float(low), float(max(high, low + 1e-6))
-
-
-def _binned(
-    energy: Float[np.ndarray, "step pixel"], angles: Float[np.ndarray, "pixel"], low: float, high: float
-) -> Float[np.ndarray, "step plane"]:
-    number = np.floor((angles - low) / (high - low) * NUM_PLANES).astype(int)
-    used = np.flatnonzero((number >= 0) & (number < NUM_PLANES) & energy.any(axis=0))
-    chosen = np.zeros((len(used), NUM_PLANES), np.float32)
-    chosen[np.arange(len(used)), number[used]] = 1.0
-    return energy[:, used] @ chosen
-
-
-def correlation(a: Float[np.ndarray, "step plane"], b: Float[np.ndarray, "_step plane"]) -> float:
-    """Normalised correlation over time and planes, the mean of each plane taken off."""
-    a, b = a - a.mean(axis=0), b - b.mean(axis=0)
-    return float((a * b).sum() / np.sqrt(float((a * a).sum()) * float((b * b).sum()) + 1e-12))
-
-
-def lag_curve(
-    a: Float[np.ndarray, "step plane"], b: Float[np.ndarray, "_step plane"], most: int
-) -> Float[np.ndarray, "lag"]:
-    """Correlation of a(t + lag) with b(t), for lags from -most to most."""
-    return np.array([correlation(*shifted(a, b, lag)) for lag in range(-most, most + 1)])
-
-
-def shifted(
-    a: Float[np.ndarray, "step plane"], b: Float[np.ndarray, "_step plane"], lag: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """The parts of two series where a(t + lag) and b(t) exist, side by side."""
-    count = min(len(a), len(b))
-    return a[max(lag, 0) : count + min(lag, 0)], b[max(-lag, 0) : count - max(lag, 0)]

@@ -27,14 +27,13 @@ def references_of(plates: Mapping[int, Picture], photographed: Moment | None) ->
 
 
 def place_findings(
-    names: tuple[str, ...], references: Mapping[int, tuple[str, Picture]], filmed: Moment
+    names: tuple[str, ...], references: Mapping[int, tuple[str, Picture]], filmed: Mapping[int, Picture]
 ) -> list[Finding]:
-    """Videos that show what another camera's still pictures show, or what none shows."""
+    """Videos (by camera a picture of each) that show what another camera's still pictures show, or what none shows."""
     likeness = place_likeness(references, filmed)
     findings, paired = [], set()
     for camera, row in likeness.items():
-        black = not filmed.pictures[camera].any()  # the camera is missing there
-        if row[camera] >= SAME or camera in paired or black:
+        if row[camera] >= SAME or camera in paired:
             continue
         other = max(row, key=row.__getitem__)
         label = references[camera][0]
@@ -55,12 +54,14 @@ def place_findings(
     return findings
 
 
-def place_likeness(references: Mapping[int, tuple[str, Picture]], filmed: Moment) -> dict[int, dict[int, float]]:
+def place_likeness(
+    references: Mapping[int, tuple[str, Picture]], filmed: Mapping[int, Picture]
+) -> dict[int, dict[int, float]]:
     """For each camera with a reference how alike its video's picture is with the reference of every camera."""
     structures = {camera: _structure(picture) for camera, (_, picture) in references.items()}
     rows = {}
-    for camera in references:
-        own = _structure(filmed.pictures[camera])
+    for camera in references.keys() & filmed.keys():
+        own = _structure(filmed[camera])
         rows[camera] = {other: float((own * reference).mean()) for other, reference in structures.items()}
     return rows
 

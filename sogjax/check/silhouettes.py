@@ -1,13 +1,13 @@
 """Where the subject is in the pictures: masks of example poses and of a few frames of the videos."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, UInt8
 
-from sogjax.check.clip import Clip, picture_or_black, working_picture
+from sogjax.check.clip import Clip, working_picture
 from sogjax.data.image_file import read_mask
 from sogjax.data.recording import ExamplePose, Recording
 from sogjax.data.video import read_prepared, read_still
@@ -28,7 +28,7 @@ class Moment:
     filmed: bool
     """From the videos; else photographed as an example pose."""
     pictures: dict[int, Picture]
-    """By camera (its index in the rig), BGR."""
+    """By camera (its index in the rig) that is present, BGR."""
     masks: dict[int, Mask]
     """By camera; absent where the subject could not be told."""
 
@@ -51,10 +51,9 @@ def video_moments(clip: Clip, offsets: Sequence[int]) -> list[Moment]:
     with ThreadPoolExecutor() as pool:
         moments = []
         for index, pictures in stills.items():
-            masks = pool.map(lambda k, shown=pictures: _from_plate(shown[k], plates.get(k)), range(len(pictures)))
-            found = {camera: mask for camera, mask in enumerate(masks) if mask is not None}
-            label = f"frame {clip.frame_number(index)}"
-            moments.append(Moment(label, True, dict(enumerate(pictures)), found))
+            masks = pool.map(lambda k, shown=pictures: _from_plate(shown[k], plates.get(k)), pictures)
+            found = {camera: mask for camera, mask in zip(pictures, masks, strict=True) if mask is not None}
+            moments.append(Moment(f"frame {clip.frame_number(index)}", True, pictures, found))
     return moments
 
 
@@ -106,11 +105,11 @@ def _from_plate(picture: Picture, plate: Picture | None) -> Mask | None:
     return guess if is_subject(guess) else None
 
 
-def _at_working_size(recording: Recording) -> Callable[[int, np.ndarray | None], Picture]:
-    return lambda camera, image: working_picture(picture_or_black(recording, camera, image))
+def _at_working_size(camera: int, image: np.ndarray | None) -> Picture | None:
+    return None if image is None else working_picture(image)
 
 
-def _stills_apart(clip: Clip, offsets: Sequence[int]) -> dict[int, tuple[Picture, ...]]:
+def _stills_apart(clip: Clip, offsets: Sequence[int]) -> dict[int, dict[int, Picture]]:
     """The pictures as they belong together with other offsets, read again."""
     names = clip.recording.rig.names
     moved = {name: clip.recording.frame_offset[name] + int(more) for name, more in zip(names, offsets, strict=True)}
@@ -119,6 +118,6 @@ def _stills_apart(clip: Clip, offsets: Sequence[int]) -> dict[int, tuple[Picture
     stills = {}
     for index in sorted({int(np.clip(k, border, max(clip.num_frames - 1 - border, border))) for k in clip.stills}):
         frame = clip.first + index
-        shown = next(read_prepared(recording, _at_working_size(recording), frame, frame + 1))
-        stills[index] = tuple(shown)
+        shown = next(read_prepared(recording, _at_working_size, frame, frame + 1))
+        stills[index] = {camera: picture for camera, picture in enumerate(shown) if picture is not None}
     return stills

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from sogjax.check.barcodes import PairCodes, lag_curve
 from sogjax.check.findings import Finding, listed
-from sogjax.check.motion import PairCodes, lag_curve
+from sogjax.sentences import counted
 
 ALIKE = 0.4
 """Correlation of two cameras' motion from which on its lag counts."""
@@ -16,6 +17,7 @@ SURE_MARGIN = 0.03
 SURE_MEAN = 0.35
 """Mean correlation at the offset, weighted, below which an offset is not believed."""
 FEWEST_STEPS = 8
+"""From a frame to the next, for offsets to be looked for."""
 REFITS = 10
 
 
@@ -127,8 +129,20 @@ def _support(
     return alike, margins, sharpness
 
 
+def too_short(frames: int, available: int) -> Finding:
+    """That so many frames say nothing of offsets; `available` are those of the recording."""
+    needed = FEWEST_STEPS + 1
+    what = f"time offsets cannot be estimated: the clip is too short, {counted(frames, 'frame')} of {needed} needed"
+    remedy = f"give frames={needed} or more" if available >= needed else "record more frames"
+    return Finding("note", "synchronisation", what, "", remedy)
+
+
 def synchrony_findings(
-    found: Synchrony, known: Mapping[str, int], moving: bool, jumped: Collection[int] = ()
+    found: Synchrony,
+    known: Mapping[str, int],
+    moving: bool,
+    jumped: Collection[int] = (),
+    away: Collection[int] = (),
 ) -> list[Finding]:
     """What the offsets mean.
 
@@ -137,6 +151,7 @@ def synchrony_findings(
         known: those that the recording has already.
         moving: whether anything moves.
         jumped: cameras whose offset changes on the way, so that no number mends it.
+        away: cameras that have too few pictures for anything to be told.
     """
     if len(found.names) < 2:
         return []
@@ -148,16 +163,16 @@ def synchrony_findings(
     for k in late:
         name, offset = found.names[k], int(found.offsets[k])
         when = "later" if offset > 0 else "earlier"
-        what = f"{name} shows everything {abs(offset)} frame{'s' * (abs(offset) > 1)} {when} than the others"
+        what = f"{name} shows everything {counted(abs(offset), 'frame')} {when} than the others"
         remedy = f"write `frame_offset: {{{name}: {known[name] + offset}}}` into recording.yaml, or add write=true"
         cause = "cameras that were not started or triggered together"
         findings.append(Finding("warning", "synchronisation", what, cause, remedy, (name,)))
-    unsure = tuple(name for name, sure in zip(found.names, found.sure, strict=True) if not sure)
+    unsure = tuple(name for k, name in enumerate(found.names) if not found.sure[k] and k not in away)
     if unsure:
         what = f"time offsets of {listed(unsure)} could not be told: what moves there is not what the others see"
         cause = "little of the motion is in their pictures, or their calibration or names are wrong"
         findings.append(Finding("note", "synchronisation", what, cause, cameras=unsure))
     if not late:
-        what = f"{int(found.sure.sum()) - len(jumped)} of {len(found.names)} cameras are in step"
+        what = f"in step: {int(found.sure.sum()) - len(jumped)} of {counted(len(found.names), 'camera')}"
         findings.append(Finding("ok", "synchronisation", what))
     return findings

@@ -9,6 +9,7 @@ from jaxtyping import Float
 from sogjax.data.atomic import atomic_path
 from sogjax.data.npz_file import float_array, number, read_npz, text_array
 from sogjax.errors import InputError
+from sogjax.sentences import counted
 
 
 @dataclass
@@ -66,7 +67,8 @@ def load_ground_truth(path: Path) -> GroundTruth:
     if markers is None and joints is None:
         raise InputError(f"{path}: holds neither 'markers' nor 'joints'; add one of them")
     if markers is not None and joints is not None and len(markers) != len(joints):
-        raise InputError(f"{path}: 'markers' has {len(markers)} frames and 'joints' {len(joints)}; make them equal")
+        counts = f"'markers' has {counted(len(markers), 'frame')} and 'joints' {len(joints)}"
+        raise InputError(f"{path}: {counts}; make them equal")
     return GroundTruth(fps, markers, marker_names, joints, joint_names)
 
 

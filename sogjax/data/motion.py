@@ -58,6 +58,8 @@ class Motion:
     converged: Bool[np.ndarray, "frame"]
     up: str = DEFAULT_UP
     """The world's vertical, one of `sogjax.model.frames.UP_AXES`."""
+    actor: str = ""
+    """Whose motion it is; empty where the file does not say it."""
     pose_std: Float[np.ndarray, "frame dof"] | None = None
     """Standard deviation of each degree of freedom; None where it was not computed, as in `joint_std`."""
     joint_std: Float[np.ndarray, "frame joint"] | None = None
@@ -113,6 +115,7 @@ def motion_from_poses(
         iterations=np.zeros(count, int) if iterations is None else iterations,
         converged=np.ones(count, bool) if converged is None else converged,
         up=up,
+        actor=body.name,
         pose_std=pose_std,
         joint_std=joint_std,
     )
@@ -178,6 +181,7 @@ def checked_motion(path: Path, arrays: dict[str, np.ndarray]) -> Motion:
         iterations=int_array(path, arrays, "iterations", (frames,)),
         converged=bool_array(path, arrays, "converged", (frames,)),
         up=str(text_array(path, arrays, "up", ())) if "up" in arrays else DEFAULT_UP,
+        actor=str(text_array(path, arrays, "actor", ())) if "actor" in arrays else "",
         pose_std=_if_there(path, arrays, "pose_std", (frames, len(dof_names))),
         joint_std=_if_there(path, arrays, "joint_std", (frames, joints)),
     )

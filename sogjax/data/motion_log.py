@@ -55,7 +55,8 @@ class MotionLog:
         """All that was written; `mapped`: the arrays stay on disk, as long as the folder does."""
         arrays = read_log(self.folder, mapped)
         arrays["fps"] = float(arrays["fps"])  # pyright: ignore[reportArgumentType]
-        arrays["up"] = str(arrays["up"])  # pyright: ignore[reportArgumentType]
+        for name in {"up", "actor"} & arrays.keys():
+            arrays[name] = str(arrays[name])  # pyright: ignore[reportArgumentType]
         arrays.pop("format_version")
         return Motion(**arrays)  # pyright: ignore[reportArgumentType]
 

@@ -1,5 +1,6 @@
 """A recording: a folder with synchronised videos, their calibration, and what else is known of them."""
 
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from sogjax.data.calibration import CameraRig, find_calibrations, load_calibration
+from sogjax.data.camera_choice import chosen_cameras, folder_around
 from sogjax.data.color_gains import ColorGains
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.initial_pose import read_initial_poses
@@ -75,6 +77,13 @@ class Recording:
         number = self.first_frame + frame
         return any(first <= number <= last for first, last in self.missing.get(camera, ()))
 
+    def num_missing(self, frames: Iterable[int]) -> dict[str, int]:
+        """By camera how many of the frames (as in `has_image`) it has no picture of; none where it has all."""
+        shown = lambda camera, frame: self.has_image(camera, frame) and not self.is_missing(camera, frame)
+        frames = [] if self.complete else list(frames)
+        counts = {camera: sum(not shown(camera, frame) for frame in frames) for camera in self.rig.names}
+        return {camera: count for camera, count in counts.items() if count}
+
 
 def open_recording(path: Path) -> Recording:
     """The recording in the folder `path`, everything in it looked at.
@@ -83,12 +92,13 @@ def open_recording(path: Path) -> Recording:
         InputError: something is missing, unreadable, or does not fit together.
     """
     if not path.is_dir():
-        raise InputError(f"{path}: there is no such folder; give the folder of a recording")
+        what = "this is a file" if path.is_file() else "there is no such folder"
+        raise InputError(f"{path}: {what}; {folder_around(path) or 'give the folder of a recording'}")
     settings = read_recording_settings(path / "recording.yaml")
     calibration = _calibration(path, settings)
     calibrated = load_calibration(calibration, settings.unit)
     sources = find_sources(path)
-    cameras = _cameras(path, calibration, settings, calibrated.names, tuple(sources))
+    cameras = chosen_cameras(path, calibration, settings, calibrated.names, sources)
     rig = calibrated.select(cameras)
     sources = {camera: sources[camera] for camera in cameras}
     for key, by_camera in settings.by_camera.items():
@@ -139,34 +149,11 @@ def _calibration(path: Path, settings: RecordingSettings) -> Path:
         return named
     found = find_calibrations(path)
     if not found:
-        raise InputError(f"{path}: holds no calibration file; add calibration.toml")
+        raise InputError(f"{path}: holds no calibration file; {folder_around(path) or 'add calibration.toml'}")
     if len(found) > 1:
         names = ", ".join(file.name for file in found)
         raise InputError(f"{path}: holds several calibrations ({names}); name one as `calibration:` in recording.yaml")
     return found[0]
-
-
-def _cameras(
-    path: Path,
-    calibration: Path,
-    settings: RecordingSettings,
-    calibrated: tuple[str, ...],
-    filmed: tuple[str, ...],
-) -> tuple[str, ...]:
-    """The cameras to use: those that recording.yaml names, else all, which then must all be whole."""
-    wanted = settings.cameras or tuple(dict.fromkeys(calibrated + filmed))
-    otherwise = "" if settings.cameras else ", or list the cameras to use as `cameras:` in recording.yaml"
-    for camera in wanted:
-        if camera not in calibrated:
-            raise InputError(
-                f"{calibration}: has no camera {camera!r}, only: {', '.join(calibrated)}; calibrate it{otherwise}"
-            )
-        if camera not in filmed:
-            raise InputError(
-                f"{path}: has no video of the camera {camera!r}, only of: {', '.join(sorted(filmed))}; "
-                f"add videos/{camera}.mp4{otherwise}"
-            )
-    return wanted
 
 
 def _missing(

@@ -10,6 +10,7 @@ from sogjax.data.recording_settings import RecordingSettings
 from sogjax.data.source import SourceInfo
 from sogjax.data.video_file import frame_times
 from sogjax.errors import InputError
+from sogjax.sentences import counted
 
 FPS_TOLERANCE = 5e-4
 """Relative difference of two videos' frame rates that is taken for rounding (29.97 and 30 differ by 1e-3)."""
@@ -83,14 +84,15 @@ def frames_in_common(
     if latest < earliest:
         lengths = ", ".join(f"{camera} {count}" for camera, count in counts.items())
         raise InputError(
-            f"{path}: the videos have no frame in common ({lengths} frames); correct `frame_offset:` or the videos"
+            f"{path}: the videos have no frame in common (frames: {lengths}); correct `frame_offset:` or the videos"
         )
     first, last = settings.first_frame, settings.last_frame
     for key, frame in (("first_frame", first), ("last_frame", last)):
         if frame is not None and not earliest <= frame <= latest:
             raise InputError(
                 f"{path / 'recording.yaml'}: {key}: {frame} is out of range; "
-                f"the frames that {'all' if needed == len(counts) else needed} cameras have are {earliest} to {latest}"
+                f"the frames of {'all' if needed == len(counts) else 'at least'} {counted(needed, 'camera')} are "
+                f"{earliest} to {latest}"
             )
     first, last = earliest if first is None else first, latest if last is None else last
     if last < first:
@@ -105,7 +107,7 @@ def frames_in_common(
             )
     elif settings.last_frame is None and len(set(ends.values())) > 1:
         lengths = ", ".join(f"{camera} {count}" for camera, count in counts.items())
-        warnings = (f"{path}: the videos differ in length ({lengths} frames); frames {first} to {last} are used",)
+        warnings = (f"{path}: the videos differ in length (frames: {lengths}); frames {first} to {last} are used",)
     return first, last - first + 1, warnings
 
 
@@ -114,16 +116,16 @@ def uneven(
 ) -> list[str]:
     """Sentences on videos whose images do not come at one rate; `fewest` is `fewest_cameras` of recording.yaml."""
     done = "the camera is missing there" if fewest is not None else "the nearest one is taken"
-    counted = [
+    by_number = [
         f"{sources[camera]}: its images do not come evenly (up to {info.longest_gap:.1f} times the usual time lies "
         "between two): the frame rate varies or images were dropped, and each counts as one frame; write "
         "`time_stamps: true` into recording.yaml to go by their times"
         for camera, info in infos.items()
         if camera not in timed and info.longest_gap > LONGEST_GAP
     ]
-    return counted + [
-        f"{sources[camera]}: has no image of {len(images.lost)} of its {len(images.picked)} frames by its time "
-        f"stamps; {done}"
+    return by_number + [
+        f"{sources[camera]}: has no image of {len(images.lost)} of its {counted(len(images.picked), 'frame')} by its "
+        f"time stamps; {done}"
         for camera, images in timed.items()
         if images.lost
     ]

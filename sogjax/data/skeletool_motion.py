@@ -10,6 +10,7 @@ from sogjax.data.motion import DEFAULT_UP, Motion, motion_from_poses
 from sogjax.data.text_lines import Lines
 from sogjax.errors import InputError
 from sogjax.model.body import Body
+from sogjax.sentences import counted
 
 HEADER = "Skeletool Motion File V1.0"
 MAX_BYTES = 256 * 2**20
@@ -26,7 +27,7 @@ def read_skeletool_motion(path: Path, body: Body, fps: float, up: str = DEFAULT_
     if " ".join(lines.take("the header")) != HEADER:
         raise lines.error(f"the header {HEADER!r}")
     count = body.skeleton.num_dofs
-    expected = f"a frame and {count} numbers, one for each degree of freedom of {body.name!r}"
+    expected = f"a frame and {counted(count, 'number')}, one for each degree of freedom of {body.name!r}"
     frames: list[int] = []
     poses: list[list[float]] = []
     while lines.left:

@@ -13,6 +13,7 @@ from yaml.constructor import ConstructorError
 
 from sogjax.data.bounded_file import read_bounded
 from sogjax.errors import InputError
+from sogjax.sentences import counted
 
 MAX_BYTES = 1_000_000
 """A larger file is no file that a person wrote."""
@@ -164,7 +165,7 @@ def _shown(value: object) -> str:
         return "a number with very many digits"
     if isinstance(value, list):
         text = f"[{', '.join(map(_shown, value[:4]))}]"
-        return text if len(value) <= 4 and len(text) <= 80 else f"a list of {len(value)} values"
+        return text if len(value) <= 4 and len(text) <= 80 else f"a list of {counted(len(value), 'value')}"
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
 

@@ -24,6 +24,7 @@ from sogjax.evaluate.metrics import (
     summarize,
 )
 from sogjax.evaluate.swaps import Swap, identity_swaps
+from sogjax.sentences import counted
 
 MM = 1000.0
 
@@ -70,7 +71,7 @@ class Evaluation:
                 lines.append(_summary_row(f"all {title}", summarize(points.errors)))
                 rows = enumerate(points.names) if details else ()
                 lines += [_summary_row(f"  {name}", summarize(points.errors[:, [k]])) for k, name in rows]
-        lines.append(f"{len(self.frames)} frames, {self.frames[0]} to {self.frames[-1]}; distances in mm")
+        lines.append(f"{counted(len(self.frames), 'frame')}, {self.frames[0]} to {self.frames[-1]}; distances in mm")
         if self.markers is not None:
             lines.append("markers are attached in their first frame: a wrong first pose shows in the joints only")
         lines += [

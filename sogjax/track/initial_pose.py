@@ -13,6 +13,7 @@ from sogjax.data.initial_pose import InitialPose
 from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.model.frames import axis_vector
+from sogjax.sentences import counted
 
 LANDMARK_NOISE = 0.03
 """Metres: what a landmark is expected to be off."""
@@ -152,7 +153,7 @@ def landmark_targets(
         )
     if len(landmarks) < MIN_LANDMARKS:
         raise InputError(
-            f"{len(landmarks)} landmarks are too few to fit the body {body.name!r}; "
+            f"{counted(len(landmarks), 'landmark')} cannot fit the body {body.name!r}; "
             f"give at least {MIN_LANDMARKS}, well spread"
         )
     indices = jnp.array([known.index(name) for name in landmarks])

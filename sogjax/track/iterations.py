@@ -6,7 +6,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, UInt8
 
 from sogjax.track.culling import Capacities
-from sogjax.track.tracker import Tracker, TrackState
+from sogjax.track.frame import TrackState
+from sogjax.track.tracker import Tracker
 
 
 @eqx.filter_jit

@@ -12,8 +12,9 @@ from jaxtyping import Array, Float, Int, UInt8
 
 from sogjax.energy.objective import Views
 from sogjax.track.culling import Capacities, in_boxes
+from sogjax.track.frame import FrameResult, TrackState
 from sogjax.track.scan import ClipCells, with_room, without_images
-from sogjax.track.tracker import FrameResult, Tracker, TrackState, first_capacities
+from sogjax.track.tracker import Tracker, first_capacities
 
 Batching = Literal["one_by_one", "in_step"]
 """How the solver works through the members of a frame: one after the other, or all iterations in step."""

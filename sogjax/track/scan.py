@@ -14,16 +14,8 @@ from jaxtyping import Array, Bool, Float, UInt8
 
 from sogjax.model.sog import Sog
 from sogjax.track.culling import Capacities
-from sogjax.track.tracker import (
-    FrameCells,
-    FrameResult,
-    TrackedFrame,
-    Tracker,
-    TrackState,
-    first_capacities,
-    larger_capacities,
-    on_device,
-)
+from sogjax.track.frame import FrameCells, FrameResult, TrackedFrame, TrackState, on_device
+from sogjax.track.tracker import Tracker, first_capacities, larger_capacities
 
 ClipCells = UInt8[Array, "frame camera rows columns 3"]
 

@@ -2,22 +2,19 @@
 
 import time
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from functools import partial
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Bool, Float, Int, UInt8
 
 from sogjax.energy.curvature import FrameEnergy
-from sogjax.energy.objective import EnergyTerms, EnergyWeights, History, Views, terms_of_energy
+from sogjax.energy.objective import EnergyWeights, History, Views, terms_of_energy
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.color import from_rgb
-from sogjax.model.sog import Sog
 from sogjax.model.stages import computed_once
 from sogjax.solve import Scales, Solution, Solver
 from sogjax.track.confidence import Deviations, Laplace
@@ -32,6 +29,7 @@ from sogjax.track.culling import (
     common_boxes,
     union_boxes,
 )
+from sogjax.track.frame import FrameCells, FrameResult, TrackedFrame, TrackState, on_device, on_host
 from sogjax.track.rounds import solve_near
 
 HEADROOM = 1.4
@@ -40,43 +38,6 @@ BLOCK_HEADROOM = 1.25
 """The same for blocks of pairs, whose number for all cameras together changes less."""
 
 PairChoice = Literal["dense", "sparse"]
-
-
-class TrackState(eqx.Module):
-    """The poses of the two frames before, and how many of them are known (0, 1, 2)."""
-
-    previous: Float[Array, "dof"]
-    before_previous: Float[Array, "dof"]
-    num_known: Int[Array, ""]
-
-    @classmethod
-    def from_pose(cls, pose: Float[Array, "dof"]) -> "TrackState":
-        """The state before the first frame, from a rough pose."""
-        return cls(pose, pose, jnp.asarray(0))
-
-    def advanced(self, pose: Float[Array, "dof"]) -> "TrackState":
-        """The state after a frame whose pose was found; the first one has no history but itself."""
-        first = self.num_known == 0
-        return TrackState(pose, jnp.where(first, pose, self.previous), jnp.minimum(self.num_known + 1, 2))
-
-
-class FrameResult(eqx.Module):
-    """What was found in one frame."""
-
-    pose: Float[Array, "dof"]
-    terms: EnergyTerms
-    iterations: Int[Array, ""]
-    evaluations: Int[Array, ""]
-    """Of the energy, with its gradient."""
-    converged: Bool[Array, ""]
-    num_near: Int[Array, "camera"]
-    num_matching: Int[Array, "camera"]
-    num_blocks: Int[Array, ""]
-    """Blocks of near pairs; 0 where all pairs were compared."""
-    deviations: Deviations | None
-    """How sure the pose is; None: it was not asked for."""
-    images: Sog
-    """The image blobs that were used, for each camera (working colour space)."""
 
 
 class Tracker(eqx.Module):
@@ -198,37 +159,6 @@ class Tracker(eqx.Module):
 _step = eqx.filter_jit(Tracker.step)
 
 
-class PartialCells(NamedTuple):
-    """The cells of a frame of which some cameras have no picture."""
-
-    cells: UInt8[np.ndarray, "camera rows columns 3"]
-    present: Bool[np.ndarray, "camera"]
-
-
-FrameCells = UInt8[np.ndarray, "camera rows columns 3"] | PartialCells
-
-
-def on_device(
-    frame: FrameCells,
-) -> tuple[UInt8[Array, "camera rows columns 3"], Bool[Array, "camera"] | None]:
-    """The cells of a frame, and which cameras are present; None: all are."""
-    if isinstance(frame, PartialCells):
-        return jnp.asarray(frame.cells), jnp.asarray(frame.present)
-    return jnp.asarray(frame), None
-
-
-@dataclass
-class TrackedFrame:
-    """The result of one frame, the capacities it was computed with, and how long that took."""
-
-    index: int
-    result: FrameResult
-    capacities: Capacities
-    color_space: str
-    """Of the colours in `result.images`."""
-    seconds: float
-
-
 def track(
     tracker: Tracker,
     start: Float[Array, "dof"] | TrackState,
@@ -261,14 +191,6 @@ def track(
         state = next_state
         seconds = time.perf_counter() - begin
         yield TrackedFrame(index, on_host(result), capacities, tracker.reader.color_space, seconds)
-
-
-def on_host(result: FrameResult) -> FrameResult:
-    """The result with its small arrays on the host; the image blobs stay on the device until somebody needs them."""
-    images, leaves = jax.tree.structure(result.images), jax.tree.leaves(result)
-    small = len(leaves) - images.num_leaves  # `images` is the last field
-    host = jax.device_get(leaves[:small])
-    return jax.tree.unflatten(jax.tree.structure(result), [*host, *leaves[small:]])
 
 
 def larger_capacities(capacities: Capacities, near: int, matching: int, blocks: int) -> Capacities:

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from sogjax.data.bounded_file import read_bounded
 from sogjax.data.calibration.rig import METRES, CameraEntry, CameraRig, rig_from_entries
 from sogjax.errors import InputError
+from sogjax.sentences import counted
 
 MAX_BYTES = 4 * 2**20
 MAX_NESTING = 16
@@ -112,7 +113,7 @@ def _matrix(where: str, content: Content, key: str, count: int | None = None) ->
         raise InputError(f"{where}: has no {key}; add it, or calibrate the camera again")
     values = content[key]
     if not isinstance(values, np.ndarray) or (count is not None and len(values) != count):
-        found = f"{len(values)} numbers" if isinstance(values, np.ndarray) else "no matrix of numbers"
+        found = counted(len(values), "number") if isinstance(values, np.ndarray) else "no matrix of numbers"
         raise InputError(f"{where}: {key} holds {found}; give {count or 'a row of'} numbers (!!opencv-matrix)")
     return values
 

@@ -13,6 +13,7 @@ from jaxtyping import Float
 from sogjax.data.file_names import objection
 from sogjax.errors import InputError
 from sogjax.model.camera import Camera
+from sogjax.sentences import counted
 
 ROTATION_TOLERANCE = 1e-3
 """How far a rotation matrix of a file may be from orthonormal: files with four digits pass."""
@@ -154,12 +155,11 @@ def _check(path: Path, entry: CameraEntry) -> None:
             f"{where}: {_text(rotation)} is no rotation matrix (determinant {np.linalg.det(rotation):.3g}, "
             f"R R^T differs from 1 by {deviation:.3g}); calibrate it again or export it with more digits"
         )
+    given = counted(len(entry.distortion), "distortion coefficient")
     if entry.fisheye and len(entry.distortion) != 4:
-        raise InputError(
-            f"{where}: it has {len(entry.distortion)} distortion coefficients; a fisheye camera has k1 k2 k3 k4"
-        )
+        raise InputError(f"{where}: it has {given}; a fisheye camera has k1 k2 k3 k4")
     if len(entry.distortion) not in (4, 5):
-        raise InputError(f"{where}: it has {len(entry.distortion)} distortion coefficients; give k1 k2 p1 p2 [k3]")
+        raise InputError(f"{where}: it has {given}; give k1 k2 p1 p2 [k3]")
 
 
 def _camera_from_world(entry: CameraEntry) -> Float[np.ndarray, "4 4"]:

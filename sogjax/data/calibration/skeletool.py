@@ -9,6 +9,7 @@ from jaxtyping import Float
 from sogjax.data.atomic import atomic_path
 from sogjax.data.calibration.rig import METRES, CameraEntry, CameraRig, rig_from_entries
 from sogjax.errors import InputError
+from sogjax.sentences import counted
 
 HEADER = "Skeletool Camera Calibration File V1.0"
 
@@ -101,7 +102,9 @@ def _take(where: str, camera: _Camera, key: str, words: list[str], frame: str) -
     except ValueError:
         values = np.empty(0)
     if len(values) != _COUNTS[key]:
-        raise InputError(f"{where}: {key} = {' '.join(words)[:80]!r} is not {_COUNTS[key]} numbers; correct it")
+        raise InputError(
+            f"{where}: {key} = {' '.join(words)[:80]!r} is not {counted(_COUNTS[key], 'number')}; correct it"
+        )
     if frame and key in _MOVING:
         first, before = camera.framed.setdefault(key, (frame, values))
         if not np.array_equal(before, values, equal_nan=True):

@@ -1,0 +1,71 @@
+"""Which cameras of a recording are used, and a word where calibration and videos do not fit together."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from sogjax.data.recording_settings import RecordingSettings
+from sogjax.errors import InputError
+
+
+def chosen_cameras(
+    path: Path,
+    calibration: Path,
+    settings: RecordingSettings,
+    calibrated: tuple[str, ...],
+    sources: Mapping[str, Path],
+) -> tuple[str, ...]:
+    """The cameras to use: those that recording.yaml names, else all, which then must all be whole.
+
+    Args:
+        path: the recording.
+        calibration: its file.
+        settings: of recording.yaml.
+        calibrated: the cameras of the calibration.
+        sources: by camera its video or folder of images.
+
+    Raises:
+        InputError: a camera without calibration or without video.
+    """
+    wanted = settings.cameras or tuple(dict.fromkeys((*calibrated, *sources)))
+    otherwise = "" if settings.cameras else ", or list the cameras to use as `cameras:` in recording.yaml"
+    wrong = next((camera for camera in wanted if camera not in calibrated or camera not in sources), None)
+    if wrong is None:
+        return wanted
+    _refuse_other_name(calibration, wanted, calibrated, sources, otherwise)
+    if wrong not in calibrated:
+        raise InputError(
+            f"{calibration}: has no camera {wrong!r}, only: {', '.join(calibrated)}; calibrate it{otherwise}"
+        )
+    raise InputError(
+        f"{path}: has no video of the camera {wrong!r}, only of: {', '.join(sorted(sources))}; "
+        f"add videos/{wrong}.mp4{otherwise}"
+    )
+
+
+def _refuse_other_name(
+    calibration: Path,
+    wanted: tuple[str, ...],
+    calibrated: tuple[str, ...],
+    sources: Mapping[str, Path],
+    otherwise: str,
+) -> None:
+    """Where one video and one camera are left over, they are likely to be the same under two names."""
+    videos = [source for camera, source in sources.items() if camera not in calibrated]
+    cameras = [camera for camera in calibrated if camera in wanted and camera not in sources]
+    if len(videos) != 1 or len(cameras) != 1:
+        return
+    video, camera = videos[0], cameras[0]
+    new_name = camera if video.is_dir() else f"{camera}{video.suffix}"
+    raise InputError(
+        f"{video}: {calibration.name} has no camera of this name, and its camera {camera!r} has no video; rename "
+        f"the video to {new_name} if it is that camera's{otherwise}"
+    )
+
+
+def folder_around(path: Path) -> str:
+    """The remedy where something inside of a recording was given in its place; empty where that is not so."""
+    inside = path.is_file() or path.name in ("videos", "images", "background", "example_poses")
+    for folder in path.resolve().parents[:2] if inside else ():
+        if any((folder / name).is_dir() for name in ("videos", "images")):
+            return f"give the folder of the recording, {folder}"
+    return ""

@@ -1,0 +1,91 @@
+"""What goes into the tracking of one frame, and what comes out of it."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int, UInt8
+
+from sogjax.energy.objective import EnergyTerms
+from sogjax.model.sog import Sog
+from sogjax.track.confidence import Deviations
+from sogjax.track.culling import Capacities
+
+
+class PartialCells(NamedTuple):
+    """The cells of a frame of which some cameras have no picture."""
+
+    cells: UInt8[np.ndarray, "camera rows columns 3"]
+    present: Bool[np.ndarray, "camera"]
+
+
+FrameCells = UInt8[np.ndarray, "camera rows columns 3"] | PartialCells
+
+
+def on_device(
+    frame: FrameCells,
+) -> tuple[UInt8[Array, "camera rows columns 3"], Bool[Array, "camera"] | None]:
+    """The cells of a frame, and which cameras are present; None: all are."""
+    if isinstance(frame, PartialCells):
+        return jnp.asarray(frame.cells), jnp.asarray(frame.present)
+    return jnp.asarray(frame), None
+
+
+class TrackState(eqx.Module):
+    """The poses of the two frames before, and how many of them are known (0, 1, 2)."""
+
+    previous: Float[Array, "dof"]
+    before_previous: Float[Array, "dof"]
+    num_known: Int[Array, ""]
+
+    @classmethod
+    def from_pose(cls, pose: Float[Array, "dof"]) -> "TrackState":
+        """The state before the first frame, from a rough pose."""
+        return cls(pose, pose, jnp.asarray(0))
+
+    def advanced(self, pose: Float[Array, "dof"]) -> "TrackState":
+        """The state after a frame whose pose was found; the first one has no history but itself."""
+        first = self.num_known == 0
+        return TrackState(pose, jnp.where(first, pose, self.previous), jnp.minimum(self.num_known + 1, 2))
+
+
+class FrameResult(eqx.Module):
+    """What was found in one frame."""
+
+    pose: Float[Array, "dof"]
+    terms: EnergyTerms
+    iterations: Int[Array, ""]
+    evaluations: Int[Array, ""]
+    """Of the energy, with its gradient."""
+    converged: Bool[Array, ""]
+    num_near: Int[Array, "camera"]
+    num_matching: Int[Array, "camera"]
+    num_blocks: Int[Array, ""]
+    """Blocks of near pairs; 0 where all pairs were compared."""
+    deviations: Deviations | None
+    """How sure the pose is; None: it was not asked for."""
+    images: Sog
+    """The image blobs that were used, for each camera (working colour space)."""
+
+
+@dataclass
+class TrackedFrame:
+    """The result of one frame, the capacities it was computed with, and how long that took."""
+
+    index: int
+    result: FrameResult
+    capacities: Capacities
+    color_space: str
+    """Of the colours in `result.images`."""
+    seconds: float
+
+
+def on_host(result: FrameResult) -> FrameResult:
+    """The result with its small arrays on the host; the image blobs stay on the device until somebody needs them."""
+    images, leaves = jax.tree.structure(result.images), jax.tree.leaves(result)
+    small = len(leaves) - images.num_leaves  # `images` is the last field
+    host = jax.device_get(leaves[:small])
+    return jax.tree.unflatten(jax.tree.structure(result), [*host, *leaves[small:]])
