@@ -20,8 +20,9 @@ from sogjax.app.study.source import Source, source_named
 from sogjax.data.motion import Motion, motion_from_poses
 from sogjax.data.video import read_frames
 from sogjax.errors import InputError
+from sogjax.track.frame import TrackState
 from sogjax.track.iterations import best_after
-from sogjax.track.tracker import TrackState, track
+from sogjax.track.tracker import track
 from sogjax.view.rerun import write_iterations
 
 

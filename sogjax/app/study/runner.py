@@ -24,7 +24,8 @@ from sogjax.evaluate import GroupEvaluation, evaluate_motions
 from sogjax.evaluate.metrics import mean_per_frame
 from sogjax.model.body import Body, dof_slices
 from sogjax.track.culling import Capacities
-from sogjax.track.tracker import FrameResult, track
+from sogjax.track.frame import FrameResult
+from sogjax.track.tracker import track
 
 STAGES = ("decode", "step", "whole")
 
