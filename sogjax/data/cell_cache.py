@@ -18,6 +18,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from sogjax.data.atomic import atomic_path
+from sogjax.data.npz_file import check_npy
 from sogjax.data.recording import Recording
 from sogjax.data.source import fingerprint
 from sogjax.errors import InputError
@@ -112,8 +113,9 @@ class CellCache:
         if made_from != self._made_from:
             raise _UnusableError("was made from other files or settings")
         try:
+            check_npy(array)
             cells = np.load(array, mmap_mode="r", allow_pickle=False)
-        except (OSError, ValueError, EOFError) as error:
+        except (OSError, ValueError, EOFError, InputError) as error:
             raise _UnusableError("is missing or cut short") from error
         if _checksum(array, cells.offset) != checksum:
             raise _UnusableError("is damaged")
