@@ -4,10 +4,11 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 from bad_inputs import make_workplace
 
-from sogjax.app.kept_run import FOLDER, NOTE, KeptRun
+from sogjax.app.kept_run import CAPACITIES, CAPACITY, COLUMNS, FOLDER, NOTE, TERMS, KeptRun
 from sogjax.data.actor_file import load_body
 from sogjax.data.array_log import ArrayLog
 from sogjax.data.calibration import load_calibration
@@ -88,8 +89,9 @@ def _runs(place: Path) -> dict[str, tuple[Path, Read]]:
     with_motion.close()
     kept.begin("track", {"version": "1"})
     kept.keep_actors([load_body(place / "actor.yaml")])
-    kept.keep_start(motion.pose[0])
-    rows = {"pose": motion.pose, "energy": motion.energy, "iterations": motion.iterations}
+    kept.keep_start(jnp.asarray(motion.pose[0]))
+    names = (*COLUMNS, *TERMS, *(CAPACITY.format(name) for name in CAPACITIES))
+    rows = dict.fromkeys(names, motion.iterations) | {"pose": motion.pose}
     ArrayLog(kept.folder, {}, rows).close()
     whole_motion = lambda path: load_motion(path.parent)
     return {

@@ -137,7 +137,7 @@ class KeptRun:
         rows = None
         with suppress(InputError):
             rows = read_log(self.folder)
-        if rows is None or not _NEEDED <= rows.keys():
+        if rows is None or not rows.keys() >= _NEEDED:
             return None
         whole = min(readable, len(rows["pose"]))
         count = whole if whole == total else whole - whole % FRAMES_AT_ONCE

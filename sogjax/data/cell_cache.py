@@ -108,6 +108,8 @@ class CellCache:
         try:
             content = json.loads(note.read_text())
             made_from, begin, checksum = (content[key] for key in ("made_from", "first_frame", "checksum"))
+            if not isinstance(begin, int):
+                raise TypeError("first_frame is no number")
         except (OSError, ValueError, LookupError, TypeError) as error:
             raise _UnusableError("has no readable note of what it was made from") from error
         if made_from != self._made_from:

@@ -197,5 +197,8 @@ class VideoWriter:
         height, width = image.shape[:2]
         writer = cv2.VideoWriter(str(self._temporary), cv2.VideoWriter.fourcc(*"mp4v"), self._fps, (width, height))
         if not writer.isOpened():
-            raise InputError(f"{self._path}: a video of {width}x{height} at {self._fps:g} fps cannot be written")
+            raise InputError(
+                f"{self._path}: a video of {width}x{height} at {self._fps:g} fps cannot be written "
+                "there; choose another folder"
+            )
         return writer
