@@ -22,7 +22,6 @@ from sogjax.errors import InputError
 
 FIRST_FRAMES = 8
 LATER_FRAMES = 24
-SMALL_DISK = 2**20
 LIGHT = ("outputs.overlay=false", "outputs.rerun=false")
 
 
@@ -51,11 +50,10 @@ def interrupted(ward: Ward) -> list[Survived]:
 
 
 def full_disk(ward: Ward) -> list[Survived]:
-    """Files that may not grow beyond some bytes (RLIMIT_FSIZE), and a small disk where we may mount one."""
+    """Files that may not grow beyond some bytes (RLIMIT_FSIZE)."""
     motion = (ward.place / "alone/motion.npz").stat().st_size
     file = (ward.place / "alone/motion.rrd").stat().st_size
-    rows = [limited(ward, "motion.partial", motion * 3 // 4), limited(ward, "motion.rrd", file // 2)]
-    return rows + small_disk(ward)
+    return [limited(ward, "motion.partial", motion * 3 // 4), limited(ward, "motion.rrd", file // 2)]
 
 
 def limited(ward: Ward, name: str, limit: int) -> Survived:
@@ -65,22 +63,6 @@ def limited(ward: Ward, name: str, limit: int) -> Survived:
     resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (limit, limit))  # long before it writes
     done = f"no file may exceed {limit} bytes, which are too few for {name}"
     return ward.resumed("full disk", done, folder, said_by(process))
-
-
-def small_disk(ward: Ward) -> list[Survived]:
-    """A file system of its own, too small for all outputs together; none where it cannot be mounted."""
-    folder = ward.place / "small_disk"
-    folder.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", f"size={SMALL_DISK}", "tmpfs", str(folder)]
-    if shutil.which("mount") is None or subprocess.run(mount, check=False, capture_output=True).returncode != 0:
-        return []
-    try:
-        said = said_by(started(ward.alone.command, folder))
-        subprocess.run(["mount", "-o", "remount,size=64m", str(folder)], check=True)
-        done = f"a file system of {SMALL_DISK} bytes, too small for all outputs together; then made larger"
-        return [ward.resumed("full disk", done, folder, said)]
-    finally:
-        subprocess.run(["umount", str(folder)], check=True)
 
 
 def damaged_video(ward: Ward) -> list[Survived]:
@@ -163,7 +145,9 @@ def second_run(ward: Ward) -> Survived:
     """The same command again while it runs."""
     folder = ward.place / "two_runs"
     first = after_frames(ward.alone.command, folder, FIRST_FRAMES)
+    first.send_signal(signal.SIGSTOP)  # else it might end before the other one has begun
     said = said_by(started([*ward.alone.command, "overwrite=true"], folder))
+    first.send_signal(signal.SIGCONT)
     frames = frames_left(folder)
     end, same = ward.compared(folder, said_by(first))
     done = "a second run with overwrite=true into the folder of one that runs"
