@@ -137,7 +137,8 @@ def power_loss(ward: Ward) -> list[Survived]:
             with log.open("rb") as file:
                 row = npy_header(file)[1].itemsize
             log.write_bytes(change(log.read_bytes(), row))
-        rows.append(ward.resumed("loss of power", f"SIGKILL, and {what}", folder, said, status=-signal.SIGKILL))
+        row = ward.resumed("loss of power", f"SIGKILL, and {what}", folder, said, status=-signal.SIGKILL)
+        rows.append(replace(row, good=row.good and int(row.frames) >= LATER_FRAMES - 1))
     return rows
 
 

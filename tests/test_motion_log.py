@@ -100,3 +100,14 @@ def test_rows_are_on_the_disk_before_the_header_counts_them(tmp_path, monkeypatc
         log.append(part(motion, slice(first, stop)))
     log.close()
     assert counts == [(0, 4), (4, 8)]
+
+
+def test_only_a_record_that_was_cut_in_half_is_lost(tmp_path):
+    motion, log = walking_motion(8), MotionLog(tmp_path / "motion.partial")
+    log.append(motion)
+    log.close()
+    path = log.folder / ROWS
+    with path.open("rb") as file:
+        row = npy_header(file)[1].itemsize
+    path.write_bytes(path.read_bytes()[: -row // 2])
+    assert_same(load_motion(log.folder), part(motion, slice(0, 7)))

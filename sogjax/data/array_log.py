@@ -13,7 +13,7 @@ from types import TracebackType
 import numpy as np
 
 from sogjax.data.atomic import atomic_path, disk_trouble_told
-from sogjax.data.npz_file import check_npy, npy_header, read_npz
+from sogjax.data.npz_file import npy_header, read_npz
 from sogjax.errors import InputError
 
 CONSTANT, ROWS = "constant.npz", "rows.npy"
@@ -105,7 +105,6 @@ def read_log(folder: Path, mapped: bool = False) -> Arrays:
     """
     constant = read_npz(folder / CONSTANT)
     path = folder / ROWS
-    check_npy(path)
     try:
         rows = _whole_rows(path, mapped)
     except (OSError, ValueError, EOFError) as error:
