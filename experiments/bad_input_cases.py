@@ -121,6 +121,8 @@ RECORDING: list[tuple[str, Damage]] = [
     ("a frame rate in words", write(REC, "fps: fast\n")),
     ("an unknown camera", write(REC, "cameras: [left, cellar]\n")),
     ("no cameras", write(REC, "cameras: []\n")),
+    ("a maybe for going by time stamps", write(REC, "time_stamps: maybe\n")),
+    ("a number for going by time stamps", write(REC, "time_stamps: 2\n")),
     ("an offset of an unknown camera", write(REC, "frame_offset: {cellar: 2}\n")),
     ("an offset beyond the end", write(REC, "frame_offset: {left: 1000}\n")),
     ("the last frame before the first", write(REC, "first_frame: 3\nlast_frame: 1\n")),

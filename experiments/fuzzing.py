@@ -1,20 +1,17 @@
 """Readers of files against damaged files, for `reliability.py`."""
 
+import os
 import tempfile
 import time
-from collections.abc import Callable
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from bad_inputs import make_workplace
+from fuzzed_readers import Read, readers
 
-from sogjax.data.actor_file import load_body
-from sogjax.data.calibration import load_calibration
-from sogjax.data.ground_truth import load_ground_truth
-from sogjax.data.initial_pose import load_initial_poses
-from sogjax.data.motion import load_motion
-from sogjax.data.recording_settings import read_recording_settings
 from sogjax.errors import InputError
 
 EXTREME = (b"nan", b"inf", b"-1", b"0", b"1e308", b"9" * 40, b"''", b"null", b"[]", b"{}", b"\x00", b"\xff\xfe")
@@ -31,26 +28,28 @@ class FuzzedReader:
     seconds: float = 0.0
 
 
-def readers() -> dict[str, tuple[str, Callable[[Path], object]]]:
-    """By name: a good file of the workplace, and what reads it."""
-    return {
-        "calibration, TOML": ("walk/calibration.toml", load_calibration),
-        "recording.yaml": ("walk/recording.yaml", read_recording_settings),
-        "initial_pose.yaml": ("walk/initial_pose.yaml", lambda path: load_initial_poses(path, ["puppet"])),
-        "actor.yaml": ("actor.yaml", load_body),
-        "motion.npz": ("motion.npz", load_motion),
-        "ground_truth.npz": ("truth.npz", load_ground_truth),
-    }
-
-
 def fuzz_readers(count: int) -> list[FuzzedReader]:
     """Every reader with `count` damaged files; the same ones in every run."""
     with tempfile.TemporaryDirectory() as place:
-        make_workplace(Path(place))
-        return [fuzzed(name, Path(place) / file, read, count) for name, (file, read) in readers().items()]
+        good = readers(Path(place))
+        with without_the_codecs_lines():
+            return [fuzzed(name, path, read, count) for name, (path, read) in good.items()]
 
 
-def fuzzed(name: str, path: Path, read: Callable[[Path], object], count: int) -> FuzzedReader:
+@contextmanager
+def without_the_codecs_lines() -> Iterator[None]:
+    """Libraries for pictures tell every damage on standard error; that is dropped within the block."""
+    with Path(os.devnull).open("w") as nowhere:
+        kept = os.dup(2)
+        os.dup2(nowhere.fileno(), 2)
+        try:
+            yield
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
+
+
+def fuzzed(name: str, path: Path, read: Read, count: int) -> FuzzedReader:
     """One reader with `count` damaged versions of a file."""
     good, rng, result = path.read_bytes(), np.random.default_rng(0), FuzzedReader(name)
     begin = time.perf_counter()
@@ -62,7 +61,8 @@ def fuzzed(name: str, path: Path, read: Callable[[Path], object], count: int) ->
         except InputError:
             result.refused += 1
         except Exception as error:
-            result.crashes.append(f"{type(error).__name__}: {error}")
+            where = traceback.extract_tb(error.__traceback__)[-1]
+            result.crashes.append(f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})")
     result.seconds = time.perf_counter() - begin
     path.write_bytes(good)
     return result

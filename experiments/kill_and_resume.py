@@ -43,31 +43,72 @@ class Settings:
     """Make the actor from example poses, too."""
 
 
+@dataclass(frozen=True)
+class Undisturbed:
+    """A run that was left alone, with which others are compared."""
+
+    command: list[str]
+    """Without its folder."""
+    motion: Motion
+    seconds: float
+    """That it took when its programs had been compiled."""
+
+
+@dataclass(frozen=True)
+class Kills:
+    """What many kills did."""
+
+    left: list[int]
+    """Frames that could be read after each."""
+    runs: int
+    """Folders that were needed, as some runs came to their end before they were killed."""
+
+
 def main() -> None:
     """Kill, go on, compare, and say how many frames every kill left."""
-    settings, chance = settings_from(Settings), random.Random(0)
-    chance.seed(settings.seed)
+    settings = settings_from(Settings)
     print(machine_line())
     with TemporaryDirectory() as place:
-        command = tracking(settings)
-        alone = Path(place) / "alone"
-        started(command, alone).wait()  # compiled programs are kept from here on, where SOGJAX_COMPILATION_CACHE is set
-        begin = time.perf_counter()
-        started([*command, "overwrite=true"], alone).wait()
-        life = time.perf_counter() - begin
-        whole, left, folder, runs = load_motion(alone / "motion.npz"), [], Path(place) / "run_0", 1
-        while len(left) < settings.kills:
-            late = len(left) % 2 == 1
-            if killed(command, folder, chance.uniform(0.0, LATE * life if late else life), late):
-                left.append(frames_left(folder))
-                print(f"kill {len(left)}: {left[-1]} frames readable", flush=True)
-                continue
-            check_same(folder, whole, settings)
-            folder, runs = Path(place) / f"run_{runs}", runs + 1
-        if started([*command, "resume=true"], folder).wait() != 0:
-            raise InputError(f"{folder}: the last run did not end well")
-        check_same(folder, whole, settings)
-    print(f"{settings.kills} kills in {runs} runs of {settings.frames} frames: every end is bit for bit the same")
+        kills = killed_and_resumed(settings, undisturbed(settings, Path(place)), Path(place))
+    print(
+        f"{len(kills.left)} kills in {kills.runs} runs of {settings.frames} frames: every end is bit for bit the same"
+    )
+
+
+def undisturbed(settings: Settings, place: Path) -> Undisturbed:
+    """A run in a folder below `place`, done twice, the second time for the clock.
+
+    Compiled programs are kept from the first one on, where SOGJAX_COMPILATION_CACHE is set.
+    """
+    command, folder = tracking(settings), place / "alone"
+    started(command, folder).communicate()
+    begin = time.perf_counter()
+    started([*command, "overwrite=true"], folder).communicate()
+    return Undisturbed(command, load_motion(folder / "motion.npz"), time.perf_counter() - begin)
+
+
+def killed_and_resumed(settings: Settings, alone: Undisturbed, place: Path) -> Kills:
+    """Kill runs in folders below `place` and go on with them, until there were enough kills.
+
+    Raises:
+        InputError: one came to another end.
+    """
+    chance, left, folder, runs = random.Random(settings.seed), [], place / "run_0", 1
+    while len(left) < settings.kills:
+        late = len(left) % 2 == 1
+        after = chance.uniform(0.0, LATE * alone.seconds if late else alone.seconds)
+        if killed(alone.command, folder, after, late):
+            left.append(frames_left(folder))
+            print(f"kill {len(left)}: {left[-1]} frames readable", flush=True)
+            continue
+        check_same(folder, alone.motion, settings)
+        folder, runs = place / f"run_{runs}", runs + 1
+    process = started([*alone.command, "resume=true"], folder)
+    _, said = process.communicate()
+    if process.returncode != 0:
+        raise InputError(f"{folder}: the last run did not end well: {said}")
+    check_same(folder, alone.motion, settings)
+    return Kills(left, runs)
 
 
 def tracking(settings: Settings) -> list[str]:

@@ -1,10 +1,11 @@
 """What is said to wrong input, and is anything left half-written?
 
-    python experiments/reliability.py [page=docs/reliability.md] [only=calibration]
+    python experiments/reliability.py [page=docs/reliability.md] [only=calibration] [faults=false]
 
 Every case of `bad_input_cases.py` damages a good workplace in one place and runs a command there. It passes where the
 exit status is 2, one sentence is said, and the files are afterwards what they were before. Then the readers of files
-are given thousands of damaged ones: only a sentence may come out.
+are given thousands of damaged ones: only a sentence may come out. Last, the surroundings of runs fail (`faults.py`):
+they must say so, lose nothing that was written, and come to the same end when they are gone on with.
 """
 
 import contextlib
@@ -19,11 +20,16 @@ from pathlib import Path
 
 from bad_input_cases import cases
 from bad_inputs import BadInput, make_workplace
+from faults import Survived, survived
 from fuzzing import FuzzedReader, fuzz_readers
+from kill_and_resume import Settings as RunSettings
 
 from sogjax.app.cli import main as sogjax
 from sogjax.app.script import machine_line, run_script, settings_from
 from sogjax.data.atomic import atomic_path
+
+RUNS = RunSettings()
+"""Those that faults are made to."""
 
 
 @dataclass
@@ -35,6 +41,10 @@ class Settings:
     """A family."""
     mutations: int = 2000
     """For each reader."""
+    faults: bool = True
+    """Let runs fail, too."""
+    kills: int = 20
+    """Among these faults."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +67,7 @@ def main() -> None:
     settings = settings_from(Settings)
     outcomes = outcomes_of([case for case in cases() if settings.only in (None, case.family)])
     fuzzed = fuzz_readers(settings.mutations) if settings.only is None else []
+    failed = survived(settings.kills) if settings.faults and settings.only is None else []
     bad = [outcome for outcome in outcomes if not outcome.good]
     for outcome in bad:
         print(f"{outcome.case.family}: {outcome.case.what}: status {outcome.status}, {outcome.said!r}")
@@ -64,11 +75,14 @@ def main() -> None:
     crashes = [reader for reader in fuzzed if reader.crashes]
     for reader in crashes:
         print(f"{reader.name}: {reader.crashes[0]}")
+    lost = [row for row in failed if not row.good]
+    for row in lost:
+        print(f"{row.fault}: {row.done}: {row.said}, {row.frames} frames; {row.end}")
     print(f"{len(outcomes) - len(bad)} of {len(outcomes)} wrong inputs refused as they should be")
     if settings.page is not None:
         with atomic_path(Path(settings.page)) as temporary:
-            temporary.write_text(page(outcomes, fuzzed), encoding="utf-8")
-    sys.exit(1 if bad or crashes else 0)
+            temporary.write_text(page(outcomes, fuzzed, failed), encoding="utf-8")
+    sys.exit(1 if bad or crashes or lost else 0)
 
 
 def outcomes_of(inputs: list[BadInput]) -> list[Outcome]:
@@ -103,8 +117,8 @@ def contents(folder: Path) -> dict[str, str]:
     return {str(path.relative_to(folder)): digest(path) for path in sorted(folder.rglob("*"))}
 
 
-def page(outcomes: list[Outcome], fuzzed: list[FuzzedReader]) -> str:
-    """The table, as Markdown."""
+def page(outcomes: list[Outcome], fuzzed: list[FuzzedReader], failed: list[Survived]) -> str:
+    """The tables, as Markdown."""
     good = sum(outcome.good for outcome in outcomes)
     lines = [
         "# Reliability",
@@ -131,17 +145,46 @@ def page(outcomes: list[Outcome], fuzzed: list[FuzzedReader]) -> str:
     for r in fuzzed:
         counts = (r.files, r.refused, r.files - r.refused - len(r.crashes), len(r.crashes))
         lines.append(f"| {r.name} | {' | '.join(map(str, counts))} | {r.seconds:.1f} |")
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines + faults_part(failed)) + "\n"
+
+
+def faults_part(rows: list[Survived]) -> list[str]:
+    """The table of faults; nothing where none were made."""
+    if not rows:
+        return []
+    lines = [
+        "",
+        "## Faults injected and survived",
+        "",
+        f"A small rendered walk ({RUNS.frames} frames, {RUNS.cameras} cameras, all outputs, first pose searched for) "
+        "was tracked while its",
+        "surroundings failed. Every fault was made for real, to a process of its own. Afterwards the same command with",
+        "`resume=true` went on, and every array of its `motion.npz` was compared with that of a run left alone.",
+        f"{sum(row.good for row in rows)} of {len(rows)} ended as they should: without a traceback, with every frame "
+        "that had been written, and with the same end.",
+        "",
+        "| fault | what was done | what was said, and the exit status | frames readable afterwards | the end after "
+        "`resume=true` |",
+        "|---|---|---|---|---|",
+    ]
+    return lines + [
+        f"| {' | '.join(cell(text) for text in (row.fault, row.done, row.said, row.frames, row.end))} |" for row in rows
+    ]
 
 
 def row(outcome: Outcome) -> str:
     """One line of the table of wrong inputs."""
-    said = outcome.said.replace("|", "\\|").replace("\n", " ").replace("<", "&lt;").replace("`", "'")
+    said = cell(outcome.said).replace("`", "'")
     said = said if len(said) < 300 else said[:297] + "..."
     left = "yes" if outcome.nothing_left else "NO"
     command = outcome.case.command[0]
     what = outcome.case.what.replace("|", "\\|")
     return f"| {outcome.case.family} | {what} | {command} | {said} | {outcome.status} | {left} |"
+
+
+def cell(text: str) -> str:
+    """What can stand in a cell of a table."""
+    return text.replace("|", "\\|").replace("\n", " ").replace("<", "&lt;")
 
 
 if __name__ == "__main__":

@@ -54,3 +54,13 @@ def test_a_full_disk_is_no_traceback_but_other_errors_pass(tmp_path):
     with pytest.raises(FileNotFoundError), atomic_path(tmp_path / "a.npz"):
         (tmp_path / "missing").read_text()
     assert names_in(tmp_path) == []
+
+
+def test_a_folder_that_is_removed_meanwhile_is_one_sentence(tmp_path):
+    def write():
+        with atomic_path(tmp_path / "a" / "motion.npz") as path:
+            path.unlink()
+            path.parent.rmdir()
+
+    with pytest.raises(InputError, match=r"motion\.npz: was removed"):
+        write()

@@ -93,7 +93,7 @@ def test_a_changed_image_of_a_folder_is_noticed(walk, tmp_path):
     assert cells(walk, cache)[1] == 4
 
 
-@pytest.mark.parametrize("damage", ["cut short", "one bit", "no array", "no note", "empty"])
+@pytest.mark.parametrize("damage", ["cut short", "one bit", "no array", "no note", "no number", "empty"])
 def test_damaged_cells_are_never_used(walk, tmp_path, capsys, damage):
     cache = tmp_path / "cache"
     whole, _ = cells(walk, cache)
@@ -106,6 +106,8 @@ def test_damaged_cells_are_never_used(walk, tmp_path, capsys, damage):
         array.write_bytes(content)
     elif damage == "no array":
         array.unlink()
+    elif damage == "no number":
+        note.write_text(json.dumps(json.loads(note.read_text()) | {"first_frame": {}}))
     elif damage == "empty":
         array.write_bytes(b"")
     else:

@@ -158,3 +158,12 @@ def test_half_a_file_and_one_with_broken_bytes_are_refused(saved):
         saved.write_bytes(content)
         with pytest.raises(InputError, match=r"motion\.npz"):
             load_motion(saved)
+
+
+def test_numbers_beyond_all_rotations_are_refused_without_a_warning(saved):
+    with np.load(saved) as kept:
+        arrays = dict(kept)
+    arrays["world_from_joint"][0, 0, :3, :3] = np.array([[1e30, -1e30, 0.0], [1e30, 1e30, 0.0], [0.0, 0.0, 1.0]])
+    np.savez(saved, **arrays)
+    with pytest.raises(InputError, match="no rotations"):
+        load_motion(saved)

@@ -1,5 +1,6 @@
 """A motion that grows on disk can be read at any moment, and is the same as the whole one."""
 
+import os
 from dataclasses import fields, replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from motion_cases import walking_motion
 from sogjax.data.array_log import ROWS
 from sogjax.data.motion import Motion, load_motion, save_motion
 from sogjax.data.motion_log import PER_FRAME, SOMETIMES_PER_FRAME, MotionLog
+from sogjax.data.npz_file import npy_header
 from sogjax.errors import InputError
 
 
@@ -66,3 +68,46 @@ def test_a_log_begins_anew(tmp_path):
 def test_a_folder_that_is_no_log_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"constant\.npz"):
         load_motion(tmp_path)
+
+
+@pytest.mark.parametrize("damage", [(b"{'descr'", b"{('escr'"), (b"(8,)", b"(-8,)"), (b"'shape': (", b"'shape': 9L")])
+def test_a_header_that_numpy_cannot_parse_is_refused(tmp_path, damage):
+    log = MotionLog(tmp_path / "motion.partial")
+    log.append(walking_motion(8))
+    log.close()
+    path = log.folder / ROWS
+    content = path.read_bytes()
+    assert damage[0] in content
+    path.write_bytes(content.replace(*damage, 1))
+    with pytest.raises(InputError, match=ROWS):
+        load_motion(log.folder)
+
+
+def test_rows_are_on_the_disk_before_the_header_counts_them(tmp_path, monkeypatch):
+    """Else a loss of power may leave a header that counts rows of zeros."""
+    log, counts = MotionLog(tmp_path / "motion.partial"), []
+    whole = os.fsync
+
+    def fsync(file):
+        whole(file)
+        with (log.folder / ROWS).open("rb") as rows:
+            (count,), dtype = npy_header(rows)
+            counts.append((count, (os.fstat(file.fileno()).st_size - rows.tell()) // dtype.itemsize))
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    motion = walking_motion(8)
+    for first, stop in ((0, 4), (4, 8)):
+        log.append(part(motion, slice(first, stop)))
+    log.close()
+    assert counts == [(0, 4), (4, 8)]
+
+
+def test_only_a_record_that_was_cut_in_half_is_lost(tmp_path):
+    motion, log = walking_motion(8), MotionLog(tmp_path / "motion.partial")
+    log.append(motion)
+    log.close()
+    path = log.folder / ROWS
+    with path.open("rb") as file:
+        row = npy_header(file)[1].itemsize
+    path.write_bytes(path.read_bytes()[: -row // 2])
+    assert_same(load_motion(log.folder), part(motion, slice(0, 7)))

@@ -6,6 +6,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from full_disk import files_of_at_most
 from motion_cases import points_on, walking_motion
 from rerun.chunk import RrdReader
 from rig_cases import black, opencv_pixels, recording_of, ring_rig
@@ -155,3 +156,15 @@ def test_deviations_are_balls_around_the_joints(tmp_path, motion):
     assert len(radii) == 6
     np.testing.assert_allclose(radii, 0.03, rtol=1e-6)
     assert np.allclose(np.ravel(found["/curves/deviations/deviation_mm"]["Scalars:scalars"]), 30.0)
+
+
+@pytest.mark.parametrize("size", [20, 3000, 20_000, 40_000])
+def test_a_file_for_which_there_is_no_room_is_refused(tmp_path, motion, size):
+    """Rerun itself waits forever for some of these sizes."""
+    recording = recording_of(ring_rig(), 10)
+    write_rerun(tmp_path / "whole.rrd", recording, [motion])
+    assert size < (tmp_path / "whole.rrd").stat().st_size
+    with files_of_at_most(size), pytest.raises(InputError, match=r"a\.rrd: could not be written") as error:
+        write_rerun(tmp_path / "a.rrd", recording, [motion])
+    assert "\n" not in str(error.value)
+    assert [path.name for path in tmp_path.iterdir()] == ["whole.rrd"]

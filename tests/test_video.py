@@ -9,6 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from full_disk import files_of_at_most
 from small_recording import (
     FPS,
     frame_image,
@@ -25,6 +26,7 @@ from small_recording import (
 from sogjax.data import image_folder
 from sogjax.data.recording import open_recording
 from sogjax.data.video import VideoWriter, read_frames, read_image, read_mask
+from sogjax.data.video_file import frame_times
 from sogjax.errors import InputError
 
 
@@ -219,3 +221,21 @@ def test_images_and_masks(tmp_path):
     assert read_mask(tmp_path / "mask.png").tolist() == [[False, False], [True, True]]
     with pytest.raises(InputError, match=r"absent\.png"):
         read_image(tmp_path / "absent.png")
+
+
+@pytest.mark.parametrize("size", [10, 3000])
+def test_a_video_for_which_there_is_no_room_is_refused(tmp_path, size):
+    """The codec says nothing of it."""
+
+    def write():
+        chance = np.random.default_rng(0)
+        with VideoWriter(tmp_path / "a.mp4", FPS) as video:
+            for _ in range(20):
+                video.write(chance.integers(0, 255, (48, 64, 3), np.uint8))
+
+    with files_of_at_most(size), pytest.raises(InputError, match=r"a\.mp4: (could not|a video).*be written") as error:
+        write()
+    assert "\n" not in str(error.value)
+    assert list(tmp_path.iterdir()) == []
+    write()
+    assert len(frame_times(tmp_path / "a.mp4")) == 20

@@ -5,6 +5,8 @@ import sys
 import textwrap
 from collections.abc import Sequence
 
+INTERRUPTED, TERMINATED = 130, 143
+"""Exit status after Ctrl-C and SIGTERM, as shells have them."""
 USAGE = "usage: sogjax COMMAND [key=value ...] [-m for a sweep], sogjax COMMAND --help"
 
 
@@ -13,6 +15,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     from sogjax.app.compilation_cache import use_compilation_cache
     from sogjax.app.composition import SCHEMAS, composed
+    from sogjax.app.termination import TerminatedError, terminated_as_interrupted
     from sogjax.errors import InputError
 
     if not arguments or arguments[0] in ("-h", "--help", "help"):
@@ -36,12 +39,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
             return run_sweep(command, [word for word in overrides if word not in ("-m", "--multirun")])
         config = composed(command, overrides)
-        importlib.import_module(f"sogjax.app.{command}").run(config)
+        with terminated_as_interrupted():
+            importlib.import_module(f"sogjax.app.{command}").run(config)
     except InputError as error:
         return _wrong_input(str(error))
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
         print("\nstopped", file=sys.stderr)
-        return 130
+        return TERMINATED if isinstance(stop, TerminatedError) else INTERRUPTED
     return 0
 
 

@@ -18,14 +18,14 @@ from sogjax.data.actor_file import load_body, save_body
 from sogjax.data.array_log import ArrayLog, read_log
 from sogjax.data.atomic import atomic_path
 from sogjax.data.motion import FRAMES_AT_ONCE
-from sogjax.data.npz_file import read_npz
+from sogjax.data.npz_file import finite_array, read_npz
 from sogjax.energy.objective import EnergyTerms
 from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.model.sog import Sog
 from sogjax.track.confidence import Deviations
 from sogjax.track.culling import Capacities
-from sogjax.track.tracker import FrameResult, TrackedFrame, TrackState
+from sogjax.track.frame import FrameResult, TrackedFrame, TrackState
 
 FOLDER = "run.partial"
 NOTE, START, ACTOR = "run.json", "start.npz", "actor"
@@ -33,6 +33,7 @@ TERMS = ("similarity", "limit_penalty", "acceleration_penalty", "energy")
 DEVIATIONS = {"pose_std": "pose", "joint_std": "joints"}
 COLUMNS = ("pose", "iterations", "evaluations", "converged", "num_near", "num_matching", "num_blocks")
 CAPACITY, CAPACITIES = "capacity_{}", ("near", "matching", "blocks")
+_NEEDED = {*COLUMNS, *TERMS, *(CAPACITY.format(name) for name in CAPACITIES)}
 
 
 @dataclass(frozen=True)
@@ -108,13 +109,14 @@ class KeptRun:
 
     def actors(self) -> list[Body] | None:
         """The actors that were kept."""
-        exact = _read(self.folder / f"{ACTOR}s.npz")
+        file = self.folder / f"{ACTOR}s.npz"
+        exact = _read(file)
         if exact is None:
             return None
         bodies = []
         while (path := self.folder / f"{ACTOR}_{len(bodies)}.yaml").is_file():
             leaves, structure = jax.tree.flatten(load_body(path))
-            kept = [jnp.asarray(exact[f"{len(bodies)}_{n}"]) for n in range(len(leaves))]
+            kept = [_leaf(file, exact, f"{len(bodies)}_{n}", leaf) for n, leaf in enumerate(leaves)]
             bodies.append(jax.tree.unflatten(structure, kept))
         return bodies
 
@@ -125,7 +127,7 @@ class KeptRun:
     def start(self) -> Float[Array, "dof"] | None:
         """The rough pose that was kept."""
         kept = _read(self.folder / START)
-        return None if kept is None else jnp.asarray(kept["start"])
+        return None if kept is None else jnp.asarray(finite_array(self.folder / START, kept, "start", (None,)))
 
     def prefix(self, readable: int, total: int) -> Prefix | None:
         """The frames to go on from: at most `readable` of `total`, as many as a run writes at once.
@@ -135,9 +137,11 @@ class KeptRun:
         rows = None
         with suppress(InputError):
             rows = read_log(self.folder)
-        whole = 0 if rows is None else min(readable, len(rows["pose"]))
+        if rows is None or not rows.keys() >= _NEEDED:
+            return None
+        whole = min(readable, len(rows["pose"]))
         count = whole if whole == total else whole - whole % FRAMES_AT_ONCE
-        if rows is None or not count:
+        if not count:
             return None
         self.num_kept = count
         return Prefix({name: column[:count] for name, column in rows.items()})
@@ -192,6 +196,14 @@ def _rows(frames: Sequence[TrackedFrame]) -> dict[str, np.ndarray]:
 def _save(path: Path, arrays: dict[str, np.ndarray]) -> None:
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         np.savez(file, **arrays)  # pyright: ignore[reportArgumentType]
+
+
+def _leaf(path: Path, arrays: dict[str, np.ndarray], key: str, like: Any) -> Array:
+    """An array of an actor that is made as `like`."""
+    kept = arrays.get(key)
+    if kept is None or (kept.shape, kept.dtype) != (like.shape, like.dtype):
+        raise InputError(f"{path}: {key!r} is not that of the actor beside it; begin anew with overwrite=true")
+    return jnp.asarray(kept)
 
 
 def _read(path: Path) -> dict[str, np.ndarray] | None:

@@ -156,7 +156,7 @@ class Streams:
     def say_what_is_left(self) -> None:
         """After an error: where the frames so far are."""
         count = max(self._next_frame, self._first_new) - self._first_frame
-        if not count:
+        if not count or not all(log.folder.is_dir() for log in self._logs.values()):
             return
         folders = ", ".join(str(log.folder) for log in self._logs.values())
         remedy = "" if self._kept is None else "; the same command with resume=true goes on from there"

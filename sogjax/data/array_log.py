@@ -4,6 +4,7 @@ A folder with two files: `constant.npz` has what is known from the beginning, `r
 Rows are only ever appended; the header of `rows.npy`, whose length does not change, is brought up to date after them.
 """
 
+import os
 from contextlib import ExitStack
 from io import BytesIO
 from pathlib import Path
@@ -12,7 +13,7 @@ from types import TracebackType
 import numpy as np
 
 from sogjax.data.atomic import atomic_path, disk_trouble_told
-from sogjax.data.npz_file import check_npy, read_npz
+from sogjax.data.npz_file import npy_header, read_npz
 from sogjax.errors import InputError
 
 CONSTANT, ROWS = "constant.npz", "rows.npy"
@@ -57,6 +58,7 @@ class ArrayLog:
         with disk_trouble_told(self._path):
             self._file.seek(self._end)
             self._write(records.tobytes())
+            os.fsync(self._file)  # else a loss of power may leave a header that counts rows which are not there
             self._count += len(records)
             self._write_header()
 
@@ -103,7 +105,6 @@ def read_log(folder: Path, mapped: bool = False) -> Arrays:
     """
     constant = read_npz(folder / CONSTANT)
     path = folder / ROWS
-    check_npy(path)
     try:
         rows = _whole_rows(path, mapped)
     except (OSError, ValueError, EOFError) as error:
@@ -114,10 +115,9 @@ def read_log(folder: Path, mapped: bool = False) -> Arrays:
 def _whole_rows(path: Path, mapped: bool) -> np.ndarray:
     """The rows that the header counts, less those that a loss of power took."""
     with path.open("rb") as file:
-        np.lib.format.read_magic(file)
-        shape, _, dtype = np.lib.format.read_array_header_1_0(file)
+        shape, dtype = npy_header(file)
         begin = file.tell()
-    if dtype.hasobject or len(shape) != 1:
+    if len(shape) != 1:
         raise ValueError("it holds no rows of numbers")
     count = min(shape[0], (path.stat().st_size - begin) // max(dtype.itemsize, 1))
     if mapped and count:

@@ -34,9 +34,16 @@ def atomic_path(path: Path) -> Iterator[Path]:
     try:
         with disk_trouble_told(path):
             yield temporary
-            temporary.replace(path)
+            _rename(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _rename(temporary: Path, path: Path) -> None:
+    try:
+        temporary.replace(path)
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: was removed, or its folder was, while it was written; write it again") from error
 
 
 @contextmanager

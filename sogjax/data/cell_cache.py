@@ -18,6 +18,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from sogjax.data.atomic import atomic_path
+from sogjax.data.npz_file import check_npy
 from sogjax.data.recording import Recording
 from sogjax.data.source import fingerprint
 from sogjax.errors import InputError
@@ -107,13 +108,16 @@ class CellCache:
         try:
             content = json.loads(note.read_text())
             made_from, begin, checksum = (content[key] for key in ("made_from", "first_frame", "checksum"))
+            if not isinstance(begin, int):
+                raise TypeError("first_frame is no number")
         except (OSError, ValueError, LookupError, TypeError) as error:
             raise _UnusableError("has no readable note of what it was made from") from error
         if made_from != self._made_from:
             raise _UnusableError("was made from other files or settings")
         try:
+            check_npy(array)
             cells = np.load(array, mmap_mode="r", allow_pickle=False)
-        except (OSError, ValueError, EOFError) as error:
+        except (OSError, ValueError, EOFError, InputError) as error:
             raise _UnusableError("is missing or cut short") from error
         if _checksum(array, cells.offset) != checksum:
             raise _UnusableError("is damaged")

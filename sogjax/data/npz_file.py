@@ -2,9 +2,11 @@
 
 import io
 import math
+import warnings
 import zipfile
 import zlib
 from pathlib import Path
+from tokenize import TokenError
 from typing import IO
 
 import numpy as np
@@ -15,6 +17,8 @@ from sogjax.errors import InputError
 MAX_BYTES = 4 * 2**30
 """Bytes that the arrays of one file may take in memory."""
 
+_DAMAGED_HEADER = (TokenError, SyntaxError, TypeError, LookupError, RecursionError, MemoryError, Warning)
+"""What numpy raises, beside ValueError, on a header that it cannot parse."""
 _UNREADABLE = (OSError, ValueError, zipfile.BadZipFile, zlib.error, EOFError, KeyError, MemoryError, RuntimeError)
 
 
@@ -55,7 +59,12 @@ def check_npy(path: Path) -> None:
         raise InputError(f"{path}: is not readable as npy ({error}); write it anew") from error
 
 
-def _check_claim(path: Path, file: IO[bytes] | io.BufferedIOBase, size: int) -> None:
+def npy_header(file: IO[bytes] | io.BufferedIOBase) -> tuple[tuple[int, ...], np.dtype]:
+    """Shape and type of the array in an npy file, which is read up to its first number.
+
+    Raises:
+        ValueError: no npy, a header that is damaged, or pickled objects inside.
+    """
     version = np.lib.format.read_magic(file)  # pyright: ignore[reportArgumentType]
     read_header = {
         (1, 0): np.lib.format.read_array_header_1_0,
@@ -63,9 +72,21 @@ def _check_claim(path: Path, file: IO[bytes] | io.BufferedIOBase, size: int) -> 
     }.get(version)
     if read_header is None:
         raise ValueError(f"npy version {version} is unknown")
-    shape, _, dtype = read_header(file)  # pyright: ignore[reportArgumentType]
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # numpy tries damaged headers again, as if Python 2 had written them
+            shape, _, dtype = read_header(file)  # pyright: ignore[reportArgumentType]
+    except _DAMAGED_HEADER as error:
+        raise ValueError("its header is damaged") from error
     if dtype.hasobject:
         raise ValueError("it holds pickled objects")
+    if any(length < 0 for length in shape):
+        raise ValueError("its header claims fewer than no numbers")
+    return shape, dtype
+
+
+def _check_claim(path: Path, file: IO[bytes] | io.BufferedIOBase, size: int) -> None:
+    shape, dtype = npy_header(file)
     claimed = math.prod(shape) * dtype.itemsize
     if claimed > size:
         raise InputError(f"{path}: claims {claimed} bytes of {dtype}, but holds {size}; write it anew")

@@ -18,6 +18,7 @@ from sogjax.data.image_file import read_image, read_mask
 from sogjax.data.image_stream import ImageStream
 from sogjax.data.recording import Recording
 from sogjax.data.source import open_source
+from sogjax.data.video_file import frame_times
 from sogjax.errors import InputError
 
 __all__ = ["VideoWriter", "read_frames", "read_image", "read_mask", "read_prepared", "read_still"]
@@ -144,6 +145,7 @@ class VideoWriter:
         self._stack = ExitStack()
         self._writer: cv2.VideoWriter | None = None
         self._shape: tuple[int, ...] | None = None
+        self._count = 0
 
     def __enter__(self) -> "VideoWriter":
         self._temporary = self._stack.enter_context(atomic_path(self._path))
@@ -156,6 +158,7 @@ class VideoWriter:
         if image.shape != self._shape:
             raise ValueError(f"{self._path}: an image of shape {image.shape} after one of {self._shape}")
         writer.write(np.ascontiguousarray(image))
+        self._count += 1
 
     def __exit__(
         self,
@@ -163,18 +166,39 @@ class VideoWriter:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        """Finish the file, or remove it after an error or where no image was written."""
+        """Finish the file, or remove it after an error, where no image was written, or where some are missing.
+
+        Raises:
+            InputError: not all images are in the file.
+        """
         if self._writer is not None:
             self._writer.release()
-        elif error is None:
-            error = ValueError(f"{self._path}: no image was written")
-            self._stack.__exit__(ValueError, error, None)
-            raise error
-        self._stack.__exit__(kind, error, traceback)
+        if error is not None:
+            self._stack.__exit__(kind, error, traceback)
+            return
+        with self._stack:
+            self._check_whole()
+
+    def _check_whole(self) -> None:
+        """The codec does not say that the disk is full."""
+        if self._writer is None:
+            raise ValueError(f"{self._path}: no image was written")
+        try:
+            found = len(frame_times(self._temporary))
+        except InputError:
+            found = 0
+        if found != self._count:
+            raise InputError(
+                f"{self._path}: could not be written whole ({found} of {self._count} images are in it; the disk may "
+                "be full); choose another disk"
+            )
 
     def _open(self, image: UInt8[np.ndarray, "height width 3"]) -> cv2.VideoWriter:
         height, width = image.shape[:2]
         writer = cv2.VideoWriter(str(self._temporary), cv2.VideoWriter.fourcc(*"mp4v"), self._fps, (width, height))
         if not writer.isOpened():
-            raise InputError(f"{self._path}: a video of {width}x{height} at {self._fps:g} fps cannot be written")
+            raise InputError(
+                f"{self._path}: a video of {width}x{height} at {self._fps:g} fps cannot be written "
+                "there; choose another folder"
+            )
         return writer

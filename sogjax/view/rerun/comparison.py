@@ -7,7 +7,6 @@ import numpy as np
 import rerun as rr
 from jaxtyping import Float
 
-from sogjax.data.atomic import atomic_path
 from sogjax.data.ground_truth import GroundTruth
 from sogjax.data.motion import Motion
 from sogjax.data.recording import Recording
@@ -18,6 +17,7 @@ from sogjax.view.rerun.curves import log_curve_looks, log_curves, own_curves, pl
 from sogjax.view.rerun.layout import comparison_layout, eye
 from sogjax.view.rerun.names import FRAME, TIME, camera_entity, run_entity
 from sogjax.view.rerun.scene import log_actor, log_cameras, log_look, log_markers
+from sogjax.view.rerun.stream import rerun_stream
 
 PICTURE_WIDTH = 480
 
@@ -43,15 +43,8 @@ def write_comparison(
         frames: BGR pictures of all cameras from the first frame of all runs to the last; None: no pictures.
         truth: markers to show beside the bodies.
     """
-    with atomic_path(Path(path)) as temporary:
-        stream = rr.RecordingStream("sogjax")
-        stream.set_log_time_enabled(False)
-        stream.set_log_tick_enabled(False)
-        stream.save(temporary)
-        stream.send_recording_name(f"{recording.name}: {len(runs)} runs")
+    with rerun_stream(Path(path), f"{recording.name}: {len(runs)} runs") as stream:
         _write(stream, recording, runs, errors or {}, frames, truth)
-        stream.flush()
-        stream.disconnect()
 
 
 def _write(

@@ -12,7 +12,6 @@ import numpy as np
 import rerun as rr
 from jaxtyping import Float
 
-from sogjax.data.atomic import atomic_path
 from sogjax.data.ground_truth import GroundTruth
 from sogjax.data.motion import Motion
 from sogjax.data.recording import Recording
@@ -23,8 +22,8 @@ from sogjax.view.rerun.curves import log_curve_looks, log_curves, log_traces, ow
 from sogjax.view.rerun.layout import eye, tracking_layout
 from sogjax.view.rerun.names import FRAME, TIME, actor_entity, camera_entity, color_bytes
 from sogjax.view.rerun.scene import log_actor, log_cameras, log_deviations, log_look, log_markers, log_path
+from sogjax.view.rerun.stream import rerun_stream
 
-APPLICATION = "sogjax"
 QUALITY = 80
 """Of the JPEG pictures, 0 to 100."""
 
@@ -116,11 +115,7 @@ class RerunFile:
 
     def __enter__(self) -> "RerunFile":
         self._files = ExitStack()
-        self._stream = rr.RecordingStream(APPLICATION)
-        self._stream.set_log_time_enabled(False)
-        self._stream.set_log_tick_enabled(False)
-        self._stream.save(self._files.enter_context(atomic_path(self._path)))
-        self._stream.send_recording_name(self._recording.name)
+        self._stream = self._files.enter_context(rerun_stream(self._path, self._recording.name))
         return self
 
     def jpeg(self, camera: int, image: np.ndarray | None, quality: int = QUALITY) -> bytes | None:
@@ -177,16 +172,17 @@ class RerunFile:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        """Write what is known only at the end, or remove the file after an error."""
+        """Write what is known only at the end, or remove the file after an error.
+
+        Raises:
+            InputError: the file could not be written.
+        """
         if error is not None:
-            self._stream.disconnect()
             self._files.__exit__(kind, error, traceback)
             return
         with self._files:
             if self._bones:
                 self._end()
-            self._stream.flush()
-            self._stream.disconnect()
 
     def _end(self) -> None:
         """What needs the whole motion: how cameras are shown, the roots' paths, the layout."""

@@ -6,7 +6,6 @@ import numpy as np
 import rerun as rr
 from jaxtyping import Float
 
-from sogjax.data.atomic import atomic_path
 from sogjax.data.motion import Motion
 from sogjax.data.recording import Recording
 from sogjax.view.bones import blob_palette, bones_from_motion
@@ -14,6 +13,7 @@ from sogjax.view.picture_camera import picture_camera
 from sogjax.view.rerun.layout import eye, iterations_layout
 from sogjax.view.rerun.names import ITERATION, camera_entity
 from sogjax.view.rerun.scene import log_cameras, log_look, log_skeletons
+from sogjax.view.rerun.stream import rerun_stream
 
 
 def write_iterations(
@@ -32,15 +32,8 @@ def write_iterations(
         energies: after each iteration.
         pictures: BGR, of all cameras in that frame; None: without pictures.
     """
-    with atomic_path(Path(path)) as temporary:
-        stream = rr.RecordingStream("sogjax")
-        stream.set_log_time_enabled(False)
-        stream.set_log_tick_enabled(False)
-        stream.save(temporary)
-        stream.send_recording_name(f"{recording.name}: iterations of one frame")
+    with rerun_stream(Path(path), f"{recording.name}: iterations of one frame") as stream:
         _write(stream, recording, steps, energies, pictures or [])
-        stream.flush()
-        stream.disconnect()
 
 
 def _write(

@@ -1,0 +1,70 @@
+"""A stream into a Rerun file that is either whole or not there."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import FileIO
+from pathlib import Path
+from threading import Thread
+
+import rerun as rr
+
+from sogjax.data.atomic import atomic_path
+
+_AT_ONCE = 2**20
+_OPEN_FILES = Path("/dev/fd")
+
+
+@contextmanager
+def rerun_stream(path: Path, name: str) -> Iterator[rr.RecordingStream]:
+    """What is logged within the block is in the file at its end, under a recording of that name.
+
+    Raises:
+        InputError: the file could not be written.
+    """
+    with atomic_path(path) as temporary, _written_by_ourselves(temporary) as target:
+        stream = rr.RecordingStream("sogjax")
+        stream.set_log_time_enabled(False)
+        stream.set_log_tick_enabled(False)
+        stream.save(target)
+        stream.send_recording_name(name)
+        try:
+            yield stream
+            stream.flush()
+        finally:
+            stream.disconnect()
+
+
+@contextmanager
+def _written_by_ourselves(path: Path) -> Iterator[Path]:
+    """What Rerun is to write into: a pipe, whose other end a thread puts into the file.
+
+    On a full disk Rerun prints that, leaves a part of the file, and may wait forever (0.41); a pipe takes everything.
+    """
+    if not _OPEN_FILES.is_dir():  # Windows
+        yield path
+        return
+    errors: list[OSError] = []
+    with path.open("wb", buffering=0) as file:
+        end, begin = os.pipe()
+        thread = Thread(target=_copy, args=(end, file, errors), name="rerun file", daemon=True)
+        thread.start()
+        try:
+            yield _OPEN_FILES / str(begin)
+        finally:
+            os.close(begin)
+            thread.join()
+            os.close(end)
+    if errors:
+        raise errors[0]  # atomic_path knows the file's own name
+
+
+def _copy(end: int, file: FileIO, errors: list[OSError]) -> None:
+    """All that comes, to a file; when it cannot be written, what comes is taken all the same."""
+    while content := os.read(end, _AT_ONCE):
+        left = memoryview(content)
+        try:
+            while left and not errors:
+                left = left[file.write(left) :]
+        except OSError as error:
+            errors.append(error)
