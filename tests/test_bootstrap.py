@@ -13,14 +13,30 @@ def test_interval_of_independent_frames_is_that_of_the_central_limit():
     np.testing.assert_allclose([low, high], [values.mean() - half, values.mean() + half], atol=0.15)
 
 
-def test_interval_covers_the_true_mean_of_recordings_about_as_often_as_it_says():
-    rng = np.random.default_rng(2)
-    covered = []
-    for _ in range(60):
-        clips = [rng.normal(rng.normal(0.0, 3.0), 1.0, 40) for _ in range(12)]
-        low, high = bootstrap_interval(clips, draws=400)
+def of_recordings(rng, count):
+    """Errors of recordings that differ, with neighbouring frames alike (lag 1: 0.85)."""
+    clips = []
+    for _ in range(count):
+        clip = [rng.normal()]
+        for _ in range(39):
+            clip.append(0.85 * clip[-1] + 0.53 * rng.normal())
+        clips.append(np.array(clip) + rng.normal(0.0, 1.0))
+    return clips
+
+
+@pytest.mark.parametrize("count", [2, 3, 8, 12])
+def test_interval_covers_the_true_mean_of_recordings_about_as_often_as_it_says(count):
+    rng, covered = np.random.default_rng(2), []
+    for _ in range(400):
+        low, high = bootstrap_interval(of_recordings(rng, count), draws=200)
         covered.append(low <= 0.0 <= high)
-    assert 0.82 <= np.mean(covered) <= 1.0
+    assert 0.925 <= np.mean(covered) <= 0.99
+
+
+def test_a_clip_too_short_for_blocks_says_nothing():
+    assert np.isnan(bootstrap_interval([np.array([1.0, 2.0])])).all()
+    low, high = bootstrap_interval([np.arange(8.0)])
+    assert low < 3.5 < high
 
 
 def test_blocks_know_that_neighbouring_frames_are_alike():

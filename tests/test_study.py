@@ -1,6 +1,7 @@
 """Studies: their files, that a run is done once, what a summary says, and the documents."""
 
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from sogjax.app.configs import TrackConfig
 from sogjax.app.study.document import Picture, Section, write_html, write_markdown
 from sogjax.app.study.experiment import Experiment, ExperimentConfig, RowConfig, experiment_names
 from sogjax.app.study.record import RunFolder, RunPlan, RunRecord
-from sogjax.app.study.source import Source
+from sogjax.app.study.source import Source, source_named
 from sogjax.app.study.study import Study
 from sogjax.app.study.summary import pooled_std, summarized
 from sogjax.app.study.table import difference_words, findings, markdown_table
@@ -65,6 +66,9 @@ def test_the_key_of_a_run_knows_its_numbers_and_not_its_outputs():
     assert len(keys | {base.key, RunPlan.of("walk", 9, ("a",), 1, "accuracy", other).key}) == 5
 
 
+PAPERS = dict.fromkeys("abc", ("", None))
+
+
 def record(errors, frames=None, **more):
     frames = list(range(len(errors))) if frames is None else frames
     return RunRecord({}, "here", frame=frames, error_mm=list(errors), joint_error_mm=list(errors), **more)
@@ -72,11 +76,34 @@ def record(errors, frames=None, **more):
 
 def test_differences_are_taken_in_the_frames_that_both_runs_have():
     slow, fast = record([9.0, 1.0, 9.0, 1.0]), record([2.0, 2.0], frames=[1, 3])
-    rows = summarized({"a": {"r": slow}, "b": {"r": fast}}, "a", {"a": ("", None), "b": ("", None)})
+    papers = {"a": ("", None), "b": ("", None)}
+    rows = summarized({"a": {"r": slow, "s": slow}, "b": {"r": fast, "s": fast}}, "a", papers)
     assert rows[0].difference is None
+    assert difference_words(rows[0]) == "reference"
     assert rows[1].difference.mean == pytest.approx(1.0)
     assert rows[1].difference.shows
     assert difference_words(rows[1]) == "+1.0 (+1.0 to +1.0)"
+
+
+def test_one_recording_alone_shows_no_difference():
+    rows = summarized({"a": {"r": record(np.arange(40.0))}, "b": {"r": record(np.arange(40.0) + 5.0)}}, "a", PAPERS)
+    assert not rows[1].difference.shows
+    assert difference_words(rows[1]).startswith("one recording: +5.0")
+    assert not any("show" in line for line in findings(experiment(a=RowConfig(), b=RowConfig()), rows))
+
+
+def test_where_the_reference_failed_the_first_row_that_worked_takes_its_place():
+    done = record([1.0, 2.0])
+    rows = summarized({"a": {"r": record([], failed="no")}, "b": {"r": done}, "c": {"r": done}}, "a", PAPERS)
+    assert [row.is_reference for row in rows] == [False, True, False]
+    assert [difference_words(row) for row in rows][:2] == ["", "reference"]
+
+
+def test_the_best_rows_are_told_on_the_recordings_that_all_have():
+    hard, easy = record([50.0, 50.0]), record([10.0, 10.0])
+    rows = summarized({"a": {"r": hard, "s": easy}, "b": {"s": record([11.0, 11.0])}, "c": {"s": easy}}, "a", PAPERS)
+    said = findings(experiment(a=RowConfig(), b=RowConfig(), c=RowConfig()), rows)
+    assert said[0] == "Smallest mean error: a, c (10.0 mm)."
 
 
 def test_a_difference_within_the_spread_does_not_show_and_a_clear_one_does():
@@ -112,8 +139,9 @@ def source_folder(tmp_path_factory):
     settings = SynthSettings(cameras=3, frames=4, width=96, height=72, example_poses=False, background=False)
     render_recording(settings, folder / "person")
     (folder / "person" / "initial_pose.yaml").write_text("pose: rest\nposition: [0.0, 0.0, 1.0]\nheading: 0.0\n")
-    (folder / "actors" / "person").mkdir(parents=True)
-    actor_file(folder / "actors" / "person" / "0_puppet.yaml")
+    source = source_named(str(folder / "person"), 4, folder)
+    source.actor_folder.mkdir(parents=True)
+    actor_file(source.actor_folder / "0_puppet.yaml")
     return folder
 
 
@@ -123,11 +151,40 @@ def test_a_run_is_done_once_and_resumed_after_that(source_folder, monkeypatch, c
     first = {row: run for row, _, run in study.records(experiment(**rows))}
     assert [run.frame for run in first.values()] == [[0, 1, 2, 3], [0, 2]]
     assert len(first["b"].plan["cameras"]) == 2
-    assert all(np.isfinite(run.errors).all() for run in first.values())
+    assert all(np.isfinite(run.errors[1:]).all() for run in first.values())
+    assert all(np.isnan(run.errors[0]) for run in first.values())  # where markers are attached
     monkeypatch.setattr(Source, "cells", None)
     again = {row: run for row, _, run in Study(source_folder, study.recordings, 4).records(experiment(**rows))}
-    assert again == first
+    assert repr(again) == repr(first)  # NaN equals nothing
     assert len(list((source_folder / "runs").glob("*.json"))) == 2
+
+
+def test_rows_of_more_cameras_than_there_are_are_left_out(source_folder):
+    rows = {"a": RowConfig(set=list(SMALL), cameras=12), "b": RowConfig(set=list(SMALL), cameras=3)}
+    study = Study(source_folder, [str(source_folder / "person")], 4)
+    assert [row for row, _, _ in study.records(experiment(**rows))] == ["b"]
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"frames": 0}, "frames=0"),
+        ({"recordings": []}, r"recordings=\[\]"),
+        ({"overrides": ["actor=/nope.yaml"]}, "overrides: actor=/nope.yaml"),
+        ({"overrides": ["start=3"]}, "overrides: start=3"),
+    ],
+)
+def test_a_study_that_cannot_be(tmp_path, settings, words):
+    with pytest.raises(InputError, match=words):
+        Study(tmp_path, **{"recordings": ["walk:0"], "frames": 4} | settings)
+
+
+def test_other_files_of_a_recording_are_another_recording(source_folder, tmp_path):
+    folder = shutil.copytree(source_folder / "person", tmp_path / "person")
+    before = source_named(str(folder), 4, tmp_path).identity
+    assert source_named(str(folder), 4, tmp_path).identity == before
+    (folder / "calibration.toml").touch()
+    assert source_named(str(folder), 4, tmp_path).identity != before
 
 
 def test_a_run_that_fails_is_kept_and_the_others_go_on(source_folder):

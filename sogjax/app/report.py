@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+import numpy as np
 from omegaconf import OmegaConf
 
 from sogjax import __version__
@@ -17,7 +18,7 @@ from sogjax.app.configs import OutputsConfig, ReportConfig
 from sogjax.app.outputs import results_folder
 from sogjax.app.recordings import say
 from sogjax.app.script import machine_line
-from sogjax.app.study.calibration import kept_said_and_found
+from sogjax.app.study.calibration import SaidAndFound, kept_said_and_found
 from sogjax.app.study.document import Picture, Section, write_html, write_markdown
 from sogjax.app.study.experiment import Experiment, experiment_names
 from sogjax.app.study.pictures import experiment_chart, worst_frame
@@ -25,7 +26,7 @@ from sogjax.app.study.record import RunRecord
 from sogjax.app.study.source import Source
 from sogjax.app.study.study import Study
 from sogjax.app.study.summary import RowSummary
-from sogjax.app.study.table import findings, markdown_table, recordings_table
+from sogjax.app.study.table import findings, iterations_table, markdown_table, recordings_table
 from sogjax.data.atomic import atomic_path
 from sogjax.errors import InputError
 from sogjax.view.charts import calibration_chart
@@ -56,10 +57,13 @@ def run(config: ReportConfig) -> list[Path]:
     experiments = [Experiment.named(name) for name in names if name != CONFIDENCE]
     _check_matplotlib()
     with results_folder(Path(config.out)) as out:
-        study = Study(out, config.recordings, config.frames, config.overrides, config.do)
+        study = Study(out, config.recordings, config.frames, config.overrides, config.do, config.body)
         begin = time.perf_counter()
         done: list[Done] = []
         sections = [_experiment_section(experiment, study, done) for experiment in experiments]
+        if not any(not one.record.failed for one in done) and experiments:
+            reason = done[0].record.failed if done else "do=false, and none was done before"
+            raise InputError(f"{out}: no run worked: {reason}")
         sections += [confidence_section(study)] if CONFIDENCE in names else []
         say(f"runs done or read in {time.perf_counter() - begin:.0f} s")
         sections = [_about(config, done), *sections, _worst(done, config.pictures), _versions(config)]
@@ -75,22 +79,29 @@ def _experiment_section(experiment: Experiment, study: Study, done: list[Done]) 
     rows = study.summary(experiment)
     rows = [row for row in rows if row.by_recording or row.failed]
     chart = experiment_chart(experiment, rows)
-    return Section(experiment.config.title, _parts(experiment, rows), [chart] if chart else [])
+    parts = _parts(experiment, rows)
+    parts += [experiment.config.remark] if experiment.config.remark and study.is_committed else []
+    return Section(experiment.config.title, parts, [chart] if chart else [])
 
 
 def _parts(experiment: Experiment, rows: Sequence[RowSummary]) -> list[str]:
     config = experiment.config
+    if not any(row.by_recording for row in rows):
+        return [config.question, *(f"failed, {row.name}: {reason}" for row in rows for reason in row.failed)]
     base = f" All rows: `{' '.join(config.base)}`." if config.base else ""
-    parts = [f"{config.question} (`python experiments/{experiment.name}.py`){base}", markdown_table(experiment, rows)]
+    script = f" (`python experiments/{experiment.name}.py`)" if experiment.is_shipped else ""
+    parts = [f"{config.question}{script}{base}", markdown_table(experiment, rows)]
     if config.measure == "accuracy":
         parts += ["Mean error on each recording, mm:", recordings_table(experiment, rows)]
+    if config.iterations_by_recording:
+        parts += ["Iterations a frame on each recording:", iterations_table(experiment, rows)]
+    parts += [config.note] if config.note else []
     if config.paper_note:
         parts.append(f"The paper's figures: {config.paper_note}.")
     said = findings(experiment, rows)
     return [
         *parts,
         *(["\n".join(f"- {line}" for line in said)] if said else []),
-        *([config.remark] if config.remark else []),
     ]
 
 
@@ -101,10 +112,15 @@ def confidence_section(study: Study) -> Section:
         InputError: a recording that is not there.
     """
     temperature = OutputsConfig().temperature
-    results = {
-        source.name: kept_said_and_found(source, temperature, study.overrides)
-        for source in map(study.source, study.recordings)
-    }
+    results: dict[str, SaidAndFound] = {}
+    without = []
+    for source in map(study.source, study.recordings):
+        try:
+            results[source.name] = kept_said_and_found(source, temperature, study.overrides)
+        except InputError as error:
+            without.append(str(error))
+    if not results:
+        return Section("Confidence", without)
     lines = ["| recording | found / said | below 1 deviation | below 2 | rank correlation |", "|---|---|---|---|---|"]
     for name, result in results.items():
         ratio = result.mean_square_ratio**0.5
@@ -124,6 +140,7 @@ def confidence_section(study: Study) -> Section:
             "belongs to the actor. 68 % and 95 % would be expected of a single coordinate, 61 % and 99 % of a distance "
             "in space whose three coordinates are alike.",
             "\n".join(lines),
+            *without,
             "A ratio over 1 says that the deviations are too small there, a rank correlation near 0 that they do not "
             "tell which joints are farther off.",
         ],
@@ -142,11 +159,13 @@ def _about(config: ReportConfig, done: Sequence[Done]) -> Section:
             "- " + "\n- ".join(f"Runs on: {machine}" for machine in machines),
             f"{len(list(_different(done)))} runs of at most {config.frames} frames, {seconds / 60.0:.0f} minutes in "
             "all with compilation and actors. Errors are distances of markers to the truth in millimetres, mean +- "
-            "standard deviation over all markers, frames and recordings; a marker is lost for a stretch where it is "
-            "more than 200 mm off for five frames on end. Intervals are at 95 %, by bootstrap over recordings and "
-            "stretches of ten frames; a difference to the reference, taken in the same frames, whose interval holds "
-            "zero does not show. Few recordings make wide and rough intervals. The actor of a recording and its pose "
-            "in the first frame are the same for all runs. Times are the median of a tracking step from kept cells.",
+            "standard deviation over all markers, recordings and frames but the first, in which markers are attached; "
+            "joints are not. A marker is lost for a stretch where it is more than 200 mm off for five tracked "
+            "frames on end. Intervals are at 95 %, by Student's t with the standard error of a bootstrap over the "
+            "recordings; a difference to the reference, taken in the same frames, whose interval holds zero does not "
+            "show. Of twenty differences that are none, one shows all the same; and two seeds of one motion are not "
+            "quite two recordings. The actor of a recording and its rough pose in the first frame are the same for all "
+            "runs. Times are the median of a tracking step from kept cells.",
             "The paper's recordings are not ours: compare how numbers change, not how large they are.",
         ],
     )
@@ -154,8 +173,8 @@ def _about(config: ReportConfig, done: Sequence[Done]) -> Section:
 
 def _worst(done: Sequence[Done], count: int) -> Section:
     """The frames with the largest errors, one an experiment at most."""
-    usable = [one for one in done if not one.record.failed and one.experiment.config.measure == "accuracy"]
-    ranked = sorted(usable, key=lambda one: -max(one.record.error_mm, default=0.0))
+    usable = [one for one in done if one.experiment.config.measure == "accuracy" and np.isfinite(one.record.mean_mm)]
+    ranked = sorted(usable, key=lambda one: -np.nanmax(one.record.errors))
     pictures: list[Picture] = []
     seen: set[str] = set()
     for one in ranked:

@@ -1,13 +1,16 @@
-"""How sure a mean over a few recordings is: bootstrap over recordings, and over stretches of frames within them."""
+"""How sure a mean over a few recordings is: bootstrap over recordings, or over stretches of frames of a single one."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
+from scipy.stats import t as student
 
 BLOCK = 10
 """Frames that are drawn together: the errors of neighbouring frames are alike."""
+FEWEST_BLOCKS = 3
+"""Of one recording; blocks of shorter ones are shorter."""
 DRAWS = 2000
 LEVEL = 0.95
 
@@ -32,31 +35,28 @@ def bootstrap_interval(
     level: float = LEVEL,
     seed: int = 0,
 ) -> Interval:
-    """Percentile interval of the mean of all frames of all clips (Efron; circular blocks of Politis and Romano).
+    """Interval of the mean of all frames of all clips: Student's t with the standard error of a bootstrap.
 
-    Recordings are drawn with replacement, then within each drawn one as many frames as it has, in blocks. NaN is left
-    out beforehand. With a single recording only its frames are drawn: the interval says nothing of other recordings.
+    Recordings are drawn with replacement as a whole, since their frames are alike (cluster bootstrap). Of a single one
+    stretches of frames are drawn: that says nothing of other recordings.
+    Percentiles of so few pieces would be too narrow, so the error is that of a sample (n / (n - 1)) and the quantile
+    that of n - 1 degrees of freedom. NaN is left out beforehand.
     """
     present = [values for clip in clips if (values := np.asarray(clip, float)[np.isfinite(clip)]).size]
-    if not present:
-        return Interval(float("nan"), float("nan"))
-    rng = np.random.default_rng(seed)
+    if len(present) == 1:
+        present = _blocks(present[0], block)
     count = len(present)
-    means = np.stack([_drawn_means(clip, block, draws, count, rng) for clip in present])
-    lengths = np.array([len(clip) for clip in present], float)
-    drawn = rng.integers(count, size=(draws, count))
-    picked = means[drawn, np.arange(draws)[:, None], np.arange(count)[None, :]]
-    totals = np.sum(picked * lengths[drawn], axis=1) / np.sum(lengths[drawn], axis=1)
-    low, high = np.quantile(totals, [0.5 - level / 2.0, 0.5 + level / 2.0])
-    return Interval(float(low), float(high))
+    if count < 2:
+        return Interval(float("nan"), float("nan"))
+    sums, lengths = np.array([clip.sum() for clip in present]), np.array([len(clip) for clip in present], float)
+    drawn = np.random.default_rng(seed).integers(count, size=(draws, count))
+    means = sums[drawn].sum(axis=1) / lengths[drawn].sum(axis=1)
+    half = student.ppf(0.5 + level / 2.0, count - 1) * means.std() * (count / (count - 1)) ** 0.5
+    mean = sums.sum() / lengths.sum()
+    return Interval(float(mean - half), float(mean + half))
 
 
-def _drawn_means(
-    clip: Float[np.ndarray, "_"], block: int, draws: int, places: int, rng: np.random.Generator
-) -> Float[np.ndarray, "{draws} {places}"]:
-    """Means of clips made of random blocks of one clip, for every draw and every place that it may be drawn to."""
-    size = min(block, len(clip))
-    around = np.concatenate([clip, clip[: size - 1]])
-    block_means = np.convolve(around, np.full(size, 1.0 / size), mode="valid")
-    num_blocks = -(-len(clip) // size)
-    return block_means[rng.integers(len(clip), size=(draws, places, num_blocks))].mean(axis=-1)
+def _blocks(clip: Float[np.ndarray, "_"], block: int) -> list[Float[np.ndarray, "_"]]:
+    """A clip as stretches of frames; none where it is too short for `FEWEST_BLOCKS`."""
+    size = min(block, len(clip) // FEWEST_BLOCKS)
+    return np.array_split(clip, len(clip) // size) if size else []

@@ -12,10 +12,12 @@ from sogjax import __version__
 from sogjax.app.composition import composed
 from sogjax.app.overrides import quoted_value
 from sogjax.app.streams import deviations_of
+from sogjax.app.study.record import program_digest
 from sogjax.app.study.source import Source
 from sogjax.data.atomic import atomic_path
 from sogjax.data.ground_truth import GroundTruth
 from sogjax.data.motion import Motion, motion_from_poses
+from sogjax.errors import InputError
 from sogjax.evaluate.markers import common_frames, joint_pairs
 from sogjax.track.tracker import track
 
@@ -61,9 +63,9 @@ def kept_said_and_found(source: Source, temperature: float, overrides: Sequence[
     """The same, read where it was done before.
 
     Raises:
-        InputError: the study's folder cannot be written.
+        InputError: as `said_and_found`, or the study's folder cannot be written.
     """
-    what = json.dumps([__version__, source.identity, source.num_frames, temperature, list(overrides)])
+    what = json.dumps([__version__, program_digest(), source.identity, source.num_frames, temperature, list(overrides)])
     path = source.folder / "confidence" / f"{hashlib.sha256(what.encode()).hexdigest()[:16]}.npz"
     if path.is_file():
         with np.load(path) as kept:
@@ -75,7 +77,13 @@ def kept_said_and_found(source: Source, temperature: float, overrides: Sequence[
 
 
 def said_and_found(source: Source, temperature: float, overrides: Sequence[str] = ()) -> SaidAndFound:
-    """Track a recording of one actor and compare its joints with the truth."""
+    """Track a recording of one actor and compare its joints with the truth.
+
+    Raises:
+        InputError: there are several actors, or no true joints.
+    """
+    if len(source.bodies) != 1 or source.truth.joints is None:
+        raise InputError(f"{source.name}: deviations are compared for the true joints of one person only")
     words = [f"recording={quoted_value(str(source.path))}", *overrides]
     words += ["outputs.confidence=true", f"outputs.temperature={temperature!r}"]
     config = composed("track", words)
@@ -88,7 +96,8 @@ def said_and_found(source: Source, temperature: float, overrides: Sequence[str] 
     _, deviations = deviations_of(results)
     assert deviations is not None
     joints, errors = joint_offsets(motion, source.truth)
-    said, found = deviations[:, joints].astype(float).ravel(), without_constant_offset(errors).ravel()
+    rows, _ = common_frames(motion, source.truth)
+    said, found = deviations[rows][:, joints].astype(float).ravel(), without_constant_offset(errors).ravel()
     known = np.isfinite(found)
     return SaidAndFound(said[known], found[known])
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import yaml
 from omegaconf import MISSING, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
@@ -46,7 +47,11 @@ class ExperimentConfig:
     measure: str = "accuracy"
     """accuracy: from kept cells, one frame after the other | speed: from the videos, all stages beside each other."""
     recordings: list[str] | None = None
-    """Those that are tracked; None: the study's."""
+    """Those that are tracked where the study is on the recordings of the committed report; None: the study's."""
+    note: str = ""
+    """What holds of the comparison on any recordings."""
+    iterations_by_recording: bool = False
+    """Whether the iterations on each recording are shown, too."""
     paper_note: str = ""
     """What the paper's figures were measured on."""
     remark: str = ""
@@ -63,11 +68,15 @@ class Experiment:
 
     @classmethod
     def named(cls, name: str) -> "Experiment":
-        """The experiment of `conf/experiment/NAME.yaml`.
+        """The experiment of `conf/experiment/NAME.yaml`, or of any file whose name ends so.
 
         Raises:
-            InputError: there is none of that name.
+            InputError: there is none of that name, or something in the file is wrong.
         """
+        if name.endswith((".yaml", ".yml")):
+            if not Path(name).is_file():
+                raise InputError(f"{name}: there is no such file; give an experiment as those in conf/experiment")
+            return cls.from_file(Path(name))
         path = _folder() / f"{name}.yaml"
         if not path.is_file():
             raise InputError(f"{name}: no such experiment; choose from {', '.join(experiment_names())}")
@@ -86,9 +95,14 @@ class Experiment:
             if missing:
                 raise InputError(f"{path}: has no {missing[0]}; add it")
             config: ExperimentConfig = OmegaConf.to_object(tree)  # pyright: ignore[reportAssignmentType]
-        except OmegaConfBaseException as error:
+        except (OmegaConfBaseException, yaml.YAMLError) as error:
             raise InputError(f"{path}: {str(error).splitlines()[0]}; correct it") from error
         return cls(path.stem, _checked(path, config))
+
+    @property
+    def is_shipped(self) -> bool:
+        """Whether it has a script in `experiments/`."""
+        return self.name in experiment_names()
 
     def overrides(self, row: str, common: Sequence[str] = ()) -> list[str]:
         """The overrides of a row: those common to the study, then the experiment's, then its own."""

@@ -3,18 +3,22 @@
 import hashlib
 import json
 from dataclasses import asdict, dataclass, field, fields
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
 
+import sogjax
 from sogjax import __version__
 from sogjax.app.configs import TrackConfig
 from sogjax.data.atomic import atomic_path
 
-RECORD_VERSION = 1
+RECORD_VERSION = 2
 """To be raised with every change that makes earlier runs incomparable."""
+_DECIDE = ("model", "energy", "solve", "images", "track", "data", "actor", "evaluate")
+"""Packages whose code decides the result of a run."""
 _OF_THE_RESULT = ("body", "color", "images", "energy", "solver", "tracking")
 
 
@@ -42,8 +46,8 @@ class RunPlan:
 
     @property
     def key(self) -> str:
-        """Sixteen letters that differ where anything differs."""
-        content = [RECORD_VERSION, __version__, asdict(self)]
+        """Sixteen letters that differ where anything differs, the program's own files included."""
+        content = [RECORD_VERSION, __version__, program_digest(), asdict(self)]
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 
 
@@ -56,10 +60,11 @@ class RunRecord:
     """Processor, versions and date."""
     frame: list[int] = field(default_factory=list)
     error_mm: list[float] = field(default_factory=list)
-    """Mean distance of the markers (of the joints where there are no markers); NaN: nothing to compare with."""
+    """Mean distance of the markers (of the joints where there are no markers); NaN: nothing to compare with, as in the
+    first frame, in which markers are attached."""
     joint_error_mm: list[float] = field(default_factory=list)
     std_mm: float = float("nan")
-    """Over all distances."""
+    """Over all distances of those frames."""
     lost: int = 0
     """Stretches of frames with a lost marker."""
     swaps: int = 0
@@ -98,6 +103,17 @@ class RunRecord:
     def step_ms(self) -> float:
         """Median time of a tracking step without the first frame, which compiles."""
         return float(np.median(self.milliseconds[1:])) if len(self.milliseconds) > 1 else float("nan")
+
+
+@cache
+def program_digest() -> str:
+    """Of the files of the program that decide how a run comes out."""
+    package = Path(sogjax.__file__).parent
+    files = sorted(path for name in _DECIDE for path in (package / name).rglob("*.py"))
+    content = hashlib.sha256()
+    for path in files:
+        content.update(f"{path.relative_to(package)}\n".encode() + path.read_bytes())
+    return content.hexdigest()[:16]
 
 
 class RunFolder:

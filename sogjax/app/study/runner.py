@@ -1,10 +1,11 @@
 """One run of a study: from a source and a row of an experiment to a record."""
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 
 import numpy as np
+from jaxtyping import Float
 
 from sogjax.app import build
 from sogjax.app.compiled_programs import forget_programs_if_many
@@ -40,10 +41,11 @@ def run_row(
 ) -> RunRecord | None:
     """The record of a row on a recording: read where it was done before, else made now and kept, or None.
 
-    A run that fails through its input is kept as failed, and the others go on.
+    A run that fails is kept as failed, and done again the next time; the others go on. None, too, where the recording
+    has not as many cameras as the row asks for.
 
     Raises:
-        InputError: an override that cannot be; a recording without ground truth.
+        InputError: an override that cannot be.
     """
     entry = experiment.config.rows[row]
     words = [
@@ -53,11 +55,13 @@ def run_row(
     ]
     config: TrackConfig = composed("track", words)
     build.check(config)
+    if entry.cameras is not None and entry.cameras > len(source.recording.rig.names):
+        return None
     cameras = source.cameras(entry.cameras)
     measure = experiment.config.measure
     plan = RunPlan.of(source.identity, source.num_frames, cameras, entry.every, measure, config)
     found = runs.find(plan)
-    if found is not None or not do:
+    if (found is not None and not found.failed) or not do:
         return found
     say(f"{experiment.name} {row!r}: {source.name}")
     forget_programs_if_many()
@@ -65,9 +69,10 @@ def run_row(
     try:
         measured = _accuracy if measure == "accuracy" else _speed
         record = measured(record, source, config, cameras, entry.every)
-    except InputError as error:
-        record = replace(record, failed=str(error))
-        say(f"failed: {error}")
+    except Exception as error:
+        reason = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
+        record = replace(record, failed=reason.splitlines()[0])
+        say(f"failed: {record.failed}")
     record = replace(record, seconds=time.perf_counter() - begin)
     runs.keep(plan, record)
     return record
@@ -149,18 +154,33 @@ def _evaluated(record: RunRecord, source: Source) -> RunRecord:
     """The record with its distances to the truth."""
     motions = motions_of(record, source.bodies, source.recording.fps)
     evaluation = evaluate_motions(motions, source.truth)
+    joints = _distances(evaluation, "joints", record.frame)
+    markers = _distances(evaluation, "markers", record.frame)
+    errors = markers if markers.shape[1] else joints
     return replace(
         record,
-        error_mm=_per_frame(evaluation, "markers"),
-        joint_error_mm=_per_frame(evaluation, "joints"),
-        std_mm=1000.0 * evaluation.summary.std,
+        error_mm=_rounded_means(errors),
+        joint_error_mm=_rounded_means(joints),
+        std_mm=float(np.nanstd(errors)) if np.isfinite(errors).any() else float("nan"),
         lost=sum(len(part.lost) for part in evaluation.evaluations.values()),
         swaps=len(evaluation.swaps),
     )
 
 
-def _per_frame(evaluation: GroupEvaluation, kind: str) -> list[float]:
-    """Mean distance in every frame over the points of all actors, mm; of the joints where there are no markers."""
-    parts: Iterable = evaluation.evaluations.values()
-    errors = [points.errors for part in parts if (points := getattr(part, kind) or part.joints) is not None]
-    return np.round(1000.0 * mean_per_frame(np.concatenate(errors, axis=1)), 4).tolist()
+def _distances(evaluation: GroupEvaluation, kind: str, frames: Sequence[int]) -> Float[np.ndarray, "frame point"]:
+    """Distances of the points of all actors in every tracked frame, mm; NaN where a marker is attached, or no truth."""
+    columns = [np.zeros((len(frames), 0))]
+    for part in evaluation.evaluations.values():
+        points = getattr(part, kind)
+        if points is not None:
+            column = np.full((len(frames), points.errors.shape[1]), np.nan)
+            column[np.searchsorted(frames, part.frames)] = 1000.0 * points.errors
+            if kind == "markers":
+                first = np.argmax(np.isfinite(column), axis=0)
+                column[first, np.arange(column.shape[1])] = np.nan
+            columns.append(column)
+    return np.concatenate(columns, axis=1)
+
+
+def _rounded_means(distances: Float[np.ndarray, "frame point"]) -> list[float]:
+    return np.round(mean_per_frame(distances), 4).tolist()

@@ -19,6 +19,8 @@ class Settings:
     frames: int = ReportConfig().frames
     out: str = ReportConfig().out
     """Where runs are kept; a run that is there is not done again."""
+    body: str = ReportConfig().body
+    """That actors are made from."""
     overrides: list[str] = field(default_factory=list)
     """Of the track config, for all rows."""
 
@@ -30,7 +32,8 @@ def study_main(name: str) -> None:
 
 def _print_tables(name: str, settings: Settings) -> None:
     experiment = Experiment.named(name)
-    rows = Study(Path(settings.out), settings.recordings, settings.frames, settings.overrides).summary(experiment)
+    study = Study(Path(settings.out), settings.recordings, settings.frames, settings.overrides, body=settings.body)
+    rows = [row for row in study.summary(experiment) if row.by_recording or row.failed]
     print(machine_line())
     print(f"\n{experiment.config.title}: {experiment.config.question}\n")
     print(markdown_table(experiment, rows), recordings_table(experiment, rows), sep="\n\n", end="\n\n")

@@ -1,5 +1,6 @@
 """The recordings of a study: opened once, their actor made once, their cells read once, for all runs."""
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -24,8 +25,11 @@ from sogjax.data.recording import Recording
 from sogjax.errors import InputError
 from sogjax.model.body import Body, concatenate
 from sogjax.synth import SynthSettings, cached_recording
+from sogjax.synth.settings import MOTIONS
 from sogjax.track.tracker import Tracker
 
+PARTS = ("videos", "images", "background", "example_poses")
+"""Folders of a recording."""
 MOST_FRAMES = 60
 """That are rendered of a motion; a study of fewer frames tracks the first ones of the same recording."""
 
@@ -37,11 +41,13 @@ class Source:
     name: str
     path: Path
     identity: str
-    """Differs between recordings: a rendered one's settings, or where the folder is."""
+    """Differs between recordings: a rendered one's settings, or where a folder is and what state its files are in."""
     num_frames: int
     """How many of its frames are tracked."""
     folder: Path
     """The study's, where actors and cells are kept."""
+    body: str = "human"
+    """The body that actors are made from."""
     _trackers: dict[tuple[object, ...], Tracker] = field(default_factory=dict)
     _cells: dict[int, CellsOfClip] = field(default_factory=dict)
 
@@ -61,15 +67,21 @@ class Source:
             raise InputError(f"{self.path}: has no ground_truth.npz; give a recording with ground truth")
         return load_ground_truth(self.recording.ground_truth)
 
+    @property
+    def actor_folder(self) -> Path:
+        """Where its actors are kept."""
+        digest = hashlib.sha256(f"{self.identity} {self.body}".encode()).hexdigest()[:8]
+        return self.folder / "actors" / f"{self.name}-{digest}"
+
     @cached_property
     def actors(self) -> list[Body]:
         """The actors in their own upright frames, made from the example poses with all cameras, or read."""
-        files = sorted((self.folder / "actors" / self.name).glob("*.yaml"))
+        files = sorted(self.actor_folder.glob("*.yaml"))
         if files:
             return [load_body(path) for path in files]
-        actors, _ = actors_of(self.recording, None, "human", self.default_config.color)
+        actors, _ = actors_of(self.recording, None, self.body, self.default_config.color)
         for number, actor in enumerate(actors):
-            save_body(self.folder / "actors" / self.name / f"{number}_{actor.name}.yaml", actor)
+            save_body(self.actor_folder / f"{number}_{actor.name}.yaml", actor)
         return actors
 
     @cached_property
@@ -122,7 +134,7 @@ class Source:
         return build.varied(self._trackers[key], config)
 
 
-def source_named(name: str, num_frames: int, folder: Path, actors: int = 1) -> Source:
+def source_named(name: str, num_frames: int, folder: Path, actors: int = 1, body: str = "human") -> Source:
     """A recording by its folder, or rendered now if it is not there yet: `walk:0` is a motion and a seed.
 
     Raises:
@@ -131,10 +143,19 @@ def source_named(name: str, num_frames: int, folder: Path, actors: int = 1) -> S
     if Path(name).is_dir():
         path = Path(name)
         num_frames = min(num_frames, opened(str(path)).num_frames)
-        return Source(path.resolve().name, path, str(path.resolve()), num_frames, folder)
+        return Source(path.resolve().name, path, _state_of(path), num_frames, folder, body)
     motion, _, seed = name.partition(":")
-    if seed and not seed.isdecimal():
+    if motion not in MOTIONS or (seed and not seed.isdecimal()):
         raise InputError(f"{name}: is no folder, and no MOTION:SEED such as walk:0")
     frames = max(num_frames, MOST_FRAMES)
     path = cached_recording(SynthSettings(motion, actors=actors, frames=frames, seed=int(seed or 0)), progress=progress)
-    return Source(f"{motion}-seed{int(seed or 0)}", path, path.name, num_frames, folder)
+    people = f"-{actors}people" if actors > 1 else ""
+    return Source(f"{motion}-seed{int(seed or 0)}{people}", path, path.name, num_frames, folder, body)
+
+
+def _state_of(path: Path) -> str:
+    """Where a recording is, and names, sizes and times of last change of all that belongs to it."""
+    inside = [file for part in PARTS for file in (path / part).rglob("*")]
+    files = sorted(file for file in [*path.iterdir(), *inside] if file.is_file())
+    looked = [(str(file.relative_to(path)), (state := file.stat()).st_size, state.st_mtime_ns) for file in files]
+    return f"{path.resolve()} {hashlib.sha256(repr(looked).encode()).hexdigest()[:16]}"

@@ -21,11 +21,13 @@ class Difference:
     mean: float
     """Millimetres; positive: the row is worse."""
     interval: Interval
+    recordings: int
+    """That it was taken on."""
 
     @property
     def shows(self) -> bool:
-        """Whether it is larger than what other recordings and frames could have made of it."""
-        return not self.interval.holds_zero
+        """Whether it is larger than what other recordings could have made of it; a single one cannot tell."""
+        return self.recordings > 1 and not self.interval.holds_zero
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,7 @@ class RowSummary:
     """Of the mean, at 95 %."""
     difference: Difference | None
     """None: this is the reference, or nothing can be compared."""
+    is_reference: bool
     joints: float
     lost: int
     swaps: int
@@ -54,6 +57,7 @@ class RowSummary:
     rates: Mapping[str, float]
     by_recording: Mapping[str, float]
     """The mean error on each."""
+    iterations_by_recording: Mapping[str, float]
     failed: Sequence[str]
 
 
@@ -64,11 +68,13 @@ def summarized(
 
     Args:
         rows: the runs of each row.
-        reference: the row that the others are compared with.
+        reference: the row that the others are compared with; the first one with runs where it has none.
         papers: what the paper says of a row, in words and as a number.
     """
+    worked = [name for name, records in rows.items() if any(not record.failed for record in records.values())]
+    compared = reference if reference in worked or not worked else worked[0]
     return [
-        _summary(name, records, None if name == reference else rows[reference], papers[name])
+        _summary(name, records, None if name == compared else rows[compared], papers[name])
         for name, records in rows.items()
     ]
 
@@ -86,6 +92,7 @@ def _summary(name: str, records: Records, reference: Records | None, paper: tupl
         std=pooled_std(runs),
         interval=bootstrap_interval(errors),
         difference=None if reference is None else _difference(done, reference),
+        is_reference=reference is None,
         joints=_mean(_joined([np.asarray(record.joint_error_mm, float) for record in runs])),
         lost=sum(record.lost for record in runs),
         swaps=sum(record.swaps for record in runs),
@@ -96,6 +103,7 @@ def _summary(name: str, records: Records, reference: Records | None, paper: tupl
         image_blobs=average(lambda record: record.image_blobs),
         rates=_mean_rates(runs),
         by_recording={source: _mean(record.errors) for source, record in done.items()},
+        iterations_by_recording={source: _mean(record.iterations) for source, record in done.items()},
         failed=tuple(f"{source}: {record.failed}" for source, record in records.items() if record.failed),
     )
 
@@ -117,9 +125,8 @@ def _difference(records: Records, reference: Records) -> Difference | None:
         for source, record in records.items()
         if source in reference and not reference[source].failed
     ]
-    if not any(np.isfinite(pair).any() for pair in pairs):
-        return None
-    return Difference(_mean(_joined(pairs)), bootstrap_interval(pairs))
+    pairs = [pair for pair in pairs if np.isfinite(pair).any()]
+    return Difference(_mean(_joined(pairs)), bootstrap_interval(pairs), len(pairs)) if pairs else None
 
 
 def frame_differences(record: RunRecord, reference: RunRecord) -> Float[np.ndarray, "_"]:
