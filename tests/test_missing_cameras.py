@@ -270,3 +270,13 @@ def test_checks_know_where_a_camera_is_missing(tmp_path):
     for pictures, present in zip(clip.grey, clip.present, strict=True):
         assert [bool(picture.any()) for picture in pictures] == present.tolist()
     assert {index: list(pictures) for index, pictures in clip.stills.items()} == {1: [0], 2: [0]}
+
+
+def test_times_that_jump_or_a_rate_that_cannot_be_are_refused_at_once(tmp_path):
+    folder = make_recording(tmp_path / "r", settings="up: z\nfps: 25\ntime_stamps: true\n", frames=4)
+    come_at(folder / "videos" / "right.mp4", (1, 100000, 1))
+    with pytest.raises(InputError, match=r"right.mp4: 4 images do not make .* after image 1"):
+        open_recording(folder)
+    (folder / "recording.yaml").write_text("up: z\nfps: 1.0e+15\ntime_stamps: true\n")
+    with pytest.raises(InputError, match="at most 10000"):
+        open_recording(folder)

@@ -1,5 +1,6 @@
 """Nothing is overwritten unasked, no two runs share a folder, nothing of an older run is left."""
 
+import json
 import subprocess
 import sys
 
@@ -7,6 +8,7 @@ import pytest
 from command_line import actor_file, done, refused, trackable
 from motion_cases import walking_motion
 
+from sogjax.app.kept_run import NOTE
 from sogjax.app.run_folder import LOCK, run_folder
 from sogjax.data.motion import load_motion, save_motion
 from sogjax.errors import InputError
@@ -44,9 +46,15 @@ def test_nothing_of_an_older_run_is_left_but_what_is_not_its_own(capsys, tmp_pat
     run = tmp_path / "run"
     for name in ("notes.txt", "overlay.mp4", "metrics.json", "motion_anna.npz", ".motion.0123abcd.tmp.npz"):
         (run / name).write_text("older")
+    note = json.loads((run / "run.json").read_text())
+    (run / "run.json").write_text(json.dumps(note | {"files": [*note["files"], "motion_anna.npz"]}))
+    for name in ("motion_notes.csv", "motion_before.c3d"):
+        (run / name).write_text("the user's own")
     (run / "motion_anna.partial").mkdir()
     done(capsys, *command, "outputs.bvh=false", "overwrite=true")
-    assert sorted(contents(run)) == ["config.yaml", "motion.npz", "notes.txt", "run.json"]
+    assert sorted(contents(run)) == [
+        *("config.yaml", "motion.npz", "motion_before.c3d", "motion_notes.csv", "notes.txt", "run.json")
+    ]
 
 
 def test_an_actor_that_an_older_run_made_and_this_one_reads(capsys, tmp_path, command):
@@ -156,3 +164,24 @@ def test_a_rendered_recording_is_replaced_as_a_whole(capsys, tmp_path):
     (tmp_path / "r" / "actor.yaml").write_text("mine")
     assert "actor.yaml" in refused(capsys, *words, "overwrite=true")
     assert (tmp_path / "r" / "actor.yaml").read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", ["..", ".", "../precious.txt", "videos", "/etc/hostname"])
+def test_a_note_that_names_what_is_no_result_removes_nothing(tmp_path, name):
+    out = tmp_path / "work" / "out"
+    (out / "videos").mkdir(parents=True)
+    (out / "videos" / "left.mp4").write_text("a video")
+    (tmp_path / "work" / "precious.txt").write_text("keep")
+    (out / NOTE).write_text(json.dumps({"command": "track", "files": [name]}))
+    with run_folder(out, overwrite=True) as folder:
+        folder.begin("track", {})
+    assert (tmp_path / "work" / "precious.txt").read_text() == "keep"
+    assert (out / "videos" / "left.mp4").is_file()
+
+
+def test_folders_of_the_user_inside_of_an_unfinished_run_stay(tmp_path):
+    (tmp_path / "motion.partial" / "mine").mkdir(parents=True)
+    (tmp_path / "motion.partial" / "mine" / "notes.txt").write_text("keep")
+    with run_folder(tmp_path, overwrite=True) as folder:
+        folder.begin("track", {})
+    assert (tmp_path / "motion.partial" / "mine" / "notes.txt").is_file()

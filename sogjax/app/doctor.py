@@ -1,6 +1,5 @@
 """`sogjax doctor`: what is installed here, what it runs on, and whether it computes rightly."""
 
-import importlib.util
 import os
 import platform
 import tempfile
@@ -23,8 +22,16 @@ PACKAGES = (
 CLASHING = ("opencv-python", "opencv-contrib-python", "opencv-contrib-python-headless")
 """They overwrite opencv-python-headless's files."""
 EXTRAS = {
-    "test": ("pytest", "xdist", "hypothesis", "beartype", "bvhio"),
-    "lint": ("ruff", "pyright", "importlinter"),
+    "export": ("ezc3d",),
+    "report": ("matplotlib",),
+    "notebook": ("matplotlib", "ipykernel", "nbmake"),
+    "joblib": ("hydra-joblib-launcher",),
+    "submitit": ("hydra-submitit-launcher",),
+    "ray": ("hydra-ray-launcher",),
+    "optuna": ("hydra-optuna-sweeper",),
+    "test": ("pytest", "pytest-xdist", "hypothesis", "beartype", "bvhio", "pygltflib"),
+    "lint": ("ruff", "pyright", "import-linter"),
+    "docs": ("sphinx", "myst-parser", "furo"),
 }
 PROBE_BYTES = 32 * 2**20
 SLOW = 20.0
@@ -94,9 +101,10 @@ def _say_cache() -> None:
 
 def _say_extras() -> None:
     """What nobody needs who only tracks."""
-    for extra, modules in EXTRAS.items():
-        missing = [name for name in modules if importlib.util.find_spec(name) is None]
-        _line(f"extra [{extra}]", f"not whole, without {', '.join(missing)}" if missing else "there")
+    for extra, packages in EXTRAS.items():
+        missing = [name for name in packages if _version(name) is None]
+        remedy = f"without {', '.join(missing)}; pip install 'sogjax[{extra}]' adds it"
+        _line(f"extra [{extra}]", remedy if missing else "there")
 
 
 def _write_speed(folder: Path) -> Iterator[str]:

@@ -2,7 +2,6 @@
 
 import os
 import re
-import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -12,6 +11,7 @@ from sogjax.app.made_from import MadeFrom, difference
 from sogjax.app.outputs import results_folder
 from sogjax.app.recordings import say
 from sogjax.data.export import WRITERS
+from sogjax.data.file_names import objection
 from sogjax.errors import InputError
 
 try:
@@ -23,12 +23,11 @@ LOCK = ".lock"
 REPLACING_THEIR_OWN = ("demo",)
 """Commands that show something and can do so again: an earlier run of theirs is replaced unasked."""
 PARTIAL = ("motion.partial", "motion_*.partial", FOLDER)
-RESULTS = (
-    *PARTIAL,
-    *(f"motion{name}{ending}" for name in ("", "_*") for ending in WRITERS),
-    *("config.yaml", "metrics.json", "overlay.mp4", "motion.rrd", NOTE),
-)
-"""Names of what a run leaves, beside the files that its note lists."""
+"""Folders of a run that has not ended."""
+RESULTS = (*(f"motion{ending}" for ending in WRITERS), "config.yaml", "metrics.json", "overlay.mp4", "motion.rrd", NOTE)
+"""Names of files that every run leaves."""
+OF_ACTORS = tuple(f"motion_*{ending}" for ending in WRITERS)
+"""Names of several actors' files. A user's own may be called so: they go only where a run's note lists them."""
 _HALF_WRITTEN = re.compile(
     r"\.(motion|overlay|config|metrics|run|actor)(_.*)?\.[0-9a-f]{8}\.tmp(\..*)?|\.probe-[0-9a-f]*"
 )
@@ -54,7 +53,7 @@ class RunFolder:
         self.began = False
         """Whether a run was begun here just now."""
         overwrite = overwrite or (command in REPLACING_THEIR_OWN and begun_by == command)
-        found = earlier_results(path)
+        found = earlier_results(path, self.note) or sorted(_named(path, OF_ACTORS))
         if not found or overwrite:
             return
         names = ", ".join(file.name for file in found[:3]) + (", ..." if len(found) > 3 else "")
@@ -89,8 +88,10 @@ class RunFolder:
             say(f"{self.path}: there is nothing to go on from; the run begins with the first frame")
             return False
         self._check_same(before, made_from)
-        for path in [*half_written(self.path), *(_named(self.path, PARTIAL) if self.note else ())]:
-            _remove(path)
+        for path in half_written(self.path):
+            path.unlink(missing_ok=True)
+        for path in _named(self.path, PARTIAL) if self.note else ():
+            _remove_partial(path)
         return True
 
     def begin(self, command: str, made_from: MadeFrom, needed: Sequence[Path] = ()) -> None:
@@ -118,13 +119,17 @@ class RunFolder:
         kept = {path.resolve() for path in needed}
         (self.path / NOTE).unlink(missing_ok=True)  # first: without it nothing is taken for whole
         for path in [*earlier_results(self.path, self.note), *half_written(self.path)]:
-            if path.resolve() not in kept:
-                _remove(path)
+            if path.resolve() in kept:
+                continue
+            if path.is_dir() and not path.is_symlink():
+                _remove_partial(path)
+            else:
+                path.unlink(missing_ok=True)
 
     def finish(self, command: str, made_from: MadeFrom, files: Sequence[Path]) -> None:
         """Note that the run has ended, and with which files; what it kept for going on may go then."""
         for path in half_written(self.path):
-            _remove(path)
+            path.unlink(missing_ok=True)
         names = [path.name for path in files]
         write_note(self.path / NOTE, {"command": command, "files": names, "made_from": made_from})
 
@@ -154,13 +159,18 @@ def run_folder(
             raise
 
 
-def earlier_results(folder: Path, note: dict | None = None) -> list[Path]:
-    """What a run left in a folder, by the names of results and by its note."""
+def earlier_results(folder: Path, note: dict) -> list[Path]:
+    """What a run left in a folder: folders of its unfinished state, and files by their names and by its note.
+
+    A note is a file that anybody may have written: it names nothing but files of this very folder.
+    """
     if not folder.is_dir():
         return []
-    listed = (read_note(folder / NOTE) if note is None else note).get("files", [])
-    named = {folder / name for name in listed if isinstance(name, str) and Path(name).name == name}
-    return sorted(_named(folder, RESULTS) | {path for path in named if path.exists()})
+    listed = note.get("files", [])
+    names = [name for name in listed if isinstance(name, str) and objection(name) is None] if listed else []
+    files = _named(folder, RESULTS) | {folder / name for name in names}
+    partial = {path for path in _named(folder, PARTIAL) if path.is_dir()}
+    return sorted(partial | {path for path in files if path.is_file() or path.is_symlink()})
 
 
 def _named(folder: Path, patterns: Sequence[str]) -> set[Path]:
@@ -169,14 +179,16 @@ def _named(folder: Path, patterns: Sequence[str]) -> set[Path]:
 
 def half_written(folder: Path) -> list[Path]:
     """Files under temporary names, which a run leaves where it was killed."""
-    return [path for path in folder.iterdir() if _HALF_WRITTEN.fullmatch(path.name)]
+    return [path for path in folder.iterdir() if _HALF_WRITTEN.fullmatch(path.name) and not path.is_dir()]
 
 
-def _remove(path: Path) -> None:
-    if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path)
-    else:
-        path.unlink(missing_ok=True)
+def _remove_partial(path: Path) -> None:
+    """Remove a folder of an unfinished run; what is in it that is not a run's stays, and the folder with it."""
+    for file in path.iterdir():
+        if not file.is_dir() or file.is_symlink():
+            file.unlink()
+    with suppress(OSError):
+        path.rmdir()
 
 
 @contextmanager

@@ -5,7 +5,10 @@ MAX_BYTES = 100
 
 
 def objection(name: str) -> str | None:
-    """Why a name cannot be the name of a file in any folder, on any system; None where it can."""
+    """Why a name cannot be the name of a file in any folder; None where it can.
+
+    Names that Windows alone keeps for itself (CON, or with a colon) pass: writing fails there, and harms nothing.
+    """
     if "/" in name or "\\" in name:
         return "a name without slashes"
     if not name.isprintable():

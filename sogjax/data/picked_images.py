@@ -10,6 +10,8 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from sogjax.data.image_stream import ImageStream
 
+MOST_FRAMES = 50
+"""For each image on the average: with more, a time stamp or the rate is wrong."""
 FARTHEST = 0.75
 """Frames that an image may lie away from the time it stands for; a video of even images of any rate stays below."""
 
@@ -20,7 +22,12 @@ def picked_images(times: Float[np.ndarray, "image"], fps: float) -> Int[np.ndarr
     Args:
         times: of the images, in seconds, ascending.
         fps: frames a second.
+
+    Raises:
+        ValueError: there are no images, or `MOST_FRAMES` times as many frames as images.
     """
+    if not len(times) or (times[-1] - times[0]) * fps > MOST_FRAMES * len(times):
+        raise ValueError(f"{len(times)} images do not make a video of {fps:g} frames a second")
     wanted = _frame_times(times, fps)
     after = np.searchsorted(times, wanted).clip(0, len(times) - 1)
     before = (after - 1).clip(0)

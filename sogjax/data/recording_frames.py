@@ -33,13 +33,20 @@ def images_by_time(sources: dict[str, Path], infos: dict[str, SourceInfo], fps: 
     """By camera that has a video. Folders of images have no times.
 
     Raises:
-        InputError: a video cannot be read.
+        InputError: a video cannot be read, or its times do not suit the rate.
     """
     found = {}
     for camera, info in infos.items():
         if not sources[camera].is_dir():
             times = frame_times(sources[camera]) if info.times is None else info.times
-            picked = picked_images(times, fps)
+            try:
+                picked = picked_images(times, fps)
+            except ValueError as error:
+                where = int(np.argmax(np.diff(times))) if len(times) > 1 else 0
+                raise InputError(
+                    f"{sources[camera]}: {error}; its longest pause comes after image {where}; correct `fps:`, convert "
+                    "the video again, or leave `time_stamps:` out of recording.yaml"
+                ) from error
             lost = np.flatnonzero(frames_without_image(times, fps, picked))
             found[camera] = TimedImages(tuple(picked.tolist()), tuple(lost.tolist()))
     return found

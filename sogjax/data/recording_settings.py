@@ -14,6 +14,9 @@ from sogjax.model.frames import UP_AXES
 LARGEST_GAIN = 8.0
 """Of a camera's colours; a larger one is taken for a mistake."""
 
+FASTEST = 10_000.0
+"""Frames a second; a faster camera is taken for a mistake."""
+
 _KEYS = (
     "fps",
     "calibration",
@@ -94,9 +97,9 @@ def read_recording_settings(path: Path) -> RecordingSettings:
 
 
 def _positive(entry: Entry) -> float:
-    expected = "a positive number of frames per second"
+    expected = f"a positive number of frames per second, at most {FASTEST:g}"
     result = entry.number(expected)
-    if result <= 0:
+    if not 0.0 < result <= FASTEST:
         raise entry.error(expected)
     return result
 

@@ -28,9 +28,11 @@ class Lines:
         text = read_text(path, max_bytes)
         if until is not None:
             text = text.partition(f"\n{until}")[0]
-        for character in own_line:
-            text = text.replace(character, f"\n{character}\n")
-        self._rows = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip()]
+        self._rows: list[tuple[int, str]] = []
+        for number, line in enumerate(text.splitlines(), 1):
+            for character in own_line:
+                line = line.replace(character, f"\n{character}\n")
+            self._rows += [(number, part) for part in line.split("\n") if part.strip()]
         self._next = 0
 
     @property
