@@ -44,10 +44,7 @@ def main() -> None:
     """Print a line for each iteration, and write the file."""
     settings = settings_from(Settings)
     source = source_named(settings.recording, settings.frame + 1, Path(settings.out))
-    if not 0 < settings.frame < source.num_frames or len(source.bodies) > 1:
-        raise InputError(
-            f"frame={settings.frame}: choose one of 1 to {source.num_frames - 1}, of a recording of one person"
-        )
+    check_showable(source, settings)
     steps, energies = watched(source, settings.options, settings.frame)
     print(machine_line())
     previous = steps.blob_means[0]
@@ -58,6 +55,24 @@ def main() -> None:
     pictures = next(iter(read_frames(source.recording, settings.frame, settings.frame + 1)))
     write_iterations(Path(settings.to), source.recording, steps, energies, pictures)
     print(settings.to)
+
+
+def check_showable(source: Source, settings: Settings) -> None:
+    """Refuse what has no iterations that could be shown.
+
+    Raises:
+        InputError: several people, or a frame that the recording has not, or its first, which is no step of tracking.
+    """
+    if len(source.bodies) > 1:
+        raise InputError(
+            f"recording={settings.recording}: has {len(source.bodies)} people, and the iterations of one can be shown; "
+            "choose a recording of one person"
+        )
+    if not 0 < settings.frame < source.recording.num_frames:
+        raise InputError(
+            f"frame={settings.frame}: choose one of 1 to {source.recording.num_frames - 1}, frames of {source.name} "
+            "after its first"
+        )
 
 
 def watched(source: Source, options: list[str], frame: int) -> tuple[Motion, np.ndarray]:

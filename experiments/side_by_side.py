@@ -3,7 +3,8 @@
 python experiments/side_by_side.py [experiment=solvers] [recording=walk:0] [frames=40] [to=side_by_side.rrd]
 python experiments/side_by_side.py sweep=multirun/DATE recording=FOLDER to=sweep.rrd
 
-Runs of an experiment that were done (in the folder `out`) are read, the others are made.
+Runs of an experiment that were done (in the folder `out`) are read, the others are made; rows that need a recording of
+their own, such as one of several people, are left out.
 """
 
 from collections.abc import Mapping
@@ -15,7 +16,7 @@ import numpy as np
 from sogjax.app.configs import ReportConfig
 from sogjax.app.script import run_script, settings_from
 from sogjax.app.study.experiment import Experiment
-from sogjax.app.study.runner import motions_of
+from sogjax.app.study.runner import motions_of, run_row
 from sogjax.app.study.source import Source
 from sogjax.app.study.study import Study
 from sogjax.app.sweep_results import differing, kept_results
@@ -58,10 +59,27 @@ def main() -> None:
 def of_experiment(
     study: Study, experiment: Experiment, source: Source
 ) -> tuple[dict[str, list[Motion]], dict[str, np.ndarray]]:
-    """The motions of every row, and their errors in metres."""
-    records = {row: record for row, _, record in study.records(experiment) if not record.failed}
-    motions = {row: list(motions_of(r, source.bodies, source.recording.fps).values()) for row, r in records.items()}
-    return motions, {row: 1e-3 * record.errors for row, record in records.items()}
+    """The motions on one recording of every row that tracks it and did not fail, and their errors in metres.
+
+    Raises:
+        InputError: there is none.
+    """
+    motions, errors, failed = {}, {}, "all its rows are of several people"
+    for row, entry in experiment.config.rows.items():
+        if entry.actors is not None and entry.actors > 1:  # tracked on a recording of its own
+            continue
+        record = run_row(experiment, row, source, study.runs, study.overrides)
+        if record is None or record.failed:
+            failed = record.failed if record else failed
+            continue
+        motions[row] = list(motions_of(record, source.bodies, source.recording.fps).values())
+        errors[row] = 1e-3 * record.errors
+    if not motions:
+        raise InputError(
+            f"experiment={experiment.name}: no row worked on {source.name} ({failed}); choose another recording or "
+            "experiment"
+        )
+    return motions, errors
 
 
 def of_sweep(folder: Path) -> dict[str, list[Motion]]:

@@ -21,9 +21,8 @@ def test_the_body_of_the_guide_is_one(tmp_path):
 
 def test_options_that_the_guide_names_exist():
     pages = [path.read_text(encoding="utf-8") for path in GUIDE.glob("*.md")]
-    words = {
-        word for page in pages for word in re.findall(r"`((?:solver|energy|images|color|tracking)\.?\w*=\w+)`", page)
-    }
+    option = r"`((?:solver|energy|images|color|tracking|outputs)\.?\w*=\w+)`"
+    words = {word for page in pages for word in re.findall(option, page)}
     assert words
     for word in words:
         composed("track", ["recording=somewhere", word])

@@ -10,6 +10,7 @@ from rendered_person import rendered_person
 
 from sogjax.app import grid
 from sogjax.app.cli import main
+from sogjax.app.composition import sweep_folder
 from sogjax.data.motion import load_motion
 from sogjax.errors import InputError
 
@@ -86,7 +87,9 @@ def test_what_is_no_number_of_one_program_is_refused(capsys, tmp_path, override,
 
 def test_hydras_own_settings_and_unknown_ways_are_refused(capsys, tmp_path):
     words = ("track", "-m", f"recording={tmp_path}", "energy.limit_weight=1,2")
-    assert "Hydra's own settings" in refused(capsys, *words, "sweep=vmapped", "hydra.sweep.dir=x")
+    for word in ("hydra.sweep.subdir=x", "hydra/launcher=joblib", "+hydra.sweep.dir=x"):
+        assert "Hydra's own settings" in refused(capsys, *words, "sweep=vmapped", word)
+    assert "write key=value" in refused(capsys, *words, "sweep=vmapped", "hydra.sweep.dir=x", "start=[")
     assert "each, vmapped" in refused(capsys, "track", f"recording={trackable(tmp_path / 'walk')}", "sweep=batched")
 
 
@@ -105,3 +108,25 @@ def test_a_member_that_fails_is_a_row_and_the_others_go_on(capsys, tmp_path, rec
     assert "failed: the disk is full" in first
     assert "failed" not in second
     assert load_motion(next(Path("multirun").iterdir()) / "1" / "motion.npz").num_frames == 3
+
+
+def test_the_folder_can_be_chosen_and_is_not_overwritten_unasked(capsys, tmp_path, recording):
+    folder = tmp_path / "my sweeps" / "first"
+    light = ("outputs.rerun=false", "energy.limit_weight=0,1", "sweep=vmapped", f"hydra.sweep.dir={folder}")
+    words = ("track", "-m", f"recording={recording}", f"actor={actor_file(tmp_path / 'a.yaml')}", *LIGHT, *light)
+    done(capsys, *words)
+    assert not Path("multirun").exists()
+    before = {name: (folder / name).read_bytes() for name in files_in(folder)}
+    assert {"sweep.csv", "0/motion.npz", "1/run.json"} <= set(before)
+    assert f"{folder}/0: holds the results of an earlier run" in refused(capsys, *words)
+    assert {name: (folder / name).read_bytes() for name in files_in(folder)} == before
+    done(capsys, *words, "overwrite=true", "outputs.bvh=false")
+    left = {name for name in before if not name.endswith(".bvh")}
+    assert set(files_in(folder)) == left
+
+
+def test_the_folder_is_the_one_of_the_ordinary_sweep():
+    assert sweep_folder("track", []).parent == Path("multirun")
+    assert sweep_folder("track", ["hydra.sweep.dir=a/${now:%Y}"]).parent == Path("a")
+    with pytest.raises(InputError, match="key=value"):
+        sweep_folder("track", ["hydra.sweep.dir=a{"])

@@ -129,12 +129,20 @@ def test_runs_lie_side_by_side_in_trees_of_their_own(tmp_path, motion):
     path = tmp_path / "runs.rrd"
     write_comparison(path, recording_of(ring_rig(), 10), {"a=1": [motion], "a=2 m/s": [other]}, errors=errors)
     found = {entity.replace("\\", ""): columns for entity, columns in read_back(path).items()}
+    seen = []
     for name, shown in (("a=1", motion), ("a=2 m/s", other)):
         blobs = found[f"/world/runs/{name}/actor_1/blobs"]["Ellipsoids3D:centers"]
         np.testing.assert_allclose(blobs[-6:], shown.blob_means, atol=1e-6)
         np.testing.assert_allclose(
             np.ravel(found[f"/curves/errors/error_mm/{name}"]["Scalars:scalars"]), 1e3 * errors[name]
         )
+        bones = set(np.ravel(found[f"/world/runs/{name}/actor_1/skeleton"]["LineStrips3D:colors"][0]).tolist())
+        curves = ("errors/error_mm", "energy/similarity", "energy/energy", "iterations/iterations")
+        colors = [np.ravel(found[f"/curves/{curve}/{name}"]["SeriesLines:colors"][0]).item() for curve in curves]
+        assert set(colors) <= bones
+        assert colors[1] != colors[2]  # which share a plot
+        seen.append(bones)
+    assert seen[0].isdisjoint(seen[1])
     assert len(RrdReader(path).blueprints()) == 1
 
 

@@ -22,6 +22,8 @@ GREY = (40, 40, 40)
 WAY = (255, 220, 90)
 """The way of a joint through the iterations."""
 FRAMES = 6
+SCENES = 0.73
+"""Of the window's height; the plots are below."""
 
 pytestmark = pytest.mark.skipif(not DRIVERS, reason="no Vulkan driver (Debian: mesa-vulkan-drivers)")
 
@@ -71,10 +73,13 @@ def test_runs_side_by_side(tmp_path, recording, pictures):
     runs = {name: [walking_motion(FRAMES, still=still)] for name, still in (("a", False), ("b", True))}
     write_comparison(tmp_path / "runs.rrd", recording, runs, frames=pictures)
     picture = shown(tmp_path / "runs.rrd", BLUE, GREEN)
-    half = picture.shape[1] // 2
-    assert has_color(picture[:, :half], BLUE)
-    assert not has_color(picture[:, :half], GREEN)
-    assert not has_color(picture[:, half:], BLUE)
+    height, half = int(SCENES * picture.shape[0]), picture.shape[1] // 2
+    scenes, plots = picture[:height], picture[height:]
+    assert has_color(scenes[:, :half], BLUE)
+    assert not has_color(scenes[:, :half], GREEN)
+    assert not has_color(scenes[:, half:], BLUE)
+    for color in (BLUE, GREEN):  # a run's curves have the colours of its body
+        assert has_color(plots, color)
 
 
 def test_iterations(tmp_path, recording, pictures):

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -61,13 +62,33 @@ def composed(command: str, overrides: Sequence[str]) -> Any:
     Raises:
         InputError: an unknown key, a value of the wrong type, a required key that is missing.
     """
-    register_schemas()
     words = ready_for_hydra(overrides, sweep=False)
+    with _plain_errors(command):
+        return to_object(command, _tree(command, words))
+
+
+def sweep_folder(command: str, words: Sequence[str]) -> Path:
+    """Where a sweep's members go: Hydra's `hydra.sweep.dir`, as it is given or else as the command's YAML file says.
+
+    Raises:
+        InputError: a word that cannot be.
+    """
+    with _plain_errors(command):
+        return Path(_tree(command, words, with_hydra=True).hydra.sweep.dir)
+
+
+def _tree(command: str, words: Sequence[str], with_hydra: bool = False) -> Any:
+    register_schemas()
     GlobalHydra.instance().clear()
+    with initialize_config_dir(str(conf_dir()), version_base="1.3"):
+        return compose(command, overrides=list(words), return_hydra_config=with_hydra)
+
+
+@contextmanager
+def _plain_errors(command: str) -> Iterator[None]:
+    """Hydra's complaints as one sentence each."""
     try:
-        with initialize_config_dir(str(conf_dir()), version_base="1.3"):
-            tree = compose(command, overrides=words)
-        return to_object(command, tree)
+        yield
     except InputError:
         raise
     except (HydraException, OmegaConfBaseException, ValueError) as error:

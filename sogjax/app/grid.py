@@ -1,6 +1,5 @@
 """Sweeps in one compiled call (`sweep=vmapped`): every member tracks the same frames, with numbers of its own."""
 
-import datetime
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
@@ -21,10 +20,10 @@ from sogjax.app.job import Job, Run, doing, frame_range
 from sogjax.app.made_from import MadeFrom, made_from
 from sogjax.app.outputs import export_endings, results_folder, write_results
 from sogjax.app.pipeline import FrameTracker, Picture, PictureReader, Preparation
-from sogjax.app.recordings import actors_of, opened, say
-from sogjax.app.run_folder import run_folder
-from sogjax.app.sweep import row_numbers
-from sogjax.app.sweep_results import Failure, Member, Numbers, finish_sweep, keep_result
+from sogjax.app.recordings import actors_of, file_list, opened, say
+from sogjax.app.run_folder import earlier_results, run_folder
+from sogjax.app.sweep import SWEEP_DIR, row_numbers
+from sogjax.app.sweep_results import Failure, Member, Numbers, finish_sweep, forget_results, keep_result
 from sogjax.data.cell_cache import CellsOfClip
 from sogjax.data.recording import Recording
 from sogjax.data.video import read_prepared
@@ -41,11 +40,16 @@ STEADY = ("gauss_newton", "lbfgs")
 """Solvers that do not magnify rounding: members may look into common boxes, and still find what single runs find."""
 
 
-def run_grid(members: Sequence[Sequence[str]]) -> int:
+def run_grid(members: Sequence[Sequence[str]], sweep: Path) -> int:
     """Track with the overrides of every member, write the results of each, and print the table; the exit status.
 
+    Args:
+        members: the overrides of each.
+        sweep: the folder of their folders 0, 1, ...
+
     Raises:
-        InputError: anything wrong with the recording, the actors or a config, or a setting that cannot be swept so.
+        InputError: anything wrong with the recording, the actors or a config, or a setting that cannot be swept so; or
+            a folder that holds results which are to stay.
     """
     configs = [composed("track", list(overrides)) for overrides in members]
     for config in configs:
@@ -57,7 +61,10 @@ def run_grid(members: Sequence[Sequence[str]]) -> int:
     initial_pose_file(recording, configs[0])
     if configs[0].resume:
         raise InputError("resume=true sweep=vmapped: a sweep in one call cannot go on; leave one of the two out")
-    with results_folder(Path("multirun") / f"{datetime.datetime.now():%Y-%m-%d_%H-%M-%S}") as folder:
+    if not configs[0].overwrite:
+        check_free(sweep, len(configs))
+    with results_folder(sweep) as folder:
+        forget_results(folder)
         bodies, made = actors_of(recording, configs[0].actor, configs[0].body, configs[0].color)
         done = []
         for number, running in enumerate(grid_runs(recording, bodies, configs, folder)):
@@ -79,6 +86,21 @@ def _row(running: AbstractContextManager[Run], config: TrackConfig, made: list[B
     except InputError as error:
         say(f"{config.out}: {error}")
         return Failure(error)
+
+
+def check_free(sweep: Path, count: int) -> None:
+    """Refuse a sweep's folder with earlier results, before anything is tracked.
+
+    Raises:
+        InputError: the folder of a member holds some.
+    """
+    for number in range(count):
+        found = earlier_results(sweep / str(number))
+        if found:
+            raise InputError(
+                f"{sweep / str(number)}: holds the results of an earlier run ({found[0].name}); choose another folder "
+                f"with {SWEEP_DIR}=DIR, or give overwrite=true"
+            )
 
 
 def check_numbers_only(configs: Sequence[TrackConfig]) -> None:
@@ -122,9 +144,12 @@ def grid_runs(
 def _one_run(
     job: Job, config: TrackConfig, folder: Path, origin: MadeFrom, read: PictureReader, follow: FrameTracker
 ) -> Iterator[Run]:
-    with run_folder(folder) as own, doing(job, config.outputs, own.path, read, follow) as run:
-        yield run
-        own.finish("track", origin, run.files)
+    with run_folder(folder, config.overwrite) as own:
+        own.begin("track", origin, [] if config.actor is None else file_list(config.actor))
+        with doing(job, config.outputs, own.path, read, follow) as run:
+            yield run
+            own.finish("track", origin, run.files)
+            own.kept.remove()
 
 
 def grid_jobs(recording: Recording, bodies: list[Body], configs: Sequence[TrackConfig]) -> list[Job]:

@@ -8,7 +8,10 @@ from keyword import iskeyword
 from sogjax.app.configs import help_lines
 from sogjax.errors import InputError
 
-PATH_KEYS = ("recording", "out", "actor", "body", "motion", "truth", "to", "calibration", "from", "dof", "images.cache")
+PATH_KEYS = (
+    *("recording", "out", "actor", "body", "motion", "truth", "to", "calibration", "from", "dof", "images.cache"),
+    "hydra.sweep.dir",
+)
 """Options whose values are paths, which may hold characters that Hydra's grammar does not take unquoted."""
 
 _PLAIN = re.compile(r"[\w./\\:%+@?|-]*", re.ASCII)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from sogjax.app.compiled_programs import forget_programs_if_many
-from sogjax.app.composition import SCHEMAS, composed, conf_dir, register_schemas, to_object
+from sogjax.app.composition import SCHEMAS, composed, conf_dir, register_schemas, sweep_folder, to_object
 from sogjax.app.overrides import plain_sentence, ready_for_hydra
 from sogjax.app.sweep_results import COLUMNS, Failure, Numbers
 from sogjax.errors import InputError
@@ -17,6 +17,7 @@ LOG = logging.getLogger(__name__)
 CHECKED_MEMBERS = 100
 """Members of a sweep that are looked at before it begins."""
 VMAPPED = "sweep=vmapped"
+SWEEP_DIR = "hydra.sweep.dir"
 
 
 def run_sweep(command: str, overrides: Sequence[str]) -> int:
@@ -29,9 +30,9 @@ def run_sweep(command: str, overrides: Sequence[str]) -> int:
         others = ", ".join(name for name in SCHEMAS if name != "track")
         raise InputError(f"{command} -m: only track can be swept, not {others}; leave -m out")
     words = ready_for_hydra(overrides, sweep=True)
-    members = _members(words)
     if VMAPPED in words:
-        return _in_one_call(words, members)
+        return _in_one_call(words)
+    _members(words)
     program = sys.argv
     sys.argv = ["sogjax track", "-m", *words]
     try:
@@ -40,7 +41,7 @@ def run_sweep(command: str, overrides: Sequence[str]) -> int:
         sys.argv = program
 
 
-def _in_one_call(words: Sequence[str], members: list[list[str]] | None) -> int:
+def _in_one_call(words: Sequence[str]) -> int:
     """Run the members of a sweep in one compiled call.
 
     Raises:
@@ -48,10 +49,19 @@ def _in_one_call(words: Sequence[str], members: list[list[str]] | None) -> int:
     """
     from sogjax.app.grid import run_grid
 
-    for word in words:
-        if word.lstrip("+~").startswith("hydra"):
-            raise InputError(f"{word}: Hydra's own settings do not count with {VMAPPED}; leave one of the two out")
-    return run_grid(members or [])
+    to_hydra = [word for word in words if _is_hydras(word)]
+    for word in to_hydra:
+        if not word.startswith(f"{SWEEP_DIR}="):
+            raise InputError(
+                f"{word}: of Hydra's own settings only {SWEEP_DIR} counts with {VMAPPED}; leave one of the two out"
+            )
+    members = _members([word for word in words if word not in to_hydra])
+    return run_grid(members or [], sweep_folder("track", to_hydra))
+
+
+def _is_hydras(word: str) -> bool:
+    """Whether it is a setting of Hydra's own."""
+    return word.lstrip("+~").startswith("hydra")
 
 
 def _members(words: Sequence[str]) -> list[list[str]] | None:
@@ -64,7 +74,7 @@ def _members(words: Sequence[str]) -> list[list[str]] | None:
     from hydra.core.override_parser.overrides_parser import OverridesParser
     from hydra.errors import HydraException
 
-    own = [word for word in words if not word.lstrip("+~").startswith("hydra")]
+    own = [word for word in words if not _is_hydras(word)]
     try:
         (members,) = BasicSweeper.split_arguments(OverridesParser.create().parse_overrides(own), None)
     except HydraException as error:

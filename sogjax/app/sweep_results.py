@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import UInt8
 
 from sogjax.data.atomic import atomic_path
 from sogjax.view.plots import plot_per_point, write_png
@@ -78,18 +79,37 @@ def finish_sweep(sweep: Path, members: Sequence[Member]) -> None:
     with atomic_path(sweep / "sweep.csv") as temporary:
         temporary.write_text(_csv(members), encoding="utf-8")
     print(f"\n{sweep / 'sweep.csv'}")
-    values = [np.nan if isinstance(m.result, str) else m.result[OBJECTIVE] for m in members]
-    if np.isfinite(values).any():
-        title = f"mean marker error over {_swept_keys(members)}"
-        labels = [" ".join(word.partition("=")[2] for word in name.split()) for name in names]
-        write_png(sweep / "sweep.png", plot_per_point(1e-3 * np.asarray(values, float), labels, title))
+    if any(not isinstance(member.result, str) and np.isfinite(member.result[OBJECTIVE]) for member in members):
+        write_png(sweep / "sweep.png", _chart(members))
         print(sweep / "sweep.png")
+
+
+def _chart(members: Sequence[Member]) -> UInt8[np.ndarray, "h w 3"]:
+    """The mean marker errors of the members, and which failed."""
+    own = _own_words([member.overrides for member in members])
+    keys = dict.fromkeys(_setting(word)[0] for words in own for word in words)
+    labels = [" ".join(_setting(word)[1] for word in words) or "as configured" for words in own]
+    failed = [number for number, member in enumerate(members) if isinstance(member.result, str)]
+    errors = [np.nan if isinstance(m.result, str) else 1e-3 * m.result[OBJECTIVE] for m in members]
+    title = f"mean marker error over {', '.join(keys) or 'one run'}"
+    return plot_per_point(np.asarray(errors, float), labels, title, failed=failed)
 
 
 def differing(members: Sequence[Sequence[str]]) -> list[str]:
     """What tells the members of a sweep apart: the overrides that not all of them have."""
+    return [" ".join(words) or "as configured" for words in _own_words(members)]
+
+
+def _own_words(members: Sequence[Sequence[str]]) -> list[list[str]]:
+    """For each member, its overrides that not all members have."""
     common = set.intersection(*(set(overrides) for overrides in members)) if members else set()
-    return [" ".join(text for text in overrides if text not in common) or "as configured" for overrides in members]
+    return [[word for word in overrides if word not in common] for overrides in members]
+
+
+def _setting(override: str) -> tuple[str, str]:
+    """Key and value of an override; `~key` takes the key away."""
+    key, _, value = override.partition("=")
+    return key.lstrip("+~"), "taken away" if key.startswith("~") else value
 
 
 def table(rows: Sequence[tuple[str, Mapping[str, float] | str]]) -> str:
@@ -106,7 +126,7 @@ def table(rows: Sequence[tuple[str, Mapping[str, float] | str]]) -> str:
 
 def _csv(members: Sequence[Member]) -> str:
     """One line a member: a column for every key that was set, then the numbers, then why it failed."""
-    settings = [dict(word.split("=", 1) for word in member.overrides) for member in members]
+    settings = [dict(_setting(word) for word in member.overrides) for member in members]
     keys = list(dict.fromkeys(key for setting in settings for key in setting))
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -116,8 +136,3 @@ def _csv(members: Sequence[Member]) -> str:
         numbers = [""] * len(COLUMNS) if isinstance(member.result, str) else [member.result[c] for c in COLUMNS]
         writer.writerow([*(setting.get(key, "") for key in keys), *numbers, member.result if failed else ""])
     return text.getvalue()
-
-
-def _swept_keys(members: Sequence[Member]) -> str:
-    words = " ".join(differing([member.overrides for member in members])).split()
-    return ", ".join(dict.fromkeys(word.partition("=")[0] for word in words if "=" in word)) or "one run"

@@ -13,6 +13,8 @@ INK, PAPER, OTHERS = "#1f77b4", "#444444", "#b8c4d0"
 _SIZE = (7.2, 2.8)
 """Inches."""
 _DPI = 90
+_NAME_HEIGHT = 0.06
+"""Of a line of text beside a panel, in units of the panel's height."""
 
 
 def mean_chart(
@@ -33,7 +35,7 @@ def mean_chart(
         intervals: low and high of each mean.
         axis: what differs between the rows.
         value: what the means are, with their unit.
-        members: further values, drawn faintly, such as the means on each recording.
+        members: further values by name, drawn as faint lines, such as the means on each recording.
         paper: the paper's figures, in a panel of their own; None where it has none.
     """
     figure = _figure()
@@ -41,6 +43,7 @@ def mean_chart(
     panels = figure.subplots(1, 2 if with_paper else 1, squeeze=False, width_ratios=[2, 1] if with_paper else [1])[0]
     _draw_means(panels[0], means, intervals, members or {})
     _finish(panels[0], names, axis, value, "here")
+    _name_lines(panels[0], members or {})
     if with_paper:
         present = [(name, number) for name, number in zip(names, paper, strict=True) if number is not None]
         panels[1].plot(range(len(present)), [number for _, number in present], "s-", color=PAPER)
@@ -78,13 +81,36 @@ def _draw_means(
     panel.errorbar(places, middle, yerr=np.nan_to_num(spread), fmt="o", color=INK, capsize=4)
 
 
+def _name_lines(panel: Any, members: Mapping[str, Sequence[float]]) -> None:
+    """The names of the lines right of the panel, at the heights where they end, or as near as a line of text allows."""
+    last = {name: np.asarray(values, float)[np.isfinite(values)][-1:] for name, values in members.items()}
+    named = sorted((name for name, end in last.items() if end.size), key=lambda name: float(last[name][0]))
+    top = panel.get_ylim()[1]
+    heights = spaced([float(last[name][0]) / top for name in named], _NAME_HEIGHT)
+    for name, height in zip(named, heights, strict=True):
+        place, beside = (1.0, height), {"xytext": (4, 0), "textcoords": "offset points"}
+        panel.annotate(name, place, xycoords="axes fraction", va="center", fontsize=6, color=PAPER, **beside)
+
+
+def spaced(heights: Sequence[float], apart: float) -> list[float]:
+    """Ascending heights moved so far that they are apart: upward, but not above 1, and downward where that is full."""
+    moved = list(heights)
+    for k in range(1, len(moved)):
+        moved[k] = max(moved[k], moved[k - 1] + apart)
+    ceiling = 1.0
+    for k in reversed(range(len(moved))):
+        moved[k] = min(moved[k], ceiling)
+        ceiling = moved[k] - apart
+    return moved
+
+
 def _finish(panel: Any, names: Sequence[str], axis: str, value: str, title: str) -> None:
     crowded = max((len(name) for name in names), default=0) * len(names) > 40
     panel.set_xticks(range(len(names)), names, rotation=30 if crowded else 0, ha="right" if crowded else "center")
     panel.set_xlabel(axis)
     panel.set_ylabel(value)
     panel.set_title(title, fontsize=9)
-    panel.set_ylim(bottom=0.0)
+    panel.set_ylim(0.0, 1.06 * panel.get_ylim()[1])  # room for a whole marker at the top
     panel.grid(axis="y", color="#e4e4e4")
 
 

@@ -1,6 +1,6 @@
 """Small plots of an evaluation, drawn with OpenCV."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import cv2
@@ -14,6 +14,7 @@ _LEFT, _RIGHT, _TOP, _BOTTOM = 64, 16, 34, 40
 _INK, _GRID = (60, 60, 60), (225, 225, 225)
 _COLORS = ((200, 110, 30), (40, 90, 230), (70, 160, 60), (170, 70, 160))
 """BGR of one curve after the other."""
+_FAILED = (30, 30, 200)
 
 
 def plot_per_frame(
@@ -36,15 +37,26 @@ def plot_per_frame(
     return canvas
 
 
-def plot_per_point(errors: Float[np.ndarray, "point"], names: Sequence[str], title: str) -> UInt8[np.ndarray, "h w 3"]:
-    """One bar a marker or joint, from metres, drawn in millimetres (BGR); no bar where the value is NaN."""
+def plot_per_point(
+    errors: Float[np.ndarray, "point"], names: Sequence[str], title: str, *, failed: Collection[int] = ()
+) -> UInt8[np.ndarray, "h w 3"]:
+    """One bar a marker, joint or run, from metres, drawn in millimetres (BGR); no bar where the value is NaN.
+
+    Args:
+        errors: metres.
+        names: written below the bars.
+        title: above them, without the unit.
+        failed: numbers of those for which the word "failed" stands instead of a bar.
+    """
     values = 1000.0 * np.asarray(errors, float)
     top = _round_up(float(np.nanmax(values)) if np.isfinite(values).any() else 1.0)
     canvas = _axes(title, top)
     step = _plot_width() / max(len(values), 1)
     for k, (value, name) in enumerate(zip(values, names, strict=True)):
         left, right = _LEFT + step * (k + 0.15), _LEFT + step * (k + 0.85)
-        if np.isfinite(value):
+        if k in failed:
+            _upward_text(canvas, "failed", (int(_LEFT + step * (k + 0.5)), SIZE[1] - _BOTTOM - 4), _FAILED)
+        elif np.isfinite(value):
             corner = _pixel(np.array([left, _height(value, top)]))
             cv2.rectangle(canvas, corner, (int(right), SIZE[1] - _BOTTOM), _COLORS[0], -1)
         row = SIZE[1] - _BOTTOM + 14 + 11 * (k % 2)
@@ -94,3 +106,14 @@ def _text(
     scale: float = 0.38,
 ) -> None:
     cv2.putText(canvas, text, corner, cv2.FONT_HERSHEY_SIMPLEX, scale, color, 1, cv2.LINE_AA)
+
+
+def _upward_text(canvas: np.ndarray, text: str, foot: tuple[int, int], color: tuple[int, int, int]) -> None:
+    """Text that runs upward from the middle of its foot, so that it needs little width."""
+    (length, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.38, 1)
+    patch = np.full((height + 4, length + 2, 3), 255, np.uint8)
+    _text(patch, text, (0, height + 1), color)
+    upright = cv2.rotate(patch, cv2.ROTATE_90_COUNTERCLOCKWISE)
+    rows, columns = upright.shape[:2]
+    left = foot[0] - columns // 2
+    canvas[foot[1] - rows : foot[1], left : left + columns] = upright

@@ -13,7 +13,7 @@ from sogjax.data.recording import Recording
 from sogjax.view.bones import blob_palette, bones_from_motion
 from sogjax.view.frames import frame_range
 from sogjax.view.picture_camera import PictureCamera, picture_camera
-from sogjax.view.rerun.curves import log_curve_looks, log_curves, own_curves, plots_with
+from sogjax.view.rerun.curves import log_body_curve_looks, log_curves, own_curves, plots_with
 from sogjax.view.rerun.layout import comparison_layout, eye
 from sogjax.view.rerun.names import FRAME, TIME, camera_entity, run_entity
 from sogjax.view.rerun.scene import log_actor, log_cameras, log_look, log_markers
@@ -33,7 +33,8 @@ def write_comparison(
 ) -> None:
     """Write runs of one recording, such as those of a sweep or of several solvers, to be looked at side by side.
 
-    A run's actors lie under `/world/runs/RUN`, its curves beside those of the others in common plots.
+    A run's actors lie under `/world/runs/RUN`, its curves, in its bodies' colours, beside those of the others in common
+    plots.
 
     Args:
         path: the `.rrd` file, replaced as a whole.
@@ -82,9 +83,8 @@ def _log_run(
         log_look(stream, entity, motion, bones, number, blob_palette(motion, number))
         log_actor(stream, entity, motion, bones)
     curves = own_curves(actors[0]) | ({} if errors is None else {"error_mm": 1000.0 * errors})
-    for curve, values in curves.items():
-        log_curve_looks(stream, name, {curve: values}, number)
-        log_curves(stream, actors[0], name, {curve: values})
+    log_body_curve_looks(stream, name, curves, number)
+    log_curves(stream, actors[0], name, curves)
 
 
 def _log_pictures(

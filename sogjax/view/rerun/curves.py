@@ -1,14 +1,18 @@
 """Curves of a Rerun file: what was found in each frame, and in each iteration."""
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import rerun as rr
 
 from sogjax.data.motion import Motion
+from sogjax.view.bones import LEFT, MIDDLE, RIGHT, actor_palette
 from sogjax.view.rerun.names import FRAME, ITERATION, entity_part, time_columns
 
 _CURVE_COLORS = ((90, 170, 255), (255, 170, 60), (120, 220, 120), (255, 110, 120), (190, 140, 255), (240, 220, 90))
+_SIDES = (LEFT, RIGHT, MIDDLE)
 _PLOTS = {
     "errors": "Error, mm",
     "energy": "Similarity and energy",
@@ -31,8 +35,21 @@ def log_curve_looks(
 ) -> None:
     """Titles and colours of curves."""
     for k, name in enumerate(curves):
-        title, color = f"{name} {actor}" if actor else name, _CURVE_COLORS[(first_color + k) % len(_CURVE_COLORS)]
-        stream.log(_curve(name, actor), rr.SeriesLines(names=title, colors=color, widths=1.5), static=True)
+        _log_look(stream, name, actor, _CURVE_COLORS[(first_color + k) % len(_CURVE_COLORS)])
+
+
+def log_body_curve_looks(stream: rr.RecordingStream, run: str, curves: Mapping[str, np.ndarray], body: int) -> None:
+    """Titles of a run's curves, and its body's colours: a plot's first curve has that of the left, then the others."""
+    in_plot: Counter[str] = Counter()
+    for name in curves:
+        number = in_plot[_plot(name)]
+        in_plot[_plot(name)] += 1
+        _log_look(stream, name, run, actor_palette(body)[_SIDES[number % len(_SIDES)]])
+
+
+def _log_look(stream: rr.RecordingStream, name: str, actor: str | None, color: Any) -> None:
+    title = f"{name} {actor}" if actor else name
+    stream.log(_curve(name, actor), rr.SeriesLines(names=title, colors=color, widths=1.5), static=True)
 
 
 def log_curves(stream: rr.RecordingStream, motion: Motion, actor: str | None, curves: Mapping[str, np.ndarray]) -> None:
