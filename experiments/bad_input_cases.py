@@ -121,6 +121,7 @@ RECORDING: list[tuple[str, Damage]] = [
     ("a frame rate in words", write(REC, "fps: fast\n")),
     ("an unknown camera", write(REC, "cameras: [left, cellar]\n")),
     ("no cameras", write(REC, "cameras: []\n")),
+    ("10^15 frames a second", write(REC, "fps: 1.0e+15\ntime_stamps: true\n")),
     ("a maybe for going by time stamps", write(REC, "time_stamps: maybe\n")),
     ("a number for going by time stamps", write(REC, "time_stamps: 2\n")),
     ("an offset of an unknown camera", write(REC, "frame_offset: {cellar: 2}\n")),
@@ -231,5 +232,10 @@ FILES: list[tuple[str, Damage, tuple[str, ...]]] = [
     ("an actor below a file", nothing, ("actor", "recording=walk", "body=body.yaml", "out=actor.yaml/a.yaml")),
     ("an export below a file", nothing, ("export", "motion=motion.npz", "to=actor.yaml/new.bvh")),
     ("a recording to be rendered that exists", nothing, ("synth", "out=walk")),
+    (
+        "a run's note that names the folder above",
+        write("results/run.json", '{"command": "track", "files": [".."]}'),
+        ("track", "recording=walk", "actor=actor.yaml", "out=results", "images.depth=99", "overwrite=true"),
+    ),
     ("a folder for the actor", nothing, ("track", "recording=walk", "actor=walk", "out=new/results")),
 ]

@@ -295,6 +295,7 @@ def test_what_is_wrong_in_a_dof_file_is_named(skeleton, tmp_path, old, new, mess
         ("CHANNELS 1 Xrotation", "CHANNELS 1 Wrotation", "CHANNELS, their number"),
         ("OFFSET 9 -4 0", "OFFSET 9 -4", "OFFSET"),
         ("OFFSET 9 -4 0", "OFFSET 9 nan 0", "finite"),
+        ("OFFSET 18 25 0", "OFFSET 18 25", "line 12 is"),
         ("OFFSET 9 -4 0", "", "OFFSET"),
         ("JOINT LeftLeg", "JOINT LeftArm", "LeftArm"),
         ("JOINT LeftLeg", "JOINT", "with a name"),

@@ -17,6 +17,7 @@ from sogjax.app.composition import composed
 from sogjax.app.configs import TrackConfig, help_lines
 from sogjax.app.first_pose import first_poses, initial_pose_file
 from sogjax.app.job import Job, Run, doing, frame_range
+from sogjax.app.kept_run import NOTE, read_note
 from sogjax.app.made_from import MadeFrom, made_from
 from sogjax.app.outputs import export_endings, results_folder, write_results
 from sogjax.app.pipeline import FrameTracker, Picture, PictureReader, Preparation
@@ -95,7 +96,7 @@ def check_free(sweep: Path, count: int) -> None:
         InputError: the folder of a member holds some.
     """
     for number in range(count):
-        found = earlier_results(sweep / str(number))
+        found = earlier_results(sweep / str(number), read_note(sweep / str(number) / NOTE))
         if found:
             raise InputError(
                 f"{sweep / str(number)}: holds the results of an earlier run ({found[0].name}); choose another folder "
