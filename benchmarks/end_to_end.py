@@ -13,13 +13,15 @@ from pathlib import Path
 
 from track_speed import demo_recording
 
-from sogjax.app.overrides import quoted_value
-from sogjax.app.pipeline import FRAMES_AHEAD
-from sogjax.app.script import machine_line, run_script, settings_from, track_folder
-from sogjax.app.sweep import row_numbers
+from sogjax.app.config.overrides import quoted_value
 from sogjax.data.recording import Recording, open_recording
 from sogjax.data.stages import ahead
 from sogjax.data.video import read_prepared
+from sogjax.engine.pipeline import FRAMES_AHEAD
+from sogjax.engine.run_numbers import row_numbers
+from sogjax.study.machine import machine_line
+from sogjax.study.script import run_script, settings_from
+from sogjax.study.tracked import track_folder
 
 HEAD = f"{'settings':<48}{'decoding alone':>16}{'to pose':>10}{'ratio':>8}{'step':>8}{'mean mm':>10}{'lost':>6}"
 

@@ -15,13 +15,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from sogjax.app.script import machine_line, settings_from
 from sogjax.data.actor_file import load_body, named_body
 from sogjax.energy.objective import EnergyWeights, History, Views, energy, similarity, whole_image_overlap
 from sogjax.energy.overlap import GradientMode
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, project
 from sogjax.model.sog import Sog
+from sogjax.study.machine import machine_line
+from sogjax.study.script import settings_from
 
 ROW = "{:<34}{:>12}{:>12}{:>24}"
 

@@ -13,14 +13,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from sogjax.app.composition import composed
-from sogjax.app.job import tracking
-from sogjax.app.overrides import quoted_value
-from sogjax.app.recordings import actors_of, opened
-from sogjax.app.script import machine_line, run_script, settings_from
 from sogjax.data.recording import Recording
 from sogjax.data.source import open_source
 from sogjax.data.video import VideoWriter
+from sogjax.engine.job import tracking
+from sogjax.engine.recordings import actors_of, opened
+from sogjax.settings.compose import track_config
+from sogjax.study.machine import machine_line
+from sogjax.study.script import run_script, settings_from
 
 MIB = 1024
 """Kibibytes, in which the system counts."""
@@ -55,8 +55,7 @@ def main() -> None:
 
 def track_repeatedly(settings: Settings, repeats: int) -> None:
     """The first frames of the recording forwards and backwards, so many times, into a folder that is removed."""
-    words = [f"recording={quoted_value(settings.recording)}", *settings.overrides]
-    config = composed("track", [*words, *([f"actor={quoted_value(settings.actor)}"] if settings.actor else [])])
+    config = track_config(settings.overrides, recording=settings.recording, actor=settings.actor)
     recording = opened(config.recording, config.cameras)
     bodies, _ = actors_of(recording, config.actor, config.body, config.color)
     with TemporaryDirectory() as folder:

@@ -41,7 +41,7 @@ def first_frame_seconds(actor: str) -> float:
     begin = time.perf_counter()
     from track_speed import demo_recording
 
-    from sogjax.app.script import track_folder
+    from sogjax.study.tracked import track_folder
 
     track_folder(demo_recording(), [f"actor={actor}", "stop=1"])
     return time.perf_counter() - begin
@@ -54,11 +54,11 @@ def resident_mib(actor: str) -> float:
     """
     from track_speed import demo_recording
 
-    from sogjax.app import track
-    from sogjax.app.composition import composed
+    from sogjax.engine.track import track_to_folder
+    from sogjax.settings.compose import track_config
 
     with TemporaryDirectory() as folder:
-        track.run(composed("track", [f"recording={demo_recording()}", f"actor={actor}", f"out={folder}/demo"]))
+        track_to_folder(track_config(recording=demo_recording(), actor=actor, out=f"{folder}/demo"))
     status = Path("/proc/self/status").read_text(encoding="ascii")
     return float(status.partition("VmHWM:")[2].split()[0]) / MIB_IN_KIB
 

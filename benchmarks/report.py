@@ -18,11 +18,11 @@ from tempfile import TemporaryDirectory
 from energies import energy_quantities, growth_quantities
 from processes import process_quantities
 from quantities import Quantity, is_worse, reference_milliseconds
-from runs import Scene, end_to_end_quantities, solver_quantities, stage_quantities, sweep_quantities
+from runs import Scene, end_to_end_quantities, solver_quantities, stage_quantities
 
-from sogjax.app.script import machine_line
 from sogjax.data.actor_file import save_body
 from sogjax.data.atomic import atomic_path
+from sogjax.study.machine import machine_line
 
 REFERENCE = "reference ms"
 FORMAT = 1
@@ -72,7 +72,6 @@ def parts() -> dict[str, Callable[[Scene], Iterable[Quantity]]]:
         "stage": stage_quantities,
         "end_to_end": end_to_end_quantities,
         "growth": lambda _: growth_quantities(),
-        "sweep": sweep_quantities,
         "process": of_processes,
     }
 

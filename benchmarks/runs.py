@@ -1,4 +1,4 @@
-"""What tracking the demo costs: solvers, quad-trees, end to end against decoding alone, and sweeps."""
+"""What tracking the demo costs: solvers, quad-trees, end to end against decoding alone."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -8,24 +8,21 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from end_to_end import decoding_rate
-from quantities import Quantity, exponent, milliseconds
+from quantities import Quantity, milliseconds
 from track_speed import demo_recording
 
-from sogjax.app import build
-from sogjax.app.cells import cells_of_clip
-from sogjax.app.composition import composed
-from sogjax.app.configs import TrackConfig
-from sogjax.app.job import Job, Run
-from sogjax.app.overrides import quoted_value
-from sogjax.app.recordings import actors_of, opened
-from sogjax.app.track import track_recording
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.recording import Recording
+from sogjax.engine.cells import cells_of_clip
+from sogjax.engine.job import Job
+from sogjax.engine.recordings import actors_of, opened
+from sogjax.engine.run import Run
+from sogjax.engine.track import track_recording
 from sogjax.evaluate import evaluate_motions
 from sogjax.model.body import Body
+from sogjax.settings import TrackConfig
+from sogjax.settings.compose import track_config
 from sogjax.track.frame import TrackState
-from sogjax.track.many import track_many
-from sogjax.track.scan import track_clip
 from sogjax.track.tracker import first_capacities
 
 SOLVERS = ("gauss_newton", "lbfgs", "conditioned_ascent")
@@ -46,14 +43,13 @@ class Scene:
         """Render and estimate what is not there yet."""
         folder = demo_recording()
         recording = opened(str(folder))
-        config: TrackConfig = composed("track", [f"recording={quoted_value(str(folder))}"])
+        config: TrackConfig = track_config(recording=folder)
         bodies, _ = actors_of(recording, config.actor, config.body, config.color)
         return cls(folder, recording, bodies, min(frames, recording.num_frames))
 
     def config(self, *overrides: str, frames: int | None = None) -> TrackConfig:
         """The config of a run."""
-        words = [f"recording={quoted_value(str(self.folder))}", f"stop={frames or self.frames}", *overrides]
-        return composed("track", words)
+        return track_config(overrides, recording=self.folder, stop=frames or self.frames)
 
     def tracked(self, *overrides: str) -> Run:
         """A run without files, evaluated."""
@@ -114,20 +110,3 @@ def end_to_end_quantities(scene: Scene) -> Iterator[Quantity]:
     yield Quantity("end to end", "decoding alone", max(decoding), "frames/s", True)
     yield Quantity("end to end", "videos to poses", max(whole), "frames/s", True)
     yield Quantity("end to end", "share of the decode-only rate", max(whole) / max(decoding), "ratio", True, 0.8)
-
-
-def sweep_quantities(scene: Scene) -> Iterator[Quantity]:
-    """Fifteen settings in one compiled call, in units of one run over the same cells."""
-    config = scene.config(frames=FRAMES_OF_SWEEP)
-    job = Job.from_config(scene.recording, scene.bodies, config)
-    cells = np.asarray(cells_of_clip(scene.recording, job.grids, config.images, job.frames))
-    weights = np.geomspace(0.003, 0.03, 15)
-    words = [f"energy.acceleration_weight={weight}" for weight in weights]
-    trackers = [build.varied(job.tracker, scene.config(word, frames=FRAMES_OF_SWEEP)) for word in words]
-    one = milliseconds(lambda: track_clip(job.tracker, job.start, cells)[0].pose, repeats=4)
-    sizes = (4, 15)
-    sweep = lambda count: track_many(trackers[:count], jnp.stack([job.start] * count), cells)[0].pose
-    costs = [milliseconds(lambda count=count: sweep(count), repeats=3) for count in sizes]
-    yield Quantity("sweep", "15 settings, in runs from kept cells", costs[-1] / one, "ratio", target=5.0)
-    name = f"exponent with settings, 1/{'/'.join(map(str, sizes))}"
-    yield Quantity("growth", name, exponent((1, *sizes), (one, *costs)), "exponent", target=1.0)

@@ -10,12 +10,14 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from sogjax.app.configs import DemoConfig
-from sogjax.app.progress import progress
-from sogjax.app.script import machine_line, run_script, settings_from, track_folder
-from sogjax.app.sweep import row_numbers
+from sogjax.app.config.schemas import DemoConfig
 from sogjax.data.recording import open_recording
 from sogjax.data.video import read_frames
+from sogjax.engine.run_numbers import row_numbers
+from sogjax.engine.terminal import progress
+from sogjax.study.machine import machine_line
+from sogjax.study.script import run_script, settings_from
+from sogjax.study.tracked import track_folder
 from sogjax.synth import SynthSettings, cached_recording
 
 

@@ -17,16 +17,18 @@ import numpy as np
 from sogjax.actor.colors import camera_of
 from sogjax.actor.make import MadeActor, make_actor, subjects_of
 from sogjax.actor.silhouette_iou import silhouette_iou
-from sogjax.app.build import energy_weights
-from sogjax.app.composition import composed
-from sogjax.app.configs import EnergyConfig
-from sogjax.app.recordings import body_named, say
-from sogjax.app.script import machine_line, run_script, settings_from
-from sogjax.app.track import track_recording
 from sogjax.data.ground_truth import GroundTruth, load_ground_truth
 from sogjax.data.recording import Recording, open_recording
+from sogjax.engine.build import energy_weights
+from sogjax.engine.recordings import body_named
+from sogjax.engine.terminal import say
+from sogjax.engine.track import track_recording
 from sogjax.evaluate import evaluate_motions
 from sogjax.model.body import Body
+from sogjax.settings import EnergyConfig
+from sogjax.settings.compose import track_config
+from sogjax.study.machine import machine_line
+from sogjax.study.script import run_script, settings_from
 from sogjax.synth import SynthSettings, cached_recording
 
 BONES = {
@@ -72,8 +74,8 @@ def report(recording: Recording, made: MadeActor, solver: str) -> list[str]:
     assert recording.ground_truth is not None
     truth = load_ground_truth(recording.ground_truth)
     errors = bone_errors(made.body, truth)
-    words = [f"recording={recording.path}", *([f"solver={solver}"] if solver else [])]
-    run = track_recording(recording, [made.body], composed("track", words))
+    words = [f"solver={solver}"] if solver else []
+    run = track_recording(recording, [made.body], track_config(words, recording=recording.path))
     evaluation = evaluate_motions(run.motions, truth)
     markers = np.concatenate(
         [part.markers.errors.ravel() for part in evaluation.evaluations.values() if part.markers is not None]

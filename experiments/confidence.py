@@ -10,10 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from sogjax.app.configs import OutputsConfig, ReportConfig
-from sogjax.app.script import machine_line, run_script, settings_from
-from sogjax.app.study.calibration import SaidAndFound, calibrated_temperature, said_and_found
-from sogjax.app.study.study import Study
+from sogjax.settings import OutputsConfig
+from sogjax.study.machine import machine_line
+from sogjax.study.script import run_script, settings_from
+from sogjax.study.settings import ReportConfig
+from sogjax.study.stated_errors import StatedErrors, calibrated_temperature, stated_errors
+from sogjax.study.study import Study
 
 
 @dataclass
@@ -37,10 +39,10 @@ def main() -> None:
     print(machine_line())
     print(f"outputs.temperature={temperature:.3g}, calibrated on {', '.join(settings.calibrate)}\n")
     for name in [*settings.calibrate, *settings.check]:
-        print_line(name, said_and_found(study.source(name), temperature))
+        print_line(name, stated_errors(study.source(name), temperature))
 
 
-def print_line(name: str, result: SaidAndFound) -> None:
+def print_line(name: str, result: StatedErrors) -> None:
     """How right the deviations of a recording are."""
     print(
         f"{name:<16}found/said {np.sqrt(result.mean_square_ratio):.2f}   below 1, 2 deviations "

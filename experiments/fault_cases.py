@@ -15,9 +15,9 @@ import yaml
 from faults import SAME, Survived, Ward, said_by
 from kill_and_resume import PARTIAL, frames_left, killed_and_resumed, started
 
-from sogjax.app.kept_run import FOLDER
 from sogjax.data.array_log import ROWS
 from sogjax.data.npz_file import npy_header
+from sogjax.engine.kept_run import FOLDER
 from sogjax.errors import InputError
 
 FIRST_FRAMES = 8

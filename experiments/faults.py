@@ -18,9 +18,10 @@ from tempfile import TemporaryDirectory
 from kill_and_resume import Settings, Undisturbed, check_same, frames_left, started
 from kill_and_resume import undisturbed as left_alone
 
-from sogjax.app.compilation_cache import VARIABLE
-from sogjax.app.script import machine_line, run_script, settings_from
+from sogjax.engine.compilation_cache import VARIABLE
 from sogjax.errors import InputError
+from sogjax.study.machine import machine_line
+from sogjax.study.script import run_script, settings_from
 
 SAME = "bit for bit that of the undisturbed run"
 

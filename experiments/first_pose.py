@@ -9,14 +9,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sogjax.app.composition import composed
-from sogjax.app.first_pose import searched_poses
-from sogjax.app.overrides import quoted_value
-from sogjax.app.recordings import actors_of, opened, upright
-from sogjax.app.script import machine_line, run_script, settings_from
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.motion import motion_from_poses
+from sogjax.engine.first_pose import searched_poses
+from sogjax.engine.recordings import actors_of, opened, upright
 from sogjax.evaluate.markers import joint_errors
+from sogjax.settings.compose import track_config
+from sogjax.study.machine import machine_line
+from sogjax.study.script import run_script, settings_from
 from sogjax.synth import SynthSettings, cached_recording
 from sogjax.synth.settings import MOTIONS
 
@@ -57,8 +57,7 @@ def errors_of(motion: str, seed: int, settings: Settings) -> list[float]:
     folder = cached_recording(
         SynthSettings(motion=motion, actors=actors, seed=seed, frames=settings.frames, cameras=settings.cameras)
     )
-    use_plates = str(settings.plates).lower()
-    config = composed("track", [f"recording={quoted_value(str(folder))}", f"images.use_plates={use_plates}"])
+    config = track_config(recording=folder, images={"use_plates": settings.plates})
     recording = opened(str(folder))
     bodies, _ = actors_of(recording, None, config.body, config.color)
     bodies = [upright(body, recording) for body in bodies]

@@ -8,7 +8,6 @@ import jax.numpy as jnp
 import numpy as np
 from bad_inputs import make_workplace
 
-from sogjax.app.kept_run import CAPACITIES, CAPACITY, COLUMNS, FOLDER, NOTE, TERMS, KeptRun
 from sogjax.data.actor_file import load_body
 from sogjax.data.array_log import ArrayLog
 from sogjax.data.calibration import load_calibration
@@ -23,6 +22,7 @@ from sogjax.data.recording_settings import read_recording_settings
 from sogjax.data.skeletons import read_skeleton
 from sogjax.data.skeletool_motion import read_skeletool_motion
 from sogjax.data.source import look_at_source, open_source
+from sogjax.engine.kept_run import CAPACITIES, CAPACITY, COLUMNS, FOLDER, NOTE, TERMS, KeptRun
 from sogjax.errors import InputError
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))

@@ -12,14 +12,15 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 
-from sogjax.app.composition import composed
-from sogjax.app.configs import ReportConfig, TrackConfig
-from sogjax.app.overrides import quoted_value
-from sogjax.app.script import machine_line, run_script, settings_from
-from sogjax.app.study.source import Source, source_named
 from sogjax.data.motion import Motion, motion_from_poses
 from sogjax.data.video import read_frames
 from sogjax.errors import InputError
+from sogjax.settings import TrackConfig
+from sogjax.settings.compose import track_config
+from sogjax.study.machine import machine_line
+from sogjax.study.script import run_script, settings_from
+from sogjax.study.settings import ReportConfig
+from sogjax.study.source import Source, source_named
 from sogjax.track.frame import TrackState
 from sogjax.track.iterations import best_after
 from sogjax.track.tracker import track
@@ -77,7 +78,7 @@ def check_showable(source: Source, settings: Settings) -> None:
 
 def watched(source: Source, options: list[str], frame: int) -> tuple[Motion, np.ndarray]:
     """The poses after 0, 1, 2, ... iterations in a frame, as a motion, and their energies."""
-    config: TrackConfig = composed("track", [f"recording={quoted_value(str(source.path))}", *options])
+    config: TrackConfig = track_config(options, recording=source.path)
     cameras = source.cameras(None)
     tracker, cells = source.tracker(config, cameras), source.cells(config.images.depth, cameras, 1)
     state = TrackState.from_pose(source.start)

@@ -18,11 +18,12 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from sogjax.app.script import machine_line, run_script, settings_from
 from sogjax.data.actor_file import named_body
 from sogjax.data.motion import Motion, load_motion
 from sogjax.data.source import look_at_source
 from sogjax.errors import InputError
+from sogjax.study.machine import machine_line
+from sogjax.study.script import run_script, settings_from
 from sogjax.synth import SynthSettings, cached_recording
 
 PARTIAL = "motion.partial"

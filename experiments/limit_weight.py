@@ -5,7 +5,7 @@ python experiments/limit_weight.py [recordings=[walk:0,FOLDER]] [frames=60] [out
 The settings that are compared stand in conf/experiment/limit_weight.yaml.
 """
 
-from sogjax.app.study.script import study_main
+from sogjax.study.command import study_main
 
 if __name__ == "__main__":
     study_main("limit_weight")

@@ -25,8 +25,9 @@ from fuzzing import FuzzedReader, fuzz_readers
 from kill_and_resume import Settings as RunSettings
 
 from sogjax.app.cli import main as sogjax
-from sogjax.app.script import machine_line, run_script, settings_from
 from sogjax.data.atomic import atomic_path
+from sogjax.study.machine import machine_line
+from sogjax.study.script import run_script, settings_from
 
 RUNS = RunSettings()
 """Those that faults are made to."""

@@ -13,16 +13,16 @@ from pathlib import Path
 
 import numpy as np
 
-from sogjax.app.configs import ReportConfig
-from sogjax.app.script import run_script, settings_from
-from sogjax.app.study.experiment import Experiment
-from sogjax.app.study.runner import motions_of, run_row
-from sogjax.app.study.source import Source
-from sogjax.app.study.study import Study
-from sogjax.app.sweep_results import differing, kept_results
+from sogjax.app.sweep.results import differing, kept_results
 from sogjax.data.motion import Motion, load_motion
 from sogjax.data.video import read_frames
 from sogjax.errors import InputError
+from sogjax.study.experiment import Experiment
+from sogjax.study.runner import motions_of, run_row
+from sogjax.study.script import run_script, settings_from
+from sogjax.study.settings import ReportConfig
+from sogjax.study.source import Source
+from sogjax.study.study import Study
 from sogjax.view.rerun import write_comparison
 
 

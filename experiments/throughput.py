@@ -5,7 +5,7 @@ python experiments/throughput.py [recordings=[walk:0,FOLDER]] [frames=60] [out=F
 The settings that are compared stand in conf/experiment/throughput.yaml.
 """
 
-from sogjax.app.study.script import study_main
+from sogjax.study.command import study_main
 
 if __name__ == "__main__":
     study_main("throughput")

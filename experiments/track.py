@@ -7,9 +7,13 @@ tracks the rendered walk of the demo; `recording=FOLDER` tracks another recordin
 
 import sys
 
-from sogjax.app.script import demo_recording_unless_given
-from sogjax.app.sweep import sweep_main, track_task
+from sogjax.app.config.overrides import quoted_value
+from sogjax.app.sweep.run import sweep_main, track_task
+from sogjax.engine.terminal import progress
+from sogjax.synth import SynthSettings, cached_recording
 
 if __name__ == "__main__":
-    demo_recording_unless_given()
+    if not any(word.startswith("recording=") or word in ("-h", "--help") for word in sys.argv[1:]):
+        demo = cached_recording(SynthSettings(), progress=progress)
+        sys.argv.append(f"recording={quoted_value(str(demo))}")
     sys.exit(sweep_main(track_task))

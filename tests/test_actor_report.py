@@ -18,7 +18,7 @@ from sogjax.actor.report import actor_report
 from sogjax.actor.shape import ShapeModel
 from sogjax.actor.silhouette_iou import body_silhouette, overlap_ratio, silhouette_iou
 from sogjax.actor.silhouettes import PosedPictures
-from sogjax.app.actor_report import report_folder, report_page, write_actor_report
+from sogjax.engine.actor_report import report_folder, report_page, write_actor_report
 from sogjax.model.body import Attachments, Body
 from sogjax.view.body_picture import BACKGROUND, body_picture
 from sogjax.view.silhouette_sheet import BOTH, ONLY_BODY, ONLY_MASK, SilhouetteView, silhouette_sheet

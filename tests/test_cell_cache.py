@@ -8,12 +8,12 @@ import pytest
 from command_line import actor_file, done, refused, trackable
 from small_recording import make_recording, write_images, write_video
 
-from sogjax.app.build import cell_grids
-from sogjax.app.cells import cells_of, cells_of_clip, picture_reader
-from sogjax.app.configs import ImagesConfig
-from sogjax.app.pipeline import Preparation
 from sogjax.data.motion import load_motion
 from sogjax.data.recording import open_recording
+from sogjax.engine.build import cell_grids
+from sogjax.engine.cells import cells_of, cells_of_clip, picture_reader
+from sogjax.engine.pipeline import Preparation
+from sogjax.settings import ImagesConfig
 
 DEPTH = 4
 

@@ -14,9 +14,9 @@ from rendered_person import rendered_person
 from small_recording import write_video
 
 from sogjax.app.cli import main
-from sogjax.app.composition import SCHEMAS, composed
-from sogjax.app.configs import help_lines
+from sogjax.app.config.composition import SCHEMAS, composed
 from sogjax.data.motion import load_motion
+from sogjax.settings.option import help_lines
 
 FAST = ("solver.max_iterations=20", "images.depth=6")
 

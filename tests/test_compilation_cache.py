@@ -7,13 +7,13 @@ from importlib.metadata import version
 
 import pytest
 
-from sogjax.app.compilation_cache import VARIABLE, use_compilation_cache
+from sogjax.engine.compilation_cache import VARIABLE, use_compilation_cache
 from sogjax.errors import InputError
 
 PROGRAM = """
 import jax
 from jax._src import monitoring
-from sogjax.app.compilation_cache import use_compilation_cache
+from sogjax.engine.compilation_cache import use_compilation_cache
 hits = []
 monitoring.register_event_listener(lambda event, **_: hits.append(event) if event.endswith("cache_hits") else None)
 use_compilation_cache()

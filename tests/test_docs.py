@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from sogjax.app.composition import composed
+from sogjax.app.config.composition import composed
 from sogjax.data.actor_file import load_body
 
 GUIDE = Path(__file__).parents[1] / "docs" / "guide"

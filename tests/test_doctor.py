@@ -3,7 +3,8 @@
 import pytest
 from command_line import done, refused
 
-from sogjax.app import doctor, self_test
+from sogjax.app import doctor
+from sogjax.engine import self_test
 
 
 def test_a_sound_installation(capsys, tmp_path):

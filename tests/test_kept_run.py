@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from command_line import actor_file
 
-from sogjax.app.kept_run import FOLDER, KeptRun
 from sogjax.data.actor_file import load_body
 from sogjax.data.array_log import ArrayLog
+from sogjax.engine.kept_run import FOLDER, KeptRun
 from sogjax.errors import InputError
 
 

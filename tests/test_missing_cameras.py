@@ -13,7 +13,6 @@ from rendered_person import rendered_person
 from rig_cases import ring_rig
 from small_recording import SIZE, frame_of, make_recording, toml_camera, write_calibration, write_video
 
-from sogjax.app import pipeline
 from sogjax.app.cli import main
 from sogjax.check.clip import read_clip
 from sogjax.data import video
@@ -21,6 +20,7 @@ from sogjax.data.motion import load_motion
 from sogjax.data.recording import open_recording
 from sogjax.data.source import look_at_source
 from sogjax.data.video import read_frames
+from sogjax.engine import pipeline
 from sogjax.errors import InputError
 from sogjax.solve import GaussNewton
 from sogjax.track.frame import PartialCells

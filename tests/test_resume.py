@@ -15,12 +15,12 @@ import pytest
 from command_line import actor_file, done, refused, trackable
 from small_recording import write_video
 
-from sogjax.app import job, kept_run, streams
-from sogjax.app import track as track_command
 from sogjax.app.cli import main
-from sogjax.app.configs import ColorConfig
 from sogjax.data import array_log
 from sogjax.data.motion import Motion, load_motion
+from sogjax.engine import job, kept_run, streams
+from sogjax.engine import track as track_command
+from sogjax.settings import ColorConfig
 from sogjax.track import tracker
 
 FRAMES, KILLS = 20, 3

@@ -12,9 +12,9 @@ sys.path.append(str(Path(__file__).parents[1] / "experiments"))
 
 import side_by_side
 
-from sogjax.app.study.experiment import Experiment, ExperimentConfig, RowConfig
-from sogjax.app.study.record import RunRecord
 from sogjax.errors import InputError
+from sogjax.study.experiment import Experiment, ExperimentConfig, RowConfig
+from sogjax.study.record import RunRecord
 
 BODY = make_body()
 SOURCE = SimpleNamespace(name="walk-seed3", bodies=[BODY], recording=SimpleNamespace(fps=30.0))

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from command_line import actor_file, trackable
 
-from sogjax.app import job, pipeline
 from sogjax.app.cli import main
 from sogjax.data.motion import Motion, load_motion
 from sogjax.data.source import look_at_source
+from sogjax.engine import job, pipeline
 from sogjax.errors import InputError
 from sogjax.view.overlay_video import OverlayVideo
 

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from command_line import actor_file
 
-from sogjax.app.build import check
-from sogjax.app.composition import composed
-from sogjax.app.configs import TrackConfig
-from sogjax.app.study.document import Picture, Section, write_html, write_markdown
-from sogjax.app.study.experiment import Experiment, ExperimentConfig, RowConfig, experiment_names
-from sogjax.app.study.record import RunFolder, RunPlan, RunRecord
-from sogjax.app.study.source import Source, source_named
-from sogjax.app.study.study import Study
-from sogjax.app.study.summary import pooled_std, summarized
-from sogjax.app.study.table import difference_words, findings, markdown_table
+from sogjax.app.config.composition import composed
+from sogjax.engine.build import check
 from sogjax.errors import InputError
+from sogjax.settings import TrackConfig
+from sogjax.study.document import Picture, Section, write_html, write_markdown
+from sogjax.study.experiment import Experiment, ExperimentConfig, RowConfig, experiment_names
+from sogjax.study.record import RunFolder, RunPlan, RunRecord
+from sogjax.study.source import Source, source_named
+from sogjax.study.study import Study
+from sogjax.study.summary import pooled_std, summarized
+from sogjax.study.table import difference_words, findings, markdown_table
 from sogjax.synth import SynthSettings, render_recording
 
 SCRIPTS = Path(__file__).resolve().parents[1] / "experiments"

@@ -7,7 +7,7 @@ import pytest
 
 from sogjax.app import track
 from sogjax.app.cli import main
-from sogjax.app.termination import TerminatedError, terminated_as_interrupted
+from sogjax.engine.termination import TerminatedError, terminated_as_interrupted
 
 
 def terminate(*_):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from sogjax.app.timing import StageTimes
+from sogjax.engine.timing import StageTimes
 
 
 def times(**seconds):

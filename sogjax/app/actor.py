@@ -10,17 +10,17 @@ import yaml
 from sogjax.actor.colors import ColoredView, camera_of
 from sogjax.actor.gains import estimated_gains
 from sogjax.actor.make import MadeActor, make_actor
-from sogjax.app.actor_report import report_folder, write_actor_report
-from sogjax.app.build import color_space_and_radius, energy_weights
-from sogjax.app.configs import ActorConfig
-from sogjax.app.outputs import free_path, results_folder
-from sogjax.app.progress import progress
-from sogjax.app.recordings import body_named, opened, say
 from sogjax.data.actor_file import save_body
 from sogjax.data.atomic import atomic_path
 from sogjax.data.recording import Recording
+from sogjax.engine.actor_report import report_folder, write_actor_report
+from sogjax.engine.build import color_space_and_radius, energy_weights
+from sogjax.engine.outputs import free_path, results_folder
+from sogjax.engine.recordings import body_named, opened
+from sogjax.engine.terminal import progress, say
 from sogjax.errors import InputError
 from sogjax.sentences import counted
+from sogjax.settings import ActorConfig
 
 NOTICED = 0.15
 """Logarithm of a camera's gain that is worth a word."""

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from sogjax.app.configs import BodyConfig
-from sogjax.app.outputs import free_path
+from sogjax.app.config.schemas import BodyConfig
 from sogjax.data.actor_file import save_body
 from sogjax.data.calibration.rig import METRES
 from sogjax.data.skeletons import read_skeleton
+from sogjax.engine.outputs import free_path
 from sogjax.errors import InputError
 from sogjax.model.frames import UP_AXES
 from sogjax.sentences import counted

@@ -4,10 +4,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-from sogjax.app.configs import CheckConfig
-from sogjax.app.outputs import results_folder
-from sogjax.app.progress import progress
-from sogjax.app.recordings import say
+from sogjax.app.config.schemas import CheckConfig
 from sogjax.check.examination import Examination, examined
 from sogjax.check.findings import SEVERITIES, Finding
 from sogjax.check.hypotheses import unit_rig
@@ -15,6 +12,8 @@ from sogjax.check.opening import opening_problems
 from sogjax.data.atomic import atomic_path
 from sogjax.data.offsets_file import write_frame_offsets
 from sogjax.data.recording import Recording, open_recording
+from sogjax.engine.outputs import results_folder
+from sogjax.engine.terminal import progress, say
 from sogjax.errors import InputError
 from sogjax.sentences import counted
 from sogjax.view.plots import write_png

@@ -13,9 +13,9 @@ USAGE = "usage: sogjax COMMAND [key=value ...] [-m for a sweep], sogjax COMMAND 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; 0: done, 2: the input was wrong (one sentence on standard error)."""
     arguments = list(sys.argv[1:] if arguments is None else arguments)
-    from sogjax.app.compilation_cache import use_compilation_cache
-    from sogjax.app.composition import SCHEMAS, composed
-    from sogjax.app.termination import TerminatedError, terminated_as_interrupted
+    from sogjax.app.config.composition import SCHEMAS, composed
+    from sogjax.engine.compilation_cache import use_compilation_cache
+    from sogjax.engine.termination import TerminatedError, terminated_as_interrupted
     from sogjax.errors import InputError
 
     if not arguments or arguments[0] in ("-h", "--help", "help"):
@@ -35,7 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         use_compilation_cache()
         if any(word in ("-m", "--multirun") for word in overrides):
-            from sogjax.app.sweep import run_sweep
+            from sogjax.app.sweep.run import run_sweep
 
             return run_sweep(command, [word for word in overrides if word not in ("-m", "--multirun")])
         config = composed(command, overrides)
@@ -51,8 +51,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def command_help(command: str) -> str:
     """Every option of a command with its default, unit and the paper's symbol."""
-    from sogjax.app.composition import SCHEMAS, config_groups
-    from sogjax.app.configs import help_lines
+    from sogjax.app.config.composition import SCHEMAS, config_groups
+    from sogjax.settings.option import help_lines
 
     schema = SCHEMAS[command]
     lines = [f"sogjax {command} [key=value ...]", "", (schema.__doc__ or "").strip(), ""]
@@ -67,7 +67,7 @@ def command_help(command: str) -> str:
 
 
 def _overview() -> str:
-    from sogjax.app.composition import SCHEMAS
+    from sogjax.app.config.composition import SCHEMAS
 
     rows = [f"  {name:<10} {(schema.__doc__ or '').strip()}" for name, schema in SCHEMAS.items()]
     return "\n".join(["Markerless motion capture by Sums of Gaussians.", "", USAGE, "", *rows])

@@ -3,15 +3,13 @@
 import time
 from pathlib import Path
 
-from sogjax.app.composition import composed
-from sogjax.app.configs import DemoConfig, TrackConfig
-from sogjax.app.job import Run
-from sogjax.app.outputs import results_folder
-from sogjax.app.overrides import quoted_value
-from sogjax.app.progress import progress
-from sogjax.app.recordings import say
-from sogjax.app.run_folder import run_folder
+from sogjax.app.config.schemas import DemoConfig
 from sogjax.app.track import run as run_track
+from sogjax.engine.outputs import results_folder
+from sogjax.engine.run import Run
+from sogjax.engine.run_folder import run_folder
+from sogjax.engine.terminal import progress, say
+from sogjax.settings.compose import track_config
 from sogjax.synth import SynthSettings, cached_recording, default_cache_dir
 
 COMMAND = "demo"
@@ -43,12 +41,9 @@ def _run_in(config: DemoConfig, out: Path) -> Run:
     recording = cached_recording(settings, default_cache_dir(), progress)
     say(f"rendered recording: {recording}")
     rendered = time.perf_counter()
-    track_config: TrackConfig = composed(
-        "track", [f"recording={quoted_value(str(recording))}", f"out={quoted_value(str(out))}", "initial_pose=auto"]
-    )
-    track_config.outputs = config.outputs
-    track_config.overwrite, track_config.resume = config.overwrite, config.resume
-    result = run_track(track_config, COMMAND)
+    track = track_config(recording=recording, out=out, initial_pose="auto")
+    track.outputs, track.overwrite, track.resume = config.outputs, config.overwrite, config.resume
+    result = run_track(track, COMMAND)
     print(
         f"rendering {rendered - begin:.1f} s (0 when it was there already), "
         f"actor, tracking and outputs {time.perf_counter() - rendered:.1f} s"

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import jax
 
-from sogjax.app.compilation_cache import VARIABLE
-from sogjax.app.configs import DoctorConfig
-from sogjax.app.self_test import LAWS
+from sogjax.app.config.schemas import DoctorConfig
+from sogjax.engine.compilation_cache import VARIABLE
+from sogjax.engine.self_test import LAWS
 from sogjax.errors import InputError
 
 PACKAGES = (

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from sogjax.app.configs import EvaluateConfig
-from sogjax.app.outputs import actor_name, free_path
-from sogjax.app.recordings import file_list
+from sogjax.app.config.schemas import EvaluateConfig
 from sogjax.data.ground_truth import GroundTruth, load_ground_truth
 from sogjax.data.motion import Motion, load_motion
+from sogjax.engine.outputs import actor_name, free_path
+from sogjax.engine.recordings import file_list
 from sogjax.errors import InputError
 from sogjax.evaluate import GroupEvaluation, evaluate_motions
 

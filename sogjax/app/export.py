@@ -4,14 +4,14 @@ from pathlib import Path
 
 import jax.numpy as jnp
 
-from sogjax.app.configs import ExportConfig
-from sogjax.app.outputs import free_path
-from sogjax.app.recordings import body_named
+from sogjax.app.config.schemas import ExportConfig
 from sogjax.data.calibration import CameraRig, load_calibration, save_calibration
 from sogjax.data.export import export_motion
 from sogjax.data.motion import DEFAULT_UP, Motion, load_motion
 from sogjax.data.recording import open_recording
 from sogjax.data.skeletool_motion import read_skeletool_motion, write_skeletool_motion
+from sogjax.engine.outputs import free_path
+from sogjax.engine.recordings import body_named
 from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.model.frames import UP_AXES, world_from_upright

@@ -9,12 +9,12 @@ from jaxtyping import UInt8
 from sogjax.actor.example_masks import ExampleMasks, example_masks
 from sogjax.actor.make import examples_of
 from sogjax.actor.silhouettes import load_images
-from sogjax.app.configs import SegmentConfig
-from sogjax.app.outputs import free_path, results_folder
-from sogjax.app.progress import progress
-from sogjax.app.recordings import opened, say
+from sogjax.app.config.schemas import SegmentConfig
 from sogjax.data.image_file import write_mask
 from sogjax.data.recording import ExamplePose, Recording
+from sogjax.engine.outputs import free_path, results_folder
+from sogjax.engine.recordings import opened
+from sogjax.engine.terminal import progress, say
 from sogjax.errors import InputError
 from sogjax.sentences import counted
 from sogjax.view.contact_sheet import GREEN, RED, Tile, contact_sheet

@@ -4,8 +4,8 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from sogjax.app.configs import SynthConfig
-from sogjax.app.progress import progress
+from sogjax.app.config.schemas import SynthConfig
+from sogjax.engine.terminal import progress
 from sogjax.errors import InputError
 from sogjax.synth import SynthSettings, render_recording
 

@@ -6,13 +6,13 @@ import sys
 import tempfile
 from pathlib import Path
 
-from sogjax.app.configs import ViewConfig
-from sogjax.app.outputs import free_path
-from sogjax.app.progress import progress
-from sogjax.app.recordings import file_list, opened
+from sogjax.app.config.schemas import ViewConfig
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.motion import load_motion
 from sogjax.data.video import read_frames
+from sogjax.engine.outputs import free_path
+from sogjax.engine.recordings import file_list, opened
+from sogjax.engine.terminal import progress
 from sogjax.errors import InputError
 from sogjax.view.frames import frame_range
 from sogjax.view.rerun import view_command, write_rerun

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from sogjax.errors import InputError
+from sogjax.settings.option import option
 
 MOTIONS = ("walk", "arms", "squat_kick", "cartwheel", "pass")
 ACTOR_NAMES = ("anna", "ben", "cleo", "dan")
@@ -12,36 +13,25 @@ ACTOR_NAMES = ("anna", "ben", "cleo", "dan")
 class SynthSettings:
     """A rendered recording; everything in it follows from these values."""
 
-    motion: str = "walk"
-    """What the people do: walk, arms, squat_kick, cartwheel, or pass (several people pass closely)."""
-    actors: int = 1
-    """Number of people, 1 to 4."""
-    cameras: int = 12
-    """Number of cameras in a ring around the people, at two heights in turn."""
-    width: int = 648
-    """Width of the pictures in pixels, even."""
-    height: int = 486
-    """Height of the pictures in pixels, even."""
-    fps: float = 30.0
-    """Frames a second."""
-    frames: int = 60
-    """Number of frames."""
-    seed: int = 0
-    """People, clothes, room, cameras and noise are drawn from it."""
-    noise: float = 0.012
-    """Standard deviation of the sensor noise, in units of the brightest value."""
-    camera_variation: float = 0.03
-    """Standard deviation of the cameras' exposures (a share), and a third of it of their colour balance."""
-    radius: float = 4.0
-    """Radius of the ring of cameras in metres, 3.5 to 4.5."""
-    distortion: float = 0.0
-    """Radial lens distortion k1 of all cameras (OpenCV's model), -0.3 to 0.1."""
-    example_poses: bool = True
-    """Whether four still poses of each actor are photographed too, with masks."""
-    background: bool = True
-    """Whether the empty scene is photographed too."""
-    shadows: bool = True
-    """Whether people throw shadows."""
+    motion: str = option(
+        "walk", "what the people do: walk, arms, squat_kick, cartwheel, or pass (several people pass closely)"
+    )
+    actors: int = option(1, "number of people, 1 to 4")
+    cameras: int = option(12, "number of cameras in a ring around the people, at two heights in turn")
+    width: int = option(648, "width of the pictures in pixels, even")
+    height: int = option(486, "height of the pictures in pixels, even")
+    fps: float = option(30.0, "frames a second")
+    frames: int = option(60, "number of frames")
+    seed: int = option(0, "people, clothes, room, cameras and noise are drawn from it")
+    noise: float = option(0.012, "standard deviation of the sensor noise, in units of the brightest value")
+    camera_variation: float = option(
+        0.03, "standard deviation of the cameras' exposures (a share), and a third of it of their colour balance"
+    )
+    radius: float = option(4.0, "radius of the ring of cameras in metres, 3.5 to 4.5")
+    distortion: float = option(0.0, "radial lens distortion k1 of all cameras (OpenCV's model), -0.3 to 0.1")
+    example_poses: bool = option(True, "whether four still poses of each actor are photographed too, with masks")
+    background: bool = option(True, "whether the empty scene is photographed too")
+    shadows: bool = option(True, "whether people throw shadows")
 
     def check(self) -> None:
         """Refuse values that cannot be rendered.

@@ -1,0 +1,1 @@
+"""Configuration of the commands by Hydra: schemas, composition, the words of a command line."""

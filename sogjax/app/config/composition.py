@@ -1,0 +1,76 @@
+"""Config objects from the YAML files of `conf/` and the overrides of a command line."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from hydra import compose, initialize_config_dir
+from hydra.core.config_store import ConfigStore
+from hydra.core.global_hydra import GlobalHydra
+from hydra.errors import HydraException
+from omegaconf.errors import OmegaConfBaseException
+
+from sogjax.app.config import schemas
+from sogjax.app.config.overrides import plain_sentence, ready_for_hydra
+from sogjax.errors import InputError
+from sogjax.settings import ActorConfig, TrackConfig
+from sogjax.settings.compose import as_object
+from sogjax.settings.files import choices_of, conf_dir, default_choices
+from sogjax.study.settings import ReportConfig
+
+SCHEMAS: dict[str, type] = {
+    "demo": schemas.DemoConfig,
+    "track": TrackConfig,
+    "actor": ActorConfig,
+    "body": schemas.BodyConfig,
+    "segment": schemas.SegmentConfig,
+    "check": schemas.CheckConfig,
+    "evaluate": schemas.EvaluateConfig,
+    "report": ReportConfig,
+    "synth": schemas.SynthConfig,
+    "view": schemas.ViewConfig,
+    "export": schemas.ExportConfig,
+    "doctor": schemas.DoctorConfig,
+}
+"""The commands and their schemas."""
+
+
+def config_groups(command: str) -> dict[str, list[str]]:
+    """The config groups of a command and the choices of each: the YAML files of a folder of `conf/`."""
+    return {group: choices_of(group) for group in default_choices(command)}
+
+
+def register_schemas() -> None:
+    """Make the schemas known to Hydra; the YAML files build on them."""
+    store = ConfigStore.instance()
+    for name, schema in SCHEMAS.items():
+        store.store(name=f"schema_{name}", node=schema)
+
+
+def composed(command: str, overrides: Sequence[str]) -> Any:
+    """The config object of a command.
+
+    Raises:
+        InputError: an unknown key, a value of the wrong type, a required key that is missing.
+    """
+    words = ready_for_hydra(overrides, sweep=False)
+    with _plain_errors(command):
+        return as_object(_tree(command, words), command)
+
+
+def _tree(command: str, words: Sequence[str]) -> Any:
+    register_schemas()
+    GlobalHydra.instance().clear()
+    with initialize_config_dir(str(conf_dir()), version_base="1.3"):
+        return compose(command, overrides=list(words))
+
+
+@contextmanager
+def _plain_errors(command: str) -> Iterator[None]:
+    """Hydra's complaints as one sentence each."""
+    try:
+        yield
+    except InputError:
+        raise
+    except (HydraException, OmegaConfBaseException, ValueError) as error:
+        raise InputError(plain_sentence(command, SCHEMAS[command], error)) from error

@@ -1,0 +1,118 @@
+"""Schemas of the other commands; the YAML files of `conf/` hold deltas.
+
+Every field carries its help text; `--help` prints it. Symbols in brackets are the paper's.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from sogjax.settings.option import REQUIRED, group, option
+from sogjax.settings.run import OVERWRITE, OutputsConfig
+from sogjax.synth.settings import SynthSettings
+
+_RENDERED = SynthSettings()
+
+
+@dataclass
+class BodyConfig:
+    """Make a body file from the skeleton of another program."""
+
+    from_: str = option(REQUIRED, "skeleton: a .skeleton of Skeletool, or a .bvh, of which the hierarchy is read")
+    out: str = option(REQUIRED, "body file to write; for body= of the other commands, or to be edited first")
+    dof: str | None = option(None, "a .dof of Skeletool, whose degrees of freedom replace those of the .skeleton")
+    unit: str | None = option(None, "m | cm | mm: the file's lengths; null: mm of a .skeleton, m of a .bvh")
+    up: str = option("y", "vertical of the file's rest pose: x y z -x -y -z")
+    overwrite: bool = option(False, OVERWRITE)
+
+
+@dataclass
+class SegmentConfig:
+    """Show the masks of the example poses: from files, else made from the empty background pictures."""
+
+    recording: str = option(REQUIRED, "folder of the recording")
+    out: str = option(REQUIRED, "folder for POSE/CAMERA.mask.png and one contact sheet a pose, POSE.png")
+    subject: str | None = option(None, "which subject, where the recording has several")
+    cameras: list[str] | None = option(None, "cameras to use; null: all")
+    overwrite: bool = option(False, OVERWRITE)
+
+
+@dataclass
+class CheckConfig:
+    """Look at a recording: calibration, synchronisation, exposure, files; say what is wrong and what to do."""
+
+    recording: str = option(REQUIRED, "folder of the recording")
+    out: str = option("", "folder for check.json and check.png, which are replaced; default: outputs/RECORDING/check")
+    start: int | None = option(None, "first frame to look at, counted from the recording's first; null: the middle")
+    frames: int = option(90, "frames to look at, at most; they should show somebody moving")
+    largest_offset: int = option(15, "time offsets between cameras are looked for up to so many frames")
+    write: bool = option(False, "write the time offsets that were found into recording.yaml, as frame_offset")
+    cameras: list[str] | None = option(None, "cameras to look at; null: all")
+
+
+@dataclass
+class SynthConfig(SynthSettings):
+    """Render a recording with ground truth."""
+
+    out: str = option(REQUIRED, "folder to write")
+    overwrite: bool = option(False, "replace a rendered recording that is there")
+
+
+@dataclass
+class DemoConfig:
+    """Render a person, make the actor, track, evaluate: everything at once."""
+
+    out: str = option("outputs/demo", "folder for the results; those of an earlier demo are replaced")
+    motion: str = option(_RENDERED.motion, "walk | arms | squat_kick | cartwheel")
+    cameras: int = option(_RENDERED.cameras, "number of cameras")
+    frames: int = option(_RENDERED.frames, "number of frames")
+    width: int = option(_RENDERED.width, "width of the pictures, px")
+    height: int = option(_RENDERED.height, "height of the pictures, px")
+    seed: int = option(_RENDERED.seed, "person, clothes, room and noise")
+    resume: bool = option(False, "go on with the demo that was stopped in this folder")
+    overwrite: bool = option(False, OVERWRITE)
+    outputs: OutputsConfig = group(OutputsConfig, "")
+
+
+@dataclass
+class EvaluateConfig:
+    """Compare a motion with ground truth (Section 6)."""
+
+    motion: Any = option(REQUIRED, "motion.npz, or a list of them with several actors")
+    truth: str = option(REQUIRED, "ground_truth.npz, or the folder of a recording that has one")
+    out: str | None = option(None, "metrics.json to write; null: only print")
+    overwrite: bool = option(False, OVERWRITE)
+
+
+@dataclass
+class ViewConfig:
+    """Write or open the Rerun recording of a motion."""
+
+    motion: Any = option(REQUIRED, "motion.npz, or a list of them with several actors")
+    recording: str = option(REQUIRED, "folder of the recording")
+    out: str | None = option(None, "motion.rrd to write; null: open the viewer")
+    images: bool = option(True, "with the pictures")
+    overwrite: bool = option(False, OVERWRITE)
+
+
+@dataclass
+class ExportConfig:
+    """Write a motion, or a calibration, in another format."""
+
+    motion: str | None = option(None, "motion.npz, or a .motion of Skeletool")
+    calibration: str | None = option(None, "calibration file, or the folder of a recording; instead of a motion")
+    to: str = option(
+        REQUIRED,
+        "file to write; its ending says the format: .bvh .trc .c3d .glb .csv .motion .npz; "
+        "of a calibration: .toml .calibration",
+    )
+    up: str | None = option(None, "vertical of the motion's world: x y z -x -y -z; null: what the motion says")
+    actor: str | None = option(None, "actor or body file of the motion; only a .motion needs it, read or written")
+    fps: float | None = option(None, "frames per second; only a .motion that is read needs it")
+    overwrite: bool = option(False, OVERWRITE)
+
+
+@dataclass
+class DoctorConfig:
+    """Look at the installation: versions, devices, extras, speed of the disk, and a test of five seconds."""
+
+    folder: str = option(".", "folder whose write speed is measured")

@@ -1,0 +1,1 @@
+"""Sweeps: a command for every combination of settings."""

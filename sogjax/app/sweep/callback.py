@@ -1,0 +1,37 @@
+"""Hydra callback that gathers the members of a sweep and prints their table at the end."""
+
+from pathlib import Path
+from typing import Any
+
+from hydra.core.utils import JobReturn, JobStatus
+from hydra.experimental.callback import Callback
+from hydra.types import RunMode
+
+from sogjax.app.sweep.results import Failure, Member, finish_sweep, forget_results, keep_result, kept_results
+
+failures: list[str] = []
+"""Why members of the last sweep of this process failed, whatever process they ran in."""
+
+
+class SweepTable(Callback):
+    """Each member leaves a file in its folder, whichever process it runs in; the table is made of these."""
+
+    def on_multirun_start(self, config: Any, **kwargs: Any) -> None:
+        """Forget what an earlier sweep left in the same folder."""
+        failures.clear()
+        forget_results(Path(config.hydra.sweep.dir))
+
+    def on_job_end(self, config: Any, job_return: JobReturn, **kwargs: Any) -> None:
+        """Keep the row of a member that ended."""
+        if config.hydra.mode != RunMode.MULTIRUN:
+            return
+        completed = job_return.status == JobStatus.COMPLETED
+        result = job_return.return_value if completed else Failure(job_return._return_value)
+        keep_result(Path(config.hydra.runtime.output_dir), Member(list(job_return.overrides or []), result))
+
+    def on_multirun_end(self, config: Any, **kwargs: Any) -> None:
+        """Print the table; write the CSV and the plot."""
+        sweep = Path(config.hydra.sweep.dir)
+        members = kept_results(sweep)
+        failures.extend(member.result for member in members if isinstance(member.result, str))
+        finish_sweep(sweep, members)

@@ -1,0 +1,138 @@
+"""Sweeps: `-m` runs every combination of the overrides and ends with a table."""
+
+import logging
+import os
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from sogjax.app.config.composition import SCHEMAS, composed, register_schemas
+from sogjax.app.config.overrides import plain_sentence, ready_for_hydra
+from sogjax.app.sweep.results import Failure
+from sogjax.engine.compiled_programs import forget_programs_if_many
+from sogjax.engine.run_numbers import Numbers, row_numbers
+from sogjax.errors import InputError
+from sogjax.settings.compose import as_object
+from sogjax.settings.files import conf_dir
+
+LOG = logging.getLogger(__name__)
+
+CHECKED_MEMBERS = 100
+"""Members of a sweep that are looked at before it begins."""
+
+
+def run_sweep(command: str, overrides: Sequence[str]) -> int:
+    """Run a command for every combination of overrides such as `energy.limit_weight=0,1,2`.
+
+    Raises:
+        InputError: a command other than track, or an override that cannot be.
+    """
+    if command != "track":
+        others = ", ".join(name for name in SCHEMAS if name != "track")
+        raise InputError(f"{command} -m: only track can be swept, not {others}; leave -m out")
+    words = ready_for_hydra(overrides, sweep=True)
+    _members(words)
+    program = sys.argv
+    sys.argv = ["sogjax track", "-m", *words]
+    try:
+        return run_hydra(track_task)
+    finally:
+        sys.argv = program
+
+
+def _is_hydras(word: str) -> bool:
+    """Whether it is a setting of Hydra's own."""
+    return word.lstrip("+~").startswith("hydra")
+
+
+def _members(words: Sequence[str]) -> list[list[str]] | None:
+    """The overrides of every member, composed before Hydra makes their folders; None: only Hydra knows them.
+
+    Raises:
+        InputError: a member that cannot be.
+    """
+    from hydra._internal.core_plugins.basic_sweeper import BasicSweeper
+    from hydra.core.override_parser.overrides_parser import OverridesParser
+    from hydra.errors import HydraException
+
+    own = [word for word in words if not _is_hydras(word)]
+    try:
+        (members,) = BasicSweeper.split_arguments(OverridesParser.create().parse_overrides(own), None)
+    except HydraException as error:
+        if len(own) < len(words):  # another sweeper than Hydra's own may understand it
+            return None
+        raise InputError(plain_sentence("track", SCHEMAS["track"], error)) from error
+    for member in members[:CHECKED_MEMBERS]:
+        composed("track", member)
+    return [list(member) for member in members]
+
+
+def sweep_main(task: Callable[[Any], Any]) -> int:
+    """What an experiment's script ends with: run the task as `sys.argv` says; the exit status."""
+    try:
+        return run_hydra(task)
+    except InputError as error:
+        print(f"sogjax: {error}", file=sys.stderr)
+        return 2
+
+
+def run_hydra(task: Callable[[Any], Any]) -> int:
+    """Run a task of the track config once, or with `-m` as a sweep, whose other members go on where one fails.
+
+    Raises:
+        InputError: an override that cannot be; or the only run has wrong input.
+    """
+    import hydra
+    from hydra.core.hydra_config import HydraConfig
+    from hydra.errors import HydraException
+    from hydra.types import RunMode
+    from omegaconf.errors import OmegaConfBaseException
+
+    from sogjax.app.sweep.callback import failures
+
+    failures.clear()
+    register_schemas()
+    wrong: list[str] = []
+
+    def member(tree: Any) -> Any:
+        forget_programs_if_many()
+        try:
+            return task(tree)
+        except InputError as error:
+            wrong.append(str(error))
+            return Failure(error)
+        except Exception as error:
+            if HydraConfig.get().mode != RunMode.MULTIRUN:
+                raise
+            LOG.exception("a member of the sweep failed")
+            wrong.append(f"{type(error).__name__}: {error}")
+            return Failure(wrong[-1])
+
+    before = os.environ.get("HYDRA_FULL_ERROR")
+    os.environ["HYDRA_FULL_ERROR"] = "1"  # errors come here instead of being printed with a traceback
+    try:
+        hydra.main(version_base="1.3", config_path=str(conf_dir()), config_name="track")(member)()
+    except (HydraException, OmegaConfBaseException) as error:
+        raise InputError(plain_sentence("track", SCHEMAS["track"], error)) from error
+    finally:
+        if before is None:
+            del os.environ["HYDRA_FULL_ERROR"]
+        else:
+            os.environ["HYDRA_FULL_ERROR"] = before
+    wrong = failures or wrong
+    if wrong:
+        raise InputError(wrong[0] if len(wrong) == 1 else f"{len(wrong)} runs failed; the first: {wrong[0]}")
+    return 0
+
+
+def track_task(tree: Any) -> Numbers:
+    """One member of a sweep: track into the member's own folder; the numbers of its row."""
+    from hydra.core.hydra_config import HydraConfig
+    from hydra.types import RunMode
+
+    from sogjax.app import track
+
+    config = as_object(tree, "track")
+    if not config.out or HydraConfig.get().mode == RunMode.MULTIRUN:
+        config.out = HydraConfig.get().runtime.output_dir
+    return row_numbers(track.run(config))

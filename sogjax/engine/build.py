@@ -1,0 +1,251 @@
+"""From config objects to the modules of the core: the only place where both are known."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, UInt8
+
+from sogjax.data.recording import Recording
+from sogjax.data.video import read_still
+from sogjax.energy.objective import EnergyWeights, whole_image_overlap
+from sogjax.energy.overlap import EXACT_EXPONENT, PRINTED_EXPONENT
+from sogjax.errors import InputError
+from sogjax.images.cells import CellGrid, stack_cells
+from sogjax.images.quadtree import Candidates, quadtree
+from sogjax.model.body import Body
+from sogjax.model.camera import Camera
+from sogjax.model.color import COLOR_RADIUS, averaging_space, from_rgb
+from sogjax.settings import ColorConfig, EnergyConfig, ImagesConfig, OutputsConfig, SolverConfig, TrackConfig
+from sogjax.solve import ConditionedAscent, GaussNewton, OptimistixSolver, Scales, Solver
+from sogjax.track.confidence import Laplace
+from sogjax.track.culling import ImageReader
+from sogjax.track.scales import pose_scales
+from sogjax.track.tracker import PairChoice, Tracker
+
+MAX_DEPTH = 12
+"""Of a quad-tree: one pixel of the largest pictures that a camera takes."""
+OPTIMISTIX_METHODS = ("bfgs", "lbfgs", "nonlinear_cg")
+
+
+def one_of(key: str, value: str, allowed: Sequence[str]) -> str:
+    """The value, if it is allowed.
+
+    Raises:
+        InputError: it is not.
+    """
+    if value not in allowed:
+        raise InputError(f"{key}={value}: no such choice; use one of {', '.join(allowed)}")
+    return value
+
+
+def at_least(key: str, value: float | int, bound: float | int) -> float | int:
+    """The value, if it is a number not below the bound.
+
+    Raises:
+        InputError: it is not.
+    """
+    if not value >= bound or not np.isfinite(value):
+        raise InputError(f"{key}={value}: must be a number of at least {bound:g}")
+    return value
+
+
+def between(key: str, value: float | int, low: float | int, high: float | int) -> float | int:
+    """The value, if it lies between the bounds.
+
+    Raises:
+        InputError: it does not.
+    """
+    if not low <= value <= high:
+        raise InputError(f"{key}={value}: must lie between {low:g} and {high:g}")
+    return value
+
+
+def check(config: TrackConfig) -> None:
+    """Look at every setting before anything is done that takes time.
+
+    Raises:
+        InputError: a value that is no choice or out of range.
+    """
+    color_space_and_radius(config.color)
+    energy_weights(config.energy)
+    pair_choice(config.energy)
+    solver(config.solver)
+    for key in ("first_angle", "first_translation", "largest_angle", "largest_translation"):
+        at_least(f"solver.{key}", getattr(config.solver, key), 1e-6)
+    between("images.depth", config.images.depth, 1, MAX_DEPTH)
+    between("tracking.extrapolation", config.tracking.extrapolation, 0.0, 2.0)
+    if not np.isfinite(config.images.color_tolerance):
+        raise InputError(f"images.color_tolerance={config.images.color_tolerance}: must be a number")
+    at_least("images.box_enlargement", config.images.box_enlargement, 0.0)
+    at_least("images.plate_tolerance", config.images.plate_tolerance, 0.0)
+    confidence(config.outputs)
+    at_least("outputs.overlay_width", config.outputs.overlay_width, 64)
+
+
+def color_space_and_radius(config: ColorConfig) -> tuple[str, float]:
+    """The colour space and its eps_sim."""
+    space = one_of("color.space", config.space, tuple(COLOR_RADIUS))
+    radius = COLOR_RADIUS[space] if config.radius is None else config.radius
+    return space, at_least("color.radius", radius, 1e-6)
+
+
+def energy_weights(config: EnergyConfig) -> EnergyWeights:
+    """The constants of Eq. 10."""
+    exponent = one_of("energy.overlap_exponent", config.overlap_exponent, ("exact", "printed"))
+    gradient = one_of("energy.gradient", config.gradient, ("forward", "autodiff"))
+    return EnergyWeights(
+        limit_weight=at_least("energy.limit_weight", config.limit_weight, 0.0),
+        acceleration_weight=at_least("energy.acceleration_weight", config.acceleration_weight, 0.0),
+        exponent=EXACT_EXPONENT if exponent == "exact" else PRINTED_EXPONENT,
+        capped=config.capped,
+        gradient="forward" if gradient == "forward" else "autodiff",
+    )
+
+
+def pair_choice(config: EnergyConfig) -> PairChoice:
+    """Which pairs of blobs are compared."""
+    return "sparse" if one_of("energy.pairs", config.pairs, ("dense", "sparse")) == "sparse" else "dense"
+
+
+def solver(config: SolverConfig) -> Solver:
+    """The solver that a config names."""
+    methods = ("conditioned_ascent", "gradient_ascent", "gauss_newton", *OPTIMISTIX_METHODS)
+    method = one_of("solver.method", config.method, methods)
+    at_least("solver.epsilon", config.epsilon, 0.0)
+    at_least("solver.max_iterations", config.max_iterations, 1)
+    between("solver.min_iterations", config.min_iterations, 0, config.max_iterations)
+    if method in OPTIMISTIX_METHODS:
+        return OptimistixSolver(method, epsilon=config.epsilon, max_iterations=config.max_iterations)
+    if method == "gauss_newton":
+        return GaussNewton(
+            epsilon=config.epsilon, min_iterations=config.min_iterations, max_iterations=config.max_iterations
+        )
+    conditioned = method == "conditioned_ascent"
+    return ConditionedAscent(
+        epsilon=config.epsilon,
+        grow=at_least("solver.grow", config.grow, 1.0) if conditioned else 1.0,
+        shrink=between("solver.shrink", config.shrink, 0.0, 1.0) if conditioned else 1.0,
+        min_iterations=config.min_iterations,
+        max_iterations=config.max_iterations,
+    )
+
+
+def solver_scales(config: SolverConfig, body: Body) -> Scales:
+    """First and largest steps for the degrees of freedom of a body."""
+    return pose_scales(
+        body.skeleton,
+        config.first_angle,
+        config.first_translation,
+        config.largest_angle,
+        config.largest_translation,
+    )
+
+
+def device_cameras(recording: Recording) -> Camera:
+    """The recording's cameras in jax's working precision."""
+    return jax.tree.map(jnp.asarray, recording.rig.cameras)
+
+
+def cell_grids(recording: Recording, depth: int) -> tuple[CellGrid, ...]:
+    """How the pictures of each camera are cut into cells."""
+    sizes = np.asarray(recording.rig.cameras.image_size).astype(int)
+    return tuple(CellGrid.from_depth(int(w), int(h), depth) for w, h in sizes)
+
+
+def image_reader(recording: Recording, grids: tuple[CellGrid, ...], config: TrackConfig) -> ImageReader:
+    """What turns the cells of a frame into image blobs.
+
+    Raises:
+        InputError: plates are asked for, but a camera has none, or one of another size.
+    """
+    space, radius = color_space_and_radius(config.color)
+    candidates = Candidates.from_grids(grids, device_cameras(recording))
+    return ImageReader(
+        candidates=candidates,
+        color_radius=radius,
+        color_tolerance=config.images.color_tolerance,
+        box_enlargement=at_least("images.box_enlargement", config.images.box_enlargement, 0.0),
+        color_space=space,
+        plate_colors=_plate_colors(recording, grids, candidates, space, config.images),
+        plate_tolerance=at_least("images.plate_tolerance", config.images.plate_tolerance, 0.0),
+    )
+
+
+def tracker(recording: Recording, body: Body, grids: tuple[CellGrid, ...], config: TrackConfig) -> Tracker:
+    """The tracker of a recording for a body that stands upright in its world."""
+    cameras = device_cameras(recording)
+    return Tracker(
+        body=body,
+        cameras=cameras,
+        normalizers=whole_image_overlap(cameras.image_size),
+        reader=image_reader(recording, grids, config),
+        weights=energy_weights(config.energy),
+        solver=solver(config.solver),
+        scales=solver_scales(config.solver, body),
+        extrapolation=config.tracking.extrapolation,
+        pairs=pair_choice(config.energy),
+        confidence=confidence(config.outputs),
+    )
+
+
+def confidence(config: OutputsConfig) -> Laplace | None:
+    """How standard deviations are found; None: they are not wanted."""
+    return Laplace(at_least("outputs.temperature", config.temperature, 1e-12)) if config.confidence else None
+
+
+def varied(tracker: Tracker, config: TrackConfig) -> Tracker:
+    """A tracker with the numbers of another config that looks at the same pictures in the same colours."""
+    reader = replace(
+        tracker.reader,
+        color_radius=color_space_and_radius(config.color)[1],
+        color_tolerance=config.images.color_tolerance,
+        box_enlargement=config.images.box_enlargement,
+        plate_tolerance=config.images.plate_tolerance,
+    )
+    return replace(
+        tracker,
+        reader=reader,
+        weights=energy_weights(config.energy),
+        solver=solver(config.solver),
+        scales=solver_scales(config.solver, tracker.body),
+        extrapolation=config.tracking.extrapolation,
+        pairs=pair_choice(config.energy),
+        confidence=confidence(config.outputs),
+    )
+
+
+def _plate_colors(
+    recording: Recording,
+    grids: tuple[CellGrid, ...],
+    candidates: Candidates,
+    space: str,
+    config: ImagesConfig,
+) -> Float[Array, "camera candidate 3"] | None:
+    """Colours of the quad-tree nodes of the empty background.
+
+    Raises:
+        InputError: plates are asked for, but a camera has none, or one of another size.
+    """
+    missing = [name for name in recording.rig.names if name not in recording.background]
+    if config.use_plates is False or (config.use_plates is None and missing):
+        return None
+    if missing:
+        raise InputError(
+            f"{recording.path}: images.use_plates=true, but background/ has no picture of "
+            f"{', '.join(missing)}; add it, or set images.use_plates=false"
+        )
+    images = [read_still(recording, name, recording.background[name]) for name in recording.rig.names]
+    return _node_colors(jnp.asarray(stack_cells(images, grids)), candidates, space)
+
+
+@partial(jax.jit, static_argnames="space")
+def _node_colors(
+    cells: UInt8[Array, "camera rows columns 3"], candidates: Candidates, space: str
+) -> Float[Array, "camera candidate 3"]:
+    colors = from_rgb(cells.astype(candidates.sigmas.dtype) / 255.0, averaging_space(space))
+    tolerance = jnp.asarray(0.0, colors.dtype)
+    return jax.vmap(quadtree, in_axes=(0, 0, None))(colors, candidates, tolerance)[0]

@@ -1,0 +1,147 @@
+"""One run of the tracker over a recording: what it needs, what comes of it, and the way from one to the other."""
+
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from sogjax.data.recording import Recording
+from sogjax.data.stages import Behind
+from sogjax.engine import build
+from sogjax.engine.cells import picture_reader
+from sogjax.engine.first_pose import first_poses
+from sogjax.engine.kept_run import KeptRun
+from sogjax.engine.pipeline import FrameTracker, PictureReader, tracked_frames
+from sogjax.engine.recordings import upright
+from sogjax.engine.resume import resumed
+from sogjax.engine.run import Run
+from sogjax.engine.streams import Streams, readable_frames
+from sogjax.engine.terminal import say
+from sogjax.engine.timing import StageTimes
+from sogjax.errors import InputError
+from sogjax.images.cells import CellGrid, stack_shape
+from sogjax.model.body import Body, concatenate
+from sogjax.sentences import counted
+from sogjax.settings import OutputsConfig, TrackConfig
+from sogjax.track.tracker import Tracker, compile_counts, track
+
+FRAMES_BEHIND = 8
+"""Tracked frames that wait to be written."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """All that must be known before a recording is tracked."""
+
+    recording: Recording
+    bodies: list[Body]
+    """The actors, upright in the recording's world."""
+    frames: tuple[int, int]
+    """First and one after the last, counted from the recording's first."""
+    grids: tuple[CellGrid, ...]
+    tracker: Tracker
+    start: Float[Array, "dof"]
+    """The rough pose of the first frame."""
+
+    @classmethod
+    def from_config(
+        cls, recording: Recording, bodies: list[Body], config: TrackConfig, kept: KeptRun | None = None
+    ) -> "Job":
+        """To track actors (in their own upright frames) in a recording, from the first pose that was kept, if any."""
+        bodies = [upright(body, recording) for body in bodies]
+        frames = frame_range(recording, config)
+        grids = build.cell_grids(recording, config.images.depth)
+        with ThreadPoolExecutor(1) as beside:  # both compile for seconds
+            building = beside.submit(_tracker, recording, bodies, grids, config)
+            start = None if kept is None else kept.start()
+            if start is None:
+                start = jnp.concatenate(first_poses(recording, bodies, config, frames[0]))
+                if kept is not None:
+                    kept.keep_start(start)
+            tracker = building.result()
+        return cls(recording, bodies, frames, grids, tracker, start)
+
+
+@contextmanager
+def tracking(
+    recording: Recording,
+    bodies: list[Body],
+    config: TrackConfig,
+    outputs: OutputsConfig,
+    out: Path,
+    kept: KeptRun | None = None,
+) -> Iterator[Run]:
+    """Track, going on with what was kept; within the block the motions are in files that go when it ends well."""
+    job = Job.from_config(recording, bodies, config, kept)
+    with run_job(job, outputs, out, picture_reader(config.images), kept=kept) as result:
+        yield result
+
+
+@contextmanager
+def run_job(
+    job: Job,
+    outputs: OutputsConfig,
+    out: Path,
+    read: PictureReader,
+    follow: FrameTracker = track,
+    kept: KeptRun | None = None,
+) -> Iterator[Run]:
+    """The same, with what reads the pictures and what tracks their cells."""
+    first, last = job.frames
+    times = StageTimes()
+    prefix = None if kept is None else kept.prefix(readable_frames(out, job.bodies), last - first)
+    num_kept = 0 if prefix is None else prefix.num_frames
+    streams = Streams(out, job.recording, job.bodies, job.recording.first_frame + first, outputs, times, kept, num_kept)
+    if prefix is not None:
+        say(f"{out}: {num_kept} of {counted(last - first, 'frame')} are there; the run goes on behind them")
+        follow = resumed(prefix, shown=not streams.num_skipped, with_images=outputs.rerun)
+    used: list[float] = []
+    missing = Counter(job.recording.num_missing(range(first, first + streams.num_skipped)))
+    try:
+        with streams:
+            count = last - first - streams.num_skipped
+            pictures = read(job.recording, streams.preparation(job.grids), last - count, last) if count else iter(())
+            frames = tracked_frames(pictures, count, job.tracker, job.start, times, follow)
+            with closing(frames), Behind(streams.consume, FRAMES_BEHIND) as behind:
+                for done in frames:
+                    used.append(float(np.mean(done.tracked.result.num_matching)))
+                    missing.update(
+                        name
+                        for name, picture in zip(job.recording.rig.names, done.pictures, strict=True)
+                        if picture.cells is None
+                    )
+                    behind.put(done)
+        motions = streams.motions(mapped=True)
+        image_blobs = float(np.mean(used)) if used else float("nan")
+        yield Run(job.recording, job.bodies, motions, times, image_blobs, files=streams.files, missing=missing)
+        streams.remove_partial()
+    except BaseException:
+        streams.say_what_is_left()
+        raise
+
+
+def _tracker(recording: Recording, bodies: list[Body], grids: tuple[CellGrid, ...], config: TrackConfig) -> Tracker:
+    tracker = build.tracker(recording, concatenate(bodies), grids, config)
+    compile_counts(tracker, (len(grids), *stack_shape(grids), 3))
+    return tracker
+
+
+def frame_range(recording: Recording, config: TrackConfig) -> tuple[int, int]:
+    """First frame to track and the one after the last, counted from the recording's first.
+
+    Raises:
+        InputError: nothing lies between them.
+    """
+    last = recording.num_frames if config.stop is None else config.stop
+    if not 0 <= config.start < last <= recording.num_frames:
+        raise InputError(
+            f"start={config.start} stop={'null' if config.stop is None else config.stop}: {recording.path} has the "
+            f"frames 0 to {recording.num_frames - 1}; choose 0 <= start < stop <= {recording.num_frames}"
+        )
+    return config.start, last

@@ -1,0 +1,210 @@
+"""What a run keeps on disk beside its motion, so that it can go on to the very end that it would have had."""
+
+import json
+import shutil
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from sogjax.data.actor_file import load_body, save_body
+from sogjax.data.array_log import ArrayLog, read_log
+from sogjax.data.atomic import atomic_path
+from sogjax.data.motion import FRAMES_AT_ONCE
+from sogjax.data.npz_file import finite_array, read_npz
+from sogjax.energy.objective import EnergyTerms
+from sogjax.engine.origin import Origin
+from sogjax.errors import InputError
+from sogjax.model.body import Body
+from sogjax.model.sog import Sog
+from sogjax.track.confidence import Deviations
+from sogjax.track.culling import Capacities
+from sogjax.track.frame import FrameResult, TrackedFrame, TrackState
+
+FOLDER = "run.partial"
+NOTE, START, ACTOR = "run.json", "start.npz", "actor"
+TERMS = ("similarity", "limit_penalty", "acceleration_penalty", "energy")
+DEVIATIONS = {"pose_std": "pose", "joint_std": "joints"}
+COLUMNS = ("pose", "iterations", "evaluations", "converged", "num_near", "num_matching", "num_blocks")
+CAPACITY, CAPACITIES = "capacity_{}", ("near", "matching", "blocks")
+_NEEDED = {*COLUMNS, *TERMS, *(CAPACITY.format(name) for name in CAPACITIES)}
+
+
+@dataclass(frozen=True)
+class Prefix:
+    """The frames that were tracked already."""
+
+    rows: dict[str, np.ndarray]
+    """What was kept of each."""
+
+    @property
+    def num_frames(self) -> int:
+        """How many."""
+        return len(self.rows["pose"])
+
+    @property
+    def capacities(self) -> Capacities:
+        """Of the last one."""
+        return Capacities(*(int(self.rows[CAPACITY.format(name)][-1]) for name in CAPACITIES))
+
+    def state(self, start: Float[Array, "dof"]) -> TrackState:
+        """The tracker's state behind them, if it began at `start`."""
+        state = TrackState.from_pose(start)
+        for pose in self.rows["pose"][-2:]:
+            state = state.advanced(jnp.asarray(pose))
+        return state
+
+    def result(self, frame: int, images: Sog) -> FrameResult:
+        """What was found in one of them; image blobs are not kept."""
+        values = {name: jnp.asarray(column[frame]) for name, column in self.rows.items()}
+        sure = {name: values[key] for key, name in DEVIATIONS.items() if key in values}
+        return FrameResult(
+            terms=EnergyTerms(**{name: values[name] for name in TERMS}),
+            deviations=Deviations(**sure) if sure else None,
+            images=images,
+            **{name: values[name] for name in COLUMNS},
+        )
+
+
+class KeptRun:
+    """The folder `run.partial`: what the run is made from, its actors, its first pose, what was found in each frame.
+
+    Each is written as soon as it is known, so a run that was killed at any moment finds again what it had.
+
+    Args:
+        folder: of the results.
+
+    Raises:
+        InputError: the folder cannot be written, here or later.
+    """
+
+    def __init__(self, folder: Path):
+        self.folder = folder / FOLDER
+        self._log: ArrayLog | None = None
+        self.num_kept = 0
+        """Frames of an earlier process that are gone on from."""
+
+    @property
+    def note(self) -> dict[str, Any]:
+        """The command that began the run, and what it was made from; nothing where none was begun."""
+        return read_note(self.folder / NOTE)
+
+    def begin(self, command: str, origin: Origin) -> None:
+        """Note what the run is made from."""
+        write_note(self.folder / NOTE, {"command": command, "origin": origin})
+
+    def keep_actors(self, bodies: Sequence[Body]) -> None:
+        """Keep actors that were made, exactly: their files hold rounded colours."""
+        arrays = {}
+        for k, body in enumerate(bodies):
+            save_body(self.folder / f"{ACTOR}_{k}.yaml", body)
+            arrays |= {f"{k}_{n}": np.asarray(leaf) for n, leaf in enumerate(jax.tree.leaves(body))}
+        _save(self.folder / f"{ACTOR}s.npz", arrays)
+
+    def actors(self) -> list[Body] | None:
+        """The actors that were kept."""
+        file = self.folder / f"{ACTOR}s.npz"
+        exact = _read(file)
+        if exact is None:
+            return None
+        bodies = []
+        while (path := self.folder / f"{ACTOR}_{len(bodies)}.yaml").is_file():
+            leaves, structure = jax.tree.flatten(load_body(path))
+            kept = [_leaf(file, exact, f"{len(bodies)}_{n}", leaf) for n, leaf in enumerate(leaves)]
+            bodies.append(jax.tree.unflatten(structure, kept))
+        return bodies
+
+    def keep_start(self, start: Float[Array, "dof"]) -> None:
+        """Keep the rough pose of the first frame."""
+        _save(self.folder / START, {"start": np.asarray(start)})
+
+    def start(self) -> Float[Array, "dof"] | None:
+        """The rough pose that was kept."""
+        kept = _read(self.folder / START)
+        return None if kept is None else jnp.asarray(finite_array(self.folder / START, kept, "start", (None,)))
+
+    def prefix(self, readable: int, total: int) -> Prefix | None:
+        """The frames to go on from: at most `readable` of `total`, as many as a run writes at once.
+
+        So the frames after them are written in the same blocks as in a run that was not stopped.
+        """
+        rows = None
+        with suppress(InputError):
+            rows = read_log(self.folder)
+        if rows is None or not rows.keys() >= _NEEDED:
+            return None
+        whole = min(readable, len(rows["pose"]))
+        count = whole if whole == total else whole - whole % FRAMES_AT_ONCE
+        if not count:
+            return None
+        self.num_kept = count
+        return Prefix({name: column[:count] for name, column in rows.items()})
+
+    def append(self, frames: Sequence[TrackedFrame]) -> None:
+        """Keep what was found in the frames that follow."""
+        rows = _rows(frames)
+        if self._log is None:
+            self._log = ArrayLog(self.folder, {}, rows, self.num_kept)
+        else:
+            self._log.append(rows)
+
+    def close(self) -> None:
+        """Close the file; the folder stays."""
+        if self._log is not None:
+            self._log.close()
+
+    def remove(self) -> None:
+        """Remove the folder, when the run has ended."""
+        self.close()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def read_note(path: Path) -> dict[str, Any]:
+    """What `write_note` wrote; nothing where there is no such file."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
+def write_note(path: Path, note: dict[str, Any]) -> None:
+    """Write a note on a run, as JSON."""
+    with atomic_path(path) as temporary:
+        temporary.write_text(json.dumps(note, indent=1) + "\n", encoding="utf-8")
+
+
+def _rows(frames: Sequence[TrackedFrame]) -> dict[str, np.ndarray]:
+    results, terms = [frame.result for frame in frames], [frame.result.terms for frame in frames]
+    column = lambda parts, name: np.stack([np.asarray(getattr(part, name)) for part in parts])
+    capacity = lambda name: np.array([getattr(frame.capacities, name) for frame in frames])
+    sure = [result.deviations for result in results if result.deviations is not None]
+    return (
+        {name: column(results, name) for name in COLUMNS}
+        | {key: column(sure, name) for key, name in DEVIATIONS.items() if sure}
+        | {name: column(terms, name) for name in TERMS}
+        | {CAPACITY.format(name): capacity(name) for name in CAPACITIES}
+    )
+
+
+def _save(path: Path, arrays: dict[str, np.ndarray]) -> None:
+    with atomic_path(path) as temporary, temporary.open("wb") as file:
+        np.savez(file, **arrays)  # pyright: ignore[reportArgumentType]
+
+
+def _leaf(path: Path, arrays: dict[str, np.ndarray], key: str, like: Any) -> Array:
+    """An array of an actor that is made as `like`."""
+    kept = arrays.get(key)
+    if kept is None or (kept.shape, kept.dtype) != (like.shape, like.dtype):
+        raise InputError(f"{path}: {key!r} is not that of the actor beside it; begin anew with overwrite=true")
+    return jnp.asarray(kept)
+
+
+def _read(path: Path) -> dict[str, np.ndarray] | None:
+    return read_npz(path) if path.is_file() else None

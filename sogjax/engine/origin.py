@@ -1,0 +1,92 @@
+"""What the frames of a run depend on, so that a run is only gone on with by the settings and files that began it."""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import fields, is_dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+import sogjax
+from sogjax.data.recording import Recording
+from sogjax.data.source import fingerprint
+from sogjax.engine.first_pose import initial_pose_file
+from sogjax.model.body import Body
+from sogjax.settings import TrackConfig
+
+PACKAGES = ("jax", "jaxlib", "numpy", "equinox", "optimistix", "opencv-python-headless")
+NO_MATTER = ("recording", "out", "actor", "cameras", "outputs", "resume", "overwrite", "images.cache")
+"""Settings that change no pose, or whose files are compared instead of their names."""
+SHOWN = 60
+"""Characters of a value that a sentence may hold."""
+
+Origin = dict[str, Any]
+"""By a short description: what can be stored as JSON, and must be equal."""
+
+
+def origin_of(recording: Recording, config: TrackConfig, given_actors: Sequence[Body] | None) -> Origin:
+    """All that the poses of a run depend on; `given_actors` are None where they are made from the example poses."""
+    poses = initial_pose_file(recording, config)
+    return {
+        "sogjax": sogjax.__version__,
+        **{name: version(name) for name in PACKAGES},
+        "device": jax.default_backend(),
+        "precision": str(jnp.asarray(0.0).dtype),
+        **_settings(config, ""),
+        "outputs.confidence": config.outputs.confidence,
+        "outputs.temperature": config.outputs.temperature,
+        **_of_recording(recording),
+        "the actors": None if given_actors is None else [digest(actor) for actor in given_actors],
+        "the rough pose": None if poses is None else hashlib.sha256(poses.read_bytes()).hexdigest(),
+    }
+
+
+def difference(before: Origin, now: Origin) -> str | None:
+    """The first thing that is not the same, in words; None: all is."""
+    for key in (*now, *before):
+        was, is_now = before.get(key), now.get(key)
+        if was != is_now:
+            short = not key.startswith("the ") and len(f"{was}{is_now}") <= SHOWN
+            return f"{key} was {was}, now it is {is_now}" if short else f"{key} changed"
+    return None
+
+
+def digest(arrays: Any) -> str:
+    """Of everything in a tree of arrays and names, to the bit."""
+    content = hashlib.sha256(str(jax.tree.structure(arrays)).encode())
+    for leaf in map(np.asarray, jax.tree.leaves(arrays)):
+        content.update(f"{leaf.dtype}{leaf.shape}".encode() + leaf.tobytes())
+    return content.hexdigest()
+
+
+def _settings(config: Any, prefix: str) -> Origin:
+    """The settings that poses depend on, by key."""
+    found: Origin = {}
+    for entry in fields(config):
+        key, value = prefix + entry.name, getattr(config, entry.name)
+        if key not in NO_MATTER:
+            found |= _settings(value, f"{key}.") if is_dataclass(value) else {key: value}
+    return found
+
+
+def _of_recording(recording: Recording) -> Origin:
+    pictures = {f"the pictures of {name}": fingerprint(recording.sources[name]) for name in recording.rig.names}
+    return {
+        "cameras": list(recording.rig.names),
+        "fps": recording.fps,
+        "up": recording.up,
+        "first_frame": recording.first_frame,
+        "number of frames": recording.num_frames,
+        "frame_offset": {name: recording.frame_offset[name] for name in recording.rig.names},
+        "fewest_cameras": recording.fewest_cameras,
+        "time_stamps": bool(recording.picked),
+        "missing": {name: [list(span) for span in spans] for name, spans in recording.missing.items()},
+        "color_gains": {name: list(gains) for name, gains in recording.color_gains.items()},
+        "the calibration": digest(recording.rig.cameras),
+        "the empty background pictures": {name: fingerprint(Path(p)) for name, p in recording.background.items()},
+        **pictures,
+    }

@@ -1,0 +1,123 @@
+"""What a run leaves in its folder when it has ended: motion, configuration, metrics, BVH."""
+
+import uuid
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from omegaconf import OmegaConf
+
+from sogjax.data.actor_file import save_body
+from sogjax.data.atomic import atomic_path
+from sogjax.data.export import WRITERS, export_motion, require_ezc3d
+from sogjax.data.ground_truth import load_ground_truth
+from sogjax.data.motion import Motion, save_motion
+from sogjax.engine.run import Run
+from sogjax.engine.streams import file_name
+from sogjax.engine.terminal import say
+from sogjax.errors import InputError
+from sogjax.evaluate import evaluate_motions
+from sogjax.model.body import Body
+from sogjax.settings import OutputsConfig
+
+
+@contextmanager
+def results_folder(path: Path) -> Iterator[Path]:
+    """The folder for results, made if it is not there; found out before the work begins, not after.
+
+    When the work ends with an error, the folders made for it are removed, unless there is something in them.
+
+    Raises:
+        InputError: it cannot be made or written.
+    """
+    made = [folder for folder in (path, *path.parents) if not folder.exists()]
+    try:
+        _make_writable(path)
+        yield path
+    except BaseException:
+        for folder in made:
+            with suppress(OSError):
+                folder.rmdir()
+        raise
+
+
+def _make_writable(path: Path) -> None:
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        probe = path / f".probe-{uuid.uuid4().hex}"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputError(f"{path}: cannot write there ({reason}); choose another folder with out=DIR") from error
+
+
+def free_path(key: str, value: str | Path, overwrite: bool) -> Path:
+    """The path of an output, if nothing is there yet or it may be replaced.
+
+    Raises:
+        InputError: something is there.
+    """
+    path = Path(value)
+    if path.exists() and not overwrite:
+        raise InputError(f"{key}={path}: is there already; choose another name, or give overwrite=true to replace it")
+    return path
+
+
+def export_endings(wanted: OutputsConfig) -> list[str]:
+    """The file endings in which motions are written, beside motion.npz.
+
+    Raises:
+        InputError: a format that cannot be written.
+    """
+    formats = (["bvh"] if wanted.bvh else []) + (wanted.formats or [])
+    for name in formats:
+        if f".{name}" not in WRITERS or name == "npz":
+            known = ", ".join(sorted(ending[1:] for ending in WRITERS if ending != ".npz"))
+            raise InputError(f"outputs.formats={name}: no such format; use some of {known}")
+        if name == "c3d":
+            require_ezc3d("outputs.formats=c3d")
+    return [f".{name}" for name in dict.fromkeys(formats)]
+
+
+def write_results(result: Run, out: Path, wanted: OutputsConfig, config: Any, made_actors: Sequence[Body]) -> None:
+    """Write what needs whole motions; each file appears under its name only when it is whole."""
+    names = list(result.motions)
+    streamed, result.files = result.files, []
+    for actor in made_actors:
+        result.files.append(out / file_name("actor", ".yaml", actor.name, len(made_actors)))
+        save_body(result.files[-1], actor)
+    for name, motion in result.motions.items():
+        result.files.append(out / file_name("motion", ".npz", name, len(names)))
+        save_motion(result.files[-1], motion)
+        for ending in export_endings(wanted):
+            result.files.append(out / file_name("motion", ending, name, len(names)))
+            export_motion(motion, result.files[-1])
+    with atomic_path(out / "config.yaml") as temporary:
+        temporary.write_text(OmegaConf.to_yaml(config))
+    result.files.append(out / "config.yaml")
+    evaluate(result)
+    if result.evaluation is not None:
+        result.evaluation.to_json(out / "metrics.json")
+        result.files.append(out / "metrics.json")
+    result.files += streamed
+
+
+def actor_name(path: Path, motion: Motion) -> str:
+    """Whose motion a file holds: what it says itself, else what its name says, as `motion_NAME.npz` does."""
+    return motion.actor or path.stem.removeprefix("motion").removeprefix("_") or "actor"
+
+
+def evaluate(result: Run) -> None:
+    """Compare with the ground truth, where there is one."""
+    if result.recording.ground_truth is None:
+        return
+    truth = load_ground_truth(result.recording.ground_truth)
+    if len(result.motions) > 1 and not set(result.motions) <= set(truth.subjects):
+        say(f"warning: {result.recording.ground_truth} knows {', '.join(truth.subjects)}; nothing is compared")
+        return
+    try:
+        result.evaluation = evaluate_motions(result.motions, truth)
+    except InputError as error:
+        say(f"warning: nothing is compared: {error}")

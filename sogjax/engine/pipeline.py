@@ -1,0 +1,126 @@
+"""The stages of tracking beside each other: decoding and averaging, the tracking step, writing."""
+
+import time
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Array, Float, UInt8
+
+from sogjax.data.recording import Recording
+from sogjax.data.stages import ahead
+from sogjax.engine.terminal import progress
+from sogjax.engine.timing import StageTimes
+from sogjax.errors import InputError
+from sogjax.images.cells import CellGrid, padded_cells, stack_shape
+from sogjax.track.frame import FrameCells, PartialCells, TrackedFrame
+from sogjax.track.tracker import Tracker, track
+
+FRAMES_AHEAD = 3
+"""Frames that wait for the tracking step, beside the one that is being decoded."""
+
+PictureMaker = Callable[[int, np.ndarray], np.ndarray | bytes | None]
+"""Of the number of a camera and its picture (BGR)."""
+
+
+class Picture(NamedTuple):
+    """What is kept of one camera's picture."""
+
+    cells: UInt8[np.ndarray, "rows columns 3"] | None
+    """None where the camera is missing."""
+    tile: np.ndarray | bytes | None
+    """For the overlay."""
+    jpeg: np.ndarray | bytes | None
+    """For the Rerun file."""
+    seconds: float
+    """That the cells took."""
+
+
+class FrameDone(NamedTuple):
+    """A tracked frame and the pictures it was tracked in."""
+
+    tracked: TrackedFrame
+    pictures: list[Picture]
+
+
+PictureReader = Callable[[Recording, "Preparation", int, int], Iterator[list[Picture]]]
+"""Of a recording, what to make of each picture, the first frame and the one after the last."""
+
+
+FrameTracker = Callable[[Tracker, Float[Array, "dof"], Iterable[FrameCells]], Iterator[TrackedFrame]]
+"""What finds the poses of frames from their cells, one after the other, as `sogjax.track.tracker.track` does."""
+
+
+def nothing(camera: int, image: np.ndarray) -> None:
+    """Made of a picture that no output shows."""
+
+
+@dataclass(frozen=True)
+class Preparation:
+    """What the decoding threads make of each picture before they drop it."""
+
+    grids: tuple[CellGrid, ...]
+    tile: PictureMaker = nothing
+    jpeg: PictureMaker = nothing
+
+    @property
+    def cells_only(self) -> bool:
+        """Whether cells are all that is needed."""
+        return self.tile is nothing and self.jpeg is nothing
+
+    def __call__(self, camera: int, image: np.ndarray | None) -> Picture:
+        """The cells of a picture, and what outputs need of it; nothing where there is none."""
+        if image is None:
+            return Picture(None, None, None, 0.0)
+        begin = time.perf_counter()
+        cells = padded_cells(image, self.grids[camera], stack_shape(self.grids))
+        seconds = time.perf_counter() - begin
+        return Picture(cells, self.tile(camera, image), self.jpeg(camera, image), seconds)
+
+
+def cells_of_frame(cells: Sequence[UInt8[np.ndarray, "rows columns 3"] | None]) -> FrameCells:
+    """The cells of all cameras; None: a camera is missing.
+
+    Raises:
+        InputError: all are.
+    """
+    some = next((of_camera for of_camera in cells if of_camera is not None), None)
+    if some is None:
+        raise InputError("a frame has no picture of any camera; track the frames before or behind it (start=, stop=)")
+    stacked = np.stack([np.zeros_like(some) if of_camera is None else of_camera for of_camera in cells])
+    present = np.array([of_camera is not None for of_camera in cells])
+    return stacked if present.all() else PartialCells(stacked, present)
+
+
+def tracked_frames(
+    pictures: Iterator[list[Picture]],
+    count: int,
+    tracker: Tracker,
+    start: Float[Array, "dof"],
+    times: StageTimes,
+    follow: FrameTracker = track,
+) -> Generator[FrameDone, None, None]:
+    """Track `count` frames, while a thread takes the pictures of those that follow.
+
+    Raises:
+        InputError: a video ends early, or a picture has too many image blobs.
+    """
+    waiting: deque[list[Picture]] = deque()
+    with closing(ahead(pictures, FRAMES_AHEAD)) as ready:
+
+        def cells() -> Iterator[FrameCells]:
+            for frame in progress(times.timed("decode", ready), count, "tracking"):
+                waiting.append(frame)
+                times.add("cells", sum(picture.seconds for picture in frame))
+                yield cells_of_frame([picture.cells for picture in frame])
+
+        begin = time.perf_counter()
+        for tracked in follow(tracker, start, cells()):
+            if tracked.seconds > 0.0:  # not where a frame was tracked before
+                times.add("step", tracked.seconds)
+            times.add("whole", time.perf_counter() - begin)
+            begin = time.perf_counter()
+            yield FrameDone(tracked, waiting.popleft())

@@ -1,0 +1,101 @@
+"""Opening recordings and actors, and making actors where none are given."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import jax.numpy as jnp
+
+from sogjax.actor.make import make_actor, subjects_of
+from sogjax.data.actor_file import load_body, named_body
+from sogjax.data.recording import Recording, open_recording
+from sogjax.engine.build import color_space_and_radius, energy_weights
+from sogjax.engine.terminal import progress, say
+from sogjax.errors import InputError
+from sogjax.model.body import Body
+from sogjax.model.frames import world_from_upright
+from sogjax.settings import ColorConfig, EnergyConfig
+
+
+def opened(path: str, cameras: Sequence[str] | None = None) -> Recording:
+    """A recording, with some of its cameras or all, its warnings said.
+
+    Raises:
+        InputError: anything wrong with it, or a camera that it does not have.
+    """
+    recording = open_recording(Path(path))
+    for warning in recording.warnings:
+        say(f"warning: {warning}")
+    if cameras is None:
+        return recording
+    if not cameras or len(set(cameras)) < len(cameras):
+        named = ", ".join(recording.rig.names)
+        raise InputError(f"cameras=[{','.join(cameras)}]: name at least one camera, each once; there are {named}")
+    unknown = [name for name in cameras if name not in recording.rig.names]
+    if unknown:
+        raise InputError(
+            f"cameras={','.join(cameras)}: {recording.path} has no camera {', '.join(unknown)}; "
+            f"it has {', '.join(recording.rig.names)}"
+        )
+    return replace(recording, rig=recording.rig.select(tuple(cameras)))
+
+
+def body_named(name: str) -> Body:
+    """A body that comes with the program, or one from a file.
+
+    Raises:
+        InputError: neither.
+    """
+    path = Path(name)
+    return load_body(path if path.is_file() else named_body(name))
+
+
+def file_list(value: Any) -> list[Path]:
+    """One file or several, as a config gives them."""
+    values = value if isinstance(value, (list, tuple)) else [value]
+    return [Path(str(item)) for item in values]
+
+
+def actors_of(recording: Recording, files: Any, body: str, color: ColorConfig) -> tuple[list[Body], bool]:
+    """The actors of a recording and whether they were made just now from its example poses.
+
+    Raises:
+        InputError: a wrong actor file; two actors of one name; example poses that do not suffice.
+    """
+    if files is not None:
+        actors = [load_body(path) for path in file_list(files)]
+        names = [actor.name for actor in actors]
+        if len(set(names)) < len(names):
+            raise InputError(
+                f"actor={files}: two actors are named {max(names, key=names.count)!r}; give each its own `name`"
+            )
+        return actors, False
+    space, _ = color_space_and_radius(color)
+    cameras = recording.rig.names
+    subjects = subjects_of(recording)
+    return [_made_actor(str(recording.path), cameras, body, subject, space) for subject in subjects], True
+
+
+@cache
+def _made_actor(path: str, cameras: tuple[str, ...], body: str, subject: str | None, space: str) -> Body:
+    """The actor of a recording; made once a process, so that the members of a sweep share it."""
+    recording = open_recording(Path(path))
+    recording = replace(recording, rig=recording.rig.select(cameras))
+    label = "actor" if subject is None else f"actor {subject}"
+    weights = energy_weights(EnergyConfig())
+    return make_actor(
+        recording,
+        body_named(body),
+        subject,
+        space,
+        weights,
+        report=lambda stage: say(f"{label}: {stage}"),
+        progress=progress,
+    ).body
+
+
+def upright(body: Body, recording: Recording) -> Body:
+    """A body that stands upright in the recording's world."""
+    return body.rotated(jnp.asarray(world_from_upright(recording.up), body.blob_sigmas.dtype))

@@ -1,0 +1,54 @@
+"""A tracker that goes on where another process stopped."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from itertools import islice
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from sogjax.engine.kept_run import Prefix
+from sogjax.engine.pipeline import FrameTracker
+from sogjax.model.sog import Sog
+from sogjax.track.frame import FrameCells, TrackedFrame, TrackState, on_device
+from sogjax.track.scan import image_blobs
+from sogjax.track.tracker import Tracker, track
+
+Frames = Iterable[FrameCells]
+
+
+def resumed(prefix: Prefix, shown: bool, with_images: bool) -> FrameTracker:
+    """Tracks the frames behind a prefix, in whose place it can be put where the whole clip is tracked.
+
+    Args:
+        prefix: the frames that were tracked already.
+        shown: the frames that come begin with those of the prefix, which outputs show; their poses are those found.
+        with_images: find their image blobs again, too.
+    """
+
+    def follow(tracker: Tracker, start: Float[Array, "dof"], frames: Frames) -> Iterator[TrackedFrame]:
+        coming = iter(frames)
+        if shown:
+            yield from _again(prefix, tracker, start, islice(coming, prefix.num_frames), with_images)
+        for tracked in track(tracker, prefix.state(start), coming, prefix.capacities):
+            yield replace(tracked, index=prefix.num_frames + tracked.index)
+
+    return follow
+
+
+def _again(
+    prefix: Prefix, tracker: Tracker, start: Float[Array, "dof"], frames: Frames, with_images: bool
+) -> Iterator[TrackedFrame]:
+    """The frames of a prefix; they take no time."""
+    state, capacities = TrackState.from_pose(start), prefix.capacities
+    for index, frame in enumerate(frames):
+        cells, present = on_device(frame)
+        images = image_blobs(tracker, state, cells, capacities, present) if with_images else _no_blobs(len(cells))
+        result = prefix.result(index, images)
+        yield TrackedFrame(index, result, capacities, tracker.reader.color_space, 0.0)
+        state = state.advanced(result.pose)
+
+
+def _no_blobs(cameras: int) -> Sog:
+    none = jnp.zeros((cameras, 0))
+    return Sog(jnp.zeros((cameras, 0, 2)), none, jnp.zeros((cameras, 0, 3)), none.astype(bool))

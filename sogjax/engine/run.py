@@ -1,0 +1,40 @@
+"""A run of the tracker over a recording: what came of it."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Int
+
+from sogjax.data.motion import Motion
+from sogjax.data.recording import Recording
+from sogjax.engine.timing import StageTimes
+from sogjax.evaluate import GroupEvaluation
+from sogjax.model.body import Body
+
+
+@dataclass
+class Run:
+    """A recording that was tracked, and what came of it."""
+
+    recording: Recording
+    bodies: list[Body]
+    """The actors, upright in the recording's world; none where the run had ended before."""
+    motions: dict[str, Motion]
+    times: StageTimes
+    image_blobs: float
+    """Used in a frame by a camera, on average."""
+    evaluation: GroupEvaluation | None = None
+    missing: dict[str, int] = field(default_factory=dict)
+    """Frames of the motion in which a camera had no picture, by camera."""
+    files: list[Path] = field(default_factory=list)
+
+    @property
+    def iterations(self) -> Int[np.ndarray, "frame"]:
+        """Of the solver, for all actors together."""
+        return next(iter(self.motions.values())).iterations
+
+    @property
+    def converged(self) -> Bool[np.ndarray, "frame"]:
+        """Whether the solver did, for all actors together."""
+        return next(iter(self.motions.values())).converged

@@ -1,0 +1,33 @@
+"""A run in a few numbers, as a row of a table shows it."""
+
+import numpy as np
+
+from sogjax.engine.run import Run
+
+COLUMNS = ("mean mm", "std mm", "joints mm", "lost", "swaps", "iterations", "not converged", "frames/s")
+OBJECTIVE = "mean mm"
+"""What a sweeper that searches makes least."""
+
+
+class Numbers(dict[str, float]):
+    """The numbers of a member's row; as one number, what a search makes least."""
+
+    def __float__(self) -> float:
+        return float(self[OBJECTIVE])
+
+
+def row_numbers(result: Run) -> Numbers:
+    """The numbers of a run."""
+    numbers = Numbers(dict.fromkeys(COLUMNS, float("nan")))
+    if result.evaluation is not None:
+        summary = result.evaluation.summary
+        numbers["mean mm"], numbers["std mm"] = 1000.0 * summary.mean, 1000.0 * summary.std
+        joints = [e.joints.errors for e in result.evaluation.evaluations.values() if e.joints is not None]
+        if joints:
+            numbers["joints mm"] = 1000.0 * float(np.nanmean(np.concatenate(joints, axis=1)))
+        numbers["swaps"] = len(result.evaluation.swaps)
+        numbers["lost"] = sum(len(e.lost) for e in result.evaluation.evaluations.values())
+    numbers["iterations"] = float(np.mean(result.iterations))
+    numbers["not converged"] = int(np.sum(~result.converged))
+    numbers["frames/s"] = result.times.frames_per_second("step")
+    return numbers

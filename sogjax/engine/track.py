@@ -1,0 +1,91 @@
+"""From the videos of a recording to the motion of its actors: with files, or without."""
+
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from omegaconf import OmegaConf
+
+from sogjax.data.motion import arrays_of, load_motion
+from sogjax.data.motion_log import PER_FRAME, SOMETIMES_PER_FRAME
+from sogjax.data.recording import Recording
+from sogjax.engine import build
+from sogjax.engine.first_pose import initial_pose_file
+from sogjax.engine.job import frame_range, tracking
+from sogjax.engine.origin import origin_of
+from sogjax.engine.outputs import actor_name, evaluate, export_endings, write_results
+from sogjax.engine.recordings import actors_of, file_list, opened
+from sogjax.engine.run import Run
+from sogjax.engine.run_folder import RunFolder, run_folder
+from sogjax.engine.terminal import say
+from sogjax.engine.timing import StageTimes
+from sogjax.model.body import Body
+from sogjax.settings import OutputsConfig, TrackConfig
+
+_ROWS = (*PER_FRAME, *SOMETIMES_PER_FRAME)
+
+
+def track_to_folder(config: TrackConfig, command: str = "track") -> Run:
+    """Track, evaluate where there is ground truth, and write the results, or go on with a run that was stopped.
+
+    Raises:
+        InputError: anything wrong with the recording, the actors or the config; or a folder that another run uses, or
+            with results that are to stay.
+    """
+    build.check(config)
+    export_endings(config.outputs)
+    recording = opened(config.recording, config.cameras)
+    frame_range(recording, config)
+    initial_pose_file(recording, config)
+    path = Path(config.out or f"outputs/{recording.name}")
+    with run_folder(path, config.overwrite, config.resume, command) as folder:
+        return _run_in(folder, recording, config, command)
+
+
+def _run_in(folder: RunFolder, recording: Recording, config: TrackConfig, command: str) -> Run:
+    """Track into a folder that is this run's own, or go on there."""
+    actors = partial(actors_of, recording, config.actor, config.body, config.color)
+    made = config.actor is None
+    bodies = None if made else actors()[0]
+    origin = origin_of(recording, config, bodies)
+    going_on, kept = folder.goes_on(origin), folder.kept
+    if folder.ended:
+        return _ended(folder, recording)
+    if bodies is None and going_on:
+        bodies = kept.actors()
+    anew = bodies is None
+    bodies = actors()[0] if bodies is None else bodies
+    if not going_on:
+        folder.begin(command, origin, [] if made else file_list(config.actor))
+    if anew:
+        kept.keep_actors(bodies)
+    with tracking(recording, bodies, config, config.outputs, folder.path, kept=kept) as result:
+        write_results(result, folder.path, config.outputs, OmegaConf.structured(config), bodies if made else [])
+        folder.finish(command, origin, result.files)
+    return result
+
+
+def _ended(folder: RunFolder, recording: Recording) -> Run:
+    """A run that ended before."""
+    say(f"{folder.path}: the run has ended already; nothing is left to do")
+    files = [folder.path / name for name in folder.note["files"]]
+    loaded = {path: load_motion(path) for path in files if path.suffix == ".npz"}
+    motions = {actor_name(path, motion): motion for path, motion in loaded.items()}
+    frames = next(iter(motions.values())).frame - recording.first_frame
+    missing = recording.num_missing(frames.tolist())
+    result = Run(recording, [], motions, StageTimes(), float("nan"), files=files, missing=missing)
+    evaluate(result)
+    return result
+
+
+def track_recording(recording: Recording, bodies: list[Body], config: TrackConfig) -> Run:
+    """The motion of actors (in their own upright frames) in a recording; no files are written."""
+    nothing = OutputsConfig(overlay=False, rerun=False, bvh=False)
+    with TemporaryDirectory() as folder, tracking(recording, bodies, config, nothing, Path(folder)) as result:
+        motions = {
+            name: replace(motion, **{key: np.array(rows) for key, rows in arrays_of(motion).items() if key in _ROWS})
+            for name, motion in result.motions.items()
+        }
+        return replace(result, motions=motions)

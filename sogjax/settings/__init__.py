@@ -1,0 +1,15 @@
+"""Settings with their defaults, help texts and presets, as plain dataclasses; nothing here needs Hydra."""
+
+from sogjax.settings.method import ColorConfig, EnergyConfig, ImagesConfig, SolverConfig, TrackingConfig
+from sogjax.settings.run import ActorConfig, OutputsConfig, TrackConfig
+
+__all__ = [
+    "ActorConfig",
+    "ColorConfig",
+    "EnergyConfig",
+    "ImagesConfig",
+    "OutputsConfig",
+    "SolverConfig",
+    "TrackConfig",
+    "TrackingConfig",
+]

@@ -1,0 +1,67 @@
+"""The settings of a run: what is tracked, with which method, and what is written; and those of an actor."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from sogjax.settings.method import ColorConfig, EnergyConfig, ImagesConfig, SolverConfig, TrackingConfig
+from sogjax.settings.option import REQUIRED, group, option
+
+OVERWRITE = "replace what an earlier run wrote there"
+
+
+@dataclass
+class OutputsConfig:
+    """What is written beside the motion."""
+
+    overlay: bool = option(True, "overlay.mp4, the skeleton on every camera's pictures")
+    overlay_width: int = option(1920, "width of the overlay video, px")
+    rerun: bool = option(True, "motion.rrd, for the Rerun viewer")
+    rerun_images: bool = option(True, "put the pictures into motion.rrd")
+    bvh: bool = option(True, "motion.bvh")
+    formats: list[str] | None = option(None, "further formats of the motion, some of [trc,c3d,glb,csv]; null: none")
+    confidence: bool = option(
+        False, "standard deviations of the pose and the joints, in motion.npz; rough, see experiments/confidence.py"
+    )
+    temperature: float = option(
+        1e-5,
+        "energy that counts as one unit of log-likelihood, for the standard deviations; by experiments/confidence.py",
+    )
+
+
+@dataclass
+class TrackConfig:
+    """Track the actors of a recording."""
+
+    recording: str = option(REQUIRED, "folder of the recording")
+    out: str = option("", "folder for the results; default: outputs/RECORDING")
+    actor: Any = option(None, "actor file, or a list of them; null: made from the example poses")
+    body: str = option("human", "body that actors are made from: human, dog, or a body file")
+    initial_pose: str | None = option(
+        None, "auto: search for it | file with a rough pose; null: the recording's initial_pose.yaml, else auto"
+    )
+    start: int = option(0, "first frame to track, counted from the recording's first")
+    stop: int | None = option(None, "frame before which to stop; null: the end")
+    cameras: list[str] | None = option(None, "cameras to use; null: all")
+    resume: bool = option(False, "go on with the run that was stopped in this folder")
+    overwrite: bool = option(False, OVERWRITE)
+    color: ColorConfig = group(ColorConfig, "")
+    images: ImagesConfig = group(ImagesConfig, "")
+    energy: EnergyConfig = group(EnergyConfig, "")
+    solver: SolverConfig = group(SolverConfig, "")
+    tracking: TrackingConfig = group(TrackingConfig, "")
+    outputs: OutputsConfig = group(OutputsConfig, "")
+
+
+@dataclass
+class ActorConfig:
+    """Make an actor file from the example poses of a recording."""
+
+    recording: str = option(REQUIRED, "folder of the recording")
+    out: str = option(REQUIRED, "actor file to write")
+    subject: str | None = option(None, "which subject, where the recording has several")
+    symmetric: bool = option(True, "left and right limbs have the same lengths and sizes")
+    body: str = option("human", "body to start from: human, dog, or a body file")
+    cameras: list[str] | None = option(None, "cameras to use; null: all")
+    overwrite: bool = option(False, OVERWRITE)
+    color: ColorConfig = group(ColorConfig, "")
+    energy: EnergyConfig = group(EnergyConfig, "")

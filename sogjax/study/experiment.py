@@ -1,0 +1,151 @@
+"""What an experiment is: a question, rows of settings, and what the paper found. One YAML file each."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import yaml
+from omegaconf import MISSING, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from sogjax.errors import InputError
+from sogjax.settings.files import conf_dir
+
+MEASURES = ("accuracy", "speed")
+
+
+@dataclass
+class RowConfig:
+    """One line of an experiment's table."""
+
+    set: list[str] = field(default_factory=list)
+    """Overrides of the track config."""
+    cameras: int | None = None
+    """How many of the recording's cameras look on, evenly taken; None: all."""
+    every: int = 1
+    """Every so many frames are looked at."""
+    actors: int | None = None
+    """Rendered recordings of this many people passing each other take the place of the study's; None: the study's."""
+    paper: str = ""
+    """What the paper says of this row, in words for the table."""
+    paper_value: float | None = None
+    """The same as a number for the plot, in the unit of the experiment's first column."""
+
+
+@dataclass
+class ExperimentConfig:
+    """One question, and the settings that are compared to answer it."""
+
+    title: str = MISSING
+    question: str = MISSING
+    axis: str = MISSING
+    """What differs between the rows, with its unit."""
+    reference: str = MISSING
+    """The row that the others are compared with."""
+    base: list[str] = field(default_factory=list)
+    """Overrides of all rows."""
+    measure: str = "accuracy"
+    """accuracy: from kept cells, one frame after the other | speed: from the videos, all stages beside each other."""
+    recordings: list[str] | None = None
+    """Those that are tracked where the study is on the recordings of the committed report; None: the study's."""
+    note: str = ""
+    """What holds of the comparison on any recordings."""
+    iterations_by_recording: bool = False
+    """Whether the iterations on each recording are shown, too."""
+    paper_note: str = ""
+    """What the paper's figures were measured on."""
+    remark: str = ""
+    """What was made of the outcome on the recordings of the committed report."""
+    rows: dict[str, RowConfig] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """An experiment and its name, which is that of its file."""
+
+    name: str
+    config: ExperimentConfig
+
+    @classmethod
+    def named(cls, name: str) -> "Experiment":
+        """The experiment of `conf/experiment/NAME.yaml`, or of any file whose name ends so.
+
+        Raises:
+            InputError: there is none of that name, or something in the file is wrong.
+        """
+        if name.endswith((".yaml", ".yml")):
+            if not Path(name).is_file():
+                raise InputError(f"{name}: there is no such file; give an experiment as those in conf/experiment")
+            return cls.from_file(Path(name))
+        path = _folder() / f"{name}.yaml"
+        if not path.is_file():
+            raise InputError(f"{name}: no such experiment; choose from {', '.join(experiment_names())}")
+        return cls.from_file(path)
+
+    @classmethod
+    def from_file(cls, path: Path) -> "Experiment":
+        """Read an experiment.
+
+        Raises:
+            InputError: something in the file is wrong.
+        """
+        try:
+            tree = OmegaConf.merge(OmegaConf.structured(ExperimentConfig), OmegaConf.load(path))
+            missing = sorted(OmegaConf.missing_keys(tree))
+            if missing:
+                raise InputError(f"{path}: has no {missing[0]}; add it")
+            config: ExperimentConfig = OmegaConf.to_object(tree)  # pyright: ignore[reportAssignmentType]
+        except (OmegaConfBaseException, yaml.YAMLError) as error:
+            raise InputError(f"{path}: {str(error).splitlines()[0]}; correct it") from error
+        return cls(path.stem, _checked(path, config))
+
+    @property
+    def is_shipped(self) -> bool:
+        """Whether it has a script in `experiments/`."""
+        return self.name in experiment_names()
+
+    def overrides(self, row: str, common: Sequence[str] = ()) -> list[str]:
+        """The overrides of a row: those common to the study, then the experiment's, then its own."""
+        return [*common, *self.config.base, *self.config.rows[row].set]
+
+
+def experiment_names() -> list[str]:
+    """The experiments that come with the program, in the order of a report."""
+    present = {path.stem for path in _folder().glob("*.yaml")}
+    return [name for name in _ORDER if name in present] + sorted(present - set(_ORDER))
+
+
+_ORDER = (
+    "limit_weight",
+    "acceleration_weight",
+    "occlusion_cap",
+    "solvers",
+    "resolution",
+    "cameras",
+    "frame_rate",
+    "epsilon",
+    "min_iterations",
+    "color_space",
+    "color_radius",
+    "color_tolerance",
+    "depth",
+    "extrapolation",
+    "overlap_exponent",
+    "throughput",
+)
+"""The paper's own experiments first."""
+
+
+def _folder() -> Path:
+    return conf_dir() / "experiment"
+
+
+def _checked(path: Path, config: ExperimentConfig) -> ExperimentConfig:
+    if config.reference not in config.rows:
+        raise InputError(f"{path}: reference: {config.reference!r} is no row; choose from {', '.join(config.rows)}")
+    if config.measure not in MEASURES:
+        raise InputError(f"{path}: measure: {config.measure!r}: use one of {', '.join(MEASURES)}")
+    for name, row in config.rows.items():
+        if row.every < 1 or (row.cameras is not None and row.cameras < 1):
+            raise InputError(f"{path}: row {name!r}: every={row.every} cameras={row.cameras}: must be 1 or more")
+    return config

@@ -1,0 +1,90 @@
+"""The pictures of a report: charts of experiments, and the worst frames with the tracked skeleton."""
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from jaxtyping import Float
+
+from sogjax.data.calibration import CameraRig
+from sogjax.data.motion import Motion
+from sogjax.data.video import read_frames
+from sogjax.study.document import Picture
+from sogjax.study.experiment import Experiment
+from sogjax.study.record import RunRecord
+from sogjax.study.runner import motions_of
+from sogjax.study.source import Source
+from sogjax.study.summary import RowSummary
+from sogjax.view.charts import mean_chart
+from sogjax.view.overlay import overlay_frame, write_label
+from sogjax.view.projection import picture_points
+
+CAMERAS_SHOWN = 3
+TILE, JPEG_QUALITY = 300, 75
+MARGIN = 1.25
+"""Side of what is cut out, in units of what it is about."""
+
+
+def experiment_chart(experiment: Experiment, rows: Sequence[RowSummary]) -> Picture | None:
+    """Mean errors with their intervals (or rates) over the rows; None where there is nothing to draw."""
+    done = [row for row in rows if np.isfinite(row.mean)]
+    if not done:
+        return None
+    speed = experiment.config.measure == "speed"
+    names = list(dict.fromkeys(name for row in done for name in row.by_recording))
+    content = mean_chart(
+        [row.name for row in done],
+        [row.rates.get("whole", np.nan) if speed else row.mean for row in done],
+        [(np.nan, np.nan) if speed else row.interval for row in done],
+        axis=experiment.config.axis,
+        value="frames/s, whole" if speed else "marker error, mm",
+        members={} if speed else {name: [row.by_recording.get(name, np.nan) for row in done] for name in names},
+        paper=[row.paper_value for row in done],
+    )
+    what = "frames a second" if speed else "mean error with its 95 % interval; thin lines: each recording"
+    return Picture(f"{experiment.name}.png", content, f"{experiment.config.title}: {what}")
+
+
+def worst_frame(label: str, source: Source, record: RunRecord) -> Picture:
+    """The frame of a run with the largest error, in cameras that see it from different sides, cut out around it."""
+    row = int(np.nanargmax(record.errors))
+    frame = record.frame[row]
+    recording = source.recording
+    motions = list(motions_of(record, source.bodies, recording.fps).values())
+    images = next(iter(read_frames(recording, frame - recording.first_frame, frame - recording.first_frame + 1)))
+    points = np.concatenate([motion.blob_means[row] for motion in motions] + _true_points(source, frame))
+    cameras = source.cameras(min(CAMERAS_SHOWN, len(recording.rig.names)))
+    cut = [_cut_out(images, recording.rig, motions, frame, camera, points) for camera in cameras]
+    jpeg = cv2.imencode(".jpg", cv2.hconcat(cut), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1].tobytes()
+    caption = f"{label}: {source.name}, frame {frame}, mean error {record.errors[row]:.0f} mm"
+    name = "".join(letter if letter.isalnum() else "_" for letter in f"worst_{label}_{source.name}")
+    return Picture(f"{name}.jpg", jpeg, caption)
+
+
+def _true_points(source: Source, frame: int) -> list[np.ndarray]:
+    """Where the subjects really are."""
+    truth = source.truth.markers if source.truth.markers is not None else source.truth.joints
+    assert truth is not None
+    return [truth[frame][np.isfinite(truth[frame]).all(axis=1)]]
+
+
+def _cut_out(
+    images: Sequence[np.ndarray | None],
+    rig: CameraRig,
+    motions: Sequence[Motion],
+    frame: int,
+    camera: str,
+    points: Float[np.ndarray, "point 3"],
+) -> np.ndarray:
+    """One camera's picture with the skeletons, as far as the points (world) reach, as a square tile."""
+    width, height = rig.image_size(camera)
+    drawn = overlay_frame(images, rig, motions, frame, cameras=[camera], width=width)
+    scale = drawn.shape[1] / width
+    pixels = scale * picture_points(rig.select((camera,)), points[None].astype(np.float32))[0][0, 0]
+    seen = pixels[np.isfinite(pixels).all(axis=1)].clip(0, (drawn.shape[1], drawn.shape[0]))
+    low, high = (seen.min(axis=0), seen.max(axis=0)) if len(seen) else (np.zeros(2), np.array([width, height]))
+    side = int(min(MARGIN * max(*(high - low), TILE / 2), *drawn.shape[:2]))
+    x, y = (np.clip(0.5 * (low + high - side), 0, np.array([drawn.shape[1], drawn.shape[0]]) - side)).astype(int)
+    tile = cv2.resize(drawn[y : y + side, x : x + side], (TILE, TILE), interpolation=cv2.INTER_AREA)
+    write_label(tile, camera, (6, 14))
+    return tile

@@ -1,0 +1,145 @@
+"""What is kept of one run of a study: a JSON file, by which a run that was done is not done again."""
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass, field, fields
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+
+import sogjax
+from sogjax import __version__
+from sogjax.data.atomic import atomic_path
+from sogjax.settings import TrackConfig
+
+RECORD_VERSION = 2
+"""To be raised with every change that makes earlier runs incomparable."""
+_DECIDE = ("model", "energy", "solve", "images", "track", "data", "actor", "evaluate")
+"""Packages whose code decides the result of a run."""
+_OF_THE_RESULT = ("body", "color", "images", "energy", "solver", "tracking")
+
+
+@dataclass(frozen=True)
+class RunPlan:
+    """All that decides how a run comes out; its `key` names the file."""
+
+    recording: str
+    """The study's name of the recording, which for a rendered one holds its settings."""
+    frames: int
+    cameras: list[str]
+    every: int
+    measure: str
+    config: dict[str, Any]
+    """The track config, without what has no say in the result."""
+
+    @classmethod
+    def of(
+        cls, recording: str, frames: int, cameras: tuple[str, ...], every: int, measure: str, config: TrackConfig
+    ) -> "RunPlan":
+        """A plan for a track config."""
+        kept = {key: value for key, value in asdict(config).items() if key in _OF_THE_RESULT}
+        kept["images"].pop("cache")
+        return cls(recording, frames, list(cameras), every, measure, kept)
+
+    @property
+    def key(self) -> str:
+        """Sixteen letters that differ where anything differs, the program's own files included."""
+        content = [RECORD_VERSION, __version__, program_digest(), asdict(self)]
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
+
+
+@dataclass
+class RunRecord:
+    """One run: what was tracked and how, and what came of it. Lists have a value for every frame."""
+
+    plan: dict[str, Any]
+    machine: str
+    """Processor, versions and date."""
+    frame: list[int] = field(default_factory=list)
+    error_mm: list[float] = field(default_factory=list)
+    """Mean distance of the markers (of the joints where there are no markers); NaN: nothing to compare with, as in the
+    first frame, in which markers are attached."""
+    joint_error_mm: list[float] = field(default_factory=list)
+    std_mm: float = float("nan")
+    """Over all distances of those frames."""
+    lost: int = 0
+    """Stretches of frames with a lost marker."""
+    swaps: int = 0
+    iterations: list[int] = field(default_factory=list)
+    evaluations: list[int] = field(default_factory=list)
+    converged: list[bool] = field(default_factory=list)
+    milliseconds: list[float] = field(default_factory=list)
+    """Of the tracking step; the first frame's hold the compilation."""
+    image_blobs: float = float("nan")
+    """Used in a frame by a camera."""
+    pose: list[list[float]] = field(default_factory=list)
+    rates: dict[str, float] = field(default_factory=dict)
+    """Frames a second by stage, where the speed was measured."""
+    seconds: float = float("nan")
+    """That the whole run took, with compilation and, where it was the first of its recording, the actor."""
+    failed: str = ""
+    """Why there is no result."""
+
+    @property
+    def errors(self) -> Float[np.ndarray, "frame"]:
+        """`error_mm` as an array."""
+        return np.asarray(self.error_mm, float)
+
+    @property
+    def frames(self) -> Int[np.ndarray, "frame"]:
+        """`frame` as an array."""
+        return np.asarray(self.frame, int)
+
+    @property
+    def mean_mm(self) -> float:
+        """The mean of the frames that have an error; NaN where none has."""
+        present = self.errors[np.isfinite(self.errors)]
+        return float(present.mean()) if present.size else float("nan")
+
+    @property
+    def step_ms(self) -> float:
+        """Median time of a tracking step without the first frame, which compiles."""
+        return float(np.median(self.milliseconds[1:])) if len(self.milliseconds) > 1 else float("nan")
+
+
+@cache
+def program_digest() -> str:
+    """Of the files of the program that decide how a run comes out."""
+    package = Path(sogjax.__file__).parent
+    files = sorted(path for name in _DECIDE for path in (package / name).rglob("*.py"))
+    content = hashlib.sha256()
+    for path in files:
+        content.update(f"{path.relative_to(package)}\n".encode() + path.read_bytes())
+    return content.hexdigest()[:16]
+
+
+class RunFolder:
+    """The folder of a study's runs."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = Path(folder)
+
+    def find(self, plan: RunPlan) -> RunRecord | None:
+        """The record of a run that was done; None where it must be done."""
+        path = self._path(plan)
+        try:
+            content = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+        known = {entry.name for entry in fields(RunRecord)}
+        return RunRecord(**content) if set(content) <= known else None
+
+    def keep(self, plan: RunPlan, record: RunRecord) -> None:
+        """Write a record, in one piece or not at all.
+
+        Raises:
+            InputError: the folder cannot be written.
+        """
+        with atomic_path(self._path(plan)) as temporary:
+            temporary.write_text(json.dumps(asdict(record)), encoding="utf-8")
+
+    def _path(self, plan: RunPlan) -> Path:
+        return self.folder / "runs" / f"{plan.key}.json"

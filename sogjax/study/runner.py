@@ -1,0 +1,180 @@
+"""One run of a study: from a source and a row of an experiment to a record."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from sogjax.data.motion import Motion, motion_from_poses
+from sogjax.engine import build
+from sogjax.engine.compiled_programs import forget_programs_if_many
+from sogjax.engine.terminal import say
+from sogjax.engine.timing import StageTimes
+from sogjax.engine.track import track_recording
+from sogjax.errors import InputError
+from sogjax.evaluate import GroupEvaluation, evaluate_motions
+from sogjax.evaluate.metrics import mean_per_frame
+from sogjax.model.body import Body, dof_slices
+from sogjax.settings import TrackConfig
+from sogjax.settings.compose import track_config
+from sogjax.study.experiment import Experiment
+from sogjax.study.machine import machine_facts
+from sogjax.study.record import RunFolder, RunPlan, RunRecord
+from sogjax.study.source import Source
+from sogjax.track.culling import Capacities
+from sogjax.track.frame import FrameResult
+from sogjax.track.tracker import track
+
+STAGES = ("decode", "step", "whole")
+
+
+def run_row(
+    experiment: Experiment,
+    row: str,
+    source: Source,
+    runs: RunFolder,
+    common: Sequence[str] = (),
+    do: bool = True,
+) -> RunRecord | None:
+    """The record of a row on a recording: read where it was done before, else made now and kept, or None.
+
+    A run that fails is kept as failed, and done again the next time; the others go on. None, too, where the recording
+    has not as many cameras as the row asks for.
+
+    Raises:
+        InputError: an override that cannot be.
+    """
+    entry = experiment.config.rows[row]
+    config = track_config(experiment.overrides(row, common), recording=source.path, outputs={"confidence": False})
+    build.check(config)
+    if entry.cameras is not None and entry.cameras > len(source.recording.rig.names):
+        return None
+    cameras = source.cameras(entry.cameras)
+    measure = experiment.config.measure
+    plan = RunPlan.of(source.identity, source.num_frames, cameras, entry.every, measure, config)
+    found = runs.find(plan)
+    if (found is not None and not found.failed) or not do:
+        return found
+    say(f"{experiment.name} {row!r}: {source.name}")
+    forget_programs_if_many()
+    record, begin = RunRecord(plan=asdict(plan), machine=machine_facts()), time.perf_counter()
+    try:
+        measured = _accuracy if measure == "accuracy" else _speed
+        record = measured(record, source, config, cameras, entry.every)
+    except Exception as error:
+        reason = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
+        record = replace(record, failed=reason.splitlines()[0])
+        say(f"failed: {record.failed}")
+    record = replace(record, seconds=time.perf_counter() - begin)
+    runs.keep(plan, record)
+    return record
+
+
+def motions_of(record: RunRecord, bodies: Sequence[Body], fps: float) -> dict[str, Motion]:
+    """The motions of a run's actors, from the poses and the solver's account in its record."""
+    poses = np.asarray(record.pose, float)
+    iterations = np.asarray(record.iterations, int)
+    return {
+        body.name: motion_from_poses(body, poses[:, part], fps, frame=record.frames, iterations=iterations)
+        for body, part in zip(bodies, dof_slices(bodies), strict=True)
+    }
+
+
+def _accuracy(
+    record: RunRecord, source: Source, config: TrackConfig, cameras: tuple[str, ...], every: int
+) -> RunRecord:
+    """Track from kept cells, from the start pose that all runs share."""
+    tracker = source.tracker(config, cameras)
+    cells = source.cells(config.images.depth, cameras, every)
+    kind = _program(config, cameras)
+    tracked = list(track(tracker, source.start, cells, _capacities.get(kind)))
+    _capacities[kind] = tracked[-1].capacities
+    results = [frame.result for frame in tracked]
+    frames = source.recording.first_frame + every * np.arange(len(cells))
+    record = replace(
+        record,
+        frame=frames.tolist(),
+        milliseconds=[round(1000.0 * frame.seconds, 3) for frame in tracked],
+        image_blobs=float(np.mean([result.num_matching for result in results])),
+        **_of_solver(results),
+    )
+    return _evaluated(record, source)
+
+
+_capacities: dict[tuple[object, ...], Capacities] = {}
+"""What sufficed for earlier runs of the process, by what the number of image blobs depends on: one program serves
+several recordings."""
+
+
+def _program(config: TrackConfig, cameras: tuple[str, ...]) -> tuple[object, ...]:
+    return (config.energy.pairs, *asdict(config.images).values(), *asdict(config.color).values(), len(cameras))
+
+
+def _of_solver(results: Sequence[FrameResult]) -> dict[str, list]:
+    return {
+        "iterations": [int(result.iterations) for result in results],
+        "evaluations": [int(result.evaluations) for result in results],
+        "converged": [bool(result.converged) for result in results],
+        "pose": [np.round(np.asarray(result.pose, float), 6).tolist() for result in results],
+    }
+
+
+def _speed(record: RunRecord, source: Source, config: TrackConfig, cameras: tuple[str, ...], every: int) -> RunRecord:
+    """Track from the videos, all stages beside each other, as `sogjax track` does; twice, the faster one counts."""
+    config = replace(config, stop=source.num_frames)
+    runs = [track_recording(source.seen_by(cameras), source.actors, config) for _ in range(2)]
+    best = max(runs, key=lambda run: run.times.frames_per_second("whole"))
+    motion = next(iter(best.motions.values()))
+    record = replace(
+        record,
+        frame=motion.frame.tolist(),
+        iterations=motion.iterations.tolist(),
+        converged=motion.converged.tolist(),
+        milliseconds=[1000.0 * seconds for seconds in best.times.seconds["step"]],
+        image_blobs=best.image_blobs,
+        rates=_rates(best.times),
+        pose=np.concatenate([motion.pose for motion in best.motions.values()], axis=1).tolist(),
+    )
+    return _evaluated(record, source)
+
+
+def _rates(times: StageTimes) -> dict[str, float]:
+    return {stage: times.frames_per_second(stage) for stage in STAGES}
+
+
+def _evaluated(record: RunRecord, source: Source) -> RunRecord:
+    """The record with its distances to the truth."""
+    motions = motions_of(record, source.bodies, source.recording.fps)
+    evaluation = evaluate_motions(motions, source.truth)
+    joints = _distances(evaluation, "joints", record.frame)
+    markers = _distances(evaluation, "markers", record.frame)
+    errors = markers if markers.shape[1] else joints
+    return replace(
+        record,
+        error_mm=_rounded_means(errors),
+        joint_error_mm=_rounded_means(joints),
+        std_mm=float(np.nanstd(errors)) if np.isfinite(errors).any() else float("nan"),
+        lost=sum(len(part.lost) for part in evaluation.evaluations.values()),
+        swaps=len(evaluation.swaps),
+    )
+
+
+def _distances(evaluation: GroupEvaluation, kind: str, frames: Sequence[int]) -> Float[np.ndarray, "frame point"]:
+    """Distances of the points of all actors in every tracked frame, mm; NaN where a marker is attached, or no truth."""
+    columns = [np.zeros((len(frames), 0))]
+    for part in evaluation.evaluations.values():
+        points = getattr(part, kind)
+        if points is not None:
+            column = np.full((len(frames), points.errors.shape[1]), np.nan)
+            column[np.searchsorted(frames, part.frames)] = 1000.0 * points.errors
+            if kind == "markers":
+                first = np.argmax(np.isfinite(column), axis=0)
+                column[first, np.arange(column.shape[1])] = np.nan
+            columns.append(column)
+    return np.concatenate(columns, axis=1)
+
+
+def _rounded_means(distances: Float[np.ndarray, "frame point"]) -> list[float]:
+    return np.round(mean_per_frame(distances), 4).tolist()

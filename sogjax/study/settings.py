@@ -1,0 +1,27 @@
+"""The settings of a report."""
+
+from dataclasses import dataclass
+
+from sogjax.settings.option import group, option
+
+
+@dataclass
+class ReportConfig:
+    """Run the experiments of the paper's Section 6 and more, and write report.html and report.md; resumes."""
+
+    out: str = option("outputs/report", "folder for the report and its runs; a run that is there is not done again")
+    only: list[str] | None = option(
+        None, "experiments, by their names in conf/experiment or as files FOLDER/NAME.yaml; null: all"
+    )
+    recordings: list[str] = group(
+        lambda: [f"{motion}:{seed}" for motion in ("walk", "arms", "squat_kick", "cartwheel") for seed in (0, 1)],
+        "folders of recordings with ground truth, or MOTION:SEED of rendered ones",
+    )
+    frames: int = option(40, "frames of each recording to track, at most")
+    body: str = option("human", "body that the actors are made from, as for actor")
+    overrides: list[str] = group(
+        lambda: [], "options of track for all runs, of color, images, energy, solver or tracking: [solver=lbfgs]"
+    )
+    pictures: int = option(6, "worst frames to show")
+    note: str = option("", "a sentence for the beginning of the report, such as what else the machine did")
+    do: bool = option(True, "do the runs that are missing; false: report on those that are there")

@@ -1,0 +1,93 @@
+"""A study: some experiments over some recordings, every run of them done once."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+from sogjax.errors import InputError
+from sogjax.study.experiment import Experiment
+from sogjax.study.record import RunFolder, RunRecord
+from sogjax.study.runner import run_row
+from sogjax.study.settings import ReportConfig
+from sogjax.study.source import Source, source_named
+from sogjax.study.summary import RowSummary, summarized
+
+_GROUPS = ("color", "images", "energy", "solver", "tracking")
+"""Settings that are a run's; recordings, actors and outputs are the study's."""
+
+
+@dataclass(eq=False)
+class Study:
+    """Where its runs are kept, and what they are made on."""
+
+    folder: Path
+    recordings: Sequence[str]
+    """Folders with ground truth, or MOTION:SEED."""
+    frames: int
+    """Tracked of each recording, at most."""
+    overrides: Sequence[str] = ()
+    """Of the track config, for all runs."""
+    do: bool = True
+    """Whether runs that are missing are done; else they are left out."""
+    body: str = "human"
+    """The body that actors are made from."""
+
+    @cached_property
+    def runs(self) -> RunFolder:
+        """The records."""
+        return RunFolder(self.folder)
+
+    def __post_init__(self) -> None:
+        self._sources: dict[tuple[str, int], Source] = {}
+        if not self.recordings:
+            raise InputError("recordings=[]: name at least one, a folder or MOTION:SEED such as walk:0")
+        if self.frames < 2:
+            raise InputError(f"frames={self.frames}: must be at least 2, since markers are attached in the first one")
+        for word in self.overrides:
+            if word.partition("=")[0].partition(".")[0] not in _GROUPS:
+                raise InputError(f"overrides: {word}: is none of a run's settings; choose of {', '.join(_GROUPS)}")
+
+    @property
+    def is_committed(self) -> bool:
+        """Whether it is what the project's own report was made of, of which the remarks speak."""
+        usual = ReportConfig()
+        return [*self.recordings] == usual.recordings and self.frames == usual.frames and not self.overrides
+
+    def source(self, recording: str, actors: int = 1) -> Source:
+        """A recording, opened once.
+
+        Raises:
+            InputError: there is none of that name.
+        """
+        key = (recording, actors)
+        if key not in self._sources:
+            source = source_named(recording, self.frames, self.folder, actors, self.body)
+            alike = [other for other in self._sources.values() if other.name.partition(" ")[0] == source.name]
+            name = f"{source.name} {len(alike) + 1}" if alike else source.name
+            self._sources[key] = replace(source, name=name)
+        return self._sources[key]
+
+    def sources_of(self, experiment: Experiment, row: str) -> list[Source]:
+        """The recordings that a row is tracked on."""
+        actors = experiment.config.rows[row].actors
+        if actors is not None and actors > 1:
+            return [self.source("pass:0", actors)]
+        names = experiment.config.recordings if self.is_committed else None
+        return [self.source(name) for name in names or self.recordings]
+
+    def records(self, experiment: Experiment) -> Iterator[tuple[str, Source, RunRecord]]:
+        """Every run of an experiment as (row, recording, record), as they are done or read."""
+        for row in experiment.config.rows:
+            for source in self.sources_of(experiment, row):
+                record = run_row(experiment, row, source, self.runs, self.overrides, self.do)
+                if record is not None:
+                    yield row, source, record
+
+    def summary(self, experiment: Experiment) -> list[RowSummary]:
+        """The rows of an experiment."""
+        rows: dict[str, dict[str, RunRecord]] = {row: {} for row in experiment.config.rows}
+        for row, source, record in self.records(experiment):
+            rows[row][source.name] = record
+        papers = {name: (row.paper, row.paper_value) for name, row in experiment.config.rows.items()}
+        return summarized(rows, experiment.config.reference, papers)

@@ -1,0 +1,152 @@
+"""An experiment's runs in a few numbers a row: means with their intervals, and differences that show or do not."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from sogjax.evaluate.bootstrap import Interval, bootstrap_interval
+from sogjax.study.record import RunRecord
+
+Records = Mapping[str, RunRecord]
+"""The runs of one row, by recording."""
+UNKNOWN = float("nan")
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Of a row's error to that of the reference, in the same frames of the same recordings."""
+
+    mean: float
+    """Millimetres; positive: the row is worse."""
+    interval: Interval
+    recordings: int
+    """That it was taken on."""
+
+    @property
+    def shows(self) -> bool:
+        """Whether it is larger than what other recordings could have made of it; a single one cannot tell."""
+        return self.recordings > 1 and not self.interval.holds_zero
+
+
+@dataclass(frozen=True)
+class RowSummary:
+    """One row of an experiment over all its recordings. Errors in millimetres."""
+
+    name: str
+    paper: str
+    paper_value: float | None
+    mean: float
+    std: float
+    """Over all distances of all recordings."""
+    interval: Interval
+    """Of the mean, at 95 %."""
+    difference: Difference | None
+    """None: this is the reference, or nothing can be compared."""
+    is_reference: bool
+    joints: float
+    lost: int
+    swaps: int
+    iterations: float
+    evaluations: float
+    not_converged: int
+    milliseconds: float
+    """The median of a tracking step; the mean over the recordings."""
+    image_blobs: float
+    rates: Mapping[str, float]
+    by_recording: Mapping[str, float]
+    """The mean error on each."""
+    iterations_by_recording: Mapping[str, float]
+    failed: Sequence[str]
+
+
+def summarized(
+    rows: Mapping[str, Records], reference: str, papers: Mapping[str, tuple[str, float | None]]
+) -> list[RowSummary]:
+    """A summary of every row.
+
+    Args:
+        rows: the runs of each row.
+        reference: the row that the others are compared with; the first one with runs where it has none.
+        papers: what the paper says of a row, in words and as a number.
+    """
+    worked = [name for name, records in rows.items() if any(not record.failed for record in records.values())]
+    compared = reference if reference in worked or not worked else worked[0]
+    return [
+        _summary(name, records, None if name == compared else rows[compared], papers[name])
+        for name, records in rows.items()
+    ]
+
+
+def _summary(name: str, records: Records, reference: Records | None, paper: tuple[str, float | None]) -> RowSummary:
+    done = {source: record for source, record in records.items() if not record.failed}
+    runs = list(done.values())
+    errors = [record.errors for record in runs]
+    average = lambda value: _mean([value(record) for record in runs])
+    return RowSummary(
+        name=name,
+        paper=paper[0],
+        paper_value=paper[1],
+        mean=_mean(_joined(errors)),
+        std=pooled_std(runs),
+        interval=bootstrap_interval(errors),
+        difference=None if reference is None else _difference(done, reference),
+        is_reference=reference is None,
+        joints=_mean(_joined([np.asarray(record.joint_error_mm, float) for record in runs])),
+        lost=sum(record.lost for record in runs),
+        swaps=sum(record.swaps for record in runs),
+        iterations=average(lambda record: _mean(record.iterations)),
+        evaluations=average(lambda record: _mean(record.evaluations)),
+        not_converged=sum(not one for record in runs for one in record.converged),
+        milliseconds=average(lambda record: record.step_ms),
+        image_blobs=average(lambda record: record.image_blobs),
+        rates=_mean_rates(runs),
+        by_recording={source: _mean(record.errors) for source, record in done.items()},
+        iterations_by_recording={source: _mean(record.iterations) for source, record in done.items()},
+        failed=tuple(f"{source}: {record.failed}" for source, record in records.items() if record.failed),
+    )
+
+
+def pooled_std(runs: Sequence[RunRecord]) -> float:
+    """Standard deviation over the distances of all runs, from that of each, which has as many in every frame."""
+    counts = np.array([np.isfinite(record.errors).sum() for record in runs], float)
+    means = np.array([_mean(record.errors) for record in runs])
+    if not counts.sum() > 0.0:
+        return UNKNOWN
+    counts, means, stds = counts[counts > 0], means[counts > 0], np.array([r.std_mm for r in runs])[counts > 0]
+    weights = counts / counts.sum()
+    return float(np.sqrt(np.sum(weights * (stds**2 + (means - np.sum(weights * means)) ** 2))))
+
+
+def _difference(records: Records, reference: Records) -> Difference | None:
+    pairs = [
+        frame_differences(record, reference[source])
+        for source, record in records.items()
+        if source in reference and not reference[source].failed
+    ]
+    pairs = [pair for pair in pairs if np.isfinite(pair).any()]
+    return Difference(_mean(_joined(pairs)), bootstrap_interval(pairs), len(pairs)) if pairs else None
+
+
+def frame_differences(record: RunRecord, reference: RunRecord) -> Float[np.ndarray, "_"]:
+    """Error less the reference's, in the frames that both have."""
+    _, ours, theirs = np.intersect1d(record.frames, reference.frames, return_indices=True)
+    return record.errors[ours] - reference.errors[theirs]
+
+
+def _mean_rates(runs: Sequence[RunRecord]) -> dict[str, float]:
+    stages = dict.fromkeys(stage for record in runs for stage in record.rates)
+    rate: Callable[[str], float] = lambda stage: _mean([record.rates.get(stage, UNKNOWN) for record in runs])
+    return {stage: rate(stage) for stage in stages}
+
+
+def _joined(parts: Sequence[np.ndarray]) -> np.ndarray:
+    return np.concatenate([*parts, np.zeros(0)])
+
+
+def _mean(values: Sequence[float] | np.ndarray) -> float:
+    """Of those that are finite; NaN where none is."""
+    present = np.asarray(values, float)
+    present = present[np.isfinite(present)]
+    return float(present.mean()) if present.size else UNKNOWN

@@ -1,0 +1,126 @@
+"""An experiment's summaries as a table in Markdown, and as sentences."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from sogjax.study.experiment import Experiment
+from sogjax.study.summary import RowSummary
+
+Cell = Callable[[RowSummary], str]
+
+ACCURACY: dict[str, Cell] = {
+    "error, mm": lambda row: f"{row.mean:.1f} +- {row.std:.1f}",
+    "95 % interval": lambda row: _range(row.interval.low, row.interval.high),
+    "difference": lambda row: difference_words(row),
+    "joints, mm": lambda row: f"{row.joints:.1f}",
+    "lost": lambda row: str(row.lost),
+    "iterations": lambda row: f"{row.iterations:.1f}",
+    "evaluations": lambda row: f"{row.evaluations:.1f}",
+    "not converged": lambda row: str(row.not_converged),
+    "ms a step": lambda row: f"{row.milliseconds:.0f}",
+    "the paper": lambda row: row.paper or "",
+}
+SPEED: dict[str, Cell] = {
+    "tracking step, frames/s": lambda row: _rate(row, "step"),
+    "whole, frames/s": lambda row: _rate(row, "whole"),
+    "waiting for pictures, ms": lambda row: _waiting(row),
+    "image blobs": lambda row: f"{row.image_blobs:.0f}",
+    "iterations": lambda row: f"{row.iterations:.1f}",
+    "error, mm": lambda row: f"{row.mean:.1f} +- {row.std:.1f}",
+    "the paper": lambda row: row.paper or "",
+}
+
+
+def markdown_table(experiment: Experiment, rows: Sequence[RowSummary]) -> str:
+    """The table of an experiment; columns without any value are left out."""
+    columns = ACCURACY if experiment.config.measure == "accuracy" else SPEED
+    texts = {title: [cell(row) if _done(row) else "" for row in rows] for title, cell in columns.items()}
+    texts = {title: cells for title, cells in texts.items() if any(cell not in ("", "nan") for cell in cells)}
+    lines = [f"| {_in_cell(experiment.config.axis)} | " + " | ".join(texts) + " |", "|---" * (1 + len(texts)) + "|"]
+    for k, row in enumerate(rows):
+        lines.append(f"| {_in_cell(row.name)} | " + " | ".join(cells[k] for cells in texts.values()) + " |")
+    return "\n".join(lines + [f"\nfailed, {row.name}: {reason}" for row in rows for reason in row.failed])
+
+
+def recordings_table(experiment: Experiment, rows: Sequence[RowSummary]) -> str:
+    """The mean error of every row on every recording."""
+    return _by_recording(experiment, rows, lambda row: row.by_recording)
+
+
+def iterations_table(experiment: Experiment, rows: Sequence[RowSummary]) -> str:
+    """The iterations a frame of every row on every recording."""
+    return _by_recording(experiment, rows, lambda row: row.iterations_by_recording)
+
+
+def _by_recording(
+    experiment: Experiment, rows: Sequence[RowSummary], values_of: Callable[[RowSummary], Mapping[str, float]]
+) -> str:
+    names = list(dict.fromkeys(name for row in rows for name in row.by_recording))
+    lines = [" | ".join([_in_cell(experiment.config.axis), *names]), "|".join(["---"] * (1 + len(names)))]
+    for row in rows:
+        values = values_of(row)
+        lines.append(" | ".join([_in_cell(row.name), *(f"{values[n]:.1f}" if n in values else "" for n in names)]))
+    return "\n".join(f"| {line} |" for line in lines)
+
+
+def difference_words(row: RowSummary) -> str:
+    """The difference to the reference with its interval, or that it does not show."""
+    if row.difference is None:
+        return "reference" if row.is_reference else ""
+    low, high = row.difference.interval
+    number = f"{row.difference.mean:+.1f}" + (f" ({low:+.1f} to {high:+.1f})" if np.isfinite(low) else "")
+    if row.difference.recordings == 1:
+        return f"one recording: {number}"
+    return number if row.difference.shows else f"does not show: {number}"
+
+
+def findings(experiment: Experiment, rows: Sequence[RowSummary]) -> list[str]:
+    """What the experiment says in words: the best rows, which differences show, and what the paper's best was."""
+    done = [row for row in rows if np.isfinite(row.mean)]
+    if not done or experiment.config.measure != "accuracy":
+        return []
+    compared = [row for row in done if row.difference is not None and row.difference.recordings > 1]
+    reference = next((row.name for row in rows if row.is_reference), "")
+    lines = _best(done)
+    for verb, names in (
+        ("show", [row.name for row in compared if row.difference is not None and row.difference.shows]),
+        ("do not show", [row.name for row in compared if row.difference is not None and not row.difference.shows]),
+    ):
+        lines += [f"Differences to {reference!r} that {verb}: {', '.join(names)}."] if names else []
+    papers = [row for row in rows if row.paper_value is not None]
+    if papers:
+        lines.append(f"The paper's best: {min(papers, key=lambda row: row.paper_value or 0.0).name}.")
+    return lines
+
+
+def _best(rows: Sequence[RowSummary]) -> list[str]:
+    """The rows of the smallest mean error on the recordings that all of them have."""
+    common = set.intersection(*(set(row.by_recording) for row in rows))
+    if len(rows) < 2 or not common:
+        return []
+    means = {row.name: float(np.mean([row.by_recording[name] for name in sorted(common)])) for row in rows}
+    least = min(means.values())
+    names = [name for name, mean in means.items() if round(mean, 1) == round(least, 1)]
+    return [f"Smallest mean error: {', '.join(names)} ({least:.1f} mm)."]
+
+
+def _done(row: RowSummary) -> bool:
+    return bool(row.by_recording)
+
+
+def _range(low: float, high: float) -> str:
+    return f"{low:.1f} to {high:.1f}"
+
+
+def _rate(row: RowSummary, stage: str) -> str:
+    return f"{row.rates.get(stage, float('nan')):.1f}"
+
+
+def _waiting(row: RowSummary) -> str:
+    return f"{1000.0 / row.rates.get('decode', float('nan')):.1f}"
+
+
+def _in_cell(text: str) -> str:
+    """Without what would end a cell of a table."""
+    return text.replace("|", "\\|")
