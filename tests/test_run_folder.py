@@ -141,7 +141,7 @@ def test_files_of_the_other_commands(capsys, tmp_path, monkeypatch):
         ("view", "motion=motion.npz", "recording=walk", "out=walk.bvh"),
     ):
         sentence = refused(capsys, *command)
-        assert "walk.bvh: is there already" in sentence
+        assert "walk.bvh: already exists" in sentence
         assert "overwrite=true" in sentence
     assert (tmp_path / "walk.bvh").read_text() == "mine"
     done(capsys, "export", "motion=motion.npz", "to=walk.bvh", "overwrite=true")
@@ -151,7 +151,7 @@ def test_files_of_the_other_commands(capsys, tmp_path, monkeypatch):
 def test_an_actor_file_that_is_there(capsys, tmp_path):
     recording = trackable(tmp_path / "walk")
     (tmp_path / "a.yaml").write_text("mine")
-    assert "is there already" in refused(capsys, "actor", f"recording={recording}", f"out={tmp_path / 'a.yaml'}")
+    assert "already exists" in refused(capsys, "actor", f"recording={recording}", f"out={tmp_path / 'a.yaml'}")
     assert (tmp_path / "a.yaml").read_text() == "mine"
 
 

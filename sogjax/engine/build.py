@@ -1,4 +1,4 @@
-"""From config objects to the modules of the core: the only place where both are known."""
+"""From settings to the modules of the core: the only place that knows both."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -27,7 +27,7 @@ from sogjax.track.scales import pose_scales
 from sogjax.track.tracker import PairChoice, Tracker
 
 MAX_DEPTH = 12
-"""Of a quad-tree: one pixel of the largest pictures that a camera takes."""
+"""Of a quad-tree: one pixel of the largest pictures cameras take."""
 OPTIMISTIX_METHODS = ("bfgs", "lbfgs", "nonlinear_cg")
 
 
@@ -43,7 +43,7 @@ def one_of(key: str, value: str, allowed: Sequence[str]) -> str:
 
 
 def at_least(key: str, value: float | int, bound: float | int) -> float | int:
-    """The value, if it is a number not below the bound.
+    """The value, if it is a finite number not below the bound.
 
     Raises:
         InputError: it is not.
@@ -65,10 +65,10 @@ def between(key: str, value: float | int, low: float | int, high: float | int) -
 
 
 def check(config: TrackConfig) -> None:
-    """Look at every setting before anything is done that takes time.
+    """Check every setting before any work begins.
 
     Raises:
-        InputError: a value that is no choice or out of range.
+        InputError: a value that is no valid choice or is out of range.
     """
     color_space_and_radius(config.color)
     energy_weights(config.energy)
@@ -160,7 +160,7 @@ def image_reader(recording: Recording, grids: tuple[CellGrid, ...], config: Trac
     """What turns the cells of a frame into image blobs.
 
     Raises:
-        InputError: plates are asked for, but a camera has none, or one of another size.
+        InputError: plates are requested, but a camera has none or one of the wrong size.
     """
     space, radius = color_space_and_radius(config.color)
     candidates = Candidates.from_grids(grids, device_cameras(recording))
@@ -193,12 +193,12 @@ def tracker(recording: Recording, body: Body, grids: tuple[CellGrid, ...], confi
 
 
 def confidence(config: OutputsConfig) -> Laplace | None:
-    """How standard deviations are found; None: they are not wanted."""
+    """How standard deviations are found; None: they are not computed."""
     return Laplace(at_least("outputs.temperature", config.temperature, 1e-12)) if config.confidence else None
 
 
 def varied(tracker: Tracker, config: TrackConfig) -> Tracker:
-    """A tracker with the numbers of another config that looks at the same pictures in the same colours."""
+    """The same tracker with the numbers of other settings; pictures and colour space must be the same."""
     reader = replace(
         tracker.reader,
         color_radius=color_space_and_radius(config.color)[1],
@@ -228,7 +228,7 @@ def _plate_colors(
     """Colours of the quad-tree nodes of the empty background.
 
     Raises:
-        InputError: plates are asked for, but a camera has none, or one of another size.
+        InputError: plates are requested, but a camera has none or one of the wrong size.
     """
     missing = [name for name in recording.rig.names if name not in recording.background]
     if config.use_plates is False or (config.use_plates is None and missing):

@@ -1,4 +1,4 @@
-"""The cells of a recording's frames for a command: from the cache where there is one, else from the videos."""
+"""The cells of a recording's frames, from the cache if there is one, else from the videos."""
 
 from collections.abc import Iterator
 
@@ -15,9 +15,9 @@ from sogjax.settings import ImagesConfig
 
 
 def picture_reader(images: ImagesConfig) -> PictureReader:
-    """What reads the pictures of a recording: kept cells where they are enough, else the videos, whose cells are kept.
+    """A reader of pictures that uses cached cells where they suffice, and else decodes the videos and caches the cells.
 
-    Reading raises an InputError where a picture cannot be read, or the cache's folder cannot be written.
+    Reading raises an InputError if a picture cannot be read or the cache's folder cannot be written.
     """
     folder = images.cache
     if folder is None:
@@ -25,7 +25,7 @@ def picture_reader(images: ImagesConfig) -> PictureReader:
 
     def read(recording: Recording, preparation: Preparation, first: int, last: int) -> Iterator[list[Picture]]:
         if not recording.complete:
-            say("images.cache: no cells are kept of a recording in which cameras are missing for a while")
+            say("images.cache: not used for this recording, since cameras are missing in some frames")
             return read_prepared(recording, preparation, first, last)
         cache = cell_cache(folder, recording, images.depth, say)
         kept = cache.find(first, last)
@@ -38,7 +38,7 @@ def picture_reader(images: ImagesConfig) -> PictureReader:
 
 
 def pictures_of(clip: CellsOfClip) -> Iterator[list[Picture]]:
-    """Pictures of which nothing but cells is known."""
+    """Pictures of which only the cells are known."""
     for cells in clip:
         yield [Picture(np.asarray(of_camera), None, None, 0.0) for of_camera in cells]
 
@@ -51,14 +51,14 @@ def cells_of(pictures: list[Picture]) -> Cells:
 def cells_of_clip(
     recording: Recording, grids: tuple[CellGrid, ...], images: ImagesConfig, frames: tuple[int, int]
 ) -> CellsOfClip:
-    """Those of all frames at once; memory-mapped where they are kept.
+    """The cells of all frames at once; memory-mapped if they are cached.
 
     Raises:
-        InputError: cameras are missing for a while.
+        InputError: cameras are missing in some frames.
     """
     if not recording.complete:
         raise InputError(
-            f"{recording.path}: cameras are missing for a while, which sweep=vmapped does not know of; leave it out"
+            f"{recording.path}: cameras are missing in some frames, but a whole clip of cells needs all of them"
         )
     if images.cache is not None:
         kept = cell_cache(images.cache, recording, images.depth, say).find(*frames)

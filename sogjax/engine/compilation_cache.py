@@ -1,4 +1,4 @@
-"""Compiled programs on disk, where a person asks for it: the next start is quicker."""
+"""Compiled programs kept on disk on request, so that the next start is quicker."""
 
 import hashlib
 import os
@@ -9,13 +9,13 @@ from pathlib import Path
 from sogjax.errors import InputError
 
 VARIABLE = "SOGJAX_COMPILATION_CACHE"
-"""The environment variable that names the folder."""
+"""The environment variable with the folder."""
 
 
 def use_compilation_cache() -> None:
-    """Keep compiled programs in the folder that the environment names, if it does.
+    """Keep compiled programs in the folder that the environment variable names, if it is set.
 
-    Each version of jaxlib and each kind of processor has a folder of its own there: programs of one may fail on
+    Each version of jaxlib and each kind of processor has its own subfolder: a program compiled for one may fail on
     another.
 
     Raises:
@@ -38,7 +38,7 @@ def use_compilation_cache() -> None:
 
 
 def _processor() -> str:
-    """A short name for the kind of processor and what it can do."""
+    """A short name for the kind of processor and its features."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

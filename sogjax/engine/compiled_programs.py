@@ -1,7 +1,7 @@
-"""Compiled programs are forgotten before there are more of them than a process may hold.
+"""Compiled programs are dropped before a process holds more of them than it may.
 
-Each takes some memory maps, of which Linux allows a process 65530 by default; a process that has used them up does not
-get an error that could be caught, but ends. A study or sweep of many settings that each need a program gets there.
+Each program takes some memory maps, of which Linux allows a process 65530 by default. A process that runs out of them
+is ended without an error that could be caught. Studies and sweeps over many settings can get that far.
 """
 
 import gc
@@ -10,14 +10,14 @@ from pathlib import Path
 import jax
 
 FULL = 0.4
-"""Share of the maps that are allowed, from which on programs are forgotten; one run may need a tenth."""
+"""Share of the allowed maps above which programs are dropped; one run may need a tenth."""
 _MAPS, _MOST = Path("/proc/self/maps"), Path("/proc/sys/vm/max_map_count")
 
 
 def forget_programs_if_many(maps: Path = _MAPS, most: Path = _MOST) -> bool:
-    """Forget all compiled programs where the process has used up many of its maps; whether that was so.
+    """Drop all compiled programs if the process has used many of its memory maps; returns whether it did.
 
-    They are compiled again when they are needed. Where the system does not tell, nothing is done.
+    They are compiled again when needed. Does nothing where the system does not report its maps.
     """
     try:
         with maps.open("rb") as lines:

@@ -23,14 +23,14 @@ from sogjax.track.pose_search import FoundPose, search_poses
 
 AUTO = "auto"
 SURE = 0.005
-"""A margin below this is said with a warning."""
+"""A margin below this gets a warning."""
 
 
 def initial_pose_file(recording: Recording, config: TrackConfig) -> Path | None:
     """The file with rough poses; None: they are searched for.
 
     Raises:
-        InputError: a file is asked for that is not there.
+        InputError: the requested file does not exist.
     """
     if config.initial_pose == AUTO:
         return None
@@ -45,10 +45,10 @@ def initial_pose_file(recording: Recording, config: TrackConfig) -> Path | None:
 def first_poses(
     recording: Recording, bodies: Sequence[Body], config: TrackConfig, frame: int
 ) -> list[Float[Array, "dof"]]:
-    """The poses in a frame (counted from the recording's first) of bodies that stand upright in its world.
+    """The poses of bodies, upright in the recording's world, in a frame counted from the recording's first.
 
     Raises:
-        InputError: something in the file is wrong, or nothing of an actor is found in the pictures.
+        InputError: the file is invalid, or an actor is not found in the pictures.
     """
     path = initial_pose_file(recording, config)
     if path is None:
@@ -56,10 +56,10 @@ def first_poses(
         for body, pose in zip(bodies, found, strict=True):
             say(f"first pose of {body.name} found; the next different one is {100.0 * pose.margin:.1f} % worse")
             if pose.margin < SURE:
-                say(f"warning: that is not sure; look at the first frame of the overlay, or write {_remedy(recording)}")
+                say(f"warning: uncertain; check the first frame of the overlay, or write {_remedy(recording)}")
         return [pose.pose for pose in found]
     if frame + recording.first_frame > 0:
-        say(f"warning: the rough pose of {path} is taken for frame {frame + recording.first_frame}")
+        say(f"warning: the rough pose of {path} is used for frame {frame + recording.first_frame}")
     descriptions = load_initial_poses(path, [body.name for body in bodies])
     poses = []
     for body in bodies:
@@ -71,10 +71,10 @@ def first_poses(
 
 
 def searched_poses(recording: Recording, bodies: Sequence[Body], config: TrackConfig, frame: int) -> list[FoundPose]:
-    """The poses that suit the pictures of a frame best, in the order of the bodies.
+    """The poses that fit the pictures of a frame best, in the order of the bodies.
 
     Raises:
-        InputError: the pictures show nothing of an actor's colours where cameras see it.
+        InputError: the pictures show nothing in an actor's colours where the cameras look.
     """
     recording, pictures = _seen(recording, frame)
     depths = levels(config.images.depth)

@@ -1,4 +1,4 @@
-"""One run of the tracker over a recording: what it needs, what comes of it, and the way from one to the other."""
+"""One run of the tracker over a recording: what it needs, and how its result is made."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -32,12 +32,12 @@ from sogjax.settings import OutputsConfig, TrackConfig
 from sogjax.track.tracker import Tracker, compile_counts, track
 
 FRAMES_BEHIND = 8
-"""Tracked frames that wait to be written."""
+"""Tracked frames waiting to be written, at most."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """All that must be known before a recording is tracked."""
+    """Everything needed before tracking begins."""
 
     recording: Recording
     bodies: list[Body]
@@ -53,7 +53,7 @@ class Job:
     def from_config(
         cls, recording: Recording, bodies: list[Body], config: TrackConfig, kept: KeptRun | None = None
     ) -> "Job":
-        """To track actors (in their own upright frames) in a recording, from the first pose that was kept, if any."""
+        """The job of tracking actors (in their own upright frames), from the first pose that was kept, if any."""
         bodies = [upright(body, recording) for body in bodies]
         frames = frame_range(recording, config)
         grids = build.cell_grids(recording, config.images.depth)
@@ -77,7 +77,7 @@ def tracking(
     out: Path,
     kept: KeptRun | None = None,
 ) -> Iterator[Run]:
-    """Track, going on with what was kept; within the block the motions are in files that go when it ends well."""
+    """Track, resuming what was kept; the motions are in files that are removed when the block ends without an error."""
     job = Job.from_config(recording, bodies, config, kept)
     with run_job(job, outputs, out, picture_reader(config.images), kept=kept) as result:
         yield result
@@ -92,14 +92,14 @@ def run_job(
     follow: FrameTracker = track,
     kept: KeptRun | None = None,
 ) -> Iterator[Run]:
-    """The same, with what reads the pictures and what tracks their cells."""
+    """Run a job, with a reader of pictures and a tracker of their cells."""
     first, last = job.frames
     times = StageTimes()
     prefix = None if kept is None else kept.prefix(readable_frames(out, job.bodies), last - first)
     num_kept = 0 if prefix is None else prefix.num_frames
     streams = Streams(out, job.recording, job.bodies, job.recording.first_frame + first, outputs, times, kept, num_kept)
     if prefix is not None:
-        say(f"{out}: {num_kept} of {counted(last - first, 'frame')} are there; the run goes on behind them")
+        say(f"{out}: {num_kept} of {counted(last - first, 'frame')} are done; resuming after them")
         follow = resumed(prefix, shown=not streams.num_skipped, with_images=outputs.rerun)
     used: list[float] = []
     missing = Counter(job.recording.num_missing(range(first, first + streams.num_skipped)))
@@ -136,7 +136,7 @@ def frame_range(recording: Recording, config: TrackConfig) -> tuple[int, int]:
     """First frame to track and the one after the last, counted from the recording's first.
 
     Raises:
-        InputError: nothing lies between them.
+        InputError: there is no frame between them.
     """
     last = recording.num_frames if config.stop is None else config.stop
     if not 0 <= config.start < last <= recording.num_frames:

@@ -1,4 +1,4 @@
-"""What a run keeps on disk beside its motion, so that it can go on to the very end that it would have had."""
+"""What a run keeps on disk beside its motion, so that it can be resumed with the same result."""
 
 import json
 import shutil
@@ -38,10 +38,10 @@ _NEEDED = {*COLUMNS, *TERMS, *(CAPACITY.format(name) for name in CAPACITIES)}
 
 @dataclass(frozen=True)
 class Prefix:
-    """The frames that were tracked already."""
+    """The frames that were already tracked."""
 
     rows: dict[str, np.ndarray]
-    """What was kept of each."""
+    """What was kept of each frame."""
 
     @property
     def num_frames(self) -> int:
@@ -54,14 +54,14 @@ class Prefix:
         return Capacities(*(int(self.rows[CAPACITY.format(name)][-1]) for name in CAPACITIES))
 
     def state(self, start: Float[Array, "dof"]) -> TrackState:
-        """The tracker's state behind them, if it began at `start`."""
+        """The tracker's state after these frames, if it began at `start`."""
         state = TrackState.from_pose(start)
         for pose in self.rows["pose"][-2:]:
             state = state.advanced(jnp.asarray(pose))
         return state
 
     def result(self, frame: int, images: Sog) -> FrameResult:
-        """What was found in one of them; image blobs are not kept."""
+        """The result of one frame; image blobs are not kept."""
         values = {name: jnp.asarray(column[frame]) for name, column in self.rows.items()}
         sure = {name: values[key] for key, name in DEVIATIONS.items() if key in values}
         return FrameResult(
@@ -73,9 +73,9 @@ class Prefix:
 
 
 class KeptRun:
-    """The folder `run.partial`: what the run is made from, its actors, its first pose, what was found in each frame.
+    """The folder `run.partial`: the origin of a run, its actors, its first pose, and the result of each frame.
 
-    Each is written as soon as it is known, so a run that was killed at any moment finds again what it had.
+    Each is written as soon as it is known, so a run can be killed at any moment and resumed.
 
     Args:
         folder: of the results.
@@ -88,19 +88,19 @@ class KeptRun:
         self.folder = folder / FOLDER
         self._log: ArrayLog | None = None
         self.num_kept = 0
-        """Frames of an earlier process that are gone on from."""
+        """Frames that an earlier process tracked."""
 
     @property
     def note(self) -> dict[str, Any]:
-        """The command that began the run, and what it was made from; nothing where none was begun."""
+        """The command that began the run and its origin; empty if none was begun."""
         return read_note(self.folder / NOTE)
 
     def begin(self, command: str, origin: Origin) -> None:
-        """Note what the run is made from."""
+        """Write down the command and the origin of the run."""
         write_note(self.folder / NOTE, {"command": command, "origin": origin})
 
     def keep_actors(self, bodies: Sequence[Body]) -> None:
-        """Keep actors that were made, exactly: their files hold rounded colours."""
+        """Keep estimated actors exactly; their files hold rounded colours."""
         arrays = {}
         for k, body in enumerate(bodies):
             save_body(self.folder / f"{ACTOR}_{k}.yaml", body)
@@ -130,9 +130,9 @@ class KeptRun:
         return None if kept is None else jnp.asarray(finite_array(self.folder / START, kept, "start", (None,)))
 
     def prefix(self, readable: int, total: int) -> Prefix | None:
-        """The frames to go on from: at most `readable` of `total`, as many as a run writes at once.
+        """The frames to resume after: at most `readable` of `total`, a multiple of the frames written at once.
 
-        So the frames after them are written in the same blocks as in a run that was not stopped.
+        So the frames after them are written in the same blocks as in an uninterrupted run.
         """
         rows = None
         with suppress(InputError):
@@ -147,7 +147,7 @@ class KeptRun:
         return Prefix({name: column[:count] for name, column in rows.items()})
 
     def append(self, frames: Sequence[TrackedFrame]) -> None:
-        """Keep what was found in the frames that follow."""
+        """Keep the results of the frames that follow."""
         rows = _rows(frames)
         if self._log is None:
             self._log = ArrayLog(self.folder, {}, rows, self.num_kept)
@@ -160,13 +160,13 @@ class KeptRun:
             self._log.close()
 
     def remove(self) -> None:
-        """Remove the folder, when the run has ended."""
+        """Remove the folder once the run has ended."""
         self.close()
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
 def read_note(path: Path) -> dict[str, Any]:
-    """What `write_note` wrote; nothing where there is no such file."""
+    """What `write_note` wrote; empty if there is no such file."""
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -199,10 +199,10 @@ def _save(path: Path, arrays: dict[str, np.ndarray]) -> None:
 
 
 def _leaf(path: Path, arrays: dict[str, np.ndarray], key: str, like: Any) -> Array:
-    """An array of an actor that is made as `like`."""
+    """An array of an actor, with the shape and type of `like`."""
     kept = arrays.get(key)
     if kept is None or (kept.shape, kept.dtype) != (like.shape, like.dtype):
-        raise InputError(f"{path}: {key!r} is not that of the actor beside it; begin anew with overwrite=true")
+        raise InputError(f"{path}: {key!r} does not match the actor beside it; start over with overwrite=true")
     return jnp.asarray(kept)
 
 

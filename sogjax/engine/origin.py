@@ -1,4 +1,4 @@
-"""What the frames of a run depend on, so that a run is only gone on with by the settings and files that began it."""
+"""What the poses of a run depend on: a run is only resumed with the settings and files that began it."""
 
 import hashlib
 from collections.abc import Sequence
@@ -20,16 +20,16 @@ from sogjax.settings import TrackConfig
 
 PACKAGES = ("jax", "jaxlib", "numpy", "equinox", "optimistix", "opencv-python-headless")
 NO_MATTER = ("recording", "out", "actor", "cameras", "outputs", "resume", "overwrite", "images.cache")
-"""Settings that change no pose, or whose files are compared instead of their names."""
+"""Settings that change no pose, or whose files are compared instead."""
 SHOWN = 60
-"""Characters of a value that a sentence may hold."""
+"""Longest value that is quoted in a sentence, characters."""
 
 Origin = dict[str, Any]
 """By a short description: what can be stored as JSON, and must be equal."""
 
 
 def origin_of(recording: Recording, config: TrackConfig, given_actors: Sequence[Body] | None) -> Origin:
-    """All that the poses of a run depend on; `given_actors` are None where they are made from the example poses."""
+    """Everything the poses of a run depend on; `given_actors` is None if they are made from the example poses."""
     poses = initial_pose_file(recording, config)
     return {
         "sogjax": sogjax.__version__,
@@ -46,7 +46,7 @@ def origin_of(recording: Recording, config: TrackConfig, given_actors: Sequence[
 
 
 def difference(before: Origin, now: Origin) -> str | None:
-    """The first thing that is not the same, in words; None: all is."""
+    """The first difference, in words; None: there is none."""
     for key in (*now, *before):
         was, is_now = before.get(key), now.get(key)
         if was != is_now:
@@ -56,7 +56,7 @@ def difference(before: Origin, now: Origin) -> str | None:
 
 
 def digest(arrays: Any) -> str:
-    """Of everything in a tree of arrays and names, to the bit."""
+    """Digest of a tree of arrays and names, exact to the bit."""
     content = hashlib.sha256(str(jax.tree.structure(arrays)).encode())
     for leaf in map(np.asarray, jax.tree.leaves(arrays)):
         content.update(f"{leaf.dtype}{leaf.shape}".encode() + leaf.tobytes())

@@ -1,4 +1,4 @@
-"""What a run leaves in its folder when it has ended: motion, configuration, metrics, BVH."""
+"""The files of a run that are written when it has ended: motion, configuration, metrics, BVH."""
 
 import uuid
 from collections.abc import Iterator, Sequence
@@ -24,12 +24,12 @@ from sogjax.settings import OutputsConfig
 
 @contextmanager
 def results_folder(path: Path) -> Iterator[Path]:
-    """The folder for results, made if it is not there; found out before the work begins, not after.
+    """The folder for results, created if missing; problems show before the work begins.
 
-    When the work ends with an error, the folders made for it are removed, unless there is something in them.
+    If the work ends with an error, folders created for it are removed unless they hold something.
 
     Raises:
-        InputError: it cannot be made or written.
+        InputError: it cannot be created or written.
     """
     made = [folder for folder in (path, *path.parents) if not folder.exists()]
     try:
@@ -54,19 +54,19 @@ def _make_writable(path: Path) -> None:
 
 
 def free_path(key: str, value: str | Path, overwrite: bool) -> Path:
-    """The path of an output, if nothing is there yet or it may be replaced.
+    """The path of an output, if it is free or may be replaced.
 
     Raises:
-        InputError: something is there.
+        InputError: a file exists there.
     """
     path = Path(value)
     if path.exists() and not overwrite:
-        raise InputError(f"{key}={path}: is there already; choose another name, or give overwrite=true to replace it")
+        raise InputError(f"{key}={path}: already exists; choose another name, or give overwrite=true to replace it")
     return path
 
 
 def export_endings(wanted: OutputsConfig) -> list[str]:
-    """The file endings in which motions are written, beside motion.npz.
+    """The formats of motions to write beside motion.npz, as file endings.
 
     Raises:
         InputError: a format that cannot be written.
@@ -82,7 +82,7 @@ def export_endings(wanted: OutputsConfig) -> list[str]:
 
 
 def write_results(result: Run, out: Path, wanted: OutputsConfig, config: Any, made_actors: Sequence[Body]) -> None:
-    """Write what needs whole motions; each file appears under its name only when it is whole."""
+    """Write the files that need whole motions; each appears under its name only when complete."""
     names = list(result.motions)
     streamed, result.files = result.files, []
     for actor in made_actors:
@@ -105,19 +105,19 @@ def write_results(result: Run, out: Path, wanted: OutputsConfig, config: Any, ma
 
 
 def actor_name(path: Path, motion: Motion) -> str:
-    """Whose motion a file holds: what it says itself, else what its name says, as `motion_NAME.npz` does."""
+    """Whose motion a file holds: as stated in the file, else by its name (`motion_NAME.npz`)."""
     return motion.actor or path.stem.removeprefix("motion").removeprefix("_") or "actor"
 
 
 def evaluate(result: Run) -> None:
-    """Compare with the ground truth, where there is one."""
+    """Compare with the ground truth, if there is one."""
     if result.recording.ground_truth is None:
         return
     truth = load_ground_truth(result.recording.ground_truth)
     if len(result.motions) > 1 and not set(result.motions) <= set(truth.subjects):
-        say(f"warning: {result.recording.ground_truth} knows {', '.join(truth.subjects)}; nothing is compared")
+        say(f"warning: {result.recording.ground_truth} knows {', '.join(truth.subjects)}; nothing was compared")
         return
     try:
         result.evaluation = evaluate_motions(result.motions, truth)
     except InputError as error:
-        say(f"warning: nothing is compared: {error}")
+        say(f"warning: not compared with the truth: {error}")

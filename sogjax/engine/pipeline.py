@@ -1,4 +1,4 @@
-"""The stages of tracking beside each other: decoding and averaging, the tracking step, writing."""
+"""The stages of tracking, running concurrently: decoding and averaging, the tracking step, writing."""
 
 import time
 from collections import deque
@@ -20,10 +20,10 @@ from sogjax.track.frame import FrameCells, PartialCells, TrackedFrame
 from sogjax.track.tracker import Tracker, track
 
 FRAMES_AHEAD = 3
-"""Frames that wait for the tracking step, beside the one that is being decoded."""
+"""Decoded frames waiting for the tracking step, at most."""
 
 PictureMaker = Callable[[int, np.ndarray], np.ndarray | bytes | None]
-"""Of the number of a camera and its picture (BGR)."""
+"""Called with the index of a camera and its picture (BGR)."""
 
 
 class Picture(NamedTuple):
@@ -36,7 +36,7 @@ class Picture(NamedTuple):
     jpeg: np.ndarray | bytes | None
     """For the Rerun file."""
     seconds: float
-    """That the cells took."""
+    """Time taken by the cells."""
 
 
 class FrameDone(NamedTuple):
@@ -47,15 +47,15 @@ class FrameDone(NamedTuple):
 
 
 PictureReader = Callable[[Recording, "Preparation", int, int], Iterator[list[Picture]]]
-"""Of a recording, what to make of each picture, the first frame and the one after the last."""
+"""Called with a recording, what to make of each picture, the first frame and the one after the last."""
 
 
 FrameTracker = Callable[[Tracker, Float[Array, "dof"], Iterable[FrameCells]], Iterator[TrackedFrame]]
-"""What finds the poses of frames from their cells, one after the other, as `sogjax.track.tracker.track` does."""
+"""Finds the poses of frames from their cells in turn, as `sogjax.track.tracker.track` does."""
 
 
 def nothing(camera: int, image: np.ndarray) -> None:
-    """Made of a picture that no output shows."""
+    """Made of a picture that no output needs."""
 
 
 @dataclass(frozen=True)
@@ -68,11 +68,11 @@ class Preparation:
 
     @property
     def cells_only(self) -> bool:
-        """Whether cells are all that is needed."""
+        """Whether only the cells are needed."""
         return self.tile is nothing and self.jpeg is nothing
 
     def __call__(self, camera: int, image: np.ndarray | None) -> Picture:
-        """The cells of a picture, and what outputs need of it; nothing where there is none."""
+        """The cells of a picture and what the outputs need of it; empty if there is no picture."""
         if image is None:
             return Picture(None, None, None, 0.0)
         begin = time.perf_counter()
@@ -85,11 +85,11 @@ def cells_of_frame(cells: Sequence[UInt8[np.ndarray, "rows columns 3"] | None]) 
     """The cells of all cameras; None: a camera is missing.
 
     Raises:
-        InputError: all are.
+        InputError: all cameras are missing.
     """
     some = next((of_camera for of_camera in cells if of_camera is not None), None)
     if some is None:
-        raise InputError("a frame has no picture of any camera; track the frames before or behind it (start=, stop=)")
+        raise InputError("a frame has no picture from any camera; track the frames before or after it (start=, stop=)")
     stacked = np.stack([np.zeros_like(some) if of_camera is None else of_camera for of_camera in cells])
     present = np.array([of_camera is not None for of_camera in cells])
     return stacked if present.all() else PartialCells(stacked, present)
@@ -103,7 +103,7 @@ def tracked_frames(
     times: StageTimes,
     follow: FrameTracker = track,
 ) -> Generator[FrameDone, None, None]:
-    """Track `count` frames, while a thread takes the pictures of those that follow.
+    """Track `count` frames, while a thread reads the pictures of later ones.
 
     Raises:
         InputError: a video ends early, or a picture has too many image blobs.

@@ -20,10 +20,10 @@ from sogjax.settings import ColorConfig, EnergyConfig
 
 
 def opened(path: str, cameras: Sequence[str] | None = None) -> Recording:
-    """A recording, with some of its cameras or all, its warnings said.
+    """A recording with some or all of its cameras; its warnings are printed.
 
     Raises:
-        InputError: anything wrong with it, or a camera that it does not have.
+        InputError: the recording is invalid, or lacks one of the cameras.
     """
     recording = open_recording(Path(path))
     for warning in recording.warnings:
@@ -43,10 +43,10 @@ def opened(path: str, cameras: Sequence[str] | None = None) -> Recording:
 
 
 def body_named(name: str) -> Body:
-    """A body that comes with the program, or one from a file.
+    """A bundled body, or one from a file.
 
     Raises:
-        InputError: neither.
+        InputError: there is neither.
     """
     path = Path(name)
     return load_body(path if path.is_file() else named_body(name))
@@ -59,10 +59,10 @@ def file_list(value: Any) -> list[Path]:
 
 
 def actors_of(recording: Recording, files: Any, body: str, color: ColorConfig) -> tuple[list[Body], bool]:
-    """The actors of a recording and whether they were made just now from its example poses.
+    """The actors of a recording, and whether they were just made from its example poses.
 
     Raises:
-        InputError: a wrong actor file; two actors of one name; example poses that do not suffice.
+        InputError: an invalid actor file, two actors with one name, or unsuitable example poses.
     """
     if files is not None:
         actors = [load_body(path) for path in file_list(files)]
@@ -80,7 +80,7 @@ def actors_of(recording: Recording, files: Any, body: str, color: ColorConfig) -
 
 @cache
 def _made_actor(path: str, cameras: tuple[str, ...], body: str, subject: str | None, space: str) -> Body:
-    """The actor of a recording; made once a process, so that the members of a sweep share it."""
+    """The actor of a recording, made once per process: the members of a sweep share it."""
     recording = open_recording(Path(path))
     recording = replace(recording, rig=recording.rig.select(cameras))
     label = "actor" if subject is None else f"actor {subject}"

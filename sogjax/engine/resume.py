@@ -1,4 +1,4 @@
-"""A tracker that goes on where another process stopped."""
+"""A tracker that resumes where another process stopped."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -18,12 +18,12 @@ Frames = Iterable[FrameCells]
 
 
 def resumed(prefix: Prefix, shown: bool, with_images: bool) -> FrameTracker:
-    """Tracks the frames behind a prefix, in whose place it can be put where the whole clip is tracked.
+    """Tracks the frames after a prefix; replaces a tracker of the whole clip.
 
     Args:
-        prefix: the frames that were tracked already.
-        shown: the frames that come begin with those of the prefix, which outputs show; their poses are those found.
-        with_images: find their image blobs again, too.
+        prefix: the frames that were already tracked.
+        shown: whether the frames given begin with those of the prefix, which outputs show with the poses found.
+        with_images: whether to compute their image blobs again.
     """
 
     def follow(tracker: Tracker, start: Float[Array, "dof"], frames: Frames) -> Iterator[TrackedFrame]:
@@ -39,7 +39,7 @@ def resumed(prefix: Prefix, shown: bool, with_images: bool) -> FrameTracker:
 def _again(
     prefix: Prefix, tracker: Tracker, start: Float[Array, "dof"], frames: Frames, with_images: bool
 ) -> Iterator[TrackedFrame]:
-    """The frames of a prefix; they take no time."""
+    """The frames of a prefix, without tracking them."""
     state, capacities = TrackState.from_pose(start), prefix.capacities
     for index, frame in enumerate(frames):
         cells, present = on_device(frame)

@@ -1,4 +1,4 @@
-"""A run of the tracker over a recording: what came of it."""
+"""The result of tracking a recording."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,15 +15,15 @@ from sogjax.model.body import Body
 
 @dataclass
 class Run:
-    """A recording that was tracked, and what came of it."""
+    """A tracked recording and its motions."""
 
     recording: Recording
     bodies: list[Body]
-    """The actors, upright in the recording's world; none where the run had ended before."""
+    """The actors, upright in the recording's world; none if the run had ended before."""
     motions: dict[str, Motion]
     times: StageTimes
     image_blobs: float
-    """Used in a frame by a camera, on average."""
+    """Used per frame and camera, on average."""
     evaluation: GroupEvaluation | None = None
     missing: dict[str, int] = field(default_factory=dict)
     """Frames of the motion in which a camera had no picture, by camera."""

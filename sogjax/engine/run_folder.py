@@ -1,4 +1,4 @@
-"""The folder of a run: one run at a time in it, nothing overwritten unasked, nothing of an older run left in it."""
+"""The folder of a run: one run at a time, nothing overwritten unasked, nothing left of an older run."""
 
 import os
 import re
@@ -21,13 +21,13 @@ except ImportError:  # Windows: two runs in one folder are not noticed there
 
 LOCK = ".lock"
 REPLACING_THEIR_OWN = ("demo",)
-"""Commands that show something and can do so again: an earlier run of theirs is replaced unasked."""
+"""Commands whose own earlier runs are replaced unasked, since they can be repeated."""
 PARTIAL = ("motion.partial", "motion_*.partial", FOLDER)
 """Folders of a run that has not ended."""
 RESULTS = (*(f"motion{ending}" for ending in WRITERS), "config.yaml", "metrics.json", "overlay.mp4", "motion.rrd", NOTE)
 """Names of files that every run leaves."""
 OF_ACTORS = tuple(f"motion_*{ending}" for ending in WRITERS)
-"""Names of several actors' files. A user's own may be called so: they go only where a run's note lists them."""
+"""Names of several actors' files. A user's own files may match: only those listed in a run's note are removed."""
 _HALF_WRITTEN = re.compile(
     r"\.(motion|overlay|config|metrics|run|actor)(_.*)?\.[0-9a-f]{8}\.tmp(\..*)?|\.probe-[0-9a-f]*"
 )
@@ -37,7 +37,7 @@ class RunFolder:
     """A folder that is claimed by this run.
 
     Raises:
-        InputError: it holds the results of another run, and they are neither to be overwritten nor to be gone on with.
+        InputError: it holds the results of another run, which may be neither overwritten nor resumed.
     """
 
     def __init__(self, path: Path, overwrite: bool, resume: bool, command: str):
@@ -45,13 +45,13 @@ class RunFolder:
         if overwrite and resume:
             raise InputError("overwrite=true resume=true: exclude each other; leave one of them out")
         self.note = read_note(path / NOTE)
-        """Of a run that has ended."""
+        """Note of a run that has ended."""
         self.kept = KeptRun(path)
-        """Of one that was stopped."""
+        """State of a run that was stopped."""
         begun_by = (self.note or self.kept.note).get("command")
         self._resume = resume
         self.began = False
-        """Whether a run was begun here just now."""
+        """Whether this process began a run here."""
         overwrite = overwrite or (command in REPLACING_THEIR_OWN and begun_by == command)
         found = earlier_results(path, self.note) or sorted(_named(path, OF_ACTORS))
         if not found or overwrite:
@@ -60,11 +60,11 @@ class RunFolder:
         unfinished = (path / FOLDER).is_dir()
         if resume and not (unfinished or self.note):
             raise InputError(
-                f"{path}: holds results ({names}) but not what a run needs to go on; choose another folder with "
+                f"{path}: holds results ({names}) but not the state needed to resume; choose another folder with "
                 "out=DIR, or give overwrite=true instead of resume=true"
             )
         if not resume:
-            remedy = "resume=true to go on with it, or overwrite=true" if unfinished else "overwrite=true"
+            remedy = "resume=true to resume it, or overwrite=true" if unfinished else "overwrite=true"
             raise InputError(
                 f"{path}: holds the results of an earlier run ({names}); choose another folder with out=DIR, or give "
                 f"{remedy}"
@@ -72,20 +72,20 @@ class RunFolder:
 
     @property
     def ended(self) -> bool:
-        """Whether the run that is to be gone on with has ended."""
+        """Whether the run to resume has already ended."""
         return self._resume and bool(self.note)
 
     def goes_on(self, origin: Origin) -> bool:
-        """Whether this run goes on with one that was begun here, with the same settings and files.
+        """Whether this run resumes one that was begun here with the same settings and files.
 
         Raises:
-            InputError: it was begun with something else.
+            InputError: it was begun with other settings or files.
         """
         if not self._resume:
             return False
         before = (self.note or self.kept.note).get("origin")
         if before is None:
-            say(f"{self.path}: there is nothing to go on from; the run begins with the first frame")
+            say(f"{self.path}: nothing to resume; starting with the first frame")
             return False
         self._check_same(before, origin)
         for path in half_written(self.path):
@@ -110,12 +110,12 @@ class RunFolder:
         what = difference(before, now)
         if what is not None:
             raise InputError(
-                f"{self.path}: resume=true cannot go on with the run that was begun there, because {what}; give the "
-                "same settings and files, or begin anew with overwrite=true"
+                f"{self.path}: resume=true cannot resume the run that was begun there, because {what}; give the "
+                "same settings and files, or start over with overwrite=true"
             )
 
     def _clear(self, needed: Sequence[Path]) -> None:
-        """Remove what an earlier run left, except files that this one reads."""
+        """Remove the files of an earlier run, except those that this one reads."""
         kept = {path.resolve() for path in needed}
         (self.path / NOTE).unlink(missing_ok=True)  # first: without it nothing is taken for whole
         for path in [*earlier_results(self.path, self.note), *half_written(self.path)]:
@@ -127,7 +127,7 @@ class RunFolder:
                 path.unlink(missing_ok=True)
 
     def finish(self, command: str, origin: Origin, files: Sequence[Path]) -> None:
-        """Note that the run has ended, and with which files; what it kept for going on may go then."""
+        """Write down that the run has ended, and its files."""
         for path in half_written(self.path):
             path.unlink(missing_ok=True)
         names = [path.name for path in files]
@@ -138,16 +138,16 @@ class RunFolder:
 def run_folder(
     path: Path, overwrite: bool = False, resume: bool = False, command: str = "track"
 ) -> Iterator[RunFolder]:
-    """The folder of this run, made where it is missing; no other run may use it within the block.
+    """The folder of this run, created if missing; no other run may use it within the block.
 
     Args:
         path: the folder.
-        overwrite: an earlier run's results in it may go.
-        resume: they are to be gone on with.
+        overwrite: whether the results of an earlier run may be replaced.
+        resume: whether to resume an earlier run.
         command: that runs.
 
     Raises:
-        InputError: it cannot be written, another run uses it, or it holds results that are to stay.
+        InputError: it cannot be written, another run uses it, or it holds results that must not be overwritten.
     """
     with results_folder(path), _locked(path):
         folder = RunFolder(path, overwrite, resume, command)
@@ -160,9 +160,9 @@ def run_folder(
 
 
 def earlier_results(folder: Path, note: dict) -> list[Path]:
-    """What a run left in a folder: folders of its unfinished state, and files by their names and by its note.
+    """What an earlier run left in a folder: its unfinished state, and files known by name or from its note.
 
-    A note is a file that anybody may have written: it names nothing but files of this very folder.
+    Anybody may have written the note, so only files in this very folder count.
     """
     if not folder.is_dir():
         return []
@@ -178,12 +178,12 @@ def _named(folder: Path, patterns: Sequence[str]) -> set[Path]:
 
 
 def half_written(folder: Path) -> list[Path]:
-    """Files under temporary names, which a run leaves where it was killed."""
+    """Files under temporary names, left by a run that was killed."""
     return [path for path in folder.iterdir() if _HALF_WRITTEN.fullmatch(path.name) and not path.is_dir()]
 
 
 def _remove_partial(path: Path) -> None:
-    """Remove a folder of an unfinished run; what is in it that is not a run's stays, and the folder with it."""
+    """Remove the folder of an unfinished run; it stays if it holds subfolders of somebody else's."""
     for file in path.iterdir():
         if not file.is_dir() or file.is_symlink():
             file.unlink()
@@ -193,7 +193,7 @@ def _remove_partial(path: Path) -> None:
 
 @contextmanager
 def _locked(folder: Path) -> Iterator[None]:
-    """Hold the folder's lock, which the system gives back however the process ends.
+    """Hold the folder's lock, which the system releases however the process ends.
 
     Raises:
         InputError: another run holds it.
@@ -211,7 +211,7 @@ def _locked(folder: Path) -> Iterator[None]:
 
 
 def _lock(path: Path) -> int:
-    """The open, locked file; one that another run removed meanwhile does not count."""
+    """The open, locked file; tried again if another run removed it meanwhile."""
     assert fcntl is not None
     while True:
         file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
@@ -221,7 +221,7 @@ def _lock(path: Path) -> int:
             holder = os.read(file, 32).decode(errors="replace") or "?"
             os.close(file)
             raise InputError(
-                f"{path.parent}: another run (process {holder}) writes there; wait until it has ended, or choose "
+                f"{path.parent}: another run (process {holder}) is writing there; wait until it has ended, or choose "
                 "another folder with out=DIR"
             ) from error
         except OSError:  # a file system without locks

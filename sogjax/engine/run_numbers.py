@@ -1,4 +1,4 @@
-"""A run in a few numbers, as a row of a table shows it."""
+"""A run in a few numbers, as in a row of a table."""
 
 import numpy as np
 
@@ -6,11 +6,11 @@ from sogjax.engine.run import Run
 
 COLUMNS = ("mean mm", "std mm", "joints mm", "lost", "swaps", "iterations", "not converged", "frames/s")
 OBJECTIVE = "mean mm"
-"""What a sweeper that searches makes least."""
+"""What a searching sweeper minimises."""
 
 
 class Numbers(dict[str, float]):
-    """The numbers of a member's row; as one number, what a search makes least."""
+    """The numbers of a run; as one number, what a search minimises."""
 
     def __float__(self) -> float:
         return float(self[OBJECTIVE])

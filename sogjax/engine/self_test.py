@@ -1,4 +1,4 @@
-"""Three laws that a sound installation keeps, tried in about five seconds: overlap, gradient, tracking step."""
+"""Three laws that hold in a sound installation, checked in about five seconds: overlap, gradient, tracking step."""
 
 from collections.abc import Callable
 
@@ -21,10 +21,10 @@ GRADIENT_TOLERANCE = 0.02
 STEP = 0.004
 """Metres, of the central difference."""
 DISPLACEMENT = (0.03, -0.02, 0.02)
-"""Metres by which the body is moved away, and from which the solver has to bring it back."""
+"""Metres by which the body is displaced; the solver must bring it back."""
 NUM_BLOBS = 20
 BACK = 0.003
-"""Metres from the true place that the solver may leave."""
+"""Metres that the solver may end from the true place."""
 
 
 def overlap_is_the_integral() -> str | None:
@@ -57,7 +57,7 @@ def gradient_is_the_slope() -> str | None:
 
 
 def body_finds_its_own_picture() -> str | None:
-    """A body that was moved away from its own pictures climbs back: nothing is more like a picture than itself."""
+    """A displaced body climbs back onto its own pictures: nothing resembles a picture more than itself."""
     objective = _objective()
     scales = Scales(jnp.array([0, 0, 0]), jnp.array([0.01]), jnp.array([0.05]))
     solver = OptimistixSolver("lbfgs", epsilon=1e-4, max_iterations=100)
@@ -72,11 +72,11 @@ LAWS: dict[str, Callable[[], str | None]] = {
     "gradient": gradient_is_the_slope,
     "tracking step": body_finds_its_own_picture,
 }
-"""Each gives a complaint, or None where it holds."""
+"""Each returns a complaint, or None if the law holds."""
 
 
 def _objective() -> Callable[[Float[Array, "3"]], Float[Array, ""]]:
-    """Similarity of a body with pictures of itself at the origin, by how far it is moved."""
+    """Similarity of a body with pictures of itself at the origin, as a function of its displacement."""
     cameras = jax.tree.map(lambda *leaves: jnp.stack(leaves), *[_camera(angle) for angle in (0.0, 1.6, 3.5)])
     blobs = _blobs()
     views = eqx.filter_jit(_own_views)(cameras, blobs)
@@ -97,7 +97,7 @@ def _own_views(cameras: Camera, blobs: Sog) -> Views:
 
 
 def _blobs() -> Sog:
-    """A subject of a person's size, each blob in a colour of its own, so that it fits its own picture only."""
+    """A subject the size of a person; each blob has its own colour, so it only fits its own picture."""
     rng = np.random.default_rng(0)
     means = rng.uniform([-0.3, -0.3, -0.8], [0.3, 0.3, 0.8], (NUM_BLOBS, 3))
     colors = rng.random((NUM_BLOBS, 3))

@@ -1,4 +1,4 @@
-"""What goes to disk while a recording is tracked: the motions, the overlay video and the Rerun file."""
+"""Files that grow while a recording is tracked: motions, overlay video and Rerun file."""
 
 import time
 from collections.abc import Iterator, Sequence
@@ -31,7 +31,7 @@ from sogjax.settings import OutputsConfig
 from sogjax.track.frame import FrameResult
 
 PARTIAL = ".partial"
-"""Ending of the folder with a motion that is not complete."""
+"""Ending of the folder of an incomplete motion."""
 
 
 def file_name(stem: str, ending: str, actor: str, num_actors: int) -> str:
@@ -40,12 +40,12 @@ def file_name(stem: str, ending: str, actor: str, num_actors: int) -> str:
 
 
 def partial_motions(folder: Path, bodies: Sequence[Body]) -> dict[str, Path]:
-    """The folders of the motions that are not complete, by actor."""
+    """The folders of the incomplete motions, by actor."""
     return {body.name: folder / file_name("motion", PARTIAL, body.name, len(bodies)) for body in bodies}
 
 
 def readable_frames(folder: Path, bodies: Sequence[Body]) -> int:
-    """How many frames of all motions an earlier process wrote."""
+    """How many frames an earlier process wrote of every motion."""
     counts = []
     for path in partial_motions(folder, bodies).values():
         try:
@@ -56,19 +56,19 @@ def readable_frames(folder: Path, bodies: Sequence[Body]) -> int:
 
 
 class Streams:
-    """The files of a run that grow with it, within a `with` block; only `consume` runs in another thread.
+    """The growing files of a run, within a `with` block; only `consume` runs in another thread.
 
-    Where the block is left by an error, the motions stay beside their final names (`motion.partial`), readable by every
-    command; overlay and Rerun file appear only when they are whole.
+    If the block ends with an error, the motions stay beside their final names (`motion.partial`), readable by every
+    command; overlay and Rerun file appear only when complete.
 
     Args:
         folder: of the results.
         recording: what is tracked.
         bodies: the actors, upright in the recording's world.
-        first_frame: of the motion, by the recording's own numbers.
+        first_frame: of the motion, in the recording's own numbering.
         wanted: which files.
-        times: takes the time of the stage `outputs`.
-        kept: where all that is found is kept, so that another process can go on.
+        times: where the time of the stage `outputs` is noted.
+        kept: where results are kept, so that another process can resume.
         num_kept: frames of the motion that an earlier process wrote.
     """
 
@@ -86,7 +86,7 @@ class Streams:
         self._recording, self._bodies, self._wanted, self._times = recording, bodies, wanted, times
         self._first_frame, self._first_new = first_frame, first_frame + num_kept
         self.num_skipped = 0 if wanted.overlay or wanted.rerun else num_kept
-        """Frames at the beginning that nothing is to be done with, as no output shows them."""
+        """Frames at the beginning that can be skipped, since no output shows them."""
         self._next_frame = first_frame + self.num_skipped
         self._logs = {name: MotionLog(path, num_kept) for name, path in partial_motions(folder, bodies).items()}
         self._folder, self._kept = folder, kept
@@ -94,7 +94,7 @@ class Streams:
         self._overlay: Any = None
         self._rerun: Any = None
         self.files: list[Path] = []
-        """Those that are whole at the end of the block."""
+        """Files that are complete at the end of the block."""
 
     def __enter__(self) -> "Streams":
         for log in self._logs.values():
@@ -134,7 +134,7 @@ class Streams:
         return Preparation(grids, **makers)
 
     def consume(self, frames: Iterator[FrameDone]) -> None:
-        """Write the frames as they come, some at a time."""
+        """Write the frames as they come, a few at a time."""
         while block := list(islice(frames, FRAMES_AT_ONCE)):
             begin = time.perf_counter()
             self._write(block)
@@ -147,14 +147,14 @@ class Streams:
         return {name: log.motion(mapped) for name, log in self._logs.items()}
 
     def remove_partial(self) -> None:
-        """Remove the growing motions, when they have been written under their final names."""
+        """Remove the growing motions once they have been written under their final names."""
         for log in self._logs.values():
             log.remove()
         if self._kept is not None:
             self._kept.remove()
 
     def say_what_is_left(self) -> None:
-        """After an error: where the frames so far are."""
+        """After an error: print where the frames so far are."""
         count = max(self._next_frame, self._first_new) - self._first_frame
         if not count or not all(log.folder.is_dir() for log in self._logs.values()):
             return
@@ -177,7 +177,7 @@ class Streams:
             self._write_rerun(block, shown, first)
 
     def _motions(self, block: list[FrameDone]) -> dict[str, Motion]:
-        """One motion an actor; similarity, energy and iterations are those of all actors together."""
+        """One motion per actor; similarity, energy and iterations are those of all actors together."""
         results = [done.tracked.result for done in block]
         poses = np.stack([np.asarray(result.pose) for result in results])
         pose_std, joint_std = deviations_of(results)

@@ -1,4 +1,4 @@
-"""A progress bar with a rate; silent where the output is no terminal."""
+"""Progress bar and messages on standard error; the bar only appears on a terminal."""
 
 import sys
 import time
@@ -8,7 +8,7 @@ from typing import TextIO, TypeVar
 Item = TypeVar("Item")
 
 SHOWN_AFTER = 1.0
-"""Seconds before a bar appears: what takes less needs none."""
+"""Seconds before a bar appears: shorter work needs none."""
 REDRAWN_AFTER = 0.1
 WIDTH = 24
 
@@ -37,11 +37,11 @@ def progress(items: Iterable[Item], total: int, label: str, stream: TextIO | Non
 
 
 def bar(label: str, count: int, total: int, seconds: float) -> str:
-    """One line that says how far a job is and how fast it goes."""
+    """One line with the progress and speed of a job."""
     filled = WIDTH * count // max(total, 1)
     return f"{label:<18} {'#' * filled}{'-' * (WIDTH - filled)} {count}/{total} {count / max(seconds, 1e-9):.1f}/s "
 
 
 def say(text: str) -> None:
-    """A line for the person at the terminal, apart from the results on standard output."""
+    """Print a message for the user, apart from the results on standard output."""
     print(text, file=sys.stderr, flush=True)

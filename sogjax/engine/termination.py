@@ -1,4 +1,4 @@
-"""A request to end (SIGTERM, as batch systems and `kill` send it) is obeyed as Ctrl-C is: tidily."""
+"""SIGTERM, as sent by batch systems and `kill`, ends a run as tidily as Ctrl-C."""
 
 import signal
 import threading
@@ -12,9 +12,9 @@ class TerminatedError(KeyboardInterrupt):
 
 @contextmanager
 def terminated_as_interrupted() -> Iterator[None]:
-    """Within the block SIGTERM raises a `TerminatedError`, so that what was found is written and the rest removed.
+    """Within the block SIGTERM raises a `TerminatedError`, so that results are written and the rest is removed.
 
-    In other threads than the main one, which gets the signals, nothing changes.
+    Does nothing outside the main thread, which alone receives signals.
     """
     if threading.current_thread() is not threading.main_thread():
         yield

@@ -1,4 +1,4 @@
-"""How long the stages of a run take, the first frames (which compile) apart."""
+"""How long the stages of a run take, without the first frames, which compile."""
 
 import math
 import time
@@ -17,9 +17,9 @@ STAGES = {
     "whole": "decoding to pose, together",
 }
 WAITING = ("decode",)
-"""Stages that are no work, so that a rate of theirs says nothing."""
+"""Stages that only wait, so that their rate means nothing."""
 LEAST_SHARE = 0.01
-"""Of the time of all stages together, that a stage takes to be worth a line."""
+"""Share of the total time below which a stage gets no line."""
 
 
 @dataclass
@@ -29,7 +29,7 @@ class StageTimes:
     seconds: dict[str, array] = field(default_factory=dict)
 
     def timed(self, stage: str, items: Iterable[Item]) -> Iterator[Item]:
-        """The items; the time that each takes to come is noted."""
+        """The items, noting how long each takes to arrive."""
         iterator = iter(items)
         while True:
             begin = time.perf_counter()
@@ -54,7 +54,7 @@ class StageTimes:
         return float(sum(self.seconds.get(stage, array("f"))[skipped:]))
 
     def table(self) -> str:
-        """A line for each stage that takes time: its rate, or the seconds that were waited; the first frame's time."""
+        """A line per stage with its rate, or the seconds spent waiting, and the first frame's time."""
         lines, least = [], LEAST_SHARE * self.total("whole")
         for stage, text in STAGES.items():
             total, rate = self.total(stage), self.frames_per_second(stage)

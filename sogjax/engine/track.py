@@ -1,4 +1,4 @@
-"""From the videos of a recording to the motion of its actors: with files, or without."""
+"""From the videos of a recording to the motion of its actors, with or without files."""
 
 from dataclasses import replace
 from functools import partial
@@ -28,11 +28,10 @@ _ROWS = (*PER_FRAME, *SOMETIMES_PER_FRAME)
 
 
 def track_to_folder(config: TrackConfig, command: str = "track") -> Run:
-    """Track, evaluate where there is ground truth, and write the results, or go on with a run that was stopped.
+    """Track, evaluate if there is ground truth, and write the results; or resume a run that was stopped.
 
     Raises:
-        InputError: anything wrong with the recording, the actors or the config; or a folder that another run uses, or
-            with results that are to stay.
+        InputError: an invalid recording, actor or setting; a folder that another run uses, or whose results must stay.
     """
     build.check(config)
     export_endings(config.outputs)
@@ -45,7 +44,7 @@ def track_to_folder(config: TrackConfig, command: str = "track") -> Run:
 
 
 def _run_in(folder: RunFolder, recording: Recording, config: TrackConfig, command: str) -> Run:
-    """Track into a folder that is this run's own, or go on there."""
+    """Track into this run's own folder, or resume there."""
     actors = partial(actors_of, recording, config.actor, config.body, config.color)
     made = config.actor is None
     bodies = None if made else actors()[0]
@@ -69,7 +68,7 @@ def _run_in(folder: RunFolder, recording: Recording, config: TrackConfig, comman
 
 def _ended(folder: RunFolder, recording: Recording) -> Run:
     """A run that ended before."""
-    say(f"{folder.path}: the run has ended already; nothing is left to do")
+    say(f"{folder.path}: the run has already ended; nothing to do")
     files = [folder.path / name for name in folder.note["files"]]
     loaded = {path: load_motion(path) for path in files if path.suffix == ".npz"}
     motions = {actor_name(path, motion): motion for path, motion in loaded.items()}
@@ -81,7 +80,7 @@ def _ended(folder: RunFolder, recording: Recording) -> Run:
 
 
 def track_recording(recording: Recording, bodies: list[Body], config: TrackConfig) -> Run:
-    """The motion of actors (in their own upright frames) in a recording; no files are written."""
+    """Track actors (in their own upright frames) without writing files."""
     nothing = OutputsConfig(overlay=False, rerun=False, bvh=False)
     with TemporaryDirectory() as folder, tracking(recording, bodies, config, nothing, Path(folder)) as result:
         motions = {
