@@ -124,7 +124,7 @@ def test_a_command_replaces_its_own_results_only(tmp_path):
         folder.kept.remove()
     with run_folder(tmp_path / "run", command="demo") as folder:
         folder.begin("demo", {})
-    with pytest.raises(InputError, match="resume=true to go on"), run_folder(tmp_path / "run", command="track"):
+    with pytest.raises(InputError, match="resume=true to resume it"), run_folder(tmp_path / "run", command="track"):
         pass
     with run_folder(tmp_path / "run", command="demo"):
         pass

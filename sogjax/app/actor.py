@@ -1,4 +1,4 @@
-"""`sogjax actor`: an actor file from the example poses of a recording, and a report beside it."""
+"""`sogjax actor`: an actor file from the example poses of a recording, with a report beside it."""
 
 from pathlib import Path
 
@@ -23,14 +23,14 @@ from sogjax.sentences import counted
 from sogjax.settings import ActorConfig
 
 NOTICED = 0.15
-"""Logarithm of a camera's gain that is worth a word."""
+"""Logarithm of a camera's gain above which it is reported."""
 
 
 def run(config: ActorConfig) -> Path:
     """Make the actor and write its file and its report.
 
     Raises:
-        InputError: anything wrong with the recording, its example poses or the body, or an actor file that is there.
+        InputError: an invalid recording, example pose or body, or an actor file that already exists.
     """
     space, _ = color_space_and_radius(config.color)
     weights = energy_weights(config.energy)
@@ -57,7 +57,7 @@ def run(config: ActorConfig) -> Path:
 
 
 def say_gains(recording: Recording, made: MadeActor, folder: Path) -> None:
-    """Write color_gains.yaml, and say so where cameras show the actor's colours differently."""
+    """Write color_gains.yaml, and report cameras that show the actor's colours differently."""
     names, rig = recording.rig.names, jax.tree.map(jnp.asarray, recording.rig.cameras)
     views: dict[int, list[ColoredView]] = {}
     for posed, pose in zip(made.pictures, made.example_poses.values(), strict=True):
@@ -73,8 +73,8 @@ def say_gains(recording: Recording, made: MadeActor, folder: Path) -> None:
         worst = max(unlike, key=lambda name: float(np.abs(np.log(unlike[name])).max()))
         factors = " ".join(f"{gain:.2f}" for gain in unlike[worst])
         say(
-            f"in {len(unlike)} of {counted(len(found), 'camera')} the subject's colours stand in another light than "
-            f"in the others (most of all {worst}: red, green, blue would have to be multiplied by {factors}); that may "
+            f"in {len(unlike)} of {counted(len(found), 'camera')} the subject's colours differ from "
+            f"the other cameras' (most in {worst}: red, green, blue must be multiplied by {factors}); this may "
             "be shading; if the cameras differ in exposure or white balance, copy color_gains of "
             f"{folder / 'color_gains.yaml'} into recording.yaml and make the actor again"
         )

@@ -13,10 +13,10 @@ from sogjax.sentences import counted
 
 
 def run(config: BodyConfig) -> Path:
-    """Read the skeleton, attach blobs where it has none, and write the body file.
+    """Read the skeleton, attach blobs if it has none, and write the body file.
 
     Raises:
-        InputError: anything wrong with the file or the options, or a body file that is there.
+        InputError: an invalid file or option, or a body file that already exists.
     """
     if config.up not in UP_AXES:
         raise InputError(f"up={config.up}: must be one of {', '.join(UP_AXES)}")

@@ -21,7 +21,7 @@ from sogjax.view.room import room_sheet
 
 
 def run(config: CheckConfig) -> list[Finding]:
-    """Look at a recording, say what was found, and write it as check.json and check.png.
+    """Examine a recording, print the findings, and write check.json and check.png.
 
     Raises:
         InputError: a recording that does not open, once all that is wrong with its files was said; an option that is
@@ -45,7 +45,7 @@ def run(config: CheckConfig) -> list[Finding]:
 
 
 def _opened(config: CheckConfig) -> Recording:
-    """The recording, or every problem of its files said before the first one is raised."""
+    """The recording; all problems of its files are printed before the first one is raised."""
     path = Path(config.recording)
     try:
         recording = open_recording(path)
@@ -65,7 +65,7 @@ def _opened(config: CheckConfig) -> Recording:
 
 
 def _stretch(config: CheckConfig, recording: Recording) -> tuple[int, int]:
-    """First frame and number of frames to look at."""
+    """First frame and number of frames to examine."""
     if config.frames < 1:
         raise InputError(f"frames={config.frames}: must be 1 or more")
     if config.largest_offset < 0:
@@ -90,7 +90,7 @@ def _picture(recording: Recording, found: Examination):
 
 
 def _offer_offsets(config: CheckConfig, recording: Recording, found: Examination) -> None:
-    """Print the lines that correct the offsets, and write them where that was asked for."""
+    """Print the lines that correct the offsets, and write them on request."""
     if not found.offsets:
         if config.write:
             say("write=true: no time offset was found, so recording.yaml stays as it is")
@@ -100,4 +100,4 @@ def _offer_offsets(config: CheckConfig, recording: Recording, found: Examination
     if config.write:
         path = recording.path / "recording.yaml"
         kept = write_frame_offsets(path, {name: offset for name, offset in found.offsets.items() if offset})
-        say(f"{path}: frame_offset was written{'' if kept is None else f'; the file as it was is {kept}'}")
+        say(f"{path}: frame_offset was written{'' if kept is None else f'; the previous file is {kept}'}")

@@ -1,4 +1,4 @@
-"""The console script `sogjax`: one subcommand a task, with Hydra overrides as arguments."""
+"""The console script `sogjax`: one subcommand per task, with Hydra overrides as arguments."""
 
 import importlib
 import sys
@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Sequence
 
 INTERRUPTED, TERMINATED = 130, 143
-"""Exit status after Ctrl-C and SIGTERM, as shells have them."""
+"""Exit status after Ctrl-C and SIGTERM, as in shells."""
 USAGE = "usage: sogjax COMMAND [key=value ...] [-m for a sweep], sogjax COMMAND --help"
 
 

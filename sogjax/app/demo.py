@@ -16,10 +16,10 @@ COMMAND = "demo"
 
 
 def run(config: DemoConfig) -> Run:
-    """Render the demo recording if it is not there, and track it.
+    """Render the demo recording if needed, and track it.
 
     Raises:
-        InputError: a setting out of range, a folder that cannot be written, or one with results that no demo made.
+        InputError: a setting out of range, a folder that cannot be written, or one with results that are not of a demo.
     """
     out = Path(config.out)
     with results_folder(out):
@@ -45,7 +45,7 @@ def _run_in(config: DemoConfig, out: Path) -> Run:
     track.outputs, track.overwrite, track.resume = config.outputs, config.overwrite, config.resume
     result = run_track(track, COMMAND)
     print(
-        f"rendering {rendered - begin:.1f} s (0 when it was there already), "
+        f"rendering {rendered - begin:.1f} s (0 if it was already there), "
         f"actor, tracking and outputs {time.perf_counter() - rendered:.1f} s"
     )
     return result

@@ -1,4 +1,4 @@
-"""`sogjax doctor`: what is installed here, what it runs on, and whether it computes rightly."""
+"""`sogjax doctor`: what is installed, what it runs on, and whether it computes correctly."""
 
 import os
 import platform
@@ -20,7 +20,7 @@ PACKAGES = (
     *("opencv-python-headless", "rerun-sdk", "hydra-core"),
 )
 CLASHING = ("opencv-python", "opencv-contrib-python", "opencv-contrib-python-headless")
-"""They overwrite opencv-python-headless's files."""
+"""Packages that overwrite opencv-python-headless's files."""
 EXTRAS = {
     "export": ("ezc3d",),
     "report": ("matplotlib",),
@@ -35,14 +35,14 @@ EXTRAS = {
 }
 PROBE_BYTES = 32 * 2**20
 SLOW = 20.0
-"""MB/s, below which a folder is slower than videos need."""
+"""MB/s below which a folder is too slow for videos."""
 
 
 def run(config: DoctorConfig) -> None:
-    """Say what is there, and test it.
+    """Print what is installed, and test it.
 
     Raises:
-        InputError: something that sogjax needs is missing, clashes or computes wrongly; all of it was said before.
+        InputError: something that sogjax needs is missing, clashes or computes wrong results, as printed before.
     """
     troubles = [*_packages()]
     _say_machine()
@@ -100,7 +100,7 @@ def _say_cache() -> None:
 
 
 def _say_extras() -> None:
-    """What nobody needs who only tracks."""
+    """Extras, which tracking alone does not need."""
     for extra, packages in EXTRAS.items():
         missing = [name for name in packages if _version(name) is None]
         remedy = f"without {', '.join(missing)}; pip install 'sogjax[{extra}]' adds it"
@@ -123,7 +123,7 @@ def _write_speed(folder: Path) -> Iterator[str]:
 
 
 def _tested(name: str, law: Callable[[], str | None]) -> Iterator[str]:
-    """A law is tried; what it complains of, or an error on the way, is a trouble."""
+    """Check a law; its complaint, or an error on the way, is a problem."""
     begin = time.monotonic()
     try:
         complaint = law()
@@ -131,4 +131,4 @@ def _tested(name: str, law: Callable[[], str | None]) -> Iterator[str]:
         complaint = f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else 'no message'}"
     _line(f"test: {name}", f"{'right' if complaint is None else 'WRONG'} ({time.monotonic() - begin:.1f} s)")
     if complaint is not None:
-        yield f"{name}: {complaint}; this machine or its libraries compute wrongly, install sogjax again"
+        yield f"{name}: {complaint}; this machine or its libraries compute wrong results; install sogjax again"

@@ -12,10 +12,10 @@ from sogjax.evaluate import GroupEvaluation, evaluate_motions
 
 
 def run(config: EvaluateConfig) -> GroupEvaluation:
-    """Print the table; write the JSON file where one is asked for.
+    """Print the table; write the JSON file on request.
 
     Raises:
-        InputError: files that do not open or do not fit together, or a file for the metrics that is there.
+        InputError: files that cannot be opened or do not match, or an existing file for the metrics.
     """
     out = None if config.out is None else free_path("out", config.out, config.overwrite)
     truth = load_ground_truth(truth_file(Path(config.truth)))
@@ -28,10 +28,10 @@ def run(config: EvaluateConfig) -> GroupEvaluation:
 
 
 def truth_file(path: Path) -> Path:
-    """The file of a truth, which may be given as the folder of its recording.
+    """The file of a truth, which may be given as its recording's folder.
 
     Raises:
-        InputError: a folder that holds none.
+        InputError: the folder has none.
     """
     if not path.is_dir():
         return path
@@ -43,10 +43,10 @@ def truth_file(path: Path) -> Path:
 
 
 def named_motions(paths: list[Path], truth: GroundTruth) -> dict[str, Motion]:
-    """The motions by actor: `motion_NAME.npz` is NAME's, where the truth has several subjects.
+    """The motions by actor: `motion_NAME.npz` is NAME's if the truth has several subjects.
 
     Raises:
-        InputError: a motion whose file name tells no subject of the truth.
+        InputError: a motion whose file name is that of no subject of the truth.
     """
     if len(paths) == 1 and len(truth.subjects) < 2:
         motion = load_motion(paths[0])

@@ -21,7 +21,7 @@ def run(config: ExportConfig) -> Path:
     """Write the file.
 
     Raises:
-        InputError: a motion or calibration that does not open, an ending that no writer knows, or a file that is there.
+        InputError: a motion or calibration that cannot be opened, an unknown ending, or a file that already exists.
     """
     out = free_path("to", config.to, config.overwrite)
     if (config.motion is None) == (config.calibration is None):

@@ -7,7 +7,7 @@ from sogjax.study.settings import ReportConfig
 
 
 def run(config: ReportConfig) -> list[Path]:
-    """Do the runs that are not there yet, write the report, and name its files.
+    """Do the missing runs, write the report, and print its files.
 
     Raises:
         InputError: as `write_report`.

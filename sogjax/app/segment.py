@@ -22,7 +22,7 @@ from sogjax.view.plots import write_png
 
 
 def run(config: SegmentConfig) -> list[Path]:
-    """Write the masks of every example pose, POSE/CAMERA.mask.png, and one contact sheet a pose.
+    """Write the masks of every example pose, POSE/CAMERA.mask.png, and one contact sheet per pose.
 
     Raises:
         InputError: anything wrong with the recording or its example poses, a folder in which masks were given, or
@@ -59,7 +59,7 @@ def mask_sheet(
     images: Mapping[int, UInt8[np.ndarray, "_h _w 3"]],
     found: ExampleMasks,
 ) -> UInt8[np.ndarray, "h w 3"]:
-    """The pictures with their masks: green where it is used, red where it is left out."""
+    """The pictures with their masks: green if used, red if left out."""
     tiles = []
     for camera, image in images.items():
         name, origin = recording.rig.names[camera], found.origins.get(camera)
@@ -77,6 +77,6 @@ def _check_apart(recording: Recording, out: Path) -> None:
     given = (recording.path / "example_poses").resolve()
     if out.resolve() == given or given in out.resolve().parents or out.resolve() == recording.path.resolve():
         raise InputError(
-            f"out={out}: lies in the recording, whose own masks would be overwritten; choose another folder, look at "
-            "the sheets, and copy what is good"
+            f"out={out}: lies in the recording, whose own masks would be overwritten; choose another folder, check "
+            "the sheets, and copy the good masks"
         )

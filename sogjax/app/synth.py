@@ -35,10 +35,10 @@ def run(config: SynthConfig) -> Path:
 
 
 def _replace(out: Path, settings: SynthSettings) -> None:
-    """Render a recording in the place of an older one, which goes when the new one is whole."""
+    """Render a recording in place of an older one, which is removed once the new one is complete."""
     strange = sorted(path.name for path in out.iterdir() if path.name not in RENDERED)
     if strange:
-        raise InputError(f"out={out}: holds {strange[0]}, which no rendered recording has; choose another folder")
+        raise InputError(f"out={out}: holds {strange[0]}, not part of a rendered recording; choose another folder")
     with TemporaryDirectory(prefix=f".{out.name[:80]}.", suffix=".tmp", dir=out.absolute().parent) as beside:
         new, old = Path(beside) / "new", Path(beside) / "old"
         render_recording(settings, new, progress)

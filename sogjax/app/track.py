@@ -10,7 +10,7 @@ from sogjax.settings import TrackConfig
 
 
 def run(config: TrackConfig, command: str = "track") -> Run:
-    """Track into a folder, and say what came of it.
+    """Track into a folder, and print the results.
 
     Raises:
         InputError: as `track_to_folder`.
@@ -21,20 +21,20 @@ def run(config: TrackConfig, command: str = "track") -> Run:
 
 
 def say_results(result: Run) -> None:
-    """The tables on standard output, then the files."""
+    """Print the tables and the files on standard output, warnings on standard error."""
     if result.evaluation is not None:
         print(result.evaluation.table(details=False), end="\n\n")
     if table := result.times.table():
         print(table)
-    print(f"iterations                      {np.mean(result.iterations):10.1f} a frame", end="\n\n")
+    print(f"iterations                      {np.mean(result.iterations):10.1f} per frame", end="\n\n")
     for path in result.files:
         print(path)
     frames = counted(len(result.converged), "frame")
     for camera, count in result.missing.items():
-        say(f"warning: {camera} had no picture in {count} of {frames}; the others were used")
+        say(f"warning: {camera} had no picture in {count} of {frames}; the other cameras were used")
     not_converged = int(np.sum(~result.converged))
     if not_converged:
         say(
             f"warning: {not_converged} of {frames} did not converge within "
-            "solver.max_iterations; look at them in the overlay"
+            "solver.max_iterations; check them in the overlay"
         )

@@ -18,14 +18,14 @@ from sogjax.view.frames import frame_range
 from sogjax.view.rerun import view_command, write_rerun
 
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")
-"""Variables of the environment of which one names the display to open windows on, where there is one."""
+"""Environment variables that name the display, if there is one."""
 
 
 def run(config: ViewConfig) -> Path:
-    """Write the Rerun file, or open the viewer on it where no file is asked for.
+    """Write the Rerun file, or open the viewer if no file is requested.
 
     Raises:
-        InputError: files that do not open or do not fit together, a Rerun file that is there, or no viewer.
+        InputError: files that cannot be opened or do not match, an existing Rerun file, or no viewer.
     """
     if config.out is None:
         _require_display()
@@ -49,7 +49,7 @@ def run(config: ViewConfig) -> Path:
 
 
 def _require_display() -> None:
-    """Raise where no window can be opened; only Linux says so beforehand."""
+    """Raise if no window can be opened; only Linux tells beforehand."""
     if sys.platform == "linux" and not any(os.environ.get(name) for name in DISPLAYS):
         raise InputError(
             "out=null: there is no display to open the Rerun viewer on; write a file with out=FILE.rrd, and open it "
@@ -58,7 +58,7 @@ def _require_display() -> None:
 
 
 def _open_viewer(path: Path) -> None:
-    """Open the viewer and wait until it is closed; what it says itself is shown only as the reason of a failure."""
+    """Open the viewer and wait until it is closed; its own output is only shown if it fails."""
     ended = subprocess.run(view_command(path), check=False, stderr=subprocess.PIPE, text=True, errors="replace")
     if ended.returncode != 0:
         said = ended.stderr.strip().splitlines()

@@ -20,7 +20,7 @@ from sogjax.settings.wrong_values import no_such_choice, unfit_value, unknown_ke
 Schema = TypeVar("Schema")
 
 PRESET = "preset"
-"""The config group whose options are of no group, but of all."""
+"""The config group whose options belong to all groups."""
 SEE = "see sogjax {} --help"
 
 
@@ -33,7 +33,7 @@ def track_config(words: Sequence[str] = (), **keywords: Any) -> TrackConfig:
             `solver="lbfgs", energy={"limit_weight": 2.0}`. They count more than `words`.
 
     Raises:
-        InputError: an unknown key (with the nearest known one), or a value that cannot be.
+        InputError: an unknown key (with the nearest known one), or an invalid value.
     """
     return composed_without_hydra(TrackConfig, "track", words, keywords)
 
@@ -64,7 +64,7 @@ def as_object(tree: Any, command: str) -> Any:
     """The schema object of a composed config.
 
     Raises:
-        InputError: a required key that is missing, or a number that is none.
+        InputError: a missing required key, or a number that is not finite.
     """
     missing = sorted(option_key(key) for key in OmegaConf.missing_keys(tree))
     if missing:

@@ -19,14 +19,12 @@ class ImagesConfig:
 
     depth: int = option(8, "levels of the quad-tree below its root, the smallest power of two that holds a picture")
     color_tolerance: float = option(0.1, "[eps_col] a node splits above this standard deviation; < 0: always")
-    box_enlargement: float = option(0.15, "border around an actor's box, as a part of its size")
+    box_enlargement: float = option(0.15, "border around an actor's box, as a share of its size")
     use_plates: bool | None = option(
-        None, "leave out image blobs that equal the empty background pictures; null: where every camera has one"
+        None, "leave out image blobs that equal the empty background pictures; null: if every camera has one"
     )
     plate_tolerance: float = option(0.1, "colours nearer than this to the plate's are background")
-    cache: str | None = option(
-        None, "folder where averaged pictures are kept, so that later runs decode no video; null: none are kept"
-    )
+    cache: str | None = option(None, "folder for averaged pictures, so that later runs decode no video; null: none")
 
 
 @dataclass
@@ -37,7 +35,7 @@ class EnergyConfig:
     acceleration_weight: float = option(0.01, "[w_a] weight of smooth motion, 1/rad^2")
     overlap_exponent: str = option("exact", "exact | printed: Eq. 6 with or without the 1/2 that Eq. 2 implies")
     capped: bool = option(True, "the cap of Eq. 8 against blobs that hide each other")
-    pairs: str = option("sparse", "dense: all pairs of blobs | sparse: those near each other, the same to 1e-4")
+    pairs: str = option("sparse", "dense: all pairs of blobs | sparse: pairs near each other, equal to 1e-4")
     gradient: str = option("forward", "forward: closed form beside the value | autodiff: plain reverse mode")
 
 
@@ -48,11 +46,11 @@ class SolverConfig:
     method: str = option(
         "gauss_newton", "conditioned_ascent | gradient_ascent | gauss_newton | bfgs | lbfgs | nonlinear_cg"
     )
-    epsilon: float = option(0.01, "[epsilon] stop when a step is shorter, rad and m; other solvers: 0.002")
-    min_iterations: int = option(1, "[n_iter] iterations made at least; other solvers: 10")
-    max_iterations: int = option(50, "iterations made at most; other solvers: 200")
+    epsilon: float = option(0.01, "[epsilon] stop when a step is shorter than this, rad and m; other solvers: 0.002")
+    min_iterations: int = option(1, "[n_iter] least number of iterations; other solvers: 10")
+    max_iterations: int = option(50, "largest number of iterations; other solvers: 200")
     grow: float = option(1.2, "[mu+] growth of a step size while the gradient keeps its sign")
-    shrink: float = option(0.5, "[mu-] shrinkage where it does not")
+    shrink: float = option(0.5, "[mu-] shrinkage of a step size where the gradient changes sign")
     first_angle: float = option(0.02, "[sigma_0] length of the first step of the angles, rad")
     first_translation: float = option(0.01, "[sigma_0] length of the first step of the translations, m")
     largest_angle: float = option(0.15, "bound on a step of an angle, rad")
@@ -63,4 +61,4 @@ class SolverConfig:
 class TrackingConfig:
     """Prediction and the first frame (Section 5.3)."""
 
-    extrapolation: float = option(0.5, "[alpha] part of the last motion that is added to predict the next pose")
+    extrapolation: float = option(0.5, "[alpha] share of the last motion that is added to predict the next pose")

@@ -6,12 +6,12 @@ from typing import Any
 from sogjax.settings.method import ColorConfig, EnergyConfig, ImagesConfig, SolverConfig, TrackingConfig
 from sogjax.settings.option import REQUIRED, group, option
 
-OVERWRITE = "replace what an earlier run wrote there"
+OVERWRITE = "replace the results of an earlier run"
 
 
 @dataclass
 class OutputsConfig:
-    """What is written beside the motion."""
+    """Files to write beside the motion."""
 
     overlay: bool = option(True, "overlay.mp4, the skeleton on every camera's pictures")
     overlay_width: int = option(1920, "width of the overlay video, px")
@@ -24,7 +24,7 @@ class OutputsConfig:
     )
     temperature: float = option(
         1e-5,
-        "energy that counts as one unit of log-likelihood, for the standard deviations; by experiments/confidence.py",
+        "energy per unit of log-likelihood, for the standard deviations; from experiments/confidence.py",
     )
 
 
@@ -34,15 +34,15 @@ class TrackConfig:
 
     recording: str = option(REQUIRED, "folder of the recording")
     out: str = option("", "folder for the results; default: outputs/RECORDING")
-    actor: Any = option(None, "actor file, or a list of them; null: made from the example poses")
+    actor: Any = option(None, "actor file, or a list of them; null: make it from the example poses")
     body: str = option("human", "body that actors are made from: human, dog, or a body file")
     initial_pose: str | None = option(
-        None, "auto: search for it | file with a rough pose; null: the recording's initial_pose.yaml, else auto"
+        None, "auto: search | file with a rough pose; null: the recording's initial_pose.yaml, else auto"
     )
     start: int = option(0, "first frame to track, counted from the recording's first")
     stop: int | None = option(None, "frame before which to stop; null: the end")
     cameras: list[str] | None = option(None, "cameras to use; null: all")
-    resume: bool = option(False, "go on with the run that was stopped in this folder")
+    resume: bool = option(False, "resume the run that was stopped in this folder")
     overwrite: bool = option(False, OVERWRITE)
     color: ColorConfig = group(ColorConfig, "")
     images: ImagesConfig = group(ImagesConfig, "")
@@ -58,7 +58,7 @@ class ActorConfig:
 
     recording: str = option(REQUIRED, "folder of the recording")
     out: str = option(REQUIRED, "actor file to write")
-    subject: str | None = option(None, "which subject, where the recording has several")
+    subject: str | None = option(None, "which subject, if the recording has several")
     symmetric: bool = option(True, "left and right limbs have the same lengths and sizes")
     body: str = option("human", "body to start from: human, dog, or a body file")
     cameras: list[str] | None = option(None, "cameras to use; null: all")

@@ -16,7 +16,7 @@ _EXPECTED = (
 
 
 def unknown_key(key: str, schema: type, see: str) -> str:
-    """An unknown key, with the nearest one that there is, or else where to look."""
+    """An unknown key, with the nearest known one, or else where to look."""
     known = [name for name, _, _ in help_lines(schema)]
     near = difflib.get_close_matches(key, known, 1)
     # The last word alone may be right: `limit_weight` for `energy.limit_weight`.
@@ -26,11 +26,11 @@ def unknown_key(key: str, schema: type, see: str) -> str:
 
 
 def no_such_choice(key: str, value: object, choices: list[str]) -> str:
-    """A choice that there is not, with those that there are."""
+    """An unknown choice, with the known ones."""
     return f"{key}={value}: no such choice; use one of {', '.join(choices)}"
 
 
 def unfit_value(key: str, value: object, complaint: str, see: str) -> str:
-    """A value of the wrong kind, from what OmegaConf complains of."""
+    """A value of the wrong kind, from the error of OmegaConf."""
     expected = next((words for pattern, words in _EXPECTED if re.search(pattern, complaint)), "does not fit")
     return f"{key}={value}: {expected.replace('key', key)} ({see})"

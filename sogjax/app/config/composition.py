@@ -67,7 +67,7 @@ def _tree(command: str, words: Sequence[str]) -> Any:
 
 @contextmanager
 def _plain_errors(command: str) -> Iterator[None]:
-    """Hydra's complaints as one sentence each."""
+    """Turn Hydra's errors into one sentence each."""
     try:
         yield
     except InputError:

@@ -1,4 +1,4 @@
-"""The words of a command line: made ready for Hydra, and Hydra's complaints about them in plain sentences."""
+"""The words of a command line: prepared for Hydra, and Hydra's errors in plain sentences."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -11,7 +11,7 @@ PATH_KEYS = (
     *("recording", "out", "actor", "body", "motion", "truth", "to", "calibration", "from", "dof", "images.cache"),
     "hydra.sweep.dir",
 )
-"""Options whose values are paths, which may hold characters that Hydra's grammar does not take unquoted."""
+"""Options whose values are paths, which may need quotes in Hydra's grammar."""
 
 _PLAIN = re.compile(r"[\w./\\:%+@?|-]*", re.ASCII)
 _OWN_SYNTAX = ("'", '"', "[", "{", "$")
@@ -37,12 +37,12 @@ def _checked(word: str, sweep: bool) -> str:
     if for_hydra and not sweep:
         raise InputError(f"{word}: Hydra's own settings only count in a sweep; add -m or leave it out")
     if key[0] in "+~" and not for_hydra:
-        raise InputError(f"{word}: nothing can be added to the options or taken from them; write key=value")
+        raise InputError(f"{word}: options cannot be added or removed; write key=value")
     return word
 
 
 def _for_schema(word: str) -> str:
-    """Keys that are words of Python have a line after them in the schemas."""
+    """Keys that are Python keywords have a trailing underscore in the schemas."""
     key, _, value = word.partition("=")
     return f"{key}_={value}" if iskeyword(key) else word
 
@@ -56,13 +56,13 @@ def _quoted(word: str) -> str:
 
 
 def quoted_value(value: str) -> str:
-    """A value as Hydra's grammar takes it, whatever characters it has."""
+    """A value quoted for Hydra's grammar."""
     escaped = value.replace("\\", "\\\\").replace("'", "\\'")
     return f"'{escaped}'"
 
 
 def plain_sentence(command: str, schema: type, error: BaseException) -> str:
-    """What Hydra complains of, as one sentence with the option, its value and the remedy."""
+    """Hydra's error as one sentence with the option, its value and the remedy."""
     text = "\n".join(str(cause) for cause in _causes(error))
     see = f"see sogjax {command} --help"
     if found := re.search(r"Could not override '([^']*)'", text):

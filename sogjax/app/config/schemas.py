@@ -15,9 +15,9 @@ _RENDERED = SynthSettings()
 
 @dataclass
 class BodyConfig:
-    """Make a body file from the skeleton of another program."""
+    """Make a body file from another program's skeleton."""
 
-    from_: str = option(REQUIRED, "skeleton: a .skeleton of Skeletool, or a .bvh, of which the hierarchy is read")
+    from_: str = option(REQUIRED, "skeleton: a .skeleton of Skeletool, or a .bvh, whose hierarchy is read")
     out: str = option(REQUIRED, "body file to write; for body= of the other commands, or to be edited first")
     dof: str | None = option(None, "a .dof of Skeletool, whose degrees of freedom replace those of the .skeleton")
     unit: str | None = option(None, "m | cm | mm: the file's lengths; null: mm of a .skeleton, m of a .bvh")
@@ -27,26 +27,26 @@ class BodyConfig:
 
 @dataclass
 class SegmentConfig:
-    """Show the masks of the example poses: from files, else made from the empty background pictures."""
+    """Show the masks of the example poses: from files, or made from the empty background pictures."""
 
     recording: str = option(REQUIRED, "folder of the recording")
-    out: str = option(REQUIRED, "folder for POSE/CAMERA.mask.png and one contact sheet a pose, POSE.png")
-    subject: str | None = option(None, "which subject, where the recording has several")
+    out: str = option(REQUIRED, "folder for POSE/CAMERA.mask.png and one contact sheet per pose, POSE.png")
+    subject: str | None = option(None, "which subject, if the recording has several")
     cameras: list[str] | None = option(None, "cameras to use; null: all")
     overwrite: bool = option(False, OVERWRITE)
 
 
 @dataclass
 class CheckConfig:
-    """Look at a recording: calibration, synchronisation, exposure, files; say what is wrong and what to do."""
+    """Check a recording: calibration, synchronisation, exposure, files; say what is wrong and what to do."""
 
     recording: str = option(REQUIRED, "folder of the recording")
-    out: str = option("", "folder for check.json and check.png, which are replaced; default: outputs/RECORDING/check")
-    start: int | None = option(None, "first frame to look at, counted from the recording's first; null: the middle")
-    frames: int = option(90, "frames to look at, at most; they should show somebody moving")
-    largest_offset: int = option(15, "time offsets between cameras are looked for up to so many frames")
-    write: bool = option(False, "write the time offsets that were found into recording.yaml, as frame_offset")
-    cameras: list[str] | None = option(None, "cameras to look at; null: all")
+    out: str = option("", "folder of check.json and check.png, overwritten if there; default: outputs/RECORDING/check")
+    start: int | None = option(None, "first frame to examine, counted from the recording's first; null: the middle")
+    frames: int = option(90, "frames to examine, at most; somebody should be moving in them")
+    largest_offset: int = option(15, "largest time offset between cameras to look for, frames")
+    write: bool = option(False, "write the time offsets found into recording.yaml, as frame_offset")
+    cameras: list[str] | None = option(None, "cameras to examine; null: all")
 
 
 @dataclass
@@ -54,7 +54,7 @@ class SynthConfig(SynthSettings):
     """Render a recording with ground truth."""
 
     out: str = option(REQUIRED, "folder to write")
-    overwrite: bool = option(False, "replace a rendered recording that is there")
+    overwrite: bool = option(False, "replace an existing rendered recording")
 
 
 @dataclass
@@ -68,7 +68,7 @@ class DemoConfig:
     width: int = option(_RENDERED.width, "width of the pictures, px")
     height: int = option(_RENDERED.height, "height of the pictures, px")
     seed: int = option(_RENDERED.seed, "person, clothes, room and noise")
-    resume: bool = option(False, "go on with the demo that was stopped in this folder")
+    resume: bool = option(False, "resume the demo that was stopped in this folder")
     overwrite: bool = option(False, OVERWRITE)
     outputs: OutputsConfig = group(OutputsConfig, "")
 
@@ -102,17 +102,17 @@ class ExportConfig:
     calibration: str | None = option(None, "calibration file, or the folder of a recording; instead of a motion")
     to: str = option(
         REQUIRED,
-        "file to write; its ending says the format: .bvh .trc .c3d .glb .csv .motion .npz; "
+        "file to write; the ending gives the format: .bvh .trc .c3d .glb .csv .motion .npz; "
         "of a calibration: .toml .calibration",
     )
     up: str | None = option(None, "vertical of the motion's world: x y z -x -y -z; null: what the motion says")
-    actor: str | None = option(None, "actor or body file of the motion; only a .motion needs it, read or written")
-    fps: float | None = option(None, "frames per second; only a .motion that is read needs it")
+    actor: str | None = option(None, "actor or body file of the motion; only needed to read or write a .motion")
+    fps: float | None = option(None, "frames per second; only needed to read a .motion")
     overwrite: bool = option(False, OVERWRITE)
 
 
 @dataclass
 class DoctorConfig:
-    """Look at the installation: versions, devices, extras, speed of the disk, and a test of five seconds."""
+    """Check the installation: versions, devices, extras, speed of the disk, and a five-second test."""
 
-    folder: str = option(".", "folder whose write speed is measured")
+    folder: str = option(".", "folder whose writing speed is measured")

@@ -1,4 +1,4 @@
-"""Hydra callback that gathers the members of a sweep and prints their table at the end."""
+"""Hydra callback that collects the results of a sweep and prints their table at the end."""
 
 from pathlib import Path
 from typing import Any
@@ -14,10 +14,10 @@ failures: list[str] = []
 
 
 class SweepTable(Callback):
-    """Each member leaves a file in its folder, whichever process it runs in; the table is made of these."""
+    """Each member leaves a file in its folder, whatever process it runs in; the table is made from these."""
 
     def on_multirun_start(self, config: Any, **kwargs: Any) -> None:
-        """Forget what an earlier sweep left in the same folder."""
+        """Remove the results of an earlier sweep in the same folder."""
         failures.clear()
         forget_results(Path(config.hydra.sweep.dir))
 

@@ -1,4 +1,4 @@
-"""What the members of a sweep leave for its end: a file each, then one table, one CSV and one plot of all of them.
+"""The results of a sweep: a file per member, then one table, one CSV and one plot of all of them.
 
 Launchers may run members in other processes or on other machines, so their results go through files.
 """
@@ -21,14 +21,14 @@ RESULT = "result.json"
 
 
 class Failure(str):
-    """Why a member failed; as one number, worse than any other, so that a search goes on elsewhere."""
+    """Why a member failed; as one number, worse than any other, so that a search continues elsewhere."""
 
     def __float__(self) -> float:
         return float("inf")
 
 
 class Member(NamedTuple):
-    """A member that ended."""
+    """A member that has ended."""
 
     overrides: list[str]
     result: Mapping[str, float] | str
@@ -46,7 +46,7 @@ def keep_result(folder: Path, member: Member) -> None:
 
 
 def forget_results(sweep: Path) -> None:
-    """Remove what an earlier sweep left in a folder."""
+    """Remove the results of an earlier sweep from a folder."""
     for path in sweep.glob(f"*/{RESULT}"):
         path.unlink()
 
@@ -87,24 +87,24 @@ def _chart(members: Sequence[Member]) -> UInt8[np.ndarray, "h w 3"]:
 
 
 def differing(members: Sequence[Sequence[str]]) -> list[str]:
-    """What tells the members of a sweep apart: the overrides that not all of them have."""
+    """The overrides that differ between the members of a sweep."""
     return [" ".join(words) or "as configured" for words in _own_words(members)]
 
 
 def _own_words(members: Sequence[Sequence[str]]) -> list[list[str]]:
-    """For each member, its overrides that not all members have."""
+    """For each member, its overrides that differ between members."""
     common = set.intersection(*(set(overrides) for overrides in members)) if members else set()
     return [[word for word in overrides if word not in common] for overrides in members]
 
 
 def _setting(override: str) -> tuple[str, str]:
-    """Key and value of an override; `~key` takes the key away."""
+    """Key and value of an override; `~key` removes the key."""
     key, _, value = override.partition("=")
     return key.lstrip("+~"), "taken away" if key.startswith("~") else value
 
 
 def table(rows: Sequence[tuple[str, Mapping[str, float] | str]]) -> str:
-    """A plain-text table: what was set, and what came of it."""
+    """A plain-text table of settings and results."""
     width = max(len("settings"), *(len(name) for name, _ in rows)) if rows else 8
     lines = [f"{'settings':<{width}}" + "".join(f"{column:>14}" for column in COLUMNS)]
     for name, numbers in rows:
@@ -116,7 +116,7 @@ def table(rows: Sequence[tuple[str, Mapping[str, float] | str]]) -> str:
 
 
 def _csv(members: Sequence[Member]) -> str:
-    """One line a member: a column for every key that was set, then the numbers, then why it failed."""
+    """One line per member: a column per key that differs, then the numbers, then why it failed."""
     settings = [dict(_setting(word) for word in member.overrides) for member in members]
     keys = list(dict.fromkeys(key for setting in settings for key in setting))
     text = io.StringIO()

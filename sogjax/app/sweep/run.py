@@ -18,14 +18,14 @@ from sogjax.settings.files import conf_dir
 LOG = logging.getLogger(__name__)
 
 CHECKED_MEMBERS = 100
-"""Members of a sweep that are looked at before it begins."""
+"""Members of a sweep that are checked before it begins."""
 
 
 def run_sweep(command: str, overrides: Sequence[str]) -> int:
     """Run a command for every combination of overrides such as `energy.limit_weight=0,1,2`.
 
     Raises:
-        InputError: a command other than track, or an override that cannot be.
+        InputError: a command other than track, or an invalid override.
     """
     if command != "track":
         others = ", ".join(name for name in SCHEMAS if name != "track")
@@ -41,7 +41,7 @@ def run_sweep(command: str, overrides: Sequence[str]) -> int:
 
 
 def _is_hydras(word: str) -> bool:
-    """Whether it is a setting of Hydra's own."""
+    """Whether it is one of Hydra's own settings."""
     return word.lstrip("+~").startswith("hydra")
 
 
@@ -49,7 +49,7 @@ def _members(words: Sequence[str]) -> list[list[str]] | None:
     """The overrides of every member, composed before Hydra makes their folders; None: only Hydra knows them.
 
     Raises:
-        InputError: a member that cannot be.
+        InputError: an invalid member.
     """
     from hydra._internal.core_plugins.basic_sweeper import BasicSweeper
     from hydra.core.override_parser.overrides_parser import OverridesParser
@@ -68,7 +68,7 @@ def _members(words: Sequence[str]) -> list[list[str]] | None:
 
 
 def sweep_main(task: Callable[[Any], Any]) -> int:
-    """What an experiment's script ends with: run the task as `sys.argv` says; the exit status."""
+    """Run the task as `sys.argv` says; the exit status, for a script."""
     try:
         return run_hydra(task)
     except InputError as error:
@@ -77,10 +77,10 @@ def sweep_main(task: Callable[[Any], Any]) -> int:
 
 
 def run_hydra(task: Callable[[Any], Any]) -> int:
-    """Run a task of the track config once, or with `-m` as a sweep, whose other members go on where one fails.
+    """Run a task of the track settings once, or with `-m` as a sweep, which continues when a member fails.
 
     Raises:
-        InputError: an override that cannot be; or the only run has wrong input.
+        InputError: an invalid override, or the only run has wrong input.
     """
     import hydra
     from hydra.core.hydra_config import HydraConfig
@@ -126,7 +126,7 @@ def run_hydra(task: Callable[[Any], Any]) -> int:
 
 
 def track_task(tree: Any) -> Numbers:
-    """One member of a sweep: track into the member's own folder; the numbers of its row."""
+    """Track one member of a sweep into its own folder; the numbers of its row."""
     from hydra.core.hydra_config import HydraConfig
     from hydra.types import RunMode
 
