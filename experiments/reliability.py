@@ -2,10 +2,10 @@
 
     python experiments/reliability.py [page=docs/reliability.md] [only=calibration] [faults=false]
 
-Every case of `bad_input_cases.py` damages a valid workplace in one place and runs a command there. It passes if the exit
-status is 2, the message is one sentence, and all files are unchanged. Then the readers get thousands of damaged files:
-each must be read or refused with one sentence. Last, the surroundings of runs fail (`faults.py`): a run must report it,
-lose nothing that was written, and give the same result when it is resumed.
+Every case of `bad_input_cases.py` damages a valid workplace in one place and runs a command there. It passes if the
+exit status is 2, the message is one sentence, and all files are unchanged. Then the readers get thousands of damaged
+files: each must be read or refused with one sentence. Last, the surroundings of runs fail (`faults.py`): a run must
+report it, lose nothing that was written, and give the same result when it is resumed.
 """
 
 import contextlib
@@ -159,7 +159,7 @@ def faults_part(rows: list[Survived]) -> list[str]:
         f"A small rendered walk ({RUNS.frames} frames, {RUNS.cameras} cameras, all outputs, searched first pose) was "
         "tracked while its",
         "surroundings failed. Every fault was real and hit a process of its own. Then the same command with",
-        "`resume=true` continued the run, and every array of its `motion.npz` was compared with that of an undisturbed run.",
+        "`resume=true` continued the run, and every array of its `motion.npz` was compared with an undisturbed run's.",
         f"{sum(row.good for row in rows)} of {len(rows)} ended as expected: without a traceback, with every frame that "
         "had been written, and with the same result.",
         "",
