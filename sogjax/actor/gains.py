@@ -59,7 +59,7 @@ def _log_middle(rgb: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "3"]:
 
 
 def _median(values: Float[np.ndarray, "camera blob 3"], axis: int) -> Float[np.ndarray, "_ 3"]:
-    """Of what is known; NaN where nothing is."""
+    """Median of the known values; NaN where there are none."""
     known = np.isfinite(values).any(axis=axis)
     filled = np.where(np.expand_dims(known, axis), values, 0.0)
     return np.where(known, np.nanmedian(filled, axis=axis), np.nan)

@@ -24,7 +24,7 @@ class Jump:
 
 
 def find_jumps(codes: PairCodes, steps: int, whole: Synchrony) -> dict[int, Jump]:
-    """By camera the difference of its offsets in the two halves of a clip, where both are sure."""
+    """By camera the difference of its offsets in the two halves of a clip, where both are certain."""
     half = steps // 2
     if half < FEWEST_STEPS:
         return {}

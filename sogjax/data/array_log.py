@@ -22,13 +22,13 @@ Arrays = dict[str, np.ndarray]
 
 
 class ArrayLog:
-    """Writes such a folder, which is made, or begun anew; the file stays open until `close`.
+    """Writes such a folder, which is created or overwritten; the file stays open until `close`.
 
     Args:
         folder: to write.
         constant: what is known from the beginning.
         first_rows: the rows to write first; they say the names, types and shapes of all.
-        kept: rows of a log that is there already, after which this one goes on; rows behind these are dropped.
+        kept: rows of an existing log, after which this one continues; rows behind these are dropped.
 
     Raises:
         InputError: the folder cannot be written, here or later.

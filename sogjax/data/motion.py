@@ -1,4 +1,4 @@
-"""Motion: what tracking finds, one pose a frame and all that follows from it."""
+"""Motion: what tracking finds, one pose per frame and all that follows from it."""
 
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -224,7 +224,7 @@ def _forward(
 
 
 def _check(path: Path, motion: Motion) -> None:
-    """Refuse indices that point nowhere, and what is no succession of rigid frames."""
+    """Refuse indices that point nowhere, and anything but a sequence of rigid frames."""
     if motion.up not in UP_AXES:
         raise InputError(f"{path}: 'up' is {motion.up!r}; it should be one of {', '.join(UP_AXES)}")
     joints = np.arange(len(motion.joint_names))
@@ -236,7 +236,7 @@ def _check(path: Path, motion: Motion) -> None:
         )
     wrong = (motion.blob_joint < 0) | (motion.blob_joint >= len(joints))
     if wrong.any():
-        raise InputError(f"{path}: 'blob_joint' holds {motion.blob_joint[wrong][0]}, which is no joint; correct it")
+        raise InputError(f"{path}: 'blob_joint' holds {motion.blob_joint[wrong][0]}, which is not a joint; correct it")
     if (np.diff(motion.frame) <= 0).any():
         raise InputError(f"{path}: 'frame' does not increase ({motion.frame[:5].tolist()} ...); sort the frames")
     for key in ("similarity", "energy"):

@@ -1,4 +1,4 @@
-"""Stages of work in threads of their own, joined by bounded queues: a slow stage holds the others back."""
+"""Stages of work in threads of their own, joined by bounded queues: a slow stage makes the others wait."""
 
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator

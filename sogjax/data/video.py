@@ -140,7 +140,7 @@ class VideoWriter:
 
     def __init__(self, path: Path, fps: float):
         if path.suffix.lower() != ".mp4":
-            raise InputError(f"{path}: videos are written as .mp4 only; change the ending")
+            raise InputError(f"{path}: videos are written as .mp4 only; change the extension")
         self._path, self._fps = path, fps
         self._stack = ExitStack()
         self._writer: cv2.VideoWriter | None = None
@@ -189,8 +189,8 @@ class VideoWriter:
             found = 0
         if found != self._count:
             raise InputError(
-                f"{self._path}: could not be written whole ({found} of {self._count} images are in it; the disk may "
-                "be full); choose another disk"
+                f"{self._path}: could not be written completely ({found} of {self._count} images are in it; the "
+                "disk may be full); choose another disk"
             )
 
     def _open(self, image: UInt8[np.ndarray, "height width 3"]) -> cv2.VideoWriter:

@@ -13,7 +13,7 @@ from jaxtyping import Float, UInt8
 from sogjax.data.image_file import MAX_PIXELS
 from sogjax.errors import InputError
 
-# A file that does not open is told in our own sentence, without the codecs' own lines before it.
+# A file that does not open is reported in our own sentence, without lines from the codecs before it.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 
@@ -52,7 +52,7 @@ class VideoFile:
 
 @dataclass(frozen=True)
 class VideoFacts:
-    """What a video's file says of it, checked where that is cheap."""
+    """What a video's file says about it, checked where that is cheap."""
 
     fps: float
     num_frames: int

@@ -1,4 +1,4 @@
-"""What can be asked of a rendered recording."""
+"""The settings of a rendered recording."""
 
 from dataclasses import dataclass
 
@@ -23,7 +23,7 @@ class SynthSettings:
     height: int = 486
     """Height of the pictures in pixels, even."""
     fps: float = 30.0
-    """Frames a second."""
+    """Frames per second."""
     frames: int = 60
     """Number of frames."""
     seed: int = 0
@@ -67,7 +67,7 @@ class SynthSettings:
         for name in ("width", "height"):
             if getattr(self, name) % 2:
                 raise InputError(
-                    f"{name}={getattr(self, name)} is odd, which video files do not take; use an even number"
+                    f"{name}={getattr(self, name)} is odd, which video files do not support; use an even number"
                 )
 
     @property

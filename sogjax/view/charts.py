@@ -31,7 +31,7 @@ def mean_chart(
 
     Args:
         names: of the rows, from left to right.
-        means: one a row.
+        means: one per row.
         intervals: low and high of each mean.
         axis: what differs between the rows.
         value: what the means are, with their unit.
@@ -62,7 +62,7 @@ def calibration_chart(
         panel.plot(1000.0 * values, 1000.0 * found[name], "o-", markersize=4, label=name)
         top = max(top, 1000.0 * float(np.nanmax([values, found[name]])))
     panel.plot([0.0, top], [0.0, top], "--", color=PAPER, linewidth=1)
-    panel.set(xlabel="standard deviation said, mm", ylabel="root mean square error, mm", title=title)
+    panel.set(xlabel="predicted standard deviation, mm", ylabel="root mean square error, mm", title=title)
     panel.legend(fontsize=8, frameon=False)
     return _png(figure)
 

@@ -1,4 +1,4 @@
-"""C3D, the file of marker systems: one point a bone, in millimetres, in the motion's own world."""
+"""C3D, the file format of marker systems: one point per bone, in millimetres, in the motion's own world."""
 
 import importlib
 from pathlib import Path

@@ -69,7 +69,7 @@ def write_rerun(
         truth: markers to show beside the bodies.
         picture_width: largest width of the stored pictures in pixels.
         quality: of the JPEG pictures, 0 to 100.
-        progress: wraps the frames' numbers to show how far it is: (numbers, count, title).
+        progress: wraps the frames' numbers to show progress: (numbers, count, title).
     """
     names = list(names) if names else ["actor", *(f"actor_{k + 2}" for k in range(len(motions) - 1))][: len(motions)]
     first, stop = frame_range(recording, motions)

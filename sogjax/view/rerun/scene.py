@@ -88,7 +88,7 @@ def log_deviations(stream: rr.RecordingStream, entity: str, motion: Motion, bone
 
 
 def log_path(stream: rr.RecordingStream, entity: str, path: np.ndarray, actor: int) -> None:
-    """The way of an actor's root through all frames."""
+    """The path of an actor's root through all frames."""
     trail = rr.LineStrips3D([path], colors=[actor_palette(actor)[1]], radii=[0.004])
     stream.log(f"{entity}/path", trail, static=True)
 
