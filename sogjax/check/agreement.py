@@ -16,11 +16,11 @@ from sogjax.images.visual_hull import Cube, VoxelPixels, cube_around, resized, v
 FEWEST_VIEWS = 3
 """With two silhouettes that disagree, nothing tells which is wrong."""
 AWAY = 0.75
-"""Degrees that a silhouette may be from where the others put the subject: masks are rough, calibrations too."""
+"""Degrees that a silhouette may be from where the others put the subject: masks are rough, and so are calibrations."""
 TURNED = 4.0
 """Degrees by which it may be turned in the picture."""
 ELONGATED = 2.5
-"""Length over width, from which on a silhouette shows how it is turned."""
+"""Length over width above which a silhouette shows how it is turned."""
 TIGHT = 1.5
 """The others' hull must not be larger than this, in areas of the silhouette, to show how it is turned."""
 COARSER = 2

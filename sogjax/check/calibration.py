@@ -14,9 +14,9 @@ from sogjax.data.calibration import CameraRig
 POOR = 0.6
 """Mean coverage below which the calibration as a whole is doubted."""
 BETTER = 0.25
-"""Another calibration must raise the mean coverage by so much to be named."""
+"""How much another calibration must raise the mean coverage to be named."""
 MOST_SUSPECTS = 4
-"""Cameras among which exchanged ones are looked for."""
+"""Cameras among which a swap is looked for."""
 
 
 def calibration_findings(

@@ -16,11 +16,11 @@ from sogjax.data.source import SourceInfo, look_at_source
 from sogjax.sentences import counted
 
 GAP = 1.5
-"""A pause between two frames of a file, in units of the usual one, from which on a frame is missing."""
+"""A pause between two frames of a file, in units of the usual one, above which a frame is missing."""
 UNEVEN = 0.2
 """Share of the usual pause by which most pauses may vary before the rate is called variable."""
 SAME = 0.05
-"""Two frames are one where they differ by less than this share of what they usually differ by in that video,"""
+"""Two frames count as the same if they differ by less than this share of the usual difference in that video,"""
 ELSEWHERE = 0.3
 """while those of most other cameras differ by more than this share."""
 LEAST_DIFFERENCE = 0.02

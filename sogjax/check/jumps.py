@@ -1,4 +1,4 @@
-"""Frames that one camera lost or repeated: its offset at the end of a clip is not the one at its beginning."""
+"""Frames that one camera lost or repeated: its offset at the end of a clip differs from that at its beginning."""
 
 from dataclasses import dataclass
 

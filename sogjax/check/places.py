@@ -12,7 +12,7 @@ from sogjax.check.silhouettes import Moment, Picture
 SIZE = (96, 72)
 """Pixels to which pictures are made smaller before they are compared."""
 SAME = 0.55
-"""Correlation of two pictures' fine structure, from which on they show the same place."""
+"""Correlation of two pictures' fine structure above which they show the same place."""
 MARGIN = 0.2
 
 

@@ -11,9 +11,9 @@ from sogjax.check.findings import Finding, listed
 from sogjax.sentences import counted
 
 ALIKE = 0.4
-"""Correlation of two cameras' motion from which on its lag counts."""
+"""Correlation of two cameras' motion above which its lag counts."""
 SURE_MARGIN = 0.03
-"""By so much the mean correlation of a camera with the others must fall away from its offset."""
+"""How far the mean correlation of a camera with the others must fall away from its offset."""
 SURE_MEAN = 0.35
 """Mean correlation at the offset, weighted, below which an offset is not believed."""
 FEWEST_STEPS = 8
@@ -54,7 +54,7 @@ def synchrony(names: tuple[str, ...], codes: PairCodes, steps: int, largest: int
 
 
 def _least_squares(curves: Mapping[tuple[int, int], np.ndarray], count: int, most: int) -> Int[np.ndarray, "camera"]:
-    """Offsets that explain the best lags of the pairs, those that fit badly weighted down (Huber)."""
+    """Offsets that explain the best lags of the pairs, with those that fit badly weighted down (Huber)."""
     kept = {pair: curve for pair, curve in curves.items() if curve.max() > ALIKE}
     if not kept:
         return np.zeros(count, int)

@@ -91,7 +91,7 @@ class ArrayLog:
         return len(header.getvalue())
 
     def _write(self, content: bytes) -> None:
-        """All of it: without a buffer, a call may write a part only."""
+        """Write all of it: without a buffer, one call may write only a part."""
         left = memoryview(content)
         while left:
             left = left[self._file.write(left) :]
@@ -113,7 +113,7 @@ def read_log(folder: Path, mapped: bool = False) -> Arrays:
 
 
 def _whole_rows(path: Path, mapped: bool) -> np.ndarray:
-    """The rows that the header counts, less those that a loss of power took."""
+    """The rows that the header counts, without those lost to a power failure."""
     with path.open("rb") as file:
         shape, dtype = npy_header(file)
         begin = file.tell()

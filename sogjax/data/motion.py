@@ -26,7 +26,7 @@ from sogjax.model.frames import UP_AXES
 
 FORMAT_VERSION = 1
 DEFAULT_UP = "z"
-"""The vertical of a file that does not say it."""
+"""The vertical of a file that does not give one."""
 FRAMES_AT_ONCE = 8
 """Joint frames and blobs are computed in blocks of so many frames, so that one program serves motions of any length."""
 
@@ -59,11 +59,11 @@ class Motion:
     up: str = DEFAULT_UP
     """The world's vertical, one of `sogjax.model.frames.UP_AXES`."""
     actor: str = ""
-    """Whose motion it is; empty where the file does not say it."""
+    """Whose motion it is; empty if the file does not say."""
     pose_std: Float[np.ndarray, "frame dof"] | None = None
     """Standard deviation of each degree of freedom; None where it was not computed, as in `joint_std`."""
     joint_std: Float[np.ndarray, "frame joint"] | None = None
-    """Root of the mean squared distance that each joint may be off, metres."""
+    """Expected root mean square error of each joint, metres."""
 
     @property
     def num_frames(self) -> int:

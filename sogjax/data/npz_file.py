@@ -47,7 +47,7 @@ def read_npz(path: Path) -> dict[str, np.ndarray]:
 
 
 def check_npy(path: Path) -> None:
-    """Hold what the header of a npy file claims against the file's size, before memory is taken for it.
+    """Check the size in an npy header against the file's size before memory is allocated.
 
     Raises:
         InputError: no npy, pickled objects inside, or fewer bytes than claimed.

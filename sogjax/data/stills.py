@@ -106,7 +106,7 @@ def _check_sizes(rig: CameraRig, images: dict[str, Path], masks: dict[str, Path]
 
 
 def check_size(path: Path, size: tuple[int, int], rig: CameraRig, camera: str) -> None:
-    """Hold the (width, height) of images against the calibration.
+    """Check the (width, height) of images against the calibration.
 
     Raises:
         InputError: they differ.

@@ -133,7 +133,7 @@ def read_still(recording: Recording, camera: str, path: Path) -> UInt8[np.ndarra
 
 
 class VideoWriter:
-    """Writes an mp4 (codec mp4v), within a `with` block; it gets its name only when it is whole.
+    """Writes an mp4 (codec mp4v), within a `with` block; it gets its name only when it is complete.
 
     The codec stores even sizes only: the last row or column of an odd image is left out.
     """

@@ -156,7 +156,7 @@ def _float(value: object) -> float:
 
 
 def _shown(value: object) -> str:
-    """The value as it may stand in a sentence: short, and never more than one line."""
+    """The value for a sentence: short, and never more than one line."""
     if value is None:
         return "empty"
     if isinstance(value, Mapping):

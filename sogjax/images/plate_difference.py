@@ -32,7 +32,7 @@ class Difference:
     change: Float[np.ndarray, "rows columns"]
     """Mean squared difference, in units of the noise."""
     unexplained: Float[np.ndarray, "rows columns"]
-    """What a shadow does not explain of it."""
+    """The part of it that a shadow does not explain."""
     changed: Bool[np.ndarray, "rows columns"]
     """Subject or shadow, without what is certainly a shadow by its pattern."""
     different: Bool[np.ndarray, "rows columns"]
@@ -77,12 +77,12 @@ def plate_difference(
 
 
 def opened(mask: Bool[np.ndarray, "rows columns"], width: int) -> Bool[np.ndarray, "rows columns"]:
-    """Without what is narrower than `width` pixels."""
+    """The mask without anything narrower than `width` pixels."""
     return cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, disc(width)) > 0
 
 
 def closed(mask: Bool[np.ndarray, "rows columns"], width: int) -> Bool[np.ndarray, "rows columns"]:
-    """Without gaps that are narrower than `width` pixels."""
+    """The mask without gaps narrower than `width` pixels."""
     return cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, disc(width)) > 0
 
 

@@ -140,7 +140,7 @@ def _widened(mask: Mask, pixels: int) -> Mask:
 
 
 def is_subject(mask: Mask) -> bool:
-    """Whether a region is neither next to nothing nor most of the picture."""
+    """Whether a region is neither almost nothing nor most of the picture."""
     return SMALLEST_SHARE < float(mask.mean()) < LARGEST_SHARE
 
 

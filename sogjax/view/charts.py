@@ -54,7 +54,7 @@ def mean_chart(
 def calibration_chart(
     expected: Mapping[str, Float[np.ndarray, "bin"]], found: Mapping[str, Float[np.ndarray, "bin"]], title: str
 ) -> bytes:
-    """What was expected against what was found, in millimetres from metres, by name (PNG)."""
+    """Predicted against actual errors by name, drawn in millimetres from metres (PNG)."""
     figure = _figure((4.2, 3.6))
     panel = figure.subplots()
     top = 0.0
@@ -93,7 +93,7 @@ def _name_lines(panel: Any, members: Mapping[str, Sequence[float]]) -> None:
 
 
 def spaced(heights: Sequence[float], apart: float) -> list[float]:
-    """Ascending heights moved so far that they are apart: upward, but not above 1, and downward where that is full."""
+    """Ascending heights moved apart: upward, but not above 1, and downward where there is no room."""
     moved = list(heights)
     for k in range(1, len(moved)):
         moved[k] = max(moved[k], moved[k - 1] + apart)

@@ -38,7 +38,7 @@ def log_look(
     colors: np.ndarray,
     static: bool = False,
 ) -> None:
-    """What does not change of an actor: colours, widths, sizes of its blobs.
+    """What does not change about an actor: colours, widths, sizes of its blobs.
 
     Blobs are only static where the motion's frames are not on the timelines: else they would stand there before it.
     """
