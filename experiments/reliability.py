@@ -1,11 +1,11 @@
-"""What is said to wrong input, and is anything left half-written?
+"""How are wrong inputs answered, and is anything left half-written?
 
     python experiments/reliability.py [page=docs/reliability.md] [only=calibration] [faults=false]
 
-Every case of `bad_input_cases.py` damages a good workplace in one place and runs a command there. It passes where the
-exit status is 2, one sentence is said, and the files are afterwards what they were before. Then the readers of files
-are given thousands of damaged ones: only a sentence may come out. Last, the surroundings of runs fail (`faults.py`):
-they must say so, lose nothing that was written, and come to the same end when they are gone on with.
+Every case of `bad_input_cases.py` damages a valid workplace in one place and runs a command there. It passes if the
+exit status is 2, the message is one sentence, and all files are unchanged. Then the readers get thousands of damaged
+files: each must be read or refused with one sentence. Last, the surroundings of runs fail (`faults.py`): a run must
+report it, lose nothing that was written, and give the same result when it is resumed.
 """
 
 import contextlib
@@ -30,27 +30,27 @@ from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from
 
 RUNS = RunSettings()
-"""Those that faults are made to."""
+"""The runs that the faults are injected into."""
 
 
 @dataclass
 class Settings:
-    """What is tried and where the page goes."""
+    """What is tried, and where the page is written."""
 
     page: str | None = None
     only: str | None = None
-    """A family."""
+    """One family of wrong inputs."""
     mutations: int = 2000
-    """For each reader."""
+    """Damaged files per reader."""
     faults: bool = True
-    """Let runs fail, too."""
+    """Whether to inject faults into runs."""
     kills: int = 20
-    """Among these faults."""
+    """How many runs are killed."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a command did about an input."""
+    """How a command answered an input."""
 
     case: BadInput
     status: int | str
@@ -59,12 +59,12 @@ class Outcome:
 
     @property
     def good(self) -> bool:
-        """Refused with one sentence, and nothing changed."""
+        """Whether it was refused with one sentence and nothing changed."""
         return self.status == 2 and self.nothing_left and len(self.said.splitlines()) == 1
 
 
 def main() -> None:
-    """Print what fails, and write the page."""
+    """Print what failed, and write the page."""
     settings = settings_from(Settings)
     outcomes = outcomes_of([case for case in cases() if settings.only in (None, case.family)])
     fuzzed = fuzz_readers(settings.mutations) if settings.only is None else []
@@ -79,7 +79,7 @@ def main() -> None:
     lost = [row for row in failed if not row.good]
     for row in lost:
         print(f"{row.fault}: {row.done}: {row.said}, {row.frames} frames; {row.end}")
-    print(f"{len(outcomes) - len(bad)} of {len(outcomes)} wrong inputs refused as they should be")
+    print(f"{len(outcomes) - len(bad)} of {len(outcomes)} wrong inputs refused as expected")
     if settings.page is not None:
         with atomic_path(Path(settings.page)) as temporary:
             temporary.write_text(page(outcomes, fuzzed, failed), encoding="utf-8")
@@ -87,7 +87,7 @@ def main() -> None:
 
 
 def outcomes_of(inputs: list[BadInput]) -> list[Outcome]:
-    """Each case in a fresh copy of the workplace."""
+    """Try each case in a fresh copy of the workplace."""
     with tempfile.TemporaryDirectory() as place:
         good = Path(place) / "good"
         good.mkdir()
@@ -96,7 +96,7 @@ def outcomes_of(inputs: list[BadInput]) -> list[Outcome]:
 
 
 def outcome_of(case: BadInput, good: Path, work: Path) -> Outcome:
-    """Damage a copy, run the command in it, and look at what is there afterwards."""
+    """Damage a copy, run the command in it, and compare the files before and after."""
     shutil.copytree(good, work)
     case.damage(work)
     before = contents(work)
@@ -113,7 +113,7 @@ def outcome_of(case: BadInput, good: Path, work: Path) -> Outcome:
 
 
 def contents(folder: Path) -> dict[str, str]:
-    """Every file and folder with a digest of what is in it."""
+    """Every file and folder with a digest of its content."""
     digest = lambda path: hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else "folder"
     return {str(path.relative_to(folder)): digest(path) for path in sorted(folder.rglob("*"))}
 
@@ -129,16 +129,16 @@ def page(outcomes: list[Outcome], fuzzed: list[FuzzedReader], failed: list[Survi
         "## Wrong input",
         "",
         f"{good} of {len(outcomes)} wrong inputs were refused with exit status 2 and one sentence, and left every file "
-        "as it was.",
+        "unchanged.",
         "",
-        "| family | what is wrong | command | what was said | status | files unchanged |",
+        "| family | what is wrong | command | message | status | files unchanged |",
         "|---|---|---|---|---|---|",
     ]
     lines += [row(outcome) for outcome in outcomes]
     lines += ["", "## Damaged files", ""]
     lines += [
-        "Valid files with bytes changed, lines left out, doubled or exchanged, and numbers made extreme, given to the",
-        "readers. Only a sentence (`InputError`) or a result may come out.",
+        "The readers got valid files in which bytes were changed, lines removed, doubled or swapped, and numbers made",
+        "extreme. Each file must be read or refused with one sentence (`InputError`).",
         "",
         "| reader | files | refused | read | other exceptions | seconds |",
         "|---|---|---|---|---|---|",
@@ -150,21 +150,21 @@ def page(outcomes: list[Outcome], fuzzed: list[FuzzedReader], failed: list[Survi
 
 
 def faults_part(rows: list[Survived]) -> list[str]:
-    """The table of faults; nothing where none were made."""
+    """The table of faults; empty if none were injected."""
     if not rows:
         return []
     lines = [
         "",
         "## Faults injected and survived",
         "",
-        f"A small rendered walk ({RUNS.frames} frames, {RUNS.cameras} cameras, all outputs, first pose searched for) "
-        "was tracked while its",
-        "surroundings failed. Every fault was made for real, to a process of its own. Afterwards the same command with",
-        "`resume=true` went on, and every array of its `motion.npz` was compared with that of a run left alone.",
-        f"{sum(row.good for row in rows)} of {len(rows)} ended as they should: without a traceback, with every frame "
-        "that had been written, and with the same end.",
+        f"A small rendered walk ({RUNS.frames} frames, {RUNS.cameras} cameras, all outputs, searched first pose) was "
+        "tracked while its",
+        "surroundings failed. Every fault was real and hit a process of its own. Then the same command with",
+        "`resume=true` continued the run, and every array of its `motion.npz` was compared with an undisturbed run's.",
+        f"{sum(row.good for row in rows)} of {len(rows)} ended as expected: without a traceback, with every frame that "
+        "had been written, and with the same result.",
         "",
-        "| fault | what was done | what was said, and the exit status | frames readable afterwards | the end after "
+        "| fault | what was done | last message, and exit status | frames readable afterwards | result after "
         "`resume=true` |",
         "|---|---|---|---|---|",
     ]
@@ -184,7 +184,7 @@ def row(outcome: Outcome) -> str:
 
 
 def cell(text: str) -> str:
-    """What can stand in a cell of a table."""
+    """The text, escaped for a cell of a table."""
     return text.replace("|", "\\|").replace("\n", " ").replace("<", "&lt;")
 
 

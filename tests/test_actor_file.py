@@ -234,7 +234,7 @@ BROKEN = {
     "a text": ("hello", "the content is 'hello', expected a mapping"),
     "empty": ("", "the content is empty"),
     "number as key": ("1: 2\n", "names as keys"),
-    "key twice": (TEXT + "name: other\n", "'name' stands there twice"),
+    "key twice": (TEXT + "name: other\n", "'name' occurs twice"),
     "alias": ("a: &a [1]\nb: *a\n", "aliases"),
     "a few aliases for gigabytes": ("a: &a [x,x,x]\nb: &b [*a,*a,*a]\nc: [*b,*b,*b]\n", "aliases"),
     "python object": ("name: !!python/object/apply:os.system ['true']\n", "valid YAML"),

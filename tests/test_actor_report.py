@@ -183,7 +183,7 @@ def test_what_the_pictures_did_not_tell_is_said():
 
 
 def _kind(warning):
-    kinds = ("left out", "silhouettes agree", "never seen well")
+    kinds = ("left out", "silhouettes overlap", "never seen well")
     return next(k for k, words in enumerate(kinds) if words in warning)
 
 

@@ -101,9 +101,9 @@ def test_a_wrong_value_is_named_with_its_file_and_camera(tmp_path, changes, mess
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"", "no calibration of a known format"),
-        (b"just text", "no calibration of a known format"),
-        (b"\0\1\2" * 100, "no calibration of a known format"),
+        (b"", "not a calibration of a known format"),
+        (b"just text", "not a calibration of a known format"),
+        (b"\0\1\2" * 100, "not a calibration of a known format"),
         (b"[a]\nmatrix = [[1, 2", "TOML"),
         (b"[a]\nmatrix = " + b"[" * 100000, "TOML"),
         (b"[a]\n# \xff\xfe\nmatrix = 1\n", "TOML"),
@@ -128,7 +128,11 @@ def test_names_are_unique_and_the_file_is_there(tmp_path):
 
 @pytest.mark.parametrize(
     ("rotation", "message"),
-    [(np.eye(3) * 1.1, "no rotation"), (np.diag([1.0, 1.0, -1.0]), "determinant -1"), (np.zeros((3, 3)), "no rot")],
+    [
+        (np.eye(3) * 1.1, "not a rotation"),
+        (np.diag([1.0, 1.0, -1.0]), "determinant -1"),
+        (np.zeros((3, 3)), "not a rot"),
+    ],
 )
 def test_a_matrix_that_is_no_rotation_is_refused_for_formats_that_give_matrices(tmp_path, rotation, message):
     entry = CameraEntry("a", np.diag([60.0, 60.0, 1.0]), rotation, np.zeros(3), np.zeros(4), (64, 48))

@@ -219,7 +219,7 @@ def test_the_commands(skeleton, tmp_path, capsys, monkeypatch):
     assert "from=" in refused(capsys, "body", "out=no.yaml")
     assert "unit" in refused(capsys, "body", "from=its name.bvh", "out=no.yaml")
     assert "mile" in refused(capsys, "body", "from=its name.bvh", "unit=mile", "out=no.yaml")
-    assert "no skeleton" in refused(capsys, "body", "from=body.yaml", "out=no.yaml")
+    assert "not a skeleton" in refused(capsys, "body", "from=body.yaml", "out=no.yaml")
     assert "leave it out" in refused(capsys, "body", "from=its name.bvh", "dof=a.dof", "out=no.yaml")
     assert not list(tmp_path.glob("no.*"))
 
@@ -229,7 +229,7 @@ WRONG = [
     ("joints: 6", "joints: 5", "one of"),
     ("joints: 6", "joints: 6.5", "whole number"),
     ("joints: 6", "joints: many", "whole number"),
-    ("Definition V1.0", "Definition V2.0", "no skeleton of a known format"),
+    ("Definition V1.0", "Definition V2.0", "not a skeleton of a known format"),
     ("revolute shoulder", "ball shoulder", r"joints\[0\]\.kind is 'ball'.*revolute"),
     ("prismatic tx", "prismatic elbo", r"parent is 'elbo'"),
     ("prismatic none", "prismatic hand", "cycle"),

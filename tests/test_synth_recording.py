@@ -182,7 +182,7 @@ def test_nothing_is_left_behind_when_rendering_fails(stage, tmp_path, monkeypatc
 
 def test_a_folder_that_holds_something_is_not_touched(tmp_path):
     (tmp_path / "mine.txt").write_text("keep")
-    with pytest.raises(InputError, match="not an empty folder"):
+    with pytest.raises(InputError, match="exists and is not empty"):
         render_recording(SMALL, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 

@@ -1,8 +1,8 @@
-"""How far a body covers a silhouette, cell by cell: the soft picture that a body of blobs throws.
+"""How far a body covers a silhouette, cell by cell: the soft picture that a body of blobs casts.
 
 In the terms of Eq. 8: a cell of the picture is an image blob, and the body covers it where the sum of the overlaps
 reaches the cap. Eq. 9 counts that sum up to the cap, so it hardly tells where the edge of the body is; here the sum
-goes through a step at the cap, so that the edge of the body is held against the edge of the mask.
+goes through a step at the cap, so that the edge of the body is compared with the edge of the mask.
 """
 
 from typing import NamedTuple

@@ -26,7 +26,7 @@ CLIMB_ITERATIONS = 150
 
 
 class Estimate(eqx.Module):
-    """The poses of the example pictures, the shape parameters they share, and how sure both are."""
+    """The poses of the example pictures, the shape parameters they share, and how certain both are."""
 
     poses: Float[Array, "pose dof"]
     shape_params: Float[Array, "shape"]

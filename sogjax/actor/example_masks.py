@@ -1,4 +1,4 @@
-"""The masks of an example pose: from files, else from pictures of the empty scene; blunders left out."""
+"""The masks of an example pose: from files, else from pictures of the empty scene, without wrong ones."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class ExampleMasks:
     origins: dict[int, str]
     """`FROM_FILE` or `FROM_PLATE`, of masks that are left out too."""
     left_out: dict[int, Mask]
-    """Masks that do not show what the others show."""
+    """Masks that do not agree with the others."""
     warnings: tuple[str, ...]
     """One sentence each."""
 
@@ -61,7 +61,7 @@ def example_masks(
     if len(masks) == 2 and (share := min(hull_coverage(masks, cameras).values())) < AGREEING:
         pair = " and ".join(names[camera] for camera in masks)
         warnings.append(
-            f"example pose {example.name!r}: the masks of {pair} agree only to {share:.0%}; look at them with "
+            f"example pose {example.name!r}: the masks of {pair} agree by only {share:.0%}; look at them with "
             "`sogjax segment` and replace the wrong one, or add a camera"
         )
     return ExampleMasks(
@@ -80,7 +80,7 @@ def _checked_mask(path: Path) -> Mask:
 
 
 def _check_count(recording: Recording, example: ExamplePose, num_images: int, usable: list[int]) -> None:
-    """Hold the number of cameras with a mask or a plate against the two that a pose needs."""
+    """Check that at least two cameras have a mask or a plate, as a pose needs."""
     if len(usable) >= 2:
         return
     where = f"{recording.path / 'example_poses' / example.name}: the example pose {example.name!r}"
@@ -102,21 +102,21 @@ def _check_found(recording: Recording, example: ExamplePose, found: list[int], f
         return
     names = ", ".join(recording.rig.names[camera] for camera in failed)
     raise InputError(
-        f"{recording.path / 'example_poses' / example.name}: in the pictures of {names} no subject can be told from "
-        f"the empty scene in {recording.path / 'background'}; give CAMERA.mask.png (white = subject), or pictures of "
-        "the empty scene from the same places in the same light"
+        f"{recording.path / 'example_poses' / example.name}: in the pictures of {names} no subject can be told apart "
+        f"from the empty scene in {recording.path / 'background'}; give CAMERA.mask.png (white = subject), or pictures "
+        "of the empty scene from the same places in the same light"
     )
 
 
 def _unlike(example: ExamplePose, camera: str, share: float) -> str:
     return (
-        f"example pose {example.name!r}: {camera} is left out, since its mask does not show what the other cameras "
-        f"show ({share:.0%} of it agrees); look at it with `sogjax segment`, and give {camera}.mask.png"
+        f"example pose {example.name!r}: {camera} is left out, since its mask does not agree with the other "
+        f"cameras ({share:.0%} of it does); look at it with `sogjax segment`, and give {camera}.mask.png"
     )
 
 
 def _no_subject(recording: Recording, example: ExamplePose, camera: str) -> str:
     return (
-        f"example pose {example.name!r}: {camera} is left out, since no subject can be told from "
+        f"example pose {example.name!r}: {camera} is left out, since no subject can be told apart from "
         f"{recording.background[camera]}; give {camera}.mask.png"
     )

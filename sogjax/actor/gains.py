@@ -38,7 +38,7 @@ def estimated_gains(body: Body, views: Mapping[int, Sequence[ColoredView]]) -> d
 
 
 def _with_unknown(gains: Float[np.ndarray, "camera 3"]) -> Float[np.ndarray, "camera 3"]:
-    """A channel of which a camera shows too little goes with the camera's others; 0 where it shows nothing."""
+    """A channel of which a camera shows too little follows its other channels; 0 where it shows nothing."""
     known = np.isfinite(gains)
     others = np.where(known, gains, 0.0).sum(axis=1, keepdims=True) / np.maximum(known.sum(axis=1, keepdims=True), 1)
     return np.where(known, gains, others)
@@ -59,7 +59,7 @@ def _log_middle(rgb: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "3"]:
 
 
 def _median(values: Float[np.ndarray, "camera blob 3"], axis: int) -> Float[np.ndarray, "_ 3"]:
-    """Of what is known; NaN where nothing is."""
+    """Median of the known values; NaN where there are none."""
     known = np.isfinite(values).any(axis=axis)
     filled = np.where(np.expand_dims(known, axis), values, 0.0)
     return np.where(known, np.nanmedian(filled, axis=axis), np.nan)

@@ -35,7 +35,7 @@ from sogjax.track.initial_pose import rough_pose
 
 Report = Callable[[str], None]
 Progress = Callable[[Iterable[Any], int, str], Iterable[Any]]
-"""Wraps items, of which there are so many, to show under a label how far the work is."""
+"""Wraps items, of which there are so many, to show the progress under a label."""
 
 POSE_FOUND = 0.5
 """Least IoU of masks and silhouettes, the mean over the cameras. Good fits have 0.8 to 0.9."""
@@ -69,7 +69,7 @@ class MadeActor:
 
     @property
     def shape_priors(self) -> Float[np.ndarray, "shape"]:
-        """What these would be without pictures."""
+        """The same without any pictures."""
         return np.asarray(self.shape_model.spread, float)
 
     @property

@@ -1,4 +1,4 @@
-"""How good is an actor: silhouettes against masks, bone lengths, and what the pictures did not tell."""
+"""How good an actor is: silhouettes against masks, bone lengths, and what the pictures did not determine."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -91,7 +91,7 @@ class ActorReport:
     warnings: tuple[str, ...]
     """One sentence each."""
     notes: tuple[str, ...] = ()
-    """The same, of what is usual."""
+    """The same, for what is usual."""
 
     @property
     def mean_iou(self) -> float:
@@ -115,7 +115,7 @@ class ActorReport:
 
 
 def actor_report(made: FinishedActor, rig: CameraRig) -> ActorReport:
-    """Hold the actor against its pictures."""
+    """Compare the actor with its pictures."""
     ious = {
         posed.name: {
             rig.names[camera]: silhouette_iou(made.upright_body, pose, rig.camera(rig.names[camera]), mask)
@@ -136,7 +136,7 @@ def actor_report(made: FinishedActor, rig: CameraRig) -> ActorReport:
 def _poor_silhouettes(ious: Mapping[str, Mapping[str, float]]) -> list[str]:
     means = {pose: float(np.mean([*cameras.values()])) for pose, cameras in ious.items()}
     return [
-        f"example pose {pose!r}: the silhouettes agree with the masks only to {mean:.2f} (IoU); look at "
+        f"example pose {pose!r}: the silhouettes overlap the masks by only {mean:.2f} (IoU); look at "
         f"silhouettes_{pose}.png, and correct a mask or give the pose's `initial_pose` in recording.yaml"
         for pose, mean in means.items()
         if mean < POOR_IOU
@@ -144,14 +144,14 @@ def _poor_silhouettes(ious: Mapping[str, Mapping[str, float]]) -> list[str]:
 
 
 def _undetermined_sizes(made: FinishedActor) -> tuple[str, ...]:
-    """One sentence on all of them: a few hidden or small parts are so with most recordings."""
+    """One sentence for all of them, as most recordings have a few hidden or small parts."""
     rows = zip(made.shape_names, made.shape_deviations, made.shape_priors, strict=True)
     found = [
         f"{name} (by {deviation:.0%}, without pictures {prior:.0%})"
         for name, deviation, prior in rows
         if not deviation <= UNDETERMINED * prior
     ]
-    kept = "were not determined by the pictures, and are kept near those of the body it started from"
+    kept = "were not determined by the pictures and stay near those of the starting body"
     return (f"some sizes {kept}; they are uncertain: {', '.join(found)}",) if found else ()
 
 
@@ -165,7 +165,7 @@ def _poorly_seen_dofs(made: FinishedActor) -> list[str]:
         if deviation > (POORLY_SEEN_LENGTH if slide else POORLY_SEEN_ANGLE):
             amount = f"{1000 * deviation:.0f} mm" if slide else f"{np.degrees(deviation):.0f} degrees"
             warnings.append(
-                f"{name} was never seen well (uncertain by {amount} in the best pose): what turns with it may be off; "
+                f"{name} was never seen well (uncertain by {amount} in the best pose): whatever it turns may be off; "
                 "add an example pose in which it is bent or seen from the side"
             )
     return warnings

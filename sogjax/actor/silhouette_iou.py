@@ -1,4 +1,4 @@
-"""The silhouette that a body throws, and how well it covers a mask."""
+"""The silhouette that a body casts, and how well it covers a mask."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -30,7 +30,7 @@ def overlap_ratio(first: Bool[np.ndarray, "rows columns"], second: Bool[np.ndarr
 def body_silhouette(
     body: Body, pose: Float[Array, "dof"], camera: Camera, shape: tuple[int, int]
 ) -> Bool[np.ndarray, "rows columns"]:
-    """Where the body is seen in the camera's picture as recorded, made smaller or larger to (rows, columns)."""
+    """Where the body is visible in the camera's picture as recorded, resized to (rows, columns)."""
     return np.asarray(_coverage(body, pose, resized(camera, (shape[1], shape[0])), shape)) > BODY_LEVEL
 
 

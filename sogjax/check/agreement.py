@@ -1,4 +1,4 @@
-"""Do the silhouettes of all cameras show one thing: each is held against the visual hull of the others."""
+"""Whether the silhouettes of all cameras show one thing: each is compared with the visual hull of the others."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,13 +14,13 @@ from sogjax.images.agreement import AGREEING, OWN_COVERAGE, widened_by_half_a_vo
 from sogjax.images.visual_hull import Cube, VoxelPixels, cube_around, resized, voxel_pixels
 
 FEWEST_VIEWS = 3
-"""Of two silhouettes that disagree, none can be told wrong."""
+"""With two silhouettes that disagree, nothing tells which is wrong."""
 AWAY = 0.75
-"""Degrees that a silhouette may be from where the others put the subject: masks are rough, calibrations too."""
+"""Degrees that a silhouette may be from where the others put the subject: masks are rough, and so are calibrations."""
 TURNED = 4.0
 """Degrees by which it may be turned in the picture."""
 ELONGATED = 2.5
-"""Length over width, from which on a silhouette shows how it is turned."""
+"""Length over width above which a silhouette shows how it is turned."""
 TIGHT = 1.5
 """The others' hull must not be larger than this, in areas of the silhouette, to show how it is turned."""
 COARSER = 2
@@ -81,7 +81,7 @@ class MomentHull:
 
     @cached_property
     def misfits(self) -> dict[int, Misfit]:
-        """By camera how its silhouette differs from the others; those of wrong ones are not counted as others.
+        """By camera how its silhouette differs from the others; wrong ones do not count as others.
 
         While a silhouette contradicts the rest, the camera is taken out without which the rest agrees best.
         """
@@ -108,7 +108,7 @@ class MomentHull:
 
 
 def smallest_shift(mask: Mask, region: Mask) -> float:
-    """By how many pixels a mask must be moved to lie in a region as well as anywhere.
+    """By how many pixels a mask must be moved to lie in a region as well as it can.
 
     The region may be larger: the visual hull of few cameras is, and its middle says little.
     """

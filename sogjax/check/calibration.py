@@ -1,4 +1,4 @@
-"""Whether calibration and pictures belong together, and if not, what was most likely mixed up."""
+"""Whether calibration and pictures belong together, and if not, what was probably mixed up."""
 
 from collections.abc import Mapping, Sequence
 from itertools import combinations
@@ -14,15 +14,15 @@ from sogjax.data.calibration import CameraRig
 POOR = 0.6
 """Mean coverage below which the calibration as a whole is doubted."""
 BETTER = 0.25
-"""Another calibration must raise the mean coverage by so much to be named."""
+"""How much another calibration must raise the mean coverage to be named."""
 MOST_SUSPECTS = 4
-"""Cameras among which exchanged ones are looked for."""
+"""Cameras among which a swap is looked for."""
 
 
 def calibration_findings(
     rig: CameraRig, photographed: Sequence[Moment], filmed: Sequence[Moment]
 ) -> tuple[list[Finding], dict[int, Misfit]]:
-    """What the silhouettes say, and by camera how well it fits (of example poses where there are any)."""
+    """What the silhouettes show, and by camera how well it fits (from example poses where there are any)."""
     looks = [("example poses", photographed, "the calibration"), ("videos", filmed, "the calibration or the video")]
     findings: list[Finding] = []
     fits: dict[int, Misfit] = {}
@@ -40,12 +40,12 @@ def calibration_findings(
                 told.add(finding.what.split(" (")[0])
                 findings.append(finding)
     if not compared:
-        what = "the calibration cannot be held against silhouettes: those of at least three cameras are needed"
-        remedy = "add masks, or pictures of the empty scene as background/CAMERA.jpg, of more cameras"
+        what = "the calibration cannot be checked against silhouettes: at least three cameras need one"
+        remedy = "add masks, or pictures of the empty scene as background/CAMERA.jpg, for more cameras"
         return [Finding("note", "calibration", what, "", remedy)], {}
     if not findings:
         lowest = min(fits.values(), key=lambda fit: fit.coverage).coverage
-        what = f"the silhouettes of all cameras agree ({' and '.join(compared)}; {100 * lowest:.0f} % and more)"
+        what = f"the silhouettes of all cameras agree ({' and '.join(compared)}; at least {100 * lowest:.0f} %)"
         findings.append(Finding("ok", "calibration", what))
     return findings, fits
 
@@ -76,9 +76,9 @@ def _told(
         return [swapped, *_each(rig, rest, label, what)]
     if 2 * len(wrong) > len(misfits) and len(misfits) > 3:
         shown = f"the silhouettes of {listed(rig.names[k] for k in wrong)} contradict the others' ({label})"
-        cause = "a calibration of another day or set-up, or of other axes than OpenCV's"
+        cause = "a calibration from another day or set-up, or with axes other than OpenCV's"
         names = tuple(rig.names[k] for k in wrong)
-        return [Finding("warning", "calibration", shown, cause, "calibrate the cameras as they stood", names)]
+        return [Finding("warning", "calibration", shown, cause, "calibrate the cameras where they stood", names)]
     return _each(rig, wrong, label, what)
 
 
@@ -86,15 +86,15 @@ def _each(rig: CameraRig, wrong: Mapping[int, Misfit], label: str, what: str) ->
     findings = []
     for camera, misfit in wrong.items():
         name = rig.names[camera]
-        shown = f"{name} does not show what the others show: {_how(misfit)} ({label})"
-        cause = f"{what} of {name} is wrong: the camera was moved, or turned, or its file is another one's"
+        shown = f"{name} does not agree with the others: {_how(misfit)} ({label})"
+        cause = f"{what} of {name} is wrong: the camera was moved or turned, or the file is another camera's"
         remedy = f"calibrate {name} again, or leave it out with `cameras:` in recording.yaml"
         findings.append(Finding("warning", "calibration", shown, cause, remedy, (name,)))
     return findings
 
 
 def _how(misfit: Misfit) -> str:
-    parts = [f"{100 * misfit.coverage:.0f} % of its silhouette are confirmed"]
+    parts = [f"{100 * misfit.coverage:.0f} % of its silhouette is confirmed"]
     if np.isfinite(misfit.away) and misfit.away > 0:
         parts.append(f"it lies {misfit.away:.1f} degrees away")
     if misfit.turned:

@@ -1,4 +1,4 @@
-"""Where the cameras of a rig stand and look, and what of that no real set-up has."""
+"""Where the cameras of a rig stand and look, and which of that no real set-up has."""
 
 from dataclasses import dataclass
 from itertools import combinations
@@ -12,15 +12,15 @@ from sogjax.model.frames import UP_AXES, axis_vector
 from sogjax.sentences import counted
 
 NARROW, WIDE = 8.0, 150.0
-"""Degrees: fields of view outside of this range are taken for mistakes."""
+"""Degrees: fields of view outside this range are taken for mistakes."""
 OFF_CENTRE = 0.12
 """Of the picture's size: principal points farther from its middle are taken for mistakes."""
 SMALL_ANGLE = 8.0
-"""Degrees between the cameras' directions, below which depth is hardly seen."""
+"""Degrees between the cameras' directions below which depth is hardly visible."""
 UPRIGHT = 0.5
 """Cosine between the vertical and the pictures' upward direction, on average, below which `up` is doubted."""
 TOWARDS = 0.8
-"""Cosine between a viewing direction and that to what all look at."""
+"""Cosine between a viewing direction and the direction to what all cameras look at."""
 APART = 0.1
 """Extent of a set-up in units of the cameras' distance from the origin, at least: inverse poses put all cameras near
 one place."""
@@ -100,7 +100,7 @@ def nearest_point(
 
 
 def camera_findings(rig: CameraRig, geometry: RigGeometry, up: str) -> list[Finding]:
-    """What is wrong with the calibration by itself, without a look at any picture."""
+    """What is wrong with the calibration itself, without looking at any picture."""
     turned = _directions(rig, geometry)
     findings = [*_lenses(rig, geometry), *_places(geometry), *turned]
     if not any(finding.severity == "warning" for finding in turned):
@@ -143,7 +143,7 @@ def _places(geometry: RigGeometry) -> list[Finding]:
             cause, remedy = "one camera's calibration under two names", "calibrate both, or use one of them"
             findings.append(Finding("warning", "cameras", what, cause, remedy, names))
     if len(geometry.names) == 1:
-        what = "there is one camera only, so nothing can be compared and depth is hardly seen"
+        what = "there is only one camera, so nothing can be compared and depth is hardly visible"
         return [Finding("note", "cameras", what, "", "record with several cameras around the subject")]
     return findings
 
@@ -152,18 +152,18 @@ def _directions(rig: CameraRig, geometry: RigGeometry) -> list[Finding]:
     if len(rig) < 2:
         return []
     if not _converge(rig.cameras.camera_from_world) and _converge(_inverse(rig.cameras.camera_from_world)):
-        what = "the cameras do not look at one place, but would with inverse poses"
+        what = "the cameras do not look at one place, but would if their poses were inverted"
         cause, remedy = "poses from camera to world instead of from world to camera", "export the inverse poses"
         return [Finding("warning", "calibration", what, cause, remedy)]
     cosines = geometry.forwards @ geometry.forwards.T
     widest = float(np.rad2deg(np.arccos(np.clip(cosines.min(), -1.0, 1.0))))
     if widest < SMALL_ANGLE:
-        what = f"all cameras look in the same direction within {widest:.1f} degrees, so depth is hardly seen"
-        return [Finding("note", "cameras", what, "", "place cameras around the subject, 30 degrees apart and more")]
+        what = f"all cameras look in the same direction within {widest:.1f} degrees, so depth is hardly visible"
+        return [Finding("note", "cameras", what, "", "place cameras around the subject, at least 30 degrees apart")]
     behind = tuple(name for name, distance in zip(rig.names, geometry.distances, strict=True) if distance <= 0)
     if not behind:
         return []
-    what = f"{listed(behind)} look away from the place that the optical axes come nearest to"
+    what = f"{listed(behind)} look away from the place where the optical axes nearly meet"
     cause = "a wrong calibration"
     if len(behind) == len(rig):
         cause = "cameras that look along -z, as in OpenGL and Blender, instead of OpenCV's +z"
@@ -196,14 +196,14 @@ def _vertical(geometry: RigGeometry, up: str) -> list[Finding]:
         remedy = f"write `up: {best}` into recording.yaml"
         findings.append(Finding("warning", "vertical", what, "a wrong `up`", remedy))
     elif fits[up] < UPRIGHT:
-        what = f"`up: {up}` points upward in hardly any picture, and so does no other axis"
-        cause, remedy = "a world that no one levelled, or pictures that lie on their side", "level the calibration"
+        what = f"`up: {up}` points upward in hardly any picture, and neither does any other axis"
+        cause, remedy = "a world that was never levelled, or pictures turned on their side", "level the calibration"
         findings.append(Finding("warning", "vertical", what, cause, remedy))
     low = geometry.heights < -BELOW_FLOOR * geometry.scale
     if low.any() and not findings:
         names = tuple(name for name, under in zip(geometry.names, low, strict=True) if under)
         what = f"{listed(names)} stand below the floor, the lowest at {geometry.heights.min():.2f} m"
-        cause, remedy = "a world whose zero is not on the floor", "nothing, if it is meant; else level the calibration"
+        cause, remedy = "a world whose zero is not on the floor", "nothing, if intended; else level the calibration"
         findings.append(Finding("note", "vertical", what, cause, remedy, names))
     return findings
 

@@ -1,4 +1,4 @@
-"""A short stretch of a recording, read once at reduced size: what the checks of pictures look at."""
+"""A short stretch of a recording, read once at reduced size, for the checks of pictures."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class Clip:
     grey: tuple[UInt8[np.ndarray, "frame _h _w"], ...]
     """By camera, the longer side `SMALL` pixels; black where the camera is missing."""
     present: Bool[np.ndarray, "camera frame"]
-    """Where it is not, so that there is something to look at."""
+    """Where it is not missing, so that there is something to check."""
     stills: dict[int, dict[int, UInt8[np.ndarray, "_y _x 3"]]]
     """By frame of this clip and by camera that is present, a few pictures (BGR) at the working size of masks."""
 

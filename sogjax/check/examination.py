@@ -1,4 +1,4 @@
-"""All looks at a recording, one after the other."""
+"""All checks of a recording, one after the other."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -33,7 +33,7 @@ from sogjax.data.recording import Recording
 from sogjax.data.recording_settings import read_recording_settings
 
 STILL = 1e-3
-"""Mean motion of a camera's pictures (roots of grey values) below which it sees nobody move."""
+"""Mean motion of a camera's pictures (roots of grey values) below which it sees no one move."""
 FEWEST_MOVING = 2
 
 
@@ -56,7 +56,7 @@ def examined(recording: Recording, start: int, frames: int, largest_offset: int,
     """Look at cameras, files, frames, synchrony, silhouettes, size and exposure of a recording.
 
     Args:
-        recording: what to look at.
+        recording: what to check.
         start: the first frame of the stretch that is read, counted from the recording's first.
         frames: its length at most.
         largest_offset: offsets between cameras are looked for up to so many frames.

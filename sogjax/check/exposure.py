@@ -10,15 +10,15 @@ from sogjax.check.findings import Finding
 from sogjax.check.silhouettes import Moment, Picture
 
 BRIGHTER = 1.3
-"""Ratio of values to the median camera's, from which on a camera is said to be exposed otherwise."""
+"""Ratio of values to the median camera's above which a camera counts as exposed differently."""
 TINTED = 1.2
 """The same for red or blue against green."""
 ROOM_FACTOR = 1.25
 """Both thresholds are so much wider where whole pictures are compared: cameras see different parts of a room."""
 FEWEST = 3
-"""Of two cameras that differ, none can be told wrong."""
+"""With two cameras that differ, nothing tells which is wrong."""
 CHANGED = 1.2
-"""Ratio of values between a camera's pictures, from which on its exposure is said to have changed."""
+"""Ratio of values between a camera's pictures above which its exposure counts as changed."""
 SATURATED = (5, 250)
 SCATTER = 0.25
 """Logarithms of ratios may be so far from their median by noise."""
@@ -65,7 +65,7 @@ def _colors(moment: Moment, count: int, of_subject: bool) -> Float[np.ndarray, "
 
 
 def exposure_findings(names: tuple[str, ...], found: Exposure, label: str) -> list[Finding]:
-    """Cameras that show things brighter, darker or in other colours than the others."""
+    """Cameras that show things brighter, darker or in different colours than the others."""
     known = int((~np.isnan(found.gains).any(axis=1)).sum())
     if known < FEWEST:
         return []
@@ -91,14 +91,14 @@ def exposure_findings(names: tuple[str, ...], found: Exposure, label: str) -> li
 
 
 def _finding(name: str, what: str, cause: str) -> Finding:
-    remedy = "set all cameras alike and by hand, or correct the videos; colours of the actor will not match this camera"
+    remedy = "set all cameras to the same manual values, or correct the videos; the actor's colours do not fit this one"
     return Finding("warning", "exposure", what, cause, remedy, (name,))
 
 
 def change_findings(
     names: tuple[str, ...], references: Mapping[int, tuple[str, Picture]], filmed: Mapping[int, Picture]
 ) -> list[Finding]:
-    """Cameras whose videos (a picture of each) are exposed otherwise than a still that they took of the same place."""
+    """Cameras whose video (one picture of each) is exposed differently from a still of the same place."""
     findings = []
     for camera, (label, picture) in references.items():
         gains = same_place_gains(picture, filmed[camera]) if camera in filmed else None
@@ -108,7 +108,7 @@ def change_findings(
         if low < 1.0 / CHANGED or high > CHANGED:
             shown = f"{low:.2f}" if high < low * TINTED else f"{low:.2f} to {high:.2f} (by colour)"
             what = f"the values in the video of {names[camera]} are {shown} times those in its {label}"
-            remedy = "fix exposure and white balance of the cameras, and take all pictures of one session with them"
+            remedy = "fix exposure and white balance, and take all pictures of a session with the same settings"
             cause = "automatic exposure, or settings changed in between"
             findings.append(Finding("warning", "exposure", what, cause, remedy, (names[camera],)))
     return findings

@@ -1,10 +1,10 @@
-"""What a check of a recording says: one finding for each thing that was looked at or noticed."""
+"""What a check of a recording reports: one finding for each thing that was checked or noticed."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 SEVERITIES = ("ok", "note", "warning", "error")
-"""From harmless to fatal: `ok` was looked at and is right, `error` keeps a recording from being opened."""
+"""From harmless to fatal: `ok` was checked and is right, `error` keeps a recording from being opened."""
 
 
 @dataclass(frozen=True)
@@ -14,13 +14,13 @@ class Finding:
     severity: str
     """One of `SEVERITIES`."""
     topic: str
-    """What was looked at: files, cameras, unit, vertical, calibration, frames, synchronisation, exposure."""
+    """What was checked: files, cameras, unit, vertical, calibration, frames, synchronisation, exposure."""
     what: str
     cause: str = ""
     """The likely one; empty where nothing is wrong."""
     remedy: str = ""
     cameras: tuple[str, ...] = ()
-    """Whom it concerns; empty where it is the whole recording."""
+    """The cameras it concerns; empty for the whole recording."""
 
     def sentence(self) -> str:
         """The finding in one or two sentences."""
@@ -42,6 +42,6 @@ def worst_first(findings: Iterable[Finding]) -> list[Finding]:
 
 
 def listed(names: Iterable[str], most: int = 6) -> str:
-    """Names as they may stand in a sentence, shortened where they are many."""
+    """Names for a sentence, shortened if there are many."""
     names = list(names)
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

@@ -1,4 +1,4 @@
-"""Numbers of frames, frame rates, and frames that were dropped or stand twice."""
+"""Numbers of frames, frame rates, and frames that were dropped or repeated."""
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -16,21 +16,21 @@ from sogjax.data.source import SourceInfo, look_at_source
 from sogjax.sentences import counted
 
 GAP = 1.5
-"""A pause between two frames of a file, in units of the usual one, from which on a frame is missing."""
+"""A pause between two frames of a file, in units of the usual one, above which a frame is missing."""
 UNEVEN = 0.2
 """Share of the usual pause by which most pauses may vary before the rate is called variable."""
 SAME = 0.05
-"""Two frames are one where they differ by less than this share of what they usually differ by in that video,"""
+"""Two frames count as the same if they differ by less than this share of the usual difference in that video,"""
 ELSEWHERE = 0.3
 """while those of most other cameras differ by more than this share."""
 LEAST_DIFFERENCE = 0.02
-"""Grey values; where frames usually differ by less, nothing can be told."""
+"""Grey values; where frames usually differ by less, nothing can be determined."""
 MOST_LISTED = 5
 
 
 @dataclass(frozen=True)
 class SourceFrames:
-    """What the file of one camera says of its frames."""
+    """What the file of one camera says about its frames."""
 
     info: SourceInfo
     gaps: tuple[int, ...]
@@ -40,7 +40,7 @@ class SourceFrames:
 
 
 def source_frames(recording: Recording) -> dict[str, SourceFrames]:
-    """By camera what its file says of its frames."""
+    """By camera what its file says about its frames."""
     with ThreadPoolExecutor() as pool:
         found = pool.map(lambda name: _source_frames(recording, name), recording.rig.names)
         return dict(zip(recording.rig.names, found, strict=True))
@@ -59,13 +59,13 @@ def _source_frames(recording: Recording, name: str) -> SourceFrames:
 
 
 def source_findings(recording: Recording, sources: dict[str, SourceFrames]) -> list[Finding]:
-    """What the files say of numbers of frames, rates and missing frames."""
+    """What the files say about numbers of frames, rates and missing frames."""
     counts = {name: source.info.num_frames for name, source in sources.items()}
     findings = []
     if len(set(counts.values())) > 1:
         shown = listed((f"{name} {count}" for name, count in counts.items()), 12)
-        cause = "cameras that were started or stopped apart, or that lost frames"
-        remedy = "look at the findings on synchronisation; set first_frame and last_frame to what all have"
+        cause = "cameras that started or stopped at different times, or lost frames"
+        remedy = "look at the findings on synchronisation; set first_frame and last_frame to the frames that all have"
         findings.append(
             Finding("note", "frames", f"the cameras have different numbers of frames: {shown}", cause, remedy)
         )
@@ -75,12 +75,12 @@ def source_findings(recording: Recording, sources: dict[str, SourceFrames]) -> l
             remedy = "write `time_stamps: true` into recording.yaml, or record at a constant rate"
             findings.append(Finding("warning", "frames", what, "a variable frame rate, as of phones", remedy, (name,)))
         elif source.gaps:
-            what = f"{name} lacks frames by its time stamps, after frame {_places(source.gaps)}"
+            what = f"{name} lacks frames according to its time stamps, after frame {_places(source.gaps)}"
             cause, remedy = "frames dropped while recording", "write `time_stamps: true` into recording.yaml"
             findings.append(Finding("warning", "frames", what, cause, remedy, (name,)))
     if not findings:
         frames, cameras = counted(recording.num_frames, "frame"), counted(len(sources), "camera")
-        findings.append(Finding("ok", "frames", f"{frames} of {cameras} at {recording.fps:g} a second"))
+        findings.append(Finding("ok", "frames", f"{frames} of {cameras} at {recording.fps:g} per second"))
     return findings
 
 
@@ -120,23 +120,23 @@ def missing_findings(clip: Clip) -> list[Finding]:
     shown = listed(f"{name} in {count}" for name, count in zip(names, missing[missing > 0], strict=True))
     what = f"cameras are missing in some of the {counted(clip.num_frames, 'frame')} looked at: {shown}"
     cause = "a late start, an early end, or what recording.yaml leaves out"
-    return [Finding("note", "frames", what, cause, "look at other frames with start=, if it is not meant", names)]
+    return [Finding("note", "frames", what, cause, "look at other frames with start=, if this is not intended", names)]
 
 
 def repeat_findings(clip: Clip, repeated: dict[int, list[int]]) -> list[Finding]:
-    """What repeated frames mean."""
+    """Findings on repeated frames."""
     findings = []
     for camera, frames in repeated.items():
         name = clip.recording.rig.names[camera]
         what = f"{name} shows the same picture twice, at frame {_places([clip.frame_number(k) for k in frames])}"
-        cause = "a frame that was lost and filled with the one before, or a converted frame rate"
+        cause = "a lost frame that was replaced by the one before, or a converted frame rate"
         remedy = "copy the original files again without conversion, or track the stretches between"
         findings.append(Finding("warning", "frames", what, cause, remedy, (name,)))
     return findings
 
 
 def jump_findings(clip: Clip, jumps: dict[int, Jump]) -> list[Finding]:
-    """What jumps of one camera's time against the others' mean."""
+    """Findings on jumps of one camera's time against the others'."""
     findings = []
     span = f"{clip.frame_number(0)} and {clip.frame_number(clip.num_frames - 1)}"
     for camera, jump in jumps.items():
@@ -145,7 +145,7 @@ def jump_findings(clip: Clip, jumps: dict[int, Jump]) -> list[Finding]:
         lost = jump.frames > 0
         what = f"{name} seems to have {'lost' if lost else 'gained'} {count} against the others between frames {span}"
         cause = "a frame dropped while recording or copying" if lost else "a frame that was repeated"
-        remedy = "track the stretches before and after apart, each with its own frame_offset, or record again"
+        remedy = "track the stretches before and after separately, each with its own frame_offset, or record again"
         findings.append(Finding("note", "frames", what, cause, remedy, (name,)))
     return findings
 

@@ -1,4 +1,4 @@
-"""Calibrations as they would be without a mistake that is often made; a check tries which one the pictures fit."""
+"""Calibrations with a common mistake undone; a check tries which one the pictures fit."""
 
 import jax.numpy as jnp
 import numpy as np

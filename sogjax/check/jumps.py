@@ -1,4 +1,4 @@
-"""Frames that one camera lost or repeated: its offset at the end of a clip is not the one at its beginning."""
+"""Frames that one camera lost or repeated: its offset at the end of a clip differs from that at its beginning."""
 
 from dataclasses import dataclass
 
@@ -24,7 +24,7 @@ class Jump:
 
 
 def find_jumps(codes: PairCodes, steps: int, whole: Synchrony) -> dict[int, Jump]:
-    """By camera the difference of its offsets in the two halves of a clip, where both are sure."""
+    """By camera the difference of its offsets in the two halves of a clip, where both are certain."""
     half = steps // 2
     if half < FEWEST_STEPS:
         return {}

@@ -1,4 +1,4 @@
-"""What keeps a recording from being opened: every file is looked at by itself, so that all of it is said at once."""
+"""What keeps a recording from being opened: each file is checked on its own, so all problems are reported at once."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -52,7 +52,7 @@ def _rig(path: Path, settings: RecordingSettings) -> CameraRig | None:
 
 
 def _finding(sentence: str) -> Finding:
-    if "is no rotation matrix (determinant -1" in sentence:
+    if "is not a rotation matrix (determinant -1" in sentence:
         cause = "a mirrored world: axes that changed between left-handed and right-handed"
         return Finding("error", "calibration", sentence, cause, "export the calibration for right-handed axes")
     return Finding("error", "files", sentence)

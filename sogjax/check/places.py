@@ -1,4 +1,4 @@
-"""Does each video show what its camera's still pictures show: names that were mixed up, cameras that were moved."""
+"""Whether each video shows what its camera's still pictures show, or names were mixed up, or cameras moved."""
 
 from collections.abc import Mapping
 
@@ -12,7 +12,7 @@ from sogjax.check.silhouettes import Moment, Picture
 SIZE = (96, 72)
 """Pixels to which pictures are made smaller before they are compared."""
 SAME = 0.55
-"""Correlation of two pictures' fine structure, from which on they show the same place."""
+"""Correlation of two pictures' fine structure above which they show the same place."""
 MARGIN = 0.2
 
 
@@ -38,16 +38,16 @@ def place_findings(
         other = max(row, key=row.__getitem__)
         label = references[camera][0]
         if row[other] < max(SAME, row[camera] + MARGIN):
-            what = f"the video of {names[camera]} shows another place than its {label} (likeness {row[camera]:.2f})"
-            cause = "the camera was moved in between, or one of the files is another camera's"
-            remedy = f"look at both; take the {label} again, or rename the file"
+            what = f"the video of {names[camera]} does not show the place of its {label} (likeness {row[camera]:.2f})"
+            cause = "the camera was moved in between, or one of the files belongs to another camera"
+            remedy = f"compare both; take the {label} again, or rename the file"
             findings.append(Finding("warning", "files", what, cause, remedy, (names[camera],)))
             continue
         back = likeness.get(other, {}).get(camera, 0.0)
         paired |= {camera, other} if back >= SAME else {camera}
         what = f"the video of {names[camera]} shows what the {references[other][0]} of {names[other]} shows"
         what += ", and the other way round" if back >= SAME else ""
-        cause, remedy = "videos under the wrong names", f"exchange the names of {names[camera]} and {names[other]}"
+        cause, remedy = "videos under the wrong names", f"swap the names of {names[camera]} and {names[other]}"
         findings.append(Finding("warning", "files", what, cause, remedy, (names[camera], names[other])))
     if likeness and not findings:
         findings.append(Finding("ok", "files", "every video shows the place that its camera's still pictures show"))

@@ -1,4 +1,4 @@
-"""How large the subject is by the calibration, and where it stands: that tells units, the vertical and the floor."""
+"""How large the subject is according to the calibration, and where it stands: this shows units, vertical and floor."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from sogjax.model.frames import axis_vector
 PERSON = (1.2, 2.6)
 """Metres: heights of people, raised arms included."""
 SUBJECTS = (0.25, 4.0)
-"""Metres: what is outside of this is no subject of a usual size, but another unit."""
+"""Metres: anything outside this range is not a subject of usual size, but another unit."""
 DISTANCES = (0.4, 40.0)
 """Metres from cameras to what they look at."""
 EXPECTED_HEIGHT, EXPECTED_DISTANCE = 1.7, 4.0
@@ -51,7 +51,7 @@ def subject_size(hulls: Sequence[MomentHull], good: Sequence[int], scale: float,
 def _ends(hull: MomentHull, camera: int, axis: Float[np.ndarray, "3"]) -> tuple[float, float] | None:
     """Lowest and highest point of a silhouette on the vertical line through the subject's middle.
 
-    The visual hull itself is no measure: with few cameras it reaches beyond head and feet.
+    The visual hull itself is no use: with few cameras it extends beyond head and feet.
     """
     seen, mask = hull.cameras[camera], hull.masks[camera]
     heights = np.linspace(-REACH, REACH, SAMPLES) * hull.cube.size
@@ -71,10 +71,10 @@ def _ends(hull: MomentHull, camera: int, axis: Float[np.ndarray, "3"]) -> tuple[
 
 
 def scale_findings(size: SubjectSize | None, geometry: RigGeometry, unit: str | None) -> list[Finding]:
-    """Whether the unit of length is right, and where the floor is; `unit` as recording.yaml gives it."""
+    """Whether the unit of length is right, and where the floor is; `unit` is that of recording.yaml."""
     if size is None:
         return _by_distance(geometry, unit)
-    shown = f"the subject is {_length(size.height)} tall by the calibration"
+    shown = f"the subject is {_length(size.height)} tall according to the calibration"
     low, high = SUBJECTS
     if not low <= size.height <= high:
         return [_wrong_unit(f"{shown}, a person about {EXPECTED_HEIGHT} m", EXPECTED_HEIGHT / size.height, unit)]
@@ -82,23 +82,23 @@ def scale_findings(size: SubjectSize | None, geometry: RigGeometry, unit: str | 
     if PERSON[0] <= size.height <= PERSON[1]:
         findings.append(Finding("ok", "unit", shown))
     else:
-        cause = "a subject that is no grown person, masks of a part of it, or a unit that is off"
+        cause = "a subject that is not an adult, masks of only a part of it, or a wrong unit"
         findings.append(Finding("note", "unit", shown, cause, "measure something in the scene, and compare"))
     if abs(size.lowest) > FLOOR:
         what = f"the lowest point of the subject is at {size.lowest:.2f} m along the vertical, not near 0"
         cause = "a world whose zero is not on the floor, a wrong `up`, or a subject off the floor"
-        findings.append(Finding("note", "vertical", what, cause, "nothing, if it is meant; else level the calibration"))
+        findings.append(Finding("note", "vertical", what, cause, "nothing, if intended; else level the calibration"))
     return findings
 
 
 def _by_distance(geometry: RigGeometry, unit: str | None) -> list[Finding]:
-    """Without a subject, the distance to what the cameras look at must do."""
+    """Without a subject, the distance to what the cameras look at is used."""
     if len(geometry.names) < 2:
         return []
     shown = f"the cameras are {_length(geometry.scale)} from what they look at"
     if DISTANCES[0] <= geometry.scale <= DISTANCES[1]:
         return [Finding("ok", "unit", f"{shown}, which is plausible; there is no silhouette to measure")]
-    return [_wrong_unit(f"{shown}, usual are 2 to 8 m", EXPECTED_DISTANCE / geometry.scale, unit)]
+    return [_wrong_unit(f"{shown}, 2 to 8 m is usual", EXPECTED_DISTANCE / geometry.scale, unit)]
 
 
 def _wrong_unit(what: str, factor: float, unit: str | None) -> Finding:

@@ -30,7 +30,7 @@ class Moment:
     pictures: dict[int, Picture]
     """By camera (its index in the rig) that is present, BGR."""
     masks: dict[int, Mask]
-    """By camera; absent where the subject could not be told."""
+    """By camera; absent where no subject was found."""
 
 
 def example_moments(recording: Recording) -> list[Moment]:

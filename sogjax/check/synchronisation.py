@@ -11,9 +11,9 @@ from sogjax.check.findings import Finding, listed
 from sogjax.sentences import counted
 
 ALIKE = 0.4
-"""Correlation of two cameras' motion from which on its lag counts."""
+"""Correlation of two cameras' motion above which its lag counts."""
 SURE_MARGIN = 0.03
-"""By so much the mean correlation of a camera with the others must fall away from its offset."""
+"""How far the mean correlation of a camera with the others must fall away from its offset."""
 SURE_MEAN = 0.35
 """Mean correlation at the offset, weighted, below which an offset is not believed."""
 FEWEST_STEPS = 8
@@ -37,7 +37,7 @@ class Synchrony:
     """How far that falls at the neighbouring ones."""
 
     def of(self, camera: int) -> int:
-        """The offset of a camera, 0 where it is not sure."""
+        """The offset of a camera, 0 where it is uncertain."""
         return int(self.offsets[camera]) if self.sure[camera] else 0
 
 
@@ -54,7 +54,7 @@ def synchrony(names: tuple[str, ...], codes: PairCodes, steps: int, largest: int
 
 
 def _least_squares(curves: Mapping[tuple[int, int], np.ndarray], count: int, most: int) -> Int[np.ndarray, "camera"]:
-    """Offsets that explain the best lags of the pairs, those that fit badly weighted down (Huber)."""
+    """Offsets that explain the best lags of the pairs, with those that fit badly weighted down (Huber)."""
     kept = {pair: curve for pair, curve in curves.items() if curve.max() > ALIKE}
     if not kept:
         return np.zeros(count, int)
@@ -94,7 +94,7 @@ def _scores(
 ) -> Float[np.ndarray, "lag"] | None:
     """Mean correlation with the others if the camera's offset were the median + lag, for lags -most to most.
 
-    Pairs count by how alike they can be at all; a camera that sees the subject from elsewhere says little.
+    Pairs count by how alike they can be at all; a camera that sees the subject from elsewhere tells little.
     """
     middle = int(np.median(offsets))
     total, weight = np.zeros(2 * most + 1), 1e-9
@@ -130,7 +130,7 @@ def _support(
 
 
 def too_short(frames: int, available: int) -> Finding:
-    """That so many frames say nothing of offsets; `available` are those of the recording."""
+    """The finding that the clip is too short for offsets; the recording has `available` frames."""
     needed = FEWEST_STEPS + 1
     what = f"time offsets cannot be estimated: the clip is too short, {counted(frames, 'frame')} of {needed} needed"
     remedy = f"give frames={needed} or more" if available >= needed else "record more frames"
@@ -144,19 +144,19 @@ def synchrony_findings(
     jumped: Collection[int] = (),
     away: Collection[int] = (),
 ) -> list[Finding]:
-    """What the offsets mean.
+    """Findings on the offsets.
 
     Args:
         found: the offsets.
         known: those that the recording has already.
         moving: whether anything moves.
         jumped: cameras whose offset changes on the way, so that no number mends it.
-        away: cameras that have too few pictures for anything to be told.
+        away: cameras that have too few pictures to determine anything.
     """
     if len(found.names) < 2:
         return []
     if not moving or not found.sure.any():
-        what = "time offsets cannot be estimated: hardly anything moves that several cameras see"
+        what = "time offsets cannot be estimated: several cameras hardly see anything move"
         return [Finding("note", "synchronisation", what, "", "record a clap or a jump at the beginning")]
     findings = []
     late = [k for k in np.flatnonzero(found.sure) if found.offsets[k] != 0 and k not in jumped]
@@ -169,7 +169,7 @@ def synchrony_findings(
         findings.append(Finding("warning", "synchronisation", what, cause, remedy, (name,)))
     unsure = tuple(name for k, name in enumerate(found.names) if not found.sure[k] and k not in away)
     if unsure:
-        what = f"time offsets of {listed(unsure)} could not be told: what moves there is not what the others see"
+        what = f"time offsets of {listed(unsure)} could not be determined: the motion there does not match the others'"
         cause = "little of the motion is in their pictures, or their calibration or names are wrong"
         findings.append(Finding("note", "synchronisation", what, cause, cameras=unsure))
     if not late:

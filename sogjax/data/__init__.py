@@ -1,1 +1,1 @@
-"""What comes from disk and goes to it: recordings, calibrations, videos, actors, motions."""
+"""Reading and writing: recordings, calibrations, videos, actors, motions."""

@@ -22,13 +22,13 @@ Arrays = dict[str, np.ndarray]
 
 
 class ArrayLog:
-    """Writes such a folder, which is made, or begun anew; the file stays open until `close`.
+    """Writes such a folder, which is created or overwritten; the file stays open until `close`.
 
     Args:
         folder: to write.
         constant: what is known from the beginning.
         first_rows: the rows to write first; they say the names, types and shapes of all.
-        kept: rows of a log that is there already, after which this one goes on; rows behind these are dropped.
+        kept: rows of an existing log, after which this one continues; rows behind these are dropped.
 
     Raises:
         InputError: the folder cannot be written, here or later.
@@ -91,7 +91,7 @@ class ArrayLog:
         return len(header.getvalue())
 
     def _write(self, content: bytes) -> None:
-        """All of it: without a buffer, a call may write a part only."""
+        """Write all of it: without a buffer, one call may write only a part."""
         left = memoryview(content)
         while left:
             left = left[self._file.write(left) :]
@@ -113,7 +113,7 @@ def read_log(folder: Path, mapped: bool = False) -> Arrays:
 
 
 def _whole_rows(path: Path, mapped: bool) -> np.ndarray:
-    """The rows that the header counts, less those that a loss of power took."""
+    """The rows that the header counts, without those lost to a power failure."""
     with path.open("rb") as file:
         shape, dtype = npy_header(file)
         begin = file.tell()

@@ -1,4 +1,4 @@
-"""Files that are either whole or not there: write under a temporary name, then rename."""
+"""Files that are either complete or absent: write under a temporary name, then rename."""
 
 import errno
 import uuid
@@ -43,12 +43,12 @@ def _rename(temporary: Path, path: Path) -> None:
     try:
         temporary.replace(path)
     except FileNotFoundError as error:
-        raise InputError(f"{path}: was removed, or its folder was, while it was written; write it again") from error
+        raise InputError(f"{path}: was removed, or its folder was, while being written; write it again") from error
 
 
 @contextmanager
 def disk_trouble_told(path: Path) -> Iterator[None]:
-    """A full or broken disk becomes one sentence about `path`.
+    """Turn a full or broken disk into one sentence about `path`.
 
     Raises:
         InputError: instead of the system's error.

@@ -1,4 +1,4 @@
-"""Files that are read whole, and are refused where they are larger than their kind can be."""
+"""Files that are read whole, and refused if they are larger than their kind can be."""
 
 from pathlib import Path
 
@@ -17,5 +17,5 @@ def read_bounded(path: Path, max_bytes: int) -> bytes:
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from error
     if len(content) > max_bytes:
-        raise InputError(f"{path}: is larger than {max_bytes} bytes; give a file of its kind")
+        raise InputError(f"{path}: is larger than {max_bytes} bytes; give a file of the right kind")
     return content

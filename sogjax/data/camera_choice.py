@@ -1,4 +1,4 @@
-"""Which cameras of a recording are used, and a word where calibration and videos do not fit together."""
+"""Which cameras of a recording are used, and messages where calibration and videos do not fit together."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -49,7 +49,7 @@ def _refuse_other_name(
     sources: Mapping[str, Path],
     otherwise: str,
 ) -> None:
-    """Where one video and one camera are left over, they are likely to be the same under two names."""
+    """One video and one camera left over are probably the same under two names."""
     videos = [source for camera, source in sources.items() if camera not in calibrated]
     cameras = [camera for camera in calibrated if camera in wanted and camera not in sources]
     if len(videos) != 1 or len(cameras) != 1:
@@ -63,7 +63,7 @@ def _refuse_other_name(
 
 
 def folder_around(path: Path) -> str:
-    """The remedy where something inside of a recording was given in its place; empty where that is not so."""
+    """The remedy if something inside a recording was given instead of it; else empty."""
     inside = path.is_file() or path.name in ("videos", "images", "background", "example_poses")
     for folder in path.resolve().parents[:2] if inside else ():
         if any((folder / name).is_dir() for name in ("videos", "images")):

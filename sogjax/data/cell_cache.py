@@ -24,7 +24,7 @@ from sogjax.data.source import fingerprint
 from sogjax.errors import InputError
 
 CELLS_VERSION = 1
-"""To be raised with every change that alters cells or their files."""
+"""Raise it with every change that alters cells or their files."""
 _CHUNK = 2**22
 
 Cells = UInt8[np.ndarray, "camera rows columns 3"]
@@ -40,7 +40,7 @@ class CellCache:
     recording: Recording
     depth: int
     say: Callable[[str], None]
-    """Takes a sentence where kept cells cannot be used."""
+    """Receives a sentence if kept cells cannot be used."""
 
     def find(self, first: int, last: int) -> CellsOfClip | None:
         """The cells of the frames from `first` to before `last`, memory-mapped; None where they must be made."""
@@ -92,7 +92,7 @@ class CellCache:
 
     @cached_property
     def _made_from(self) -> dict[str, Any]:
-        """All that cells depend on."""
+        """Everything that the cells depend on."""
         cameras = self.recording.rig.names
         gains = {camera: list(self.recording.color_gains[camera]) for camera in sorted(self.recording.color_gains)}
         optional = {"color_gains": gains, "picked": {camera: list(n) for camera, n in self.recording.picked.items()}}
@@ -109,7 +109,7 @@ class CellCache:
             content = json.loads(note.read_text())
             made_from, begin, checksum = (content[key] for key in ("made_from", "first_frame", "checksum"))
             if not isinstance(begin, int):
-                raise TypeError("first_frame is no number")
+                raise TypeError("first_frame is not a number")
         except (OSError, ValueError, LookupError, TypeError) as error:
             raise _UnusableError("has no readable note of what it was made from") from error
         if made_from != self._made_from:

@@ -1,7 +1,7 @@
-"""Names that stand in files and become names of files: none of them may lead out of its folder."""
+"""Names in files that become file names: none of them may lead out of its folder."""
 
 MAX_BYTES = 100
-"""Of a name; file systems take 255, and prefixes and endings are added."""
+"""Of a name; file systems allow 255, and prefixes and extensions are added."""
 
 
 def objection(name: str) -> str | None:
@@ -14,7 +14,7 @@ def objection(name: str) -> str | None:
     if not name.isprintable():
         return "a name of printable characters"
     if name.startswith(".") or name != name.strip():
-        return "a name that begins with no dot and has no space at its ends"
+        return "a name that does not begin with a dot and has no space at either end"
     if len(name.encode(errors="replace")) > MAX_BYTES:
         return f"a name of at most {MAX_BYTES} bytes"
     return None

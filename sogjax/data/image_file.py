@@ -11,7 +11,7 @@ from sogjax.errors import InputError
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 MAX_PIXELS = 2**27
-"""Of one picture. What its header claims is held against this before memory is taken for it."""
+"""Of one picture. The size in its header is checked against this before memory is allocated."""
 MAX_BYTES = 2**29
 """Of its file."""
 

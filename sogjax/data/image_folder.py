@@ -48,7 +48,7 @@ def numbered_images(folder: Path) -> list[Path]:
             raise InputError(f"{path}: its name does not end in a number; call the images 000000.png and so on")
         number = int(match[1])
         if number in numbers:
-            raise InputError(f"{path}: has the number of {numbers[number].name}; keep one image a frame")
+            raise InputError(f"{path}: has the number of {numbers[number].name}; keep one image per frame")
         numbers[number] = path
     if not numbers:
         raise InputError(f"{folder}: holds no images ({' '.join(IMAGE_SUFFIXES)}); put 000000.png ... there")

@@ -1,4 +1,4 @@
-"""Motion: what tracking finds, one pose a frame and all that follows from it."""
+"""Motion: what tracking finds, one pose per frame and all that follows from it."""
 
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -26,7 +26,7 @@ from sogjax.model.frames import UP_AXES
 
 FORMAT_VERSION = 1
 DEFAULT_UP = "z"
-"""The vertical of a file that does not say it."""
+"""The vertical of a file that does not give one."""
 FRAMES_AT_ONCE = 8
 """Joint frames and blobs are computed in blocks of so many frames, so that one program serves motions of any length."""
 
@@ -59,11 +59,11 @@ class Motion:
     up: str = DEFAULT_UP
     """The world's vertical, one of `sogjax.model.frames.UP_AXES`."""
     actor: str = ""
-    """Whose motion it is; empty where the file does not say it."""
+    """Whose motion it is; empty if the file does not say."""
     pose_std: Float[np.ndarray, "frame dof"] | None = None
     """Standard deviation of each degree of freedom; None where it was not computed, as in `joint_std`."""
     joint_std: Float[np.ndarray, "frame joint"] | None = None
-    """Root of the mean squared distance that each joint may be off, metres."""
+    """Expected root mean square error of each joint, metres."""
 
     @property
     def num_frames(self) -> int:
@@ -224,7 +224,7 @@ def _forward(
 
 
 def _check(path: Path, motion: Motion) -> None:
-    """Refuse indices that point nowhere, and what is no succession of rigid frames."""
+    """Refuse indices that point nowhere, and anything but a sequence of rigid frames."""
     if motion.up not in UP_AXES:
         raise InputError(f"{path}: 'up' is {motion.up!r}; it should be one of {', '.join(UP_AXES)}")
     joints = np.arange(len(motion.joint_names))
@@ -236,7 +236,7 @@ def _check(path: Path, motion: Motion) -> None:
         )
     wrong = (motion.blob_joint < 0) | (motion.blob_joint >= len(joints))
     if wrong.any():
-        raise InputError(f"{path}: 'blob_joint' holds {motion.blob_joint[wrong][0]}, which is no joint; correct it")
+        raise InputError(f"{path}: 'blob_joint' holds {motion.blob_joint[wrong][0]}, which is not a joint; correct it")
     if (np.diff(motion.frame) <= 0).any():
         raise InputError(f"{path}: 'frame' does not increase ({motion.frame[:5].tolist()} ...); sort the frames")
     for key in ("similarity", "energy"):

@@ -1,4 +1,4 @@
-"""A motion that goes to disk while it is found."""
+"""A motion that is written to disk while it is found."""
 
 import shutil
 from pathlib import Path
@@ -30,7 +30,7 @@ class MotionLog:
 
     Args:
         folder: of the log.
-        kept: frames of a log that is there already, after which this one goes on; 0: it begins anew.
+        kept: frames of an existing log, after which this one continues; 0: start again.
 
     Raises:
         InputError: the folder cannot be written, here or later.

@@ -18,7 +18,7 @@ MAX_BYTES = 4 * 2**30
 """Bytes that the arrays of one file may take in memory."""
 
 _DAMAGED_HEADER = (TokenError, SyntaxError, TypeError, LookupError, RecursionError, MemoryError, Warning)
-"""What numpy raises, beside ValueError, on a header that it cannot parse."""
+"""What numpy raises, besides ValueError, on a header that it cannot parse."""
 _UNREADABLE = (OSError, ValueError, zipfile.BadZipFile, zlib.error, EOFError, KeyError, MemoryError, RuntimeError)
 
 
@@ -43,11 +43,11 @@ def read_npz(path: Path) -> dict[str, np.ndarray]:
     except InputError:
         raise
     except _UNREADABLE as error:
-        raise InputError(f"{path}: is not readable as npz without pickles ({error}); write it anew") from error
+        raise InputError(f"{path}: is not readable as npz without pickles ({error}); write it again") from error
 
 
 def check_npy(path: Path) -> None:
-    """Hold what the header of a npy file claims against the file's size, before memory is taken for it.
+    """Check the size in an npy header against the file's size before memory is allocated.
 
     Raises:
         InputError: no npy, pickled objects inside, or fewer bytes than claimed.
@@ -56,7 +56,7 @@ def check_npy(path: Path) -> None:
         with path.open("rb") as file:
             _check_claim(path, file, path.stat().st_size)
     except (OSError, ValueError, EOFError) as error:
-        raise InputError(f"{path}: is not readable as npy ({error}); write it anew") from error
+        raise InputError(f"{path}: is not readable as npy ({error}); write it again") from error
 
 
 def npy_header(file: IO[bytes] | io.BufferedIOBase) -> tuple[tuple[int, ...], np.dtype]:
@@ -81,7 +81,7 @@ def npy_header(file: IO[bytes] | io.BufferedIOBase) -> tuple[tuple[int, ...], np
     if dtype.hasobject:
         raise ValueError("it holds pickled objects")
     if any(length < 0 for length in shape):
-        raise ValueError("its header claims fewer than no numbers")
+        raise ValueError("its header claims a negative number of values")
     return shape, dtype
 
 
@@ -89,7 +89,7 @@ def _check_claim(path: Path, file: IO[bytes] | io.BufferedIOBase, size: int) -> 
     shape, dtype = npy_header(file)
     claimed = math.prod(shape) * dtype.itemsize
     if claimed > size:
-        raise InputError(f"{path}: claims {claimed} bytes of {dtype}, but holds {size}; write it anew")
+        raise InputError(f"{path}: claims {claimed} bytes of {dtype}, but holds {size}; write it again")
 
 
 def float_array(

@@ -1,4 +1,4 @@
-"""Writing `frame_offset` into a recording.yaml and leaving everything else in it as it stands."""
+"""Writing `frame_offset` into a recording.yaml without changing anything else in it."""
 
 import json
 from collections.abc import Mapping
@@ -14,10 +14,10 @@ KEY = "frame_offset"
 
 
 def write_frame_offsets(path: Path, offsets: Mapping[str, int]) -> Path | None:
-    """Put `frame_offset` into `path`, in place of an older one; comments and other keys stay.
+    """Write `frame_offset` to `path`, replacing an older one; comments and other keys stay.
 
     Returns:
-        Where the file as it was is kept, None where there was none.
+        The path of the kept old file, None if there was none.
 
     Raises:
         InputError: a file that is no recording.yaml, or a folder that cannot be written.

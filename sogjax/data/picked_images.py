@@ -1,6 +1,6 @@
-"""Images taken by the times at which they are to be shown, so that a video of varying rate becomes one of a fixed rate.
+"""Images selected by their presentation times, so that a video of varying rate becomes one of a fixed rate.
 
-Telephones and cameras that lose images write such videos: counted, their images drift away from those of the others.
+Phones and cameras that drop images write such videos: if counted, their images drift away from the others'.
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 from sogjax.data.image_stream import ImageStream
 
 MOST_FRAMES = 50
-"""For each image on the average: with more, a time stamp or the rate is wrong."""
+"""Per image on average: with more, a time stamp or the rate is wrong."""
 FARTHEST = 0.75
 """Frames that an image may lie away from the time it stands for; a video of even images of any rate stays below."""
 
@@ -21,13 +21,13 @@ def picked_images(times: Float[np.ndarray, "image"], fps: float) -> Int[np.ndarr
 
     Args:
         times: of the images, in seconds, ascending.
-        fps: frames a second.
+        fps: frames per second.
 
     Raises:
         ValueError: there are no images, or `MOST_FRAMES` times as many frames as images.
     """
     if not len(times) or (times[-1] - times[0]) * fps > MOST_FRAMES * len(times):
-        raise ValueError(f"{len(times)} images do not make a video of {fps:g} frames a second")
+        raise ValueError(f"{len(times)} images do not make a video of {fps:g} frames per second")
     wanted = _frame_times(times, fps)
     after = np.searchsorted(times, wanted).clip(0, len(times) - 1)
     before = (after - 1).clip(0)

@@ -28,7 +28,7 @@ DEFAULT_UP = "z"
 
 @dataclass(frozen=True)
 class Recording:
-    """A recording whose files were looked at and fit together; images are read by `sogjax.data.video`."""
+    """A recording whose files were checked and fit together; images are read by `sogjax.data.video`."""
 
     path: Path
     name: str
@@ -58,7 +58,7 @@ class Recording:
     missing: dict[str, tuple[tuple[int, int], ...]] = field(default_factory=dict)
     """By camera the first and last frame (its own numbers) of each while in which its pictures are not to be used."""
     color_gains: dict[str, ColorGains] = field(default_factory=dict)
-    """By camera what its pictures are multiplied by; they are as recorded where there is no entry."""
+    """By camera the factors of its pictures; without an entry they stay as recorded."""
     fewest_cameras: int | None = None
     """Frames that so many cameras have are used; None: only those that all have."""
 
@@ -86,7 +86,7 @@ class Recording:
 
 
 def open_recording(path: Path) -> Recording:
-    """The recording in the folder `path`, everything in it looked at.
+    """The recording in the folder `path`, with everything in it checked.
 
     Raises:
         InputError: something is missing, unreadable, or does not fit together.
@@ -183,10 +183,10 @@ def _ground_truth(path: Path) -> Path | None:
 
 
 def _doubts(path: Path, settings: RecordingSettings, rig: CameraRig) -> tuple[str, ...]:
-    """Sentences on what is not wrong for sure."""
+    """Sentences on what may be wrong."""
     doubts = []
     if settings.up is None:
-        doubts.append(f"{path}: says nothing of the vertical; {DEFAULT_UP} is taken (`up:` in recording.yaml)")
+        doubts.append(f"{path}: does not give the vertical; {DEFAULT_UP} is assumed (`up:` in recording.yaml)")
     distances = np.linalg.norm(np.asarray(rig.cameras.camera_from_world)[:, :3, 3], axis=-1)
     if distances.max() > FAR_CAMERA:
         doubts.append(

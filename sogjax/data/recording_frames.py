@@ -16,7 +16,7 @@ FPS_TOLERANCE = 5e-4
 """Relative difference of two videos' frame rates that is taken for rounding (29.97 and 30 differ by 1e-3)."""
 
 LONGEST_GAP = 1.5
-"""Time between two images, in units of the usual one, beyond which the images do not come evenly."""
+"""Time between two images, in units of the usual one, beyond which the images are unevenly spaced."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def images_by_time(sources: dict[str, Path], infos: dict[str, SourceInfo], fps: 
 
 
 def frame_rate(path: Path, settings: RecordingSettings, infos: dict[str, SourceInfo]) -> float:
-    """Frames a second: what recording.yaml says, else the videos' headers.
+    """Frames per second: from recording.yaml, else from the videos' headers.
 
     Raises:
         InputError: the headers differ, or there are none.
@@ -110,7 +110,7 @@ def frames_in_common(
         partly = ", ".join(f"{c} {a} to {b}" for c, (a, b) in spans.items() if (a, b) != (first, last))
         if partly:
             warnings = (
-                f"{path}: frames {first} to {last} are used, of which some cameras have a part only ({partly})",
+                f"{path}: frames {first} to {last} are used, of which some cameras have only a part ({partly})",
             )
     elif settings.last_frame is None and len(set(ends.values())) > 1:
         lengths = ", ".join(f"{camera} {count}" for camera, count in counts.items())
@@ -124,14 +124,14 @@ def uneven(
     """Sentences on videos whose images do not come at one rate; `fewest` is `fewest_cameras` of recording.yaml."""
     done = "the camera is missing there" if fewest is not None else "the nearest one is taken"
     by_number = [
-        f"{sources[camera]}: its images do not come evenly (up to {info.longest_gap:.1f} times the usual time lies "
-        "between two): the frame rate varies or images were dropped, and each counts as one frame; write "
-        "`time_stamps: true` into recording.yaml to go by their times"
+        f"{sources[camera]}: its images are unevenly spaced (pauses of up to {info.longest_gap:.1f} times the usual "
+        "one): the frame rate varies or images were dropped, and each image counts as one frame; write "
+        "`time_stamps: true` into recording.yaml to use their times"
         for camera, info in infos.items()
         if camera not in timed and info.longest_gap > LONGEST_GAP
     ]
     return by_number + [
-        f"{sources[camera]}: has no image of {len(images.lost)} of its {counted(len(images.picked), 'frame')} by its "
+        f"{sources[camera]}: has no image for {len(images.lost)} of its {counted(len(images.picked), 'frame')} by its "
         f"time stamps; {done}"
         for camera, images in timed.items()
         if images.lost

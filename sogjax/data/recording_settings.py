@@ -1,4 +1,4 @@
-"""What `recording.yaml` says of a recording; every key is optional."""
+"""The content of `recording.yaml`; every key is optional."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,7 +15,7 @@ LARGEST_GAIN = 8.0
 """Of a camera's colours; a larger one is taken for a mistake."""
 
 FASTEST = 10_000.0
-"""Frames a second; a faster camera is taken for a mistake."""
+"""Frames per second; a faster camera is taken for a mistake."""
 
 _KEYS = (
     "fps",
@@ -56,7 +56,7 @@ class RecordingSettings:
     first_frame: int | None = None
     last_frame: int | None = None
     time_stamps: bool = False
-    """Whether images are taken by their times in the video files, not counted."""
+    """Whether images are selected by their times in the video files instead of counted."""
     fewest_cameras: int | None = None
     missing: dict[str, tuple[tuple[int, int], ...]] = field(default_factory=dict)
     """By camera the first and last frame of each while in which its pictures are not to be used."""
@@ -71,7 +71,7 @@ class RecordingSettings:
 
 
 def read_recording_settings(path: Path) -> RecordingSettings:
-    """Read `recording.yaml`; a file that is not there is as good as an empty one.
+    """Read `recording.yaml`; a missing file counts as empty.
 
     Raises:
         InputError: no YAML, an unknown key, or a value of the wrong kind.

@@ -1,4 +1,4 @@
-"""Skeletool's `.motion`: a line a frame with the values of all degrees of freedom, in millimetres and radians."""
+"""Skeletool's `.motion`: one line per frame with the values of all degrees of freedom, in millimetres and radians."""
 
 from pathlib import Path
 

@@ -26,7 +26,7 @@ class SourceInfo:
     num_frames: int
     size: tuple[int, int]
     times: Float[np.ndarray, "frame"] | None = None
-    """When each image is to be shown, in seconds, where the file says so and is not too large to look."""
+    """When each image is to be shown, in seconds, if the file says so and is not too large to read."""
 
     @property
     def longest_gap(self) -> float:

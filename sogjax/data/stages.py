@@ -1,4 +1,4 @@
-"""Stages of work in threads of their own, joined by bounded queues: a slow stage holds the others back."""
+"""Stages of work in threads of their own, joined by bounded queues: a slow stage makes the others wait."""
 
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
@@ -20,7 +20,7 @@ class Channel(Generic[Item]):
         self._error: BaseException | None = None
 
     def put(self, item: Item) -> bool:
-        """Append an item as soon as there is room; False where nobody takes it any more."""
+        """Append an item as soon as there is room; False if no one takes items any more."""
         with self._changed:
             self._changed.wait_for(lambda: self._closed or len(self._items) < self._room)
             if not self._closed:

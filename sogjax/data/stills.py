@@ -102,11 +102,11 @@ def _check_sizes(rig: CameraRig, images: dict[str, Path], masks: dict[str, Path]
     for (camera, path), (height, width) in zip(masks.items(), mask_shapes, strict=True):
         if (width, height) != rig.image_size(camera):
             wanted = "{}x{}".format(*rig.image_size(camera))
-            raise InputError(f"{path}: the mask is {width}x{height}, its image {wanted}; make them equal")
+            raise InputError(f"{path}: the mask is {width}x{height}, its image {wanted}; make them the same size")
 
 
 def check_size(path: Path, size: tuple[int, int], rig: CameraRig, camera: str) -> None:
-    """Hold the (width, height) of images against the calibration.
+    """Check the (width, height) of images against the calibration.
 
     Raises:
         InputError: they differ.

@@ -1,4 +1,4 @@
-"""Text files of lines and words, read one line after the other; what is wrong is told with the number of its line."""
+"""Text files of lines and words, read line by line; errors give the number of their line."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,7 +7,7 @@ from sogjax.data.bounded_file import read_bounded
 from sogjax.errors import InputError
 
 LARGEST = 1e9
-"""A larger number is none that such a file holds."""
+"""No such file holds a larger number."""
 
 
 class Lines:
@@ -37,7 +37,7 @@ class Lines:
 
     @property
     def left(self) -> int:
-        """How many lines there still are."""
+        """How many lines are left."""
         return len(self._rows) - self._next
 
     def peek(self) -> list[str]:
@@ -97,4 +97,4 @@ def read_text(path: Path, max_bytes: int) -> str:
     try:
         return read_bounded(path, max_bytes).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: is no text ({error.reason}); give a file of its kind") from error
+        raise InputError(f"{path}: is not text ({error.reason}); give a file of the right kind") from error

@@ -133,14 +133,14 @@ def read_still(recording: Recording, camera: str, path: Path) -> UInt8[np.ndarra
 
 
 class VideoWriter:
-    """Writes an mp4 (codec mp4v), within a `with` block; it gets its name only when it is whole.
+    """Writes an mp4 (codec mp4v), within a `with` block; it gets its name only when it is complete.
 
     The codec stores even sizes only: the last row or column of an odd image is left out.
     """
 
     def __init__(self, path: Path, fps: float):
         if path.suffix.lower() != ".mp4":
-            raise InputError(f"{path}: videos are written as .mp4 only; change the ending")
+            raise InputError(f"{path}: videos are written as .mp4 only; change the extension")
         self._path, self._fps = path, fps
         self._stack = ExitStack()
         self._writer: cv2.VideoWriter | None = None
@@ -189,8 +189,8 @@ class VideoWriter:
             found = 0
         if found != self._count:
             raise InputError(
-                f"{self._path}: could not be written whole ({found} of {self._count} images are in it; the disk may "
-                "be full); choose another disk"
+                f"{self._path}: could not be written completely ({found} of {self._count} images are in it; the "
+                "disk may be full); choose another disk"
             )
 
     def _open(self, image: UInt8[np.ndarray, "height width 3"]) -> cv2.VideoWriter:

@@ -13,12 +13,12 @@ from jaxtyping import Float, UInt8
 from sogjax.data.image_file import MAX_PIXELS
 from sogjax.errors import InputError
 
-# A file that does not open is told in our own sentence, without the codecs' own lines before it.
+# A file that does not open is reported in our own sentence, without lines from the codecs before it.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 
 _COUNT_PACKETS_BELOW = 256 * 2**20
-"""Bytes. The packets of larger videos are not counted, which would mean to read the whole file."""
+"""Bytes. The packets of larger videos are not counted, which would mean reading the whole file."""
 
 
 class VideoFile:
@@ -52,16 +52,16 @@ class VideoFile:
 
 @dataclass(frozen=True)
 class VideoFacts:
-    """What a video's file says of it, checked where that is cheap."""
+    """What a video's file says about it, checked where that is cheap."""
 
     fps: float
     num_frames: int
     times: Float[np.ndarray, "frame"] | None
-    """When each frame is to be shown, in seconds and ascending; None of files so large that reading them takes long."""
+    """When each frame is to be shown, in seconds and ascending; None for files too large to read."""
 
 
 def look_at_video(path: Path) -> VideoFacts:
-    """Rate, length and times of a video, of which hardly anything is decoded.
+    """Rate, length and times of a video, decoding hardly anything of it.
 
     Raises:
         InputError: it cannot be opened.
@@ -108,7 +108,7 @@ def _captured(path: Path, parameters: Sequence[int] = ()) -> Iterator[cv2.VideoC
 
 
 def _num_frames(path: Path, claimed: int, times: Float[np.ndarray, "frame"] | None) -> int:
-    """The number of frames; what the container claims is believed where its packets are as many."""
+    """The number of frames; the container's claim is believed if it has that many packets."""
     packets = None if times is None else len(times)
     if claimed > 0 and packets in (None, claimed):
         return claimed

@@ -16,7 +16,7 @@ from sogjax.errors import InputError
 from sogjax.sentences import counted
 
 MAX_BYTES = 1_000_000
-"""A larger file is no file that a person wrote."""
+"""No person writes a larger file."""
 
 _LARGEST = float(np.finfo(np.float32).max)
 
@@ -117,9 +117,9 @@ def read_yaml(path: Path) -> Entry:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = f" in line {mark.line + 1}" if mark else ""
-        raise InputError(f"{path}: is no valid YAML{line}: {error.problem}") from error
+        raise InputError(f"{path}: is not valid YAML{line}: {error.problem}") from error
     except (yaml.YAMLError, ValueError) as error:
-        raise InputError(f"{path}: is no valid YAML: {' '.join(str(error).split())}") from error
+        raise InputError(f"{path}: is not valid YAML: {' '.join(str(error).split())}") from error
     except RecursionError as error:
         raise InputError(f"{path}: is nested too deeply; give a file written for this purpose") from error
 
@@ -139,7 +139,7 @@ class _StrictLoader(yaml.SafeLoader):
         keys = [key for key, _ in pairs if isinstance(key, yaml.ScalarNode)]
         for key in keys:
             if key.value in seen:
-                problem = f"the key {_shown(key.value)} stands there twice"
+                problem = f"the key {_shown(key.value)} occurs twice"
                 raise ConstructorError(None, None, problem, key.start_mark)
             seen.add(key.value)
         return super().construct_mapping(node, deep)
@@ -156,7 +156,7 @@ def _float(value: object) -> float:
 
 
 def _shown(value: object) -> str:
-    """The value as it may stand in a sentence: short, and never more than one line."""
+    """The value for a sentence: short, and never more than one line."""
     if value is None:
         return "empty"
     if isinstance(value, Mapping):

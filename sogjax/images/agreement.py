@@ -1,4 +1,4 @@
-"""Do the masks of several cameras show one thing: each one is held against the visual hull of the others."""
+"""Whether the masks of several cameras show one thing: each is compared with the visual hull of the others."""
 
 from collections.abc import Mapping
 
@@ -24,7 +24,7 @@ def disagreeing_cameras(masks: Mapping[int, Mask], cameras: Mapping[int, Camera]
 
     Points of space that all masks hold (the visual hull) project onto the whole of every mask if the masks show one
     thing: "silhouette coherence" (Hernandez, Schmitt and Cipolla, PAMI 2007). While some mask is covered too little,
-    the camera is taken out without which the rest agree best, until two are left: of two, none can be told wrong.
+    the camera is taken out without which the rest agree best, until two are left, of which either may be wrong.
     """
     left = list(masks)
     out: dict[int, float] = {}

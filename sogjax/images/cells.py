@@ -62,7 +62,7 @@ class CellGrid:
 def stack_cells(
     images: list[UInt8[np.ndarray, "_height _width 3"]], grids: tuple[CellGrid, ...]
 ) -> UInt8[np.ndarray, "camera rows columns 3"]:
-    """RGB cells of one BGR image a camera, padded to the largest grid; the padding is never used.
+    """RGB cells of one BGR image per camera, padded to the largest grid; the padding is never used.
 
     Raises:
         ValueError: an image whose size is not its grid's.

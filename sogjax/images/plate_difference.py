@@ -1,4 +1,4 @@
-"""Where a picture differs from the empty scene, told apart from where it is only in shadow or exposed otherwise."""
+"""Where a picture differs from the empty scene, as opposed to being in shadow or exposed differently."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 WORKING_SIZE = 648
-"""Pixels. Pictures are made smaller until their longer side is not above this: averaging takes noise out."""
+"""Pixels. Pictures are scaled down until their longer side is at most this: averaging removes noise."""
 CHANGED = 8.0
 """Squared differences to the plate above this, in units of the noise, are a change."""
 DIFFERENT = 4.5
@@ -32,9 +32,9 @@ class Difference:
     change: Float[np.ndarray, "rows columns"]
     """Mean squared difference, in units of the noise."""
     unexplained: Float[np.ndarray, "rows columns"]
-    """What a shadow does not explain of it."""
+    """The part of it that a shadow does not explain."""
     changed: Bool[np.ndarray, "rows columns"]
-    """Subject or shadow: what is a shadow for sure, by its pattern, is left out."""
+    """Subject or shadow, without what is certainly a shadow by its pattern."""
     different: Bool[np.ndarray, "rows columns"]
     """Subject: the colour is another one."""
 
@@ -54,7 +54,7 @@ def reduced_mask(mask: Bool[np.ndarray, "height width"]) -> Bool[np.ndarray, "ro
 def plate_difference(
     image: UInt8[np.ndarray, "height width 3"], plate: UInt8[np.ndarray, "height width 3"]
 ) -> Difference:
-    """Hold a picture against the empty scene, seen by the same camera under an exposure that may differ.
+    """Compare a picture with the empty scene, seen by the same camera under an exposure that may differ.
 
     A shadow is the plate, darker: Horprasert, Harwood and Davis, "A Statistical Approach for Real-time Robust
     Background Subtraction and Shadow Detection" (1999). Where a brown trouser leg before a brown floor looks like one,
@@ -77,12 +77,12 @@ def plate_difference(
 
 
 def opened(mask: Bool[np.ndarray, "rows columns"], width: int) -> Bool[np.ndarray, "rows columns"]:
-    """Without what is narrower than `width` pixels."""
+    """The mask without anything narrower than `width` pixels."""
     return cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, disc(width)) > 0
 
 
 def closed(mask: Bool[np.ndarray, "rows columns"], width: int) -> Bool[np.ndarray, "rows columns"]:
-    """Without gaps that are narrower than `width` pixels."""
+    """The mask without gaps narrower than `width` pixels."""
     return cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, disc(width)) > 0
 
 

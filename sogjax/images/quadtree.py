@@ -2,7 +2,7 @@
 
 Every node that could become a blob has a fixed slot ("candidate"), whose place and size are known before any image
 is seen: only the colours and the choice of the leaves change from frame to frame. So lens distortion is removed
-from the blob centres once a recording.
+from the blob centres once per recording.
 """
 
 from collections.abc import Sequence

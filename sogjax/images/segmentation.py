@@ -12,16 +12,16 @@ from sogjax.images.visual_hull import LOW_VOXELS, VoxelPixels, cube_around, resi
 from sogjax.model.camera import Camera
 
 LARGEST_SHARE = 0.5
-"""Where more of a picture than this differs, the camera was moved or the light changed: no subject can be told."""
+"""Where more of a picture than this differs, the camera was moved or the light changed, and no subject can be found."""
 SMALLEST_SHARE = 1e-3
-"""Of the picture: less is no subject."""
+"""Share of the picture: less is not a subject."""
 SMALLEST_PART = 0.1
 """Parts of a mask smaller than this share of the largest one are dropped."""
 GRAB_CUT_ITERATIONS = 2
 MANY = 5
 """From so many cameras on, one of them may miss a part of the subject."""
 UNCHANGED = 3.0
-"""Squared differences, in units of the noise, below which a pixel is background for sure."""
+"""Squared differences, in units of the noise, below which a pixel is certainly background."""
 
 Mask = Bool[np.ndarray, "_h _w"]
 
@@ -46,7 +46,7 @@ def masks_from_plates(
         up: the world's vertical.
 
     Returns:
-        Masks by camera; a camera is absent where no subject could be told from the plate.
+        Masks by camera; a camera is absent if no subject could be told apart from its plate.
     """
     with ThreadPoolExecutor() as pool:
         found = pool.map(lambda camera: plate_difference(images[camera], plates[camera]), plates)
@@ -110,7 +110,7 @@ def _seen_together(
     cameras: Mapping[int, Camera],
     up: Float[np.ndarray, "3"],
 ) -> dict[int, Mask]:
-    """Better guesses from all cameras together; none where their regions do not meet."""
+    """Better guesses from all cameras together; empty if their regions do not meet."""
     small_known = {camera: reduced_mask(mask) for camera, mask in known.items()}
     subjects = {**guesses, **small_known}
     if len(subjects) < 2 or not guesses:
@@ -140,7 +140,7 @@ def _widened(mask: Mask, pixels: int) -> Mask:
 
 
 def is_subject(mask: Mask) -> bool:
-    """Whether a region is neither next to nothing nor most of the picture."""
+    """Whether a region is neither almost nothing nor most of the picture."""
     return SMALLEST_SHARE < float(mask.mean()) < LARGEST_SHARE
 
 

@@ -17,7 +17,7 @@ VOXELS = 64
 SIDE = 1.3
 """The cube's side, in units of the subject's size."""
 LOW = 0.2
-"""What reaches less far up from the floor, in units of the subject's size, may be a shadow."""
+"""Height above the floor, in units of the subject's size, below which something may be a shadow."""
 LOW_VOXELS = round(LOW / SIDE * VOXELS)
 """The same in voxels."""
 

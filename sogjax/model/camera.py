@@ -34,7 +34,7 @@ class Camera(eqx.Module):
     image_size: Float[Array, "*camera 2"]
     """Width and height in pixels."""
     fisheye: Bool[Array, "*camera"] | None = None
-    """Which cameras have OpenCV's fisheye model; None: none has, and nothing is computed for it."""
+    """Which cameras have OpenCV's fisheye model; None if no camera has it: nothing is computed for it then."""
 
     @property
     def focal_length(self) -> Float[Array, "*camera"]:
@@ -55,7 +55,7 @@ def project_points(camera: Camera, points_world: Float[Array, "n 3"]) -> tuple[F
 
 
 def projection_jacobian(camera: Camera, points_world: Float[Array, "n 3"]) -> Float[Array, "n 2 3"]:
-    """Derivatives of the pixels of points by the points (pixels a metre); 0 for points nearer than `NEAR`."""
+    """Derivatives of the pixels of points by the points (pixels per metre); 0 for points nearer than `NEAR`."""
     rotation = camera.camera_from_world[:3, :3]
     points_camera = jnp.matmul(points_world, rotation.T, precision="highest") + camera.camera_from_world[None, :3, 3]
     depth = points_camera[:, 2]

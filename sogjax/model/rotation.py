@@ -32,6 +32,6 @@ def rigid_transform(
 def transform_points(
     b_from_a: Float[Array, "*batch 4 4"], points: Float[Array, "*batch 3"]
 ) -> Float[Array, "*batch 3"]:
-    """Points of frame a, expressed in frame b; one transform a point."""
+    """Points of frame a, expressed in frame b; one transform per point."""
     rotated = jnp.einsum("...ij,...j->...i", b_from_a[..., :3, :3], points, precision="highest")
     return rotated + b_from_a[..., :3, 3]

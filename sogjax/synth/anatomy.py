@@ -64,7 +64,7 @@ class Pose:
     rotations: Float[np.ndarray, "22 3 3"]
 
     def with_rotation(self, joint: str, rotation: Float[np.ndarray, "3 3"]) -> "Pose":
-        """The same pose with one joint turned otherwise."""
+        """The same pose with one joint turned differently."""
         rotations = self.rotations.copy()
         rotations[INDEX[joint]] = rotation
         return Pose(self.position, rotations)

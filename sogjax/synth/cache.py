@@ -1,4 +1,4 @@
-"""Rendered recordings are kept: the same settings are rendered once on a machine."""
+"""Rendered recordings are kept, so the same settings are rendered only once on a machine."""
 
 import hashlib
 import json
@@ -11,7 +11,7 @@ from sogjax.synth.render import Progress, render_recording, silent
 from sogjax.synth.settings import SynthSettings
 
 SYNTH_VERSION = 2
-"""To be raised with every change that alters the pictures."""
+"""Raise it with every change that alters the pictures."""
 
 
 def default_cache_dir() -> Path:

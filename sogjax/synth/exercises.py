@@ -21,7 +21,7 @@ def both(**angles: float) -> dict[str, float]:
 
 
 def standing_pose(anatomy: Anatomy, angles: Angles, place: Vector, heading: float) -> Pose:
-    """A pose on two feet, which stay where standing feet are unless they are told to move."""
+    """A pose on two feet, which stay where standing feet are unless moved."""
     get = lambda name: float(angles.get(name, 0.0)) * anatomy.stature
     facing = heading_matrix(heading)
     pelvis = np.array([get("pelvis_x"), get("pelvis_y"), anatomy.hip_height - 0.012 + get("pelvis_z")])
@@ -44,7 +44,7 @@ class Exercise:
 
     anatomy: Anatomy
     keys: Sequence[tuple[float, Angles]]
-    """Seconds and poses; the last one is as the first."""
+    """Seconds and poses; the last pose equals the first."""
     place: Vector
     heading: float
     delay: float = 0.0
@@ -144,4 +144,4 @@ EXAMPLE_POSES: dict[str, Angles] = {
     "elbows": both(**{"raise": 86.0, "plane": 86.0, "roll": 88.0, "elbow": 90.0}),
     "squat": _SQUAT,
 }
-"""The stills of which an actor's size and colours are estimated."""
+"""The stills from which an actor's size and colours are estimated."""

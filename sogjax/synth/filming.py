@@ -19,7 +19,7 @@ from sogjax.synth.stage import Stage
 
 _JPEG_QUALITY = 95
 _NOISE, _VIDEO, _STILL, _EMPTY = 7, 0, 1, 2
-"""Streams of random numbers: pictures have the same noise whoever renders them."""
+"""Streams of random numbers: pictures have the same noise whichever process renders them."""
 
 
 def num_pictures(settings: SynthSettings) -> int:

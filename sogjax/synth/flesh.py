@@ -102,7 +102,7 @@ def flesh_of(anatomy: Anatomy, sleeve: float) -> Flesh:
 
 
 def _sized(lump: Lump, scale: float, girth: float) -> Lump:
-    """A lump of the average person, for another stature and girth; heads, hands and shoes do not get fat."""
+    """A lump of the average person, for another stature and girth; heads, hands and shoes do not get thicker."""
     lean = lump.joint.endswith(("head", "wrist", "ankle", "toe"))
     thickness = scale * (1.0 if lean else girth)
     points = [tuple(float(scale * value) for value in point) for point in (lump.start, lump.end)]

@@ -54,7 +54,7 @@ def egg(length: float, width: float, start: float) -> Path:
 
 @dataclass(frozen=True)
 class Walk:
-    """A person who stands, then walks along a path.
+    """A person who stands still, then walks along a path.
 
     Step n (from 1) lifts one foot and sets it down; feet alternate. Before it both feet stand side by side.
     """
@@ -64,7 +64,7 @@ class Walk:
     delay: float = 0.2
     """Seconds before the first step."""
     cadence: float = 1.75
-    """Steps a second."""
+    """Steps per second."""
     stride: float = 0.36
     """Length of a step, as a share of the stature."""
     swing: float = 1.0

@@ -1,4 +1,4 @@
-"""Poses from angles of everyday words, and limbs that reach for a place (two-bone inverse kinematics)."""
+"""Poses from angles with everyday names, and limbs that reach for a place (two-bone inverse kinematics)."""
 
 from collections.abc import Mapping
 
@@ -39,7 +39,7 @@ def pose_from_angles(angles: Mapping[str, float], position: Vector, heading: Mat
 
 
 def _arm(angles: Mapping[str, float]) -> dict[str, Matrix]:
-    """Rotations of a left arm; the shoulder girdle rises with the arm, which still points where it was told."""
+    """Rotations of a left arm; the shoulder girdle rises with the arm, which still points where it should."""
     get = lambda name: float(angles.get(name, 0.0))
     raised, plane = get("raise"), get("plane")
     clavicle = turned(("x", clavicle_lift(raised)))

@@ -11,7 +11,7 @@ from sogjax.synth.scene import Scene
 from sogjax.synth.views import View
 
 OVERSAMPLING = 2
-"""Samples a pixel in each direction."""
+"""Samples per pixel in each direction."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def plate_of(scene: Scene, view: View) -> Plate:
         filled[hits.rows, hits.columns] = samples
         return filled
 
-    # Where the shadows of the furniture fall is looked up once a pixel: they are softer than that anyway.
+    # Where the shadows of the furniture fall is looked up once per pixel: they are softer than that anyway.
     points, upwards = (image(v)[::OVERSAMPLING, ::OVERSAMPLING] for v in (values[:, :3], normals))
     lit = scene.shadow.lit((points + np.float32(0.02) * upwards).reshape(-1, 3), taps=6)
     lamp = averaged(image(albedo * light.direct(normals))) * lit.reshape(view.height, view.width, 1)

@@ -43,7 +43,7 @@ def render_recording(
         settings: what to render; the same settings give the same pictures, bit for bit.
         out: a folder that does not exist yet, or is empty.
         progress: wraps the pictures to count them.
-        workers: processes to use; the default is one a core, one only for short recordings.
+        workers: processes to use; by default one per core, and one for short recordings.
 
     Raises:
         InputError: a setting is wrong, or `out` cannot be used.
@@ -72,7 +72,7 @@ def render_recording(
 def _check_free(out: Path) -> None:
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         remedy = "choose another, or give overwrite=true to replace it"
-        raise InputError(f"out={out}: is there already and not an empty folder; {remedy}")
+        raise InputError(f"out={out}: exists and is not empty; {remedy}")
 
 
 def _temporary_beside(out: Path) -> Path:

@@ -1,4 +1,4 @@
-"""What can be asked of a rendered recording."""
+"""The settings of a rendered recording."""
 
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ class SynthSettings:
     cameras: int = option(12, "number of cameras in a ring around the people, at two heights in turn")
     width: int = option(648, "width of the pictures in pixels, even")
     height: int = option(486, "height of the pictures in pixels, even")
-    fps: float = option(30.0, "frames a second")
+    fps: float = option(30.0, "frames per second")
     frames: int = option(60, "number of frames")
     seed: int = option(0, "people, clothes, room, cameras and noise are drawn from it")
     noise: float = option(0.012, "standard deviation of the sensor noise, in units of the brightest value")
@@ -57,7 +57,7 @@ class SynthSettings:
         for name in ("width", "height"):
             if getattr(self, name) % 2:
                 raise InputError(
-                    f"{name}={getattr(self, name)} is odd, which video files do not take; use an even number"
+                    f"{name}={getattr(self, name)} is odd, which video files do not support; use an even number"
                 )
 
     @property

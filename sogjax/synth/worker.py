@@ -15,7 +15,7 @@ from sogjax.synth.stage import stage_of
 
 
 def main() -> None:
-    """Read the order (settings, cameras, folder) as JSON, film, tell of every picture."""
+    """Read the order (settings, cameras, folder) as JSON, film, report every picture."""
     order = json.load(sys.stdin)
     stage = stage_of(SynthSettings(**order["settings"]))
     try:

@@ -1,1 +1,1 @@
-"""Pictures and Rerun files that show whether to trust a motion."""
+"""Pictures and Rerun files that show whether a motion can be trusted."""

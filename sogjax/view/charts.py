@@ -31,7 +31,7 @@ def mean_chart(
 
     Args:
         names: of the rows, from left to right.
-        means: one a row.
+        means: one per row.
         intervals: low and high of each mean.
         axis: what differs between the rows.
         value: what the means are, with their unit.
@@ -54,7 +54,7 @@ def mean_chart(
 def calibration_chart(
     expected: Mapping[str, Float[np.ndarray, "bin"]], found: Mapping[str, Float[np.ndarray, "bin"]], title: str
 ) -> bytes:
-    """What was expected against what was found, in millimetres from metres, by name (PNG)."""
+    """Predicted against actual errors by name, drawn in millimetres from metres (PNG)."""
     figure = _figure((4.2, 3.6))
     panel = figure.subplots()
     top = 0.0
@@ -62,7 +62,7 @@ def calibration_chart(
         panel.plot(1000.0 * values, 1000.0 * found[name], "o-", markersize=4, label=name)
         top = max(top, 1000.0 * float(np.nanmax([values, found[name]])))
     panel.plot([0.0, top], [0.0, top], "--", color=PAPER, linewidth=1)
-    panel.set(xlabel="standard deviation said, mm", ylabel="root mean square error, mm", title=title)
+    panel.set(xlabel="predicted standard deviation, mm", ylabel="root mean square error, mm", title=title)
     panel.legend(fontsize=8, frameon=False)
     return _png(figure)
 
@@ -93,7 +93,7 @@ def _name_lines(panel: Any, members: Mapping[str, Sequence[float]]) -> None:
 
 
 def spaced(heights: Sequence[float], apart: float) -> list[float]:
-    """Ascending heights moved so far that they are apart: upward, but not above 1, and downward where that is full."""
+    """Ascending heights moved apart: upward, but not above 1, and downward where there is no room."""
     moved = list(heights)
     for k in range(1, len(moved)):
         moved[k] = max(moved[k], moved[k - 1] + apart)

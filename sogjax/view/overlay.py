@@ -1,4 +1,4 @@
-"""The tracked skeleton drawn over the pictures of all cameras: one grid a frame, or a whole video."""
+"""The tracked skeleton drawn over the pictures of all cameras: one grid per frame, or a whole video."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -147,7 +147,7 @@ def write_overlay(
         width: largest width in pixels.
         columns: tiles in a row.
         blobs: draw the blobs too.
-        progress: wraps the frames' numbers to show how far it is: (numbers, count, title).
+        progress: wraps the frames' numbers to show progress: (numbers, count, title).
 
     Raises:
         InputError: a motion that is not of this recording, or an unknown camera.

@@ -40,7 +40,7 @@ def plot_per_frame(
 def plot_per_point(
     errors: Float[np.ndarray, "point"], names: Sequence[str], title: str, *, failed: Collection[int] = ()
 ) -> UInt8[np.ndarray, "h w 3"]:
-    """One bar a marker, joint or run, from metres, drawn in millimetres (BGR); no bar where the value is NaN.
+    """One bar per marker, joint or run, from metres, drawn in millimetres (BGR); no bar where the value is NaN.
 
     Args:
         errors: metres.

@@ -136,7 +136,7 @@ def _polyline(area: np.ndarray, pixels: Float[np.ndarray, "point 2"], color: tup
 
 
 def _dim(area: np.ndarray) -> None:
-    """A little darker, so that thin lines are seen."""
+    """A little darker, so that thin lines are visible."""
     area[:] = (0.75 * area).astype(np.uint8)
 
 

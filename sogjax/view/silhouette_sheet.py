@@ -31,7 +31,7 @@ class SilhouetteView:
 
 
 def silhouette_sheet(views: Sequence[SilhouetteView], title: str) -> UInt8[np.ndarray, "h w 3"]:
-    """One tile a camera (BGR), with its IoU, below a title and a legend."""
+    """One tile per camera (BGR), with its IoU, below a title and a legend."""
     tiles = [_tile(view) for view in views]
     return contact_sheet(tiles, f"{title} ({LEGEND})")
 

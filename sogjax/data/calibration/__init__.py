@@ -1,4 +1,4 @@
-"""Camera calibrations: one reader a format, chosen by the content of the file."""
+"""Camera calibrations: one reader per format, chosen by the content of the file."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -74,7 +74,7 @@ def load_calibration(path: Path, unit: str | None = None) -> CameraRig:
     found = calibration_format(path)
     if found is None:
         known = ", ".join(known.name for known in FORMATS)
-        raise InputError(f"{path}: is no calibration of a known format; export it as one of: {known}")
+        raise InputError(f"{path}: is not a calibration of a known format; export it as one of: {known}")
     return found.read(path, unit or found.unit)
 
 
@@ -86,7 +86,7 @@ def save_calibration(path: Path, rig: CameraRig) -> None:
     """
     writer = WRITERS.get(path.suffix.lower())
     if writer is None:
-        raise InputError(f"{path}: no calibration is written with this ending; use one of: {' '.join(WRITERS)}")
+        raise InputError(f"{path}: no calibration is written with this extension; use one of: {' '.join(WRITERS)}")
     writer(path, rig)
 
 

@@ -125,7 +125,7 @@ def _text(path: Path) -> str:
 def _content(path: Path, text: str) -> Content:
     """By key a matrix as a row of numbers, or a number; all else is None."""
     if _too_deep(text) or "\0" in text:
-        raise InputError(f"{path}: is no YAML that OpenCV writes (nested too deeply); export it again")
+        raise InputError(f"{path}: is not YAML as OpenCV writes it (nested too deeply); export it again")
     try:
         storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
         root = storage.root()

@@ -152,7 +152,7 @@ def _check(path: Path, entry: CameraEntry) -> None:
     deviation = np.abs(rotation @ rotation.T - np.eye(3)).max()
     if deviation > ROTATION_TOLERANCE or np.linalg.det(rotation) < 0:
         raise InputError(
-            f"{where}: {_text(rotation)} is no rotation matrix (determinant {np.linalg.det(rotation):.3g}, "
+            f"{where}: {_text(rotation)} is not a rotation matrix (determinant {np.linalg.det(rotation):.3g}, "
             f"R R^T differs from 1 by {deviation:.3g}); calibrate it again or export it with more digits"
         )
     given = counted(len(entry.distortion), "distortion coefficient")

@@ -1,4 +1,4 @@
-"""Skeletool's `.calibration`: millimetres, one radial coefficient, a key and its values a line, in any order."""
+"""Skeletool's `.calibration`: millimetres, one radial coefficient, one key with its values per line, in any order."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -58,7 +58,7 @@ def read_skeletool(path: Path, unit: str = "mm") -> CameraRig:
         elif key in _COUNTS and cameras:
             _take(f"{path}: line {number}, camera {cameras[-1].name!r}", cameras[-1], key, words, frame)
         elif key and not line.startswith(HEADER):
-            raise InputError(f"{path}: line {number} begins with {key[:60]!r}, which is no key of a camera; correct it")
+            raise InputError(f"{path}: line {number} begins with {key[:60]!r}, not a key of a camera; correct it")
     return rig_from_entries(path, [_entry(path, camera, unit) for camera in cameras])
 
 

@@ -1,4 +1,4 @@
-"""The calibration TOML of Anipose, Pose2Sim and FreeMoCap: a table a camera."""
+"""The calibration TOML of Anipose, Pose2Sim and FreeMoCap: one table per camera."""
 
 import re
 import tomllib

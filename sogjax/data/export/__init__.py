@@ -1,4 +1,4 @@
-"""Writing motions in the formats of other programs: one writer a format, chosen by the file's ending."""
+"""Writing motions in the formats of other programs: one writer per format, chosen by the file's extension."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -44,7 +44,7 @@ def motion_writer(path: Path) -> Callable[[Path, Motion, str], None]:
     writer = WRITERS.get(path.suffix.lower())
     if writer is None:
         known = " ".join(sorted(WRITERS))
-        raise InputError(f"{path}: no writer for the ending {path.suffix!r}; use one of: {known}")
+        raise InputError(f"{path}: no writer for the extension {path.suffix!r}; use one of: {known}")
     return writer
 
 

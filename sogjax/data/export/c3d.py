@@ -1,4 +1,4 @@
-"""C3D, the file of marker systems: one point a bone, in millimetres, in the motion's own world."""
+"""C3D, the file format of marker systems: one point per bone, in millimetres, in the motion's own world."""
 
 import importlib
 from pathlib import Path
@@ -14,7 +14,7 @@ from sogjax.model.frames import forward_axis
 
 MILLIMETRES = 1000.0
 MAX_FRAMES = 65_535
-"""A C3D header counts no farther; more frames would be lost without a word."""
+"""A C3D header counts no further; more frames would be lost silently."""
 
 
 def write_c3d(path: Path, motion: Motion, up: str = "z") -> None:

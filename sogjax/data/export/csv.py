@@ -11,7 +11,7 @@ from sogjax.data.motion import Motion
 
 
 def write_csv(path: Path, motion: Motion, up: str = "z") -> None:
-    """Write a row a frame, after a line that begins with `#` and says unit and vertical, and the columns' names.
+    """Write one row per frame, after a line starting with `#` that gives unit and vertical, and the columns' names.
 
     Raises:
         InputError: a path that cannot be written.

@@ -1,4 +1,4 @@
-"""GLB, glTF in one binary file: a node a bone with tracks of its motion, and the blobs as a skinned mesh.
+"""GLB, glTF in one binary file: one node per bone with tracks of its motion, and the blobs as a skinned mesh.
 
 As glTF prescribes: metres, Y up, a figure in its rest pose looks along +Z.
 """

@@ -1,4 +1,4 @@
-"""TRC, the tab-separated marker file of OpenSim: one point a bone, in metres, Y up."""
+"""TRC, the tab-separated marker file of OpenSim: one point per bone, in metres, Y up."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Skeletons of other programs as bodies: one reader a format, chosen by the content of the file."""
+"""Skeletons of other programs as bodies: one reader per format, chosen by the content of the file."""
 
 from pathlib import Path
 
@@ -36,16 +36,16 @@ def read_skeleton(path: Path, dof: Path | None = None, unit: str | None = None, 
         rows, prescribed = read_skeletool_skeleton(path, dof), "mm"
     elif head.startswith(bvh_hierarchy.HEADER):
         if dof is not None:
-            raise InputError(f"{dof}: belongs to a .skeleton of Skeletool, but {path} is none; leave it out")
+            raise InputError(f"{dof}: belongs to a .skeleton of Skeletool, but {path} is not one; leave it out")
         rows, prescribed = read_bvh_hierarchy(path), "m"
     else:
-        raise InputError(f"{path}: is no skeleton of a known format; give a .skeleton of Skeletool or a .bvh")
+        raise InputError(f"{path}: is not a skeleton of a known format; give a .skeleton of Skeletool or a .bvh")
     chosen = unit or prescribed
     body = body_from(Entry(path, "", rows.document()), METRES[chosen])
     extent = METRES[chosen] * rows.extent()
     if not EXTENTS[0] <= extent <= EXTENTS[1]:
         others = ", ".join(other for other in METRES if other != chosen)
-        raise InputError(f"{path}: its rest pose is {extent:.3g} m large in {chosen}; give unit= as one of {others}")
+        raise InputError(f"{path}: its rest pose is {extent:.3g} m in size in {chosen}; give unit= as one of {others}")
     return body.rotated(jnp.asarray(world_from_upright(up).T, body.blob_sigmas.dtype))
 
 

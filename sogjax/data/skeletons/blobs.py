@@ -1,4 +1,4 @@
-"""Blobs along the bones of a skeleton that comes without: a beginning, which the actor's pictures then scale.
+"""Blobs along the bones of a skeleton that has none: a start, which the actor's pictures then scale.
 
 Along every bone, from a joint to a child elsewhere or to the bone's end: four blobs, two where the bone is shorter
 than a tenth of the skeleton, one below a twenty-fifth. They share the bone evenly and their sigma is half of such a

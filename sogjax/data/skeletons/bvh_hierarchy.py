@@ -86,7 +86,7 @@ def _close(lines: Lines, rows: SkeletonRows, bone: _Bone) -> None:
 
 
 def _add_joints(lines: Lines, rows: SkeletonRows, bone: _Bone, words: list[str]) -> None:
-    """One joint a channel, positions first: BVH moves a bone before it turns it, however its channels are listed."""
+    """One joint per channel, positions first: BVH moves a bone before turning it, in any order of channels."""
     expected = "CHANNELS, their number (at most 6) and their names, such as 3 Zrotation Xrotation Yrotation"
     channels = words[1:]
     if not words or words[0] not in "0123456" or int(words[0]) != len(channels) or len(set(channels)) < len(channels):

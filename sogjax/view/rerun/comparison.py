@@ -31,7 +31,7 @@ def write_comparison(
     frames: Iterable[Sequence[np.ndarray]] | None = None,
     truth: GroundTruth | None = None,
 ) -> None:
-    """Write runs of one recording, such as those of a sweep or of several solvers, to be looked at side by side.
+    """Write runs of one recording, such as those of a sweep or of several solvers, side by side.
 
     A run's actors lie under `/world/runs/RUN`, its curves, in its bodies' colours, beside those of the others in common
     plots.

@@ -1,4 +1,4 @@
-"""Everything of a tracked recording in one Rerun file."""
+"""A tracked recording, with all that is known of it, in one Rerun file."""
 
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -69,7 +69,7 @@ def write_rerun(
         truth: markers to show beside the bodies.
         picture_width: largest width of the stored pictures in pixels.
         quality: of the JPEG pictures, 0 to 100.
-        progress: wraps the frames' numbers to show how far it is: (numbers, count, title).
+        progress: wraps the frames' numbers to show progress: (numbers, count, title).
     """
     names = list(names) if names else ["actor", *(f"actor_{k + 2}" for k in range(len(motions) - 1))][: len(motions)]
     first, stop = frame_range(recording, motions)
@@ -84,7 +84,7 @@ def write_rerun(
 
 
 class RerunFile:
-    """A Rerun file that is written as the motion comes, within a `with` block; it gets its name when it is whole.
+    """A Rerun file that is written as the motion comes, within a `with` block; it gets its name when it is complete.
 
     Args:
         path: the `.rrd` file, replaced as a whole.
@@ -194,7 +194,7 @@ class RerunFile:
         self._stream.send_blueprint(tracking_layout(self._recording, self._names, self._with_blobs, self._plots, view))
 
     def _begin(self, motions: Sequence[Motion], terms: Mapping[str, np.ndarray]) -> None:
-        """What stands once in the file: looks of bodies and curves."""
+        """What is written once per file: the looks of bodies and curves."""
         self._bones = [bones_from_motion(motion) for motion in motions]
         self._plots = plots_with([*own_curves(motions[0]), *terms])
         for k, (name, motion) in enumerate(zip(self._names, motions, strict=True)):

@@ -1,4 +1,4 @@
-"""The way of a solver through one frame, iteration by iteration, on a timeline of its own."""
+"""The path of a solver through one frame, iteration by iteration, on a timeline of its own."""
 
 from pathlib import Path
 
@@ -23,7 +23,7 @@ def write_iterations(
     energies: Float[np.ndarray, "iteration"],
     pictures: list[np.ndarray] | None = None,
 ) -> None:
-    """Write the poses that a solver went through in one frame; the way of every joint is drawn as a line.
+    """Write the poses that a solver went through in one frame; the path of every joint is drawn as a line.
 
     Args:
         path: the `.rrd` file, replaced as a whole.

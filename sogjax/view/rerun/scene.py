@@ -38,7 +38,7 @@ def log_look(
     colors: np.ndarray,
     static: bool = False,
 ) -> None:
-    """What does not change of an actor: colours, widths, sizes of its blobs.
+    """What does not change about an actor: colours, widths, sizes of its blobs.
 
     Blobs are only static where the motion's frames are not on the timelines: else they would stand there before it.
     """
@@ -88,7 +88,7 @@ def log_deviations(stream: rr.RecordingStream, entity: str, motion: Motion, bone
 
 
 def log_path(stream: rr.RecordingStream, entity: str, path: np.ndarray, actor: int) -> None:
-    """The way of an actor's root through all frames."""
+    """The path of an actor's root through all frames."""
     trail = rr.LineStrips3D([path], colors=[actor_palette(actor)[1]], radii=[0.004])
     stream.log(f"{entity}/path", trail, static=True)
 

@@ -1,4 +1,4 @@
-"""A stream into a Rerun file that is either whole or not there."""
+"""A stream into a Rerun file that is either complete or absent."""
 
 import os
 from collections.abc import Iterator
@@ -37,9 +37,9 @@ def rerun_stream(path: Path, name: str) -> Iterator[rr.RecordingStream]:
 
 @contextmanager
 def _written_by_ourselves(path: Path) -> Iterator[Path]:
-    """What Rerun is to write into: a pipe, whose other end a thread puts into the file.
+    """A pipe for Rerun to write into; a thread copies its other end to the file.
 
-    On a full disk Rerun prints that, leaves a part of the file, and may wait forever (0.41); a pipe takes everything.
+    On a full disk Rerun prints a message, leaves part of the file, and may hang (0.41); a pipe takes everything.
     """
     if not _OPEN_FILES.is_dir():  # Windows
         yield path
@@ -60,7 +60,7 @@ def _written_by_ourselves(path: Path) -> Iterator[Path]:
 
 
 def _copy(end: int, file: FileIO, errors: list[OSError]) -> None:
-    """All that comes, to a file; when it cannot be written, what comes is taken all the same."""
+    """Copy everything to a file; if that fails, keep reading and discard the rest."""
     while content := os.read(end, _AT_ONCE):
         left = memoryview(content)
         try:
