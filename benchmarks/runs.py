@@ -21,6 +21,7 @@ from sogjax.app.recordings import actors_of, opened
 from sogjax.app.track import track_recording
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.recording import Recording
+from sogjax.energy.similarity import similarity_among
 from sogjax.evaluate import evaluate_motions
 from sogjax.model.body import Body
 from sogjax.track.frame import TrackState
@@ -96,7 +97,7 @@ def stage_quantities(scene: Scene) -> Iterator[Quantity]:
     views = eqx.filter_jit(lambda tracker, state, cells: tracker.views(cells, state, capacities)[0])
     near = eqx.filter_jit(
         lambda tracker, state, views: views.near(
-            tracker.body.posed_blobs(state.previous), tracker.weights, capacities.blocks
+            tracker.body.posed_blobs(state.previous), similarity_among(tracker.terms).exponent, capacities.blocks
         )
     )
     seen = views(job.tracker, state, cells)

@@ -17,7 +17,7 @@ import numpy as np
 from sogjax.actor.colors import camera_of
 from sogjax.actor.make import MadeActor, make_actor, subjects_of
 from sogjax.actor.silhouette_iou import silhouette_iou
-from sogjax.app.build import energy_weights
+from sogjax.app.build import energy_terms
 from sogjax.app.composition import composed
 from sogjax.app.configs import EnergyConfig
 from sogjax.app.recordings import body_named, say
@@ -61,7 +61,7 @@ def main() -> None:
             ("estimated", body_named("human")),
         ):
             made = make_actor(
-                recording, body, subjects_of(recording)[0], "hsv_cylinder", energy_weights(EnergyConfig()), say
+                recording, body, subjects_of(recording)[0], "hsv_cylinder", energy_terms(EnergyConfig()), say
             )
             print(f"{recording.name:<16}{kind:<10}", *report(recording, made, settings.solver), sep="  ", flush=True)
     print(machine_line())

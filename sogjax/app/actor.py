@@ -11,7 +11,7 @@ from sogjax.actor.colors import ColoredView, camera_of
 from sogjax.actor.gains import estimated_gains
 from sogjax.actor.make import MadeActor, make_actor
 from sogjax.app.actor_report import report_folder, write_actor_report
-from sogjax.app.build import color_space_and_radius, energy_weights
+from sogjax.app.build import color_space_and_radius, energy_terms
 from sogjax.app.configs import ActorConfig
 from sogjax.app.outputs import free_path, results_folder
 from sogjax.app.progress import progress
@@ -33,7 +33,7 @@ def run(config: ActorConfig) -> Path:
         InputError: anything wrong with the recording, its example poses or the body, or an actor file that is there.
     """
     space, _ = color_space_and_radius(config.color)
-    weights = energy_weights(config.energy)
+    terms = energy_terms(config.energy)
     recording = opened(config.recording, config.cameras)
     body = body_named(config.body)
     out = Path(config.out)
@@ -41,7 +41,7 @@ def run(config: ActorConfig) -> Path:
         raise InputError(f"out={out}: is a folder; give the actor file to write, such as out={out / 'actor.yaml'}")
     free_path("out", out, config.overwrite)
     with results_folder(out.parent):
-        made = make_actor(recording, body, config.subject, space, weights, say, progress, config.symmetric)
+        made = make_actor(recording, body, config.subject, space, terms, say, progress, config.symmetric)
         save_body(out, made.body)
         folder = report_folder(out)
         report = write_actor_report(folder, made, recording.rig)

@@ -10,7 +10,7 @@ from typing import Any
 import jax.numpy as jnp
 
 from sogjax.actor.make import make_actor, subjects_of
-from sogjax.app.build import color_space_and_radius, energy_weights
+from sogjax.app.build import color_space_and_radius, energy_terms
 from sogjax.app.configs import ColorConfig, EnergyConfig
 from sogjax.app.progress import progress
 from sogjax.data.actor_file import load_body, named_body
@@ -90,13 +90,13 @@ def _made_actor(path: str, cameras: tuple[str, ...], body: str, subject: str | N
     recording = open_recording(Path(path))
     recording = replace(recording, rig=recording.rig.select(cameras))
     label = "actor" if subject is None else f"actor {subject}"
-    weights = energy_weights(EnergyConfig())
+    terms = energy_terms(EnergyConfig())
     return make_actor(
         recording,
         body_named(body),
         subject,
         space,
-        weights,
+        terms,
         report=lambda stage: say(f"{label}: {stage}"),
         progress=progress,
     ).body
