@@ -12,8 +12,9 @@ from gradient import Settings, scattered_views
 from quantities import Quantity, exponent, milliseconds
 
 from sogjax.data.actor_file import load_body, named_body
-from sogjax.energy.curvature import FrameEnergy
-from sogjax.energy.objective import EnergyWeights, History, Views
+from sogjax.energy.frame_energy import FrameEnergy, standard_terms
+from sogjax.energy.posed import History
+from sogjax.energy.views import Views
 from sogjax.model.body import Body, concatenate
 from sogjax.model.skeleton import Skeleton
 
@@ -29,16 +30,15 @@ def human() -> Body:
 def frame_energy(body: Body, views: Views, gradient: str = "forward") -> FrameEnergy:
     """Eq. 10 of a frame at the rest pose."""
     rest = body.poses["rest"]
-    weights = EnergyWeights(gradient="forward" if gradient == "forward" else "autodiff")
-    return FrameEnergy(body, views, History(rest, rest, jnp.asarray(True)), weights)
+    terms = standard_terms(gradient="forward" if gradient == "forward" else "autodiff")
+    return FrameEnergy(body, views, History(rest, rest, jnp.asarray(True)), terms)
 
 
 def with_near_pairs(objective: FrameEnergy) -> FrameEnergy:
     """The same with lists of near pairs made at the rest pose, with a quarter more room than they need."""
-    blobs = objective.body.posed_blobs(objective.body.poses["rest"])
-    listed = eqx.filter_jit(lambda views, capacity: views.near(blobs, objective.weights, capacity))
-    count = int(listed(objective.views, 1)[1])
-    return eqx.tree_at(lambda o: o.views, objective, listed(objective.views, int(1.25 * count) + 1)[0])
+    rest, near = objective.body.poses["rest"], eqx.filter_jit(FrameEnergy.near)
+    count = int(near(objective, rest, 1)[1])
+    return near(objective, rest, int(1.25 * count) + 1)[0]
 
 
 def value(objective: FrameEnergy, pose: jax.Array) -> jax.Array:
@@ -53,7 +53,7 @@ def value_and_gradient(objective: FrameEnergy, pose: jax.Array) -> tuple[jax.Arr
 
 def quadratic(objective: FrameEnergy, pose: jax.Array) -> tuple[jax.Array, ...]:
     """The energy with its gradient and curvature."""
-    return tuple(objective.quadratic(pose))
+    return tuple(jax.tree.leaves(objective.quadratic(pose)))
 
 
 def forward_kinematics(objective: FrameEnergy, pose: jax.Array) -> jax.Array:

@@ -16,8 +16,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from sogjax.data.actor_file import load_body, named_body
-from sogjax.energy.objective import EnergyWeights, History, Views, energy, similarity, whole_image_overlap
+from sogjax.energy.frame_energy import FrameEnergy, standard_terms
 from sogjax.energy.overlap import GradientMode
+from sogjax.energy.posed import History
+from sogjax.energy.similarity import Similarity
+from sogjax.energy.views import Views, whole_image_overlap
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, project
 from sogjax.model.sog import Sog
@@ -53,8 +56,8 @@ def overlap_of(views: Views) -> Callable[[GradientMode], Callable]:
     """Eq. 9 as a function of the means of the blobs in the world."""
 
     def function(gradient: GradientMode) -> Callable:
-        weights = EnergyWeights(gradient=gradient)
-        return lambda blobs: similarity(blobs, views, weights)
+        similarity = Similarity(1.0, gradient=gradient)
+        return lambda blobs: similarity.of_blobs(blobs, views)
 
     return function
 
@@ -63,9 +66,8 @@ def energy_of(body: Body, views: Views) -> Callable[[GradientMode], Callable]:
     """Eq. 10 as a function of the pose."""
 
     def function(gradient: GradientMode) -> Callable:
-        weights = EnergyWeights(gradient=gradient)
         history = History(body.poses["rest"], body.poses["rest"], jnp.asarray(True))
-        return lambda pose: energy(body, pose, views, history, weights)
+        return FrameEnergy(body, views, history, standard_terms(gradient=gradient))
 
     return function
 

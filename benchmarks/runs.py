@@ -13,6 +13,7 @@ from track_speed import demo_recording
 
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.recording import Recording
+from sogjax.energy.similarity import similarity_among
 from sogjax.engine.cells import cells_of_clip
 from sogjax.engine.job import Job
 from sogjax.engine.recordings import actors_of, opened
@@ -92,7 +93,7 @@ def stage_quantities(scene: Scene) -> Iterator[Quantity]:
     views = eqx.filter_jit(lambda tracker, state, cells: tracker.views(cells, state, capacities)[0])
     near = eqx.filter_jit(
         lambda tracker, state, views: views.near(
-            tracker.body.posed_blobs(state.previous), tracker.weights, capacities.blocks
+            tracker.body.posed_blobs(state.previous), similarity_among(tracker.terms).exponent, capacities.blocks
         )
     )
     seen = views(job.tracker, state, cells)

@@ -19,7 +19,7 @@ from sogjax.actor.make import MadeActor, make_actor, subjects_of
 from sogjax.actor.silhouette_iou import silhouette_iou
 from sogjax.data.ground_truth import GroundTruth, load_ground_truth
 from sogjax.data.recording import Recording, open_recording
-from sogjax.engine.build import energy_weights
+from sogjax.engine.build import energy_terms
 from sogjax.engine.recordings import body_named
 from sogjax.engine.terminal import say
 from sogjax.engine.track import track_recording
@@ -63,7 +63,7 @@ def main() -> None:
             ("estimated", body_named("human")),
         ):
             made = make_actor(
-                recording, body, subjects_of(recording)[0], "hsv_cylinder", energy_weights(EnergyConfig()), say
+                recording, body, subjects_of(recording)[0], "hsv_cylinder", energy_terms(EnergyConfig()), say
             )
             print(f"{recording.name:<16}{kind:<10}", *report(recording, made, settings.solver), sep="  ", flush=True)
     print(machine_line())

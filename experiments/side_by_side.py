@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
 from sogjax.app.sweep.results import differing, kept_results
+
 from sogjax.data.motion import Motion, load_motion
 from sogjax.data.video import read_frames
 from sogjax.errors import InputError

@@ -7,7 +7,8 @@ from body_cases import posed
 from rig_cases import opencv_pixels
 
 from sogjax.actor.colors import colored
-from sogjax.energy.objective import EnergyWeights, whole_image_overlap
+from sogjax.energy.frame_energy import standard_terms
+from sogjax.energy.views import whole_image_overlap
 from sogjax.images.cells import CellGrid, stack_cells
 from sogjax.images.quadtree import Candidates
 from sogjax.solve import ConditionedAscent
@@ -79,7 +80,7 @@ def make_tracker(body, rig, depth=6, solver=None, color_space="hsv_cylinder", to
         cameras=rig.cameras,
         normalizers=whole_image_overlap(rig.cameras.image_size),
         reader=reader,
-        weights=EnergyWeights(),
+        terms=standard_terms(acceleration_weight=0.05),
         solver=ConditionedAscent() if solver is None else solver,
         scales=pose_scales(body.skeleton),
         extrapolation=extrapolation,

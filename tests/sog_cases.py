@@ -5,8 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 from body_cases import posed
 
-from sogjax.energy.objective import Views, whole_image_overlap
 from sogjax.energy.overlap import pair_color_similarities
+from sogjax.energy.views import Views, whole_image_overlap
 from sogjax.model.sog import Sog
 
 SIZE = 64.0

@@ -17,7 +17,7 @@ from sogjax.actor.make import make_actor, subjects_of
 from sogjax.actor.shape import ShapeModel
 from sogjax.data.initial_pose import InitialPose
 from sogjax.data.recording import ExamplePose
-from sogjax.energy.objective import EnergyWeights
+from sogjax.energy.frame_energy import standard_terms
 from sogjax.errors import InputError
 from sogjax.model.body import Attachments
 
@@ -148,7 +148,7 @@ def made(tmp_path_factory):
         write_example(folder, "trot", truth, trot, rig),
     )
     recording = replace(recording_of(rig, 1), example_poses=examples)
-    actor = make_actor(recording, dog, None, "hsv_cylinder", EnergyWeights())
+    actor = make_actor(recording, dog, None, "hsv_cylinder", standard_terms())
     return actor, truth, {"stand": stand, "trot": trot}
 
 
@@ -199,7 +199,7 @@ def drawn_recording(folder, *actors, with_masks=True):
 
 def refused(recording, message, subject=None):
     with pytest.raises(InputError, match=message):
-        make_actor(recording, shipped("dog"), subject, "rgb", EnergyWeights())
+        make_actor(recording, shipped("dog"), subject, "rgb", standard_terms())
 
 
 def test_recordings_without_what_is_needed_are_refused(tmp_path):

@@ -9,7 +9,8 @@ from body_cases import random_body, shipped
 from drawn_scene import cells_of, draw, in_colors, make_tracker, standing
 from rig_cases import ring_rig
 
-from sogjax.energy.objective import History, Views, energy_terms
+from sogjax.energy.similarity import similarity_among
+from sogjax.energy.views import Views
 from sogjax.errors import InputError
 from sogjax.images.quadtree import keep_blobs
 from sogjax.model.body import concatenate
@@ -31,9 +32,7 @@ CULLED = 2e-3
 """Part of the similarity that may be lost with the image blobs left out (tails of Gaussians beyond the box)."""
 
 similarity_of = eqx.filter_jit(
-    lambda body, pose, views, weights: (
-        energy_terms(body, pose, views, History(pose, pose, jnp.asarray(False)), weights).similarity
-    )
+    lambda body, pose, views, terms: similarity_among(terms).of_blobs(body.posed_blobs(pose), views)
 )
 
 
@@ -73,9 +72,9 @@ def test_culling_does_not_change_the_energy(scene):
     rng = np.random.default_rng(0)
     for spread in (0.0, 0.03, 0.1):
         pose = state.previous + jnp.asarray(rng.normal(size=state.previous.shape) * spread, jnp.float32)
-        expected = similarity_of(tracker.body, pose, everything, tracker.weights)
+        expected = similarity_of(tracker.body, pose, everything, tracker.terms)
         assert expected > 1e-3
-        np.testing.assert_allclose(similarity_of(tracker.body, pose, views, tracker.weights), expected, rtol=CULLED)
+        np.testing.assert_allclose(similarity_of(tracker.body, pose, views, tracker.terms), expected, rtol=CULLED)
 
 
 def test_counts_are_true_ones_whatever_the_capacity(scene):

@@ -16,8 +16,9 @@ from rig_cases import ring_rig
 from sog_cases import floats, in_float64, random_views
 
 from sogjax.energy.analytic import energy_gradient
-from sogjax.energy.objective import EnergyWeights, History, energy, energy_terms
+from sogjax.energy.frame_energy import FrameEnergy, standard_terms
 from sogjax.energy.overlap import EXACT_EXPONENT, PRINTED_EXPONENT
+from sogjax.energy.posed import History
 from sogjax.model.body import Attachments
 from sogjax.model.camera import project
 
@@ -40,11 +41,9 @@ def precise(body):
 """Loaded here, in single precision, since the loaded body is shared with other tests."""
 
 value_and_gradient = eqx.filter_jit(
-    lambda pose, body, views, history, weights: jax.value_and_grad(lambda p: energy(body, p, views, history, weights))(
-        pose
-    )
+    lambda pose, body, views, history, terms: jax.value_and_grad(FrameEnergy(body, views, history, terms))(pose)
 )
-terms_of = eqx.filter_jit(energy_terms)
+values_of = eqx.filter_jit(lambda energy, pose: energy.values(pose))
 seen_by_all = jax.jit(lambda cameras, body, pose: jax.vmap(project, (0, None))(cameras, body.posed_blobs(pose)))
 
 
@@ -67,20 +66,19 @@ def case(body, seed, padding=5, count=60):
     return pose, views, History(previous, before, jnp.asarray(True))
 
 
-def weights(mode="forward", capped=True, exponent=EXACT_EXPONENT):
-    values = {"limit_weight": floats(0.7), "acceleration_weight": floats(0.3), "exponent": floats(exponent)}
-    return EnergyWeights(**values, capped=capped, gradient=mode)
+def terms(mode="forward", capped=True, exponent=EXACT_EXPONENT):
+    return standard_terms(floats(0.7), floats(0.3), floats(exponent), capped=capped, gradient=mode)
 
 
-def assert_gradient_is_right(body, pose, views, history, weights, differences=True):
-    value, gradient = value_and_gradient(pose, body, views, history, weights)
+def assert_gradient_is_right(body, pose, views, history, terms, differences=True):
+    value, gradient = value_and_gradient(pose, body, views, history, terms)
     assert gradient.dtype == jnp.float64
     largest = float(jnp.max(jnp.abs(gradient)))
     assert largest > 0.0
-    expected = energy_gradient(body, np.asarray(pose), views, history, weights)
+    expected = energy_gradient(body, np.asarray(pose), views, history, terms)
     np.testing.assert_allclose(gradient, expected, rtol=CLOSED_FORM, atol=CLOSED_FORM * largest)
     if differences:
-        at = lambda p: float(value_and_gradient(floats(p), body, views, history, weights)[0])
+        at = lambda p: float(value_and_gradient(floats(p), body, views, history, terms)[0])
         base = np.asarray(pose)
         numeric = [(at(base + STEP * unit) - at(base - STEP * unit)) / (2 * STEP) for unit in np.eye(len(base))]
         np.testing.assert_allclose(gradient, numeric, rtol=DIFFERENCES, atol=DIFFERENCES * largest)
@@ -94,7 +92,7 @@ def assert_gradient_is_right(body, pose, views, history, weights, differences=Tr
 def test_random_poses_of_a_small_body(mode, capped, seed):
     with jax.enable_x64(True):
         body = small_body()
-        assert_gradient_is_right(body, *case(body, seed), weights(mode, capped))
+        assert_gradient_is_right(body, *case(body, seed), terms(mode, capped))
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -103,7 +101,7 @@ def test_random_poses_of_a_small_body(mode, capped, seed):
 def test_random_poses_of_the_human(mode, seed):
     with jax.enable_x64(True):
         body = precise(HUMAN)
-        assert_gradient_is_right(body, *case(body, seed), weights(mode))
+        assert_gradient_is_right(body, *case(body, seed), terms(mode))
 
 
 def test_the_human_at_rest_where_all_angles_are_zero():
@@ -111,7 +109,7 @@ def test_the_human_at_rest_where_all_angles_are_zero():
         body = precise(HUMAN)
         _, views, history = case(body, 1)
         rest = jnp.zeros(body.skeleton.num_dofs)
-        assert_gradient_is_right(body, rest, views, history, weights())
+        assert_gradient_is_right(body, rest, views, history, terms())
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -119,7 +117,7 @@ def test_zero_pose(mode):
     with jax.enable_x64(True):
         body = small_body()
         pose, views, history = case(body, 2)
-        assert_gradient_is_right(body, jnp.zeros_like(pose), views, history, weights(mode))
+        assert_gradient_is_right(body, jnp.zeros_like(pose), views, history, terms(mode))
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -127,8 +125,8 @@ def test_the_printed_exponent(mode):
     with jax.enable_x64(True):
         body = small_body()
         args = case(body, 3)
-        exact = assert_gradient_is_right(body, *args, weights(mode))
-        printed = assert_gradient_is_right(body, *args, weights(mode, exponent=PRINTED_EXPONENT))
+        exact = assert_gradient_is_right(body, *args, terms(mode))
+        printed = assert_gradient_is_right(body, *args, terms(mode, exponent=PRINTED_EXPONENT))
         assert printed[0] < exact[0]
 
 
@@ -141,7 +139,7 @@ def test_body_and_image_blobs_in_the_same_place(mode):
         seen = seen_by_all(views.cameras, body, pose)
         means = views.images.means.at[:, : body.num_blobs].set(seen.means)
         views = eqx.tree_at(lambda v: v.images.means, views, means)
-        assert_gradient_is_right(body, pose, views, history, weights(mode))
+        assert_gradient_is_right(body, pose, views, history, terms(mode))
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -156,7 +154,7 @@ def test_blobs_behind_a_camera(mode):
         views = eqx.tree_at(lambda v: v.cameras.camera_from_world, views, floats(world))
         views = eqx.tree_at(lambda v: v.images.sigmas, views, views.images.sigmas.at[0].set(80.0))
         assert 0 < int(seen_by_all(views.cameras, body, pose).mask[0].sum()) < body.num_blobs
-        assert_gradient_is_right(body, pose, views, history, weights(mode))
+        assert_gradient_is_right(body, pose, views, history, terms(mode))
 
 
 def test_joints_beyond_their_limits():
@@ -164,9 +162,9 @@ def test_joints_beyond_their_limits():
         body = precise(HUMAN)
         _, views, history = case(body, 7)
         pose = floats(np.random.default_rng(7).normal(size=body.skeleton.num_dofs) * 0.9)
-        terms = terms_of(body, pose, views, history, weights())
-        assert terms.limit_penalty > 0.5
-        assert_gradient_is_right(body, pose, views, history, weights())
+        values = values_of(FrameEnergy(body, views, history, terms()), pose)
+        assert values["limit_penalty"] > 0.5
+        assert_gradient_is_right(body, pose, views, history, terms())
 
 
 def test_without_a_history_nothing_is_known_of_the_acceleration():
@@ -174,8 +172,8 @@ def test_without_a_history_nothing_is_known_of_the_acceleration():
         body = small_body()
         pose, views, history = case(body, 8)
         unknown = History(history.previous, history.before_previous, jnp.asarray(False))
-        value, gradient = assert_gradient_is_right(body, pose, views, unknown, weights())
-        free = EnergyWeights(limit_weight=floats(0.7), acceleration_weight=floats(0.0), exponent=floats(0.5))
+        value, gradient = assert_gradient_is_right(body, pose, views, unknown, terms())
+        free = standard_terms(floats(0.7), floats(0.0))
         other_value, other_gradient = value_and_gradient(pose, body, views, history, free)
         np.testing.assert_allclose(value, other_value, rtol=1e-12)
         np.testing.assert_allclose(gradient, other_gradient, rtol=1e-12)
@@ -186,8 +184,8 @@ def test_padding_in_the_images_changes_nothing():
         body = small_body()
         pose, views, history = case(body, 9, padding=0)
         _, padded, _ = case(body, 9, padding=5)
-        value, gradient = value_and_gradient(pose, body, views, history, weights())
-        other_value, other_gradient = value_and_gradient(pose, body, padded, history, weights())
+        value, gradient = value_and_gradient(pose, body, views, history, terms())
+        other_value, other_gradient = value_and_gradient(pose, body, padded, history, terms())
         np.testing.assert_allclose(other_value, value, rtol=1e-12)
         np.testing.assert_allclose(other_gradient, gradient, rtol=1e-10, atol=1e-14)
 
@@ -195,8 +193,8 @@ def test_padding_in_the_images_changes_nothing():
 def test_single_precision_is_near_enough():
     body = HUMAN
     pose, views, history = case(body, 10)
-    value, gradient = value_and_gradient(pose, body, views, history, weights())
+    value, gradient = value_and_gradient(pose, body, views, history, terms())
     assert gradient.dtype == jnp.float32
-    expected = energy_gradient(body, np.asarray(pose), views, history, weights())
+    expected = energy_gradient(body, np.asarray(pose), views, history, terms())
     np.testing.assert_allclose(gradient, expected, atol=1e-4 * np.abs(expected).max())
     assert np.isfinite(value)

@@ -1,7 +1,5 @@
 """Gauss-Newton: the model that the energy gives of itself, and the steps made with it."""
 
-from typing import NamedTuple
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -12,16 +10,18 @@ from rig_cases import ring_rig
 from sog_cases import floats, in_float64, random_views
 from test_ascent import OPTIMUM, START, TWO_KINDS, quadratic
 
-from sogjax.energy.curvature import FrameEnergy
-from sogjax.energy.objective import EnergyWeights, History, Views, whole_image_overlap
+from sogjax.energy.frame_energy import FrameEnergy, standard_terms
+from sogjax.energy.posed import History
+from sogjax.energy.views import Views, whole_image_overlap
 from sogjax.model.camera import project, project_points, projection_jacobian
 from sogjax.model.sog import Sog
-from sogjax.solve import ConditionedAscent, CurvedObjective, GaussNewton, OptimistixSolver
+from sogjax.solve import ConditionedAscent, CurvedObjective, GaussNewton, OptimistixSolver, QuadraticModel
 from sogjax.track.scales import pose_scales
 
 FLOAT32 = 1e-4
 climb = eqx.filter_jit(lambda solver, objective, start, scales: solver.maximize(objective, start, scales))
 
+near = eqx.filter_jit(FrameEnergy.near)
 value_and_gradient = eqx.filter_jit(lambda energy, pose: jax.value_and_grad(lambda p: energy(p))(pose))
 hessian = eqx.filter_jit(lambda energy, pose: jax.hessian(lambda p: energy(p))(pose))
 
@@ -33,15 +33,14 @@ def precise_body(seed=4):
     return eqx.tree_at(lambda b: b.skeleton.axes, body, axes)
 
 
-def frame_energy(capped=True, sparse=False, known=True):
+def frame_energy(capped=True, sparse=False, known=True, added=()):
     body = precise_body()
     views = random_views(ring_rig(3).cameras, body, 1, count=60, padding=4)
-    weights = EnergyWeights(floats(0.7), floats(0.3), floats(0.5), capped=capped)
+    terms = (*standard_terms(floats(0.7), floats(0.3), floats(0.5), capped=capped), *added)
     rng = np.random.default_rng(2)
     pose, previous, before = (floats(np.asarray(body.poses["rest"]) + 0.4 * rng.normal(size=7)) for _ in range(3))
-    if sparse:
-        views, _ = jax.jit(lambda v, p: v.near(body.posed_blobs(p), weights, 300))(views, pose)
-    return FrameEnergy(body, views, History(previous, before, jnp.asarray(known)), weights), pose
+    energy = FrameEnergy(body, views, History(previous, before, jnp.asarray(known)), terms)
+    return (near(energy, pose, 300)[0] if sparse else energy), pose
 
 
 @pytest.mark.parametrize(
@@ -73,26 +72,26 @@ def test_where_body_and_pictures_are_alike_the_curvature_is_the_true_one():
         images = Sog(seen.means, seen.sigmas, seen.colors, seen.mask)
         alike = jnp.broadcast_to(jnp.eye(body.num_blobs), (3, body.num_blobs, body.num_blobs))
         views = Views(cameras, images, alike, whole_image_overlap(cameras.image_size))
-        nothing = floats(0.0)
-        weights = EnergyWeights(nothing, nothing, floats(0.5), capped=False)
-        energy = FrameEnergy(body, views, History(pose, pose, jnp.asarray(False)), weights)
+        terms = standard_terms(floats(0.0), floats(0.0), capped=False)
+        energy = FrameEnergy(body, views, History.unknown(pose), terms)
         curvature = eqx.filter_jit(energy.quadratic)(pose).curvature
-        plain = EnergyWeights(nothing, nothing, floats(0.5), capped=False, gradient="autodiff")
-        expected = -hessian(FrameEnergy(body, views, energy.history, plain), pose)
+        expected = -hessian(energy, pose)
         np.testing.assert_allclose(curvature, expected, atol=0.01 * np.abs(expected).max())
 
 
-def test_the_curvature_of_the_priors_is_exact():
+@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("place", [1, 2])
+def test_the_models_of_the_priors_are_exact(place, known):
     with jax.enable_x64(True):
-        energy, pose = frame_energy()
+        energy, pose = frame_energy(known=known)
         pose = pose + 1.5  # beyond some limits
-        prior = eqx.filter_jit(energy._priors)(pose)
-
-        def value(pose):
-            return energy._priors(pose).value
-
-        np.testing.assert_allclose(prior.curvature, -jax.jit(jax.hessian(value))(pose), atol=1e-12)
-        assert np.linalg.matrix_rank(prior.curvature - 0.3 * 0.5 * np.eye(7)) > 0
+        prior = eqx.tree_at(lambda e: e.terms, energy, (energy.terms[place],))
+        model = eqx.filter_jit(prior.quadratic)(pose)
+        value, gradient = value_and_gradient(prior, pose)
+        np.testing.assert_allclose(model.value, value, rtol=1e-12)
+        np.testing.assert_allclose(model.gradient, gradient, rtol=1e-12, atol=1e-14)
+        np.testing.assert_allclose(model.curvature, -hessian(prior, pose), atol=1e-12)
+        assert (np.abs(model.curvature).max() > 0.1) == (known or place == 1)
 
 
 def test_the_jacobian_of_the_projection_is_that_of_jacfwd():
@@ -108,12 +107,6 @@ def test_the_jacobian_of_the_projection_is_that_of_jacfwd():
         assert (found[4] == 0.0).all()  # behind the camera
 
 
-class Model(NamedTuple):
-    value: jax.Array
-    gradient: jax.Array
-    curvature: jax.Array
-
-
 class Curved(eqx.Module):
     """A function with a curvature by autodiff, made positive by its absolute eigenvalues."""
 
@@ -125,7 +118,7 @@ class Curved(eqx.Module):
     def quadratic(self, params):
         value, gradient = jax.value_and_grad(self.function)(params)
         eigenvalues, vectors = jnp.linalg.eigh(-jax.hessian(self.function)(params))
-        return Model(value, gradient, (vectors * jnp.abs(eigenvalues)[None, :]) @ vectors.T)
+        return QuadraticModel(value, gradient, (vectors * jnp.abs(eigenvalues)[None, :]) @ vectors.T)
 
 
 def valley(params):
@@ -202,8 +195,7 @@ def test_it_climbs_the_energy_as_far_as_the_others(sparse):
     start = energy.body.poses["rest"]
     energy = jax.tree.map(lambda leaf: jnp.asarray(leaf), energy)
     if sparse:
-        views, _ = jax.jit(lambda v, p: v.near(energy.body.posed_blobs(p), energy.weights, 300))(energy.views, start)
-        energy = eqx.tree_at(lambda e: e.views, energy, views, is_leaf=lambda leaf: leaf is None)
+        energy, _ = near(energy, start, 300)
     scales = pose_scales(energy.body.skeleton)
     found = climb(GaussNewton(epsilon=1e-3, max_iterations=100), energy, start, scales)
     np.testing.assert_allclose(found.value, energy(found.params), rtol=1e-4)

@@ -34,4 +34,4 @@ def test_it_leads_upwards_from_the_start_to_what_tracking_finds(solver):
     assert np.all(np.diff(np.asarray(energies)) >= -1e-6)
     assert energies[-1] > energies[0]
     np.testing.assert_allclose(poses[-1], tracked.result.pose, atol=1e-3)
-    np.testing.assert_allclose(energies[-1], tracked.result.terms.energy, rtol=1e-4)
+    np.testing.assert_allclose(energies[-1], tracked.result.energy, rtol=1e-4)

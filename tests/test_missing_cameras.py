@@ -120,8 +120,8 @@ def test_a_missing_camera_is_as_good_as_none():
         tracked.result for tracked in track(make_tracker(body, rig, 6, GaussNewton()), jnp.asarray(poses[0]), frames)
     ]
     for missing, without in zip(results(rig, partly), results(others, [f[present] for f in frames]), strict=True):
-        assert missing.terms.similarity > 0.01
-        np.testing.assert_allclose(missing.terms.similarity, without.terms.similarity, rtol=1e-4)
+        assert missing.terms["similarity"] > 0.01
+        np.testing.assert_allclose(missing.terms["similarity"], without.terms["similarity"], rtol=1e-4)
         np.testing.assert_allclose(missing.pose, without.pose, atol=1e-3)
         assert missing.num_near[1] == 0
 

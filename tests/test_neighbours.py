@@ -12,10 +12,11 @@ from hypothesis import strategies as st
 from rig_cases import ring_rig
 from sog_cases import floats, random_views
 
-from sogjax.energy.curvature import FrameEnergy
+from sogjax.energy.frame_energy import FrameEnergy, standard_terms, still_energy
 from sogjax.energy.neighbours import MARGIN, displacement
-from sogjax.energy.objective import EnergyWeights, History, energy
 from sogjax.energy.pairs import TILE
+from sogjax.energy.posed import History
+from sogjax.energy.similarity import similarity_among
 from sogjax.model.camera import project
 from sogjax.solve import ConditionedAscent
 from sogjax.track.rounds import solve_near
@@ -28,12 +29,12 @@ RIG = ring_rig(3)
 CAPACITY = 8192
 
 value_and_gradient = eqx.filter_jit(
-    lambda body, pose, views, weights: jax.value_and_grad(
-        lambda p: energy(body, p, views, History(pose, pose, jnp.asarray(False)), weights)
-    )(pose)
+    lambda body, pose, views, terms: jax.value_and_grad(lambda p: still_energy(body, p, views, terms))(pose)
 )
 near = eqx.filter_jit(
-    lambda views, body, pose, weights, capacity: views.near(body.posed_blobs(pose), weights, capacity)
+    lambda views, body, pose, terms, capacity: views.near(
+        body.posed_blobs(pose), similarity_among(terms).exponent, capacity
+    )
 )
 moved = eqx.filter_jit(lambda cameras, body, a, b: displacement(cameras, body.posed_blobs(a), body.posed_blobs(b)))
 
@@ -64,14 +65,14 @@ def towards(pose, change, size):
 def test_value_and_gradient_are_those_of_all_pairs_as_far_as_the_margin(mode, capped, seed, size):
     rng = np.random.default_rng(seed)
     views = scene(seed % 5)
-    weights = EnergyWeights(capped=capped, gradient=mode)
+    terms = standard_terms(capped=capped, gradient=mode)
     made_at = REST + jnp.asarray(rng.normal(size=REST.shape) * 0.05, jnp.float32)
     pose = towards(made_at, jnp.asarray(rng.normal(size=REST.shape), jnp.float32), size)
     assert float(moved(RIG.cameras, HUMAN, made_at, pose)) <= 1.0
-    sparse, count = near(views, HUMAN, made_at, weights, CAPACITY)
+    sparse, count = near(views, HUMAN, made_at, terms, CAPACITY)
     assert count <= CAPACITY
-    value, gradient = value_and_gradient(HUMAN, pose, sparse, weights)
-    expected_value, expected = value_and_gradient(HUMAN, pose, views, weights)
+    value, gradient = value_and_gradient(HUMAN, pose, sparse, terms)
+    expected_value, expected = value_and_gradient(HUMAN, pose, views, terms)
     np.testing.assert_allclose(value, expected_value, rtol=AGREEMENT)
     assert np.linalg.norm(gradient - expected) <= AGREEMENT * np.linalg.norm(expected)
 
@@ -79,9 +80,9 @@ def test_value_and_gradient_are_those_of_all_pairs_as_far_as_the_margin(mode, ca
 def test_lists_leave_out_far_pairs_and_no_near_one():
     """Every pair that overlaps is in a block exactly once; written with loops."""
     views = scene(0)
-    weights = EnergyWeights()
+    terms = standard_terms()
     seen = jax.jit(jax.vmap(project, (0, None)))(views.cameras, posed(HUMAN, REST)[0])
-    sparse, count = near(views, HUMAN, REST, weights, CAPACITY)
+    sparse, count = near(views, HUMAN, REST, terms, CAPACITY)
     pairs = sparse.pairs
     cameras, bodies, images = views.color_similarities.shape
     wide = pairs.image_shape[1]
@@ -104,9 +105,9 @@ def test_lists_leave_out_far_pairs_and_no_near_one():
 
 
 def test_the_number_of_blocks_is_the_true_one_whatever_the_capacity():
-    views, weights = scene(1), EnergyWeights()
-    _, count = near(views, HUMAN, REST, weights, CAPACITY)
-    _, same = near(views, HUMAN, REST, weights, 16)
+    views, terms = scene(1), standard_terms()
+    _, count = near(views, HUMAN, REST, terms, CAPACITY)
+    _, same = near(views, HUMAN, REST, terms, 16)
     assert count == same > 16
 
 
@@ -132,8 +133,8 @@ def test_lists_are_made_anew_until_the_pose_lies_where_they_hold():
     body = eqx.tree_at(lambda b: b.blobs.offsets, body, body.blobs.offsets + jnp.array([[0.0, 0.0, 1.0]]))
     rig = ring_rig(2)
     views = random_views(rig.cameras, body, 0, count=40)
-    history = History(body.poses["rest"], body.poses["rest"], jnp.asarray(False))
-    objective = FrameEnergy(body, views, history, EnergyWeights())
+    history = History.unknown(body.poses["rest"])
+    objective = FrameEnergy(body, views, history, standard_terms())
     start = body.poses["rest"] + 0.25
     solver, scales = ConditionedAscent(epsilon=1e-3), pose_scales(body.skeleton)
     solve = eqx.filter_jit(solve_near)

@@ -9,7 +9,7 @@ from body_cases import random_body
 from rig_cases import ring_rig
 from sog_cases import random_views
 
-from sogjax.energy.objective import EnergyWeights, History, energy
+from sogjax.energy.frame_energy import standard_terms, still_energy
 from sogjax.solve import OptimistixSolver, Scales
 from sogjax.track.scales import pose_scales
 
@@ -83,9 +83,8 @@ def test_the_energy_is_climbed_whichever_way_its_gradient_is_made(method, gradie
     body = eqx.tree_at(lambda b: b.blobs.offsets, body, body.blobs.offsets + jnp.array([[0.0, 0.0, 1.0]]))
     views = random_views(ring_rig(2).cameras, body, 0, count=40)
     start = body.poses["rest"]
-    history = History(start, start, jnp.asarray(False))
-    weights = EnergyWeights(gradient=gradient)
-    objective = lambda pose: energy(body, pose, views, history, weights)
+    terms = standard_terms(gradient=gradient)
+    objective = lambda pose: still_energy(body, pose, views, terms)
     solver = OptimistixSolver(method, max_iterations=60)
     solution = climb(solver, objective, start, pose_scales(body.skeleton))
     value_and_slope = jax.jit(jax.value_and_grad(objective))

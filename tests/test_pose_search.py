@@ -10,7 +10,7 @@ from body_cases import posed, shipped
 from drawn_scene import draw, in_colors, moved, standing
 from rig_cases import ring_rig
 
-from sogjax.energy.objective import EnergyWeights
+from sogjax.energy.frame_energy import standard_terms
 from sogjax.images.cells import CellGrid, stack_cells
 from sogjax.images.quadtree import Candidates
 from sogjax.track.culling import ImageReader
@@ -20,7 +20,7 @@ from sogjax.track.place_search import nearest_point, possible_places, well_seen
 from sogjax.track.pose_search import search_pose, search_poses, strain
 
 RIG = ring_rig(4, (320, 240), distance=2.5)
-WEIGHTS = EnergyWeights(limit_weight=1.0, acceleration_weight=0.0)
+TERMS = standard_terms()
 
 
 def frame_of(images, rig=RIG, depth=8):
@@ -54,7 +54,7 @@ def dog():
 
 def test_a_dog_is_found_without_a_hint(dog):
     truth = moved(dog, standing(dog, 1.1, (0.3, -0.2)), {"root_yaw": 2.1})
-    found = search_pose(dog, frame_of(draw(dog, truth, RIG)), WEIGHTS, "z")
+    found = search_pose(dog, frame_of(draw(dog, truth, RIG)), TERMS, "z")
     assert off(dog, found.pose, truth) < 0.05
     assert found.energy > 0.0
     assert 0.0 < found.margin <= 1.0
@@ -65,7 +65,7 @@ def test_two_dogs_of_other_colours_are_both_found(dog):
     first = moved(dog, standing(dog, 1.1, (0.0, 0.45)), {"root_yaw": 0.4})
     second = moved(dog, standing(dog, 1.1, (0.1, -0.45)), {"root_yaw": -2.6})
     frame = frame_of(over(draw(dog, first, RIG), draw(other, second, RIG)))
-    found = search_poses([dog, other], frame, WEIGHTS, "z")
+    found = search_poses([dog, other], frame, TERMS, "z")
     assert off(dog, found[0].pose, first) < 0.06
     assert off(other, found[1].pose, second) < 0.06
 

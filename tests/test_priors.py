@@ -11,16 +11,19 @@ from rig_cases import ring_rig
 from sog_cases import random_views
 from tiny_body import make_body
 
-from sogjax.energy.objective import EnergyWeights, History, Views, energy_terms, whole_image_overlap
+from sogjax.energy.frame_energy import FrameEnergy, standard_terms
+from sogjax.energy.limits import limit_penalty
 from sogjax.energy.overlap import self_overlaps
-from sogjax.energy.priors import acceleration_penalty, limit_penalty
+from sogjax.energy.posed import History
+from sogjax.energy.smoothness import acceleration_penalty
+from sogjax.energy.views import Views, whole_image_overlap
 from sogjax.images.cells import CellGrid
 from sogjax.images.quadtree import Candidates, keep_blobs, quadtree
 from sogjax.model.body import concatenate
 from sogjax.model.camera import Camera
 
 FLOAT32 = 1e-5
-terms_of = eqx.filter_jit(energy_terms)
+energy_and_values = eqx.filter_jit(lambda energy, pose: (energy(pose), energy.values(pose)))
 numbers = st.floats(-3.0, 3.0, width=32)
 
 
@@ -75,12 +78,13 @@ def test_weights_enter_as_in_eq_10():
     pose = jnp.asarray(np.random.default_rng(2).normal(size=body.skeleton.num_dofs) * 0.2, jnp.float32)
     views = random_views(ring_rig(2).cameras, body, 0, count=20)
     history = History(pose * 0.5, pose * 0.3, jnp.asarray(True))
-    plain = terms_of(body, pose, views, history, EnergyWeights(limit_weight=0.0, acceleration_weight=0.0))
-    heavy = terms_of(body, pose, views, history, EnergyWeights(limit_weight=3.0, acceleration_weight=2.0))
-    assert plain.energy == plain.similarity == heavy.similarity
-    expected = plain.similarity - 3.0 * plain.limit_penalty - 2.0 * plain.acceleration_penalty
-    np.testing.assert_allclose(heavy.energy, expected, rtol=FLOAT32)
-    assert plain.acceleration_penalty > 0.0
+    with_weights = lambda *weights: FrameEnergy(body, views, history, standard_terms(*weights))
+    plain, values = energy_and_values(with_weights(0.0, 0.0), pose)
+    heavy, same_values = energy_and_values(with_weights(3.0, 2.0), pose)
+    assert plain == values["similarity"] == same_values["similarity"]
+    expected = plain - 3.0 * values["limit_penalty"] - 2.0 * values["acceleration_penalty"]
+    np.testing.assert_allclose(heavy, expected, rtol=FLOAT32)
+    assert values["acceleration_penalty"] > 0.0
 
 
 def in_rig_centre(body, side):
@@ -99,7 +103,7 @@ def test_two_actors_compete_under_one_cap(distance, competing):
     views = random_views(cameras, both, 3, count=60, pose=pair, sigmas=(3.0, 4.0))
     alone = lambda part: Views(cameras, views.images, views.color_similarities[:, part], views.normalizers)
     similarity = lambda body, pose, views: float(
-        terms_of(body, pose, views, History(pose, pose, jnp.asarray(False)), EnergyWeights()).similarity
+        energy_and_values(FrameEnergy(body, views, History.unknown(pose), standard_terms()), pose)[1]["similarity"]
     )
     together = similarity(both, pair, views)
     apart = similarity(body, left, alone(slice(0, 3))) + similarity(body, right, alone(slice(3, 6)))

@@ -54,7 +54,7 @@ def different(tracker):
     return [
         tracker,
         change(lambda t: t.solver.grow, 1.6),
-        change(lambda t: t.weights.acceleration_weight, 0.3),
+        change(lambda t: t.terms[2].weight, 0.3),
         change(lambda t: t.solver.epsilon, 0.03),
         change(lambda t: t.extrapolation, 0.9),
         change(lambda t: t.reader.color_radius, 0.2),
@@ -69,8 +69,8 @@ def test_a_scanned_clip_is_the_clip_frame_by_frame(dog, kind):
     clip, capacities = track_clip(tracker, start, cells)
     for k, result in enumerate(results):
         np.testing.assert_allclose(clip.pose[k], result.pose, atol=ROUNDING)
-        np.testing.assert_allclose(clip.terms.energy[k], result.terms.energy, rtol=1e-4)
-        np.testing.assert_allclose(clip.terms.similarity[k], result.terms.similarity, rtol=1e-4)
+        np.testing.assert_allclose(clip.energy[k], result.energy, rtol=1e-4)
+        np.testing.assert_allclose(clip.terms["similarity"][k], result.terms["similarity"], rtol=1e-4)
         assert clip.iterations[k] == result.iterations
         assert clip.converged[k] == result.converged
         np.testing.assert_array_equal(clip.num_near[k], result.num_near)
@@ -115,7 +115,7 @@ def test_many_trackers_find_what_each_finds_alone(dog):
     np.testing.assert_allclose(own.pose, expected, atol=ROUNDING)
     assert capacities.hold(*needed(own))
     clip, _ = track_clip(trackers[2], start, cells)
-    np.testing.assert_allclose(member(own, 2).terms.energy, clip.terms.energy, rtol=1e-4)
+    np.testing.assert_allclose(member(own, 2).energy, clip.energy, rtol=1e-4)
     np.testing.assert_array_equal(member(own, 2).iterations, clip.iterations)
     common, _ = track_many(trackers, starts, cells)
     np.testing.assert_allclose(common.pose, expected, atol=UNNOTICED)
@@ -136,7 +136,7 @@ def test_many_sparse_gauss_newton_trackers(dog):
     change = lambda where, value: eqx.tree_at(where, sparse(tracker), jnp.asarray(value))
     trackers = [
         sparse(tracker),
-        change(lambda t: t.weights.acceleration_weight, 0.3),
+        change(lambda t: t.terms[2].weight, 0.3),
         change(lambda t: t.reader.color_radius, 0.2),
     ]
     starts = jnp.stack([start] * len(trackers)).at[1, 0].add(0.01)
@@ -152,11 +152,11 @@ def test_many_sparse_gauss_newton_trackers(dog):
 def test_members_share_what_is_equal_and_refuse_what_one_program_cannot_serve(dog):
     tracker, _, _ = dog
     members = Members.from_trackers(different(tracker)[:3])
-    assert members.swept.weights.acceleration_weight.shape == (3,)
+    assert members.swept.terms[2].weight.shape == (3,)
     assert members.swept.body.blob_sigmas is None
-    assert members.shared.weights.acceleration_weight is None
-    one = members.of(eqx.tree_at(lambda t: t.weights.acceleration_weight, members.swept, jnp.asarray(0.2)))
-    assert float(one.weights.acceleration_weight) == pytest.approx(0.2)
+    assert members.shared.terms[2].weight is None
+    one = members.of(eqx.tree_at(lambda t: t.terms[2].weight, members.swept, jnp.asarray(0.2)))
+    assert float(one.terms[2].weight) == pytest.approx(0.2)
     assert not same_program(tracker, replace(tracker, pairs="sparse"))
     with pytest.raises(ValueError, match="more than the values"):
         Members.from_trackers([tracker, sparse(tracker)])

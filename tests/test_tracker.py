@@ -11,7 +11,7 @@ from drawn_scene import cells_of, draw, in_colors, landmark_error, make_tracker,
 from jaxtyping import Array
 from rig_cases import ring_rig
 
-from sogjax.energy.objective import EnergyWeights
+from sogjax.energy.frame_energy import standard_terms
 from sogjax.model.body import concatenate, dof_slices
 from sogjax.solve import GaussNewton, Solution
 from sogjax.track import tracker as tracker_module
@@ -75,19 +75,17 @@ def test_the_motion_of_a_human_is_found_from_a_rough_start():
 def test_the_terms_of_a_result_are_those_of_its_pose(dog):
     """The energy is the sum of its parts, and the acceleration is known from the third frame on."""
     tracker, poses, frames = dog
-    weights = tracker.weights
+    _, limits, smooth = tracker.terms
     results = [r.result for r in track(tracker, jnp.asarray(poses[0]), frames[:3])]
     for k, result in enumerate(results):
         terms = result.terms
         parts = (
-            terms.similarity
-            - weights.limit_weight * terms.limit_penalty
-            - weights.acceleration_weight * terms.acceleration_penalty
+            terms["similarity"] - limits.weight * terms["limit_penalty"] - smooth.weight * terms["acceleration_penalty"]
         )
-        np.testing.assert_allclose(terms.energy, parts, rtol=1e-5)
-        assert (terms.acceleration_penalty > 0.0) == (k == 2)
+        np.testing.assert_allclose(result.energy, parts, rtol=1e-5)
+        assert (terms["acceleration_penalty"] > 0.0) == (k == 2)
     bend = 0.5 * (results[2].pose + results[0].pose) - results[1].pose
-    np.testing.assert_allclose(results[2].terms.acceleration_penalty, np.sum(bend**2), rtol=1e-3)
+    np.testing.assert_allclose(results[2].terms["acceleration_penalty"], np.sum(bend**2), rtol=1e-3)
 
 
 def test_one_compilation_serves_a_recording_and_every_swept_number(dog):
@@ -109,7 +107,7 @@ def test_one_compilation_serves_a_recording_and_every_swept_number(dog):
     list(track(tracker, start, frames[:4]))
     assert len(traces) == 1
     changes = {
-        lambda t: t.weights: EnergyWeights(limit_weight=0.3, acceleration_weight=0.01, exponent=0.6),
+        lambda t: t.terms: standard_terms(limit_weight=0.3, acceleration_weight=0.02, exponent=0.6),
         lambda t: t.extrapolation: jnp.asarray(0.9),
         lambda t: t.reader.color_radius: jnp.asarray(0.29),
         lambda t: t.reader.color_tolerance: jnp.asarray(0.16),
@@ -136,7 +134,7 @@ def test_a_frame_that_needs_more_room_is_done_again(dog, monkeypatch):
         assert a.capacities.hold(int(a.result.num_near.max()), int(a.result.num_matching.max()))
         assert a.result.num_matching.tolist() == b.result.num_matching.tolist()
         np.testing.assert_allclose(a.result.pose, b.result.pose, atol=2e-3)
-        np.testing.assert_allclose(a.result.terms.similarity, b.result.terms.similarity, rtol=1e-3)
+        np.testing.assert_allclose(a.result.terms["similarity"], b.result.terms["similarity"], rtol=1e-3)
 
 
 def test_near_pairs_are_tracked_by_gauss_newton_and_too_little_room_is_noticed(dog, monkeypatch):

@@ -14,9 +14,9 @@ from jaxtyping import Array, Bool, Float, Int
 from sogjax.actor.coverage import Silhouettes
 from sogjax.actor.shape import ShapeModel
 from sogjax.actor.silhouette_fit import SilhouetteFit, fitted, scales_with_shape
-from sogjax.energy.objective import EnergyWeights, Views, similarity
-from sogjax.energy.priors import limit_penalty
-from sogjax.model.body import Body
+from sogjax.energy.frame_energy import still_energy
+from sogjax.energy.term import Terms
+from sogjax.energy.views import Views
 from sogjax.solve import ConditionedAscent, Scales
 from sogjax.track.scales import pose_scales
 
@@ -45,7 +45,7 @@ def estimate_shape(
     poses: Float[Array, "pose dof"],
     views: Views,
     silhouettes: Silhouettes,
-    weights: EnergyWeights,
+    terms: Terms,
 ) -> Estimate:
     """The poses and the one shape that fit all masks best, from rough poses.
 
@@ -53,7 +53,7 @@ def estimate_shape(
     """
     scales = pose_scales(model.body.skeleton)
     no_shape = jnp.zeros(model.num_shape_params, poses.dtype)
-    start = climbed_together(model, poses, no_shape, views, weights)
+    start = climbed_together(model, poses, no_shape, views, terms)
     fit = SilhouetteFit(model, silhouettes)
     solution = fitted(fit, start, scales)
     poses_deviation, shape_deviation = fit.split(_deviations(fit, solution.params))
@@ -71,13 +71,13 @@ def climbed_together(
     poses: Float[Array, "pose dof"],
     shape_params: Float[Array, "shape"],
     views: Views,
-    weights: EnergyWeights,
+    terms: Terms,
     max_iterations: int = CLIMB_ITERATIONS,
 ) -> Float[Array, "param"]:
     """The mean of Eq. 9 over the example poses, climbed; the poses one after the other, then the shape."""
     scales = scales_with_shape(pose_scales(model.body.skeleton), poses.shape[0], shape_params.shape[0])
     start = jnp.concatenate([poses.reshape(-1), shape_params])
-    return _climb(model, start, poses.shape[0], views, weights, scales, max_iterations)
+    return _climb(model, start, poses.shape[0], views, terms, scales, max_iterations)
 
 
 @eqx.filter_jit
@@ -86,7 +86,7 @@ def _climb(
     start: Float[Array, "param"],
     num_poses: int,
     views: Views,
-    weights: EnergyWeights,
+    terms: Terms,
     scales: Scales,
     max_iterations: Any,
 ) -> Float[Array, "param"]:
@@ -95,14 +95,7 @@ def _climb(
     def objective(params: Float[Array, "param"]) -> Float[Array, ""]:
         shape = params[num_pose_params:]
         poses = params[:num_pose_params].reshape(num_poses, -1)
-        scores = jax.vmap(pose_score, in_axes=(None, 0, 0, None))(model.shaped(shape), poses, views, weights)
+        scores = jax.vmap(still_energy, in_axes=(None, 0, 0, None))(model.shaped(shape), poses, views, terms)
         return jnp.mean(scores) - SHAPE_WEIGHT * jnp.sum((shape / model.spread) ** 2)
 
     return ConditionedAscent(max_iterations=max_iterations).maximize(objective, start, scales).params
-
-
-def pose_score(body: Body, pose: Float[Array, "dof"], views: Views, weights: EnergyWeights) -> Float[Array, ""]:
-    """Eq. 9 with the limits of Eq. 10: there is no motion to be smooth."""
-    lower, upper = body.skeleton.joint_limits()
-    limits = limit_penalty(body.skeleton.joint_params(pose), lower, upper)
-    return similarity(body.posed_blobs(pose), views, weights) - weights.limit_weight * limits

@@ -8,11 +8,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from sogjax.energy.objective import EnergyWeights, Views
+from sogjax.energy.frame_energy import still_energy
+from sogjax.energy.term import Terms
+from sogjax.energy.views import Views
 from sogjax.model.body import Body
 from sogjax.solve import ConditionedAscent, Scales
 from sogjax.track.initial_pose import centred, turned
-from sogjax.track.pose_search import still_energy
 from sogjax.track.scales import pose_scales
 
 NUM_HEADINGS = 16
@@ -36,7 +37,7 @@ def starts_at(
 
 
 def pose_from_silhouettes(
-    body: Body, views: Views, starts: Float[Array, "heading named dof"], weights: EnergyWeights
+    body: Body, views: Views, starts: Float[Array, "heading named dof"], terms: Terms
 ) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
     """The best pose by Eq. 9 and its energy.
 
@@ -44,11 +45,11 @@ def pose_from_silhouettes(
     tell front from back; the best few are climbed to the end. A single start is climbed to the end at once.
     """
     scales = pose_scales(body.skeleton)
-    refined = lambda pose, iterations: _refined(body, pose, views, weights, scales, jnp.asarray(iterations))
+    refined = lambda pose, iterations: _refined(body, pose, views, terms, scales, jnp.asarray(iterations))
     num_headings, num_named, num_dofs = starts.shape
     candidates = starts.reshape(-1, num_dofs)
     if len(candidates) > 1:
-        promise = _energies(body, candidates, views, weights).reshape(num_headings, num_named)
+        promise = _energies(body, candidates, views, terms).reshape(num_headings, num_named)
         heading = jnp.argmax(promise, axis=0)
         opposite = (heading + num_headings // 2) % num_headings
         named = jnp.arange(num_named)
@@ -59,8 +60,8 @@ def pose_from_silhouettes(
 
 
 @eqx.filter_jit
-def _energies(body: Body, poses: Array, views: Views, weights: EnergyWeights) -> Float[Array, "start"]:
-    return jax.lax.map(lambda pose: still_energy(body, pose, views, weights), poses)
+def _energies(body: Body, poses: Array, views: Views, terms: Terms) -> Float[Array, "start"]:
+    return jax.lax.map(lambda pose: still_energy(body, pose, views, terms), poses)
 
 
 @eqx.filter_jit
@@ -68,11 +69,11 @@ def _refined(
     body: Body,
     start: Float[Array, "dof"],
     views: Views,
-    weights: EnergyWeights,
+    terms: Terms,
     scales: Scales,
     max_iterations: Array,
 ) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
     solver = ConditionedAscent(max_iterations=max_iterations)
-    objective = lambda pose: still_energy(body, pose, views, weights)
+    objective = lambda pose: still_energy(body, pose, views, terms)
     solution = solver.maximize(objective, start, scales)
     return solution.params, solution.value

@@ -26,7 +26,7 @@ from sogjax.actor.silhouettes import (
     subject_centre,
 )
 from sogjax.data.recording import ExamplePose, Recording
-from sogjax.energy.objective import EnergyWeights
+from sogjax.energy.term import Terms
 from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
@@ -83,7 +83,7 @@ def make_actor(
     body: Body,
     subject: str | None,
     color_space: str,
-    weights: EnergyWeights,
+    terms: Terms,
     report: Report = lambda _: None,
     progress: Progress = lambda items, total, label: items,
     symmetric: bool = True,
@@ -105,10 +105,10 @@ def make_actor(
     for example, posed, views in progress(triples, len(triples), "example poses"):
         report(f"pose of {example.name}")
         starts = _starts(upright, example, posed, rig, recording.up)
-        poses.append(pose_from_silhouettes(upright, views, starts, weights)[0])
+        poses.append(pose_from_silhouettes(upright, views, starts, terms)[0])
     report("shape")
     views = stack_views([silhouette_views(posed, rig, body.num_blobs, FINE_DEPTH) for posed in pictures])
-    estimate = estimate_shape(model, jnp.stack(poses), views, silhouettes_of(pictures, rig), weights)
+    estimate = estimate_shape(model, jnp.stack(poses), views, silhouettes_of(pictures, rig), terms)
     shaped = model.shaped(estimate.shape_params)
     _check_fit(recording, shaped, estimate, pictures, rig)
     report("colours")

@@ -7,10 +7,9 @@ from jaxtyping import Array, Float
 
 from sogjax.actor.coverage import Silhouettes, mismatch, mismatch_equations
 from sogjax.actor.shape import ShapeModel
-from sogjax.energy.curvature import QuadraticModel
-from sogjax.energy.priors import limit_penalty
+from sogjax.energy.limits import limit_penalty
 from sogjax.model.skeleton import Skeleton
-from sogjax.solve import GaussNewton, Scales, Solution
+from sogjax.solve import GaussNewton, QuadraticModel, Scales, Solution
 
 NOISE = 1e-3
 """Weight of the priors: the mismatch (as a part of the mask's area) that tells as little as half a squared standard
@@ -56,9 +55,8 @@ class SilhouetteFit(eqx.Module):
     def quadratic(self, params: Float[Array, "param"]) -> QuadraticModel:
         """Value, gradient, and a curvature that is positive semi-definite."""
         poses, shape = self.split(params)
-        value, gradient, curvature = jax.lax.map(
-            lambda item: self._pose_equations(item[0], shape, item[1]), (poses, self.silhouettes)
-        )
+        parts = jax.lax.map(lambda item: self._pose_equations(item[0], shape, item[1]), (poses, self.silhouettes))
+        gradient, curvature = parts.gradient, parts.curvature
         dofs = poses.shape[1]
         prior_value, prior_slope = jax.value_and_grad(self._shape_penalty)(shape)
         own = jax.scipy.linalg.block_diag(*curvature[:, :dofs, :dofs])
@@ -66,7 +64,7 @@ class SilhouetteFit(eqx.Module):
         corner = jnp.mean(curvature[:, dofs:, dofs:], axis=0) + jax.hessian(self._shape_penalty)(shape)
         scale = 1.0 / self.num_poses
         return QuadraticModel(
-            -jnp.mean(value) - prior_value,
+            -jnp.mean(parts.value) - prior_value,
             -jnp.concatenate(
                 [scale * gradient[:, :dofs].reshape(-1), jnp.mean(gradient[:, dofs:], axis=0) + prior_slope]
             ),

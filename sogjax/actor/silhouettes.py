@@ -14,7 +14,7 @@ from jaxtyping import Array, Bool, Float, UInt8
 from sogjax.actor.example_masks import example_masks
 from sogjax.data.recording import ExamplePose, Recording
 from sogjax.data.video import read_still
-from sogjax.energy.objective import Views, whole_image_overlap
+from sogjax.energy.views import Views, whole_image_overlap
 from sogjax.errors import InputError
 from sogjax.images.cells import CellGrid, stack_cells
 from sogjax.images.quadtree import Candidates, keep_blobs, quadtree

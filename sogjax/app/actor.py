@@ -14,7 +14,7 @@ from sogjax.data.actor_file import save_body
 from sogjax.data.atomic import atomic_path
 from sogjax.data.recording import Recording
 from sogjax.engine.actor_report import report_folder, write_actor_report
-from sogjax.engine.build import color_space_and_radius, energy_weights
+from sogjax.engine.build import color_space_and_radius, energy_terms
 from sogjax.engine.outputs import free_path, results_folder
 from sogjax.engine.recordings import body_named, opened
 from sogjax.engine.terminal import progress, say
@@ -33,7 +33,7 @@ def run(config: ActorConfig) -> Path:
         InputError: an invalid recording, example pose or body, or an actor file that already exists.
     """
     space, _ = color_space_and_radius(config.color)
-    weights = energy_weights(config.energy)
+    terms = energy_terms(config.energy)
     recording = opened(config.recording, config.cameras)
     body = body_named(config.body)
     out = Path(config.out)
@@ -41,7 +41,7 @@ def run(config: ActorConfig) -> Path:
         raise InputError(f"out={out}: is a folder; give the actor file to write, such as out={out / 'actor.yaml'}")
     free_path("out", out, config.overwrite)
     with results_folder(out.parent):
-        made = make_actor(recording, body, config.subject, space, weights, say, progress, config.symmetric)
+        made = make_actor(recording, body, config.subject, space, terms, say, progress, config.symmetric)
         save_body(out, made.body)
         folder = report_folder(out)
         report = write_actor_report(folder, made, recording.rig)

@@ -1,29 +1,37 @@
 """The closed-form gradient of Eq. 10, written pair by pair and joint by joint in numpy, for checking `jax.grad`.
 
-Nothing here is used to track, and nothing of `objective.py`, `overlap.py`, the projection or the forward kinematics
-is used here: only the numbers held by the models are.
+Nothing here is used to track, and nothing of the terms' own formulas, `overlap.py`, the projection or the forward
+kinematics is used here: only the numbers held by the models are.
 """
 
 import numpy as np
 from jaxtyping import Float
 
-from sogjax.energy.objective import EnergyWeights, History, Views
+from sogjax.energy.limits import LimitPenalty
+from sogjax.energy.posed import History
+from sogjax.energy.similarity import Similarity
+from sogjax.energy.smoothness import AccelerationPenalty
+from sogjax.energy.views import Views
 from sogjax.model.body import Body
 from sogjax.model.camera import NEAR
 
 Vector = Float[np.ndarray, "n"]
 
 
-def energy_gradient(body: Body, pose: Vector, views: Views, history: History, weights: EnergyWeights) -> Vector:
+StandardTerms = tuple[Similarity, LimitPenalty, AccelerationPenalty]
+
+
+def energy_gradient(body: Body, pose: Vector, views: Views, history: History, terms: StandardTerms) -> Vector:
     """Gradient of Eq. 10 by the pose, in float64."""
+    seen, limits, smooth = terms
     transform = np.asarray(body.skeleton.parameter_transform, float)
     joint_params = transform @ np.asarray(pose, float)
-    by_joint_param = _similarity_gradient(body, joint_params, views, weights)
-    by_joint_param -= float(weights.limit_weight) * _limit_gradient(body, joint_params)
+    by_joint_param = float(seen.weight) * _similarity_gradient(body, joint_params, views, seen)
+    by_joint_param -= float(limits.weight) * _limit_gradient(body, joint_params)
     gradient = transform.T @ by_joint_param
     if bool(history.known):
         middle = 0.5 * (np.asarray(history.before_previous, float) + np.asarray(pose, float))
-        gradient -= float(weights.acceleration_weight) * (middle - np.asarray(history.previous, float))
+        gradient -= float(smooth.weight) * (middle - np.asarray(history.previous, float))
     return gradient
 
 
@@ -34,12 +42,12 @@ def _limit_gradient(body: Body, joint_params: Vector) -> Vector:
     return 2.0 * (too_high + too_low)
 
 
-def _similarity_gradient(body: Body, joint_params: Vector, views: Views, weights: EnergyWeights) -> Vector:
+def _similarity_gradient(body: Body, joint_params: Vector, views: Views, similarity: Similarity) -> Vector:
     """Sum over cameras and blobs of dE/d(blob position) . d(blob position)/d(joint parameter)."""
     origins, rotations = _joint_frames(body, joint_params)
     offsets = np.asarray(body.blobs.offsets, float)
     positions = np.array([origins[j] + rotations[j] @ o for j, o in zip(body.blobs.joints, offsets, strict=True)])
-    by_position = _position_gradients(body, positions, views, weights)
+    by_position = _position_gradients(body, positions, views, similarity)
     axes = np.asarray(body.skeleton.axes, float)
     revolute = np.asarray(body.skeleton.revolute)
     gradient = np.zeros(len(joint_params))
@@ -76,7 +84,7 @@ def _joint_frames(body: Body, joint_params: Vector) -> tuple[list[np.ndarray], l
     return origins, rotations
 
 
-def _position_gradients(body: Body, positions: np.ndarray, views: Views, weights: EnergyWeights) -> np.ndarray:
+def _position_gradients(body: Body, positions: np.ndarray, views: Views, similarity: Similarity) -> np.ndarray:
     """Gradient of Eq. 9 by the position of every blob in the world."""
     gradients = np.zeros_like(positions)
     num_cameras = len(views.normalizers)
@@ -84,13 +92,13 @@ def _position_gradients(body: Body, positions: np.ndarray, views: Views, weights
         world = np.asarray(views.cameras.camera_from_world[camera], float)
         matrix = np.asarray(views.cameras.intrinsics[camera], float)
         points = positions @ world[:3, :3].T + world[:3, 3]
-        in_camera = _one_camera(body, points, matrix, camera, views, weights)
+        in_camera = _one_camera(body, points, matrix, camera, views, similarity)
         gradients += in_camera @ world[:3, :3] / float(views.normalizers[camera]) / num_cameras
     return gradients
 
 
 def _one_camera(
-    body: Body, points: np.ndarray, matrix: np.ndarray, camera: int, views: Views, weights: EnergyWeights
+    body: Body, points: np.ndarray, matrix: np.ndarray, camera: int, views: Views, similarity: Similarity
 ) -> np.ndarray:
     """Gradient of Eq. 8 by the position of every blob in the frame of one camera."""
     focal = np.sqrt(matrix[0, 0] * matrix[1, 1])
@@ -98,7 +106,7 @@ def _one_camera(
     image_sigmas = np.asarray(views.images.sigmas[camera], float)
     colors = np.asarray(views.color_similarities[camera], float)
     body_sigmas = np.asarray(body.blob_sigmas, float)
-    k = float(weights.exponent)
+    k = float(similarity.exponent)
     seen = [b for b in range(len(points)) if points[b, 2] > NEAR]
     pixel = {b: matrix[:2, :2] @ (points[b, :2] / points[b, 2]) + matrix[:2, 2] for b in seen}
     sigma = {b: body_sigmas[b] * focal / points[b, 2] for b in seen}
@@ -115,7 +123,7 @@ def _one_camera(
             * np.exp(-k * (away[b] @ away[b]) / variance[b])
             for b in seen
         }
-        if weights.capped and sum(overlap.values()) >= np.pi * image_sigmas[i] ** 2:
+        if similarity.capped and sum(overlap.values()) >= np.pi * image_sigmas[i] ** 2:
             continue
         for b in seen:
             by_pixel = overlap[b] * 2.0 * k * away[b] / variance[b]

@@ -10,11 +10,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
+from sogjax.compiled.once import computed_once
+from sogjax.compiled.selection import chosen_indices
 from sogjax.energy.pairs import MEMBERS, TILE, SparsePairs, image_quantities
 from sogjax.model.camera import Camera, project
-from sogjax.model.compaction import chosen_indices
 from sogjax.model.sog import Sog
-from sogjax.model.stages import computed_once
 
 NEGLIGIBLE = 1e-4
 """Pairs are left out where the exponential of Eq. 6 is below this, even after a motion by the margin."""
@@ -56,11 +56,11 @@ def near_pairs(
     """
     images, color_similarities = _whole_tiles(images, color_similarities)
     num_cameras, num_bodies, num_images = color_similarities.shape
-    really = margin[0] > 0.0  # it always is
-    flags = computed_once(really, _flags, images, color_similarities, seen, margin, exponent)
-    chosen, count = computed_once(really, partial(chosen_indices, capacity=capacity * MEMBERS), flags.reshape(-1))
+    running = margin[0] > 0.0
+    flags = computed_once(running, _flags, images, color_similarities, seen, margin, exponent)
+    chosen, count = computed_once(running, partial(chosen_indices, capacity=capacity * MEMBERS), flags.reshape(-1))
     tile, body_index, first, real = computed_once(
-        really, partial(_blocks_of, tiles=flags.shape[1], members=flags.shape[2], num_bodies=num_bodies), chosen, count
+        running, partial(_blocks_of, tiles=flags.shape[1], members=flags.shape[2], num_bodies=num_bodies), chosen, count
     )
     slots = jnp.arange(TILE, dtype=chosen.dtype)[:, None]
     of_image = lambda values: _taken(values, tile[None, :] * TILE + slots)

@@ -1,16 +1,16 @@
 """Overlap of a projected body with images, both Sums of Gaussians (Eq. 5, 6, 8), over any layout of their pairs.
 
-The gradient of `capped_overlap` is computed together with its value from the closed form, which costs little more than
-the value: its exponentials are the expensive part and are shared. `gradient="autodiff"` differentiates the plain
-formula instead.
+The derivative of `capped_overlap` is computed together with its value from the closed form, which costs little more
+than the value: its exponentials are the expensive part and are shared. Forward mode, reverse mode and second
+derivatives follow from it. `gradient="autodiff"` differentiates the plain formula instead.
 """
 
 from functools import partial
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, Float
 
 from sogjax.energy.pairs import DensePairs, Disks, Pairs, separations
@@ -133,30 +133,43 @@ def _apply_cap(
     return jnp.where(total < caps, total, caps) if capped else total
 
 
-@partial(jax.custom_vjp, nondiff_argnums=(0,))
+@partial(jax.custom_jvp, nondiff_argnums=(0,))
 def _forward_overlap(
     capped: bool, pairs: Pairs, caps: Float[Array, "*camera image"], body: Sog, exponent: Float[Array, ""]
 ) -> Float[Array, "*camera"]:
     return _plain_overlap(capped, pairs, caps, body, exponent)
 
 
-def _value_and_residuals(capped, pairs, caps, body, exponent):
-    pulls = overlap_pulls(pairs, caps, body, exponent, capped=capped)
-    return pulls.value, (pulls.by_mean, pulls.by_sigma, pairs, caps, body, exponent)
+def _value_and_rate(capped, primals, tangents):
+    """By the body's means and sigmas in closed form; by anything else, where that changes, by the plain formula."""
+    pulls = overlap_pulls(*primals, capped=capped)
+    pairs, caps, body, exponent = tangents
+    rate = jnp.zeros_like(pulls.value)
+    if not isinstance(body.means, SymbolicZero):
+        rate = rate + jnp.sum(pulls.by_mean * body.means, axis=(-2, -1))
+    if not isinstance(body.sigmas, SymbolicZero):
+        rate = rate + jnp.sum(pulls.by_sigma * body.sigmas, axis=-1)
+    rates = jax.tree.leaves((pairs, caps, exponent))
+    changing = [not isinstance(leaf, SymbolicZero) and leaf.dtype != jax.dtypes.float0 for leaf in rates]
+    return pulls.value, rate + _plain_rate(capped, primals, rates, changing) if any(changing) else rate
 
 
-def _pull_back(capped, residuals, cotangent):
-    by_mean, by_sigma, pairs, caps, body, exponent = residuals
-    # What nobody asks for (the gradient by the image, the colours) is dropped when the caller is compiled.
-    _, pull_back = jax.vjp(partial(_plain_overlap, capped), pairs, caps, body, exponent)
-    by_pairs, by_caps, by_body, by_exponent = pull_back(cotangent)
-    # Not `Sog(...)`: the cotangent of a mask is no array of truth values.
-    by_means, by_sigmas = cotangent[..., None, None] * by_mean, cotangent[..., None] * by_sigma
-    by_body = eqx.tree_at(lambda sog: (sog.means, sog.sigmas), by_body, (by_means, by_sigmas))
-    return by_pairs, by_caps, by_body, by_exponent
+def _plain_rate(capped: bool, primals: Any, rates: list[Any], changing: list[bool]) -> Float[Array, "*camera"]:
+    """How fast the plain formula changes with those leaves of pairs, caps and exponent that do."""
+    pairs, caps, body, exponent = primals
+    leaves, structure = jax.tree.flatten((pairs, caps, exponent))
+
+    def overlap(moving: list[Array]) -> Float[Array, "*camera"]:
+        moved = iter(moving)
+        rebuilt = [next(moved) if changes else leaf for leaf, changes in zip(leaves, changing, strict=True)]
+        pairs, caps, exponent = jax.tree.unflatten(structure, rebuilt)
+        return _plain_overlap(capped, pairs, caps, body, exponent)
+
+    chosen = lambda values: [value for value, changes in zip(values, changing, strict=True) if changes]
+    return jax.jvp(overlap, (chosen(leaves),), (chosen(rates),))[1]
 
 
-_forward_overlap.defvjp(_value_and_residuals, _pull_back)
+_forward_overlap.defjvp(_value_and_rate, symbolic_zeros=True)
 
 
 def _safe_sigmas(sog: Sog) -> Float[Array, "*camera blob"]:

@@ -11,8 +11,8 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
+from sogjax.compiled.once import computed_once
 from sogjax.model.sog import Sog
-from sogjax.model.stages import computed_once
 
 TILE = 8
 """Image blobs that follow each other in a Sog and are compared with the same body blobs."""
@@ -116,8 +116,7 @@ class SparsePairs(eqx.Module):
 
     def staged(self, function: Callable[..., Results], *arguments: Any) -> Results:
         """The results of a function over pairs, finished before they are used."""
-        really = self.variances[0, 0, 0] > 0.0  # it always is
-        return computed_once(really, function, *arguments)
+        return computed_once(self.variances[0, 0, 0] > 0.0, function, *arguments)
 
     def sum_over_body(self, values: Slots) -> Float[Array, "camera image"]:
         """For each image blob the sum over its pairs."""

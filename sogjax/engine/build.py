@@ -11,8 +11,11 @@ from jaxtyping import Array, Float, UInt8
 
 from sogjax.data.recording import Recording
 from sogjax.data.video import read_still
-from sogjax.energy.objective import EnergyWeights, whole_image_overlap
+from sogjax.energy.added import added_terms
+from sogjax.energy.frame_energy import standard_terms
 from sogjax.energy.overlap import EXACT_EXPONENT, PRINTED_EXPONENT
+from sogjax.energy.term import Terms
+from sogjax.energy.views import whole_image_overlap
 from sogjax.errors import InputError
 from sogjax.images.cells import CellGrid, stack_cells
 from sogjax.images.quadtree import Candidates, quadtree
@@ -71,7 +74,7 @@ def check(config: TrackConfig) -> None:
         InputError: a value that is no valid choice or is out of range.
     """
     color_space_and_radius(config.color)
-    energy_weights(config.energy)
+    energy_terms(config.energy)
     pair_choice(config.energy)
     solver(config.solver)
     for key in ("first_angle", "first_translation", "largest_angle", "largest_translation"):
@@ -93,17 +96,22 @@ def color_space_and_radius(config: ColorConfig) -> tuple[str, float]:
     return space, at_least("color.radius", radius, 1e-6)
 
 
-def energy_weights(config: EnergyConfig) -> EnergyWeights:
-    """The constants of Eq. 10."""
+def energy_terms(config: EnergyConfig) -> Terms:
+    """The terms of Eq. 10, and those that are added.
+
+    Raises:
+        InputError: a value that is no choice or out of range, or a term that cannot be made.
+    """
     exponent = one_of("energy.overlap_exponent", config.overlap_exponent, ("exact", "printed"))
     gradient = one_of("energy.gradient", config.gradient, ("forward", "autodiff"))
-    return EnergyWeights(
+    standard = standard_terms(
         limit_weight=at_least("energy.limit_weight", config.limit_weight, 0.0),
         acceleration_weight=at_least("energy.acceleration_weight", config.acceleration_weight, 0.0),
         exponent=EXACT_EXPONENT if exponent == "exact" else PRINTED_EXPONENT,
         capped=config.capped,
         gradient="forward" if gradient == "forward" else "autodiff",
     )
+    return (*standard, *added_terms("energy.terms", config.terms, [term.name for term in standard]))
 
 
 def pair_choice(config: EnergyConfig) -> PairChoice:
@@ -183,7 +191,7 @@ def tracker(recording: Recording, body: Body, grids: tuple[CellGrid, ...], confi
         cameras=cameras,
         normalizers=whole_image_overlap(cameras.image_size),
         reader=image_reader(recording, grids, config),
-        weights=energy_weights(config.energy),
+        terms=energy_terms(config.energy),
         solver=solver(config.solver),
         scales=solver_scales(config.solver, body),
         extrapolation=config.tracking.extrapolation,
@@ -209,7 +217,7 @@ def varied(tracker: Tracker, config: TrackConfig) -> Tracker:
     return replace(
         tracker,
         reader=reader,
-        weights=energy_weights(config.energy),
+        terms=energy_terms(config.energy),
         solver=solver(config.solver),
         scales=solver_scales(config.solver, tracker.body),
         extrapolation=config.tracking.extrapolation,

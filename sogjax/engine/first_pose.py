@@ -84,7 +84,7 @@ def searched_poses(recording: Recording, bodies: Sequence[Body], config: TrackCo
         tuple(build.image_reader(recording, grid, config) for grid in grids),
         tuple(jnp.asarray(stack_cells(pictures, grid)) for grid in grids),
     )
-    found = search_poses(bodies, views, build.energy_weights(config.energy), recording.up)
+    found = search_poses(bodies, views, build.energy_terms(config.energy), recording.up)
     lost = [body.name for body, pose in zip(bodies, found, strict=True) if not pose.energy > 0.0]
     if lost:
         raise InputError(

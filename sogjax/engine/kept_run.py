@@ -18,7 +18,6 @@ from sogjax.data.array_log import ArrayLog, read_log
 from sogjax.data.atomic import atomic_path
 from sogjax.data.motion import FRAMES_AT_ONCE
 from sogjax.data.npz_file import finite_array, read_npz
-from sogjax.energy.objective import EnergyTerms
 from sogjax.engine.origin import Origin
 from sogjax.errors import InputError
 from sogjax.model.body import Body
@@ -29,11 +28,12 @@ from sogjax.track.frame import FrameResult, TrackedFrame, TrackState
 
 FOLDER = "run.partial"
 NOTE, START, ACTOR = "run.json", "start.npz", "actor"
-TERMS = ("similarity", "limit_penalty", "acceleration_penalty", "energy")
+TERM = "term_"
+"""Before the name of a term of the energy, in the names of columns."""
 DEVIATIONS = {"pose_std": "pose", "joint_std": "joints"}
-COLUMNS = ("pose", "iterations", "evaluations", "converged", "num_near", "num_matching", "num_blocks")
+COLUMNS = ("pose", "energy", "iterations", "evaluations", "converged", "num_near", "num_matching", "num_blocks")
 CAPACITY, CAPACITIES = "capacity_{}", ("near", "matching", "blocks")
-_NEEDED = {*COLUMNS, *TERMS, *(CAPACITY.format(name) for name in CAPACITIES)}
+_NEEDED = {*COLUMNS, *(CAPACITY.format(name) for name in CAPACITIES)}
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Prefix:
         values = {name: jnp.asarray(column[frame]) for name, column in self.rows.items()}
         sure = {name: values[key] for key, name in DEVIATIONS.items() if key in values}
         return FrameResult(
-            terms=EnergyTerms(**{name: values[name] for name in TERMS}),
+            terms={name.removeprefix(TERM): value for name, value in values.items() if name.startswith(TERM)},
             deviations=Deviations(**sure) if sure else None,
             images=images,
             **{name: values[name] for name in COLUMNS},
@@ -181,14 +181,14 @@ def write_note(path: Path, note: dict[str, Any]) -> None:
 
 
 def _rows(frames: Sequence[TrackedFrame]) -> dict[str, np.ndarray]:
-    results, terms = [frame.result for frame in frames], [frame.result.terms for frame in frames]
+    results = [frame.result for frame in frames]
     column = lambda parts, name: np.stack([np.asarray(getattr(part, name)) for part in parts])
     capacity = lambda name: np.array([getattr(frame.capacities, name) for frame in frames])
     sure = [result.deviations for result in results if result.deviations is not None]
     return (
         {name: column(results, name) for name in COLUMNS}
         | {key: column(sure, name) for key, name in DEVIATIONS.items() if sure}
-        | {name: column(terms, name) for name in TERMS}
+        | {TERM + name: np.stack([np.asarray(r.terms[name]) for r in results]) for name in results[0].terms}
         | {CAPACITY.format(name): capacity(name) for name in CAPACITIES}
     )
 

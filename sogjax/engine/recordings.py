@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from sogjax.actor.make import make_actor, subjects_of
 from sogjax.data.actor_file import load_body, named_body
 from sogjax.data.recording import Recording, open_recording
-from sogjax.engine.build import color_space_and_radius, energy_weights
+from sogjax.engine.build import color_space_and_radius, energy_terms
 from sogjax.engine.terminal import progress, say
 from sogjax.errors import InputError
 from sogjax.model.body import Body
@@ -84,13 +84,13 @@ def _made_actor(path: str, cameras: tuple[str, ...], body: str, subject: str | N
     recording = open_recording(Path(path))
     recording = replace(recording, rig=recording.rig.select(cameras))
     label = "actor" if subject is None else f"actor {subject}"
-    weights = energy_weights(EnergyConfig())
+    terms = energy_terms(EnergyConfig())
     return make_actor(
         recording,
         body_named(body),
         subject,
         space,
-        weights,
+        terms,
         report=lambda stage: say(f"{label}: {stage}"),
         progress=progress,
     ).body

@@ -8,8 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from sogjax.energy.objective import EnergyWeights, Views, similarity, whole_image_overlap
 from sogjax.energy.overlap import overlaps
+from sogjax.energy.similarity import Similarity
+from sogjax.energy.views import Views, whole_image_overlap
 from sogjax.model.camera import Camera, project
 from sogjax.model.sog import Sog
 from sogjax.solve import OptimistixSolver, Scales
@@ -80,11 +81,11 @@ def _objective() -> Callable[[Float[Array, "3"]], Float[Array, ""]]:
     cameras = jax.tree.map(lambda *leaves: jnp.stack(leaves), *[_camera(angle) for angle in (0.0, 1.6, 3.5)])
     blobs = _blobs()
     views = eqx.filter_jit(_own_views)(cameras, blobs)
-    weights = EnergyWeights(capped=False)
+    similarity = Similarity(1.0, capped=False)
 
     def objective(shift: Float[Array, "3"]) -> Float[Array, ""]:
         moved = eqx.tree_at(lambda sog: sog.means, blobs, blobs.means + shift[None, :])
-        return similarity(moved, views, weights)
+        return similarity.of_blobs(moved, views)
 
     return objective
 

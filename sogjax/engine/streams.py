@@ -187,8 +187,8 @@ class Streams:
                 poses[:, part],
                 self._recording.fps,
                 frame=self._next_frame + np.arange(len(block)),
-                similarity=np.array([result.terms.similarity for result in results], float),
-                energy=np.array([result.terms.energy for result in results], float),
+                similarity=np.array([result.terms["similarity"] for result in results], float),
+                energy=np.array([result.energy for result in results], float),
                 iterations=np.array([result.iterations for result in results], int),
                 converged=np.array([result.converged for result in results], bool),
                 up=self._recording.up,
@@ -202,11 +202,8 @@ class Streams:
 
     def _write_rerun(self, block: list[FrameDone], motions: list[Motion], first: int) -> None:
         terms = [done.tracked.result.terms for done in block]
-        penalties = {
-            "limit_penalty": np.array([t.limit_penalty for t in terms], float),
-            "acceleration_penalty": np.array([t.acceleration_penalty for t in terms], float),
-        }
-        self._rerun.write(motions, penalties)
+        others = {name: np.array([t[name] for t in terms], float) for name in terms[0] if name != "similarity"}
+        self._rerun.write(motions, others)
         for frame, done in enumerate(block, first):
             self._rerun.write_pictures(frame, _jpegs(done.pictures), image_blobs(done))
 

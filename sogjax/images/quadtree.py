@@ -14,11 +14,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from sogjax.compiled.once import computed_once
+from sogjax.compiled.selection import chosen_indices
 from sogjax.images.cells import CellGrid
 from sogjax.model.camera import Camera, undistort, undistorted_sizes
-from sogjax.model.compaction import chosen_indices
 from sogjax.model.sog import Sog
-from sogjax.model.stages import computed_once
 
 Planes = list[Float[Array, "_ _"]]
 """Channels of a picture, one array each: sums over a last axis of three are slow."""
@@ -92,8 +92,8 @@ def quadtree_of_planes(
     cells: Planes, candidates: Candidates, color_tolerance: Float[Array, ""]
 ) -> tuple[list[Float[Array, "candidate"]], Bool[Array, "candidate"]]:
     """The same, of colours that lie channel by channel, which is quicker."""
-    known = ~jnp.isnan(color_tolerance)
-    levels = computed_once(known, partial(_levels, shape=candidates.shape, num_levels=candidates.num_levels), cells)
+    running = ~jnp.isnan(color_tolerance)
+    levels = computed_once(running, partial(_levels, shape=candidates.shape, num_levels=candidates.num_levels), cells)
     inside = jnp.split(candidates.inside, np.cumsum([planes[0].size for planes in levels])[:-1])
     leaves: list[Array] = []
     covered = jnp.zeros(levels[-1][0].shape, bool)
@@ -102,9 +102,9 @@ def quadtree_of_planes(
         leaf = fits & ~covered
         if level > 0:
             leaf = leaf & _uniform(levels[level], color_tolerance)
-            covered = computed_once(known, _children, covered | leaf)
+            covered = computed_once(running, _children, covered | leaf)
         leaves.append(leaf.reshape(-1))
-    return computed_once(known, _node_colors, levels), jnp.concatenate(leaves[::-1])
+    return computed_once(running, _node_colors, levels), jnp.concatenate(leaves[::-1])
 
 
 def _levels(cells: Planes, shape: tuple[int, int], num_levels: int) -> list[Planes]:

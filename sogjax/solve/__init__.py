@@ -3,6 +3,7 @@
 from sogjax.solve.ascent import ConditionedAscent, gradient_ascent
 from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.solve.optimistix import OptimistixSolver
+from sogjax.solve.quadratic import QuadraticModel
 from sogjax.solve.solution import CurvedObjective, Scales, Solution, Solver
 
 __all__ = [
@@ -10,6 +11,7 @@ __all__ = [
     "CurvedObjective",
     "GaussNewton",
     "OptimistixSolver",
+    "QuadraticModel",
     "Scales",
     "Solution",
     "Solver",

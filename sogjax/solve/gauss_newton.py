@@ -5,42 +5,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
+from sogjax.solve.quadratic import QuadraticModel
 from sogjax.solve.solution import CurvedObjective, Objective, Params, Scales, Solution
-
-
-class QuadraticModel(eqx.Module):
-    """value + gradient . d - d . curvature d / 2, a model of the objective near some parameters."""
-
-    value: Float[Array, ""]
-    gradient: Params
-    curvature: Float[Array, "param param"]
-    """Positive semi-definite."""
-
-    @classmethod
-    def of(cls, objective: CurvedObjective, params: Params) -> "QuadraticModel":
-        """The model that an objective gives of itself."""
-        model = objective.quadratic(params)
-        return cls(model.value, model.gradient, model.curvature)
-
-    def finite(self) -> Bool[Array, ""]:
-        """Whether every number is finite."""
-        return jnp.isfinite(self.value) & jnp.all(jnp.isfinite(self.gradient)) & jnp.all(jnp.isfinite(self.curvature))
-
-    def step(self, damping: Float[Array, ""], common: Float[Array, ""], bounds: Params) -> Params:
-        """The step to the maximum of the damped model, shortened as a whole where a part of it exceeds its bound."""
-        # In units of the bounds, so that angles and translations are alike.
-        curvature = self.curvature * bounds[:, None] * bounds[None, :]
-        diagonal = jnp.diag(curvature)
-        held = jnp.maximum(diagonal + common * jnp.mean(diagonal), jnp.finfo(diagonal.dtype).tiny)
-        damped = curvature + jnp.diag(damping * held)
-        factor = jax.scipy.linalg.cho_factor(damped)
-        step = jax.scipy.linalg.cho_solve(factor, self.gradient * bounds)
-        return bounds * step / jnp.maximum(jnp.max(jnp.abs(step)), 1.0)
-
-    def expected_gain(self, step: Params) -> Float[Array, ""]:
-        """How far the model rises along a step."""
-        bend = jnp.matmul(self.curvature, step, precision="highest")
-        return jnp.sum(step * (self.gradient - 0.5 * bend))
 
 
 class GaussNewtonState(eqx.Module):
@@ -62,7 +28,7 @@ class GaussNewton(eqx.Module):
     `min_iterations` are made; then the ascent stops when a step is shorter than `epsilon`, taken or not.
     """
 
-    epsilon: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=0.002)
+    epsilon: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=0.01)
     first_damping: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=0.1)
     smallest_damping: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=0.1)
     common_damping: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=3.0)
@@ -81,7 +47,7 @@ class GaussNewton(eqx.Module):
         """
         if not isinstance(objective, CurvedObjective):
             raise TypeError("Gauss-Newton needs an objective with a method `quadratic` (CurvedObjective)")
-        model = QuadraticModel.of(objective, start)
+        model = objective.quadratic(start)
         state = GaussNewtonState(
             params=start,
             model=model,
@@ -96,7 +62,7 @@ class GaussNewton(eqx.Module):
 
         def climb(state: GaussNewtonState) -> GaussNewtonState:
             step = state.model.step(state.damping, self.common_damping, scales.step_bounds)
-            tried = QuadraticModel.of(objective, state.params + step)
+            tried = objective.quadratic(state.params + step)
             better = (tried.value > state.model.value) & tried.finite()
             keep = lambda new, old: jnp.where(better, new, old)
             small = jnp.linalg.norm(step) < self.epsilon

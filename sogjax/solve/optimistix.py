@@ -46,7 +46,7 @@ class OptimistixSolver(eqx.Module):
         units = scales.first_steps[scales.kinds]
         largest = jnp.max(jnp.abs(gradient * units))
         gain = jnp.where(largest > 0.0, largest, 1.0)
-        cost = _linearizable(lambda z: (first_value - objective(start + z * units)) / gain)
+        cost = lambda z: (first_value - objective(start + z * units)) / gain
         tolerance = self.epsilon / jnp.max(units)
         best_of = optx.BestSoFarMinimiser(_MINIMISERS[self.method](rtol=0.0, atol=tolerance))
         solver = _Bounded(
@@ -97,21 +97,3 @@ class _Bounded(optx.AbstractMinimiser):
         self, fn: Any, y: Any, aux: Any, args: Any, options: Any, state: Any, tags: Any, result: Any
     ) -> tuple[Any, Any, dict[str, Any]]:
         return self.minimiser.postprocess(fn, y, aux, args, options, state[0], tags, result)
-
-
-def _linearizable(function: Callable[[Params], Float[Array, ""]]) -> Callable[[Params], Float[Array, ""]]:
-    """The same function with a forward derivative made of its reverse-mode gradient.
-
-    Optimistix calls `jax.linearize`, which refuses functions with a `custom_vjp` such as the overlap.
-    """
-
-    @jax.custom_jvp
-    def wrapped(z: Params) -> Float[Array, ""]:
-        return function(z)
-
-    @wrapped.defjvp
-    def _(primals, tangents):
-        value, gradient = jax.value_and_grad(function)(*primals)
-        return value, jnp.sum(gradient * tangents[0])
-
-    return wrapped

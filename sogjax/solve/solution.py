@@ -1,13 +1,14 @@
 """What every solver takes and returns."""
 
 from collections.abc import Callable
-from typing import Any, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-Params = Float[Array, "param"]
+from sogjax.solve.quadratic import Params, QuadraticModel
+
 Objective = Callable[[Params], Float[Array, ""]]
 
 
@@ -19,11 +20,8 @@ class CurvedObjective(Protocol):
         """The objective."""
         ...
 
-    def quadratic(self, params: Params) -> Any:
-        """The model near `params`: value + gradient . d - d . curvature d / 2, with these three attributes.
-
-        The curvature is positive semi-definite.
-        """
+    def quadratic(self, params: Params) -> QuadraticModel:
+        """The model near `params`, whose curvature is positive semi-definite."""
         ...
 
 

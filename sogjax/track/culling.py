@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from sogjax.compiled.once import computed_once
 from sogjax.energy.overlap import pair_color_similarities
 from sogjax.errors import InputError
 from sogjax.images.quadtree import Candidates, keep_blobs, keep_blobs_of_planes, quadtree_of_planes
@@ -16,7 +17,6 @@ from sogjax.model.camera import Camera, project
 from sogjax.model.color import averaging_space, convert, from_rgb
 from sogjax.model.skeleton import Skeleton
 from sogjax.model.sog import Sog
-from sogjax.model.stages import computed_once
 
 CAPACITIES = (256, 512, 768, 1024, 1536, 2048, 3072, 4096, 6144, 8192, 16384, 32768, 65536)
 """The sizes of padded image Sogs. Few, so that few programs are compiled."""
@@ -86,8 +86,8 @@ class ImageReader(eqx.Module):
         return jnp.stack(planes, axis=-1), leaves
 
     @property
-    def known(self) -> Bool[Array, ""]:
-        """True, but only when the program runs (see `computed_once`)."""
+    def true_at_run_time(self) -> Bool[Array, ""]:
+        """True, which the compiler cannot know (see `computed_once`)."""
         return ~jnp.isnan(self.color_tolerance)
 
     def _leaf_planes(
@@ -95,7 +95,7 @@ class ImageReader(eqx.Module):
     ) -> tuple[list[Float[Array, "camera candidate"]], Bool[Array, "camera candidate"]]:
         """The same, the colours channel by channel."""
         space = averaging_space(self.color_space)
-        converted = computed_once(self.known, partial(_color_planes, space=space), cells)
+        converted = computed_once(self.true_at_run_time, partial(_color_planes, space=space), cells)
         planes, leaves = jax.vmap(quadtree_of_planes, in_axes=(0, 0, None))(
             converted, self.candidates, self.color_tolerance
         )
@@ -136,7 +136,7 @@ class ImageReader(eqx.Module):
     ) -> tuple[Sog, Float[Array, "camera body image"], Int[Array, "camera"]]:
         """The near blobs in their places, those masked out that resemble no blob of the body; the same otherwise."""
         compare = lambda image: pair_color_similarities(image, body, self.color_space, self.color_radius)
-        similarities = computed_once(self.known, jax.vmap(compare), near)
+        similarities = computed_once(self.true_at_run_time, jax.vmap(compare), near)
         mask = near.mask & jnp.any(similarities > 0.0, axis=1)
         return eqx.tree_at(lambda sog: sog.mask, near, mask), similarities, jnp.sum(mask, axis=1)
 

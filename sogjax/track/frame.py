@@ -9,7 +9,6 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int, UInt8
 
-from sogjax.energy.objective import EnergyTerms
 from sogjax.model.sog import Sog
 from sogjax.track.confidence import Deviations
 from sogjax.track.culling import Capacities
@@ -56,7 +55,9 @@ class FrameResult(eqx.Module):
     """What was found in one frame."""
 
     pose: Float[Array, "dof"]
-    terms: EnergyTerms
+    energy: Float[Array, ""]
+    terms: dict[str, Float[Array, ""]]
+    """The value of each term of the energy, without its weight."""
     iterations: Int[Array, ""]
     evaluations: Int[Array, ""]
     """Of the energy, with its gradient."""

@@ -7,8 +7,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, UInt8
 
-from sogjax.energy.objective import Views, whole_image_overlap
 from sogjax.energy.overlap import EXACT_EXPONENT, overlaps, pair_color_similarities, self_overlaps
+from sogjax.energy.views import Views, whole_image_overlap
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, project
 from sogjax.model.color import from_rgb

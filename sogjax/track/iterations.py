@@ -27,6 +27,6 @@ def best_after(
     def after(count: Int[Array, ""]) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
         stopped = eqx.tree_at(lambda t: t.solver.max_iterations, tracker, count)
         _, result = stopped.found(state, seen, capacities)
-        return result.pose, result.terms.energy
+        return result.pose, result.energy
 
     return jax.lax.map(after, jnp.asarray(counts))

@@ -10,7 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int, UInt8
 
-from sogjax.energy.objective import Views
+from sogjax.energy.similarity import similarity_among
+from sogjax.energy.views import Views
 from sogjax.track.culling import Capacities, in_boxes
 from sogjax.track.frame import FrameResult, TrackState
 from sogjax.track.scan import ClipCells, with_room, without_images
@@ -135,7 +136,7 @@ def _common_capacities(
 
 def _sees_the_same(a: Tracker, start_a: Array, b: Tracker, start_b: Array) -> bool:
     """Whether two trackers keep the same image blobs and pairs in the first frame."""
-    looks = lambda tracker, start: jax.tree.leaves((tracker.reader, tracker.weights.exponent, start))
+    looks = lambda tracker, start: jax.tree.leaves((tracker.reader, similarity_among(tracker.terms).exponent, start))
     return all(_all_equal(pair) for pair in zip(looks(a, start_a), looks(b, start_b), strict=True))
 
 

@@ -6,7 +6,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from sogjax.energy.objective import EnergyWeights, Views, similarity
+from sogjax.energy.similarity import Similarity, similarity_among
+from sogjax.energy.term import Terms
+from sogjax.energy.views import Views
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, distort, project_points
 from sogjax.model.frames import axis_vector
@@ -100,10 +102,11 @@ def well_seen(cameras: Camera, points: Float[Array, "place 3"]) -> Bool[Array, "
 
 
 def best_places(
-    slices: Slices, views: Views, places: Float[np.ndarray, "place 3"], weights: EnergyWeights, count: int
+    slices: Slices, views: Views, places: Float[np.ndarray, "place 3"], terms: Terms, count: int
 ) -> Float[np.ndarray, "best 3"]:
     """The places of the highest similarity (Eq. 9) of the slices, `APART` from each other, best first."""
-    scores = np.asarray(_scores(slices, slices.views(views), jnp.asarray(places, slices.sigmas.dtype), weights))
+    on_device = jnp.asarray(places, slices.sigmas.dtype)
+    scores = np.asarray(_scores(slices, slices.views(views), on_device, similarity_among(terms)))
     left, best = np.argsort(-scores), []
     while len(left) and len(best) < count:
         best.append(left[0])
@@ -112,11 +115,11 @@ def best_places(
 
 
 @eqx.filter_jit
-def _scores(slices: Slices, views: Views, places: Float[Array, "place 3"], weights: EnergyWeights) -> Array:
+def _scores(slices: Slices, views: Views, places: Float[Array, "place 3"], similarity: Similarity) -> Array:
     mask = jnp.ones(slices.sigmas.shape[0], bool)
 
     def score(place: Float[Array, "3"]) -> Float[Array, ""]:
         means = slices.offsets + place[None, :]
-        return similarity(Sog(means, slices.sigmas, jnp.zeros_like(means), mask), views, weights)
+        return similarity.of_blobs(Sog(means, slices.sigmas, jnp.zeros_like(means), mask), views)
 
     return jax.lax.map(score, places, batch_size=16)

@@ -10,7 +10,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from sogjax.energy.objective import EnergyWeights, History, Views, energy
+from sogjax.energy.frame_energy import still_energy
+from sogjax.energy.term import Terms
+from sogjax.energy.views import Views
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.skeleton import Skeleton
@@ -52,11 +54,11 @@ class FoundPose:
     """(energy - energy of the next different optimum) / energy, less what strains cost; 1 where there is no other."""
 
 
-def search_pose(body: Body, frame: FrameViews, weights: EnergyWeights, up: str) -> FoundPose:
+def search_pose(body: Body, frame: FrameViews, terms: Terms, up: str) -> FoundPose:
     """The pose of a body (upright in the world) that suits the pictures of one frame best."""
     coarse = frame.views(0, body)
     scales = pose_scales(body.skeleton)
-    poses = _promising(body, _starts(body, coarse, weights, up), coarse, weights)
+    poses = _promising(body, _starts(body, coarse, terms, up), coarse, terms)
     energies = jnp.zeros(poses.shape[0])
     for level, keep, iterations in (
         (0, NUM_MIDDLE, COARSE_ITERATIONS),
@@ -64,11 +66,11 @@ def search_pose(body: Body, frame: FrameViews, weights: EnergyWeights, up: str) 
         (2, NUM_FINE, FINE_ITERATIONS),
     ):
         views = coarse if level == 0 else frame.views(level, body, poses)
-        poses, energies = _climbed(body, poses, views, weights, scales, iterations)
+        poses, energies = _climbed(body, poses, views, terms, scales, iterations)
         energies = jnp.where(_well_seen(body, poses, views.cameras), energies, -jnp.inf)
         best = _different(body, poses, energies, keep)
         poses, energies = poses[best], energies[best]
-    better = [_better_limbs(body, jnp.roll(poses, -k, axis=0), views, weights, scales) for k in range(len(poses))]
+    better = [_better_limbs(body, jnp.roll(poses, -k, axis=0), views, terms, scales) for k in range(len(poses))]
     poses, energies = (jnp.stack(parts) for parts in zip(*better, strict=True))
     likely = energies - STRAIN_COST * jnp.abs(energies) * jax.vmap(partial(strain, body.skeleton))(poses)
     best = _different(body, poses, likely, NUM_FINE)
@@ -84,7 +86,7 @@ def strain(skeleton: Skeleton, pose: Float[Array, "dof"]) -> Float[Array, ""]:
 
 
 def _better_limbs(
-    body: Body, poses: Float[Array, "start dof"], views: Views, weights: EnergyWeights, scales: Scales
+    body: Body, poses: Float[Array, "start dof"], views: Views, terms: Terms, scales: Scales
 ) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
     """The first of some poses with each limb in turn tried as in the named poses and in the others, then climbed.
 
@@ -93,18 +95,18 @@ def _better_limbs(
     pose = poses[0]
     for limb in limbs(body.skeleton):
         variants = with_other_limb(body, pose, limb, poses[1:])
-        climbed, energies = _climbed(body, variants, views, weights, scales, LIMB_ITERATIONS)
+        climbed, energies = _climbed(body, variants, views, terms, scales, LIMB_ITERATIONS)
         pose = climbed[jnp.argmax(energies)]
-    climbed, energies = _climbed(body, pose[None], views, weights, scales, FINE_ITERATIONS)
+    climbed, energies = _climbed(body, pose[None], views, terms, scales, FINE_ITERATIONS)
     return climbed[0], energies[0]
 
 
-def search_poses(bodies: Sequence[Body], frame: FrameViews, weights: EnergyWeights, up: str) -> list[FoundPose]:
+def search_poses(bodies: Sequence[Body], frame: FrameViews, terms: Terms, up: str) -> list[FoundPose]:
     """The poses of several bodies in one frame: the surest is found first, and what it covers is its own."""
     found: dict[int, FoundPose] = {}
     while len(found) < len(bodies):
         open_ones = [k for k in range(len(bodies)) if k not in found]
-        candidates = {k: search_pose(bodies[k], frame, weights, up) for k in open_ones}
+        candidates = {k: search_pose(bodies[k], frame, terms, up) for k in open_ones}
         surest = max(open_ones, key=lambda k: candidates[k].margin)
         found[surest] = candidates[surest]
         frame = frame.with_found(bodies[surest], found[surest].pose)
@@ -112,19 +114,19 @@ def search_poses(bodies: Sequence[Body], frame: FrameViews, weights: EnergyWeigh
 
 
 def _promising(
-    body: Body, starts: Float[Array, "place start dof"], views: Views, weights: EnergyWeights
+    body: Body, starts: Float[Array, "place start dof"], views: Views, terms: Terms
 ) -> Float[Array, "promising dof"]:
     """The best starts at each place: the best of all are often the same mistake many times."""
-    energies = _energies(body, starts.reshape(-1, starts.shape[-1]), views, weights).reshape(starts.shape[:2])
+    energies = _energies(body, starts.reshape(-1, starts.shape[-1]), views, terms).reshape(starts.shape[:2])
     best = jnp.argsort(-energies, axis=1)[:, :NUM_AT_PLACE]
     return jnp.take_along_axis(starts, best[:, :, None], axis=1).reshape(-1, starts.shape[-1])
 
 
-def _starts(body: Body, views: Views, weights: EnergyWeights, up: str) -> Float[Array, "place start dof"]:
+def _starts(body: Body, views: Views, terms: Terms, up: str) -> Float[Array, "place start dof"]:
     """Every named pose at every heading, at each of the most promising places."""
     root = root_position(body, body.poses["rest"])
     slices = Slices.from_body(body, root, up)
-    places = best_places(slices, views, possible_places(views.cameras, up), weights, NUM_PLACES)
+    places = best_places(slices, views, possible_places(views.cameras, up), terms, NUM_PLACES)
     headings = np.arange(NUM_HEADINGS) * 2.0 * np.pi / NUM_HEADINGS - np.pi
     standing = jnp.stack([placed(body, body.poses["rest"], place) for place in places])
     turned_poses = jnp.stack(
@@ -141,18 +143,18 @@ def _centres(body: Body, poses: Float[Array, "start dof"]) -> Float[Array, "star
 
 
 @eqx.filter_jit
-def _energies(body: Body, poses: Array, views: Views, weights: EnergyWeights) -> Float[Array, "start"]:
-    return jax.lax.map(lambda pose: still_energy(body, pose, views, weights), poses, batch_size=8)
+def _energies(body: Body, poses: Array, views: Views, terms: Terms) -> Float[Array, "start"]:
+    return jax.lax.map(lambda pose: still_energy(body, pose, views, terms), poses, batch_size=8)
 
 
 def _climbed(
-    body: Body, poses: Array, views: Views, weights: EnergyWeights, scales: Scales, iterations: int
+    body: Body, poses: Array, views: Views, terms: Terms, scales: Scales, iterations: int
 ) -> tuple[Float[Array, "start dof"], Float[Array, "start"]]:
     """Every pose climbed and its energy; always the same number at once, so that one program serves all."""
     count = poses.shape[0]
     padded = jnp.concatenate([poses, jnp.tile(poses[-1], (-count % AT_ONCE, 1))])
     parts = [
-        _climbed_together(body, padded[k : k + AT_ONCE], views, weights, scales, jnp.asarray(iterations))
+        _climbed_together(body, padded[k : k + AT_ONCE], views, terms, scales, jnp.asarray(iterations))
         for k in range(0, len(padded), AT_ONCE)
     ]
     climbed, energies = (jnp.concatenate(part)[:count] for part in zip(*parts, strict=True))
@@ -161,12 +163,12 @@ def _climbed(
 
 @eqx.filter_jit
 def _climbed_together(
-    body: Body, poses: Array, views: Views, weights: EnergyWeights, scales: Scales, iterations: Int[Array, ""]
+    body: Body, poses: Array, views: Views, terms: Terms, scales: Scales, iterations: Int[Array, ""]
 ) -> tuple[Float[Array, "start dof"], Float[Array, "start"]]:
     solver = ConditionedAscent(max_iterations=iterations)
 
     def climb(pose: Float[Array, "dof"]) -> tuple[Array, Array]:
-        solution = solver.maximize(lambda p: still_energy(body, p, views, weights), pose, scales)
+        solution = solver.maximize(lambda p: still_energy(body, p, views, terms), pose, scales)
         return solution.params, solution.value
 
     return jax.vmap(climb)(poses)
@@ -175,11 +177,6 @@ def _climbed_together(
 @eqx.filter_jit
 def _well_seen(body: Body, poses: Array, cameras: Camera) -> Bool[Array, "start"]:
     return well_seen(cameras, _centres(body, poses))
-
-
-def still_energy(body: Body, pose: Float[Array, "dof"], views: Views, weights: EnergyWeights) -> Float[Array, ""]:
-    """Eq. 10 of a frame without history."""
-    return energy(body, pose, views, History(pose, pose, jnp.asarray(False)), weights)
 
 
 def _different(body: Body, poses: Array, energies: Array, count: int) -> np.ndarray:

@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from sogjax.energy.curvature import FrameEnergy
+from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.neighbours import displacement
 from sogjax.solve import Scales, Solution, Solver
 
@@ -35,11 +35,10 @@ def solve_near(
     posed = objective.body.posed_blobs
 
     def one_round(state: RoundsState) -> RoundsState:
-        before = posed(state.solution.params)
-        views, num_blocks = objective.views.near(before, objective.weights, capacity)
-        near = eqx.tree_at(lambda o: o.views, objective, views)
-        solution = solver.maximize(near, state.solution.params, scales)
-        moved = displacement(views.cameras, before, posed(solution.params))
+        start = state.solution.params
+        near, num_blocks = objective.near(start, capacity)
+        solution = solver.maximize(near, start, scales)
+        moved = displacement(objective.views.cameras, posed(start), posed(solution.params))
         return RoundsState(
             solution=Solution(
                 params=solution.params,

@@ -10,12 +10,15 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, UInt8
 
-from sogjax.energy.curvature import FrameEnergy
-from sogjax.energy.objective import EnergyWeights, History, Views, terms_of_energy
+from sogjax.compiled.once import computed_once
+from sogjax.energy.coloring import Coloring
+from sogjax.energy.frame_energy import FrameEnergy
+from sogjax.energy.posed import History
+from sogjax.energy.term import Terms
+from sogjax.energy.views import Views
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.color import from_rgb
-from sogjax.model.stages import computed_once
 from sogjax.solve import Scales, Solution, Solver
 from sogjax.track.confidence import Deviations, Laplace
 from sogjax.track.culling import (
@@ -47,7 +50,8 @@ class Tracker(eqx.Module):
     cameras: Camera
     normalizers: Float[Array, "camera"]
     reader: ImageReader
-    weights: EnergyWeights
+    terms: Terms
+    """Of the energy; what is added to the standard ones is climbed by every solver."""
     solver: Solver
     scales: Scales
     extrapolation: Float[Array, ""] = eqx.field(converter=jnp.asarray)
@@ -85,7 +89,7 @@ class Tracker(eqx.Module):
         """
         rgb = cells.astype(self.cameras.intrinsics.dtype) / 255.0
         near_blobs = partial(self.reader.near_blobs, capacity=capacities.near)
-        near, num_near = computed_once(self.reader.known, near_blobs, rgb, self.boxes(state))
+        near, num_near = computed_once(self.reader.true_at_run_time, near_blobs, rgb, self.boxes(state))
         normalizers = self.normalizers
         if present is not None:
             near = eqx.tree_at(lambda sog: sog.mask, near, near.mask & present[:, None])
@@ -97,7 +101,9 @@ class Tracker(eqx.Module):
             images, similarities, num_matching = self.reader.compared_blobs(near, body)
         else:
             images, similarities, num_matching = self.reader.matching_blobs(near, body, capacities.matching)
-        return Views(self.cameras, images, similarities, normalizers), num_near, num_matching
+        coloring = Coloring(self.reader.color_radius, self.reader.color_space)
+        views = Views(self.cameras, images, similarities, normalizers, coloring=coloring)
+        return views, num_near, num_matching
 
     def step(
         self,
@@ -118,12 +124,13 @@ class Tracker(eqx.Module):
         """Find the pose of one frame from what the cameras see of it."""
         views, num_near, num_matching = seen
         history = History(state.previous, state.before_previous, state.num_known == 2)
-        objective = FrameEnergy(self.body, views, history, self.weights)
+        objective = FrameEnergy(self.body, views, history, self.terms)
         solution, num_blocks = self._solved(objective, self.predicted(state), capacities)
         deviations, num_blocks = self._deviations(objective, solution.params, capacities, num_blocks)
         result = FrameResult(
             pose=solution.params,
-            terms=terms_of_energy(self.body, solution.params, solution.value, history, self.weights),
+            energy=solution.value,
+            terms=objective.values_given(solution.params, solution.value),
             iterations=solution.iterations,
             evaluations=solution.evaluations,
             converged=solution.converged,
@@ -149,8 +156,7 @@ class Tracker(eqx.Module):
         if self.confidence is None:
             return None, num_blocks
         if self.pairs == "sparse":
-            views, count = objective.views.near(self.body.posed_blobs(pose), self.weights, capacities.blocks)
-            objective = eqx.tree_at(lambda o: o.views, objective, views)
+            objective, count = objective.near(pose, capacities.blocks)
             num_blocks = jnp.maximum(num_blocks, count)
         curvature = objective.quadratic(pose).curvature
         return self.confidence.deviations(self.body.skeleton, curvature, pose), num_blocks
@@ -231,8 +237,8 @@ def _num_blocks(
 ) -> Int[Array, ""]:
     """How many blocks of near pairs there are where the solver starts."""
     views, _, _ = tracker.views(cells, state, capacities)
-    blobs = tracker.body.posed_blobs(tracker.predicted(state))
-    return views.near(blobs, tracker.weights, capacity=1)[1]
+    objective = FrameEnergy(tracker.body, views, History.unknown(state.previous), tracker.terms)
+    return objective.near(tracker.predicted(state), capacity=1)[1]
 
 
 @eqx.filter_jit

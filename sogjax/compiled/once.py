@@ -12,17 +12,24 @@ Results = TypeVar("Results")
 
 
 def computed_once(
-    really: Bool[Array, ""],
+    true_at_run_time: Bool[Array, ""],
     function: Callable[Arguments, Results],
     *arguments: Arguments.args,
     **keywords: Arguments.kwargs,
 ) -> Results:
-    """The results of a function, finished before anything that uses them begins; zeros unless `really`.
+    """The results of a function, finished before anything that uses them begins; zeros where `true_at_run_time` is not.
 
     On a CPU, XLA fuses a chain of cheap operations into its last one, which then computes the whole chain anew for
     every entry it reads; `optimization_barrier` is gone before that. A branch is not fused: the quad-trees of twelve
-    cameras take 2.2 ms in stages instead of 12. `really` must not be known when the program is compiled.
+    cameras take 2.2 ms in stages instead of 12.
+
+    Args:
+        true_at_run_time: a condition that always holds when the program runs, but that the compiler cannot know, such
+            as a variance being positive; a constant would be optimised away together with the branch.
+        function: the stage.
+        arguments: its arrays.
+        keywords: what it needs beside them.
     """
     shapes = jax.eval_shape(function, *arguments, **keywords)
     zeros = lambda *_: jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shapes)
-    return jax.lax.cond(really, lambda *a: function(*a, **keywords), zeros, *arguments)
+    return jax.lax.cond(true_at_run_time, lambda *a: function(*a, **keywords), zeros, *arguments)

@@ -1,0 +1,95 @@
+"""Derivatives of the similarities by colours, which are computed beforehand.
+
+Eq. 7 does not depend on the pose, so its values are made once a frame and only looked up while a pose is found. They
+are functions of the colours all the same: who differentiates by the colours of blobs, or by eps_sim, gets the
+derivatives of Eq. 7, computed only then.
+"""
+
+from functools import partial
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax.custom_derivatives import SymbolicZero
+from jaxtyping import Array, Float
+
+from sogjax.energy.pairs import TILE, SparsePairs
+from sogjax.model.color import color_similarity, from_rgb
+from sogjax.model.sog import Sog
+
+
+class Coloring(eqx.Module):
+    """How similarities follow from colours (Eq. 7)."""
+
+    radius: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    """eps_sim."""
+    space: str = eqx.field(static=True)
+    """Of the images' colours; a body's are sRGB."""
+
+
+def colored_similarities(
+    similarities: Float[Array, "camera body image"],
+    coloring: Coloring | None,
+    body_colors: Float[Array, "body 3"],
+    images: Sog,
+) -> Float[Array, "camera body image"]:
+    """The similarities as they are, but with derivatives by the colours."""
+    radius = None if coloring is None else coloring.radius
+    space = None if coloring is None else coloring.space
+    return _following(_all_pairs, space, similarities, (body_colors, images.colors, radius))
+
+
+def colored_pairs(
+    pairs: SparsePairs, coloring: Coloring | None, body_colors: Float[Array, "body 3"], images: Sog
+) -> SparsePairs:
+    """The pairs as they are, but their amplitudes with derivatives by the colours."""
+    radius = None if coloring is None else coloring.radius
+    space = None if coloring is None else coloring.space
+    extra = pairs.image_shape[1] - images.capacity
+    image_colors = jnp.pad(images.colors, ((0, 0), (0, extra), (0, 0)))
+    colors = (body_colors, image_colors, radius)
+    amplitudes = _following(_listed_pairs, space, pairs.amplitudes, colors, pairs)
+    return eqx.tree_at(lambda p: p.amplitudes, pairs, amplitudes)
+
+
+def _all_pairs(space: str, colors: Any, _: None) -> Float[Array, "camera body image"]:
+    """Eq. 7 for all pairs."""
+    body_colors, image_colors, radius = colors
+    return color_similarity(image_colors[:, None], from_rgb(body_colors, space)[None, :, None], space, radius)
+
+
+def _listed_pairs(space: str, colors: Any, pairs: SparsePairs) -> Float[Array, "member slot block"]:
+    """The amplitudes of listed pairs."""
+    body_colors, image_colors, radius = colors
+    of_body = from_rgb(body_colors, space)[pairs.body_index % pairs.body_shape[1]]
+    slots = jnp.arange(TILE, dtype=pairs.tile_index.dtype)[:, None]
+    of_image = image_colors.reshape(-1, 3)[pairs.tile_index[None, :] * TILE + slots]
+    similarities = color_similarity(of_image[None], of_body[:, None], space, radius)
+    return similarities * 2.0 * jnp.pi * pairs.variances
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(0, 1))
+def _following(function: Any, space: str | None, stored: Array, colors: Any, pairs: SparsePairs | None = None) -> Array:
+    """What is stored of `function(space, colors, pairs)`, differentiated as the function is; 0 stays 0."""
+    return stored
+
+
+def _rates(function, space, primals, tangents):
+    stored, colors, pairs = primals
+    stored_rate, color_rates, _ = tangents
+    solid = lambda rate, like: jnp.zeros_like(like) if isinstance(rate, SymbolicZero) else rate
+    rate = solid(stored_rate, stored)
+    if all(isinstance(leaf, SymbolicZero) for leaf in jax.tree.leaves(color_rates)):
+        return stored, rate
+    if space is None:
+        raise TypeError(
+            "these similarities do not follow from the colours by Eq. 7 alone (Views.coloring is None), "
+            "so nothing can be differentiated by colours; make the views with Views.from_images"
+        )
+    rates = jax.tree.map(solid, color_rates, colors)
+    by_colors = jax.jvp(lambda colors: function(space, colors, pairs), (colors,), (rates,))[1]
+    return stored, rate + jnp.where(stored != 0.0, by_colors, 0.0)
+
+
+_following.defjvp(_rates, symbolic_zeros=True)

@@ -1,0 +1,111 @@
+"""Similarity of a posed body with the pictures (Eq. 9), with the curvature of its springs.
+
+Each image blob that is not at its cap pulls at the body blobs it resembles, as a spring whose stiffness is the weight
+of the pair at the current pose. Springs only ever hold: the curvature is positive semi-definite wherever the pose is.
+"""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from sogjax.energy.coloring import colored_pairs, colored_similarities
+from sogjax.energy.overlap import (
+    EXACT_EXPONENT,
+    GradientMode,
+    Pulls,
+    capped_overlap,
+    overlap_of_pairs,
+    overlap_pulls,
+    self_overlaps,
+)
+from sogjax.energy.pairs import DensePairs
+from sogjax.energy.posed import Frame, Posed
+from sogjax.energy.term import Term, Terms
+from sogjax.energy.views import Views
+from sogjax.model.camera import project, projection_jacobian
+from sogjax.model.sog import Sog
+from sogjax.solve.quadratic import QuadraticModel
+
+
+class Similarity(Term):
+    """E(Theta) of Eq. 9: the mean over the cameras of the normalised similarity."""
+
+    exponent: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=EXACT_EXPONENT)
+    """k of Eq. 6: `EXACT_EXPONENT` or `PRINTED_EXPONENT`."""
+    capped: bool = eqx.field(static=True, default=True)
+    """Eq. 8; False: Eq. 5, in which blobs that hide each other count several times."""
+    gradient: GradientMode = eqx.field(static=True, default="forward")
+
+    def value(self, posed: Posed, frame: Frame) -> Float[Array, ""]:
+        """Of the posed blobs with all pictures."""
+        return self.of_blobs(posed.blobs, frame.views)
+
+    def of_blobs(self, blobs: Sog, views: Views) -> Float[Array, ""]:
+        """Of blobs in the world, which need not be a body's."""
+        seen = jax.vmap(project, in_axes=(0, None))(views.cameras, blobs)
+        modes = {"capped": self.capped, "gradient": self.gradient}
+        if views.pairs is not None:
+            pairs = colored_pairs(views.pairs, views.coloring, blobs.colors, views.images)
+            overlap = overlap_of_pairs(pairs, views.image_caps(pairs), seen, self.exponent, **modes)
+            return jnp.mean(overlap / views.normalizers)
+        similarities = colored_similarities(views.color_similarities, views.coloring, blobs.colors, views.images)
+        one_camera = lambda image, seen, similar, size: (
+            capped_overlap(image, seen, similar, self.exponent, **modes) / size
+        )
+        return jnp.mean(jax.vmap(one_camera)(views.images, seen, similarities, views.normalizers))
+
+    def quadratic(self, posed: Posed, frame: Frame) -> QuadraticModel:
+        """Value, gradient and the curvature of the springs, the exponentials computed once."""
+        value, by_mean, stiffness = self._springs(posed.blobs, frame.views)
+        jacobian = posed.point_jacobian()
+        stretched = jnp.einsum("bij,bjd->bid", stiffness, jacobian, precision="highest")
+        flat = lambda array: array.reshape(-1, array.shape[-1])
+        return QuadraticModel(
+            value=self.weight * value,
+            gradient=self.weight * jnp.matmul(by_mean.reshape(-1), flat(jacobian), precision="highest"),
+            curvature=self.weight * jnp.matmul(flat(jacobian).T, flat(stretched), precision="highest"),
+        )
+
+    def _springs(
+        self, blobs: Sog, views: Views
+    ) -> tuple[Float[Array, ""], Float[Array, "blob 3"], Float[Array, "blob 3 3"]]:
+        """Eq. 9 with its gradient and its stiffness by the blobs' means in the world."""
+
+        def projected(means: Float[Array, "blob 3"]) -> tuple[tuple[Array, Array], Sog]:
+            seen = jax.vmap(project, in_axes=(0, None))(views.cameras, eqx.tree_at(lambda b: b.means, blobs, means))
+            return (seen.means, seen.sigmas), seen
+
+        _, pull_back, seen = jax.vjp(projected, blobs.means, has_aux=True)
+        pulls = self._pulls(seen, views)
+        scale = 1.0 / (views.normalizers * views.normalizers.shape[0])
+        (by_mean,) = pull_back((pulls.by_mean * scale[:, None, None], pulls.by_sigma * scale[:, None]))
+        across = jax.vmap(projection_jacobian, in_axes=(0, None))(views.cameras, blobs.means)
+        springs = jnp.where(seen.mask, pulls.stiffness, 0.0) * scale[:, None]
+        stretched = across * springs[:, :, None, None]
+        stiffness = jnp.einsum("cbki,cbkj->bij", across, stretched, precision="highest")
+        return jnp.sum(pulls.value * scale), by_mean, stiffness
+
+    def _pulls(self, seen: Sog, views: Views) -> Pulls:
+        """Pulls of the image blobs at the projected body blobs, for each camera."""
+        if views.pairs is not None:
+            caps = views.image_caps(views.pairs)
+            return overlap_pulls(views.pairs, caps, seen, self.exponent, capped=self.capped)
+
+        def one_camera(image: Sog, similarities: Float[Array, "blob image"], seen: Sog) -> Pulls:
+            pairs = DensePairs.from_image(image, similarities)
+            return overlap_pulls(pairs, self_overlaps(image), seen, self.exponent, capped=self.capped)
+
+        return jax.vmap(one_camera)(views.images, views.color_similarities, seen)
+
+
+def similarity_among(terms: Terms) -> Similarity:
+    """The similarity of an energy.
+
+    Raises:
+        ValueError: the energy has none.
+    """
+    found = [term for term in terms if isinstance(term, Similarity)]
+    if not found:
+        raise ValueError("this needs a Similarity among the terms of the energy")
+    return found[0]
