@@ -17,28 +17,19 @@ import numpy as np
 from sogjax.actor.colors import camera_of
 from sogjax.actor.make import MadeActor, make_actor, subjects_of
 from sogjax.actor.silhouette_iou import silhouette_iou
-from sogjax.data.ground_truth import GroundTruth, load_ground_truth
+from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.recording import Recording, open_recording
 from sogjax.engine.build import energy_terms
 from sogjax.engine.recordings import body_named
 from sogjax.engine.terminal import say
 from sogjax.engine.track import track_recording
 from sogjax.evaluate import evaluate_motions
-from sogjax.model.body import Body
+from sogjax.evaluate.bone_lengths import bone_errors
 from sogjax.settings import EnergyConfig
 from sogjax.settings.compose import track_config
 from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from
 from sogjax.synth import SynthSettings, cached_recording
-
-BONES = {
-    "upper arm": ("{side}_shoulder", "{side}_elbow"),
-    "forearm": ("{side}_elbow", "{side}_wrist"),
-    "thigh": ("{side}_hip", "{side}_knee"),
-    "shank": ("{side}_knee", "{side}_ankle"),
-    "shoulders": ("left_shoulder", "right_shoulder"),
-    "hips": ("left_hip", "right_hip"),
-}
 
 
 @dataclass
@@ -85,8 +76,8 @@ def report(recording: Recording, made: MadeActor, solver: str) -> list[str]:
     )
     return [
         f"IoU {mean_iou(recording, made):.3f}",
-        f"bones {np.mean(np.abs([*errors.values()])):.1f} %",
-        "(" + " ".join(f"{name} {error:+.1f}" for name, error in errors.items()) + ")",
+        f"bones {100.0 * np.mean(np.abs([*errors.values()])):.1f} %",
+        "(" + " ".join(f"{name} {100.0 * error:+.1f}" for name, error in errors.items()) + ")",
         f"markers {1000 * np.nanmean(markers):.1f} +- {1000 * np.nanstd(markers):.1f} mm",
         f"joints {1000 * np.nanmean(joints):.1f} mm",
     ]
@@ -101,31 +92,6 @@ def mean_iou(recording: Recording, made: MadeActor) -> float:
                 silhouette_iou(made.upright_body, pose, camera_of(rig, camera), mask)
                 for posed, pose in zip(made.pictures, made.example_poses.values(), strict=True)
                 for camera, mask in posed.masks.items()
-            ]
-        )
-    )
-
-
-def bone_errors(body: Body, truth: GroundTruth) -> dict[str, float]:
-    """Deviation of each length from the truth's, percent."""
-    assert truth.joints is not None
-    names = [str(name).split("/")[-1] for name in truth.joint_names]
-    sides = {"l_": "left_", "r_": "right_"}
-    names = [sides[name[:2]] + name[2:] if name[:2] in sides else name for name in names]
-    landmarks = np.asarray(body.posed_landmarks(body.poses["rest"]), float)[None]
-    return {
-        bone: 100.0 * (_length(landmarks, body.landmarks.names, ends) / _length(truth.joints, names, ends) - 1.0)
-        for bone, ends in BONES.items()
-    }
-
-
-def _length(points: np.ndarray, names: list[str] | tuple[str, ...], ends: tuple[str, str]) -> float:
-    at = lambda name: points[:, list(names).index(name)]
-    return float(
-        np.mean(
-            [
-                np.nanmean(np.linalg.norm(at(ends[0].format(side=side)) - at(ends[1].format(side=side)), axis=-1))
-                for side in ("left", "right")
             ]
         )
     )

@@ -9,21 +9,14 @@ them for Rerun: the skeleton on a timeline of iterations, and every joint's way 
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import jax.numpy as jnp
 import numpy as np
 
-from sogjax.data.motion import Motion, motion_from_poses
 from sogjax.data.video import read_frames
-from sogjax.errors import InputError
-from sogjax.settings import TrackConfig
-from sogjax.settings.compose import track_config
+from sogjax.study.iterations import check_showable, watched
 from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from
 from sogjax.study.settings import ReportConfig
-from sogjax.study.source import Source, source_named
-from sogjax.track.frame import TrackState
-from sogjax.track.iterations import best_after
-from sogjax.track.tracker import track
+from sogjax.study.source import source_named
 from sogjax.view.rerun import write_iterations
 
 
@@ -45,7 +38,7 @@ def main() -> None:
     """Print a line for each iteration, and write the file."""
     settings = settings_from(Settings)
     source = source_named(settings.recording, settings.frame + 1, Path(settings.out))
-    check_showable(source, settings)
+    check_showable(source, settings.frame)
     steps, energies = watched(source, settings.options, settings.frame)
     print(machine_line())
     previous = steps.blob_means[0]
@@ -56,38 +49,6 @@ def main() -> None:
     pictures = next(iter(read_frames(source.recording, settings.frame, settings.frame + 1)))
     write_iterations(Path(settings.to), source.recording, steps, energies, pictures)
     print(settings.to)
-
-
-def check_showable(source: Source, settings: Settings) -> None:
-    """Refuse what has no iterations that could be shown.
-
-    Raises:
-        InputError: several people, or a frame that the recording has not, or its first, which is no step of tracking.
-    """
-    if len(source.bodies) > 1:
-        raise InputError(
-            f"recording={settings.recording}: has {len(source.bodies)} people, and the iterations of one can be shown; "
-            "choose a recording of one person"
-        )
-    if not 0 < settings.frame < source.recording.num_frames:
-        raise InputError(
-            f"frame={settings.frame}: choose one of 1 to {source.recording.num_frames - 1}, frames of {source.name} "
-            "after its first"
-        )
-
-
-def watched(source: Source, options: list[str], frame: int) -> tuple[Motion, np.ndarray]:
-    """The poses after 0, 1, 2, ... iterations in a frame, as a motion, and their energies."""
-    config: TrackConfig = track_config(options, recording=source.path)
-    cameras = source.cameras(None)
-    tracker, cells = source.tracker(config, cameras), source.cells(config.images.depth, cameras, 1)
-    state = TrackState.from_pose(source.start)
-    tracked = list(track(tracker, state, cells[: frame + 1]))
-    for done in tracked[:-1]:
-        state = state.advanced(jnp.asarray(done.result.pose))
-    counts = jnp.arange(int(tracked[-1].result.iterations) + 1)
-    poses, energies = best_after(tracker, state, jnp.asarray(cells[frame]), tracked[-1].capacities, counts)
-    return motion_from_poses(source.bodies[0], np.asarray(poses), source.recording.fps), np.asarray(energies)
 
 
 if __name__ == "__main__":

@@ -12,16 +12,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from sogjax.app.sweep.results import differing, kept_results
 
+from sogjax.app.sweep.results import differing, kept_results
 from sogjax.data.motion import Motion, load_motion
 from sogjax.data.video import read_frames
 from sogjax.errors import InputError
 from sogjax.study.experiment import Experiment
-from sogjax.study.runner import motions_of, run_row
 from sogjax.study.script import run_script, settings_from
 from sogjax.study.settings import ReportConfig
-from sogjax.study.source import Source
+from sogjax.study.side_by_side import of_experiment
 from sogjax.study.study import Study
 from sogjax.view.rerun import write_comparison
 
@@ -54,32 +53,6 @@ def main() -> None:
     truth = None if source.recording.ground_truth is None else source.truth
     write_comparison(Path(settings.to), source.recording, runs, errors=errors, frames=pictures, truth=truth)
     print(settings.to)
-
-
-def of_experiment(
-    study: Study, experiment: Experiment, source: Source
-) -> tuple[dict[str, list[Motion]], dict[str, np.ndarray]]:
-    """The motions on one recording of every row that tracks it and did not fail, and their errors in metres.
-
-    Raises:
-        InputError: there is none.
-    """
-    motions, errors, failed = {}, {}, "all its rows are of several people"
-    for row, entry in experiment.config.rows.items():
-        if entry.actors is not None and entry.actors > 1:  # tracked on a recording of its own
-            continue
-        record = run_row(experiment, row, source, study.runs, study.overrides)
-        if record is None or record.failed:
-            failed = record.failed if record else failed
-            continue
-        motions[row] = list(motions_of(record, source.bodies, source.recording.fps).values())
-        errors[row] = 1e-3 * record.errors
-    if not motions:
-        raise InputError(
-            f"experiment={experiment.name}: no row worked on {source.name} ({failed}); choose another recording or "
-            "experiment"
-        )
-    return motions, errors
 
 
 def of_sweep(folder: Path) -> dict[str, list[Motion]]:

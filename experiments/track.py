@@ -7,9 +7,8 @@ tracks the rendered walk of the demo; `recording=FOLDER` tracks another recordin
 
 import sys
 
-from sogjax.app.sweep.run import sweep_main, track_task
-
 from sogjax.app.config.overrides import quoted_value
+from sogjax.app.sweep.run import sweep_main, track_task
 from sogjax.engine.terminal import progress
 from sogjax.synth import SynthSettings, cached_recording
 

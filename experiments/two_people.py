@@ -9,7 +9,6 @@ import sys
 from dataclasses import dataclass, field
 
 from sogjax.app.sweep.results import table
-
 from sogjax.engine.run_numbers import row_numbers
 from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from

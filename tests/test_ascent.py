@@ -148,12 +148,14 @@ def test_plain_ascent_keeps_its_step_sizes():
 def test_conditioning_needs_fewer_iterations_in_a_narrow_valley():
     valley = lambda params: -0.5 * jnp.sum(jnp.array([1.0, 100.0]) * params**2)
     start = np.array([1.0, 0.05])
-    conditioned = maximum(ConditionedAscent(epsilon=1e-3, max_iterations=3000), start, scales(2), valley)
-    plain = maximum(gradient_ascent(epsilon=1e-3, max_iterations=3000), start, scales(2), valley)
-    assert conditioned.converged
-    assert np.linalg.norm(conditioned.params) < 0.02
-    reached = np.linalg.norm(plain.params) <= np.linalg.norm(conditioned.params)
-    assert not reached or plain.iterations > 2 * conditioned.iterations
+    conditioned, plain = (
+        maximum(solver(epsilon=1e-5, max_iterations=5000), start, scales(2), valley)
+        for solver in (ConditionedAscent, gradient_ascent)
+    )
+    for solution in (conditioned, plain):
+        assert solution.converged
+        np.testing.assert_allclose(solution.params, 0.0, atol=5e-3)
+    assert 2 * conditioned.iterations < plain.iterations
 
 
 def test_many_starts_at_once_give_what_single_ones_do():

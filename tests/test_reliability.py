@@ -1,15 +1,9 @@
-"""The script that makes the page on reliability: nearly every way in which an input can be wrong."""
-
-import sys
-from pathlib import Path
+"""The program that makes the page on reliability: nearly every way in which an input can be wrong."""
 
 import pytest
-
-sys.path.append(str(Path(__file__).parents[1] / "experiments"))
-
 from bad_input_cases import cases
 from fuzzing import fuzz_readers
-from reliability import outcomes_of
+from outcomes import outcomes_of
 
 FAMILIES = sorted({case.family for case in cases()})
 

@@ -219,7 +219,7 @@ def test_a_video_that_breaks_off_and_is_there_again(capsys, tmp_path, recording,
 
 
 def test_killed_at_random_moments(tmp_path, command):
-    """SIGKILL; `experiments/kill_and_resume.py` does the same with all outputs, 20 times."""
+    """SIGKILL; `tests/reliability/kill_and_resume.py` does the same with all outputs, 20 times."""
     environment = os.environ | {"SOGJAX_COMPILATION_CACHE": str(tmp_path / "programs")}
     started = lambda *words: subprocess.Popen(
         [sys.executable, "-m", "sogjax", *command, *words],

@@ -89,7 +89,7 @@ def _parts(experiment: Experiment, rows: Sequence[RowSummary]) -> list[str]:
     if not any(row.by_recording for row in rows):
         return [config.question, *(f"failed, {row.name}: {reason}" for row in rows for reason in row.failed)]
     base = f" All rows: `{' '.join(config.base)}`." if config.base else ""
-    script = f" (`python experiments/{experiment.name}.py`)" if experiment.is_shipped else ""
+    script = f" (`python experiments/study.py {experiment.name}`)" if experiment.is_shipped else ""
     parts = [f"{config.question}{script}{base}", markdown_table(experiment, rows)]
     if config.measure == "accuracy":
         parts += ["Mean error on each recording, mm:", recordings_table(experiment, rows)]

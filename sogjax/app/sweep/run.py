@@ -3,8 +3,9 @@
 import logging
 import os
 import sys
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
+from itertools import islice, product
+from typing import TYPE_CHECKING, Any
 
 from sogjax.app.config.composition import SCHEMAS, composed, register_schemas
 from sogjax.app.config.overrides import plain_sentence, ready_for_hydra
@@ -14,6 +15,9 @@ from sogjax.engine.run_numbers import Numbers, row_numbers
 from sogjax.errors import InputError
 from sogjax.settings.compose import as_object
 from sogjax.settings.files import conf_dir
+
+if TYPE_CHECKING:
+    from hydra.core.override_parser.types import Override
 
 LOG = logging.getLogger(__name__)
 
@@ -31,7 +35,7 @@ def run_sweep(command: str, overrides: Sequence[str]) -> int:
         others = ", ".join(name for name in SCHEMAS if name != "track")
         raise InputError(f"{command} -m: only track can be swept, not {others}; leave -m out")
     words = ready_for_hydra(overrides, sweep=True)
-    _members(words)
+    _check_members(words)
     program = sys.argv
     sys.argv = ["sogjax track", "-m", *words]
     try:
@@ -45,26 +49,45 @@ def _is_hydras(word: str) -> bool:
     return word.lstrip("+~").startswith("hydra")
 
 
-def _members(words: Sequence[str]) -> list[list[str]] | None:
-    """The overrides of every member, composed before Hydra makes their folders; None: only Hydra knows them.
+def _check_members(words: Sequence[str]) -> None:
+    """Compose the members of a sweep before Hydra makes their folders.
 
     Raises:
         InputError: an invalid member.
     """
-    from hydra._internal.core_plugins.basic_sweeper import BasicSweeper
     from hydra.core.override_parser.overrides_parser import OverridesParser
     from hydra.errors import HydraException
+    from omegaconf.errors import OmegaConfBaseException
 
     own = [word for word in words if not _is_hydras(word)]
     try:
-        (members,) = BasicSweeper.split_arguments(OverridesParser.create().parse_overrides(own), None)
-    except HydraException as error:
+        members = list(islice(_members(OverridesParser.create().parse_overrides(own)), CHECKED_MEMBERS))
+    except (HydraException, OmegaConfBaseException) as error:
         if len(own) < len(words):  # another sweeper than Hydra's own may understand it
-            return None
+            return
         raise InputError(plain_sentence("track", SCHEMAS["track"], error)) from error
-    for member in members[:CHECKED_MEMBERS]:
+    for member in members:
         composed("track", member)
-    return [list(member) for member in members]
+
+
+def _members(overrides: "Sequence[Override]") -> Iterator[tuple[str, ...]]:
+    """Every combination of the overrides' values, as Hydra's own sweeper makes them: the last one varies fastest.
+
+    Raises:
+        HydraException: an override without a list of values, such as an interval.
+    """
+    from hydra.errors import HydraException
+
+    choices: dict[str, list[str]] = {}
+    for override in overrides:
+        key = override.get_key_element()
+        if not override.is_sweep_override():
+            choices[key] = [f"{key}={override.get_value_element_as_str()}"]
+        elif override.is_discrete_sweep():
+            choices[key] = [f"{key}={value}" for value in override.sweep_string_iterator()]
+        else:
+            raise HydraException(f"{override.input_line}: name the values, as in {key}=0,1,2")
+    return product(*choices.values())
 
 
 def sweep_main(task: Callable[[Any], Any]) -> int:

@@ -1,4 +1,4 @@
-"""The table of what is wrong, by family, for `reliability.py`."""
+"""The table of what is wrong, by family."""
 
 import io
 import zipfile

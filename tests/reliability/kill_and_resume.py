@@ -1,6 +1,6 @@
 """Does a run that is killed at any moment go on to the very end that it would have had?
 
-python experiments/kill_and_resume.py kills=20
+python tests/reliability/kill_and_resume.py kills=20
 
 tracks a small rendered walk, all outputs on, first pose searched for; kills the process (SIGKILL) at random moments of
 its life in its folder, every other time after it wrote its first frames; goes on with resume=true, and compares every

@@ -1,6 +1,6 @@
-"""Runs whose surroundings fail, for `reliability.py`: what was said, what is left, and the end after going on.
+"""Runs whose surroundings fail: what was said, what is left, and the end after going on.
 
-python experiments/faults.py [only=disk]
+python tests/reliability/faults.py [only=disk]
 
 Each run is a process of its own, and each fault of `fault_cases.py` is made for real. Afterwards it is looked how many
 frames can be read; then the same command with resume=true goes on, and every array of its end is compared with that of

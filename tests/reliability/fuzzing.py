@@ -1,4 +1,4 @@
-"""Readers of files against damaged files, for `reliability.py`."""
+"""Readers of files against damaged files."""
 
 import os
 import tempfile

@@ -1,4 +1,4 @@
-"""Inputs that are wrong in one place, for `reliability.py`: a good workplace, and what is damaged in it."""
+"""Inputs that are wrong in one place: a good workplace, and what is damaged in it."""
 
 import re
 from collections.abc import Callable

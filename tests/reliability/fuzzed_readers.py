@@ -1,11 +1,12 @@
 """Every reader of files with a good file, for `fuzzing.py`."""
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import calibration_cases
 import jax.numpy as jnp
 import numpy as np
+import skeleton_cases
 from bad_inputs import make_workplace
 
 from sogjax.data.actor_file import load_body
@@ -24,11 +25,6 @@ from sogjax.data.skeletool_motion import read_skeletool_motion
 from sogjax.data.source import look_at_source, open_source
 from sogjax.engine.kept_run import CAPACITIES, CAPACITY, COLUMNS, FOLDER, NOTE, TERMS, KeptRun
 from sogjax.errors import InputError
-
-sys.path.append(str(Path(__file__).parents[1] / "tests"))
-
-import calibration_cases
-import skeleton_cases
 
 Read = Callable[[Path], object]
 

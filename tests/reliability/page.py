@@ -1,0 +1,81 @@
+"""The page on reliability, as Markdown."""
+
+from faults import Survived
+from fuzzing import FuzzedReader
+from kill_and_resume import Settings as RunSettings
+from outcomes import Outcome
+
+from sogjax.study.machine import machine_line
+
+RUNS = RunSettings()
+"""The runs that the faults are injected into."""
+
+
+def page(outcomes: list[Outcome], fuzzed: list[FuzzedReader], failed: list[Survived]) -> str:
+    """The tables, as Markdown."""
+    good = sum(outcome.good for outcome in outcomes)
+    lines = [
+        "# Reliability",
+        "",
+        f"Made by `python tests/reliability page=docs/reliability.md` ({machine_line()}).",
+        "",
+        "## Wrong input",
+        "",
+        f"{good} of {len(outcomes)} wrong inputs were refused with exit status 2 and one sentence, and left every file "
+        "unchanged.",
+        "",
+        "| family | what is wrong | command | message | status | files unchanged |",
+        "|---|---|---|---|---|---|",
+    ]
+    lines += [row(outcome) for outcome in outcomes]
+    lines += ["", "## Damaged files", ""]
+    lines += [
+        "The readers got valid files in which bytes were changed, lines removed, doubled or swapped, and numbers made",
+        "extreme. Each file must be read or refused with one sentence (`InputError`).",
+        "",
+        "| reader | files | refused | read | other exceptions | seconds |",
+        "|---|---|---|---|---|---|",
+    ]
+    for r in fuzzed:
+        counts = (r.files, r.refused, r.files - r.refused - len(r.crashes), len(r.crashes))
+        lines.append(f"| {r.name} | {' | '.join(map(str, counts))} | {r.seconds:.1f} |")
+    return "\n".join(lines + faults_part(failed)) + "\n"
+
+
+def faults_part(rows: list[Survived]) -> list[str]:
+    """The table of faults; empty if none were injected."""
+    if not rows:
+        return []
+    lines = [
+        "",
+        "## Faults injected and survived",
+        "",
+        f"A small rendered walk ({RUNS.frames} frames, {RUNS.cameras} cameras, all outputs, searched first pose) was "
+        "tracked while its",
+        "surroundings failed. Every fault was real and hit a process of its own. Then the same command with",
+        "`resume=true` continued the run, and every array of its `motion.npz` was compared with an undisturbed run's.",
+        f"{sum(row.good for row in rows)} of {len(rows)} ended as expected: without a traceback, with every frame that "
+        "had been written, and with the same result.",
+        "",
+        "| fault | what was done | last message, and exit status | frames readable afterwards | result after "
+        "`resume=true` |",
+        "|---|---|---|---|---|",
+    ]
+    return lines + [
+        f"| {' | '.join(cell(text) for text in (row.fault, row.done, row.said, row.frames, row.end))} |" for row in rows
+    ]
+
+
+def row(outcome: Outcome) -> str:
+    """One line of the table of wrong inputs."""
+    said = cell(outcome.said).replace("`", "'")
+    said = said if len(said) < 300 else said[:297] + "..."
+    left = "yes" if outcome.nothing_left else "NO"
+    command = outcome.case.command[0]
+    what = outcome.case.what.replace("|", "\\|")
+    return f"| {outcome.case.family} | {what} | {command} | {said} | {outcome.status} | {left} |"
+
+
+def cell(text: str) -> str:
+    """The text, escaped for a cell of a table."""
+    return text.replace("|", "\\|").replace("\n", " ").replace("<", "&lt;")
