@@ -90,7 +90,7 @@ def test_two_masks_that_do_not_fit_are_said(tmp_path):
     write(recording.example_poses[0].masks["cam1"], wrong.astype(np.uint8) * 255)
     found = masks_of(recording)
     assert list(found.masks) == [0, 1]
-    assert "cam0 and cam1 agree only to" in found.warnings[0]
+    assert "cam0 and cam1 agree by only" in found.warnings[0]
 
 
 def test_a_plate_that_is_not_empty_is_left_out_and_said(tmp_path):

@@ -249,7 +249,7 @@ def test_time_stamps_are_gone_by_where_asked_for(tmp_path, fewest, right, says):
     left = [*range(8), None, None][: len(right)]
     assert frames_seen(recording) == [list(pair) for pair in zip(left, right, strict=True)]
     assert frames_seen(recording, 5) == frames_seen(recording)[5:]
-    assert any("no image of 2 of its 10 frames" in warning and says in warning for warning in recording.warnings)
+    assert any("no image for 2 of its 10 frames" in warning and says in warning for warning in recording.warnings)
 
 
 def test_time_stamps_of_another_rate(tmp_path):
