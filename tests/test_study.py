@@ -1,7 +1,9 @@
 """Studies: their files, that a run is done once, what a summary says, and the documents."""
 
 import re
+import runpy
 import shutil
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,16 +24,30 @@ from sogjax.study.summary import pooled_std, summarized
 from sogjax.study.table import difference_words, findings, markdown_table
 from sogjax.synth import SynthSettings, render_recording
 
-SCRIPTS = Path(__file__).resolve().parents[1] / "experiments"
+STUDY = Path(__file__).resolve().parents[1] / "experiments" / "study.py"
 SMALL = ("images.depth=5", "solver.max_iterations=12")
 
 
 @pytest.mark.parametrize("name", experiment_names())
-def test_every_experiment_can_be_composed_and_has_its_script(name):
+def test_every_experiment_can_be_composed(name):
     experiment = Experiment.named(name)
     for row in experiment.config.rows:
         check(composed("track", ["recording=x", *experiment.overrides(row)]))
-    assert f'study_main("{name}")' in (SCRIPTS / f"{name}.py").read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"), [([], "no experiment"), (["luck"], "luck: no such"), (["depth", "luck"], "depth and luck")]
+)
+def test_a_study_without_the_name_of_one_experiment_lists_them(monkeypatch, capsys, words, said):
+    monkeypatch.setattr(sys, "argv", [str(STUDY), *words, "frames=4"])
+    with pytest.raises(SystemExit) as end:
+        runpy.run_path(str(STUDY), run_name="__main__")
+    assert end.value.code == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert len(err.splitlines()) == 1
+    assert said in err
+    assert all(name in err for name in experiment_names())
 
 
 def experiment(**rows):

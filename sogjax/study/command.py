@@ -1,9 +1,11 @@
-"""What the scripts in `experiments/` share: one experiment of `conf/experiment/` from the command line."""
+"""One experiment of `conf/experiment/`, or of a file like those, from the command line."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from sogjax.study.experiment import Experiment
+from sogjax.errors import InputError
+from sogjax.study.experiment import Experiment, experiment_names
 from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from
 from sogjax.study.settings import ReportConfig
@@ -26,13 +28,24 @@ class Settings:
     """Of the track config, for all rows."""
 
 
-def study_main(name: str) -> None:
-    """Do the runs of an experiment that are not there yet, and print its tables."""
-    run_script(lambda: _print_tables(name, settings_from(Settings)))
+def study_main(words: Sequence[str]) -> None:
+    """Do the runs of an experiment that are not there yet, and print its tables.
+
+    Args:
+        words: the experiment's name, then settings.
+    """
+    run_script(lambda: _print_tables(*_experiment_and_settings(words)))
 
 
-def _print_tables(name: str, settings: Settings) -> None:
-    experiment = Experiment.named(name)
+def _experiment_and_settings(words: Sequence[str]) -> tuple[Experiment, Settings]:
+    names = [word for word in words if "=" not in word]
+    if len(names) != 1:
+        given = " and ".join(names) if names else "no experiment"
+        raise InputError(f"{given}: name one experiment: {', '.join(experiment_names())}")
+    return Experiment.named(names[0]), settings_from(Settings, [word for word in words if "=" in word])
+
+
+def _print_tables(experiment: Experiment, settings: Settings) -> None:
     study = Study(Path(settings.out), settings.recordings, settings.frames, settings.overrides, body=settings.body)
     rows = [row for row in study.summary(experiment) if row.by_recording or row.failed]
     print(machine_line())

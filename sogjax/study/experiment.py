@@ -101,7 +101,7 @@ class Experiment:
 
     @property
     def is_shipped(self) -> bool:
-        """Whether it has a script in `experiments/`."""
+        """Whether it comes with the program, so that its name alone tells it."""
         return self.name in experiment_names()
 
     def overrides(self, row: str, common: Sequence[str] = ()) -> list[str]:
