@@ -40,16 +40,41 @@ def test_a_marker_belongs_to_the_joint_of_the_closest_blob():
     np.testing.assert_array_equal(attach_markers(motion, markers).joints, [5, 8])
 
 
-def test_a_marker_on_a_thigh_does_not_go_with_the_hand_before_it():
+THIGH, HAND = 2, 5
+
+
+def hand_before_thigh():
+    """A motion, and a marker on its thigh that is nearer to the hand's centre in frame 0."""
     motion = walking_motion()
-    thigh, hand = 2, 5
     motion.blob_sigma[:] = 0.01
-    motion.blob_sigma[thigh] = 0.08
-    motion.blob_sigma[hand] = 0.03
-    on_the_thigh = motion.blob_means[:, thigh] + [0.1, 0.0, 0.0]
-    motion.blob_means[0, hand] = on_the_thigh[0] + [0.07, 0.0, 0.0]
-    joints = attach_markers(motion, on_the_thigh[:, None]).joints
-    np.testing.assert_array_equal(joints, [motion.blob_joint[thigh]])
+    motion.blob_sigma[THIGH] = 0.08
+    motion.blob_sigma[HAND] = 0.03
+    on_the_thigh = motion.blob_means[:, THIGH] + [0.1, 0.0, 0.0]
+    motion.blob_means[0, HAND] = on_the_thigh[0] + [0.07, 0.0, 0.0]
+    return motion, on_the_thigh[:, None]
+
+
+def test_a_marker_on_a_thigh_does_not_go_with_the_hand_before_it_but_to_the_letter():
+    motion, markers = hand_before_thigh()
+    attached = {rule: attach_markers(motion, markers, rule).joints for rule in ("scaled", "closest")}
+    np.testing.assert_array_equal(attached["scaled"], [motion.blob_joint[THIGH]])
+    np.testing.assert_array_equal(attached["closest"], [motion.blob_joint[HAND]])  # Section 6 to the letter
+
+
+@pytest.mark.parametrize("rule", ["scaled", "closest"])
+def test_both_means_are_told_whichever_rule_is_chosen(rule):
+    motion, markers = hand_before_thigh()
+    truth = GroundTruth(motion.fps, markers, NAMES[:1])
+    alone = {one: marker_errors(motion, truth, one).errors for one in ("scaled", "closest")}
+    assert alone["scaled"].mean() != pytest.approx(alone["closest"].mean())
+    group = evaluate_motions({"ann": motion}, truth, rule=rule)
+    numbers = group.as_dict()
+    assert numbers["marker_rule"] == numbers["subjects"]["ann"]["marker_rule"] == rule
+    assert numbers["all"]["mean_mm"] == pytest.approx(1000.0 * alone[rule].mean())
+    for one, errors in alone.items():
+        expected = {"mean_mm": pytest.approx(1000.0 * errors.mean()), "std_mm": pytest.approx(1000.0 * errors.std())}
+        assert numbers["markers_by_rule"][one] == numbers["subjects"]["ann"]["markers_by_rule"][one] == expected
+    assert f"markers by the rule {rule}" in group.table()
 
 
 def test_a_translation_of_the_truth_after_the_first_frame_is_the_error():

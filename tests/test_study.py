@@ -21,7 +21,7 @@ from sogjax.study.record import RunFolder, RunPlan, RunRecord
 from sogjax.study.source import Source, source_named
 from sogjax.study.study import Study
 from sogjax.study.summary import pooled_std, summarized
-from sogjax.study.table import difference_words, findings, markdown_table
+from sogjax.study.table import difference_words, findings, markdown_table, significance
 from sogjax.synth import SynthSettings, render_recording
 
 STUDY = Path(__file__).resolve().parents[1] / "experiments" / "study.py"
@@ -31,8 +31,9 @@ SMALL = ("images.depth=5", "solver.max_iterations=12")
 @pytest.mark.parametrize("name", experiment_names())
 def test_every_experiment_can_be_composed(name):
     experiment = Experiment.named(name)
-    for row in experiment.config.rows:
-        check(composed("track", ["recording=x", *experiment.overrides(row)]))
+    for method in experiment.methods:
+        for row in experiment.rows_of(method):
+            check(composed("track", ["recording=x", *experiment.overrides(row, method=method)]))
 
 
 @pytest.mark.parametrize(
@@ -62,6 +63,10 @@ def experiment(**rows):
         ("title: T\nquestion: Q\naxis: x\nreference: b\nrows: {a: {}}", "'b' is no row"),
         ("title: T\nquestion: Q\naxis: x\nreference: a\nrows: {a: {every: 0}}", "must be 1 or more"),
         ("title: T\nquestion: Q\naxis: x\nreference: a\nrows: {a: {sets: []}}", "sets"),
+        (
+            "title: T\nquestion: Q\naxis: x\nreference: a\nmethods: {m: []}\nrows: {a: {methods: [n]}}",
+            "'n' is none of m",
+        ),
         ("title: T\nquestion: Q\naxis: x\nreference: a\nmeasure: luck\nrows: {a: {}}", "luck"),
     ],
 )
@@ -97,15 +102,15 @@ def test_differences_are_taken_in_the_frames_that_both_runs_have():
     assert rows[0].difference is None
     assert difference_words(rows[0]) == "reference"
     assert rows[1].difference.mean == pytest.approx(1.0)
-    assert rows[1].difference.shows
+    assert rows[1].difference.is_significant
     assert difference_words(rows[1]) == "+1.0 (+1.0 to +1.0)"
 
 
-def test_one_recording_alone_shows_no_difference():
+def test_a_difference_on_one_recording_alone_is_never_significant():
     rows = summarized({"a": {"r": record(np.arange(40.0))}, "b": {"r": record(np.arange(40.0) + 5.0)}}, "a", PAPERS)
-    assert not rows[1].difference.shows
+    assert not rows[1].difference.is_significant
     assert difference_words(rows[1]).startswith("one recording: +5.0")
-    assert not any("show" in line for line in findings(experiment(a=RowConfig(), b=RowConfig()), rows))
+    assert not any("ignificant" in line for line in findings(experiment(a=RowConfig(), b=RowConfig()), rows))
 
 
 def test_where_the_reference_failed_the_first_row_that_worked_takes_its_place():
@@ -122,7 +127,7 @@ def test_the_best_rows_are_told_on_the_recordings_that_all_have():
     assert said[0] == "Smallest mean error: a, c (10.0 mm)."
 
 
-def test_a_difference_within_the_spread_does_not_show_and_a_clear_one_does():
+def test_a_clear_difference_is_significant_and_one_within_the_spread_is_not():
     rng = np.random.default_rng(0)
     base = {f"r{k}": record(rng.normal(20.0, 4.0, 40)) for k in range(4)}
     shaken = {name: record(run.errors + rng.normal(0.0, 4.0, 40)) for name, run in base.items()}
@@ -130,15 +135,16 @@ def test_a_difference_within_the_spread_does_not_show_and_a_clear_one_does():
     papers = dict.fromkeys("abc", ("", None))
     rows = summarized({"a": base, "b": shaken, "c": worse}, "a", papers)
     said = findings(experiment(a=RowConfig(), b=RowConfig(), c=RowConfig()), rows)
-    assert "Differences to 'a' that show: c." in said
-    assert "Differences to 'a' that do not show: b." in said
+    assert "Significantly different from 'a': c." in said
+    assert "Not significantly different from 'a': b." in said
+    assert [significance(row).endswith(", not significant") for row in rows] == [False, True, False]
 
 
 def test_the_standard_deviation_of_all_distances_is_that_of_the_parts_together():
     rng = np.random.default_rng(1)
     parts = [rng.normal(mean, 3.0, (30, 7)) for mean in (10.0, 25.0)]
-    runs = [record(part.mean(axis=1), std_mm=float(part.std())) for part in parts]
-    assert pooled_std(runs) == pytest.approx(np.concatenate(parts).std())
+    found = pooled_std([part.mean(axis=1) for part in parts], [part.std() for part in parts])
+    assert found == pytest.approx(np.concatenate(parts).std())
 
 
 def test_a_failed_run_is_a_row_that_says_so():
@@ -168,7 +174,8 @@ def test_a_run_is_done_once_and_resumed_after_that(source_folder, monkeypatch, c
     assert [run.frame for run in first.values()] == [[0, 1, 2, 3], [0, 2]]
     assert len(first["b"].plan["cameras"]) == 2
     assert all(np.isfinite(run.errors[1:]).all() for run in first.values())
-    assert all(np.isnan(run.errors[0]) for run in first.values())  # where markers are attached
+    assert all(run.errors[0] == 0.0 for run in first.values())  # where markers are attached: it counts, as everywhere
+    assert all(len(run.closest_mm) == len(run.error_mm) for run in first.values())
     monkeypatch.setattr(Source, "cells", None)
     again = {row: run for row, _, run in Study(source_folder, study.recordings, 4).records(experiment(**rows))}
     assert repr(again) == repr(first)  # NaN equals nothing

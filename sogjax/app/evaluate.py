@@ -5,6 +5,7 @@ from pathlib import Path
 from sogjax.app.config.schemas import EvaluateConfig
 from sogjax.data.ground_truth import GroundTruth, load_ground_truth
 from sogjax.data.motion import Motion, load_motion
+from sogjax.engine.build import marker_rule
 from sogjax.engine.outputs import actor_name, free_path
 from sogjax.engine.recordings import file_list
 from sogjax.errors import InputError
@@ -18,8 +19,9 @@ def run(config: EvaluateConfig) -> GroupEvaluation:
         InputError: files that cannot be opened or do not match, or an existing file for the metrics.
     """
     out = None if config.out is None else free_path("out", config.out, config.overwrite)
+    rule = marker_rule(config.markers, "markers")
     truth = load_ground_truth(truth_file(Path(config.truth)))
-    evaluation = evaluate_motions(named_motions(file_list(config.motion), truth), truth)
+    evaluation = evaluate_motions(named_motions(file_list(config.motion), truth), truth, rule=rule)
     print(evaluation.table())
     if out is not None:
         evaluation.to_json(out)

@@ -17,6 +17,7 @@ from sogjax.energy.overlap import EXACT_EXPONENT, PRINTED_EXPONENT
 from sogjax.energy.term import Terms
 from sogjax.energy.views import whole_image_overlap
 from sogjax.errors import InputError
+from sogjax.evaluate.markers import MARKER_RULES, MarkerRule
 from sogjax.images.cells import CellGrid, stack_cells
 from sogjax.images.quadtree import Candidates, quadtree
 from sogjax.model.body import Body
@@ -25,7 +26,7 @@ from sogjax.model.color import COLOR_RADIUS, averaging_space, from_rgb
 from sogjax.settings import ColorConfig, EnergyConfig, ImagesConfig, OutputsConfig, SolverConfig, TrackConfig
 from sogjax.solve import ConditionedAscent, GaussNewton, OptimistixSolver, Scales, Solver
 from sogjax.track.confidence import Laplace
-from sogjax.track.culling import ImageReader
+from sogjax.track.culling import BoxAround, ImageReader
 from sogjax.track.scales import pose_scales
 from sogjax.track.tracker import PairChoice, Tracker
 
@@ -84,8 +85,10 @@ def check(config: TrackConfig) -> None:
     if not np.isfinite(config.images.color_tolerance):
         raise InputError(f"images.color_tolerance={config.images.color_tolerance}: must be a number")
     at_least("images.box_enlargement", config.images.box_enlargement, 0.0)
+    box_around(config.images)
     at_least("images.plate_tolerance", config.images.plate_tolerance, 0.0)
     confidence(config.outputs)
+    marker_rule(config.outputs.markers, "outputs.markers")
     at_least("outputs.overlay_width", config.outputs.overlay_width, 64)
 
 
@@ -112,6 +115,16 @@ def energy_terms(config: EnergyConfig) -> Terms:
         gradient="forward" if gradient == "forward" else "autodiff",
     )
     return (*standard, *added_terms("energy.terms", config.terms, [term.name for term in standard]))
+
+
+def box_around(config: ImagesConfig) -> BoxAround:
+    """Which poses the culling box holds."""
+    return "last" if one_of("images.box_around", config.box_around, ("predicted", "last")) == "last" else "predicted"
+
+
+def marker_rule(value: str, key: str) -> MarkerRule:
+    """How markers are attached to a motion."""
+    return "closest" if one_of(key, value, MARKER_RULES) == "closest" else "scaled"
 
 
 def pair_choice(config: EnergyConfig) -> PairChoice:
@@ -178,6 +191,7 @@ def image_reader(recording: Recording, grids: tuple[CellGrid, ...], config: Trac
         color_tolerance=config.images.color_tolerance,
         box_enlargement=at_least("images.box_enlargement", config.images.box_enlargement, 0.0),
         color_space=space,
+        box_around=box_around(config.images),
         plate_colors=_plate_colors(recording, grids, candidates, space, config.images),
         plate_tolerance=at_least("images.plate_tolerance", config.images.plate_tolerance, 0.0),
     )
@@ -212,6 +226,7 @@ def varied(tracker: Tracker, config: TrackConfig) -> Tracker:
         color_radius=color_space_and_radius(config.color)[1],
         color_tolerance=config.images.color_tolerance,
         box_enlargement=config.images.box_enlargement,
+        box_around=box_around(config.images),
         plate_tolerance=config.images.plate_tolerance,
     )
     return replace(

@@ -13,6 +13,7 @@ from sogjax.data.atomic import atomic_path
 from sogjax.data.export import WRITERS, export_motion, require_ezc3d
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.motion import Motion, save_motion
+from sogjax.engine.build import marker_rule
 from sogjax.engine.run import Run
 from sogjax.engine.streams import file_name
 from sogjax.engine.terminal import say
@@ -97,7 +98,7 @@ def write_results(result: Run, out: Path, wanted: OutputsConfig, config: Any, ma
     with atomic_path(out / "config.yaml") as temporary:
         temporary.write_text(OmegaConf.to_yaml(config))
     result.files.append(out / "config.yaml")
-    evaluate(result)
+    evaluate(result, wanted)
     if result.evaluation is not None:
         result.evaluation.to_json(out / "metrics.json")
         result.files.append(out / "metrics.json")
@@ -109,7 +110,7 @@ def actor_name(path: Path, motion: Motion) -> str:
     return motion.actor or path.stem.removeprefix("motion").removeprefix("_") or "actor"
 
 
-def evaluate(result: Run) -> None:
+def evaluate(result: Run, wanted: OutputsConfig) -> None:
     """Compare with the ground truth, if there is one."""
     if result.recording.ground_truth is None:
         return
@@ -118,6 +119,6 @@ def evaluate(result: Run) -> None:
         say(f"warning: {result.recording.ground_truth} knows {', '.join(truth.subjects)}; nothing was compared")
         return
     try:
-        result.evaluation = evaluate_motions(result.motions, truth)
+        result.evaluation = evaluate_motions(result.motions, truth, rule=marker_rule(wanted.markers, "outputs.markers"))
     except InputError as error:
         say(f"warning: not compared with the truth: {error}")

@@ -51,7 +51,7 @@ def _run_in(folder: RunFolder, recording: Recording, config: TrackConfig, comman
     origin = origin_of(recording, config, bodies)
     going_on, kept = folder.goes_on(origin), folder.kept
     if folder.ended:
-        return _ended(folder, recording)
+        return _ended(folder, recording, config.outputs)
     if bodies is None and going_on:
         bodies = kept.actors()
     anew = bodies is None
@@ -66,7 +66,7 @@ def _run_in(folder: RunFolder, recording: Recording, config: TrackConfig, comman
     return result
 
 
-def _ended(folder: RunFolder, recording: Recording) -> Run:
+def _ended(folder: RunFolder, recording: Recording, wanted: OutputsConfig) -> Run:
     """A run that ended before."""
     say(f"{folder.path}: the run has already ended; nothing to do")
     files = [folder.path / name for name in folder.note["files"]]
@@ -75,7 +75,7 @@ def _ended(folder: RunFolder, recording: Recording) -> Run:
     frames = next(iter(motions.values())).frame - recording.first_frame
     missing = recording.num_missing(frames.tolist())
     result = Run(recording, [], motions, StageTimes(), float("nan"), files=files, missing=missing)
-    evaluate(result)
+    evaluate(result, wanted)
     return result
 
 

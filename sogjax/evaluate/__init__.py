@@ -1,6 +1,6 @@
 """How far a motion is from the truth (Section 6)."""
 
-from sogjax.evaluate.markers import PointErrors, VirtualMarkers, attach_markers, joint_errors, marker_errors
+from sogjax.evaluate.markers import MarkerRule, PointErrors, VirtualMarkers, attach_markers, joint_errors, marker_errors
 from sogjax.evaluate.metrics import ErrorSummary, LostPoint, lost_points, summarize
 from sogjax.evaluate.report import Evaluation, GroupEvaluation, evaluate_motion, evaluate_motions
 from sogjax.evaluate.swaps import Swap, identity_swaps
@@ -10,6 +10,7 @@ __all__ = [
     "Evaluation",
     "GroupEvaluation",
     "LostPoint",
+    "MarkerRule",
     "PointErrors",
     "Swap",
     "VirtualMarkers",

@@ -23,7 +23,7 @@ class Interval(NamedTuple):
 
     @property
     def holds_zero(self) -> bool:
-        """Whether a difference with this interval does not show."""
+        """Whether a difference with this interval is not significant."""
         return not (self.low > 0.0 or self.high < 0.0)
 
 

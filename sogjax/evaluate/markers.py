@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -12,6 +13,10 @@ from sogjax.errors import InputError
 
 SAME_ORIGIN = 1e-4
 """Metres. One-axis joints nearer than this to each other in every frame are one anatomical joint."""
+
+MarkerRule = Literal["scaled", "closest"]
+"""Which blob of a body is closest to a marker: in the blob's own sigmas, or by plain distance (Section 6)."""
+MARKER_RULES: tuple[MarkerRule, ...] = ("scaled", "closest")
 
 _BY_FRAME = "frame time pose joint_params world_from_joint blob_means similarity energy iterations converged"
 
@@ -70,35 +75,43 @@ def common_frames(motion: Motion, truth: GroundTruth) -> tuple[Int[np.ndarray, "
     return rows, frames[rows]
 
 
-def attach_markers(motion: Motion, markers: Float[np.ndarray, "frame marker 3"]) -> VirtualMarkers:
-    """Attach each marker to the parent joint of its closest blob (Section 6), in the blob's own sigmas.
+def attach_markers(
+    motion: Motion, markers: Float[np.ndarray, "frame marker 3"], rule: MarkerRule = "scaled"
+) -> VirtualMarkers:
+    """Attach each marker to the parent joint of its closest blob, in the first frame that has the marker.
 
-    By bare distance, a marker on a thigh would go with the hand that hangs before it: the hand's blob is small and its
-    centre near. Done in the first frame that has the marker; `markers` has one row for each row of `motion`.
+    By plain distance (`closest`, Section 6), a marker on a thigh may go with the hand that hangs in front of it: the
+    hand's blob is small and its centre near. In the blob's own sigmas (`scaled`) it goes with the thigh.
+
+    Args:
+        motion: the tracked motion.
+        markers: where the markers are, one row for each row of `motion`.
+        rule: what closest means.
     """
     present = ~np.isnan(markers.sum(axis=2))
     first = present.argmax(axis=0)
     points = np.where(present.any(axis=0)[:, None], markers[first, np.arange(len(first))], 0.0)
     distances = np.linalg.norm(motion.blob_means[first] - points[:, None], axis=-1)
-    closest = (distances / np.asarray(motion.blob_sigma, float)[None]).argmin(axis=1)
-    joints = np.asarray(motion.blob_joint, int)[closest]
+    if rule == "scaled":
+        distances = distances / np.asarray(motion.blob_sigma, float)
+    joints = np.asarray(motion.blob_joint, int)[distances.argmin(axis=1)]
     frames = np.asarray(motion.world_from_joint, float)[first, joints]
     offsets = np.einsum("mji,mj->mi", frames[:, :3, :3], points - frames[:, :3, 3])
     return VirtualMarkers(np.where(present.any(axis=0), joints, -1), offsets)
 
 
-def marker_errors(motion: Motion, truth: GroundTruth) -> PointErrors | None:
+def marker_errors(motion: Motion, truth: GroundTruth, rule: MarkerRule = "scaled") -> PointErrors | None:
     """Distances of the truth's markers to the virtual ones; None where the truth has no markers.
 
-    A marker's error is 0 by construction in the first frame that has it, which counts all the same, as in the
-    paper.
+    A marker's error is 0 by construction in the first frame that has it. That frame counts in every mean of this
+    project: the paper's "average distance" excludes none.
     """
     if truth.markers is None:
         return None
     rows, truth_rows = common_frames(motion, truth)
     part = _rows_of(motion, rows)
     markers = np.asarray(truth.markers, float)[truth_rows]
-    virtual = attach_markers(part, markers)
+    virtual = attach_markers(part, markers, rule)
     names = np.append(np.asarray(motion.joint_names, str), "")
     return PointErrors(
         names=tuple(map(str, truth.marker_names)),

@@ -40,7 +40,7 @@ class LostPoint:
 
 
 def summarize(errors: Float[np.ndarray, "frame point"]) -> ErrorSummary:
-    """All distances in a few numbers. NaN is left out; all frames count, the first too, as in the paper."""
+    """All distances in a few numbers. NaN is left out; all frames count, the first too (see `marker_errors`)."""
     values = errors[np.isfinite(errors)].astype(float)
     if values.size == 0:
         return ErrorSummary(*[float("nan")] * 7, num_values=0, num_frames=len(errors))

@@ -1,6 +1,5 @@
 """One motion, or several, held against a ground truth: as data, as JSON and as a table."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -9,24 +8,14 @@ from typing import Any
 import numpy as np
 from jaxtyping import Int
 
-from sogjax.data.atomic import atomic_path
 from sogjax.data.ground_truth import GroundTruth
 from sogjax.data.motion import Motion
 from sogjax.errors import InputError
-from sogjax.evaluate.markers import PointErrors, common_frames, joint_errors, marker_errors
-from sogjax.evaluate.metrics import (
-    ErrorSummary,
-    LostPoint,
-    lost_points,
-    mean_per_frame,
-    mean_per_point,
-    std_per_point,
-    summarize,
-)
+from sogjax.evaluate.markers import MARKER_RULES, MarkerRule, PointErrors, common_frames, joint_errors, marker_errors
+from sogjax.evaluate.metrics import ErrorSummary, LostPoint, lost_points, summarize
+from sogjax.evaluate.numbers import MM, TABLE_ROW, in_mm, points_dict, rule_dict, summary_dict, summary_row, write_json
 from sogjax.evaluate.swaps import Swap, identity_swaps
 from sogjax.sentences import counted
-
-MM = 1000.0
 
 
 @dataclass(frozen=True)
@@ -40,6 +29,10 @@ class Evaluation:
     """Section 6's virtual markers; each one's first frame counts, where it is 0 by construction."""
     joints: PointErrors | None
     lost: tuple[LostPoint, ...]
+    rule: MarkerRule = "scaled"
+    """How `markers` were attached."""
+    markers_by_rule: Mapping[MarkerRule, PointErrors] = field(default_factory=dict)
+    """The markers attached by either rule; empty where the truth has none."""
 
     @property
     def summary(self) -> ErrorSummary:
@@ -54,9 +47,11 @@ class Evaluation:
             "num_frames": len(self.frames),
             "first_frame": int(self.frames[0]),
             "last_frame": int(self.frames[-1]),
-            "markers": _points_dict(self.markers),
-            "joints": _points_dict(self.joints),
-            "lost": [_in_mm(asdict(point), "mean") for point in self.lost],
+            "marker_rule": self.rule,
+            "markers": points_dict(self.markers),
+            "markers_by_rule": {rule: rule_dict([points]) for rule, points in self.markers_by_rule.items()},
+            "joints": points_dict(self.joints),
+            "lost": [in_mm(asdict(point), "mean") for point in self.lost],
         }
 
     def to_json(self, path: Path) -> None:
@@ -65,19 +60,29 @@ class Evaluation:
 
     def table(self, details: bool = True) -> str:
         """The numbers in millimetres as a plain-text table, with every marker and joint unless told otherwise."""
-        lines = [_ROW.format(self.name or "mm", "mean", "std", "median", "95 %", "max", "<50", "<100")]
+        lines = [TABLE_ROW.format(self.name or "mm", "mean", "std", "median", "95 %", "max", "<50", "<100")]
         for title, points in (("markers", self.markers), ("joints", self.joints)):
             if points is not None:
-                lines.append(_summary_row(f"all {title}", summarize(points.errors)))
+                lines.append(summary_row(f"all {title}", summarize(points.errors)))
                 rows = enumerate(points.names) if details else ()
-                lines += [_summary_row(f"  {name}", summarize(points.errors[:, [k]])) for k, name in rows]
+                lines += [summary_row(f"  {name}", summarize(points.errors[:, [k]])) for k, name in rows]
         lines.append(f"{counted(len(self.frames), 'frame')}, {self.frames[0]} to {self.frames[-1]}; distances in mm")
         if self.markers is not None:
-            lines.append("markers are attached in their first frame: a wrong first pose shows in the joints only")
+            lines += self._about_markers()
         lines += [
             f"lost: {p.name} in frames {p.first_frame} to {p.last_frame}, {MM * p.mean:.0f} mm" for p in self.lost
         ]
         return "\n".join(lines)
+
+    def _about_markers(self) -> list[str]:
+        both = ", ".join(
+            f"{rule} {MM * (s := summarize(points.errors)).mean:.1f} +- {MM * s.std:.1f}"
+            for rule, points in self.markers_by_rule.items()
+        )
+        return [
+            f"markers by the rule {self.rule}; by either, mean +- std: {both}",
+            "markers are attached in their first frame, which counts: a wrong first pose shows in the joints only",
+        ]
 
 
 @dataclass(frozen=True)
@@ -98,10 +103,17 @@ class GroupEvaluation:
     def as_dict(self) -> dict[str, Any]:
         """What `to_json` writes."""
         return {
+            "marker_rule": next((e.rule for e in self.evaluations.values()), None),
             "all": summary_dict(self.summary),
+            "markers_by_rule": {rule: rule_dict(parts) for rule, parts in self._markers_by_rule().items()},
             "subjects": {name: e.as_dict() for name, e in self.evaluations.items()},
             "swaps": [asdict(swap) for swap in self.swaps],
         }
+
+    def _markers_by_rule(self) -> dict[MarkerRule, list[PointErrors]]:
+        rules = dict.fromkeys(rule for e in self.evaluations.values() for rule in e.markers_by_rule)
+        each = self.evaluations.values()
+        return {rule: [e.markers_by_rule[rule] for e in each if rule in e.markers_by_rule] for rule in rules}
 
     def to_json(self, path: Path) -> None:
         """Write the numbers of all actors as JSON."""
@@ -118,7 +130,11 @@ class GroupEvaluation:
 
 
 def evaluate_motion(
-    motion: Motion, truth: GroundTruth, name: str = "", joint_mapping: Mapping[str, str] | None = None
+    motion: Motion,
+    truth: GroundTruth,
+    name: str = "",
+    joint_mapping: Mapping[str, str] | None = None,
+    rule: MarkerRule = "scaled",
 ) -> Evaluation:
     """Compare one motion with the truth of its subject (names without a prefix).
 
@@ -127,13 +143,15 @@ def evaluate_motion(
         truth: what it should be; see `GroundTruth.subject` where there are several subjects.
         name: title of the result.
         joint_mapping: truth's joint to motion's joint, for names that do not say it themselves.
+        rule: how markers are attached; the result gives the mean by the other rule as well.
 
     Raises:
         InputError: nothing can be compared.
     """
     rows, _ = common_frames(motion, truth)
     frames = np.asarray(motion.frame, int)[rows]
-    markers = marker_errors(motion, truth)
+    by_rule = {each: found for each in MARKER_RULES if (found := marker_errors(motion, truth, each)) is not None}
+    markers = by_rule.get(rule)
     joints = joint_errors(motion, truth, joint_mapping)
     if markers is None and joints is None:
         raise InputError(
@@ -142,11 +160,14 @@ def evaluate_motion(
         )
     points = markers or joints
     lost = lost_points(points.errors, points.names, frames) if points else ()
-    return Evaluation(name, frames, markers, joints, lost)
+    return Evaluation(name, frames, markers, joints, lost, rule, by_rule)
 
 
 def evaluate_motions(
-    motions: Mapping[str, Motion], truth: GroundTruth, joint_mapping: Mapping[str, str] | None = None
+    motions: Mapping[str, Motion],
+    truth: GroundTruth,
+    joint_mapping: Mapping[str, str] | None = None,
+    rule: MarkerRule = "scaled",
 ) -> GroupEvaluation:
     """Compare actors' motions, by name, with a truth whose names have the prefixes `NAME/`.
 
@@ -157,60 +178,7 @@ def evaluate_motions(
     """
     alone = len(motions) == 1 and not truth.subjects
     evaluations = {
-        name: evaluate_motion(motion, truth if alone else truth.subject(name), name, joint_mapping)
+        name: evaluate_motion(motion, truth if alone else truth.subject(name), name, joint_mapping, rule)
         for name, motion in motions.items()
     }
     return GroupEvaluation(evaluations, identity_swaps(motions, truth) if len(motions) > 1 else ())
-
-
-def summary_dict(summary: ErrorSummary) -> dict[str, Any]:
-    """A summary for JSON, in millimetres."""
-    return _in_mm(asdict(summary), "mean", "std", "median", "percentile_95", "maximum")
-
-
-def write_json(path: Path, content: dict[str, Any]) -> None:
-    """Write a mapping as readable JSON, in one piece or not at all; NaN becomes null."""
-    with atomic_path(Path(path)) as temporary:
-        temporary.write_text(json.dumps(_without_nan(content), indent=2) + "\n")
-
-
-_ROW = "{:<24}{:>8}{:>8}{:>8}{:>8}{:>8}{:>7}{:>7}"
-
-
-def _summary_row(title: str, s: ErrorSummary) -> str:
-    if s.num_values == 0:
-        return _ROW.format(title, *"-------")
-    lengths = [f"{MM * value:.1f}" for value in (s.mean, s.std, s.median, s.percentile_95, s.maximum)]
-    return _ROW.format(title, *lengths, f"{s.under_50mm:.0%}", f"{s.under_100mm:.0%}")
-
-
-def _points_dict(points: PointErrors | None) -> dict[str, Any] | None:
-    if points is None:
-        return None
-    per_point = zip(
-        points.names,
-        points.compared_with,
-        mean_per_point(points.errors),
-        std_per_point(points.errors),
-        strict=True,
-    )
-    return {
-        **summary_dict(summarize(points.errors)),
-        "per_point": {
-            name: {"joint": joint, "mean_mm": MM * float(mean), "std_mm": MM * float(std)}
-            for name, joint, mean, std in per_point
-        },
-        "mean_per_frame_mm": [MM * float(value) for value in mean_per_frame(points.errors)],
-    }
-
-
-def _in_mm(content: dict[str, Any], *keys: str) -> dict[str, Any]:
-    return {f"{k}_mm" if k in keys else k: MM * v if k in keys else v for k, v in content.items()}
-
-
-def _without_nan(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _without_nan(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_without_nan(item) for item in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -52,7 +52,7 @@ def composed_without_hydra(
         key: value for entry in values for key, value in entry.items() if key in choices and isinstance(value, str)
     }
     tree = OmegaConf.structured(schema)
-    for options in _option_sets(choices, named):
+    for options in _option_sets(command, named):
         tree = OmegaConf.merge(tree, options)
     for entry in values:
         rest = {key: value for key, value in entry.items() if key not in named or not isinstance(value, str)}
@@ -77,16 +77,13 @@ def as_object(tree: Any, command: str) -> Any:
     return config
 
 
-def _option_sets(choices: dict[str, str], named: dict[str, str]) -> Iterator[dict[str, Any]]:
-    """The sets of options that are chosen, by default, by the preset and by name, in the order in which they count."""
+def _option_sets(command: str, named: dict[str, str]) -> Iterator[dict[str, Any]]:
+    """The sets of options that are chosen, by default, by the preset or by name, in the order in which they count."""
     for group, choice in named.items():
         if choice not in choices_of(group):
             raise InputError(no_such_choice(group, choice, choices_of(group)))
-    chosen = choices | named
-    if PRESET in chosen:
-        chosen = choices | option_set(PRESET, chosen[PRESET])[1] | named
-    for group in choices:
-        options = option_set(group, chosen.get(group, choices[group]))[0]
+    for group, choice in (default_choices(command, named) | named).items():
+        options = option_set(group, choice)[0]
         yield options if group == PRESET else {group: options}
 
 

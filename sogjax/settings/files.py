@@ -1,5 +1,6 @@
 """The YAML files of `conf/`: where they are, and the sets of options that they offer."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,15 @@ def conf_dir() -> Path:
     return packaged if packaged.is_dir() else package.parent / "conf"
 
 
-def default_choices(command: str) -> dict[str, str]:
-    """The config groups of a command, in the order in which they count, and the choice of each by default."""
-    return _choices(_read(conf_dir() / f"{command}.yaml")["defaults"])
+def default_choices(command: str, named: Mapping[str, str] | None = None) -> dict[str, str]:
+    """The config groups of a command, in the order in which they count, and the choice of each by default.
+
+    A group may bring others, as a preset does: those of the choice that is named, where one is.
+    """
+    choices: dict[str, str] = {}
+    for group, choice in _choices(_read(conf_dir() / f"{command}.yaml")["defaults"]).items():
+        choices |= {group: choice, **option_set(group, (named or {}).get(group, choice))[1]}
+    return choices
 
 
 def choices_of(group: str) -> list[str]:
@@ -24,7 +31,7 @@ def choices_of(group: str) -> list[str]:
 
 
 def option_set(group: str, choice: str) -> tuple[dict[str, Any], dict[str, str]]:
-    """The options of a choice, and the choices that it makes for other groups."""
+    """The options of a choice, and the other groups that it brings, with its choices."""
     options = _read(conf_dir() / group / f"{choice}.yaml")
     return options, _choices(options.pop("defaults", []))
 
@@ -32,7 +39,7 @@ def option_set(group: str, choice: str) -> tuple[dict[str, Any], dict[str, str]]
 def _choices(defaults: list[Any]) -> dict[str, str]:
     """The groups and choices in one of Hydra's lists of defaults."""
     pairs = (pair for entry in defaults if isinstance(entry, dict) for pair in entry.items())
-    return {str(key).removeprefix("override ").lstrip("/"): str(choice) for key, choice in pairs}
+    return {str(key).lstrip("/"): str(choice) for key, choice in pairs}
 
 
 def _read(path: Path) -> dict[str, Any]:

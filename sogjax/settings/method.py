@@ -21,6 +21,9 @@ class ImagesConfig:
     depth: int = option(8, "levels of the quad-tree below its root, the smallest power of two that holds a picture")
     color_tolerance: float = option(0.1, "[eps_col] a node splits above this standard deviation; < 0: always")
     box_enlargement: float = option(0.15, "border around an actor's box, as a share of its size")
+    box_around: str = option(
+        "predicted", "predicted: the box holds the last pose and the predicted one | last: the last"
+    )
     use_plates: bool | None = option(
         None, "leave out image blobs that equal the empty background pictures; null: if every camera has one"
     )

@@ -19,6 +19,7 @@ class OutputsConfig:
     rerun_images: bool = option(True, "put the pictures into motion.rrd")
     bvh: bool = option(True, "motion.bvh")
     formats: list[str] | None = option(None, "further formats of the motion, some of [trc,c3d,glb,csv]; null: none")
+    markers: str = option("scaled", "scaled | closest: how markers are attached for metrics.json, as for evaluate")
     confidence: bool = option(
         False, "standard deviations of the pose and the joints, in motion.npz; rough, see experiments/confidence.py"
     )
@@ -32,6 +33,7 @@ class OutputsConfig:
 class TrackConfig:
     """Track the actors of a recording."""
 
+    preset: str = option("default", "default | paper: all settings by one name; what else is given counts more")
     recording: str = option(REQUIRED, "folder of the recording")
     out: str = option("", "folder for the results; default: outputs/RECORDING")
     actor: Any = option(None, "actor file, or a list of them; null: make it from the example poses")

@@ -7,6 +7,7 @@ from pathlib import Path
 from sogjax.errors import InputError
 from sogjax.study.experiment import Experiment, experiment_names
 from sogjax.study.machine import machine_line
+from sogjax.study.methods import comparison_table
 from sogjax.study.script import run_script, settings_from
 from sogjax.study.settings import ReportConfig
 from sogjax.study.study import Study
@@ -47,8 +48,11 @@ def _experiment_and_settings(words: Sequence[str]) -> tuple[Experiment, Settings
 
 def _print_tables(experiment: Experiment, settings: Settings) -> None:
     study = Study(Path(settings.out), settings.recordings, settings.frames, settings.overrides, body=settings.body)
-    rows = [row for row in study.summary(experiment) if row.by_recording or row.failed]
+    rows = {method: study.summary(experiment, method) for method in experiment.methods}
     print(machine_line())
     print(f"\n{experiment.config.title}: {experiment.config.question}\n")
-    print(markdown_table(experiment, rows), recordings_table(experiment, rows), sep="\n\n", end="\n\n")
-    print(*findings(experiment, rows), sep="\n")
+    if experiment.config.methods:
+        print(comparison_table(experiment, rows), end="\n\n")
+    for method, of_method in rows.items():
+        print(*([f"{method}:"] if method else []), markdown_table(experiment, of_method), sep="\n\n", end="\n\n")
+        print(recordings_table(experiment, of_method), *findings(experiment, of_method), sep="\n", end="\n\n")

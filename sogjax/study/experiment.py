@@ -12,6 +12,8 @@ from sogjax.errors import InputError
 from sogjax.settings.files import conf_dir
 
 MEASURES = ("accuracy", "speed")
+DEFAULTS = ""
+"""Name of the only method where an experiment names none."""
 
 
 @dataclass
@@ -26,6 +28,8 @@ class RowConfig:
     """Every so many frames are looked at."""
     actors: int | None = None
     """Rendered recordings of this many people passing each other take the place of the study's; None: the study's."""
+    methods: list[str] | None = None
+    """Which of the experiment's methods it is run with; None: all."""
     paper: str = ""
     """What the paper says of this row, in words for the table."""
     paper_value: float | None = None
@@ -42,10 +46,14 @@ class ExperimentConfig:
     """What differs between the rows, with its unit."""
     reference: str = MISSING
     """The row that the others are compared with."""
+    methods: dict[str, list[str]] = field(default_factory=dict)
+    """The methods that every row is run with, by name, and their overrides; none: the defaults only."""
     base: list[str] = field(default_factory=list)
     """Overrides of all rows."""
     measure: str = "accuracy"
     """accuracy: from kept cells, one frame after the other | speed: from the videos, all stages beside each other."""
+    slow: bool = False
+    """Whether it is run on the fewer recordings, as those with several methods are."""
     recordings: list[str] | None = None
     """Those that are tracked where the study is on the recordings of the committed report; None: the study's."""
     note: str = ""
@@ -104,9 +112,24 @@ class Experiment:
         """Whether it comes with the program, so that its name alone tells it."""
         return self.name in experiment_names()
 
-    def overrides(self, row: str, common: Sequence[str] = ()) -> list[str]:
-        """The overrides of a row: those common to the study, then the experiment's, then its own."""
-        return [*common, *self.config.base, *self.config.rows[row].set]
+    @property
+    def methods(self) -> dict[str, list[str]]:
+        """The methods by name with their overrides; a single one has no name and no overrides."""
+        return self.config.methods or {DEFAULTS: []}
+
+    @property
+    def is_slow(self) -> bool:
+        """Whether it is run on the fewer recordings."""
+        return self.config.slow or bool(self.config.methods)
+
+    def rows_of(self, method: str) -> list[str]:
+        """The rows that are run with a method."""
+        return [name for name, row in self.config.rows.items() if row.methods is None or method in row.methods]
+
+    def overrides(self, row: str, common: Sequence[str] = (), method: str = "") -> list[str]:
+        """The overrides of a row: those common to the study, then the method's, the experiment's and its own."""
+        of_method = self.config.methods.get(method, [])
+        return [*common, *of_method, *self.config.base, *self.config.rows[row].set]
 
 
 def experiment_names() -> list[str]:
@@ -116,12 +139,14 @@ def experiment_names() -> list[str]:
 
 
 _ORDER = (
+    "methods",
     "limit_weight",
     "acceleration_weight",
     "occlusion_cap",
-    "solvers",
+    "ascent",
     "resolution",
     "cameras",
+    "solvers",
     "frame_rate",
     "epsilon",
     "min_iterations",
@@ -146,6 +171,8 @@ def _checked(path: Path, config: ExperimentConfig) -> ExperimentConfig:
     if config.measure not in MEASURES:
         raise InputError(f"{path}: measure: {config.measure!r}: use one of {', '.join(MEASURES)}")
     for name, row in config.rows.items():
+        if unknown := sorted(set(row.methods or ()) - set(config.methods)):
+            raise InputError(f"{path}: row {name!r}: methods: {unknown[0]!r} is none of {', '.join(config.methods)}")
         if row.every < 1 or (row.cameras is not None and row.cameras < 1):
             raise InputError(f"{path}: row {name!r}: every={row.every} cameras={row.cameras}: must be 1 or more")
     return config

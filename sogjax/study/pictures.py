@@ -1,6 +1,6 @@
 """The pictures of a report: charts of experiments, and the worst frames with the tracked skeleton."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import cv2
 import numpy as np
@@ -15,7 +15,7 @@ from sogjax.study.record import RunRecord
 from sogjax.study.runner import motions_of
 from sogjax.study.source import Source
 from sogjax.study.summary import RowSummary
-from sogjax.view.charts import mean_chart
+from sogjax.view.charts import Means, mean_chart
 from sogjax.view.overlay import overlay_frame, write_label
 from sogjax.view.projection import picture_points
 
@@ -25,24 +25,32 @@ MARGIN = 1.25
 """Side of what is cut out, in units of what it is about."""
 
 
-def experiment_chart(experiment: Experiment, rows: Sequence[RowSummary]) -> Picture | None:
-    """Mean errors with their intervals (or rates) over the rows; None where there is nothing to draw."""
-    done = [row for row in rows if np.isfinite(row.mean)]
-    if not done:
+def experiment_chart(experiment: Experiment, rows: Mapping[str, Sequence[RowSummary]]) -> Picture | None:
+    """Mean errors with their intervals (or rates) over the rows, by method; None where there is nothing to draw."""
+    done = {method: [row for row in of_method if np.isfinite(row.mean)] for method, of_method in rows.items()}
+    if not any(done.values()):
         return None
     speed = experiment.config.measure == "speed"
-    names = list(dict.fromkeys(name for row in done for name in row.by_recording))
+    papers = {name: row.paper_value for name, row in experiment.config.rows.items() if row.paper_value is not None}
     content = mean_chart(
-        [row.name for row in done],
-        [row.rates.get("whole", np.nan) if speed else row.mean for row in done],
-        [(np.nan, np.nan) if speed else row.interval for row in done],
+        [_panel(method or "here", of_method, speed) for method, of_method in done.items() if of_method],
         axis=experiment.config.axis,
         value="frames/s, whole" if speed else "marker error, mm",
-        members={} if speed else {name: [row.by_recording.get(name, np.nan) for row in done] for name in names},
-        paper=[row.paper_value for row in done],
+        paper=papers,
     )
     what = "frames a second" if speed else "mean error with its 95 % interval; thin lines: each recording"
     return Picture(f"{experiment.name}.png", content, f"{experiment.config.title}: {what}")
+
+
+def _panel(title: str, rows: Sequence[RowSummary], speed: bool) -> Means:
+    recordings = dict.fromkeys(name for row in rows for name in row.by_recording)
+    return Means(
+        [row.name for row in rows],
+        [row.rates.get("whole", np.nan) if speed else row.mean for row in rows],
+        [(np.nan, np.nan) if speed else row.interval for row in rows],
+        title,
+        {} if speed else {name: [row.by_recording.get(name, np.nan) for row in rows] for name in recordings},
+    )
 
 
 def worst_frame(label: str, source: Source, record: RunRecord) -> Picture:

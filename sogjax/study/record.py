@@ -15,7 +15,7 @@ from sogjax import __version__
 from sogjax.data.atomic import atomic_path
 from sogjax.settings import TrackConfig
 
-RECORD_VERSION = 2
+RECORD_VERSION = 3
 """To be raised with every change that makes earlier runs incomparable."""
 _DECIDE = ("model", "energy", "solve", "images", "track", "data", "actor", "evaluate")
 """Packages whose code decides the result of a run."""
@@ -60,11 +60,14 @@ class RunRecord:
     """Processor, versions and date."""
     frame: list[int] = field(default_factory=list)
     error_mm: list[float] = field(default_factory=list)
-    """Mean distance of the markers (of the joints where there are no markers); NaN: nothing to compare with, as in the
-    first frame, in which markers are attached."""
+    """Mean distance of the markers (of the joints where there are no markers), attached by the rule `scaled`; NaN:
+    nothing to compare with."""
+    closest_mm: list[float] = field(default_factory=list)
+    """The same by the rule `closest`, of Section 6."""
     joint_error_mm: list[float] = field(default_factory=list)
     std_mm: float = float("nan")
-    """Over all distances of those frames."""
+    """Over all distances of `error_mm`."""
+    closest_std_mm: float = float("nan")
     lost: int = 0
     """Stretches of frames with a lost marker."""
     swaps: int = 0
@@ -97,6 +100,13 @@ class RunRecord:
     def mean_mm(self) -> float:
         """The mean of the frames that have an error; NaN where none has."""
         present = self.errors[np.isfinite(self.errors)]
+        return float(present.mean()) if present.size else float("nan")
+
+    @property
+    def closest_mean_mm(self) -> float:
+        """The same by the rule `closest`."""
+        present = np.asarray(self.closest_mm, float)
+        present = present[np.isfinite(present)]
         return float(present.mean()) if present.size else float("nan")
 
     @property

@@ -1,7 +1,7 @@
 """One run of a study: from a source and a row of an experiment to a record."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from sogjax.engine.terminal import say
 from sogjax.engine.timing import StageTimes
 from sogjax.engine.track import track_recording
 from sogjax.errors import InputError
-from sogjax.evaluate import GroupEvaluation, evaluate_motions
+from sogjax.evaluate import Evaluation, GroupEvaluation, PointErrors, evaluate_motions
 from sogjax.evaluate.metrics import mean_per_frame
 from sogjax.model.body import Body, dof_slices
 from sogjax.settings import TrackConfig
@@ -37,8 +37,11 @@ def run_row(
     runs: RunFolder,
     common: Sequence[str] = (),
     do: bool = True,
+    method: str = "",
 ) -> RunRecord | None:
-    """The record of a row on a recording: read where it was done before, else made now and kept, or None.
+    """The record of a row on a recording, with one of the experiment's methods.
+
+    It is read where the run was done before; else, if `do`, the run is made now and its record kept.
 
     A run that fails is kept as failed, and done again the next time; the others go on. None, too, where the recording
     has not as many cameras as the row asks for.
@@ -47,7 +50,9 @@ def run_row(
         InputError: an override that cannot be.
     """
     entry = experiment.config.rows[row]
-    config = track_config(experiment.overrides(row, common), recording=source.path, outputs={"confidence": False})
+    config = track_config(
+        experiment.overrides(row, common, method), recording=source.path, outputs={"confidence": False}
+    )
     build.check(config)
     if entry.cameras is not None and entry.cameras > len(source.recording.rig.names):
         return None
@@ -57,7 +62,7 @@ def run_row(
     found = runs.find(plan)
     if (found is not None and not found.failed) or not do:
         return found
-    say(f"{experiment.name} {row!r}: {source.name}")
+    say(f"{experiment.name} {row!r}{method and f', {method}'}: {source.name}")
     forget_programs_if_many()
     record, begin = RunRecord(plan=asdict(plan), machine=machine_facts()), time.perf_counter()
     try:
@@ -148,32 +153,38 @@ def _evaluated(record: RunRecord, source: Source) -> RunRecord:
     """The record with its distances to the truth."""
     motions = motions_of(record, source.bodies, source.recording.fps)
     evaluation = evaluate_motions(motions, source.truth)
-    joints = _distances(evaluation, "joints", record.frame)
-    markers = _distances(evaluation, "markers", record.frame)
+    joints = _distances(evaluation, lambda part: part.joints, record.frame)
+    markers = _distances(evaluation, lambda part: part.markers, record.frame)
+    closest = _distances(evaluation, lambda part: part.markers_by_rule.get("closest"), record.frame)
     errors = markers if markers.shape[1] else joints
     return replace(
         record,
         error_mm=_rounded_means(errors),
         joint_error_mm=_rounded_means(joints),
-        std_mm=float(np.nanstd(errors)) if np.isfinite(errors).any() else float("nan"),
+        std_mm=_deviation(errors),
+        closest_mm=_rounded_means(closest),
+        closest_std_mm=_deviation(closest),
         lost=sum(len(part.lost) for part in evaluation.evaluations.values()),
         swaps=len(evaluation.swaps),
     )
 
 
-def _distances(evaluation: GroupEvaluation, kind: str, frames: Sequence[int]) -> Float[np.ndarray, "frame point"]:
-    """Distances of the points of all actors in every tracked frame, mm; NaN where a marker is attached, or no truth."""
+def _distances(
+    evaluation: GroupEvaluation, points_of: Callable[[Evaluation], PointErrors | None], frames: Sequence[int]
+) -> Float[np.ndarray, "frame point"]:
+    """Distances of the points of all actors in every tracked frame, mm; NaN where there is no truth."""
     columns = [np.zeros((len(frames), 0))]
     for part in evaluation.evaluations.values():
-        points = getattr(part, kind)
+        points = points_of(part)
         if points is not None:
             column = np.full((len(frames), points.errors.shape[1]), np.nan)
             column[np.searchsorted(frames, part.frames)] = 1000.0 * points.errors
-            if kind == "markers":
-                first = np.argmax(np.isfinite(column), axis=0)
-                column[first, np.arange(column.shape[1])] = np.nan
             columns.append(column)
     return np.concatenate(columns, axis=1)
+
+
+def _deviation(distances: Float[np.ndarray, "frame point"]) -> float:
+    return float(np.nanstd(distances)) if np.isfinite(distances).any() else float("nan")
 
 
 def _rounded_means(distances: Float[np.ndarray, "frame point"]) -> list[float]:

@@ -17,6 +17,9 @@ class ReportConfig:
         lambda: [f"{motion}:{seed}" for motion in ("walk", "arms", "squat_kick", "cartwheel") for seed in (0, 1)],
         "folders of recordings with ground truth, or MOTION:SEED of rendered ones",
     )
+    compared: list[str] | None = option(
+        None, "recordings of the experiments with the paper's method, which is slow; null: one seed of each motion"
+    )
     frames: int = option(40, "frames of each recording to track, at most")
     body: str = option("human", "body that the actors are made from, as for actor")
     overrides: list[str] = group(

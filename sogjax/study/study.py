@@ -32,6 +32,13 @@ class Study:
     """Whether runs that are missing are done; else they are left out."""
     body: str = "human"
     """The body that actors are made from."""
+    compared: Sequence[str] | None = None
+    """Recordings of slow experiments; None: one seed of each motion, and all folders."""
+
+    @classmethod
+    def from_config(cls, config: ReportConfig, folder: Path) -> "Study":
+        """The study of a report."""
+        return cls(folder, config.recordings, config.frames, config.overrides, config.do, config.body, config.compared)
 
     @cached_property
     def runs(self) -> RunFolder:
@@ -52,7 +59,7 @@ class Study:
     def is_committed(self) -> bool:
         """Whether it is what the project's own report was made of, of which the remarks speak."""
         usual = ReportConfig()
-        return [*self.recordings] == usual.recordings and self.frames == usual.frames and not self.overrides
+        return {*self.recordings} >= {*usual.recordings} and self.frames == usual.frames and not self.overrides
 
     def source(self, recording: str, actors: int = 1) -> Source:
         """A recording, opened once.
@@ -74,20 +81,32 @@ class Study:
         if actors is not None and actors > 1:
             return [self.source("pass:0", actors)]
         names = experiment.config.recordings if self.is_committed else None
-        return [self.source(name) for name in names or self.recordings]
+        usual = self._compared if experiment.is_slow else self.recordings
+        return [self.source(name) for name in names or usual]
 
-    def records(self, experiment: Experiment) -> Iterator[tuple[str, Source, RunRecord]]:
-        """Every run of an experiment as (row, recording, record), as they are done or read."""
-        for row in experiment.config.rows:
+    @property
+    def _compared(self) -> list[str]:
+        """The recordings of slow experiments."""
+        if self.compared is not None:
+            return [*self.compared]
+        seeds: dict[str, str] = {}
+        for name in self.recordings:
+            seeds.setdefault(name if Path(name).is_dir() else name.partition(":")[0], name)
+        return [*seeds.values()]
+
+    def records(self, experiment: Experiment, method: str = "") -> Iterator[tuple[str, Source, RunRecord]]:
+        """Every run of an experiment with a method as (row, recording, record), as they are done or read."""
+        for row in experiment.rows_of(method):
             for source in self.sources_of(experiment, row):
-                record = run_row(experiment, row, source, self.runs, self.overrides, self.do)
+                record = run_row(experiment, row, source, self.runs, self.overrides, self.do, method)
                 if record is not None:
                     yield row, source, record
 
-    def summary(self, experiment: Experiment) -> list[RowSummary]:
-        """The rows of an experiment."""
-        rows: dict[str, dict[str, RunRecord]] = {row: {} for row in experiment.config.rows}
-        for row, source, record in self.records(experiment):
+    def summary(self, experiment: Experiment, method: str = "") -> list[RowSummary]:
+        """The rows of an experiment with a method; those without any run are left out."""
+        rows: dict[str, dict[str, RunRecord]] = {row: {} for row in experiment.rows_of(method)}
+        for row, source, record in self.records(experiment, method):
             rows[row][source.name] = record
         papers = {name: (row.paper, row.paper_value) for name, row in experiment.config.rows.items()}
-        return summarized(rows, experiment.config.reference, papers)
+        found = summarized(rows, experiment.config.reference, papers)
+        return [row for row in found if row.by_recording or row.failed]

@@ -1,4 +1,4 @@
-"""An experiment's runs in a few numbers a row: means with their intervals, and differences that show or do not."""
+"""An experiment's runs in a few numbers per row: means with their intervals, and significant differences."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,8 +25,8 @@ class Difference:
     """That it was taken on."""
 
     @property
-    def shows(self) -> bool:
-        """Whether it is larger than what other recordings could have made of it; a single one cannot tell."""
+    def is_significant(self) -> bool:
+        """Whether its interval leaves out zero; a single recording cannot tell."""
         return self.recordings > 1 and not self.interval.holds_zero
 
 
@@ -40,6 +40,9 @@ class RowSummary:
     mean: float
     std: float
     """Over all distances of all recordings."""
+    closest: float
+    """The mean with markers attached by the rule of Section 6, `closest`; `mean` is by `scaled`."""
+    closest_std: float
     interval: Interval
     """Of the mean, at 95 %."""
     difference: Difference | None
@@ -83,13 +86,16 @@ def _summary(name: str, records: Records, reference: Records | None, paper: tupl
     done = {source: record for source, record in records.items() if not record.failed}
     runs = list(done.values())
     errors = [record.errors for record in runs]
+    closest = [np.asarray(record.closest_mm, float) for record in runs]
     average = lambda value: _mean([value(record) for record in runs])
     return RowSummary(
         name=name,
         paper=paper[0],
         paper_value=paper[1],
         mean=_mean(_joined(errors)),
-        std=pooled_std(runs),
+        std=pooled_std(errors, [record.std_mm for record in runs]),
+        closest=_mean(_joined(closest)),
+        closest_std=pooled_std(closest, [record.closest_std_mm for record in runs]),
         interval=bootstrap_interval(errors),
         difference=None if reference is None else _difference(done, reference),
         is_reference=reference is None,
@@ -108,13 +114,17 @@ def _summary(name: str, records: Records, reference: Records | None, paper: tupl
     )
 
 
-def pooled_std(runs: Sequence[RunRecord]) -> float:
-    """Standard deviation over the distances of all runs, from that of each, which has as many in every frame."""
-    counts = np.array([np.isfinite(record.errors).sum() for record in runs], float)
-    means = np.array([_mean(record.errors) for record in runs])
+def pooled_std(runs: Sequence[Float[np.ndarray, "_"]], stds: Sequence[float]) -> float:
+    """Standard deviation over the distances of all runs, from the means of each one's frames and its own deviation.
+
+    Every frame of a run has as many distances.
+    """
+    counts = np.array([np.isfinite(errors).sum() for errors in runs], float)
     if not counts.sum() > 0.0:
         return UNKNOWN
-    counts, means, stds = counts[counts > 0], means[counts > 0], np.array([r.std_mm for r in runs])[counts > 0]
+    present = counts > 0
+    counts, means = counts[present], np.array([_mean(errors) for errors in runs])[present]
+    stds = np.asarray(stds, float)[present]
     weights = counts / counts.sum()
     return float(np.sqrt(np.sum(weights * (stds**2 + (means - np.sum(weights * means)) ** 2))))
 
@@ -145,7 +155,7 @@ def _joined(parts: Sequence[np.ndarray]) -> np.ndarray:
     return np.concatenate([*parts, np.zeros(0)])
 
 
-def _mean(values: Sequence[float] | np.ndarray) -> float:
+def _mean(values: Sequence[float] | Sequence[int] | np.ndarray) -> float:
     """Of those that are finite; NaN where none is."""
     present = np.asarray(values, float)
     present = present[np.isfinite(present)]

@@ -13,12 +13,13 @@ ACCURACY: dict[str, Cell] = {
     "error, mm": lambda row: f"{row.mean:.1f} +- {row.std:.1f}",
     "95 % interval": lambda row: _range(row.interval.low, row.interval.high),
     "difference": lambda row: difference_words(row),
+    "closest rule, mm": lambda row: f"{row.closest:.1f} +- {row.closest_std:.1f}",
     "joints, mm": lambda row: f"{row.joints:.1f}",
     "lost": lambda row: str(row.lost),
     "iterations": lambda row: f"{row.iterations:.1f}",
     "evaluations": lambda row: f"{row.evaluations:.1f}",
     "not converged": lambda row: str(row.not_converged),
-    "ms a step": lambda row: f"{row.milliseconds:.0f}",
+    "ms per step": lambda row: f"{row.milliseconds:.0f}",
     "the paper": lambda row: row.paper or "",
 }
 SPEED: dict[str, Cell] = {
@@ -36,10 +37,12 @@ def markdown_table(experiment: Experiment, rows: Sequence[RowSummary]) -> str:
     """The table of an experiment; columns without any value are left out."""
     columns = ACCURACY if experiment.config.measure == "accuracy" else SPEED
     texts = {title: [cell(row) if _done(row) else "" for row in rows] for title, cell in columns.items()}
-    texts = {title: cells for title, cells in texts.items() if any(cell not in ("", "nan") for cell in cells)}
-    lines = [f"| {_in_cell(experiment.config.axis)} | " + " | ".join(texts) + " |", "|---" * (1 + len(texts)) + "|"]
+    texts = {
+        title: cells for title, cells in texts.items() if any(cell not in ("", "nan", "nan +- nan") for cell in cells)
+    }
+    lines = [f"| {in_cell(experiment.config.axis)} | " + " | ".join(texts) + " |", "|---" * (1 + len(texts)) + "|"]
     for k, row in enumerate(rows):
-        lines.append(f"| {_in_cell(row.name)} | " + " | ".join(cells[k] for cells in texts.values()) + " |")
+        lines.append(f"| {in_cell(row.name)} | " + " | ".join(cells[k] for cells in texts.values()) + " |")
     return "\n".join(lines + [f"\nfailed, {row.name}: {reason}" for row in rows for reason in row.failed])
 
 
@@ -49,7 +52,7 @@ def recordings_table(experiment: Experiment, rows: Sequence[RowSummary]) -> str:
 
 
 def iterations_table(experiment: Experiment, rows: Sequence[RowSummary]) -> str:
-    """The iterations a frame of every row on every recording."""
+    """The iterations per frame of every row on every recording."""
     return _by_recording(experiment, rows, lambda row: row.iterations_by_recording)
 
 
@@ -57,37 +60,44 @@ def _by_recording(
     experiment: Experiment, rows: Sequence[RowSummary], values_of: Callable[[RowSummary], Mapping[str, float]]
 ) -> str:
     names = list(dict.fromkeys(name for row in rows for name in row.by_recording))
-    lines = [" | ".join([_in_cell(experiment.config.axis), *names]), "|".join(["---"] * (1 + len(names)))]
+    lines = [" | ".join([in_cell(experiment.config.axis), *names]), "|".join(["---"] * (1 + len(names)))]
     for row in rows:
         values = values_of(row)
-        lines.append(" | ".join([_in_cell(row.name), *(f"{values[n]:.1f}" if n in values else "" for n in names)]))
+        lines.append(" | ".join([in_cell(row.name), *(f"{values[n]:.1f}" if n in values else "" for n in names)]))
     return "\n".join(f"| {line} |" for line in lines)
 
 
 def difference_words(row: RowSummary) -> str:
-    """The difference to the reference with its interval, or that it does not show."""
+    """The difference to the reference with its interval, and whether it is significant."""
     if row.difference is None:
         return "reference" if row.is_reference else ""
     low, high = row.difference.interval
     number = f"{row.difference.mean:+.1f}" + (f" ({low:+.1f} to {high:+.1f})" if np.isfinite(low) else "")
     if row.difference.recordings == 1:
         return f"one recording: {number}"
-    return number if row.difference.shows else f"does not show: {number}"
+    return number if row.difference.is_significant else f"not significant: {number}"
+
+
+def significance(row: RowSummary) -> str:
+    """The difference to the reference in a few words."""
+    if row.difference is None:
+        return "reference" if row.is_reference else ""
+    words = "" if row.difference.recordings == 1 or row.difference.is_significant else ", not significant"
+    return f"{row.difference.mean:+.1f}{words}"
 
 
 def findings(experiment: Experiment, rows: Sequence[RowSummary]) -> list[str]:
-    """What the experiment says in words: the best rows, which differences show, and what the paper's best was."""
+    """What the experiment says in words: the best rows, which differences are significant, the paper's best row."""
     done = [row for row in rows if np.isfinite(row.mean)]
     if not done or experiment.config.measure != "accuracy":
         return []
     compared = [row for row in done if row.difference is not None and row.difference.recordings > 1]
     reference = next((row.name for row in rows if row.is_reference), "")
     lines = _best(done)
-    for verb, names in (
-        ("show", [row.name for row in compared if row.difference is not None and row.difference.shows]),
-        ("do not show", [row.name for row in compared if row.difference is not None and not row.difference.shows]),
-    ):
-        lines += [f"Differences to {reference!r} that {verb}: {', '.join(names)}."] if names else []
+    significant = {row.name: row.difference is not None and row.difference.is_significant for row in compared}
+    for words, kind in (("Significantly different", True), ("Not significantly different", False)):
+        names = [name for name, is_so in significant.items() if is_so is kind]
+        lines += [f"{words} from {reference!r}: {', '.join(names)}."] if names else []
     papers = [row for row in rows if row.paper_value is not None]
     if papers:
         lines.append(f"The paper's best: {min(papers, key=lambda row: row.paper_value or 0.0).name}.")
@@ -121,6 +131,6 @@ def _waiting(row: RowSummary) -> str:
     return f"{1000.0 / row.rates.get('decode', float('nan')):.1f}"
 
 
-def _in_cell(text: str) -> str:
+def in_cell(text: str) -> str:
     """Without what would end a cell of a table."""
     return text.replace("|", "\\|")

@@ -2,6 +2,7 @@
 
 import math
 from functools import partial
+from typing import Literal
 
 import equinox as eqx
 import jax
@@ -24,6 +25,8 @@ CAPACITIES = (256, 512, 768, 1024, 1536, 2048, 3072, 4096, 6144, 8192, 16384, 32
 BLOB_RADIUS = 3.0
 """Sigmas around a blob's centre that belong to the box of a body."""
 
+
+BoxAround = Literal["last", "predicted"]
 
 BLOCK_STEP = 128
 """Room for blocks of pairs comes in multiples of this."""
@@ -73,6 +76,8 @@ class ImageReader(eqx.Module):
     box_enlargement: Float[Array, ""] = eqx.field(converter=jnp.asarray)
     """Part of the box's size that is added on each side."""
     color_space: str = eqx.field(static=True)
+    box_around: BoxAround = eqx.field(static=True, default="predicted")
+    """Whether boxes hold the last pose only, or the predicted one too."""
     plate_colors: Float[Array, "camera candidate 3"] | None = None
     """Colours of every node of the empty background, in the averaging space; None: plates are not used."""
     plate_tolerance: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=0.1)

@@ -68,12 +68,14 @@ class Tracker(eqx.Module):
         return state.previous + self.extrapolation * (state.previous - state.before_previous)
 
     def boxes(self, state: TrackState) -> Float[Array, "camera actor 2 2"]:
-        """Where the actors may be seen: around the last pose and the predicted one."""
+        """Where the actors may be seen: around the last pose and, unless told otherwise, the predicted one too."""
         actors = actor_of_blobs(self.body.skeleton, self.body.blobs.joints)
         around = lambda pose: jax.vmap(body_boxes, in_axes=(None, 0, None, None))(
             self.body.posed_blobs(pose), self.cameras, actors, self.reader.box_enlargement
         )
-        boxes = union_boxes(around(state.previous), around(self.predicted(state)))
+        boxes = around(state.previous)
+        if self.reader.box_around == "predicted":
+            boxes = union_boxes(boxes, around(self.predicted(state)))
         return boxes if self.together is None else common_boxes(boxes, self.together)
 
     def views(

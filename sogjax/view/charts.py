@@ -2,6 +2,7 @@
 
 import io
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -17,37 +18,40 @@ _NAME_HEIGHT = 0.06
 """Of a line of text beside a panel, in units of the panel's height."""
 
 
-def mean_chart(
-    names: Sequence[str],
-    means: Sequence[float],
-    intervals: Sequence[tuple[float, float]],
-    *,
-    axis: str,
-    value: str,
-    members: Mapping[str, Sequence[float]] | None = None,
-    paper: Sequence[float | None] = (),
-) -> bytes:
+@dataclass(frozen=True)
+class Means:
+    """The means of one panel of a chart."""
+
+    names: Sequence[str]
+    """Of the rows, from left to right."""
+    means: Sequence[float]
+    """One per row."""
+    intervals: Sequence[tuple[float, float]]
+    """Low and high of each mean."""
+    title: str = "here"
+    members: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    """Further values by name, drawn as faint lines, such as the means on each recording."""
+
+
+def mean_chart(panels: Sequence[Means], *, axis: str, value: str, paper: Mapping[str, float] | None = None) -> bytes:
     """Means with their intervals beside the paper's figures, as a PNG.
 
     Args:
-        names: of the rows, from left to right.
-        means: one per row.
-        intervals: low and high of each mean.
+        panels: what is drawn, a panel each.
         axis: what differs between the rows.
         value: what the means are, with their unit.
-        members: further values by name, drawn as faint lines, such as the means on each recording.
-        paper: the paper's figures, in a panel of their own; None where it has none.
+        paper: the paper's figures by row, in a panel of their own.
     """
-    figure = _figure()
-    with_paper = any(number is not None for number in paper)
-    panels = figure.subplots(1, 2 if with_paper else 1, squeeze=False, width_ratios=[2, 1] if with_paper else [1])[0]
-    _draw_means(panels[0], means, intervals, members or {})
-    _finish(panels[0], names, axis, value, "here")
-    _name_lines(panels[0], members or {})
-    if with_paper:
-        present = [(name, number) for name, number in zip(names, paper, strict=True) if number is not None]
-        panels[1].plot(range(len(present)), [number for _, number in present], "s-", color=PAPER)
-        _finish(panels[1], [name for name, _ in present], axis, value, "the paper")
+    ratios = [2.0] * len(panels) + [1.0] * bool(paper)
+    figure = _figure((max(_SIZE[0], 1.5 * sum(ratios)), _SIZE[1]))
+    drawn = figure.subplots(1, len(ratios), squeeze=False, width_ratios=ratios)[0]
+    for panel, content in zip(drawn, panels, strict=False):
+        _draw_means(panel, content.means, content.intervals, content.members)
+        _finish(panel, content.names, axis, value, content.title)
+        _name_lines(panel, content.members)
+    if paper:
+        drawn[-1].plot(range(len(paper)), list(paper.values()), "s-", color=PAPER)
+        _finish(drawn[-1], list(paper), axis, value, "the paper")
     return _png(figure)
 
 

@@ -80,6 +80,10 @@ class EvaluateConfig:
     motion: Any = option(REQUIRED, "motion.npz, or a list of them with several actors")
     truth: str = option(REQUIRED, "ground_truth.npz, or the folder of a recording that has one")
     out: str | None = option(None, "metrics.json to write; null: only print")
+    markers: str = option(
+        "scaled",
+        "markers go with the closest blob's joint; scaled: distances in the blob's sigmas | closest: as in Section 6",
+    )
     overwrite: bool = option(False, OVERWRITE)
 
 

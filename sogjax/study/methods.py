@@ -1,0 +1,97 @@
+"""The methods that a report compares: by what their settings differ, and their results side by side."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+from sogjax.engine.build import color_space_and_radius
+from sogjax.settings import TrackConfig
+from sogjax.settings.compose import track_config
+from sogjax.study.experiment import Experiment
+from sogjax.study.summary import RowSummary
+from sogjax.study.table import in_cell, significance
+
+Rows = Mapping[str, Sequence[RowSummary]]
+"""The rows of an experiment, by method."""
+
+PRESETS = {"the paper's method": "paper", "ours": "default"}
+"""The methods of the report, and their presets."""
+
+
+def settings_table() -> str:
+    """What every method of the report is, in Markdown: the settings that differ come first."""
+    configs = [track_config(recording="RECORDING", preset=preset) for preset in PRESETS.values()]
+    titles = ["", *(f"{name} (`preset={preset}`)" for name, preset in PRESETS.items())]
+    lines = [[title, *map(words, configs)] for title, words in _SETTINGS.items()]
+    return _markdown([titles, *sorted(lines, key=lambda line: len(set(line[1:])) == 1)])
+
+
+def comparison_table(experiment: Experiment, rows: Rows) -> str:
+    """The paper's figure and every method's results, a line for each row of the experiment, in Markdown."""
+    titles = [experiment.config.axis, "the paper"]
+    titles += [f"{method}: {title}" for method in rows for title in _RESULTS]
+    lines = [titles]
+    for name, row in experiment.config.rows.items():
+        found = [next((one for one in of_method if one.name == name), None) for of_method in rows.values()]
+        if any(found):
+            lines.append([name, row.paper, *(cell(one) for one in found for cell in _RESULTS.values())])
+    return _markdown(lines)
+
+
+def overview_table(rows: Sequence[RowSummary]) -> str:
+    """Methods in a line each, with both rules by which markers are attached, in Markdown."""
+    lines = [["", *_OVERVIEW], *([row.name, *(cell(row) for cell in _OVERVIEW.values())] for row in rows)]
+    return _markdown(lines)
+
+
+def _solver(config: TrackConfig) -> str:
+    solver, is_ascent = config.solver, config.solver.method == "conditioned_ascent"
+    steps = f", mu+ {solver.grow:g}, mu- {solver.shrink:g}" if is_ascent else ""
+    least = f"n_iter {solver.min_iterations}, epsilon {solver.epsilon:g}"
+    return f"{solver.method.replace('_', ' ')}{steps}, {least}"
+
+
+def _colors(config: TrackConfig) -> str:
+    space, radius = color_space_and_radius(config.color)
+    return f"{space}, eps_sim {radius:g}"
+
+
+_SETTINGS: dict[str, Callable[[TrackConfig], str]] = {
+    "solver": _solver,
+    "weights": lambda c: f"w_l {c.energy.limit_weight:g}, w_a {c.energy.acceleration_weight:g}",
+    "colours": _colors,
+    "quad-tree": lambda c: f"depth {c.images.depth}, eps_col {c.images.color_tolerance:g}",
+    "empty background pictures (plates)": lambda c: "not used" if c.images.use_plates is False else "used",
+    "Eq. 6": lambda c: {"printed": "as printed", "exact": "with the 1/2 of Eq. 2"}[c.energy.overlap_exponent],
+    "Eq. 8": lambda c: "capped" if c.energy.capped else "not capped",
+    "pairs of blobs": lambda c: {"dense": "all", "sparse": "near ones"}[c.energy.pairs],
+    "culling box": lambda c: {"last": "of the last pose"}.get(c.images.box_around, "of the last and predicted pose"),
+    "prediction": lambda c: f"alpha {c.tracking.extrapolation:g}",
+}
+
+
+def _result(cell: Callable[[RowSummary], str]) -> Callable[[RowSummary | None], str]:
+    return lambda row: "" if row is None else cell(row) if row.by_recording else "failed"
+
+
+_RESULTS: dict[str, Callable[[RowSummary | None], str]] = {
+    "error, mm": _result(lambda row: f"{row.mean:.1f}"),
+    "closest rule, mm": _result(lambda row: f"{row.closest:.1f}"),
+    "difference": _result(lambda row: significance(row)),
+    "lost": _result(lambda row: str(row.lost)),
+    "iterations": _result(lambda row: f"{row.iterations:.1f}"),
+}
+_OVERVIEW: dict[str, Callable[[RowSummary], str]] = {
+    "the paper": lambda row: row.paper,
+    "error by the closest rule, mm": lambda row: f"{row.closest:.1f} +- {row.closest_std:.1f}",
+    "error by the scaled rule, mm": lambda row: f"{row.mean:.1f} +- {row.std:.1f}",
+    "joints, mm": lambda row: f"{row.joints:.1f}",
+    "lost": lambda row: str(row.lost),
+    "iterations": lambda row: f"{row.iterations:.1f}",
+    "not converged": lambda row: str(row.not_converged),
+    "tracking step, frames/s": lambda row: f"{1000.0 / row.milliseconds:.1f}",
+    "failed": lambda row: str(len(row.failed)),
+}
+
+
+def _markdown(lines: Sequence[Sequence[str]]) -> str:
+    ruled = [lines[0], ["---"] * len(lines[0]), *lines[1:]]
+    return "\n".join(f"| {' | '.join(in_cell(str(cell)) for cell in line)} |" for line in ruled)

@@ -1,0 +1,90 @@
+"""The sections about a report itself: how it was made, what its words mean, with which versions."""
+
+import platform
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+
+from omegaconf import OmegaConf
+
+from sogjax import __version__
+from sogjax.settings.compose import track_config
+from sogjax.study.document import Section
+from sogjax.study.done import Done, different
+from sogjax.study.machine import machine_line
+from sogjax.study.methods import settings_table
+from sogjax.study.settings import ReportConfig
+
+PACKAGES = ("sogjax", "jax", "jaxlib", "optimistix", "equinox", "numpy", "opencv-python-headless", "matplotlib")
+
+READING = (
+    "Errors are distances of markers to the truth in millimetres: mean, +- standard deviation over all markers, "
+    "recordings and frames. All frames count, as in `metrics.json`: the first one too, in which markers are attached "
+    "and their error is 0. Markers are attached by one of two rules: *closest*, Section 6 to the letter (to the joint "
+    "of the blob whose centre is closest), beside which the paper's 44.93 mm stand, and *scaled*, ours (the distance "
+    "is measured in the blob's sigmas). Where no rule is named it is scaled. Joint errors need no rule. A marker is "
+    "lost where it is more than 200 mm off for at least five tracked frames in a row; *lost* counts these stretches.",
+    "Intervals are at 95 %, by Student's t with the standard error of a bootstrap over the recordings. A difference "
+    "to the reference is taken in the same frames; it is significant if its interval leaves out zero. One in twenty "
+    "differences will be significant by chance alone, and two seeds of one motion are not quite two recordings.",
+    "The actor of a recording and its rough pose in the first frame are the same for all runs, made with the default "
+    "settings. Times are the median of a tracking step from kept cells.",
+    "The paper's recordings are not available. Compare how numbers change from row to row, not how large they are.",
+)
+
+
+def about_section(config: ReportConfig, done: Sequence[Done]) -> Section:
+    """Where the runs were made, and how to read the tables."""
+    seconds = sum({id(one.record): one.record.seconds for one in different(done)}.values())
+    machines = dict.fromkeys(one.record.machine for one in done)
+    return Section(
+        "How this was made",
+        [
+            f"`{machine_line()}`",
+            *([config.note] if config.note else []),
+            "- " + "\n- ".join(f"Runs on: {machine}" for machine in machines),
+            f"{len(list(different(done)))} runs of at most {config.frames} frames, {seconds / 60.0:.0f} minutes in "
+            f"all with compilation and actors. {_recordings(done)}",
+            *READING,
+        ],
+    )
+
+
+def methods_section() -> Section:
+    """What the methods are that stand beside each other."""
+    text = (
+        "Two methods are compared: the paper's, to the letter as far as the paper tells (`docs/guide/the_paper.md` "
+        "says how the rest was read), and this project's own, the default. Where a table gives both, a row changes "
+        "one setting of each."
+    )
+    return Section("The two methods", [text, settings_table()])
+
+
+def versions_section(config: ReportConfig) -> Section:
+    """Packages, and the settings that rows do not change."""
+    tree = OmegaConf.structured(track_config(config.overrides, recording="RECORDING"))
+    return Section(
+        "Configuration and versions",
+        [
+            "\n".join(f"- {name} {installed_version(name)}" for name in PACKAGES)
+            + f"\n- Python {platform.python_version()}",
+            "What rows do not set is the default; `runs.csv` lists every run, and `runs/KEY.json` holds it.",
+            "```\n" + OmegaConf.to_yaml(tree).strip() + "\n```",
+        ],
+    )
+
+
+def installed_version(package: str) -> str:
+    """Of a package, or that it is not installed."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return __version__ if package == "sogjax" else "not installed"
+
+
+def _recordings(done: Sequence[Done]) -> str:
+    """Which recordings the experiments were run on."""
+    slow = dict.fromkeys(one.source.name for one in done if one.experiment.is_slow)
+    usual = dict.fromkeys(one.source.name for one in done if not one.experiment.is_slow)
+    parts = [f"Experiments with the paper's method, which is slow, were run on {', '.join(slow)}."] if slow else []
+    parts += [f"The others were run on {', '.join(usual)}."] if usual else []
+    return " ".join(parts)
