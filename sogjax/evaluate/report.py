@@ -41,6 +41,9 @@ class Evaluation:
     joints: PointErrors | None
     lost: tuple[LostPoint, ...]
 
+    def __str__(self) -> str:
+        return self.table(details=False)
+
     @property
     def summary(self) -> ErrorSummary:
         """The numbers of the markers, or of the joints where the truth has no markers."""
@@ -86,6 +89,9 @@ class GroupEvaluation:
 
     evaluations: dict[str, Evaluation]
     swaps: tuple[Swap, ...] = field(default=())
+
+    def __str__(self) -> str:
+        return self.table(details=False)
 
     @property
     def summary(self) -> ErrorSummary:
