@@ -1,13 +1,10 @@
 """The tracker as a pure object, for programs that go from frame to frame themselves."""
 
 from collections.abc import Iterator, Sequence
-from contextlib import closing
 from dataclasses import replace
 from typing import Any
 
-import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, UInt8
 
 from sogjax.api.settings import track_settings
@@ -20,7 +17,7 @@ from sogjax.engine.recordings import with_cameras
 from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.track.culling import Capacities, capacity_for
-from sogjax.track.frame import PartialCells, TrackState, on_device
+from sogjax.track.frame import PartialCells, on_device
 from sogjax.track.tracker import Tracker, first_capacities
 
 ROOM = 2
@@ -53,8 +50,8 @@ def make_tracker(recording: Recording, actor: Body | Sequence[Body], **settings:
     job = Job.from_config(recording, actors, config)
     tracker = replace(job.tracker, first_pose=job.start)
     cells = next(read_cells(recording, tracker, job.frames[0], job.frames[0] + 1))
-    first = first_capacities(tracker, tracker.start(), cells.cells if isinstance(cells, PartialCells) else cells)
-    return replace(tracker, capacities=_with_more_room(first))
+    seen = jnp.asarray(cells.cells) if isinstance(cells, PartialCells) else cells
+    return replace(tracker, capacities=_with_more_room(first_capacities(tracker, tracker.start(), seen)))
 
 
 def read_cells(
@@ -68,8 +65,9 @@ def read_cells(
         start: first frame, counted from the recording's first.
         stop: the frame before which to stop; None: the end.
 
-    Yields:
-        For each frame its cells, as bytes; where a camera has no picture, they say so too (`PartialCells`).
+    Returns:
+        An iterator with the cells of each frame, as bytes; where a camera has no picture, they say so too
+        (`PartialCells`).
 
     Raises:
         InputError: a picture cannot be read, other cameras, or no such frames.
@@ -86,10 +84,15 @@ def read_cells(
             f"start={start} stop={stop}: {recording.path} has the frames 0 to {recording.num_frames - 1}; choose "
             f"0 <= start < stop <= {recording.num_frames}"
         )
-    with closing(read_prepared(recording, Preparation(grids), start, last)) as pictures:
-        for frame in pictures:
-            cells, present = on_device(cells_of_frame([picture.cells for picture in frame]))
-            yield cells if present is None else PartialCells(cells, present)
+    return _cells(recording, Preparation(grids), start, last)
+
+
+def _cells(
+    recording: Recording, preparation: Preparation, start: int, stop: int
+) -> Iterator[UInt8[Array, "camera rows columns 3"] | PartialCells]:
+    for pictures in read_prepared(recording, preparation, start, stop):
+        cells, present = on_device(cells_of_frame([picture.cells for picture in pictures]))
+        yield cells if present is None else PartialCells(cells, present)
 
 
 def _with_more_room(first: Capacities) -> Capacities:
