@@ -1,3 +1,104 @@
-"""Markerless motion capture by Sums of Gaussians (Stoll et al., ICCV 2011) in JAX."""
+"""Markerless motion capture by Sums of Gaussians (Stoll et al., ICCV 2011) in JAX.
+
+    import sogjax
+
+    recording = sogjax.open_recording("walk")
+    actor = sogjax.make_actor(recording)
+    motion = sogjax.track(recording, actor)
+    motion.save("walk.bvh")
+
+Importing the package loads nothing else; each name is loaded when it is first used.
+"""
+
+import sys
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from sogjax.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from sogjax.api.actors import load_actor, make_actor, save_actor
+    from sogjax.api.evaluation import evaluate
+    from sogjax.api.motions import load_motion, write_rerun
+    from sogjax.api.recordings import load_truth, open_recording, render_recording
+    from sogjax.api.settings import track_settings
+    from sogjax.api.stepping import make_tracker, read_cells
+    from sogjax.api.tracking import find_first_pose, track
+    from sogjax.data.motion import Motion
+    from sogjax.data.recording import Recording
+    from sogjax.errors import InputError
+    from sogjax.model.body import Body as Actor
+    from sogjax.settings import TrackConfig
+    from sogjax.track.frame import TrackState
+    from sogjax.track.tracker import Tracker
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "Actor",
+    "InputError",
+    "Motion",
+    "Recording",
+    "TrackConfig",
+    "TrackState",
+    "Tracker",
+    "evaluate",
+    "find_first_pose",
+    "load_actor",
+    "load_motion",
+    "load_truth",
+    "make_actor",
+    "make_tracker",
+    "open_recording",
+    "read_cells",
+    "render_recording",
+    "save_actor",
+    "track",
+    "track_settings",
+    "write_rerun",
+]
+
+_HOMES = {
+    "Actor": "sogjax.model.body:Body",
+    "InputError": "sogjax.errors",
+    "Motion": "sogjax.data.motion",
+    "Recording": "sogjax.data.recording",
+    "TrackConfig": "sogjax.settings",
+    "TrackState": "sogjax.track.frame",
+    "Tracker": "sogjax.track.tracker",
+    "evaluate": "sogjax.api.evaluation",
+    "find_first_pose": "sogjax.api.tracking",
+    "load_actor": "sogjax.api.actors",
+    "load_motion": "sogjax.api.motions",
+    "load_truth": "sogjax.api.recordings",
+    "make_actor": "sogjax.api.actors",
+    "make_tracker": "sogjax.api.stepping",
+    "open_recording": "sogjax.api.recordings",
+    "read_cells": "sogjax.api.stepping",
+    "render_recording": "sogjax.api.recordings",
+    "save_actor": "sogjax.api.actors",
+    "track": "sogjax.api.tracking",
+    "track_settings": "sogjax.api.settings",
+    "write_rerun": "sogjax.api.motions",
+}
+
+__getattr__, _names = lazy_names(__name__, _HOMES)
+
+
+def __dir__() -> list[str]:
+    return sorted({*__all__, "__version__"})
+
+
+class _Door(ModuleType):
+    """This package, whose `track` and `evaluate` are functions although packages have the same names.
+
+    Python binds a package to its name here when it is first imported; that is left out for these two, which are
+    reached by `from sogjax.track... import` as ever.
+    """
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if not (name in __all__ and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Door

@@ -1,7 +1,10 @@
 """Motion: what tracking finds, one pose per frame and all that follows from it."""
 
+import difflib
 from dataclasses import dataclass, fields
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -23,6 +26,7 @@ from sogjax.data.npz_file import (
 from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.model.frames import UP_AXES
+from sogjax.sentences import counted
 
 FORMAT_VERSION = 1
 DEFAULT_UP = "z"
@@ -31,7 +35,7 @@ FRAMES_AT_ONCE = 8
 """Joint frames and blobs are computed in blocks of so many frames, so that one program serves motions of any length."""
 
 
-@dataclass
+@dataclass(repr=False)
 class Motion:
     """The motion of one actor: poses, joints and blobs by frame; metres, radians, seconds, world frame."""
 
@@ -65,10 +69,51 @@ class Motion:
     joint_std: Float[np.ndarray, "frame joint"] | None = None
     """Expected root mean square error of each joint, metres."""
 
+    landmark_names: Shaped[np.ndarray, "landmark"] | None = None
+    """Of points fixed to joints; None where the file does not have them, as in the other two."""
+    landmark_joint: Int[np.ndarray, "landmark"] | None = None
+    landmark_offset: Float[np.ndarray, "landmark 3"] | None = None
+    """In the frame of the landmark's joint."""
+
+    def __repr__(self) -> str:
+        whose = f" of {self.actor}" if self.actor else ""
+        frames = f"{counted(self.num_frames, 'frame')} at {self.fps:g} Hz"
+        return f"<Motion{whose}: {frames}, {counted(len(self.joint_names), 'joint')}>"
+
     @property
     def num_frames(self) -> int:
         """Number of frames."""
         return len(self.frame)
+
+    def joint(self, name: str) -> Float[np.ndarray, "frame 3"]:
+        """Where a joint or landmark is in every frame, in metres in the world.
+
+        Raises:
+            InputError: the motion has no point of this name.
+        """
+        landmarks = [] if self.landmark_names is None else self.landmark_names.tolist()
+        if name in landmarks and self.landmark_joint is not None and self.landmark_offset is not None:
+            k = landmarks.index(name)
+            frames = self.world_from_joint[:, self.landmark_joint[k]]
+            return frames[:, :3, :3] @ self.landmark_offset[k] + frames[:, :3, 3]
+        joints = self.joint_names.tolist()
+        if name in joints:
+            return self.world_from_joint[:, joints.index(name), :3, 3]
+        known = [*landmarks, *joints]
+        near = difflib.get_close_matches(name, known, 1)
+        hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(known)}"
+        raise InputError(f"the motion has no joint or landmark {name!r}; {hint}")
+
+    def save(self, path: str | Path) -> None:
+        """Write the motion in the format that the ending says: .npz .bvh .trc .c3d .glb .csv.
+
+        All numbers are kept by .npz only. The file appears when it is whole, and replaces one that is there.
+
+        Raises:
+            InputError: another ending, or a file that cannot be written.
+        """
+        # The writers know what a motion is: they cannot be imported before it.
+        import_module("sogjax.data.export").export_motion(self, Path(path))
 
 
 def motion_from_poses(
@@ -118,6 +163,9 @@ def motion_from_poses(
         actor=body.name,
         pose_std=pose_std,
         joint_std=joint_std,
+        landmark_names=np.array(body.landmarks.names, str),
+        landmark_joint=np.array(body.landmarks.joints, int),
+        landmark_offset=np.asarray(body.landmarks.offsets),
     )
 
 
@@ -184,6 +232,7 @@ def checked_motion(path: Path, arrays: dict[str, np.ndarray]) -> Motion:
         actor=str(text_array(path, arrays, "actor", ())) if "actor" in arrays else "",
         pose_std=_if_there(path, arrays, "pose_std", (frames, len(dof_names))),
         joint_std=_if_there(path, arrays, "joint_std", (frames, joints)),
+        **_landmarks(path, arrays),
     )
     _check(path, motion)
     return motion
@@ -194,6 +243,18 @@ def _if_there(
 ) -> Float[np.ndarray, "..."] | None:
     """An array that a file need not have."""
     return finite_array(path, arrays, key, shape) if key in arrays else None
+
+
+def _landmarks(path: Path, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
+    """The landmarks, which a file need not have."""
+    if "landmark_names" not in arrays:
+        return {}
+    names = text_array(path, arrays, "landmark_names", (None,))
+    return {
+        "landmark_names": names,
+        "landmark_joint": int_array(path, arrays, "landmark_joint", (len(names),)),
+        "landmark_offset": finite_array(path, arrays, "landmark_offset", (len(names), 3)),
+    }
 
 
 def _forward_in_blocks(
@@ -237,6 +298,10 @@ def _check(path: Path, motion: Motion) -> None:
     wrong = (motion.blob_joint < 0) | (motion.blob_joint >= len(joints))
     if wrong.any():
         raise InputError(f"{path}: 'blob_joint' holds {motion.blob_joint[wrong][0]}, which is not a joint; correct it")
+    landmark_joint = np.zeros(0, int) if motion.landmark_joint is None else motion.landmark_joint
+    wrong = (landmark_joint < 0) | (landmark_joint >= len(joints))
+    if wrong.any():
+        raise InputError(f"{path}: 'landmark_joint' holds {landmark_joint[wrong][0]}, which is not a joint; correct it")
     if (np.diff(motion.frame) <= 0).any():
         raise InputError(f"{path}: 'frame' does not increase ({motion.frame[:5].tolist()} ...); sort the frames")
     for key in ("similarity", "energy"):

@@ -28,6 +28,15 @@ def opened(path: str, cameras: Sequence[str] | None = None) -> Recording:
     recording = open_recording(Path(path))
     for warning in recording.warnings:
         say(f"warning: {warning}")
+    return with_cameras(recording, cameras)
+
+
+def with_cameras(recording: Recording, cameras: Sequence[str] | None) -> Recording:
+    """A recording with some of its cameras; None: with all.
+
+    Raises:
+        InputError: none, one twice, or one that it does not have.
+    """
     if cameras is None:
         return recording
     if not cameras or len(set(cameras)) < len(cameras):

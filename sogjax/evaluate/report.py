@@ -34,6 +34,9 @@ class Evaluation:
     markers_by_rule: Mapping[MarkerRule, PointErrors] = field(default_factory=dict)
     """The markers attached by either rule; empty where the truth has none."""
 
+    def __str__(self) -> str:
+        return self.table(details=False)
+
     @property
     def summary(self) -> ErrorSummary:
         """The numbers of the markers, or of the joints where the truth has no markers."""
@@ -91,6 +94,9 @@ class GroupEvaluation:
 
     evaluations: dict[str, Evaluation]
     swaps: tuple[Swap, ...] = field(default=())
+
+    def __str__(self) -> str:
+        return self.table(details=False)
 
     @property
     def summary(self) -> ErrorSummary:

@@ -36,6 +36,8 @@ class Candidates(eqx.Module):
     shape: tuple[int, int] = eqx.field(static=True)
     """Rows and columns of the padded cell grid."""
     num_levels: int = eqx.field(static=True)
+    grids: tuple[CellGrid, ...] = eqx.field(static=True, default=())
+    """How the images of each camera are cut into the cells."""
 
     @classmethod
     def from_grids(cls, grids: Sequence[CellGrid], cameras: Camera) -> "Candidates":
@@ -48,7 +50,7 @@ class Candidates(eqx.Module):
         means, sigmas, inside = (np.stack(parts) for parts in zip(*tables, strict=True))
         dtype = cameras.intrinsics.dtype
         undistorted, sizes = _undistorted(cameras, jnp.asarray(means, dtype), jnp.asarray(sigmas, dtype))
-        return cls(undistorted, sizes, jnp.asarray(inside), shape, num_levels)
+        return cls(undistorted, sizes, jnp.asarray(inside), shape, num_levels, tuple(grids))
 
 
 @jax.jit

@@ -17,8 +17,8 @@ from sogjax.track.culling import Capacities
 class PartialCells(NamedTuple):
     """The cells of a frame of which some cameras have no picture."""
 
-    cells: UInt8[np.ndarray, "camera rows columns 3"]
-    present: Bool[np.ndarray, "camera"]
+    cells: UInt8[np.ndarray | Array, "camera rows columns 3"]
+    present: Bool[np.ndarray | Array, "camera"]
 
 
 FrameCells = UInt8[np.ndarray, "camera rows columns 3"] | PartialCells

@@ -8,6 +8,7 @@ from typing import Literal
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float, Int, UInt8
 
 from sogjax.compiled.once import computed_once
@@ -32,13 +33,15 @@ from sogjax.track.culling import (
     common_boxes,
     union_boxes,
 )
-from sogjax.track.frame import FrameCells, FrameResult, TrackedFrame, TrackState, on_device, on_host
+from sogjax.track.frame import FrameCells, FrameResult, PartialCells, TrackedFrame, TrackState, on_device, on_host
 from sogjax.track.rounds import solve_near
 
 HEADROOM = 1.4
 """Slots for image blobs, as a multiple of what the first frame needs."""
 BLOCK_HEADROOM = 1.25
 """The same for blocks of pairs, whose number for all cameras together changes less."""
+
+NO_ROOM = "a frame has more image blobs than the tracker has room for; make a new one, beginning with this frame"
 
 PairChoice = Literal["dense", "sparse"]
 
@@ -62,6 +65,21 @@ class Tracker(eqx.Module):
     """How standard deviations are found; None: they are not."""
     together: str | None = eqx.field(static=True, default=None)
     """Name of a mapped axis whose trackers look into common boxes, so that what they see is computed once."""
+    capacities: Capacities | None = None
+    """Room for image blobs of a step that is given none."""
+    first_pose: Float[Array, "dof"] | None = None
+    """Where `start` begins."""
+
+    def start(self, pose: Float[Array | np.ndarray, "dof"] | None = None) -> TrackState:
+        """The state before the first frame, from a rough pose of it; None: from `first_pose`.
+
+        Raises:
+            ValueError: there is neither.
+        """
+        pose = self.first_pose if pose is None else pose
+        if pose is None:
+            raise ValueError("the tracker knows no first pose; give one: tracker.start(pose)")
+        return TrackState.from_pose(jnp.asarray(pose, self.body.skeleton.offsets.dtype))
 
     def predicted(self, state: TrackState) -> Float[Array, "dof"]:
         """Theta_0 of Section 5.3: linear extrapolation of the last two poses."""
@@ -110,12 +128,29 @@ class Tracker(eqx.Module):
     def step(
         self,
         state: TrackState,
-        cells: UInt8[Array, "camera rows columns 3"],
-        capacities: Capacities,
+        cells: UInt8[Array, "camera rows columns 3"] | PartialCells,
+        capacities: Capacities | None = None,
         present: Bool[Array, "camera"] | None = None,
     ) -> tuple[TrackState, FrameResult]:
-        """Find the pose of one frame from its cells (sRGB bytes); `present` as in `views`."""
-        return self.found(state, self.views(cells, state, capacities, present), capacities)
+        """Find the pose of one frame from its cells (sRGB bytes); `present` as in `views`.
+
+        With `capacities`, whether these sufficed is for the caller to see in the counts. Without, the tracker's own
+        are used, and a frame that needs more is an error when it is computed.
+
+        Raises:
+            ValueError: there are none.
+        """
+        if isinstance(cells, PartialCells):
+            cells, present = jnp.asarray(cells.cells), jnp.asarray(cells.present)
+        if capacities is not None:
+            return self.found(state, self.views(cells, state, capacities, present), capacities)
+        if self.capacities is None:
+            raise ValueError("the tracker has no capacities; give some, or take one of sogjax.make_tracker")
+        state, result = self.step(state, cells, self.capacities, present)
+        room = self.capacities
+        cut_off = jnp.any(result.num_near > room.near) | jnp.any(result.num_matching > room.matching)
+        cut_off |= result.num_blocks > room.blocks
+        return eqx.error_if((state, result), cut_off, NO_ROOM)
 
     def found(
         self,

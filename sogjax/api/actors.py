@@ -1,0 +1,70 @@
+"""Actors: bodies fitted to one subject each, from files or from example poses."""
+
+from pathlib import Path
+from typing import Any
+
+from sogjax.actor import make
+from sogjax.data.actor_file import save_body
+from sogjax.data.recording import Recording
+from sogjax.engine.build import color_space_and_radius, energy_weights
+from sogjax.engine.recordings import body_named, with_cameras
+from sogjax.engine.terminal import progress, say
+from sogjax.errors import InputError
+from sogjax.model.body import Body
+from sogjax.settings import ActorConfig
+from sogjax.settings.compose import composed_without_hydra
+
+
+def load_actor(name: str | Path) -> Body:
+    """The actor of a file, in its own upright frame: x forward, y to its left, z up; metres.
+
+    Args:
+        name: an actor or body file (YAML), or a body that comes with the program: `human` or `dog`.
+
+    Raises:
+        InputError: no such file or body, or something in the file is wrong; the message names the key and its value.
+    """
+    return body_named(str(name))
+
+
+def save_actor(path: str | Path, actor: Body) -> None:
+    """Write an actor as a text file (YAML) that can be read and edited; the file appears only when it is whole.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    save_body(Path(path), actor)
+
+
+def make_actor(recording: Recording, subject: str | None = None, **settings: Any) -> Body:
+    """The actor that a recording's example poses show (Section 5.2), in its own upright frame.
+
+    Bone lengths and sizes are fitted to the silhouettes of all poses and cameras at once; then every blob takes its
+    colour from the pictures. The same settings give what `sogjax actor` writes; it takes about half a minute.
+
+    Args:
+        recording: with example poses, and masks or empty background pictures for them.
+        subject: which one, where the example poses show several.
+        settings: options of `sogjax actor`, such as `body="dog", symmetric=False, color="hsv"`.
+
+    Raises:
+        InputError: no example poses of the subject, pictures without masks, a pose that was not found; an unknown
+            setting (with the nearest known one) or a wrong value.
+    """
+    for key in ("out", "overwrite"):
+        if key in settings:
+            raise InputError(f"{key}: make_actor writes no file; use sogjax.save_actor(path, actor)")
+    given = settings | {"recording": recording.path, "out": "", "subject": subject}
+    config: ActorConfig = composed_without_hydra(ActorConfig, "actor", keywords=given)
+    space, _ = color_space_and_radius(config.color)
+    made = make.make_actor(
+        with_cameras(recording, config.cameras),
+        body_named(config.body),
+        config.subject,
+        space,
+        energy_weights(config.energy),
+        say,
+        progress,
+        config.symmetric,
+    )
+    return made.body

@@ -1,0 +1,99 @@
+"""The tracker as a pure object, for programs that go from frame to frame themselves."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import jax.numpy as jnp
+from jaxtyping import Array, UInt8
+
+from sogjax.api.settings import track_settings
+from sogjax.api.tracking import actor_list
+from sogjax.data.recording import Recording
+from sogjax.data.video import read_prepared
+from sogjax.engine.job import Job
+from sogjax.engine.pipeline import Preparation, cells_of_frame
+from sogjax.engine.recordings import with_cameras
+from sogjax.errors import InputError
+from sogjax.model.body import Body
+from sogjax.track.culling import Capacities, capacity_for
+from sogjax.track.frame import PartialCells, on_device
+from sogjax.track.tracker import Tracker, first_capacities
+
+ROOM = 2
+"""Times the room that suits the first frame: nobody makes more while a pure step runs."""
+
+
+def make_tracker(recording: Recording, actor: Body | Sequence[Body], **settings: Any) -> Tracker:
+    """The tracker of a recording as an immutable module (a pytree), with a pure step.
+
+        tracker = sogjax.make_tracker(recording, actor)
+        state, step = tracker.start(), equinox.filter_jit(tracker.step)
+        for cells in sogjax.read_cells(recording, tracker):
+            state, result = step(state, cells)
+
+    `tracker.start()` is the state before the first frame, in the rough pose that the recording names or that is
+    searched for; `tracker.start(pose)` in another one. A result has the `pose` (dof,) in radians and metres, the terms
+    of the energy, and what the solver did. The step can be compiled, mapped and differentiated as any function of jax.
+    A frame that needs more room for image blobs than the tracker has, twice what its first frame needs, is an error.
+
+    Args:
+        recording: whose cameras and first frame the tracker is made for.
+        actor: one, or a list of them, which become one body with their poses one after the other.
+        settings: as in `track_settings`.
+
+    Raises:
+        InputError: as `track`.
+    """
+    config, actors = track_settings(**settings), actor_list(actor)
+    recording = with_cameras(recording, config.cameras)
+    job = Job.from_config(recording, actors, config)
+    tracker = replace(job.tracker, first_pose=job.start)
+    cells = next(read_cells(recording, tracker, job.frames[0], job.frames[0] + 1))
+    seen = jnp.asarray(cells.cells) if isinstance(cells, PartialCells) else cells
+    return replace(tracker, capacities=_with_more_room(first_capacities(tracker, tracker.start(), seen)))
+
+
+def read_cells(
+    recording: Recording, tracker: Tracker, start: int = 0, stop: int | None = None
+) -> Iterator[UInt8[Array, "camera rows columns 3"] | PartialCells]:
+    """What a tracker's step takes of each frame: the pictures of all cameras, averaged to cells (sRGB).
+
+    Args:
+        recording: with the cameras that the tracker was made for.
+        tracker: which says how pictures are cut into cells.
+        start: first frame, counted from the recording's first.
+        stop: the frame before which to stop; None: the end.
+
+    Returns:
+        An iterator with the cells of each frame, as bytes; where a camera has no picture, they say so too
+        (`PartialCells`).
+
+    Raises:
+        InputError: a picture cannot be read, other cameras, or no such frames.
+    """
+    grids = tracker.reader.candidates.grids
+    last = recording.num_frames if stop is None else stop
+    if len(grids) != len(recording.rig.names):
+        raise InputError(
+            f"{recording.path}: the tracker was made for {len(grids)} cameras, this recording has "
+            f"{len(recording.rig.names)}; open it with the same cameras"
+        )
+    if not 0 <= start < last <= recording.num_frames:
+        raise InputError(
+            f"start={start} stop={stop}: {recording.path} has the frames 0 to {recording.num_frames - 1}; choose "
+            f"0 <= start < stop <= {recording.num_frames}"
+        )
+    return _cells(recording, Preparation(grids), start, last)
+
+
+def _cells(
+    recording: Recording, preparation: Preparation, start: int, stop: int
+) -> Iterator[UInt8[Array, "camera rows columns 3"] | PartialCells]:
+    for pictures in read_prepared(recording, preparation, start, stop):
+        cells, present = on_device(cells_of_frame([picture.cells for picture in pictures]))
+        yield cells if present is None else PartialCells(cells, present)
+
+
+def _with_more_room(first: Capacities) -> Capacities:
+    return Capacities(capacity_for(ROOM * first.near), capacity_for(ROOM * first.matching), ROOM * first.blocks)
