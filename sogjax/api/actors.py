@@ -6,7 +6,7 @@ from typing import Any
 from sogjax.actor import make
 from sogjax.data.actor_file import save_body
 from sogjax.data.recording import Recording
-from sogjax.engine.build import color_space_and_radius, energy_weights
+from sogjax.engine.build import color_space_and_radius, energy_terms
 from sogjax.engine.recordings import body_named, with_cameras
 from sogjax.engine.terminal import progress, say
 from sogjax.errors import InputError
@@ -62,7 +62,7 @@ def make_actor(recording: Recording, subject: str | None = None, **settings: Any
         body_named(config.body),
         config.subject,
         space,
-        energy_weights(config.energy),
+        energy_terms(config.energy),
         say,
         progress,
         config.symmetric,

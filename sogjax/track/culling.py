@@ -181,17 +181,6 @@ def union_boxes(a: Float[Array, "*batch 2 2"], b: Float[Array, "*batch 2 2"]) ->
     return jnp.stack([low, jnp.maximum(a[..., 1, :], b[..., 1, :])], axis=-2)
 
 
-def in_boxes(images: Sog, boxes: Float[Array, "camera actor 2 2"]) -> Bool[Array, "camera image"]:
-    """Image blobs of each camera whose square touches one of its boxes."""
-    return jax.vmap(_in_boxes)(images.means, images.sigmas, boxes)
-
-
-def common_boxes(boxes: Float[Array, "*batch 2 2"], axis: str) -> Float[Array, "*batch 2 2"]:
-    """The smallest boxes that hold those of everyone on a mapped axis."""
-    low, high = jax.lax.pmin(boxes[..., 0, :], axis), jax.lax.pmax(boxes[..., 1, :], axis)
-    return jnp.stack([low, high], axis=-2)
-
-
 def _in_boxes(
     means: Float[Array, "n 2"], sigmas: Float[Array, "n"], boxes: Float[Array, "actor 2 2"]
 ) -> Bool[Array, "n"]:

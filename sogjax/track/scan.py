@@ -1,10 +1,8 @@
 """A whole clip as one compiled call: the tracker's step in a `lax.scan` over the cells of all frames.
 
-The frame-by-frame tracker (`sogjax.track.tracker.track`) gives the same numbers; this one has no work between frames,
-and can be mapped over settings (`sogjax.track.many`).
+The frame-by-frame tracker (`sogjax.track.tracker.track`) gives the same numbers; this one does no work between
+frames.
 """
-
-from collections.abc import Callable, Iterable, Iterator
 
 import equinox as eqx
 import jax
@@ -14,7 +12,7 @@ from jaxtyping import Array, Bool, Float, UInt8
 
 from sogjax.model.sog import Sog
 from sogjax.track.culling import Capacities
-from sogjax.track.frame import FrameCells, FrameResult, TrackedFrame, TrackState, on_device
+from sogjax.track.frame import FrameResult, TrackState
 from sogjax.track.tracker import Tracker, first_capacities, larger_capacities
 
 ClipCells = UInt8[Array, "frame camera rows columns 3"]
@@ -55,46 +53,14 @@ def track_clip(
         InputError: more image blobs than the largest capacity.
     """
     on_device = jnp.asarray(cells)
-    first = first_capacities(tracker, TrackState.from_pose(start), on_device[0])
-    return with_room(lambda capacities: _scanned(tracker, start, on_device, capacities), first)
-
-
-def with_room(tracked: Callable[[Capacities], FrameResult], capacities: Capacities) -> tuple[FrameResult, Capacities]:
-    """A clip tracked with ever larger capacities until nothing was cut off.
-
-    Raises:
-        InputError: more image blobs than the largest capacity.
-    """
+    capacities = first_capacities(tracker, TrackState.from_pose(start), on_device[0])
     while True:
-        result = tracked(capacities)
+        result = _scanned(tracker, start, on_device, capacities)
         counts = jax.device_get((result.num_near, result.num_matching, result.num_blocks))
         needed = [int(count.max()) for count in counts]
         if capacities.hold(*needed):
             return result, capacities
         capacities = larger_capacities(capacities, *needed)
-
-
-def replayed(
-    clip: FrameResult, capacities: Capacities, seconds: float, with_images: bool
-) -> Callable[[Tracker, Float[Array, "dof"], Iterable[FrameCells]], Iterator[TrackedFrame]]:
-    """The results of a clip as from the tracker that goes frame by frame, in whose place it can be put.
-
-    Image blobs are found again where they are wanted. `seconds` is what a frame took.
-    """
-    results = jax.device_get(clip)
-
-    def follow(tracker: Tracker, start: Float[Array, "dof"], frames: Iterable[FrameCells]) -> Iterator[TrackedFrame]:
-        state = TrackState.from_pose(start)
-        for index, frame in enumerate(frames):
-            result = jax.tree.map(lambda leaf, k=index: leaf[k], results)
-            if with_images:
-                cells, present = on_device(frame)
-                images = image_blobs(tracker, state, cells, capacities, present)
-                result = eqx.tree_at(lambda r: r.images, result, images)
-            yield TrackedFrame(index, result, capacities, tracker.reader.color_space, seconds)
-            state = state.advanced(jnp.asarray(result.pose))
-
-    return follow
 
 
 @eqx.filter_jit

@@ -30,7 +30,6 @@ from sogjax.track.culling import (
     block_capacity,
     body_boxes,
     capacity_for,
-    common_boxes,
     union_boxes,
 )
 from sogjax.track.frame import FrameCells, FrameResult, PartialCells, TrackedFrame, TrackState, on_device, on_host
@@ -63,8 +62,6 @@ class Tracker(eqx.Module):
     """Whether all pairs of blobs are compared, or those near each other."""
     confidence: Laplace | None = None
     """How standard deviations are found; None: they are not."""
-    together: str | None = eqx.field(static=True, default=None)
-    """Name of a mapped axis whose trackers look into common boxes, so that what they see is computed once."""
     capacities: Capacities | None = None
     """Room for image blobs of a step that is given none."""
     first_pose: Float[Array, "dof"] | None = None
@@ -94,7 +91,7 @@ class Tracker(eqx.Module):
         boxes = around(state.previous)
         if self.reader.box_around == "predicted":
             boxes = union_boxes(boxes, around(self.predicted(state)))
-        return boxes if self.together is None else common_boxes(boxes, self.together)
+        return boxes
 
     def views(
         self,

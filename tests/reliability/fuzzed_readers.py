@@ -23,7 +23,7 @@ from sogjax.data.recording_settings import read_recording_settings
 from sogjax.data.skeletons import read_skeleton
 from sogjax.data.skeletool_motion import read_skeletool_motion
 from sogjax.data.source import look_at_source, open_source
-from sogjax.engine.kept_run import CAPACITIES, CAPACITY, COLUMNS, FOLDER, NOTE, TERMS, KeptRun
+from sogjax.engine.kept_run import CAPACITIES, CAPACITY, COLUMNS, FOLDER, NOTE, TERM, KeptRun
 from sogjax.errors import InputError
 
 Read = Callable[[Path], object]
@@ -86,7 +86,7 @@ def _runs(place: Path) -> dict[str, tuple[Path, Read]]:
     kept.begin("track", {"version": "1"})
     kept.keep_actors([load_body(place / "actor.yaml")])
     kept.keep_start(jnp.asarray(motion.pose[0]))
-    names = (*COLUMNS, *TERMS, *(CAPACITY.format(name) for name in CAPACITIES))
+    names = (*COLUMNS, f"{TERM}similarity", *(CAPACITY.format(name) for name in CAPACITIES))
     rows = dict.fromkeys(names, motion.iterations) | {"pose": motion.pose}
     ArrayLog(kept.folder, {}, rows).close()
     whole_motion = lambda path: load_motion(path.parent)
