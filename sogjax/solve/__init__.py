@@ -2,6 +2,7 @@
 
 from sogjax.solve.ascent import ConditionedAscent, gradient_ascent
 from sogjax.solve.gauss_newton import GaussNewton
+from sogjax.solve.implicit import Optimum, implicit_optimum
 from sogjax.solve.optimistix import OptimistixSolver
 from sogjax.solve.quadratic import QuadraticModel
 from sogjax.solve.solution import CurvedObjective, Scales, Solution, Solver
@@ -11,9 +12,11 @@ __all__ = [
     "CurvedObjective",
     "GaussNewton",
     "OptimistixSolver",
+    "Optimum",
     "QuadraticModel",
     "Scales",
     "Solution",
     "Solver",
     "gradient_ascent",
+    "implicit_optimum",
 ]

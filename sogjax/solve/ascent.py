@@ -85,7 +85,7 @@ class ConditionedAscent(eqx.Module):
         return jnp.maximum(sizes, self.smallest_step_size * first_sizes)
 
 
-def gradient_ascent(epsilon: float = 0.002, min_iterations: int = 10, max_iterations: int = 200) -> ConditionedAscent:
+def gradient_ascent(epsilon: float = 0.002, min_iterations: int = 10, max_iterations: int = 400) -> ConditionedAscent:
     """Plain gradient ascent: the conditioned one whose step sizes stay as they are."""
     return ConditionedAscent(
         epsilon=epsilon, grow=1.0, shrink=1.0, min_iterations=min_iterations, max_iterations=max_iterations

@@ -12,11 +12,19 @@ from sogjax.view.bones import LEFT, MIDDLE, RIGHT, actor_palette
 from sogjax.view.rerun.names import FRAME, ITERATION, entity_part, time_columns
 
 _CURVE_COLORS = ((90, 170, 255), (255, 170, 60), (120, 220, 120), (255, 110, 120), (190, 140, 255), (240, 220, 90))
+_PLOT_OF = {
+    "similarity": "energy",
+    "energy": "energy",
+    "iterations": "iterations",
+    "deviation_mm": "deviations",
+    "error_mm": "errors",
+}
 _SIDES = (LEFT, RIGHT, MIDDLE)
 _PLOTS = {
     "errors": "Error, mm",
     "energy": "Similarity and energy",
     "penalties": "Penalties",
+    "terms": "Further terms of the energy",
     "iterations": "Iterations",
     "deviations": "Mean standard deviation of joints, mm",
 }
@@ -84,7 +92,5 @@ def _curve(name: str, actor: str | None) -> str:
 
 
 def _plot(curve: str) -> str:
-    """Which plot a curve belongs in."""
-    if "penalty" in curve:
-        return "penalties"
-    return {"iterations": "iterations", "deviation_mm": "deviations", "error_mm": "errors"}.get(curve, "energy")
+    """Which plot a curve belongs in; what is not known is a term that a user added."""
+    return "penalties" if "penalty" in curve else _PLOT_OF.get(curve, "terms")
