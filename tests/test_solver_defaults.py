@@ -4,9 +4,9 @@ import equinox as eqx
 import jax
 import numpy as np
 import pytest
+from sogjax.app.composition import composed
 
 from sogjax.app import build
-from sogjax.app.composition import composed
 from sogjax.energy import standard_terms
 from sogjax.solve import ConditionedAscent, GaussNewton, OptimistixSolver, gradient_ascent
 

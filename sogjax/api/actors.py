@@ -51,13 +51,27 @@ def make_actor(recording: Recording, subject: str | None = None, **settings: Any
         InputError: no example poses of the subject, pictures without masks, a pose that was not found; an unknown
             setting (with the nearest known one) or a wrong value.
     """
+    return fit_actor(recording, subject, **settings).body
+
+
+def fit_actor(recording: Recording, subject: str | None = None, **settings: Any) -> make.MadeActor:
+    """What `make_actor` gives, with all that was found on the way: example poses, silhouettes, standard deviations.
+
+    Args:
+        recording: as there.
+        subject: as there.
+        settings: as there.
+
+    Raises:
+        InputError: as there.
+    """
     for key in ("out", "overwrite"):
         if key in settings:
             raise InputError(f"{key}: make_actor writes no file; use sogjax.save_actor(path, actor)")
     given = settings | {"recording": recording.path, "out": "", "subject": subject}
     config: ActorConfig = composed_without_hydra(ActorConfig, "actor", keywords=given)
     space, _ = color_space_and_radius(config.color)
-    made = make.make_actor(
+    return make.make_actor(
         with_cameras(recording, config.cameras),
         body_named(config.body),
         config.subject,
@@ -67,4 +81,3 @@ def make_actor(recording: Recording, subject: str | None = None, **settings: Any
         progress,
         config.symmetric,
     )
-    return made.body
