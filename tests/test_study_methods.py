@@ -94,10 +94,10 @@ def test_the_methods_are_told_by_their_settings():
     lines = {cells(settings_table(), line)[0]: cells(settings_table(), line)[1:] for line in range(2, 12)}
     theirs, ours = lines["solver"]
     assert theirs == "conditioned ascent, mu+ 1.2, mu- 0.5, n_iter 10, epsilon 0.002"
-    assert ours.startswith("gauss newton")
+    assert ours.startswith("Gauss-Newton")
     assert lines["weights"] == ["w_l 1, w_a 0.05", "w_l 1, w_a 0.01"]
     assert lines["colours"][0] == "hsv, eps_sim 0.15"
-    assert lines["empty background pictures (plates)"] == ["not used", "used"]
+    assert lines["empty background pictures (plates)"] == ["not used", "used where there are some"]
 
 
 def test_slow_experiments_are_run_on_one_seed_of_each_motion_and_on_folders(tmp_path, monkeypatch):

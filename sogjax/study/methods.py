@@ -12,7 +12,7 @@ from sogjax.study.table import in_cell, significance
 Rows = Mapping[str, Sequence[RowSummary]]
 """The rows of an experiment, by method."""
 
-PRESETS = {"the paper's method": "paper", "ours": "default"}
+PRESETS = {"paper's method": "paper", "ours": "default"}
 """The methods of the report, and their presets."""
 
 
@@ -46,7 +46,8 @@ def _solver(config: TrackConfig) -> str:
     solver, is_ascent = config.solver, config.solver.method == "conditioned_ascent"
     steps = f", mu+ {solver.grow:g}, mu- {solver.shrink:g}" if is_ascent else ""
     least = f"n_iter {solver.min_iterations}, epsilon {solver.epsilon:g}"
-    return f"{solver.method.replace('_', ' ')}{steps}, {least}"
+    name = {"gauss_newton": "Gauss-Newton"}.get(solver.method, solver.method.replace("_", " "))
+    return f"{name}{steps}, {least}"
 
 
 def _colors(config: TrackConfig) -> str:
@@ -59,7 +60,9 @@ _SETTINGS: dict[str, Callable[[TrackConfig], str]] = {
     "weights": lambda c: f"w_l {c.energy.limit_weight:g}, w_a {c.energy.acceleration_weight:g}",
     "colours": _colors,
     "quad-tree": lambda c: f"depth {c.images.depth}, eps_col {c.images.color_tolerance:g}",
-    "empty background pictures (plates)": lambda c: "not used" if c.images.use_plates is False else "used",
+    "empty background pictures (plates)": lambda c: (
+        "not used" if c.images.use_plates is False else "used where there are some"
+    ),
     "Eq. 6": lambda c: {"printed": "as printed", "exact": "with the 1/2 of Eq. 2"}[c.energy.overlap_exponent],
     "Eq. 8": lambda c: "capped" if c.energy.capped else "not capped",
     "pairs of blobs": lambda c: {"dense": "all", "sparse": "near ones"}[c.energy.pairs],
@@ -83,6 +86,7 @@ _OVERVIEW: dict[str, Callable[[RowSummary], str]] = {
     "the paper": lambda row: row.paper,
     "error by the closest rule, mm": lambda row: f"{row.closest:.1f} +- {row.closest_std:.1f}",
     "error by the scaled rule, mm": lambda row: f"{row.mean:.1f} +- {row.std:.1f}",
+    "difference": significance,
     "joints, mm": lambda row: f"{row.joints:.1f}",
     "lost": lambda row: str(row.lost),
     "iterations": lambda row: f"{row.iterations:.1f}",

@@ -34,8 +34,12 @@ SPEED: dict[str, Cell] = {
 
 
 def markdown_table(experiment: Experiment, rows: Sequence[RowSummary]) -> str:
-    """The table of an experiment; columns without any value are left out."""
+    """The table of an experiment; columns without any value are left out.
+
+    With several methods, the paper's figures stand in the table that compares them.
+    """
     columns = ACCURACY if experiment.config.measure == "accuracy" else SPEED
+    columns = {title: cell for title, cell in columns.items() if title != "the paper" or not experiment.config.methods}
     texts = {title: [cell(row) if _done(row) else "" for row in rows] for title, cell in columns.items()}
     texts = {
         title: cells for title, cells in texts.items() if any(cell not in ("", "nan", "nan +- nan") for cell in cells)

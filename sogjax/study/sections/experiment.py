@@ -30,7 +30,10 @@ def _parts(experiment: Experiment, rows: Rows, study: Study) -> list[str]:
     if config.methods:
         parts += [comparison_table(experiment, rows)]
     if experiment.name == OVERVIEW:
-        parts += [overview_table(of_method) for of_method in rows.values()]
+        parts += [overview_table([row for row in of_method if row.by_recording]) for of_method in rows.values()]
+        parts += [
+            f"failed, {row.name}: {reason}" for of_method in rows.values() for row in of_method for reason in row.failed
+        ]
     for method, of_method in rows.items():
         parts += _of_method(experiment, method, of_method)
     parts += [config.note] if config.note else []
@@ -51,7 +54,7 @@ def _of_method(experiment: Experiment, method: str, rows: Sequence[RowSummary]) 
     parts = [title] if method else []
     if not any(row.by_recording for row in rows):
         return [*parts, *(f"failed, {row.name}: {reason}" for row in rows for reason in row.failed)]
-    parts.append(markdown_table(experiment, rows))
+    parts += [] if experiment.name == OVERVIEW else [markdown_table(experiment, rows)]
     if experiment.config.measure == "accuracy":
         parts += ["Mean error on each recording, mm:", recordings_table(experiment, rows)]
     if experiment.config.iterations_by_recording:
