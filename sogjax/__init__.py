@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from sogjax.api.tracking import find_first_pose, track
     from sogjax.data.motion import Motion
     from sogjax.data.recording import Recording
+    from sogjax.energy.term import Penalty, Term
     from sogjax.errors import InputError
     from sogjax.model.body import Body as Actor
     from sogjax.settings import TrackConfig
@@ -38,7 +39,9 @@ __all__ = [
     "Actor",
     "InputError",
     "Motion",
+    "Penalty",
     "Recording",
+    "Term",
     "TrackConfig",
     "TrackState",
     "Tracker",
@@ -62,7 +65,9 @@ _HOMES = {
     "Actor": "sogjax.model.body:Body",
     "InputError": "sogjax.errors",
     "Motion": "sogjax.data.motion",
+    "Penalty": "sogjax.energy.term",
     "Recording": "sogjax.data.recording",
+    "Term": "sogjax.energy.term",
     "TrackConfig": "sogjax.settings",
     "TrackState": "sogjax.track.frame",
     "Tracker": "sogjax.track.tracker",

@@ -174,7 +174,7 @@ def test_a_saved_motion_is_the_same_when_loaded(tmp_path, motion):
 
 
 def test_another_ending_is_refused(tmp_path, motion):
-    with pytest.raises(sogjax.InputError, match=r"no writer for the ending '\.fbx'"):
+    with pytest.raises(sogjax.InputError, match=r"no writer for the extension '\.fbx'"):
         motion.save(tmp_path / "walk.fbx")
     assert list(tmp_path.iterdir()) == []
 
@@ -277,3 +277,25 @@ def test_a_rerun_file_shows_a_motion(tmp_path, recording, motion):
     with_pictures = (tmp_path / "walk.rrd").stat().st_size
     sogjax.write_rerun(tmp_path / "bare.rrd", recording, [motion], images=False)
     assert with_pictures > (tmp_path / "bare.rrd").stat().st_size > 0
+
+
+class Ceiling(sogjax.Penalty):
+    """Squared heights, in square metres, of the blobs above a plane."""
+
+    height: float = 0.0
+
+    def value(self, posed, frame):
+        """Summed over all blobs."""
+        return jnp.sum(jnp.maximum(posed.blobs.means[:, 2] - self.height, 0.0) ** 2)
+
+
+def test_a_term_of_ones_own_moves_the_motion(recording, actor, motion):
+    middle = float(np.median(motion.blob_means[..., 2]))
+    held = sogjax.track(recording, actor, terms=[Ceiling(weight=100.0, height=middle)], **SMALL)
+    above = lambda found: np.maximum(found.blob_means[..., 2] - middle, 0.0).sum()
+    assert above(held) < 0.7 * above(motion)
+
+
+def test_two_terms_of_one_name_are_refused(recording, actor):
+    with pytest.raises(sogjax.InputError, match="two terms are named 'ceiling'"):
+        sogjax.track(recording, actor, terms=[Ceiling(weight=1.0), Ceiling(weight=2.0)], **SMALL)

@@ -11,6 +11,7 @@ from sogjax.api.settings import track_settings
 from sogjax.api.tracking import actor_list
 from sogjax.data.recording import Recording
 from sogjax.data.video import read_prepared
+from sogjax.energy import Term
 from sogjax.engine.job import Job
 from sogjax.engine.pipeline import Preparation, cells_of_frame
 from sogjax.engine.recordings import with_cameras
@@ -24,7 +25,9 @@ ROOM = 2
 """Times the room that suits the first frame: nobody makes more while a pure step runs."""
 
 
-def make_tracker(recording: Recording, actor: Body | Sequence[Body], **settings: Any) -> Tracker:
+def make_tracker(
+    recording: Recording, actor: Body | Sequence[Body], *, terms: Sequence[Term] = (), **settings: Any
+) -> Tracker:
     """The tracker of a recording as an immutable module (a pytree), with a pure step.
 
         tracker = sogjax.make_tracker(recording, actor)
@@ -40,6 +43,7 @@ def make_tracker(recording: Recording, actor: Body | Sequence[Body], **settings:
     Args:
         recording: whose cameras and first frame the tracker is made for.
         actor: one, or a list of them, which become one body with their poses one after the other.
+        terms: further terms of the energy, beside those of the settings.
         settings: as in `track_settings`.
 
     Raises:
@@ -47,7 +51,7 @@ def make_tracker(recording: Recording, actor: Body | Sequence[Body], **settings:
     """
     config, actors = track_settings(**settings), actor_list(actor)
     recording = with_cameras(recording, config.cameras)
-    job = Job.from_config(recording, actors, config)
+    job = Job.from_config(recording, actors, config, terms=terms)
     tracker = replace(job.tracker, first_pose=job.start)
     cells = next(read_cells(recording, tracker, job.frames[0], job.frames[0] + 1))
     seen = jnp.asarray(cells.cells) if isinstance(cells, PartialCells) else cells

@@ -6,6 +6,7 @@ from typing import Any, overload
 from sogjax.api.settings import track_settings
 from sogjax.data.motion import Motion
 from sogjax.data.recording import Recording
+from sogjax.energy import Term
 from sogjax.engine.first_pose import searched_poses
 from sogjax.engine.job import frame_range
 from sogjax.engine.recordings import upright, with_cameras
@@ -16,14 +17,18 @@ from sogjax.track.pose_search import FoundPose
 
 
 @overload
-def track(recording: Recording, actor: Body, **settings: Any) -> Motion: ...
+def track(recording: Recording, actor: Body, *, terms: Sequence[Term] = (), **settings: Any) -> Motion: ...
 
 
 @overload
-def track(recording: Recording, actor: Sequence[Body], **settings: Any) -> list[Motion]: ...
+def track(
+    recording: Recording, actor: Sequence[Body], *, terms: Sequence[Term] = (), **settings: Any
+) -> list[Motion]: ...
 
 
-def track(recording: Recording, actor: Body | Sequence[Body], **settings: Any) -> Motion | list[Motion]:
+def track(
+    recording: Recording, actor: Body | Sequence[Body], *, terms: Sequence[Term] = (), **settings: Any
+) -> Motion | list[Motion]:
     """The motion of an actor in a recording (Section 5.3), or of several, tracked together.
 
     What `sogjax track` does, without its files. Progress and warnings go to standard error.
@@ -32,6 +37,7 @@ def track(recording: Recording, actor: Body | Sequence[Body], **settings: Any) -
         recording: with the first frame's rough pose in `initial_pose.yaml`; it is searched for where there is none, or
             with `initial_pose="auto"`.
         actor: one, or a list of them with different names.
+        terms: further terms of the energy, beside those of the settings.
         settings: as in `track_settings`; `start` and `stop` count from the recording's first frame.
 
     Returns:
@@ -41,7 +47,7 @@ def track(recording: Recording, actor: Body | Sequence[Body], **settings: Any) -
         InputError: a wrong setting, unreadable pictures, no such frames, or a first pose that is not found.
     """
     config, actors = track_settings(**settings), actor_list(actor)
-    motions = track_recording(with_cameras(recording, config.cameras), actors, config).motions
+    motions = track_recording(with_cameras(recording, config.cameras), actors, config, terms).motions
     found = [motions[each.name] for each in actors]
     return found[0] if isinstance(actor, Body) else found
 

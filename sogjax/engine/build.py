@@ -14,7 +14,7 @@ from sogjax.data.video import read_still
 from sogjax.energy.added import added_terms
 from sogjax.energy.frame_energy import standard_terms
 from sogjax.energy.overlap import EXACT_EXPONENT, PRINTED_EXPONENT
-from sogjax.energy.term import Terms
+from sogjax.energy.term import Term, Terms
 from sogjax.energy.views import whole_image_overlap
 from sogjax.errors import InputError
 from sogjax.evaluate.markers import MARKER_RULES, MarkerRule
@@ -99,11 +99,12 @@ def color_space_and_radius(config: ColorConfig) -> tuple[str, float]:
     return space, at_least("color.radius", radius, 1e-6)
 
 
-def energy_terms(config: EnergyConfig) -> Terms:
-    """The terms of Eq. 10, and those that are added.
+def energy_terms(config: EnergyConfig, further: Sequence[Term] = ()) -> Terms:
+    """The terms of Eq. 10, those that the settings add, and further ones.
 
     Raises:
-        InputError: a value that is no choice or out of range, or a term that cannot be made.
+        InputError: a value that is no valid choice or is out of range, a term that cannot be made, or two terms of one
+            name.
     """
     exponent = one_of("energy.overlap_exponent", config.overlap_exponent, ("exact", "printed"))
     gradient = one_of("energy.gradient", config.gradient, ("forward", "autodiff"))
@@ -114,7 +115,11 @@ def energy_terms(config: EnergyConfig) -> Terms:
         capped=config.capped,
         gradient="forward" if gradient == "forward" else "autodiff",
     )
-    return (*standard, *added_terms("energy.terms", config.terms, [term.name for term in standard]))
+    terms = (*standard, *added_terms("energy.terms", config.terms, [term.name for term in standard]), *further)
+    names = [term.name for term in terms]
+    if len(set(names)) < len(names):
+        raise InputError(f"terms: two terms are named {max(names, key=names.count)!r}; give each its own `name`")
+    return terms
 
 
 def box_around(config: ImagesConfig) -> BoxAround:
@@ -197,15 +202,17 @@ def image_reader(recording: Recording, grids: tuple[CellGrid, ...], config: Trac
     )
 
 
-def tracker(recording: Recording, body: Body, grids: tuple[CellGrid, ...], config: TrackConfig) -> Tracker:
-    """The tracker of a recording for a body that stands upright in its world."""
+def tracker(
+    recording: Recording, body: Body, grids: tuple[CellGrid, ...], config: TrackConfig, terms: Sequence[Term] = ()
+) -> Tracker:
+    """The tracker of a recording for a body that stands upright in its world, with further terms of the energy."""
     cameras = device_cameras(recording)
     return Tracker(
         body=body,
         cameras=cameras,
         normalizers=whole_image_overlap(cameras.image_size),
         reader=image_reader(recording, grids, config),
-        terms=energy_terms(config.energy),
+        terms=energy_terms(config.energy, terms),
         solver=solver(config.solver),
         scales=solver_scales(config.solver, body),
         extrapolation=config.tracking.extrapolation,

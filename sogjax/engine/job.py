@@ -1,7 +1,7 @@
 """One run of the tracker over a recording: what it needs, and how its result is made."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
@@ -13,6 +13,7 @@ from jaxtyping import Array, Float
 
 from sogjax.data.recording import Recording
 from sogjax.data.stages import Behind
+from sogjax.energy import Term
 from sogjax.engine import build
 from sogjax.engine.cells import picture_reader
 from sogjax.engine.first_pose import first_poses
@@ -51,14 +52,22 @@ class Job:
 
     @classmethod
     def from_config(
-        cls, recording: Recording, bodies: list[Body], config: TrackConfig, kept: KeptRun | None = None
+        cls,
+        recording: Recording,
+        bodies: list[Body],
+        config: TrackConfig,
+        kept: KeptRun | None = None,
+        terms: Sequence[Term] = (),
     ) -> "Job":
-        """The job of tracking actors (in their own upright frames), from the first pose that was kept, if any."""
+        """The job of tracking actors (in their own upright frames), from the first pose that was kept, if any.
+
+        `terms` are added to those of the settings.
+        """
         bodies = [upright(body, recording) for body in bodies]
         frames = frame_range(recording, config)
         grids = build.cell_grids(recording, config.images.depth)
         with ThreadPoolExecutor(1) as beside:  # both compile for seconds
-            building = beside.submit(_tracker, recording, bodies, grids, config)
+            building = beside.submit(_tracker, recording, bodies, grids, config, terms)
             start = None if kept is None else kept.start()
             if start is None:
                 start = jnp.concatenate(first_poses(recording, bodies, config, frames[0]))
@@ -76,9 +85,10 @@ def tracking(
     outputs: OutputsConfig,
     out: Path,
     kept: KeptRun | None = None,
+    terms: Sequence[Term] = (),
 ) -> Iterator[Run]:
     """Track, resuming what was kept; the motions are in files that are removed when the block ends without an error."""
-    job = Job.from_config(recording, bodies, config, kept)
+    job = Job.from_config(recording, bodies, config, kept, terms)
     with run_job(job, outputs, out, picture_reader(config.images), kept=kept) as result:
         yield result
 
@@ -126,8 +136,10 @@ def run_job(
         raise
 
 
-def _tracker(recording: Recording, bodies: list[Body], grids: tuple[CellGrid, ...], config: TrackConfig) -> Tracker:
-    tracker = build.tracker(recording, concatenate(bodies), grids, config)
+def _tracker(
+    recording: Recording, bodies: list[Body], grids: tuple[CellGrid, ...], config: TrackConfig, terms: Sequence[Term]
+) -> Tracker:
+    tracker = build.tracker(recording, concatenate(bodies), grids, config, terms)
     compile_counts(tracker, (len(grids), *stack_shape(grids), 3))
     return tracker
 

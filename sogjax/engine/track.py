@@ -1,5 +1,6 @@
 """From the videos of a recording to the motion of its actors, with or without files."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -11,6 +12,7 @@ from omegaconf import OmegaConf
 from sogjax.data.motion import arrays_of, load_motion
 from sogjax.data.motion_log import PER_FRAME, SOMETIMES_PER_FRAME
 from sogjax.data.recording import Recording
+from sogjax.energy import Term
 from sogjax.engine import build
 from sogjax.engine.first_pose import initial_pose_file
 from sogjax.engine.job import frame_range, tracking
@@ -79,10 +81,13 @@ def _ended(folder: RunFolder, recording: Recording, wanted: OutputsConfig) -> Ru
     return result
 
 
-def track_recording(recording: Recording, bodies: list[Body], config: TrackConfig) -> Run:
-    """Track actors (in their own upright frames) without writing files."""
+def track_recording(recording: Recording, bodies: list[Body], config: TrackConfig, terms: Sequence[Term] = ()) -> Run:
+    """Track actors (in their own upright frames) without writing files; `terms` are added to those of the settings."""
     nothing = OutputsConfig(overlay=False, rerun=False, bvh=False)
-    with TemporaryDirectory() as folder, tracking(recording, bodies, config, nothing, Path(folder)) as result:
+    with (
+        TemporaryDirectory() as folder,
+        tracking(recording, bodies, config, nothing, Path(folder), terms=terms) as result,
+    ):
         motions = {
             name: replace(motion, **{key: np.array(rows) for key, rows in arrays_of(motion).items() if key in _ROWS})
             for name, motion in result.motions.items()
