@@ -7,6 +7,7 @@ from sogjax.study import study as study_module
 from sogjax.study.experiment import Experiment, ExperimentConfig, RowConfig
 from sogjax.study.methods import comparison_table, overview_table, settings_table
 from sogjax.study.record import RunRecord
+from sogjax.study.report import experiment_sections
 from sogjax.study.sections.experiment import experiment_section
 from sogjax.study.source import Source
 from sogjax.study.study import Study
@@ -80,6 +81,13 @@ def test_a_section_tells_the_failures_of_a_method(study):
     assert "failed, b: r: lost" in "\n".join(section.parts)
     assert any(part.startswith("**Theirs** (`preset=paper`)") for part in section.parts)
     assert len(section.pictures) == 1
+
+
+def test_the_experiments_with_the_papers_method_lead(study):
+    ours = experiment(methods={}, title="U", rows={"a": RowConfig()})
+    titles = [section.title for section in experiment_sections([ours, experiment()], study, [])]
+    assert titles == ["The two methods", "T", "Experiments with our method", "U"]
+    assert [section.title for section in experiment_sections([ours], study, [])] == ["U"]
 
 
 def test_the_overview_has_both_rules_and_the_rate_of_the_step(study):

@@ -31,7 +31,7 @@ class Evaluation:
     lost: tuple[LostPoint, ...]
     rule: MarkerRule = "scaled"
     """How `markers` were attached."""
-    markers_by_rule: Mapping[MarkerRule, PointErrors] = field(default_factory=dict)
+    markers_by_rule: Mapping[str, PointErrors] = field(default_factory=dict)
     """The markers attached by either rule; empty where the truth has none."""
 
     def __str__(self) -> str:
@@ -116,7 +116,7 @@ class GroupEvaluation:
             "swaps": [asdict(swap) for swap in self.swaps],
         }
 
-    def _markers_by_rule(self) -> dict[MarkerRule, list[PointErrors]]:
+    def _markers_by_rule(self) -> dict[str, list[PointErrors]]:
         rules = dict.fromkeys(rule for e in self.evaluations.values() for rule in e.markers_by_rule)
         each = self.evaluations.values()
         return {rule: [e.markers_by_rule[rule] for e in each if rule in e.markers_by_rule] for rule in rules}

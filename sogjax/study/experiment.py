@@ -12,6 +12,8 @@ from sogjax.errors import InputError
 from sogjax.settings.files import conf_dir
 
 MEASURES = ("accuracy", "speed")
+OVERVIEW = "methods"
+"""The experiment whose rows are whole methods."""
 DEFAULTS = ""
 """Name of the only method where an experiment names none."""
 
@@ -116,6 +118,11 @@ class Experiment:
     def methods(self) -> dict[str, list[str]]:
         """The methods by name with their overrides; a single one has no name and no overrides."""
         return self.config.methods or {DEFAULTS: []}
+
+    @property
+    def compares_methods(self) -> bool:
+        """Whether it shows the paper's method beside ours."""
+        return bool(self.config.methods) or self.name == OVERVIEW
 
     @property
     def is_slow(self) -> bool:

@@ -1,15 +1,22 @@
 """The report: the paper's method and ours in the experiments of its Section 6, then experiments with ours."""
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from sogjax.engine.outputs import results_folder
 from sogjax.engine.terminal import say
 from sogjax.errors import InputError
-from sogjax.study.document import write_html, write_markdown
+from sogjax.study.document import Section, write_html, write_markdown
 from sogjax.study.done import Done, write_runs
 from sogjax.study.experiment import Experiment, experiment_names
-from sogjax.study.sections.about import about_section, installed_version, methods_section, versions_section
+from sogjax.study.sections.about import (
+    about_section,
+    installed_version,
+    methods_section,
+    own_section,
+    versions_section,
+)
 from sogjax.study.sections.confidence import confidence_section
 from sogjax.study.sections.experiment import experiment_section
 from sogjax.study.sections.worst import worst_section
@@ -34,18 +41,25 @@ def write_report(config: ReportConfig) -> list[Path]:
         study = Study.from_config(config, out)
         begin = time.perf_counter()
         done: list[Done] = []
-        sections = [experiment_section(experiment, study, done) for experiment in experiments]
+        sections = experiment_sections(experiments, study, done)
         if not any(not one.record.failed for one in done) and experiments:
             reason = done[0].record.failed if done else "do=false, and none was done before"
             raise InputError(f"{out}: no run worked: {reason}")
         sections += [confidence_section(study)] if CONFIDENCE in names else []
         say(f"runs done or read in {time.perf_counter() - begin:.0f} s")
-        compared = [methods_section()] if any(experiment.is_slow for experiment in experiments) else []
-        sections = [*compared, *sections, worst_section(done, config.pictures)]
-        sections += [about_section(config, done), versions_section(config)]
+        sections += [worst_section(done, config.pictures), about_section(config, done), versions_section(config)]
         write_html(out / "report.html", TITLE, sections)
         files = [out / "report.html", *write_markdown(out / "report.md", TITLE, sections)]
     return [*files, write_runs(out / "runs.csv", done)]
+
+
+def experiment_sections(experiments: Sequence[Experiment], study: Study, done: list[Done]) -> list[Section]:
+    """The experiments with the paper's method first, then those with ours only; their runs are added to `done`."""
+    compared = [experiment_section(one, study, done) for one in experiments if one.compares_methods]
+    own = [experiment_section(one, study, done) for one in experiments if not one.compares_methods]
+    if not compared:
+        return own
+    return [methods_section(), *compared, *([own_section()] if own else []), *own]
 
 
 def _check_matplotlib() -> None:

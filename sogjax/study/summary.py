@@ -124,9 +124,9 @@ def pooled_std(runs: Sequence[Float[np.ndarray, "_"]], stds: Sequence[float]) ->
         return UNKNOWN
     present = counts > 0
     counts, means = counts[present], np.array([_mean(errors) for errors in runs])[present]
-    stds = np.asarray(stds, float)[present]
+    deviations = np.asarray(stds, float)[present]
     weights = counts / counts.sum()
-    return float(np.sqrt(np.sum(weights * (stds**2 + (means - np.sum(weights * means)) ** 2))))
+    return float(np.sqrt(np.sum(weights * (deviations**2 + (means - np.sum(weights * means)) ** 2))))
 
 
 def _difference(records: Records, reference: Records) -> Difference | None:

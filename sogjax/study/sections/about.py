@@ -59,6 +59,13 @@ def methods_section() -> Section:
     return Section("The two methods", [text, settings_table()])
 
 
+def own_section() -> Section:
+    """What heads the experiments with one method."""
+    return Section(
+        "Experiments with our method", ["The sections that follow start from the default, `preset=default`."]
+    )
+
+
 def versions_section(config: ReportConfig) -> Section:
     """Packages, and the settings that rows do not change."""
     tree = OmegaConf.structured(track_config(config.overrides, recording="RECORDING"))

@@ -4,15 +4,12 @@ from collections.abc import Sequence
 
 from sogjax.study.document import Section
 from sogjax.study.done import Done
-from sogjax.study.experiment import Experiment
+from sogjax.study.experiment import OVERVIEW, Experiment
 from sogjax.study.methods import Rows, comparison_table, overview_table
 from sogjax.study.pictures import experiment_chart
 from sogjax.study.study import Study
 from sogjax.study.summary import RowSummary
 from sogjax.study.table import findings, iterations_table, markdown_table, recordings_table
-
-OVERVIEW = "methods"
-"""The experiment that compares whole methods."""
 
 
 def experiment_section(experiment: Experiment, study: Study, done: list[Done]) -> Section:
