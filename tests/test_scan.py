@@ -105,6 +105,7 @@ def alone(trackers, start, cells):
     return np.stack([np.stack([r.pose for r in frame_by_frame(t, start, cells)]) for t in trackers], axis=1)
 
 
+@pytest.mark.slow
 def test_many_trackers_find_what_each_finds_alone(dog):
     tracker, start, cells = dog
     trackers = different(tracker)
@@ -122,6 +123,7 @@ def test_many_trackers_find_what_each_finds_alone(dog):
     assert (np.asarray(common.num_near) >= np.asarray(own.num_near)).all()
 
 
+@pytest.mark.slow
 def test_members_in_step_find_the_same(dog):
     """With Gauss-Newton: the ascent's steps by signs of gradients magnify rounding."""
     tracker, start, cells = dog
@@ -131,6 +133,7 @@ def test_members_in_step_find_the_same(dog):
     np.testing.assert_allclose(in_step.pose, alone(trackers, start, cells), atol=UNNOTICED)
 
 
+@pytest.mark.slow
 def test_many_sparse_gauss_newton_trackers(dog):
     tracker, start, cells = dog
     change = lambda where, value: eqx.tree_at(where, sparse(tracker), jnp.asarray(value))

@@ -60,6 +60,7 @@ def test_the_motion_of_a_dog_is_found(dog):
     assert all((r.result.num_near <= r.capacities.near).all() for r in results)
 
 
+@pytest.mark.slow
 def test_the_motion_of_a_human_is_found_from_a_rough_start():
     body = in_colors(shipped("human"))
     rig = ring_rig(5, (160, 120), distance=3.0)
@@ -182,6 +183,7 @@ def test_the_boxes_hold_the_body_in_the_last_and_the_predicted_pose(dog):
             assert (pixels < boxes[k, 0, 1]).all()
 
 
+@pytest.mark.slow
 def test_two_actors_are_tracked_as_one_body():
     """Two dogs side by side, moving in opposite directions."""
     bodies = [in_colors(shipped("dog"), hues) for hues in ((0.0, 60.0), (80.0, 170.0))]
@@ -198,6 +200,7 @@ def test_two_actors_are_tracked_as_one_body():
         assert max(errors) < 0.03
 
 
+@pytest.mark.slow
 def test_a_tree_with_more_nodes_than_the_largest_capacity_is_tracked():
     # Few of its nodes are leaves near the body: only those need room.
     body = in_colors(shipped("dog"))
