@@ -123,6 +123,7 @@ def test_one_compilation_serves_a_recording_and_every_swept_number(dog):
     assert len(traces) == 1
 
 
+@pytest.mark.slow
 def test_a_frame_that_needs_more_room_is_done_again(dog, monkeypatch):
     """With the same result as with enough room from the start."""
     tracker, poses, frames = dog
@@ -140,6 +141,7 @@ def test_a_frame_that_needs_more_room_is_done_again(dog, monkeypatch):
         np.testing.assert_allclose(a.result.terms.similarity, b.result.terms.similarity, rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_near_pairs_are_tracked_by_gauss_newton_and_too_little_room_is_noticed(dog, monkeypatch):
     """The motion is found as with all pairs, also where the lists begin with too little room."""
     tracker, poses, frames = dog
