@@ -152,6 +152,7 @@ def made(tmp_path_factory):
     return actor, truth, {"stand": stand, "trot": trot}
 
 
+@pytest.mark.slow
 def test_the_size_of_the_subject_is_found(made):
     actor, truth, _ = made
     base = size_of(shipped("dog"))
@@ -159,6 +160,7 @@ def test_the_size_of_the_subject_is_found(made):
     assert abs(size_of(actor.body) / base - TRUE_SCALE) < (TRUE_SCALE - 1.0) / 2.0
 
 
+@pytest.mark.slow
 def test_the_poses_of_the_examples_are_found(made):
     actor, truth, poses = made
     assert set(actor.example_poses) == set(poses)
@@ -168,6 +170,7 @@ def test_the_poses_of_the_examples_are_found(made):
         assert np.linalg.norm(found - expected, axis=1).mean() < 0.05
 
 
+@pytest.mark.slow
 def test_the_colours_of_the_subject_are_found(made):
     """For most blobs: small ones lie beside each other."""
     actor, truth, _ = made
@@ -176,6 +179,7 @@ def test_the_colours_of_the_subject_are_found(made):
     assert 0.0 < float(actor.estimate.mismatch) < 0.2
 
 
+@pytest.mark.slow
 def test_the_actor_keeps_its_names_and_stands_in_its_own_frame(made):
     actor, _, _ = made
     dog = shipped("dog")

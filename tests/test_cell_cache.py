@@ -151,6 +151,7 @@ def test_a_clip_is_the_stack_of_its_frames(walk, tmp_path):
     assert isinstance(clip, np.memmap)
 
 
+@pytest.mark.slow
 def test_tracking_with_and_without_kept_cells_gives_one_motion(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     actor = actor_file(tmp_path / "actor.yaml")

@@ -66,11 +66,13 @@ def test_exchanged_videos(tmp_path):
     assert len(warnings(found)) == 1
 
 
+@pytest.mark.slow
 def test_exchanged_calibrations(tmp_path):
     found = looked_at(tmp_path / "walk", faulty.exchanged_calibration)
     assert (WRONG, OTHER) in [tuple(sorted(finding.cameras)) for finding in warnings(found, "calibration")]
 
 
+@pytest.mark.slow
 def test_a_camera_that_was_turned_by_five_degrees(tmp_path):
     found = looked_at(tmp_path / "walk", faulty.turned)
     assert {finding.cameras for finding in warnings(found)} == {(WRONG,)}
@@ -78,11 +80,13 @@ def test_a_camera_that_was_turned_by_five_degrees(tmp_path):
     assert found.numbers["silhouettes"][WRONG]["away"] == pytest.approx(5.0, abs=0.7)
 
 
+@pytest.mark.slow
 def test_a_mirrored_world(tmp_path):
     found = looked_at(tmp_path / "walk", faulty.mirrored)
     assert ["mirrored" in finding.what for finding in warnings(found)] == [True]
 
 
+@pytest.mark.slow
 def test_millimetres_taken_for_metres(tmp_path):
     found = looked_at(tmp_path / "walk", faulty.in_millimetres)
     (finding,) = warnings(found)
@@ -91,11 +95,13 @@ def test_millimetres_taken_for_metres(tmp_path):
     assert found.numbers["subject"]["height"] == pytest.approx(1700, rel=0.15)
 
 
+@pytest.mark.slow
 def test_a_wrong_vertical(tmp_path):
     found = looked_at(tmp_path / "walk", faulty.wrong_vertical)
     assert ["`up: z`" in finding.remedy for finding in warnings(found)] == [True]
 
 
+@pytest.mark.slow
 def test_a_frame_that_stands_twice(tmp_path):
     found = looked_at(tmp_path / "walk", faulty.frame_repeated)
     assert [(finding.topic, finding.cameras) for finding in warnings(found)] == [("frames", (WRONG,))]
@@ -110,6 +116,7 @@ def test_a_frame_that_was_lost(tmp_path):
     assert not found.offsets
 
 
+@pytest.mark.slow
 def test_a_camera_exposed_otherwise(tmp_path):
     found = looked_at(tmp_path / "walk", faulty.darkened)
     assert {(finding.topic, finding.cameras) for finding in warnings(found)} == {("exposure", (WRONG,))}
@@ -121,6 +128,7 @@ def left_out(folder, camera, *spans):
     path.write_text(yaml.safe_dump(yaml.safe_load(path.read_text()) | {"missing": {camera: [list(s) for s in spans]}}))
 
 
+@pytest.mark.slow
 def test_missing_pictures_are_left_out_of_every_comparison(tmp_path):
     """A late start, a gap that holds both stills, and nothing is wrong; in a shorter one offsets are sure as ever."""
     found = looked_at(tmp_path / "walk", lambda folder: left_out(folder, WRONG, (0, 1), (13, 26)))
@@ -140,6 +148,7 @@ def test_missing_pictures_are_left_out_of_every_comparison(tmp_path):
     assert found.numbers["synchronisation"][OTHER]["sure"]
 
 
+@pytest.mark.slow
 def test_a_camera_with_hardly_a_picture_is_not_said_to_be_out_of_step(tmp_path):
     found = looked_at(tmp_path / "walk", lambda folder: left_out(folder, WRONG, (4, 39)))
     assert not warnings(found)
@@ -196,6 +205,7 @@ def test_nearly_still_pictures_give_no_offsets(name):
     assert any("cannot be estimated" in finding.what for finding in found.findings)
 
 
+@pytest.mark.slow
 def test_the_command_writes_numbers_and_picture_and_offsets_only_when_asked(capsys, tmp_path):
     recording = copied(tmp_path / "walk")
     faulty.started_late(recording)

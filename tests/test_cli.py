@@ -77,6 +77,7 @@ def test_from_a_recording_to_motion_and_pictures(capsys, tmp_path, monkeypatch, 
     assert len(list((tmp_path / "multirun").glob("*/*/motion.npz"))) == 2
 
 
+@pytest.mark.slow
 def test_one_member_of_a_sweep_fails_and_the_others_go_on(capsys, tmp_path, monkeypatch, rendered, plain_logging):
     monkeypatch.chdir(tmp_path)
     light = ("outputs.overlay=false", "outputs.rerun=false", "outputs.bvh=false", "start=3")
@@ -92,6 +93,7 @@ def test_one_member_of_a_sweep_fails_and_the_others_go_on(capsys, tmp_path, monk
     assert err.splitlines()[-1].startswith("sogjax: start=3 stop=9")
 
 
+@pytest.mark.slow
 def test_videos_of_different_length(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     recording = trackable(tmp_path / "walk")

@@ -53,6 +53,7 @@ def write(path, image):
     assert cv2.imwrite(str(path), image)
 
 
+@pytest.mark.slow
 def test_a_dog_is_tracked_by_the_commands_from_files_alone(recording, tmp_path, capsys):
     """The body is asked for by name, made from its pictures, found in frame 0 and followed."""
     actor, out = tmp_path / "dog.yaml", tmp_path / "out"

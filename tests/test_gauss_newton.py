@@ -190,6 +190,7 @@ def test_a_swept_number_does_not_compile_again():
 
 
 @pytest.mark.parametrize("sparse", [False, True])
+@pytest.mark.slow
 def test_it_climbs_the_energy_as_far_as_the_others(sparse):
     energy, _ = frame_energy(sparse=False)
     start = energy.body.poses["rest"]

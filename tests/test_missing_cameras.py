@@ -139,6 +139,7 @@ def test_a_camera_that_is_missing_for_a_while_is_told(capsys, tmp_path, rendered
 
 
 @pytest.mark.parametrize("light", [(), LIGHT])
+@pytest.mark.slow
 def test_a_run_with_missing_cameras_goes_on(capsys, tmp_path, monkeypatch, light):
     """And says of how many frames they were missing: of all, not only of those that were left to do."""
     monkeypatch.chdir(tmp_path)
@@ -166,6 +167,7 @@ def test_a_run_with_missing_cameras_goes_on(capsys, tmp_path, monkeypatch, light
     assert light or look_at_source(tmp_path / "run" / "overlay.mp4").num_frames == 20
 
 
+@pytest.mark.slow
 def test_pictures_of_several_sizes_on_their_sides_and_upright(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     recording = trackable(tmp_path / "walk")

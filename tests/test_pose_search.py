@@ -52,6 +52,7 @@ def dog():
     return in_colors(shipped("dog"))
 
 
+@pytest.mark.slow
 def test_a_dog_is_found_without_a_hint(dog):
     truth = moved(dog, standing(dog, 1.1, (0.3, -0.2)), {"root_yaw": 2.1})
     found = search_pose(dog, frame_of(draw(dog, truth, RIG)), TERMS, "z")
@@ -60,6 +61,7 @@ def test_a_dog_is_found_without_a_hint(dog):
     assert 0.0 < found.margin <= 1.0
 
 
+@pytest.mark.slow
 def test_two_dogs_of_other_colours_are_both_found(dog):
     other = replace(in_colors(shipped("dog"), (175.0, 90.0)), name="other")
     first = moved(dog, standing(dog, 1.1, (0.0, 0.45)), {"root_yaw": 0.4})

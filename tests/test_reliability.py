@@ -13,10 +13,12 @@ def test_there_are_many_cases():
 
 
 @pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.slow
 def test_wrong_input_is_refused_with_one_sentence_and_changes_nothing(family):
     outcomes = outcomes_of([case for case in cases() if case.family == family])
     assert [outcome for outcome in outcomes if not outcome.good] == []
 
 
+@pytest.mark.slow
 def test_damaged_files_never_end_in_a_traceback():
     assert {reader.name: reader.crashes for reader in fuzz_readers(60) if reader.crashes} == {}

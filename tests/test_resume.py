@@ -28,6 +28,11 @@ LIGHT = ("outputs.overlay=false", "outputs.rerun=false", "outputs.bvh=false")
 SMALL = ("images.depth=4", "solver.max_iterations=3", "solver.min_iterations=1")
 
 
+def fast_and_slow(fast, *slow):
+    """Values of a parameter, all but the first left to the slow tests."""
+    return [fast, *(pytest.param(value, marks=pytest.mark.slow) for value in slow)]
+
+
 @pytest.fixture
 def recording(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -59,7 +64,7 @@ def assert_same(folder, other, name="motion.npz"):
         np.testing.assert_array_equal(getattr(one, entry.name), getattr(two, entry.name), entry.name)
 
 
-@pytest.mark.parametrize("stops", [(1,), (9,), (17, 3), (20,)])
+@pytest.mark.parametrize("stops", fast_and_slow((9,), (1,), (17, 3), (20,)))
 def test_the_end_is_that_of_a_run_that_was_not_stopped(capsys, tmp_path, monkeypatch, command, stops):
     done(capsys, *command, "out=whole")
     for frames in stops:
@@ -73,6 +78,7 @@ def test_the_end_is_that_of_a_run_that_was_not_stopped(capsys, tmp_path, monkeyp
     assert "ended already" in err
 
 
+@pytest.mark.slow
 def test_two_actors(capsys, tmp_path, monkeypatch, recording):
     (recording / "initial_pose.yaml").write_text(
         "one: {pose: rest, position: [0, 0, 1], heading: 0}\ntwo: {pose: rest, position: [0.5, 0, 1], heading: 0}\n"
@@ -101,6 +107,7 @@ def test_the_tracker_goes_on_with_the_capacities_that_it_stopped_with(capsys, tm
     assert_same(tmp_path / "run", tmp_path / "whole")
 
 
+@pytest.mark.slow
 def test_a_searched_pose_and_a_made_actor_are_kept(capsys, tmp_path, monkeypatch, recording):
     """Exactly, not as rounded in an actor's file; neither is looked for again."""
     opened = track_command.opened(str(recording))
@@ -180,7 +187,7 @@ def full_disk(monkeypatch, module, name, after):
     monkeypatch.setattr(module, name, write)
 
 
-@pytest.mark.parametrize("after", [2, 5, 7, 9, 11])
+@pytest.mark.parametrize("after", fast_and_slow(5, 2, 7, 9, 11))
 def test_a_full_disk_leaves_what_can_be_read_and_gone_on_with(capsys, tmp_path, monkeypatch, command, after):
     done(capsys, *command, "out=whole")
     with monkeypatch.context() as context:
@@ -218,6 +225,7 @@ def test_a_video_that_breaks_off_and_is_there_again(capsys, tmp_path, recording,
     assert_same(tmp_path / "run", tmp_path / "whole")
 
 
+@pytest.mark.slow
 def test_killed_at_random_moments(tmp_path, command):
     """SIGKILL; `tests/reliability/kill_and_resume.py` does the same with all outputs, 20 times."""
     environment = os.environ | {"SOGJAX_COMPILATION_CACHE": str(tmp_path / "programs")}

@@ -155,6 +155,7 @@ def test_an_actor_file_that_is_there(capsys, tmp_path):
     assert (tmp_path / "a.yaml").read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_a_rendered_recording_is_replaced_as_a_whole(capsys, tmp_path):
     words = ("synth", f"out={tmp_path / 'r'}", "cameras=1", "frames=1", "width=64", "height=64", "noise=0")
     done(capsys, *words)

@@ -167,6 +167,7 @@ def source_folder(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_a_run_is_done_once_and_resumed_after_that(source_folder, monkeypatch, capsys):
     rows = {"a": RowConfig(set=list(SMALL)), "b": RowConfig(set=list(SMALL), cameras=2, every=2)}
     study = Study(source_folder, [str(source_folder / "person")], 4)
@@ -182,6 +183,7 @@ def test_a_run_is_done_once_and_resumed_after_that(source_folder, monkeypatch, c
     assert len(list((source_folder / "runs").glob("*.json"))) == 2
 
 
+@pytest.mark.slow
 def test_rows_of_more_cameras_than_there_are_are_left_out(source_folder):
     rows = {"a": RowConfig(set=list(SMALL), cameras=12), "b": RowConfig(set=list(SMALL), cameras=3)}
     study = Study(source_folder, [str(source_folder / "person")], 4)
@@ -210,6 +212,7 @@ def test_other_files_of_a_recording_are_another_recording(source_folder, tmp_pat
     assert source_named(str(folder), 4, tmp_path).identity != before
 
 
+@pytest.mark.slow
 def test_a_run_that_fails_is_kept_and_the_others_go_on(source_folder):
     rows = {"a": RowConfig(set=[*SMALL, "images.use_plates=true"]), "b": RowConfig(set=list(SMALL))}
     study = Study(source_folder, [str(source_folder / "person")], 4)

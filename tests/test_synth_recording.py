@@ -140,6 +140,7 @@ def test_the_ground_truth_names_markers_and_landmarks(folder):
     assert 0.015 < errors.std() < 0.035
 
 
+@pytest.mark.slow
 def test_the_same_settings_make_the_same_files_with_any_number_of_processes(folder, tmp_path):
     again = render_recording(SMALL, tmp_path / "again", workers=2)
     files = sorted(path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
@@ -157,6 +158,7 @@ def test_another_seed_makes_other_people_and_cameras(stage):
     assert not np.array_equal(stage.views[0].matrix, other.views[0].matrix)
 
 
+@pytest.mark.slow
 def test_several_people_are_named_and_photographed_alone(tmp_path):
     settings = SynthSettings(motion="pass", actors=2, cameras=1, width=64, height=64, frames=2, shadows=False)
     recording = open_recording(render_recording(settings, tmp_path / "pass", workers=1))

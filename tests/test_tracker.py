@@ -60,6 +60,7 @@ def test_the_motion_of_a_dog_is_found(dog):
     assert all((r.result.num_near <= r.capacities.near).all() for r in results)
 
 
+@pytest.mark.slow
 def test_the_motion_of_a_human_is_found_from_a_rough_start():
     body = in_colors(shipped("human"))
     rig = ring_rig(5, (160, 120), distance=3.0)
@@ -120,6 +121,7 @@ def test_one_compilation_serves_a_recording_and_every_swept_number(dog):
     assert len(traces) == 1
 
 
+@pytest.mark.slow
 def test_a_frame_that_needs_more_room_is_done_again(dog, monkeypatch):
     """With the same result as with enough room from the start."""
     tracker, poses, frames = dog
@@ -137,6 +139,7 @@ def test_a_frame_that_needs_more_room_is_done_again(dog, monkeypatch):
         np.testing.assert_allclose(a.result.terms["similarity"], b.result.terms["similarity"], rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_near_pairs_are_tracked_by_gauss_newton_and_too_little_room_is_noticed(dog, monkeypatch):
     """The motion is found as with all pairs, also where the lists begin with too little room."""
     tracker, poses, frames = dog
@@ -180,6 +183,7 @@ def test_the_boxes_hold_the_body_in_the_last_and_the_predicted_pose(dog):
             assert (pixels < boxes[k, 0, 1]).all()
 
 
+@pytest.mark.slow
 def test_two_actors_are_tracked_as_one_body():
     """Two dogs side by side, moving in opposite directions."""
     bodies = [in_colors(shipped("dog"), hues) for hues in ((0.0, 60.0), (80.0, 170.0))]
@@ -196,6 +200,7 @@ def test_two_actors_are_tracked_as_one_body():
         assert max(errors) < 0.03
 
 
+@pytest.mark.slow
 def test_a_tree_with_more_nodes_than_the_largest_capacity_is_tracked():
     # Few of its nodes are leaves near the body: only those need room.
     body = in_colors(shipped("dog"))

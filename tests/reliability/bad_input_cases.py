@@ -147,7 +147,7 @@ ACTOR_FILE: list[tuple[str, Damage]] = [
     ("a cycle", edit(BODY, "parent: root_x,", "parent: waist,")),
     ("an unknown kind of joint", edit(BODY, "revolute", "ball")),
     ("an axis of length 0", edit(BODY, "axis: x", "axis: [0, 0, 0]")),
-    ("a DoF of an unknown joint", edit(BODY, r"\{waist: 1\}", "{waste: 1}")),
+    ("a DoF of an unknown joint", edit(BODY, r"\{waist: 1", "{waste: 1")),
     ("limits the wrong way round", edit(BODY, r"\[-1, 1\]", "[1, -1]")),
     ("a blob on an unknown joint", edit(BODY, "trunk, joint: waist", "trunk, joint: waste")),
     ("a size of 0", edit(BODY, "sigma: 0.1", "sigma: 0")),

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from puppet import PUPPET
 
 from sogjax.data.actor_file import load_body
 from sogjax.data.ground_truth import GroundTruth, save_ground_truth
@@ -35,30 +36,6 @@ rotation = [1.2, -0.5, 0.3]
 translation = [0.1, 0.2, 3.0]
 """
 
-BODY = """name: puppet
-unit: m
-color_space: rgb
-joints:
-  - {name: root_x, parent: world, offset: [0, 0, 0], axis: x, kind: prismatic}
-  - {name: root_y, parent: root_x, offset: [0, 0, 0], axis: y, kind: prismatic}
-  - {name: root_z, parent: root_y, offset: [0, 0, 0], axis: z, kind: prismatic}
-  - {name: root_yaw, parent: root_z, offset: [0, 0, 0], axis: z, kind: revolute}
-  - {name: waist, parent: root_yaw, offset: [0, 0, 0.3], axis: y, kind: revolute}
-dofs:
-  - {name: root_x, limits: none, joints: {root_x: 1}}
-  - {name: root_y, limits: none, joints: {root_y: 1}}
-  - {name: root_z, limits: none, joints: {root_z: 1}}
-  - {name: root_yaw, limits: none, joints: {root_yaw: 1}}
-  - {name: bend, limits: [-1, 1], joints: {waist: 1}}
-blobs:
-  - {name: legs, joint: root_yaw, offset: [0, 0, 0], sigma: 0.1, color: [0.2, 0.2, 0.6]}
-  - {name: trunk, joint: waist, offset: [0, 0, 0.1], sigma: 0.1, color: [0.6, 0.2, 0.2]}
-landmarks:
-  - {name: pelvis, joint: root_yaw, offset: [0, 0, 0]}
-  - {name: chest, joint: waist, offset: [0.1, 0, 0.1]}
-poses: {rest: {}}
-"""
-
 
 @dataclass(frozen=True)
 class BadInput:
@@ -83,7 +60,7 @@ def make_workplace(folder: Path) -> None:
     (walk / "recording.yaml").write_text("up: z\n")
     (walk / "initial_pose.yaml").write_text("pose: rest\nposition: [0.0, 0.0, 1.0]\nheading: 0.0\n")
     for name in ("actor.yaml", "body.yaml"):
-        (folder / name).write_text(BODY)
+        (folder / name).write_text(PUPPET)
     body = load_body(folder / "actor.yaml")
     poses = np.zeros((FRAMES, body.skeleton.num_dofs), np.float32)
     motion = motion_from_poses(body, poses, 25.0)
