@@ -67,7 +67,8 @@ def energy_of(body: Body, views: Views) -> Callable[[GradientMode], Callable]:
 
     def function(gradient: GradientMode) -> Callable:
         history = History(body.poses["rest"], body.poses["rest"], jnp.asarray(True))
-        return FrameEnergy(body, views, history, standard_terms(gradient=gradient))
+        objective = FrameEnergy(body, views, history, standard_terms(gradient=gradient))
+        return lambda pose: objective(pose)
 
     return function
 

@@ -47,9 +47,10 @@ def test_every_number_of_the_paper_reaches_the_tracker(recording, tmp_path):
     assert type(tracker.solver) is ConditionedAscent
     found = fields(tracker.solver, "grow", "shrink", "min_iterations", "epsilon")
     assert found == numbers(grow=1.2, shrink=0.5, min_iterations=10, epsilon=0.002)
-    found = fields(tracker.weights, "limit_weight", "acceleration_weight", "exponent")
-    assert found == numbers(limit_weight=1.0, acceleration_weight=0.05, exponent=1.0)
-    assert tracker.weights.capped
+    similarity, limits, acceleration = tracker.terms
+    assert fields(similarity, "weight", "exponent") == numbers(weight=1.0, exponent=1.0)
+    assert similarity.capped
+    assert (float(limits.weight), float(acceleration.weight)) == (1.0, pytest.approx(0.05, rel=1e-6))
     found = fields(tracker.reader, "color_radius", "color_tolerance")
     assert found == numbers(color_radius=0.15, color_tolerance=0.15)
     assert (tracker.reader.color_space, tracker.reader.box_around) == ("hsv", "last")

@@ -210,6 +210,12 @@ def test_a_wrong_term_is_said_in_one_sentence(entry, complaint):
         added_terms("energy.terms", {"ground": entry}, ["similarity"])
 
 
+def test_terms_without_names_are_refused():
+    with pytest.raises(InputError, match=r"energy\.terms=floor: must be terms by name, {NAME: {term"):
+        added_terms("energy.terms", "floor", [])
+    assert added_terms("energy.terms", None, []) == ()
+
+
 def test_a_name_that_is_taken_is_refused():
     with pytest.raises(InputError, match=r"energy\.terms\.similarity: the energy has a term of this name already"):
         added_terms("energy.terms", {"similarity": {"term": "test_terms.Floor", "weight": 1}}, ["similarity"])

@@ -14,19 +14,23 @@ CLASS = "term"
 """Key of an entry under which the class stands; the other keys are its arguments."""
 
 
-def added_terms(key: str, entries: Mapping[str, Any], taken: Sequence[str]) -> Terms:
+def added_terms(key: str, entries: Any, taken: Sequence[str]) -> Terms:
     """A term for each entry, `NAME: {term: MODULE.CLASS, weight: 1.0, ...}`, called NAME.
 
     Modules are looked for where Python does, and in the current folder.
 
     Args:
         key: of the entries in the configuration, for messages.
-        entries: the terms by name.
+        entries: the terms by name; None: there are none.
         taken: names that other terms have.
 
     Raises:
         InputError: no such class, a class that is no term, or arguments that it does not take.
     """
+    if entries is None:
+        return ()
+    if not isinstance(entries, Mapping):
+        raise InputError(f"{key}={entries}: must be terms by name, {{NAME: {{{CLASS}: MODULE.CLASS, weight: 1.0}}}}")
     for name in entries:
         if name in taken:
             raise InputError(f"{key}.{name}: the energy has a term of this name already; choose another name")

@@ -99,4 +99,4 @@ def still_energy(body: Body, pose: Float[Array, "dof"], views: Views, terms: Ter
 
 def _total(parts: list[Summand]) -> Summand:
     """The sum: the later parts first, which are small beside the similarity."""
-    return parts[0] + reduce(add, parts[1:]) if len(parts) > 1 else parts[0]
+    return parts[0] + reduce(lambda a, b: a + b, parts[1:]) if len(parts) > 1 else parts[0]

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from sogjax.settings.option import group, option
+from sogjax.settings.option import option
 
 
 @dataclass
@@ -41,7 +41,7 @@ class EnergyConfig:
     capped: bool = option(True, "the cap of Eq. 8 against blobs that hide each other")
     pairs: str = option("sparse", "dense: all pairs of blobs | sparse: pairs near each other, equal to 1e-4")
     gradient: str = option("forward", "forward: closed form beside the value | autodiff: plain reverse mode")
-    terms: dict[str, Any] = group(dict, "further terms, {NAME:{term:MODULE.CLASS,weight:1}} with the class's numbers")
+    terms: Any = option(None, "further terms, {NAME:{term:MODULE.CLASS,weight:1}} with the class's numbers; null: none")
 
 
 @dataclass
