@@ -82,7 +82,7 @@ _HOMES = {
     "write_rerun": "sogjax.api.motions",
 }
 
-__getattr__, _names = lazy_names(__name__, _HOMES)
+__getattr__, _ = lazy_names(__name__, _HOMES)
 
 
 def __dir__() -> list[str]:

@@ -40,7 +40,7 @@ def make_tracker(recording: Recording, actor: Body | Sequence[Body], **settings:
     Args:
         recording: whose cameras and first frame the tracker is made for.
         actor: one, or a list of them, which become one body with their poses one after the other.
-        settings: as in `track_settings`.
+        settings: as in `track_settings`; `start` is the frame of the first pose, and to be given to `read_cells` too.
 
     Raises:
         InputError: as `track`.
