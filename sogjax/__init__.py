@@ -1,5 +1,7 @@
 """Markerless motion capture by Sums of Gaussians (Stoll et al., ICCV 2011) in JAX.
 
+From videos to a motion::
+
     import sogjax
 
     recording = sogjax.open_recording("walk")

@@ -27,6 +27,8 @@ ROOM = 2
 def make_tracker(recording: Recording, actor: Body | Sequence[Body], **settings: Any) -> Tracker:
     """The tracker of a recording as an immutable module (a pytree), with a pure step.
 
+    A loop of one's own::
+
         tracker = sogjax.make_tracker(recording, actor)
         state, step = tracker.start(), equinox.filter_jit(tracker.step)
         for cells in sogjax.read_cells(recording, tracker):
@@ -34,7 +36,7 @@ def make_tracker(recording: Recording, actor: Body | Sequence[Body], **settings:
 
     `tracker.start()` is the state before the first frame, in the rough pose that the recording names or that is
     searched for; `tracker.start(pose)` in another one. A result has the `pose` (dof,) in radians and metres, the terms
-    of the energy, and what the solver did. The step can be compiled, mapped and differentiated as any function of jax.
+    of the energy, and what the solver did. The step can be compiled and mapped like any function of jax.
     A frame that needs more room for image blobs than the tracker has, twice what its first frame needs, is an error.
 
     Args:
