@@ -1,5 +1,7 @@
 """Markerless motion capture by Sums of Gaussians (Stoll et al., ICCV 2011) in JAX.
 
+From videos to a motion::
+
     import sogjax
 
     recording = sogjax.open_recording("walk")
@@ -87,7 +89,7 @@ _HOMES = {
     "write_rerun": "sogjax.api.motions",
 }
 
-__getattr__, _names = lazy_names(__name__, _HOMES)
+__getattr__, _ = lazy_names(__name__, _HOMES)
 
 
 def __dir__() -> list[str]:

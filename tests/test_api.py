@@ -18,9 +18,11 @@ from command_line import actor_file
 from rendered_person import rendered_person
 
 import sogjax
+from sogjax.api import tracking
 from sogjax.app.config.composition import composed
 from sogjax.engine.recordings import upright
 from sogjax.track.culling import Capacities
+from sogjax.track.pose_search import FoundPose
 
 ROOT = Path(__file__).parents[1]
 HEAVY = ("jax", "numpy", "cv2", "rerun", "hydra", "omegaconf", "yaml")
@@ -139,6 +141,23 @@ def test_actors_are_refused_that_are_none_or_the_same(recording, actor):
     for actors, sentence in (([], "the list is empty"), ([actor, actor], "two actors are named 'puppet'")):
         with pytest.raises(sogjax.InputError, match=sentence):
             sogjax.track(recording, actors)
+
+
+def test_a_first_pose_is_searched_for_in_the_first_frame_to_track(recording, actor, monkeypatch):
+    asked = []
+
+    def searched(recording, bodies, config, frame):
+        asked.append((recording.rig.names, [body.name for body in bodies], frame))
+        return [FoundPose(body.poses["rest"], 1.0, 0.1) for body in bodies]
+
+    monkeypatch.setattr(tracking, "searched_poses", searched)
+    cameras = recording.rig.names[1:]
+    assert sogjax.find_first_pose(recording, actor, start=2, cameras=list(cameras)).margin == 0.1
+    two = sogjax.find_first_pose(recording, [actor, replace(actor, name="other")])
+    assert len(two) == 2
+    assert asked == [(cameras, ["puppet"], 2), (recording.rig.names, ["puppet", "other"], 0)]
+    with pytest.raises(sogjax.InputError, match="start=4 stop=null"):
+        sogjax.find_first_pose(recording, actor, start=4)
 
 
 def test_the_points_of_a_motion_are_where_its_poses_put_them(recording, actor, motion):

@@ -30,6 +30,8 @@ def make_tracker(
 ) -> Tracker:
     """The tracker of a recording as an immutable module (a pytree), with a pure step.
 
+    A loop of one's own::
+
         tracker = sogjax.make_tracker(recording, actor)
         state, step = tracker.start(), equinox.filter_jit(tracker.step)
         for cells in sogjax.read_cells(recording, tracker):
@@ -37,14 +39,14 @@ def make_tracker(
 
     `tracker.start()` is the state before the first frame, in the rough pose that the recording names or that is
     searched for; `tracker.start(pose)` in another one. A result has the `pose` (dof,) in radians and metres, the terms
-    of the energy, and what the solver did. The step can be compiled, mapped and differentiated as any function of jax.
+    of the energy, and what the solver did. The step can be compiled and mapped like any function of jax.
     A frame that needs more room for image blobs than the tracker has, twice what its first frame needs, is an error.
 
     Args:
         recording: whose cameras and first frame the tracker is made for.
         actor: one, or a list of them, which become one body with their poses one after the other.
         terms: further terms of the energy, beside those of the settings.
-        settings: as in `track_settings`.
+        settings: as in `track_settings`; `start` is the frame of the first pose, and to be given to `read_cells` too.
 
     Raises:
         InputError: as `track`.
