@@ -50,7 +50,7 @@ def first_frame_seconds(actor: str) -> float:
 def resident_mib(actor: str) -> float:
     """After tracking the demo with all outputs; Linux only.
 
-    By `VmHWM`, which begins anew with a program: `ru_maxrss` counts what the process was forked from.
+    By `VmHWM`, which starts from zero with a program: `ru_maxrss` counts what the process was forked from.
     """
     from track_speed import demo_recording
 

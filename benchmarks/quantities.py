@@ -36,7 +36,7 @@ class Quantity:
 
     @property
     def met(self) -> bool | None:
-        """Whether the target is; None where there is none."""
+        """Whether the target is met; None if there is none."""
         if self.target is None or np.isnan(self.value):
             return None
         return self.value >= self.target if self.larger_is_better else self.value <= self.target

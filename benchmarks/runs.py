@@ -72,7 +72,7 @@ def solver_quantities(scene: Scene) -> Iterator[Quantity]:
         errors[name] = 1000.0 * result.evaluation.summary.mean
         rate = result.times.frames_per_second("step", skipped=3)
         fastest = 1000.0 * float(np.min(result.times.seconds["step"][3:]))
-        yield Quantity("solver", f"{name}: iterations a frame", float(np.mean(result.iterations)), "count")
+        yield Quantity("solver", f"{name}: iterations per frame", float(np.mean(result.iterations)), "count")
         yield Quantity("solver", f"{name}: final energy x 1000", 1000.0 * float(np.mean(motion.energy)), "energy", True)
         yield Quantity("solver", f"{name}: marker error", errors[name], "mm")
         yield Quantity("solver", f"{name}: least step", fastest, "ms")

@@ -1,4 +1,4 @@
-"""How many frames a second are tracked, by stage?
+"""How many frames per second are tracked, by stage?
 
 python benchmarks/track_speed.py [recording=FOLDER] [frames=60] [overrides=[solver=lbfgs,...]]
 
@@ -41,7 +41,7 @@ def main() -> None:
     width, height = recording.rig.image_size(recording.rig.names[0])
     print(machine_line())
     print(f"{recording.name}: {len(recording.rig.names)} cameras, {width}x{height}, {frames} frames")
-    print(f"{result.image_blobs:.0f} image blobs used a camera; {numbers['iterations']:.1f} iterations a frame")
+    print(f"{result.image_blobs:.0f} image blobs used per camera; {numbers['iterations']:.1f} iterations per frame")
     print(f"markers {numbers['mean mm']:.1f} mm, std {numbers['std mm']:.1f} mm, {numbers['lost']:.0f} lost\n")
     print(result.times.table())
     print(f"{'decoding alone':<32}{decoding_rate(folder, frames):10.1f} frames/s")
@@ -57,7 +57,7 @@ def demo_recording() -> Path:
 
 
 def decoding_rate(folder: Path, frames: int) -> float:
-    """Multi-view frames a second when nothing else is done; opening the files is left out."""
+    """Multi-view frames per second when nothing else is done, without opening the files."""
     images = read_frames(open_recording(folder), 0, frames)
     next(images)
     begin = time.perf_counter()

@@ -36,7 +36,7 @@ class Settings:
 
 
 def main() -> None:
-    """Print one line a recording and actor, then the sum."""
+    """Print one line per recording and actor, then a summary."""
     settings = settings_from(Settings)
     errors = []
     for motion in settings.motions:

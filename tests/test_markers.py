@@ -137,7 +137,7 @@ def test_a_mapping_says_which_joint_a_name_means():
 
 @pytest.mark.parametrize(
     ("change", "message"),
-    [({"fps": 25.0}, "25 frames a second"), ({"first_frame": 90}, "none of the truth's 12")],
+    [({"fps": 25.0}, "25 frames per second"), ({"first_frame": 90}, "none of the truth's 12")],
 )
 def test_what_cannot_be_matched_is_an_input_error(change, message):
     truth = truth_of(walking_motion())

@@ -193,8 +193,8 @@ def test_terms_are_made_from_a_configuration():
 @pytest.mark.parametrize(
     ("entry", "complaint"),
     [
-        (3, r"energy\.terms\.ground: is no term; write"),
-        ({"weight": 1}, r"energy\.terms\.ground: is no term; write"),
+        (3, r"energy\.terms\.ground: is not a term; write"),
+        ({"weight": 1}, r"energy\.terms\.ground: is not a term; write"),
         ({"term": "Floor"}, "must name a module and a class"),
         ({"term": "no_such_module.Floor"}, "the module no_such_module cannot be imported"),
         ({"term": "test_terms.Ceiling"}, "test_terms has no such class"),

@@ -18,7 +18,7 @@ TRUTH = "ground_truth.npz"
 def open_recording(path: str | Path, cameras: Sequence[str] | None = None) -> Recording:
     """The recording in a folder: calibration, videos, and what else is known; no picture is read yet.
 
-    Lengths are metres in the calibration's world, whatever unit its files have. Doubts are said on standard error,
+    Lengths are metres in the calibration's world, whatever unit its files have. Warnings are printed on standard error,
     and stand in `recording.warnings`.
 
     Args:

@@ -34,7 +34,7 @@ def track(
     What `sogjax track` does, without its files. Progress and warnings go to standard error.
 
     Args:
-        recording: with the first frame's rough pose in `initial_pose.yaml`; it is searched for where there is none, or
+        recording: with the first frame's rough pose in `initial_pose.yaml`; it is searched for if there is none, or
             with `initial_pose="auto"`.
         actor: one, or a list of them with different names.
         terms: further terms of the energy, beside those of the settings.

@@ -19,7 +19,7 @@ def computed_once(
 ) -> Results:
     """The results of a function, finished before anything that uses them begins; zeros where `true_at_run_time` is not.
 
-    On a CPU, XLA fuses a chain of cheap operations into its last one, which then computes the whole chain anew for
+    On a CPU, XLA fuses a chain of cheap operations into its last one, which then computes the whole chain again for
     every entry it reads; `optimization_barrier` is gone before that. A branch is not fused: the quad-trees of twelve
     cameras take 2.2 ms in stages instead of 12.
 

@@ -25,7 +25,7 @@ def added_terms(key: str, entries: Any, taken: Sequence[str]) -> Terms:
         taken: names that other terms have.
 
     Raises:
-        InputError: no such class, a class that is no term, or arguments that it does not take.
+        InputError: no such class, a class that is not a term, or arguments that it does not take.
     """
     if entries is None:
         return ()
@@ -39,7 +39,7 @@ def added_terms(key: str, entries: Any, taken: Sequence[str]) -> Terms:
 
 def _term(key: str, name: str, entry: Any) -> Term:
     if not isinstance(entry, Mapping) or not isinstance(entry.get(CLASS), str):
-        raise InputError(f"{key}: is no term; write {{{CLASS}: MODULE.CLASS, weight: 1.0}}")
+        raise InputError(f"{key}: is not a term; write {{{CLASS}: MODULE.CLASS, weight: 1.0}}")
     made_by = _class(key, entry[CLASS])
     arguments = {word: value for word, value in entry.items() if word != CLASS}
     for word, value in arguments.items():

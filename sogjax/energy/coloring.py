@@ -1,6 +1,6 @@
 """Derivatives of the similarities by colours, which are computed beforehand.
 
-Eq. 7 does not depend on the pose, so its values are made once a frame and only looked up while a pose is found. They
+Eq. 7 does not depend on the pose, so its values are computed once per frame and only looked up while a pose is found. They
 are functions of the colours all the same: who differentiates by the colours of blobs, or by eps_sim, gets the
 derivatives of Eq. 7, computed only then.
 """

@@ -1,7 +1,7 @@
 """Which pairs can matter while a pose is being found: blobs of alike colours that are near each other.
 
 The lists are made at one pose and hold for every pose whose blobs are seen at most a margin away from there. Whoever
-uses them looks at how far the blobs have moved (`displacement`) and makes them anew where that was too far.
+uses them looks at how far the blobs have moved (`displacement`) and rebuilds them if that was too far.
 """
 
 from functools import partial, reduce
@@ -19,7 +19,7 @@ from sogjax.model.sog import Sog
 NEGLIGIBLE = 1e-4
 """Pairs are left out where the exponential of Eq. 6 is below this, even after a motion by the margin."""
 MARGIN = 0.015
-"""Of the image's width: how far a blob may move before the lists are made anew. Predictions of a walk are 1 to 15
+"""Of the image's width: how far a blob may move before the lists are rebuilt. Predictions of a walk are 1 to 15
 pixels off where a picture is 1296 wide; 0.02 takes 13 % more blocks than 0.01."""
 
 

@@ -19,7 +19,7 @@ class Views(eqx.Module):
     cameras: Camera
     images: Sog
     color_similarities: Float[Array, "camera body image"]
-    """d(c_i, c_j) of Eq. 7: it does not depend on the pose, so it is computed once a frame."""
+    """d(c_i, c_j) of Eq. 7: it does not depend on the pose, so it is computed once per frame."""
     normalizers: Float[Array, "camera"]
     """E(K_l, K_l) of Eq. 9 over the whole image, before culling, in square pixels."""
     pairs: SparsePairs | None = None

@@ -159,7 +159,7 @@ class Streams:
         if not count or not all(log.folder.is_dir() for log in self._logs.values()):
             return
         folders = ", ".join(str(log.folder) for log in self._logs.values())
-        remedy = "" if self._kept is None else "; the same command with resume=true goes on from there"
+        remedy = "" if self._kept is None else "; the same command with resume=true continues"
         say(f"stopped after {counted(count, 'frame')}; their motion is in {folders}{remedy}")
 
     def _write(self, block: list[FrameDone]) -> None:

@@ -58,7 +58,7 @@ def common_frames(motion: Motion, truth: GroundTruth) -> tuple[Int[np.ndarray, "
     """
     if not np.isclose(float(motion.fps), float(truth.fps), rtol=1e-3):
         raise InputError(
-            f"the motion has {float(motion.fps):g} frames a second and the truth {float(truth.fps):g}; "
+            f"the motion has {float(motion.fps):g} frames per second and the truth {float(truth.fps):g}; "
             "resample the truth to the motion's rate"
         )
     if not np.isfinite(motion.world_from_joint).all():

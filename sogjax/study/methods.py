@@ -37,7 +37,7 @@ def comparison_table(experiment: Experiment, rows: Rows) -> str:
 
 
 def overview_table(rows: Sequence[RowSummary]) -> str:
-    """Methods in a line each, with both rules by which markers are attached, in Markdown."""
+    """One line per method, with both rules of attaching markers, in Markdown."""
     lines = [["", *_OVERVIEW], *([row.name, *(cell(row) for cell in _OVERVIEW.values())] for row in rows)]
     return _markdown(lines)
 

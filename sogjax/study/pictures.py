@@ -38,7 +38,7 @@ def experiment_chart(experiment: Experiment, rows: Mapping[str, Sequence[RowSumm
         value="frames/s, whole" if speed else "marker error, mm",
         paper=papers,
     )
-    what = "frames a second" if speed else "mean error with its 95 % interval; thin lines: each recording"
+    what = "frames per second" if speed else "mean error with its 95 % interval; thin lines: each recording"
     return Picture(f"{experiment.name}.png", content, f"{experiment.config.title}: {what}")
 
 

@@ -80,7 +80,7 @@ class RunRecord:
     """Used in a frame by a camera."""
     pose: list[list[float]] = field(default_factory=list)
     rates: dict[str, float] = field(default_factory=dict)
-    """Frames a second by stage, where the speed was measured."""
+    """Frames per second by stage, if the speed was measured."""
     seconds: float = float("nan")
     """That the whole run took, with compilation and, where it was the first of its recording, the actor."""
     failed: str = ""

@@ -53,7 +53,7 @@ class StatedErrors:
 
     @property
     def rank_correlation(self) -> float:
-        """Of Spearman: whether what is said to be less sure is farther off."""
+        """Spearman rank correlation of stated and actual errors."""
         ranks = lambda values: np.argsort(np.argsort(values)).astype(float)
         return float(np.corrcoef(ranks(self.said), ranks(self.found))[0, 1])
 

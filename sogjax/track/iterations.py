@@ -20,7 +20,7 @@ def best_after(
 ) -> tuple[Float[Array, "count dof"], Float[Array, "count"]]:
     """The best pose that the tracker's solver has seen after so many iterations of a frame, and its energy.
 
-    The frame is solved anew for every count: no solver has to know that it is watched.
+    The frame is solved again for every count, so no solver needs to know that it is watched.
     """
     seen = tracker.views(cells, state, capacities)
 

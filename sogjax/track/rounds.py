@@ -1,4 +1,4 @@
-"""Solving a frame with lists of near pairs, which are made anew where the pose has left the place they are good for."""
+"""Solving a frame with lists of near pairs, which are rebuilt when the pose has left the place they are valid for."""
 
 import equinox as eqx
 import jax

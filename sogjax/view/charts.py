@@ -37,7 +37,7 @@ def mean_chart(panels: Sequence[Means], *, axis: str, value: str, paper: Mapping
     """Means with their intervals beside the paper's figures, as a PNG.
 
     Args:
-        panels: what is drawn, a panel each.
+        panels: what is drawn, one panel each.
         axis: what differs between the rows.
         value: what the means are, with their unit.
         paper: the paper's figures by row, in a panel of their own.
