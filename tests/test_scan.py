@@ -45,7 +45,9 @@ def frame_by_frame(tracker, start, cells):
     return [frame.result for frame in track(tracker, start, cells)]
 
 
-@pytest.mark.parametrize("kind", [lambda t: t, sparse], ids=["dense", "sparse"])
+@pytest.mark.parametrize(
+    "kind", [pytest.param(lambda t: t, marks=pytest.mark.slow, id="dense"), pytest.param(sparse, id="sparse")]
+)
 def test_a_scanned_clip_is_the_clip_frame_by_frame(dog, kind):
     tracker, start, cells = dog
     tracker = kind(tracker)
@@ -64,6 +66,7 @@ def test_a_scanned_clip_is_the_clip_frame_by_frame(dog, kind):
 
 
 @pytest.mark.parametrize("kind", [lambda t: t, sparse], ids=["dense", "sparse"])
+@pytest.mark.slow
 def test_a_clip_that_needs_more_room_is_tracked_again(dog, kind, monkeypatch):
     tracker, start, cells = dog
     tracker = kind(tracker)

@@ -1,8 +1,8 @@
 """Derivatives of the similarities by colours, which are computed beforehand.
 
-Eq. 7 does not depend on the pose, so its values are computed once per frame and only looked up while a pose is found. They
-are functions of the colours all the same: who differentiates by the colours of blobs, or by eps_sim, gets the
-derivatives of Eq. 7, computed only then.
+Eq. 7 does not depend on the pose, so its values are computed once per frame and only looked up while a pose is found.
+They still are functions of the colours: differentiating by the colours of blobs, or by eps_sim, gives the derivatives
+of Eq. 7, which are computed only then.
 """
 
 from functools import partial
