@@ -14,6 +14,7 @@ from rig_cases import black, opencv_pixels, recording_of, ring_rig
 from sogjax.data.ground_truth import GroundTruth
 from sogjax.errors import InputError
 from sogjax.view.rerun import ImageBlobs, view_command, write_comparison, write_iterations, write_rerun
+from sogjax.view.rerun.curves import plots_with
 
 
 def read_back(path):
@@ -176,3 +177,7 @@ def test_a_file_for_which_there_is_no_room_is_refused(tmp_path, motion, size):
         write_rerun(tmp_path / "a.rrd", recording, [motion])
     assert "\n" not in str(error.value)
     assert [path.name for path in tmp_path.iterdir()] == ["whole.rrd"]
+
+
+def test_a_term_that_a_user_added_has_a_plot_beside_the_penalties():
+    assert plots_with(["similarity", "energy", "limit_penalty", "floor"]).keys() == {"energy", "penalties", "terms"}
