@@ -21,4 +21,5 @@ apidoc_modules = [
     }
 ]
 autodoc_member_order = "bysource"
+autodoc_default_options = {"ignore-module-all": True}  # each name once, where it is defined
 suppress_warnings = ["ref.python"]  # one field name in two classes, met in an annotation
