@@ -19,12 +19,12 @@ from sogjax.engine.job import Job
 from sogjax.engine.recordings import actors_of, opened
 from sogjax.engine.run import Run
 from sogjax.engine.track import track_recording
-from sogjax.evaluate import evaluate_motions
+from sogjax.evaluation import evaluate_motions
 from sogjax.model.body import Body
 from sogjax.settings import TrackConfig
 from sogjax.settings.compose import track_config
-from sogjax.track.frame import TrackState
-from sogjax.track.tracker import first_capacities
+from sogjax.tracking.frame import TrackState
+from sogjax.tracking.tracker import first_capacities
 
 SOLVERS = ("gauss_newton", "lbfgs", "conditioned_ascent")
 FRAMES_OF_SWEEP = 8

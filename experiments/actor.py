@@ -23,8 +23,8 @@ from sogjax.engine.build import energy_terms
 from sogjax.engine.recordings import body_named
 from sogjax.engine.terminal import say
 from sogjax.engine.track import track_recording
-from sogjax.evaluate import evaluate_motions
-from sogjax.evaluate.bone_lengths import bone_errors
+from sogjax.evaluation import evaluate_motions
+from sogjax.evaluation.bone_lengths import bone_errors
 from sogjax.settings import EnergyConfig
 from sogjax.settings.compose import track_config
 from sogjax.study.machine import machine_line

@@ -13,7 +13,7 @@ from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.motion import motion_from_poses
 from sogjax.engine.first_pose import searched_poses
 from sogjax.engine.recordings import actors_of, opened, upright
-from sogjax.evaluate.markers import joint_errors
+from sogjax.evaluation.markers import joint_errors
 from sogjax.settings.compose import track_config
 from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from

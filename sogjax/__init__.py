@@ -12,9 +12,7 @@ From videos to a motion::
 Importing the package loads nothing else; each name is loaded when it is first used.
 """
 
-import sys
-from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from sogjax.lazy import lazy_names
 
@@ -32,8 +30,8 @@ if TYPE_CHECKING:
     from sogjax.errors import InputError
     from sogjax.model.body import Body as Actor
     from sogjax.settings import TrackConfig
-    from sogjax.track.frame import TrackState
-    from sogjax.track.tracker import Tracker
+    from sogjax.tracking.frame import TrackState
+    from sogjax.tracking.tracker import Tracker
 
 __version__ = "0.1.0"
 
@@ -71,8 +69,8 @@ _HOMES = {
     "Recording": "sogjax.data.recording",
     "Term": "sogjax.energy.term",
     "TrackConfig": "sogjax.settings",
-    "TrackState": "sogjax.track.frame",
-    "Tracker": "sogjax.track.tracker",
+    "TrackState": "sogjax.tracking.frame",
+    "Tracker": "sogjax.tracking.tracker",
     "evaluate": "sogjax.api.evaluation",
     "find_first_pose": "sogjax.api.tracking",
     "load_actor": "sogjax.api.actors",
@@ -94,18 +92,3 @@ __getattr__, _ = lazy_names(__name__, _HOMES)
 
 def __dir__() -> list[str]:
     return sorted({*__all__, "__version__"})
-
-
-class _Door(ModuleType):
-    """This package, whose `track` and `evaluate` are functions although packages have the same names.
-
-    Python binds a package to its name here when it is first imported; that is left out for these two, which are
-    reached by `from sogjax.track... import` as ever.
-    """
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if not (name in __all__ and isinstance(value, ModuleType)):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Door

@@ -4,8 +4,8 @@ from typing import assert_type
 
 import sogjax
 from sogjax.data.ground_truth import GroundTruth
-from sogjax.evaluate import Evaluation, GroupEvaluation
-from sogjax.track.pose_search import FoundPose
+from sogjax.evaluation import Evaluation, GroupEvaluation
+from sogjax.tracking.pose_search import FoundPose
 
 
 def one_actor(path: str) -> None:

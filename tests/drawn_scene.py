@@ -12,9 +12,9 @@ from sogjax.energy.views import whole_image_overlap
 from sogjax.images.cells import CellGrid, stack_cells
 from sogjax.images.quadtree import Candidates
 from sogjax.solve import ConditionedAscent
-from sogjax.track.culling import ImageReader
-from sogjax.track.scales import pose_scales
-from sogjax.track.tracker import Tracker
+from sogjax.tracking.culling import ImageReader
+from sogjax.tracking.scales import pose_scales
+from sogjax.tracking.tracker import Tracker
 
 BACKGROUND = (70, 70, 70)
 DISC = 1.35

@@ -14,8 +14,8 @@ from sogjax.app.cli import main
 from sogjax.data.actor_file import load_body
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.motion import load_motion
-from sogjax.evaluate import joint_errors, marker_errors
-from sogjax.evaluate.bone_lengths import bone_errors
+from sogjax.evaluation import joint_errors, marker_errors
+from sogjax.evaluation.bone_lengths import bone_errors
 from sogjax.synth import SynthSettings, render_recording
 
 pytestmark = pytest.mark.slow

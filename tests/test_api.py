@@ -21,8 +21,8 @@ import sogjax
 from sogjax.api import tracking
 from sogjax.app.config.composition import composed
 from sogjax.engine.recordings import upright
-from sogjax.track.culling import Capacities
-from sogjax.track.pose_search import FoundPose
+from sogjax.tracking.culling import Capacities
+from sogjax.tracking.pose_search import FoundPose
 
 ROOT = Path(__file__).parents[1]
 HEAVY = ("jax", "numpy", "cv2", "rerun", "hydra", "omegaconf", "yaml")
@@ -79,11 +79,6 @@ def test_every_name_is_there_documented_and_shown_to_type_checkers():
         assert name in dir(sogjax)
     with pytest.raises(AttributeError, match="no attribute 'trakc'"):
         _ = sogjax.trakc
-
-
-def test_functions_stay_functions_when_packages_of_the_same_names_are_loaded(tmp_path):
-    code = "import sogjax.track.scan, sogjax.evaluate, sogjax; print(sogjax.track.__name__, sogjax.evaluate.__name__)"
-    assert in_a_process(code, tmp_path).split() == ["track", "evaluate"]
 
 
 def test_the_guide_has_every_name():

@@ -7,7 +7,7 @@ import pytest
 from body_cases import shipped
 
 from sogjax.data.ground_truth import GroundTruth
-from sogjax.evaluate.bone_lengths import BONES, bone_errors
+from sogjax.evaluation.bone_lengths import BONES, bone_errors
 
 SHORT = {"left_": "l_", "right_": "r_"}
 

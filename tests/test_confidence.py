@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sogjax.data.actor_file import load_body, named_body
-from sogjax.track.confidence import Laplace, range_precision
+from sogjax.tracking.confidence import Laplace, range_precision
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from sogjax.model.body import concatenate
 from sogjax.model.camera import project
 from sogjax.model.color import from_rgb
 from sogjax.model.sog import Sog
-from sogjax.track.culling import (
+from sogjax.tracking.culling import (
     BLOB_RADIUS,
     CAPACITIES,
     Capacities,
@@ -26,7 +26,7 @@ from sogjax.track.culling import (
     capacity_for,
     union_boxes,
 )
-from sogjax.track.frame import TrackState
+from sogjax.tracking.frame import TrackState
 
 CULLED = 2e-3
 """Part of the similarity that may be lost with the image blobs left out (tails of Gaussians beyond the box)."""

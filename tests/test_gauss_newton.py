@@ -16,7 +16,7 @@ from sogjax.energy.views import Views, whole_image_overlap
 from sogjax.model.camera import project, project_points, projection_jacobian
 from sogjax.model.sog import Sog
 from sogjax.solve import ConditionedAscent, CurvedObjective, GaussNewton, OptimistixSolver, QuadraticModel
-from sogjax.track.scales import pose_scales
+from sogjax.tracking.scales import pose_scales
 
 FLOAT32 = 1e-4
 climb = eqx.filter_jit(lambda solver, objective, start, scales: solver.maximize(objective, start, scales))

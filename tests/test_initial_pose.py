@@ -8,7 +8,7 @@ from body_cases import posed, reference_frames, reference_points, shipped
 from sogjax.data.initial_pose import InitialPose
 from sogjax.errors import InputError
 from sogjax.model.frames import UP_AXES, axis_vector, world_from_upright
-from sogjax.track.initial_pose import rough_pose
+from sogjax.tracking.initial_pose import rough_pose
 
 HUMAN, DOG = shipped("human"), shipped("dog")
 FITTED = 0.02

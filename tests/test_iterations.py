@@ -8,9 +8,9 @@ from drawn_scene import cells_of, draw, in_colors, make_tracker, moved, standing
 from rig_cases import ring_rig
 
 from sogjax.solve import ConditionedAscent, GaussNewton, OptimistixSolver
-from sogjax.track.frame import TrackState
-from sogjax.track.iterations import best_after
-from sogjax.track.tracker import first_capacities, track
+from sogjax.tracking.frame import TrackState
+from sogjax.tracking.iterations import best_after
+from sogjax.tracking.tracker import first_capacities, track
 
 SOLVERS = {
     "ascent": ConditionedAscent(),

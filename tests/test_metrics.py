@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from motion_cases import points_on, walking_motion
 
 from sogjax.data.ground_truth import GroundTruth
-from sogjax.evaluate.metrics import lost_points, mean_per_frame, mean_per_point, std_per_point, summarize
-from sogjax.evaluate.report import evaluate_motion
+from sogjax.evaluation.metrics import lost_points, mean_per_frame, mean_per_point, std_per_point, summarize
+from sogjax.evaluation.report import evaluate_motion
 from sogjax.view.plots import plot_per_frame, plot_per_point, write_png
 
 

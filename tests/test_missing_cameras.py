@@ -23,8 +23,8 @@ from sogjax.data.video import read_frames
 from sogjax.engine import pipeline
 from sogjax.errors import InputError
 from sogjax.solve import GaussNewton
-from sogjax.track.frame import PartialCells
-from sogjax.track.tracker import track
+from sogjax.tracking.frame import PartialCells
+from sogjax.tracking.tracker import track
 
 LIGHT = ("outputs.overlay=false", "outputs.rerun=false", "outputs.bvh=false")
 

@@ -19,8 +19,8 @@ from sogjax.energy.posed import History
 from sogjax.energy.similarity import similarity_among
 from sogjax.model.camera import project
 from sogjax.solve import ConditionedAscent
-from sogjax.track.rounds import solve_near
-from sogjax.track.scales import pose_scales
+from sogjax.tracking.rounds import solve_near
+from sogjax.tracking.scales import pose_scales
 
 AGREEMENT = 1e-4
 HUMAN = shipped("human")

@@ -11,7 +11,7 @@ from sog_cases import random_views
 
 from sogjax.energy.frame_energy import standard_terms, still_energy
 from sogjax.solve import OptimistixSolver, Scales
-from sogjax.track.scales import pose_scales
+from sogjax.tracking.scales import pose_scales
 
 METHODS = ["bfgs", "lbfgs", "nonlinear_cg"]
 SCALES = Scales(jnp.array([0, 1]), jnp.array([0.02, 0.01]), jnp.array([0.15, 0.05]))

@@ -13,11 +13,11 @@ from rig_cases import ring_rig
 from sogjax.energy.frame_energy import standard_terms
 from sogjax.images.cells import CellGrid, stack_cells
 from sogjax.images.quadtree import Candidates
-from sogjax.track.culling import ImageReader
-from sogjax.track.frame_views import FrameViews, levels
-from sogjax.track.limbs import limbs, with_other_limb
-from sogjax.track.place_search import nearest_point, possible_places, well_seen
-from sogjax.track.pose_search import search_pose, search_poses, strain
+from sogjax.tracking.culling import ImageReader
+from sogjax.tracking.frame_views import FrameViews, levels
+from sogjax.tracking.limbs import limbs, with_other_limb
+from sogjax.tracking.place_search import nearest_point, possible_places, well_seen
+from sogjax.tracking.pose_search import search_pose, search_poses, strain
 
 RIG = ring_rig(4, (320, 240), distance=2.5)
 TERMS = standard_terms()

@@ -17,7 +17,7 @@ from sogjax.settings import TrackConfig
 from sogjax.settings.compose import track_config
 from sogjax.settings.files import choices_of
 from sogjax.solve import ConditionedAscent
-from sogjax.track.frame import TrackState
+from sogjax.tracking.frame import TrackState
 
 GROUPS = ("solver", "color", "images", "energy")
 

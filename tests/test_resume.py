@@ -21,7 +21,7 @@ from sogjax.data.motion import Motion, load_motion
 from sogjax.engine import job, kept_run, streams
 from sogjax.engine import track as track_command
 from sogjax.settings import ColorConfig
-from sogjax.track import tracker
+from sogjax.tracking import tracker
 
 FRAMES, KILLS = 20, 3
 LIGHT = ("outputs.overlay=false", "outputs.rerun=false", "outputs.bvh=false")

@@ -13,7 +13,7 @@ from sogjax.actor.shape import LENGTH_SPREAD, ShapeModel
 from sogjax.actor.silhouette_cells import MAX_CELLS, cells_of
 from sogjax.actor.silhouette_fit import SilhouetteFit, fitted
 from sogjax.model.camera import project
-from sogjax.track.scales import pose_scales
+from sogjax.tracking.scales import pose_scales
 
 GRADIENT = 2e-3
 """Relative, float32."""

@@ -19,8 +19,8 @@ from sogjax.energy.posed import History, Posed
 from sogjax.energy.term import Penalty, Term
 from sogjax.errors import InputError
 from sogjax.solve import ConditionedAscent, GaussNewton, OptimistixSolver, gradient_ascent
-from sogjax.track.rounds import solve_near
-from sogjax.track.scales import pose_scales
+from sogjax.tracking.rounds import solve_near
+from sogjax.tracking.scales import pose_scales
 
 HEIGHT = 0.9
 

@@ -14,10 +14,10 @@ from rig_cases import ring_rig
 from sogjax.energy.frame_energy import standard_terms
 from sogjax.model.body import concatenate, dof_slices
 from sogjax.solve import GaussNewton, Solution
-from sogjax.track import tracker as tracker_module
-from sogjax.track.culling import CAPACITIES, Capacities
-from sogjax.track.frame import TrackState
-from sogjax.track.tracker import track
+from sogjax.tracking import tracker as tracker_module
+from sogjax.tracking.culling import CAPACITIES, Capacities
+from sogjax.tracking.frame import TrackState
+from sogjax.tracking.tracker import track
 
 DEPTH, FINE_DEPTH = 6, 7
 """Cells of 4 and 2 pixels: an arm at 3 m is 5 pixels wide."""

@@ -18,7 +18,7 @@ from sogjax.energy.frame_energy import still_energy
 from sogjax.energy.term import Terms
 from sogjax.energy.views import Views
 from sogjax.solve import ConditionedAscent, Scales
-from sogjax.track.scales import pose_scales
+from sogjax.tracking.scales import pose_scales
 
 SHAPE_WEIGHT = 3e-5
 """Weight of the shape's prior in units of the similarity of Eq. 9."""

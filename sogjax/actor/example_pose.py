@@ -13,8 +13,8 @@ from sogjax.energy.term import Terms
 from sogjax.energy.views import Views
 from sogjax.model.body import Body
 from sogjax.solve import ConditionedAscent, Scales
-from sogjax.track.initial_pose import centred, turned
-from sogjax.track.scales import pose_scales
+from sogjax.tracking.initial_pose import centred, turned
+from sogjax.tracking.scales import pose_scales
 
 NUM_HEADINGS = 16
 COARSE_ITERATIONS = 40

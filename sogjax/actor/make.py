@@ -31,7 +31,7 @@ from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.frames import world_from_upright
-from sogjax.track.initial_pose import rough_pose
+from sogjax.tracking.initial_pose import rough_pose
 
 Report = Callable[[str], None]
 Progress = Callable[[Iterable[Any], int, str], Iterable[Any]]

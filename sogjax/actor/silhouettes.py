@@ -20,7 +20,7 @@ from sogjax.images.cells import CellGrid, stack_cells
 from sogjax.images.quadtree import Candidates, keep_blobs, quadtree
 from sogjax.model.camera import Camera
 from sogjax.model.sog import Sog
-from sogjax.track.culling import capacity_for
+from sogjax.tracking.culling import capacity_for
 
 BACKGROUND_SIMILARITY = -0.15
 """d(c_i, c_j) of the body's colour with the background's. Eq. 7 has 0 there; then a blob could grow without end.

@@ -9,7 +9,7 @@ from sogjax.data.ground_truth import GroundTruth
 from sogjax.data.motion import Motion
 from sogjax.data.recording import Recording
 from sogjax.errors import InputError
-from sogjax.evaluate import Evaluation, GroupEvaluation, evaluate_motions
+from sogjax.evaluation import Evaluation, GroupEvaluation, evaluate_motions
 
 Truth = Recording | GroundTruth | str | Path
 

@@ -17,9 +17,9 @@ from sogjax.engine.pipeline import Preparation, cells_of_frame
 from sogjax.engine.recordings import with_cameras
 from sogjax.errors import InputError
 from sogjax.model.body import Body
-from sogjax.track.culling import Capacities, capacity_for
-from sogjax.track.frame import PartialCells, on_device
-from sogjax.track.tracker import Tracker, first_capacities
+from sogjax.tracking.culling import Capacities, capacity_for
+from sogjax.tracking.frame import PartialCells, on_device
+from sogjax.tracking.tracker import Tracker, first_capacities
 
 ROOM = 2
 """Times the room that suits the first frame: nobody makes more while a pure step runs."""

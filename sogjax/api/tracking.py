@@ -13,7 +13,7 @@ from sogjax.engine.recordings import upright, with_cameras
 from sogjax.engine.track import track_recording
 from sogjax.errors import InputError
 from sogjax.model.body import Body
-from sogjax.track.pose_search import FoundPose
+from sogjax.tracking.pose_search import FoundPose
 
 
 @overload

@@ -9,7 +9,7 @@ from sogjax.engine.build import marker_rule
 from sogjax.engine.outputs import actor_name, free_path
 from sogjax.engine.recordings import file_list
 from sogjax.errors import InputError
-from sogjax.evaluate import GroupEvaluation, evaluate_motions
+from sogjax.evaluation import GroupEvaluation, evaluate_motions
 
 
 def run(config: EvaluateConfig) -> GroupEvaluation:

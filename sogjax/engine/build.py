@@ -17,7 +17,7 @@ from sogjax.energy.overlap import EXACT_EXPONENT, PRINTED_EXPONENT
 from sogjax.energy.term import Term, Terms
 from sogjax.energy.views import whole_image_overlap
 from sogjax.errors import InputError
-from sogjax.evaluate.markers import MARKER_RULES, MarkerRule
+from sogjax.evaluation.markers import MARKER_RULES, MarkerRule
 from sogjax.images.cells import CellGrid, stack_cells
 from sogjax.images.quadtree import Candidates, quadtree
 from sogjax.model.body import Body
@@ -25,10 +25,10 @@ from sogjax.model.camera import Camera
 from sogjax.model.color import COLOR_RADIUS, averaging_space, from_rgb
 from sogjax.settings import ColorConfig, EnergyConfig, ImagesConfig, OutputsConfig, SolverConfig, TrackConfig
 from sogjax.solve import ConditionedAscent, GaussNewton, OptimistixSolver, Scales, Solver
-from sogjax.track.confidence import Laplace
-from sogjax.track.culling import BoxAround, ImageReader
-from sogjax.track.scales import pose_scales
-from sogjax.track.tracker import PairChoice, Tracker
+from sogjax.tracking.confidence import Laplace
+from sogjax.tracking.culling import BoxAround, ImageReader
+from sogjax.tracking.scales import pose_scales
+from sogjax.tracking.tracker import PairChoice, Tracker
 
 MAX_DEPTH = 12
 """Of a quad-tree: one pixel of the largest pictures cameras take."""

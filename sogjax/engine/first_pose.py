@@ -17,9 +17,9 @@ from sogjax.errors import InputError
 from sogjax.images.cells import stack_cells
 from sogjax.model.body import Body
 from sogjax.settings import TrackConfig
-from sogjax.track.frame_views import FrameViews, levels
-from sogjax.track.initial_pose import rough_pose
-from sogjax.track.pose_search import FoundPose, search_poses
+from sogjax.tracking.frame_views import FrameViews, levels
+from sogjax.tracking.initial_pose import rough_pose
+from sogjax.tracking.pose_search import FoundPose, search_poses
 
 AUTO = "auto"
 SURE = 0.005

@@ -30,7 +30,7 @@ from sogjax.images.cells import CellGrid, stack_shape
 from sogjax.model.body import Body, concatenate
 from sogjax.sentences import counted
 from sogjax.settings import OutputsConfig, TrackConfig
-from sogjax.track.tracker import Tracker, compile_counts, track
+from sogjax.tracking.tracker import Tracker, compile_counts, track
 
 FRAMES_BEHIND = 8
 """Tracked frames waiting to be written, at most."""

@@ -22,9 +22,9 @@ from sogjax.engine.origin import Origin
 from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.model.sog import Sog
-from sogjax.track.confidence import Deviations
-from sogjax.track.culling import Capacities
-from sogjax.track.frame import FrameResult, TrackedFrame, TrackState
+from sogjax.tracking.confidence import Deviations
+from sogjax.tracking.culling import Capacities
+from sogjax.tracking.frame import FrameResult, TrackedFrame, TrackState
 
 FOLDER = "run.partial"
 NOTE, START, ACTOR = "run.json", "start.npz", "actor"

@@ -18,7 +18,7 @@ from sogjax.engine.run import Run
 from sogjax.engine.streams import file_name
 from sogjax.engine.terminal import say
 from sogjax.errors import InputError
-from sogjax.evaluate import evaluate_motions
+from sogjax.evaluation import evaluate_motions
 from sogjax.model.body import Body
 from sogjax.settings import OutputsConfig
 

@@ -16,8 +16,8 @@ from sogjax.engine.terminal import progress
 from sogjax.engine.timing import StageTimes
 from sogjax.errors import InputError
 from sogjax.images.cells import CellGrid, padded_cells, stack_shape
-from sogjax.track.frame import FrameCells, PartialCells, TrackedFrame
-from sogjax.track.tracker import Tracker, track
+from sogjax.tracking.frame import FrameCells, PartialCells, TrackedFrame
+from sogjax.tracking.tracker import Tracker, track
 
 FRAMES_AHEAD = 3
 """Decoded frames waiting for the tracking step, at most."""
@@ -51,7 +51,7 @@ PictureReader = Callable[[Recording, "Preparation", int, int], Iterator[list[Pic
 
 
 FrameTracker = Callable[[Tracker, Float[Array, "dof"], Iterable[FrameCells]], Iterator[TrackedFrame]]
-"""Finds the poses of frames from their cells in turn, as `sogjax.track.tracker.track` does."""
+"""Finds the poses of frames from their cells in turn, as `sogjax.tracking.tracker.track` does."""
 
 
 def nothing(camera: int, image: np.ndarray) -> None:

@@ -10,9 +10,9 @@ from jaxtyping import Array, Float
 from sogjax.engine.kept_run import Prefix
 from sogjax.engine.pipeline import FrameTracker
 from sogjax.model.sog import Sog
-from sogjax.track.frame import FrameCells, TrackedFrame, TrackState, on_device
-from sogjax.track.scan import image_blobs
-from sogjax.track.tracker import Tracker, track
+from sogjax.tracking.frame import FrameCells, TrackedFrame, TrackState, on_device
+from sogjax.tracking.scan import image_blobs
+from sogjax.tracking.tracker import Tracker, track
 
 Frames = Iterable[FrameCells]
 

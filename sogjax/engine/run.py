@@ -9,7 +9,7 @@ from jaxtyping import Bool, Int
 from sogjax.data.motion import Motion
 from sogjax.data.recording import Recording
 from sogjax.engine.timing import StageTimes
-from sogjax.evaluate import GroupEvaluation
+from sogjax.evaluation import GroupEvaluation
 from sogjax.model.body import Body
 
 

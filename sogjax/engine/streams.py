@@ -28,7 +28,7 @@ from sogjax.model.body import Body, dof_slices, joint_slices
 from sogjax.model.color import to_rgb
 from sogjax.sentences import counted
 from sogjax.settings import OutputsConfig
-from sogjax.track.frame import FrameResult
+from sogjax.tracking.frame import FrameResult
 
 PARTIAL = ".partial"
 """Ending of the folder of an incomplete motion."""

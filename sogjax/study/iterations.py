@@ -8,9 +8,9 @@ from sogjax.errors import InputError
 from sogjax.settings import TrackConfig
 from sogjax.settings.compose import track_config
 from sogjax.study.source import Source
-from sogjax.track.frame import TrackState
-from sogjax.track.iterations import best_after
-from sogjax.track.tracker import track
+from sogjax.tracking.frame import TrackState
+from sogjax.tracking.iterations import best_after
+from sogjax.tracking.tracker import track
 
 
 def check_showable(source: Source, frame: int) -> None:

@@ -14,8 +14,8 @@ from sogjax.engine.terminal import say
 from sogjax.engine.timing import StageTimes
 from sogjax.engine.track import track_recording
 from sogjax.errors import InputError
-from sogjax.evaluate import Evaluation, GroupEvaluation, PointErrors, evaluate_motions
-from sogjax.evaluate.metrics import mean_per_frame
+from sogjax.evaluation import Evaluation, GroupEvaluation, PointErrors, evaluate_motions
+from sogjax.evaluation.metrics import mean_per_frame
 from sogjax.model.body import Body, dof_slices
 from sogjax.settings import TrackConfig
 from sogjax.settings.compose import track_config
@@ -23,9 +23,9 @@ from sogjax.study.experiment import Experiment
 from sogjax.study.machine import machine_facts
 from sogjax.study.record import RunFolder, RunPlan, RunRecord
 from sogjax.study.source import Source
-from sogjax.track.culling import Capacities
-from sogjax.track.frame import FrameResult
-from sogjax.track.tracker import track
+from sogjax.tracking.culling import Capacities
+from sogjax.tracking.frame import FrameResult
+from sogjax.tracking.tracker import track
 
 STAGES = ("decode", "step", "whole")
 

@@ -25,7 +25,7 @@ from sogjax.settings import TrackConfig
 from sogjax.settings.compose import track_config
 from sogjax.synth import SynthSettings, cached_recording
 from sogjax.synth.settings import MOTIONS
-from sogjax.track.tracker import Tracker
+from sogjax.tracking.tracker import Tracker
 
 PARTS = ("videos", "images", "background", "example_poses")
 """Folders of a recording."""

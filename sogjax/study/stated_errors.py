@@ -14,11 +14,11 @@ from sogjax.data.ground_truth import GroundTruth
 from sogjax.data.motion import Motion, motion_from_poses
 from sogjax.engine.streams import deviations_of
 from sogjax.errors import InputError
-from sogjax.evaluate.markers import common_frames, joint_pairs
+from sogjax.evaluation.markers import common_frames, joint_pairs
 from sogjax.settings.compose import track_config
 from sogjax.study.record import program_digest
 from sogjax.study.source import Source
-from sogjax.track.tracker import track
+from sogjax.tracking.tracker import track
 
 BINS = 8
 ROUNDS = 6

@@ -9,7 +9,7 @@ from sogjax.engine.recordings import actors_of, opened
 from sogjax.engine.run import Run
 from sogjax.engine.terminal import progress
 from sogjax.engine.track import track_recording
-from sogjax.evaluate import evaluate_motions
+from sogjax.evaluation import evaluate_motions
 from sogjax.settings.compose import track_config
 from sogjax.synth import SynthSettings, cached_recording
 from sogjax.synth.cache import default_cache_dir

@@ -9,8 +9,8 @@ from scipy.optimize import linear_sum_assignment
 
 from sogjax.data.ground_truth import GroundTruth
 from sogjax.data.motion import Motion
-from sogjax.evaluate.markers import common_frames
-from sogjax.evaluate.metrics import stretches
+from sogjax.evaluation.markers import common_frames
+from sogjax.evaluation.metrics import stretches
 
 SWAP_FRAMES = 5
 """An exchange is reported where it lasts for this many frames on end."""

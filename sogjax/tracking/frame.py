@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int, UInt8
 
 from sogjax.model.sog import Sog
-from sogjax.track.confidence import Deviations
-from sogjax.track.culling import Capacities
+from sogjax.tracking.confidence import Deviations
+from sogjax.tracking.culling import Capacities
 
 
 class PartialCells(NamedTuple):

@@ -5,9 +5,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, UInt8
 
-from sogjax.track.culling import Capacities
-from sogjax.track.frame import TrackState
-from sogjax.track.tracker import Tracker
+from sogjax.tracking.culling import Capacities
+from sogjax.tracking.frame import TrackState
+from sogjax.tracking.tracker import Tracker
 
 
 @eqx.filter_jit

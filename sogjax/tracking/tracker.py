@@ -21,8 +21,8 @@ from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.color import from_rgb
 from sogjax.solve import Scales, Solution, Solver
-from sogjax.track.confidence import Deviations, Laplace
-from sogjax.track.culling import (
+from sogjax.tracking.confidence import Deviations, Laplace
+from sogjax.tracking.culling import (
     CAPACITIES,
     Capacities,
     ImageReader,
@@ -32,8 +32,8 @@ from sogjax.track.culling import (
     capacity_for,
     union_boxes,
 )
-from sogjax.track.frame import FrameCells, FrameResult, PartialCells, TrackedFrame, TrackState, on_device, on_host
-from sogjax.track.rounds import solve_near
+from sogjax.tracking.frame import FrameCells, FrameResult, PartialCells, TrackedFrame, TrackState, on_device, on_host
+from sogjax.tracking.rounds import solve_near
 
 HEADROOM = 1.4
 """Slots for image blobs, as a multiple of what the first frame needs."""

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from sogjax.data.atomic import atomic_path
-from sogjax.evaluate.markers import PointErrors
-from sogjax.evaluate.metrics import ErrorSummary, mean_per_frame, mean_per_point, std_per_point, summarize
+from sogjax.evaluation.markers import PointErrors
+from sogjax.evaluation.metrics import ErrorSummary, mean_per_frame, mean_per_point, std_per_point, summarize
 
 MM = 1000.0
 TABLE_ROW = "{:<24}{:>8}{:>8}{:>8}{:>8}{:>8}{:>7}{:>7}"

@@ -1,6 +1,6 @@
 """A whole clip as one compiled call: the tracker's step in a `lax.scan` over the cells of all frames.
 
-The frame-by-frame tracker (`sogjax.track.tracker.track`) gives the same numbers; this one does no work between
+The frame-by-frame tracker (`sogjax.tracking.tracker.track`) gives the same numbers; this one does no work between
 frames.
 """
 
@@ -11,9 +11,9 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, UInt8
 
 from sogjax.model.sog import Sog
-from sogjax.track.culling import Capacities
-from sogjax.track.frame import FrameResult, TrackState
-from sogjax.track.tracker import Tracker, first_capacities, larger_capacities
+from sogjax.tracking.culling import Capacities
+from sogjax.tracking.frame import FrameResult, TrackState
+from sogjax.tracking.tracker import Tracker, first_capacities, larger_capacities
 
 ClipCells = UInt8[Array, "frame camera rows columns 3"]
 

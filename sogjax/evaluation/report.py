@@ -11,10 +11,19 @@ from jaxtyping import Int
 from sogjax.data.ground_truth import GroundTruth
 from sogjax.data.motion import Motion
 from sogjax.errors import InputError
-from sogjax.evaluate.markers import MARKER_RULES, MarkerRule, PointErrors, common_frames, joint_errors, marker_errors
-from sogjax.evaluate.metrics import ErrorSummary, LostPoint, lost_points, summarize
-from sogjax.evaluate.numbers import MM, TABLE_ROW, in_mm, points_dict, rule_dict, summary_dict, summary_row, write_json
-from sogjax.evaluate.swaps import Swap, identity_swaps
+from sogjax.evaluation.markers import MARKER_RULES, MarkerRule, PointErrors, common_frames, joint_errors, marker_errors
+from sogjax.evaluation.metrics import ErrorSummary, LostPoint, lost_points, summarize
+from sogjax.evaluation.numbers import (
+    MM,
+    TABLE_ROW,
+    in_mm,
+    points_dict,
+    rule_dict,
+    summary_dict,
+    summary_row,
+    write_json,
+)
+from sogjax.evaluation.swaps import Swap, identity_swaps
 from sogjax.sentences import counted
 
 

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 from sogjax.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from sogjax.track.iterations import best_after
-    from sogjax.track.scales import pose_scales
+    from sogjax.tracking.iterations import best_after
+    from sogjax.tracking.scales import pose_scales
 
 __all__ = [
     "best_after",
@@ -16,7 +16,7 @@ __all__ = [
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        "best_after": "sogjax.track.iterations",
-        "pose_scales": "sogjax.track.scales",
+        "best_after": "sogjax.tracking.iterations",
+        "pose_scales": "sogjax.tracking.scales",
     },
 )

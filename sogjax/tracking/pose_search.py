@@ -17,11 +17,11 @@ from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.skeleton import Skeleton
 from sogjax.solve import ConditionedAscent, Scales
-from sogjax.track.frame_views import FrameViews
-from sogjax.track.initial_pose import body_centre, placed, root_position, shifts, turned
-from sogjax.track.limbs import limbs, with_other_limb
-from sogjax.track.place_search import Slices, best_places, possible_places, well_seen
-from sogjax.track.scales import pose_scales
+from sogjax.tracking.frame_views import FrameViews
+from sogjax.tracking.initial_pose import body_centre, placed, root_position, shifts, turned
+from sogjax.tracking.limbs import limbs, with_other_limb
+from sogjax.tracking.place_search import Slices, best_places, possible_places, well_seen
+from sogjax.tracking.scales import pose_scales
 
 NUM_PLACES = 12
 NUM_HEADINGS = 12

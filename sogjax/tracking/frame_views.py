@@ -13,7 +13,7 @@ from sogjax.model.body import Body
 from sogjax.model.camera import Camera, project
 from sogjax.model.color import from_rgb
 from sogjax.model.sog import Sog
-from sogjax.track.culling import CAPACITIES, ImageReader, actor_of_blobs, body_boxes, capacity_for, union_boxes
+from sogjax.tracking.culling import CAPACITIES, ImageReader, actor_of_blobs, body_boxes, capacity_for, union_boxes
 
 SMALLEST_CAPACITY = 512
 Cells = UInt8[Array, "camera _rows _columns 3"]
