@@ -248,6 +248,13 @@ def test_evaluation_prints_itself(recording, motion):
     assert str(sogjax.evaluate([replace(motion, actor="anna")], truth)).startswith("anna")
 
 
+def test_markers_are_attached_by_the_rule_that_is_named(recording, motion):
+    rules = {rule: sogjax.evaluate(motion, recording, markers=rule) for rule in ("scaled", "closest")}
+    for rule, evaluation in rules.items():
+        assert evaluation.rule == rule
+        assert f"by the rule {rule}" in str(evaluation)
+
+
 def test_what_has_no_truth_is_refused(tmp_path, recording, motion):
     for source in (replace(recording, ground_truth=None), tmp_path, tmp_path / "none.npz"):
         with pytest.raises(sogjax.InputError, match="there is no ground truth"):
