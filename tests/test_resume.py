@@ -75,7 +75,7 @@ def test_the_end_is_that_of_a_run_that_was_not_stopped(capsys, tmp_path, monkeyp
     assert_same(tmp_path / "run", tmp_path / "whole")
     assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["config.yaml", "motion.npz", "run.json"]
     _, err = done(capsys, *command, "out=run", "resume=true")
-    assert "ended already" in err
+    assert "already ended" in err
 
 
 @pytest.mark.slow

@@ -4,10 +4,10 @@ import equinox as eqx
 import jax
 import numpy as np
 import pytest
-from sogjax.app.composition import composed
 
-from sogjax.app import build
+from sogjax.app.config.composition import composed
 from sogjax.energy import standard_terms
+from sogjax.engine import build
 from sogjax.solve import ConditionedAscent, GaussNewton, OptimistixSolver, gradient_ascent
 
 SOLVERS = {

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
+from sogjax.app.sweep import results as sweep_results
 from sogjax.app.sweep.results import Failure, Member, finish_sweep
-from sogjax.app.sweep.run import results as sweep_results
 from sogjax.engine.run_numbers import COLUMNS, Numbers
 from sogjax.view.plots import SIZE, plot_per_point
 
