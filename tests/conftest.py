@@ -4,6 +4,8 @@ import logging
 import os
 
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
+# Most of the tests' time is compilation, a third of it LLVM's optimisation; `.ci/run` keeps that in the slow tests.
+os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "true")
 
 import jax
 import pytest

@@ -86,6 +86,7 @@ def test_the_guide_has_every_name():
     assert [name for name in sogjax.__all__ if f"`{name}" not in page] == []
 
 
+@pytest.mark.slow
 def test_the_script_in_the_readme_runs_and_writes_only_what_it_says(tmp_path):
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     script = readme.split("## From Python")[1].split("```python\n")[1].split("```")[0]
@@ -193,6 +194,7 @@ def test_another_ending_is_refused(tmp_path, motion):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_several_motions_come_in_the_order_of_the_actors(tmp_path, recording, actor):
     rough = yaml.safe_load(recording.initial_poses.read_text())
     (tmp_path / "poses.yaml").write_text("".join(yaml.safe_dump({name: rough}) for name in ("zoe", "amy")))
@@ -217,6 +219,7 @@ def test_the_pure_step_finds_what_track_finds_and_is_compiled_once(recording, tr
     assert len(traces) == 1
 
 
+@pytest.mark.slow
 def test_a_pure_step_without_room_is_an_error(recording, tracker):
     cells = next(sogjax.read_cells(recording, tracker))
     with pytest.raises(ValueError, match="no capacities"):
@@ -310,6 +313,7 @@ class Ceiling(sogjax.Penalty):
         return jnp.sum(jnp.maximum(posed.blobs.means[:, 2] - self.height, 0.0) ** 2)
 
 
+@pytest.mark.slow
 def test_a_term_of_ones_own_moves_the_motion(recording, actor, motion):
     middle = float(np.median(motion.blob_means[..., 2]))
     held = sogjax.track(recording, actor, terms=[Ceiling(weight=100.0, height=middle)], **SMALL)

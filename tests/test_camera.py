@@ -148,6 +148,7 @@ def test_fisheye_distortion_is_opencvs(lens):
     np.testing.assert_allclose(distort(camera, jnp.asarray(found)), inside, atol=PIXELS)
 
 
+@pytest.mark.slow
 def test_fisheye_and_polynomial_cameras_in_one_stack():
     one, other = fisheye_camera(FISHEYE_LENSES[1]), fisheye_camera((-0.2, 0.05, 0.001, -0.002), fisheye=False)
     both = jax.tree.map(lambda *leaves: jnp.stack(leaves), one, other)

@@ -52,6 +52,7 @@ def test_a_sound_recording_has_no_warning(tmp_path):
     json.dumps(found.numbers)
 
 
+@pytest.mark.slow
 def test_a_camera_that_started_three_frames_late(tmp_path):
     found = looked_at(tmp_path / "walk", faulty.started_late)
     (finding,) = warnings(found)
@@ -60,6 +61,7 @@ def test_a_camera_that_started_three_frames_late(tmp_path):
     assert found.offsets == {f"cam{k:02d}": -3 * (f"cam{k:02d}" == WRONG) for k in range(6)}
 
 
+@pytest.mark.slow
 def test_exchanged_videos(tmp_path):
     found = looked_at(tmp_path / "walk", faulty.exchanged_videos)
     assert [finding.cameras for finding in warnings(found, "files")] == [(WRONG, OTHER)]
@@ -108,6 +110,7 @@ def test_a_frame_that_stands_twice(tmp_path):
     assert found.numbers["repeated_frames"] == {WRONG: [20]}
 
 
+@pytest.mark.slow
 def test_a_frame_that_was_lost(tmp_path):
     found = looked_at(tmp_path / "walk", faulty.frame_lost)
     notes = [finding for finding in found.findings if finding.severity == "note" and finding.topic == "frames"]
@@ -168,6 +171,7 @@ def test_steps_that_one_camera_has_not_seen_do_not_count():
     assert correlation(a, partly) == 0.0
 
 
+@pytest.mark.slow
 def test_a_clip_that_is_too_short_is_said_to_be_so(tmp_path):
     """One frame of those that are there, and all of a recording that has few."""
     recording = open_recording(copied(tmp_path / "walk"))

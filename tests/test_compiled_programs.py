@@ -19,6 +19,7 @@ def limits(tmp_path):
     return written
 
 
+@pytest.mark.slow
 def test_programs_are_kept_while_there_is_room_and_forgotten_when_there_is_not(limits):
     compiled = []
     double = jax.jit(lambda x: compiled.append(1) or 2.0 * x)

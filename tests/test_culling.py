@@ -62,6 +62,7 @@ def unculled(tracker, cells):
     return Views.from_images(tracker.cameras, images, blobs, tracker.normalizers, "hsv_cylinder", radius)
 
 
+@pytest.mark.slow
 def test_culling_does_not_change_the_energy(scene):
     """At the last pose and at others that a step may lead to."""
     tracker, cells, state = scene
@@ -77,6 +78,7 @@ def test_culling_does_not_change_the_energy(scene):
         np.testing.assert_allclose(similarity_of(tracker.body, pose, views, tracker.terms), expected, rtol=CULLED)
 
 
+@pytest.mark.slow
 def test_counts_are_true_ones_whatever_the_capacity(scene):
     tracker, cells, state = scene
     views = eqx.filter_jit(tracker.views)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from body_cases import random_body
 from rig_cases import ring_rig
+from slow_values import fast_and_slow
 from sog_cases import floats, in_float64, random_views
 
 from sogjax.energy.frame_energy import FrameEnergy, standard_terms
@@ -30,8 +31,8 @@ def scene(sparse=False, capped=True, gradient="forward"):
     return (near(energy, pose, 64)[0] if sparse else energy), pose
 
 
-@pytest.mark.parametrize("sparse", [False, True])
-@pytest.mark.parametrize("mode", ["forward", "autodiff"])
+@pytest.mark.parametrize("sparse", fast_and_slow(True, False))
+@pytest.mark.parametrize("mode", fast_and_slow("forward", "autodiff"))
 def test_forward_mode_is_reverse_mode(mode, sparse):
     with jax.enable_x64(True):
         energy, pose = scene(sparse, gradient=mode)
@@ -39,8 +40,8 @@ def test_forward_mode_is_reverse_mode(mode, sparse):
         np.testing.assert_allclose(forward, gradient(energy, pose), rtol=1e-10, atol=1e-14)
 
 
-@pytest.mark.parametrize("sparse", [False, True])
-@pytest.mark.parametrize("capped", [False, True])
+@pytest.mark.parametrize("sparse", fast_and_slow(True, False))
+@pytest.mark.parametrize("capped", fast_and_slow(True, False))
 def test_second_derivatives_are_differences_of_the_gradient(capped, sparse):
     """Forward over reverse, and forward over forward."""
     with jax.enable_x64(True):
@@ -64,8 +65,8 @@ def views_anew(energy, pose, body_colors, image_colors, radius, sparse):
     return near(anew, pose, 64)[0] if sparse else anew
 
 
-@pytest.mark.parametrize("sparse", [False, True])
-@pytest.mark.parametrize("what", ["body", "images", "radius"])
+@pytest.mark.parametrize("sparse", fast_and_slow(True, False))
+@pytest.mark.parametrize("what", fast_and_slow("body", "images", "radius"))
 def test_the_derivative_by_colours_is_that_of_similarities_made_anew(what, sparse):
     """Along a random direction, against central differences in which Eq. 7 is computed again."""
     with jax.enable_x64(True):
@@ -91,6 +92,7 @@ def test_the_derivative_by_colours_is_that_of_similarities_made_anew(what, spars
         np.testing.assert_allclose(jnp.sum(reverse * direction), expected, rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_where_similarities_are_no_function_of_colours_differentiating_by_them_is_an_error():
     energy, pose = scene()
     other = eqx.tree_at(lambda e: e.views.coloring, energy, None)

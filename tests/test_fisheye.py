@@ -3,6 +3,7 @@
 import cv2
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 from sogjax.data.calibration import CameraEntry, rig_from_entries
 from sogjax.images.cells import CellGrid
@@ -47,6 +48,7 @@ def test_a_viewers_picture_shows_a_point_where_a_pinhole_camera_does(tmp_path):
     np.testing.assert_allclose(centre + 0.5, camera.pixels(np.asarray(undistorted))[0], atol=0.5)
 
 
+@pytest.mark.slow
 def test_cells_cover_as_much_of_the_undistorted_picture_as_the_lens_shows(tmp_path):
     """Up to 40 degrees from the axis, a disc of radius f tan(40 degrees), to two percent."""
     rig = fisheye_rig(tmp_path)

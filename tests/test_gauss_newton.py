@@ -59,6 +59,7 @@ def test_the_model_has_the_value_and_gradient_of_the_energy_and_a_curvature_that
         assert eigenvalues[-1] > 1e-3
 
 
+@pytest.mark.slow
 def test_where_body_and_pictures_are_alike_the_curvature_is_the_true_one():
     """Every image blob lies where its body blob is seen, as large, and resembles no other one.
 

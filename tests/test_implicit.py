@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from body_cases import random_body
 from rig_cases import ring_rig
+from slow_values import fast_and_slow
 from sog_cases import floats, in_float64, random_views
 
 from sogjax.energy.frame_energy import FrameEnergy, standard_terms
@@ -77,7 +78,7 @@ def remade(energy):
     return eqx.tree_at(lambda e: e.views, energy, anew)
 
 
-@pytest.mark.parametrize("name", PLACES)
+@pytest.mark.parametrize("name", fast_and_slow(*PLACES))
 def test_the_derivative_of_the_pose_is_that_of_solving_again(optimum, name):
     """In both directions of differentiation."""
     with jax.enable_x64(True):
@@ -117,6 +118,7 @@ class Bowl(eqx.Module):
         return -((params[0] + params[1] - self.height) ** 2)
 
 
+@pytest.mark.slow
 def test_along_a_direction_that_nothing_determines_the_derivative_is_0():
     """Of the points of the line the nearest one is taken: both parameters share the change."""
     with jax.enable_x64(True):

@@ -19,6 +19,7 @@ SOLVERS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
 def test_it_leads_upwards_from_the_start_to_what_tracking_finds(solver):
     body, rig = in_colors(shipped("dog")), ring_rig(4, (160, 120), distance=1.6)

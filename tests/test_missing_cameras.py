@@ -108,6 +108,7 @@ def tracked(capsys, rendered, tmp_path, name, *words):
     return load_motion(tmp_path / name / "motion.npz"), err
 
 
+@pytest.mark.slow
 def test_a_missing_camera_is_as_good_as_none():
     """Poses and energies are those without that camera, whose share of the mean goes to the others."""
     body, rig = in_colors(shipped("dog")), ring_rig(4, (160, 120), distance=1.6)

@@ -10,6 +10,7 @@ from drawn_scene import standing
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rig_cases import ring_rig
+from slow_values import fast_and_slow
 from sog_cases import floats, random_views
 
 from sogjax.energy.frame_energy import FrameEnergy, standard_terms, still_energy
@@ -58,8 +59,8 @@ def towards(pose, change, size):
     return pose + 1e-3 * change * (size / far)
 
 
-@pytest.mark.parametrize("mode", ["forward", "autodiff"])
-@pytest.mark.parametrize("capped", [True, False])
+@pytest.mark.parametrize("mode", fast_and_slow("forward", "autodiff"))
+@pytest.mark.parametrize("capped", fast_and_slow(True, False))
 @given(seed=st.integers(0, 1000), size=st.sampled_from([0.0, 0.5, 0.95]))
 @settings(deadline=None, max_examples=5)
 def test_value_and_gradient_are_those_of_all_pairs_as_far_as_the_margin(mode, capped, seed, size):
@@ -127,6 +128,7 @@ def test_a_blob_that_comes_into_view_has_moved_too_far():
     assert np.isinf(displacement(camera, blobs, behind))
 
 
+@pytest.mark.slow
 def test_lists_are_made_anew_until_the_pose_lies_where_they_hold():
     """From a start many margins away the value at the end is that of all pairs, and as high as with them."""
     body = random_body(4, joints=5, dofs=4, blobs=6)

@@ -77,7 +77,15 @@ def test_many_starts_at_once_and_no_new_compilation_for_a_swept_number(method):
     assert traces == first
 
 
-@pytest.mark.parametrize(("method", "gradient"), [*((method, "forward") for method in METHODS), ("bfgs", "autodiff")])
+@pytest.mark.parametrize(
+    ("method", "gradient"),
+    [
+        ("lbfgs", "forward"),
+        pytest.param("bfgs", "forward", marks=pytest.mark.slow),
+        pytest.param("nonlinear_cg", "forward", marks=pytest.mark.slow),
+        pytest.param("bfgs", "autodiff", marks=pytest.mark.slow),
+    ],
+)
 def test_the_energy_is_climbed_whichever_way_its_gradient_is_made(method, gradient):
     body = random_body(4, joints=5, dofs=4, blobs=6)
     body = eqx.tree_at(lambda b: b.blobs.offsets, body, body.blobs.offsets + jnp.array([[0.0, 0.0, 1.0]]))

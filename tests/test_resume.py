@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from command_line import actor_file, done, refused, trackable
+from slow_values import fast_and_slow
 from small_recording import write_video
 
 from sogjax.app.cli import main
@@ -26,11 +27,6 @@ from sogjax.tracking import tracker
 FRAMES, KILLS = 20, 3
 LIGHT = ("outputs.overlay=false", "outputs.rerun=false", "outputs.bvh=false")
 SMALL = ("images.depth=4", "solver.max_iterations=3", "solver.min_iterations=1")
-
-
-def fast_and_slow(fast, *slow):
-    """Values of a parameter, all but the first left to the slow tests."""
-    return [fast, *(pytest.param(value, marks=pytest.mark.slow) for value in slow)]
 
 
 @pytest.fixture
@@ -94,6 +90,7 @@ def test_two_actors(capsys, tmp_path, monkeypatch, recording):
         assert_same(tmp_path / "run", tmp_path / "whole", name)
 
 
+@pytest.mark.slow
 def test_the_tracker_goes_on_with_the_capacities_that_it_stopped_with(capsys, tmp_path, monkeypatch, command):
     """Room for image blobs that had to grow is not counted anew: sums of other lengths are rounded otherwise."""
     grown = tracker.Capacities(near=512, matching=512, blocks=2048)

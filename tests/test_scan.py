@@ -45,9 +45,8 @@ def frame_by_frame(tracker, start, cells):
     return [frame.result for frame in track(tracker, start, cells)]
 
 
-@pytest.mark.parametrize(
-    "kind", [pytest.param(lambda t: t, marks=pytest.mark.slow, id="dense"), pytest.param(sparse, id="sparse")]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [lambda t: t, sparse], ids=["dense", "sparse"])
 def test_a_scanned_clip_is_the_clip_frame_by_frame(dog, kind):
     tracker, start, cells = dog
     tracker = kind(tracker)

@@ -96,6 +96,7 @@ def soft_coverage(fit, params):
     return eqx.filter_jit(jax.vmap(camera))(silhouettes.cameras, silhouettes.means, silhouettes.sigmas)[None]
 
 
+@pytest.mark.slow
 def test_one_blob_covers_a_half_where_its_gaussian_is_a_half():
     rig = ring_rig(1, (64, 48), distance=2.0)
     cameras = jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float32), rig.cameras)
@@ -113,6 +114,7 @@ def test_one_blob_covers_a_half_where_its_gaussian_is_a_half():
     assert float(mismatch(blob, at_edge)) < 1e-6
 
 
+@pytest.mark.slow
 def test_a_start_a_little_off_ends_at_the_truth(case):
     fit, truth = case
     names = list(fit.model.body.skeleton.dof_names)

@@ -11,6 +11,7 @@ import pytest
 from body_cases import random_body
 from jaxtyping import Array
 from rig_cases import ring_rig
+from slow_values import fast_and_slow
 from sog_cases import floats, in_float64, random_views
 
 from sogjax.energy.added import added_terms
@@ -60,9 +61,9 @@ class Steady(Term):
 
 
 SOLVERS = {
+    "gauss_newton": GaussNewton(epsilon=1e-3, max_iterations=100),
     "conditioned_ascent": ConditionedAscent(epsilon=1e-3, max_iterations=400),
     "gradient_ascent": gradient_ascent(epsilon=1e-3, max_iterations=400),
-    "gauss_newton": GaussNewton(epsilon=1e-3, max_iterations=100),
     "bfgs": OptimistixSolver("bfgs"),
     "lbfgs": OptimistixSolver("lbfgs"),
     "nonlinear_cg": OptimistixSolver("nonlinear_cg"),
@@ -89,8 +90,8 @@ climb_near = eqx.filter_jit(solve_near)
 model_of = eqx.filter_jit(lambda term, posed, frame: (term.quadratic(posed, frame), Term.quadratic(term, posed, frame)))
 
 
-@pytest.mark.parametrize("pairs", ["dense", "sparse"])
-@pytest.mark.parametrize("name", SOLVERS)
+@pytest.mark.parametrize("pairs", fast_and_slow("sparse", "dense"))
+@pytest.mark.parametrize("name", fast_and_slow(*SOLVERS))
 def test_every_solver_climbs_an_energy_with_a_floor(name, pairs):
     """The body stands lower than the floor where the pictures show it; a heavy floor lifts it, whoever climbs."""
     free, start = scene()
@@ -124,7 +125,8 @@ def test_gauss_newton_uses_the_curvature_of_a_term():
     assert left[Spring] < 1e-9 < 1e-6 < left[StraightSpring]
 
 
-@pytest.mark.parametrize("place", [1, 2])
+@pytest.mark.slow
+@pytest.mark.parametrize("place", fast_and_slow(1, 2))
 def test_the_model_from_autodiff_is_the_closed_one_where_that_is_exact(place):
     with jax.enable_x64(True):
         energy, pose = scene(precise=True)

@@ -115,7 +115,7 @@ def no_common_frame(folder):
         nan_in_initial_pose,
         unknown_landmark,
         unknown_pose,
-        no_initial_pose,
+        pytest.param(no_initial_pose, marks=pytest.mark.slow),
         misspelt_setting,
         wrong_truth,
         no_common_frame,
