@@ -17,7 +17,7 @@ from sogjax.settings import TrackConfig
 
 RECORD_VERSION = 3
 """To be raised with every change that makes earlier runs incomparable."""
-_DECIDE = ("model", "energy", "solve", "images", "track", "data", "actor", "evaluate")
+_DECIDE = ("compiled", "model", "energy", "solve", "images", "tracking", "data", "actor", "evaluation")
 """Packages whose code decides the result of a run."""
 _OF_THE_RESULT = ("body", "color", "images", "energy", "solver", "tracking")
 

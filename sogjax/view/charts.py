@@ -109,7 +109,8 @@ def spaced(heights: Sequence[float], apart: float) -> list[float]:
 
 
 def _finish(panel: Any, names: Sequence[str], axis: str, value: str, title: str) -> None:
-    crowded = max((len(name) for name in names), default=0) * len(names) > 40
+    width = panel.get_position().width * panel.figure.get_figwidth()
+    crowded = max((len(name) for name in names), default=0) * len(names) > 10 * width
     panel.set_xticks(range(len(names)), names, rotation=30 if crowded else 0, ha="right" if crowded else "center")
     panel.set_xlabel(axis)
     panel.set_ylabel(value)
