@@ -15,7 +15,7 @@ from sogjax.app.config.composition import composed
 from sogjax.engine.build import check
 from sogjax.errors import InputError
 from sogjax.settings import TrackConfig
-from sogjax.study import record
+from sogjax.study import record as records
 from sogjax.study.document import Picture, Section, write_html, write_markdown
 from sogjax.study.experiment import Experiment, ExperimentConfig, RowConfig, experiment_names
 from sogjax.study.record import RunFolder, RunPlan, RunRecord
@@ -252,5 +252,5 @@ def test_documents_hold_the_same_and_html_needs_nothing_beside_it(tmp_path):
 
 
 def test_the_packages_that_decide_a_result_are_there():
-    root = Path(record.__file__).parents[1]
-    assert [name for name in record._DECIDE if not (root / name / "__init__.py").is_file()] == []
+    root = Path(records.__file__).parents[1]
+    assert [name for name in records._DECIDE if not (root / name / "__init__.py").is_file()] == []
