@@ -27,7 +27,6 @@ from sogjax.tracking.frame import TrackState
 from sogjax.tracking.tracker import first_capacities
 
 SOLVERS = ("gauss_newton", "lbfgs", "conditioned_ascent")
-FRAMES_OF_SWEEP = 8
 
 
 @dataclass

@@ -100,3 +100,14 @@ def test_where_similarities_are_no_function_of_colours_differentiating_by_them_i
     assert jnp.isfinite(gradient(other, pose)).all()
     with pytest.raises(TypeError, match="differentiated by colours"):
         jax.grad(lambda colors: eqx.tree_at(lambda e: e.body.blob_colors, other, colors)(pose))(other.body.blob_colors)
+
+
+@pytest.mark.parametrize("sparse", fast_and_slow(True, False))
+def test_the_value_of_the_quadratic_model_has_the_same_derivative_by_colours(sparse):
+    with jax.enable_x64(True):
+        energy, pose = scene(sparse)
+        recolored = lambda colors: eqx.tree_at(lambda e: e.body.blob_colors, energy, colors)
+        of_value = jax.grad(lambda colors: recolored(colors)(pose))(energy.body.blob_colors)
+        of_model = jax.grad(lambda colors: recolored(colors).quadratic(pose).value)(energy.body.blob_colors)
+        assert np.abs(of_value).max() > 0.0
+        np.testing.assert_allclose(of_model, of_value, rtol=1e-9, atol=1e-14)

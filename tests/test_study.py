@@ -61,7 +61,7 @@ def experiment(**rows):
     ("text", "words"),
     [
         ("title: T\nquestion: Q\naxis: x\nrows: {a: {}}", "has no reference"),
-        ("title: T\nquestion: Q\naxis: x\nreference: b\nrows: {a: {}}", "'b' is no row"),
+        ("title: T\nquestion: Q\naxis: x\nreference: b\nrows: {a: {}}", "'b' is not a row"),
         ("title: T\nquestion: Q\naxis: x\nreference: a\nrows: {a: {every: 0}}", "must be 1 or more"),
         ("title: T\nquestion: Q\naxis: x\nreference: a\nrows: {a: {sets: []}}", "sets"),
         (

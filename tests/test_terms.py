@@ -200,11 +200,11 @@ def test_terms_are_made_from_a_configuration():
         ({"term": "Floor"}, "must name a module and a class"),
         ({"term": "no_such_module.Floor"}, "the module no_such_module cannot be imported"),
         ({"term": "test_terms.Ceiling"}, "test_terms has no such class"),
-        ({"term": "test_terms.HEIGHT"}, r"is no sogjax\.Term"),
+        ({"term": "test_terms.HEIGHT"}, r"is not a sogjax\.Term"),
         ({"term": "sogjax.energy.term.Penalty", "weight": 1}, "has no method `value`"),
         ({"term": "test_terms.Floor"}, r"cannot be made \(missing a required argument: 'weight'\); it takes weight, h"),
         ({"term": "test_terms.Floor", "weight": 1, "hight": 2}, r"unexpected keyword argument 'hight'"),
-        ({"term": "test_terms.Floor", "weight": "much"}, r"ground\.weight=much: must be a number"),
+        ({"term": "test_terms.Floor", "weight": "much"}, r"ground\.weight=much: must be a finite number"),
     ],
 )
 def test_a_wrong_term_is_said_in_one_sentence(entry, complaint):

@@ -26,7 +26,7 @@ def evaluate(motion: Sequence[Motion], truth: Truth, markers: MarkerRule = ...) 
 def evaluate(
     motion: Motion | Sequence[Motion], truth: Truth, markers: MarkerRule = "scaled"
 ) -> Evaluation | GroupEvaluation:
-    """How far a motion is from the truth, by virtual markers and joints (Section 6); of several, exchanged ones too.
+    """How far a motion is from the truth, by virtual markers and joints (Section 6), with swaps of several actors.
 
     `print` shows the numbers in millimetres; `summary` has them in metres, `markers.errors` (frame, marker) and
     `joints.errors` (frame, joint) every single distance, in metres, NaN where the truth has no value.

@@ -10,8 +10,8 @@ from sogjax.settings import OutputsConfig, TrackConfig
 from sogjax.settings.compose import track_config
 
 _NOT_HERE = {
-    "recording": "is an argument of its own, not a setting",
-    "actor": "is an argument of its own, not a setting",
+    "recording": "is a separate argument, not a setting",
+    "actor": "is a separate argument, not a setting",
     "body": "is a setting of make_actor",
     "out": "no file is written; use motion.save(path)",
     "resume": "no file is written, so nothing can be resumed; use the command `sogjax track`",

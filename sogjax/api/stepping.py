@@ -30,7 +30,7 @@ def make_tracker(
 ) -> Tracker:
     """The tracker of a recording as an immutable module (a pytree), with a pure step.
 
-    A loop of one's own::
+    Your own loop::
 
         tracker = sogjax.make_tracker(recording, actor)
         state, step = tracker.start(), equinox.filter_jit(tracker.step)
@@ -76,7 +76,7 @@ def read_cells(
         (`PartialCells`).
 
     Raises:
-        InputError: a picture cannot be read, other cameras, or no such frames.
+        InputError: a picture cannot be read, another number of cameras, or no such frames.
     """
     grids = tracker.reader.candidates.grids
     last = recording.num_frames if stop is None else stop

@@ -53,14 +53,18 @@ def track(
 
 
 @overload
-def find_first_pose(recording: Recording, actor: Body, **settings: Any) -> FoundPose: ...
+def find_first_pose(recording: Recording, actor: Body, *, terms: Sequence[Term] = (), **settings: Any) -> FoundPose: ...
 
 
 @overload
-def find_first_pose(recording: Recording, actor: Sequence[Body], **settings: Any) -> list[FoundPose]: ...
+def find_first_pose(
+    recording: Recording, actor: Sequence[Body], *, terms: Sequence[Term] = (), **settings: Any
+) -> list[FoundPose]: ...
 
 
-def find_first_pose(recording: Recording, actor: Body | Sequence[Body], **settings: Any) -> FoundPose | list[FoundPose]:
+def find_first_pose(
+    recording: Recording, actor: Body | Sequence[Body], *, terms: Sequence[Term] = (), **settings: Any
+) -> FoundPose | list[FoundPose]:
     """The pose (dof,) of an actor, or of several, in the first frame to track, searched for without a hint.
 
     Places, headings and named poses are tried at once, and the best refined.
@@ -68,6 +72,7 @@ def find_first_pose(recording: Recording, actor: Body | Sequence[Body], **settin
     Args:
         recording: whose pictures are looked at; an `initial_pose.yaml` is not.
         actor: one, or a list of them, of which each is searched for beside the others.
+        terms: further terms of the energy, beside those of the settings.
         settings: as in `track_settings`; `start` is the frame.
 
     Returns:
@@ -80,7 +85,7 @@ def find_first_pose(recording: Recording, actor: Body | Sequence[Body], **settin
     config, actors = track_settings(**settings), actor_list(actor)
     recording = with_cameras(recording, config.cameras)
     first, _ = frame_range(recording, config)
-    found = searched_poses(recording, [upright(each, recording) for each in actors], config, first)
+    found = searched_poses(recording, [upright(each, recording) for each in actors], config, first, terms)
     return found[0] if isinstance(actor, Body) else found
 
 

@@ -2,6 +2,7 @@
 
 import importlib
 import inspect
+import math
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -43,8 +44,8 @@ def _term(key: str, name: str, entry: Any) -> Term:
     made_by = _class(key, entry[CLASS])
     arguments = {word: value for word, value in entry.items() if word != CLASS}
     for word, value in arguments.items():
-        if not isinstance(value, int | float):
-            raise InputError(f"{key}.{word}={value}: must be a number")
+        if not isinstance(value, int | float) or not math.isfinite(value):
+            raise InputError(f"{key}.{word}={value}: must be a finite number")
     try:
         inspect.signature(made_by).bind(**arguments, name=name)
         return made_by(**arguments, name=name)
@@ -63,7 +64,7 @@ def _class(key: str, path: str) -> type[Term]:
     except Exception as error:  # whatever goes wrong in somebody's own module
         raise InputError(f"{key}.{CLASS}={path}: the module {module} cannot be imported ({error})") from error
     if not (inspect.isclass(found) and issubclass(found, Term)):
-        what = "has no such class" if found is None else "is no sogjax.Term"
+        what = "has no such class" if found is None else "is not a sogjax.Term"
         raise InputError(f"{key}.{CLASS}={path}: {module if found is None else path} {what}")
     if inspect.isabstract(found):
         raise InputError(f"{key}.{CLASS}={path}: has no method `value`; add it to the class")

@@ -57,7 +57,7 @@ class Similarity(Term):
 
     def quadratic(self, posed: Posed, frame: Frame) -> QuadraticModel:
         """Value, gradient and the curvature of the springs, the exponentials computed once."""
-        value, by_mean, stiffness = self._springs(posed.blobs, frame.views)
+        value, by_mean, stiffness = self._springs(posed.blobs, _colored(frame.views, posed.blobs.colors))
         jacobian = posed.point_jacobian()
         stretched = jnp.einsum("bij,bjd->bid", stiffness, jacobian, precision="highest")
         flat = lambda array: array.reshape(-1, array.shape[-1])
@@ -97,6 +97,15 @@ class Similarity(Term):
             return overlap_pulls(pairs, self_overlaps(image), seen, self.exponent, capped=self.capped)
 
         return jax.vmap(one_camera)(views.images, views.color_similarities, seen)
+
+
+def _colored(views: Views, body_colors: Float[Array, "blob 3"]) -> Views:
+    """The same views, whose similarities have derivatives by the colours."""
+    if views.pairs is not None:
+        pairs = colored_pairs(views.pairs, views.coloring, body_colors, views.images)
+        return eqx.tree_at(lambda v: v.pairs, views, pairs)
+    similarities = colored_similarities(views.color_similarities, views.coloring, body_colors, views.images)
+    return eqx.tree_at(lambda v: v.color_similarities, views, similarities)
 
 
 def similarity_among(terms: Terms) -> Similarity:

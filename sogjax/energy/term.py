@@ -17,7 +17,7 @@ from sogjax.solve.quadratic import QuadraticModel
 class Term(eqx.Module):
     """Something that the energy gains: it adds `weight` times `value`.
 
-    A term of one's own is a subclass with a method `value`, differentiable by jax. Its further fields are numbers or
+    Your own term is a subclass with a method `value`, differentiable by jax. Its further fields are numbers or
     arrays, which can be swept and differentiated by (numbers become arrays), or static ones (`eqx.field(static=True)`).
     Solvers that use curvature take it from autodiff, unless the subclass has a better `quadratic`.
     """

@@ -116,6 +116,9 @@ def energy_terms(config: EnergyConfig, further: Sequence[Term] = ()) -> Terms:
         gradient="forward" if gradient == "forward" else "autodiff",
     )
     terms = (*standard, *added_terms("energy.terms", config.terms, [term.name for term in standard]), *further)
+    for term in further:
+        if not isinstance(term, Term):
+            raise InputError(f"terms: {term!r} is not a sogjax.Term; give instances, such as Floor(weight=2.0)")
     names = [term.name for term in terms]
     if len(set(names)) < len(names):
         raise InputError(f"terms: two terms are named {max(names, key=names.count)!r}; give each its own `name`")

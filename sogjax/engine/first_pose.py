@@ -11,6 +11,7 @@ from jaxtyping import Array, Float, UInt8
 from sogjax.data.initial_pose import load_initial_poses
 from sogjax.data.recording import Recording
 from sogjax.data.video import read_frames
+from sogjax.energy import Term
 from sogjax.engine import build
 from sogjax.engine.terminal import say
 from sogjax.errors import InputError
@@ -43,7 +44,7 @@ def initial_pose_file(recording: Recording, config: TrackConfig) -> Path | None:
 
 
 def first_poses(
-    recording: Recording, bodies: Sequence[Body], config: TrackConfig, frame: int
+    recording: Recording, bodies: Sequence[Body], config: TrackConfig, frame: int, terms: Sequence[Term] = ()
 ) -> list[Float[Array, "dof"]]:
     """The poses of bodies, upright in the recording's world, in a frame counted from the recording's first.
 
@@ -52,7 +53,7 @@ def first_poses(
     """
     path = initial_pose_file(recording, config)
     if path is None:
-        found = searched_poses(recording, bodies, config, frame)
+        found = searched_poses(recording, bodies, config, frame, terms)
         for body, pose in zip(bodies, found, strict=True):
             say(f"first pose of {body.name} found; the next different one is {100.0 * pose.margin:.1f} % worse")
             if pose.margin < SURE:
@@ -70,7 +71,9 @@ def first_poses(
     return poses
 
 
-def searched_poses(recording: Recording, bodies: Sequence[Body], config: TrackConfig, frame: int) -> list[FoundPose]:
+def searched_poses(
+    recording: Recording, bodies: Sequence[Body], config: TrackConfig, frame: int, terms: Sequence[Term] = ()
+) -> list[FoundPose]:
     """The poses that fit the pictures of a frame best, in the order of the bodies.
 
     Raises:
@@ -84,7 +87,7 @@ def searched_poses(recording: Recording, bodies: Sequence[Body], config: TrackCo
         tuple(build.image_reader(recording, grid, config) for grid in grids),
         tuple(jnp.asarray(stack_cells(pictures, grid)) for grid in grids),
     )
-    found = search_poses(bodies, views, build.energy_terms(config.energy), recording.up)
+    found = search_poses(bodies, views, build.energy_terms(config.energy, terms), recording.up)
     lost = [body.name for body, pose in zip(bodies, found, strict=True) if not pose.energy > 0.0]
     if lost:
         raise InputError(

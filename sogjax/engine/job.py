@@ -70,7 +70,7 @@ class Job:
             building = beside.submit(_tracker, recording, bodies, grids, config, terms)
             start = None if kept is None else kept.start()
             if start is None:
-                start = jnp.concatenate(first_poses(recording, bodies, config, frames[0]))
+                start = jnp.concatenate(first_poses(recording, bodies, config, frames[0], terms))
                 if kept is not None:
                     kept.keep_start(start)
             tracker = building.result()

@@ -1,6 +1,7 @@
 """What the poses of a run depend on: a run is only resumed with the settings and files that began it."""
 
 import hashlib
+import sys
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
 from importlib.metadata import version
@@ -14,6 +15,7 @@ import numpy as np
 import sogjax
 from sogjax.data.recording import Recording
 from sogjax.data.source import fingerprint
+from sogjax.engine import build
 from sogjax.engine.first_pose import initial_pose_file
 from sogjax.model.body import Body
 from sogjax.settings import TrackConfig
@@ -37,6 +39,7 @@ def origin_of(recording: Recording, config: TrackConfig, given_actors: Sequence[
         "device": jax.default_backend(),
         "precision": str(jnp.asarray(0.0).dtype),
         **_settings(config, ""),
+        **_code_of_terms(config),
         "outputs.confidence": config.outputs.confidence,
         "outputs.temperature": config.outputs.temperature,
         **_of_recording(recording),
@@ -71,6 +74,14 @@ def _settings(config: Any, prefix: str) -> Origin:
         if key not in NO_MATTER:
             found |= _settings(value, f"{key}.") if is_dataclass(value) else {key: value}
     return found
+
+
+def _code_of_terms(config: TrackConfig) -> Origin:
+    """The modules of the terms that the settings add to the energy."""
+    added = [term for term in build.energy_terms(config.energy) if term.name in (config.energy.terms or {})]
+    files = {term.name: Path(getattr(sys.modules[type(term).__module__], "__file__", None) or "") for term in added}
+    digests = {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in files.items() if path.is_file()}
+    return {f"the code of energy.terms.{name}": content for name, content in digests.items()}
 
 
 def _of_recording(recording: Recording) -> Origin:

@@ -39,6 +39,8 @@ def with_cameras(recording: Recording, cameras: Sequence[str] | None) -> Recordi
     """
     if cameras is None:
         return recording
+    if isinstance(cameras, str):
+        raise InputError(f"cameras={cameras}: must be a list of names, such as [{cameras!r}]")
     if not cameras or len(set(cameras)) < len(cameras):
         named = ", ".join(recording.rig.names)
         raise InputError(f"cameras=[{','.join(cameras)}]: name at least one camera, each once; there are {named}")

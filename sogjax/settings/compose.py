@@ -24,7 +24,7 @@ PRESET = "preset"
 SEE = "see sogjax {} --help"
 
 
-def track_config(words: Sequence[str] = (), **keywords: Any) -> TrackConfig:
+def track_config(words: Sequence[str] = (), /, **keywords: Any) -> TrackConfig:
     """The settings of a track.
 
     Args:
@@ -46,11 +46,15 @@ def composed_without_hydra(
     Raises:
         InputError: as there.
     """
-    values = [*map(_of_word, words), *({key: _plain(value)} for key, value in (keywords or {}).items())]
+    values = [*map(_of_word, words), *(_nested(key, _plain(value)) for key, value in (keywords or {}).items())]
     choices = default_choices(command)
     named = {
         key: value for entry in values for key, value in entry.items() if key in choices and isinstance(value, str)
     }
+    for entry in values:
+        for key, value in entry.items():
+            if key in choices and not isinstance(value, str | Mapping):
+                raise InputError(no_such_choice(key, value, choices_of(key)))
     tree = OmegaConf.structured(schema)
     for options in _option_sets(command, named):
         tree = OmegaConf.merge(tree, options)
@@ -102,11 +106,16 @@ def _of_word(word: str) -> dict[str, Any]:
     """A nested mapping of one `key=value`."""
     key, equals, text = word.partition("=")
     if not equals or not key:
-        raise InputError(f"{word}: is no option; write key=value")
+        raise InputError(f"{word}: is not an option; write key=value")
     try:
         value = yaml.safe_load(text)
     except yaml.YAMLError as error:
         raise InputError(f"{word}: cannot be read; put a value with special characters in quotes") from error
+    return _nested(key, value)
+
+
+def _nested(key: str, value: Any) -> dict[str, Any]:
+    """`a.b` and a value as {a: {b: value}}."""
     for part in reversed(key.split(".")):
         value = {part: value}
     return value

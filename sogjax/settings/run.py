@@ -33,7 +33,7 @@ class OutputsConfig:
 class TrackConfig:
     """Track the actors of a recording."""
 
-    preset: str = option("default", "default | paper: all settings by one name; what else is given counts more")
+    preset: str = option("default", "default | paper: all settings at once; those given individually take precedence")
     recording: str = option(REQUIRED, "folder of the recording")
     out: str = option("", "folder for the results; default: outputs/RECORDING")
     actor: Any = option(None, "actor file, or a list of them; null: make it from the example poses")

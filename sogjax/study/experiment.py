@@ -174,7 +174,7 @@ def _folder() -> Path:
 
 def _checked(path: Path, config: ExperimentConfig) -> ExperimentConfig:
     if config.reference not in config.rows:
-        raise InputError(f"{path}: reference: {config.reference!r} is no row; choose from {', '.join(config.rows)}")
+        raise InputError(f"{path}: reference: {config.reference!r} is not a row; choose from {', '.join(config.rows)}")
     if config.measure not in MEASURES:
         raise InputError(f"{path}: measure: {config.measure!r}: use one of {', '.join(MEASURES)}")
     for name, row in config.rows.items():

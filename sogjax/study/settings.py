@@ -9,7 +9,7 @@ from sogjax.settings.option import group, option
 class ReportConfig:
     """Run the experiments of the paper's Section 6 and more, and write report.html and report.md; resumes."""
 
-    out: str = option("outputs/report", "folder for the report and its runs; a run that is there is not done again")
+    out: str = option("outputs/report", "folder for the report and its runs; existing runs are not repeated")
     only: list[str] | None = option(
         None, "experiments, by their names in conf/experiment or as files FOLDER/NAME.yaml; null: all"
     )
@@ -26,5 +26,5 @@ class ReportConfig:
         lambda: [], "options of track for all runs, of color, images, energy, solver or tracking: [solver=lbfgs]"
     )
     pictures: int = option(6, "worst frames to show")
-    note: str = option("", "a sentence for the beginning of the report, such as what else the machine did")
-    do: bool = option(True, "do the runs that are missing; false: report on those that are there")
+    note: str = option("", "sentence for the report, such as what else the machine was running")
+    do: bool = option(True, "run what is missing; false: report on existing runs only")

@@ -145,7 +145,7 @@ def source_named(name: str, num_frames: int, folder: Path, actors: int = 1, body
         return Source(path.resolve().name, path, _state_of(path), num_frames, folder, body)
     motion, _, seed = name.partition(":")
     if motion not in MOTIONS or (seed and not seed.isdecimal()):
-        raise InputError(f"{name}: is no folder, and no MOTION:SEED such as walk:0")
+        raise InputError(f"{name}: is neither a folder nor MOTION:SEED (such as walk:0)")
     frames = max(num_frames, MOST_FRAMES)
     path = cached_recording(SynthSettings(motion, actors=actors, frames=frames, seed=int(seed or 0)), progress=progress)
     people = f"-{actors}people" if actors > 1 else ""

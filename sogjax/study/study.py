@@ -53,13 +53,18 @@ class Study:
             raise InputError(f"frames={self.frames}: must be at least 2, since markers are attached in the first one")
         for word in self.overrides:
             if word.partition("=")[0].partition(".")[0] not in _GROUPS:
-                raise InputError(f"overrides: {word}: is none of a run's settings; choose of {', '.join(_GROUPS)}")
+                raise InputError(f"overrides: {word}: is not a setting of a run; choose from {', '.join(_GROUPS)}")
 
     @property
     def is_committed(self) -> bool:
         """Whether it is what the project's own report was made of, of which the remarks speak."""
         usual = ReportConfig()
-        return {*self.recordings} >= {*usual.recordings} and self.frames == usual.frames and not self.overrides
+        return (
+            {*self.recordings} >= {*usual.recordings}
+            and self.frames == usual.frames
+            and not self.overrides
+            and not self.compared
+        )
 
     def source(self, recording: str, actors: int = 1) -> Source:
         """A recording, opened once.

@@ -209,8 +209,8 @@ def track(
 
     The step is compiled once, with room for `HEADROOM` times the image blobs of the first frame, or with the given
     capacities (of a run whose program can so serve this one); a frame that needs more is done again with the next
-    capacity (and compiles again), so no blob is ever cut off unseen. Who goes on with a run gives the capacities that
-    it stopped with: sums of other lengths are rounded otherwise.
+    capacity (and compiles again), so no blob is ever cut off unseen. To continue a run, pass the capacities that
+    it stopped with: sums of other lengths round differently.
 
     Raises:
         InputError: more image blobs than the largest capacity.

@@ -33,7 +33,7 @@ def _checked(word: str, sweep: bool) -> str:
         remedy = f"{key.lstrip('-')}={value or 'VALUE'}"
         raise InputError(f"{word}: options are written without dashes; write {remedy}")
     if not equals or not key:
-        raise InputError(f"{word}: is no option; write key=value")
+        raise InputError(f"{word}: is not an option; write key=value")
     if for_hydra and not sweep:
         raise InputError(f"{word}: Hydra's own settings only count in a sweep; add -m or leave it out")
     if key[0] in "+~" and not for_hydra:
