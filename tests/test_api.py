@@ -142,7 +142,7 @@ def test_actors_are_refused_that_are_none_or_the_same(recording, actor):
 def test_a_first_pose_is_searched_for_in_the_first_frame_to_track(recording, actor, monkeypatch):
     asked = []
 
-    def searched(recording, bodies, config, frame):
+    def searched(recording, bodies, config, frame, terms):
         asked.append((recording.rig.names, [body.name for body in bodies], frame))
         return [FoundPose(body.poses["rest"], 1.0, 0.1) for body in bodies]
 

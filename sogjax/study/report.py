@@ -47,7 +47,8 @@ def write_report(config: ReportConfig) -> list[Path]:
             raise InputError(f"{out}: no run worked: {reason}")
         sections += [confidence_section(study)] if CONFIDENCE in names else []
         say(f"runs done or read in {time.perf_counter() - begin:.0f} s")
-        sections += [worst_section(done, config.pictures), about_section(config, done), versions_section(config)]
+        sections += [worst_section(done, config.pictures)] if config.pictures else []
+        sections += [about_section(config, done), versions_section(config)]
         write_html(out / "report.html", TITLE, sections)
         files = [out / "report.html", *write_markdown(out / "report.md", TITLE, sections)]
     return [*files, write_runs(out / "runs.csv", done)]
