@@ -172,6 +172,7 @@ def test_what_a_fisheye_lens_shows_beside_and_behind_stays_finite():
     )
 
 
+@pytest.mark.slow
 def test_sizes_grow_as_the_picture_does():
     """Against finite differences in the middle, at 40 degrees, and bounded at the rim; polynomial lenses leave them."""
     camera = fisheye_camera(FISHEYE_LENSES[1])

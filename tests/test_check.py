@@ -40,6 +40,7 @@ def warnings(found, topic=None):
     return [f for f in found.findings if f.severity == "warning" and topic in (None, f.topic)]
 
 
+@pytest.mark.slow
 def test_a_sound_recording_has_no_warning(tmp_path):
     found = looked_at(tmp_path / "walk")
     assert {finding.severity for finding in found.findings} == {"ok"}

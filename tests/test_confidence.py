@@ -36,6 +36,7 @@ def test_without_any_curvature_the_ranges_are_left(body):
     assert np.isfinite(np.asarray(deviations.joints)).all()
 
 
+@pytest.mark.slow
 def test_joints_spread_as_drawn_poses_do(body):
     curvature = random_curvature(body.skeleton.num_dofs, seed=1) + jnp.eye(body.skeleton.num_dofs)
     laplace, pose = Laplace(1e-5), body.poses["rest"]

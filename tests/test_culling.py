@@ -105,6 +105,7 @@ def test_blobs_of_the_plate_are_left_out(scene):
     np.testing.assert_array_equal(leaves_of(with_plate, rgb)[1], np.asarray(leaves) & corner)
 
 
+@pytest.mark.slow
 def test_a_box_holds_the_discs_of_its_actor_and_nothing_more():
     """Three sigmas around every blob, then a border; empty for an actor behind the camera."""
     bodies = [random_body(4, "first"), random_body(5, "second")]

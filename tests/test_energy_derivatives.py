@@ -40,6 +40,7 @@ def test_forward_mode_is_reverse_mode(mode, sparse):
         np.testing.assert_allclose(forward, gradient(energy, pose), rtol=1e-10, atol=1e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sparse", fast_and_slow(True, False))
 @pytest.mark.parametrize("capped", fast_and_slow(True, False))
 def test_second_derivatives_are_differences_of_the_gradient(capped, sparse):

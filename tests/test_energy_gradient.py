@@ -190,6 +190,7 @@ def test_padding_in_the_images_changes_nothing():
         np.testing.assert_allclose(other_gradient, gradient, rtol=1e-10, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_single_precision_is_near_enough():
     body = HUMAN
     pose, views, history = case(body, 10)

@@ -84,6 +84,7 @@ def test_rough_landmarks_give_a_rough_pose(seed):
     assert (params < upper + 0.1).all()
 
 
+@pytest.mark.slow
 def test_four_landmarks_are_enough_for_place_and_heading():
     names = ("head_top", "left_hand", "right_hand", "left_toe")
     points = points_of(HUMAN, "apose", "z", (1.0, 0.5, 0.95), 120.0)
@@ -93,6 +94,7 @@ def test_four_landmarks_are_enough_for_place_and_heading():
     assert errors.mean() < 0.05
 
 
+@pytest.mark.slow
 def test_a_given_heading_is_where_the_fit_starts():
     points = points_of(DOG, "rest", "z", (0.0, 0.3, 0.45), -60.0)
     landmarks = {name: tuple(point) for name, point in zip(DOG.landmarks.names, points, strict=True)}

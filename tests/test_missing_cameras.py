@@ -127,6 +127,7 @@ def test_a_missing_camera_is_as_good_as_none():
         assert missing.num_near[1] == 0
 
 
+@pytest.mark.slow
 def test_a_camera_that_is_missing_for_a_while_is_told(capsys, tmp_path, rendered):
     """Until then everything is to the bit as with all cameras."""
     settings = yaml.safe_load((rendered / "recording.yaml").read_text())

@@ -96,6 +96,7 @@ def test_settings_are_the_same_with_hydra_and_without(preset, group):
         assert composed("track", words) == track_config(words)
 
 
+@pytest.mark.slow
 def test_boxes_around_the_last_pose_do_not_follow_the_prediction(recording, tmp_path):
     moved = jnp.asarray([0.3, 0.0, 1.0, 0.0, 0.0])
     state = TrackState(moved, moved.at[0].set(0.0), jnp.asarray(2))
