@@ -6,33 +6,16 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
+from synth_people import motions, people, person
 
-from sogjax.synth.anatomy import INDEX, anatomy_from_seed
-from sogjax.synth.clothes import outfits_from_seed
-from sogjax.synth.figure import make_figure
+from sogjax.synth.anatomy import INDEX
 from sogjax.synth.gait import circle, egg
 from sogjax.synth.landmarks import LANDMARKS, landmark_points
-from sogjax.synth.motions import motions_of
 
 NAMES = list(LANDMARKS)
-SINGLE = ["walk", "arms", "squat_kick", "cartwheel"]
+SINGLE = ["walk", "arms", "squat_kick", "cartwheel", "run", "sit", "throw", "dance"]
 FPS = 30.0
 SECONDS = 3.4
-
-
-@cache
-def person(number):
-    outfits = outfits_from_seed(np.random.default_rng(0), 4)
-    return make_figure(anatomy_from_seed(np.random.default_rng(number)), outfits[number])
-
-
-def people(count):
-    return [person(number) for number in range(count)]
-
-
-@cache
-def motions(kind, count=1):
-    return motions_of(kind, [body.anatomy for body in people(count)], np.random.default_rng(1))
 
 
 @cache
@@ -55,7 +38,7 @@ def test_bodies_stay_on_the_floor(kind):
     body, motion = person(0), motions(kind)[0]
     lowest = [body.posed(motion(float(t))).vertices[:, 2].min() for t in np.arange(0.0, SECONDS, 0.2)]
     assert min(lowest) > -0.015
-    assert max(lowest) < 0.015
+    assert max(lowest) < (0.15 if kind == "run" else 0.015)
 
 
 @pytest.mark.parametrize("kind", SINGLE)
@@ -69,7 +52,8 @@ def test_everything_begins_upright_with_the_arms_down(kind):
 
 @pytest.mark.parametrize("kind", SINGLE)
 def test_people_stay_near_the_centre(kind):
-    assert np.abs(landmarks(kind)[:, NAMES.index("pelvis"), :2]).max() < 1.4
+    farthest = np.linalg.norm(landmarks(kind)[:, NAMES.index("pelvis"), :2], axis=1).max()
+    assert farthest < 1.7
 
 
 def test_walking_feet_do_not_slide():

@@ -13,6 +13,9 @@ from sogjax.synth.settings import SynthSettings
 SYNTH_VERSION = 2
 """Raise it with every change that alters the pictures."""
 
+_CHOICES = ("props", "outfit", "room", "light_drift")
+"""Settings that name no recording while they have their defaults."""
+
 
 def default_cache_dir() -> Path:
     """Where recordings are kept: SOGJAX_CACHE, else the system's folder for caches."""
@@ -25,7 +28,10 @@ def default_cache_dir() -> Path:
 
 def cache_name(settings: SynthSettings) -> str:
     """The folder's name for these settings: readable, and different for different settings."""
-    content = json.dumps({"version": SYNTH_VERSION, **asdict(settings)}, sort_keys=True)
+    usual = asdict(SynthSettings())
+    # Recordings rendered before there was a choice are found again.
+    chosen = {k: v for k, v in asdict(settings).items() if k not in _CHOICES or v != usual[k]}
+    content = json.dumps({"version": SYNTH_VERSION, **chosen}, sort_keys=True)
     return f"{settings.motion}{settings.actors}-{hashlib.sha256(content.encode()).hexdigest()[:12]}"
 
 

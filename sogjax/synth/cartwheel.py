@@ -9,7 +9,7 @@ from scipy.interpolate import PchipInterpolator
 from sogjax.synth.anatomy import INDEX, SIDES, Anatomy, Pose
 from sogjax.synth.exercises import READY, both
 from sogjax.synth.limbs import heading_matrix, pose_from_angles, reach
-from sogjax.synth.rotations import Vector, turned
+from sogjax.synth.rotations import Vector, between, turned
 
 _MIDDLE = 0.735
 """Where the body is upside down; lengths are shares of the stature, along the way from the place of the start."""
@@ -108,7 +108,7 @@ class Cartwheel:
         shin = self.anatomy.world_from_joint(pose)[INDEX[f"{side}_knee"], :3, :3]
         flat = shin.T @ facing @ turned(("z", 9.0 if side == "left" else -9.0))
         pointed = turned(("y", 40.0 * (1.0 - hold)))
-        return pose.with_rotation(f"{side}_ankle", _between(pointed, flat, hold))
+        return pose.with_rotation(f"{side}_ankle", between(pointed, flat, hold))
 
     def _hand(self, pose: Pose, side: str, floor: Vector, hold: float) -> Pose:
         """Hold a hand at its place on the floor, as far as its hold is 1."""
@@ -120,7 +120,7 @@ class Cartwheel:
         pose = reach(self.anatomy, pose, limb, target, -facing[:, 0])
         forearm = self.anatomy.world_from_joint(pose)[INDEX[f"{side}_elbow"], :3, :3]
         flat = forearm.T @ facing @ _FLAT_HAND[side]
-        return pose.with_rotation(f"{side}_wrist", _between(np.eye(3), flat, hold))
+        return pose.with_rotation(f"{side}_wrist", between(np.eye(3), flat, hold))
 
 
 def _places(values: Mapping[str, float]) -> list[tuple[str, float]]:
@@ -142,9 +142,3 @@ def _mirrored(angles: Mapping[str, float]) -> dict[str, float]:
             value = 2.0 * _MIDDLE - value
         result[swapped] = value
     return result
-
-
-def _between(a: np.ndarray, b: np.ndarray, share: float) -> np.ndarray:
-    """A rotation on the way from `a` to `b`."""
-    u, _, vt = np.linalg.svd((1.0 - share) * a + share * b)
-    return u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt

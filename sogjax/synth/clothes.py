@@ -1,6 +1,6 @@
 """Clothes, skin and hair: colours and patterns as functions of the surface in the bind pose."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -24,6 +24,8 @@ _TROUSERS: tuple[Rgb, ...] = ((0.20, 0.25, 0.36), (0.42, 0.38, 0.30), (0.22, 0.2
 _SHOES: tuple[Rgb, ...] = ((0.80, 0.79, 0.77), (0.30, 0.20, 0.15), (0.15, 0.16, 0.19), (0.60, 0.25, 0.20))
 _PATTERNS = ("stripes", "plaid", "checks", "bars", "dots")
 _SLEEVES = (0.62, 0.75, 1.9)
+_LONG = 1.9
+_BLACK: Rgb = (0.10, 0.10, 0.11)
 
 
 @dataclass(frozen=True)
@@ -38,10 +40,39 @@ class Outfit:
     pattern: str
     sleeve: float
     """How far the sleeves reach: 0 shoulder, 1 elbow, 2 wrist."""
+    patterned_trousers: Rgb | None = None
+    """The second colour of trousers with the shirt's pattern."""
 
 
-def outfits_from_seed(rng: np.random.Generator, count: int) -> list[Outfit]:
-    """Draw clothes for several people, who wear different shirts, trousers and shoes."""
+def outfits_from_seed(rng: np.random.Generator, count: int, kind: str = "random") -> list[Outfit]:
+    """Draw clothes for several people, who wear different ones; `kind` is one of `settings.OUTFITS`."""
+    return [_changed(outfit, kind, k) for k, outfit in enumerate(_drawn(rng, count))]
+
+
+def _changed(outfit: Outfit, kind: str, number: int) -> Outfit:
+    """Another kind of clothes for the person of this number; skin and hair stay."""
+    if kind == "long_sleeves":
+        return replace(outfit, sleeve=_LONG)
+    if kind in ("patterned", "striped"):
+        pattern = "stripes" if kind == "striped" else ("checks", "plaid", "dots", "bars")[number % 4]
+        lighter = tuple(float(value) for value in 0.45 * np.array(outfit.trousers) + 0.42)
+        return replace(outfit, pattern=pattern, sleeve=_LONG, patterned_trousers=lighter)
+    if kind in ("plain", "black_suit"):
+        color = _BLACK if kind == "black_suit" else outfit.shirt[0]
+        return replace(outfit, shirt=(color, color), trousers=color, shoes=color, sleeve=_LONG)
+    return outfit
+
+
+def without_green(outfit: Outfit) -> Outfit:
+    """The same clothes for a green room, where nobody wears green: what is green turns red."""
+    red, green, blue = outfit.shirt[0]
+    if green < max(red, blue):
+        return outfit
+    swapped = lambda color: (color[1], color[0], color[2])
+    return replace(outfit, shirt=(swapped(outfit.shirt[0]), swapped(outfit.shirt[1])))
+
+
+def _drawn(rng: np.random.Generator, count: int) -> list[Outfit]:
     draw = lambda items: [items[k % len(items)] for k in rng.permutation(len(items))]
     rows = zip(*(draw(items) for items in (_SKINS, _HAIR, _SHIRTS, _TROUSERS, _SHOES, _PATTERNS)), strict=False)
     sleeves = rng.choice(_SLEEVES, count)
@@ -79,11 +110,18 @@ class Wardrobe:
         base, other = (np.array(color) for color in self.outfit.shirt)
         return base + _pattern(self.outfit.pattern, points, radius)[:, None] * (other - base)
 
+    def _trousers(self, points: Float[np.ndarray, "n 3"], radius: float) -> Colors:
+        base, other = np.array(self.outfit.trousers), self.outfit.patterned_trousers
+        if other is None:
+            return np.tile(base, (len(points), 1))
+        return base + _pattern(self.outfit.pattern, points, radius)[:, None] * (np.array(other) - base)
+
     def _torso(self, rest: Float[np.ndarray, "n 3"], _: str) -> Colors:
         points = self._local("pelvis", rest)
         colors = self._shirt(points, 0.134)
         belt = 0.055 * self.anatomy.stature / 1.75
-        colors[points[:, 2] < belt] = self.outfit.trousers
+        below = points[:, 2] < belt
+        colors[below] = self._trousers(points[below], 0.134)
         colors[np.abs(points[:, 2] - belt + 0.01) < 0.016] = 0.45 * np.array(self.outfit.trousers)
         neck = self._local("neck", rest)
         bare = (np.hypot(neck[:, 0] - 0.01, neck[:, 1]) < 0.08) & (self._over_collar(rest) > 0.0)
@@ -124,7 +162,7 @@ class Wardrobe:
         side = name.partition("_")[0]
         points = self._local(f"{side}_hip", rest)
         foot = self._local(f"{side}_ankle", rest)
-        colors = np.tile(np.array(self.outfit.trousers), (len(points), 1))
+        colors = self._trousers(points, 0.0669)
         seam = (np.abs(points[:, 0]) < 0.006) & (foot[:, 2] > 0.0)
         colors[seam] *= 0.7
         colors[foot[:, 2] < 0.022] = self.outfit.shoes

@@ -6,13 +6,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from sogjax.synth.anatomy import SIDES, Anatomy, Pose
+from sogjax.synth.anatomy import INDEX, SIDES, Anatomy, Pose
 from sogjax.synth.limbs import heading_matrix, pose_from_angles, reach
-from sogjax.synth.rotations import Vector, turned
+from sogjax.synth.rotations import Matrix, Vector, turned
 
 Angles = Mapping[str, float]
-"""Angles of `pose_from_angles` in degrees; `pelvis_x/y/z`, `tip` (pelvis forwards), `left_foot_x/y/z` and
-`left_foot_pitch` (toes down) besides. Places are shares of the stature, relative to standing upright."""
+"""Angles of `pose_from_angles` in degrees, and `pelvis_x/y/z`, `tip` (pelvis forwards), `yaw` (pelvis to the left),
+`knees_out` and `knees_up` (parts of the direction that knees bend to), and for the feet `left_foot_x/y/z`,
+`left_foot_pitch` (toes down), `left_foot_yaw` (place and toes round to the left), `left_heel` (up, toes on the floor).
+Places are shares of the stature, relative to standing upright."""
 
 
 def both(**angles: float) -> dict[str, float]:
@@ -25,17 +27,33 @@ def standing_pose(anatomy: Anatomy, angles: Angles, place: Vector, heading: floa
     get = lambda name: float(angles.get(name, 0.0)) * anatomy.stature
     facing = heading_matrix(heading)
     pelvis = np.array([get("pelvis_x"), get("pelvis_y"), anatomy.hip_height - 0.012 + get("pelvis_z")])
-    tipped = facing @ turned(("y", angles.get("tip", 0.0)), ("x", -angles.get("roll", 0.0)))
+    tipped = facing @ turned(
+        ("z", angles.get("yaw", 0.0)), ("y", angles.get("tip", 0.0)), ("x", -angles.get("roll", 0.0))
+    )
     pose = pose_from_angles(angles, place + facing @ pelvis, tipped)
-    for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
-        foot = [get(f"{side}_foot_{axis}") for axis in "xyz"]
-        aside = 0.062 * anatomy.stature
-        ankle = np.array([foot[0] + 0.01, sign * (aside + foot[1]), anatomy.ankle_height + foot[2]])
-        sole = facing @ turned(("z", 9.0 * sign), ("y", angles.get(f"{side}_foot_pitch", 0.0)))
-        knee_towards = facing @ np.array([1.0, sign * (0.12 + angles.get("knees_out", 0.0)), 0.15])
-        limb = (f"{side}_hip", f"{side}_knee", f"{side}_ankle")
-        pose = reach(anatomy, pose, limb, place + facing @ ankle, knee_towards, sole)
+    for side in SIDES:
+        pose = _stood(anatomy, pose, side, angles, place, facing)
     return pose
+
+
+def _stood(anatomy: Anatomy, pose: Pose, side: str, angles: Angles, place: Vector, facing: Matrix) -> Pose:
+    """Set one foot where the angles say, and bend its knee."""
+    get = lambda name: float(angles.get(f"{side}_{name}", 0.0))
+    sign = 1.0 if side == "left" else -1.0
+    x, y, z = (get(f"foot_{axis}") * anatomy.stature for axis in "xyz")
+    aside = 0.062 * anatomy.stature
+    ankle = np.array([x + 0.01, sign * (aside + y), anatomy.ankle_height + z])
+    ground, outwards = facing @ turned(("z", get("foot_yaw"))), turned(("z", 9.0 * sign))
+    sole = ground @ turned(("z", 9.0 * sign), ("y", get("foot_pitch")))
+    if get("heel") != 0.0:
+        ball = np.array([anatomy.offsets[INDEX[f"{side}_toe"]][0], 0.0, -anatomy.ankle_height])
+        raised = turned(("y", get("heel")))
+        ankle, sole = ankle + outwards @ (ball - raised @ ball), sole @ raised
+        pose = pose.with_rotation(f"{side}_toe", raised.T)
+    out, up = angles.get("knees_out", 0.0), angles.get("knees_up", 0.0)
+    knee_towards = ground @ np.array([1.0, sign * (0.12 + out), 0.15 + up])
+    limb = (f"{side}_hip", f"{side}_knee", f"{side}_ankle")
+    return reach(anatomy, pose, limb, place + ground @ ankle, knee_towards, sole)
 
 
 @dataclass(frozen=True)
@@ -60,9 +78,12 @@ class Exercise:
 
     def __call__(self, time: float) -> Pose:
         """The pose at a time (seconds)."""
+        return standing_pose(self.anatomy, self.angles(time), self.place, self.heading)
+
+    def angles(self, time: float) -> dict[str, float]:
+        """What lies between the key poses at a time (seconds)."""
         since = max(time - self.delay, 0.0) % self.keys[-1][0]
-        angles = {name: float(curve(since)) for name, curve in self._curves.items()}
-        return standing_pose(self.anatomy, angles, self.place, self.heading)
+        return {name: float(curve(since)) for name, curve in self._curves.items()}
 
 
 READY = both(**{"raise": 16.0, "plane": 85.0, "elbow": 10.0})

@@ -6,14 +6,16 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Float, UInt8
 
 from sogjax.data.atomic import atomic_path
 from sogjax.data.video import VideoWriter
 from sogjax.synth.anatomy import Pose
 from sogjax.synth.exercises import EXAMPLE_POSES
+from sogjax.synth.light import drifted
 from sogjax.synth.picture import Person, Shadows, Shot, mask_of, shot_of
 from sogjax.synth.plate import Plate, plate_of
+from sogjax.synth.scene import Scene
 from sogjax.synth.settings import SynthSettings
 from sogjax.synth.stage import Stage
 
@@ -43,14 +45,21 @@ def film(stage: Stage, cameras: Sequence[int], folder: Path) -> Iterator[None]:
             _write_image(folder / "background" / f"{stage.views[camera].name}.jpg", empty)
         yield
     if stage.settings.example_poses:
-        yield from _stills(stage, plates, folder)
+        yield from _stills(stage, _bare(stage, plates), folder)
     yield from _videos(stage, plates, folder)
+
+
+def _bare(stage: Stage, plates: dict[int, Plate]) -> dict[int, Plate]:
+    """The plates of the stills, which are taken before tables and chairs are brought in."""
+    if stage.scene is stage.bare:
+        return plates
+    return {camera: plate_of(stage.bare, stage.views[camera]) for camera in plates}
 
 
 def _stills(stage: Stage, plates: dict[int, Plate], folder: Path) -> Iterator[None]:
     for actor, person in enumerate(stage.people):
         for number, pose in enumerate(EXAMPLE_POSES):
-            shots = _shots(stage, plates, [person], [stage.example_pose(actor, pose)])
+            shots = _shots(stage.bare, stage, plates, [person], [stage.example_pose(actor, pose)])
             place = folder / "example_poses" / example_folder(stage, actor, pose)
             for camera, shot in shots:
                 rng = _rng(stage, camera, _STILL, 10 * actor + number)
@@ -67,18 +76,25 @@ def _videos(stage: Stage, plates: dict[int, Plate], folder: Path) -> Iterator[No
             path = folder / "videos" / f"{stage.views[camera].name}.mp4"
             writers[camera] = stack.enter_context(VideoWriter(path, stage.settings.fps))
         for frame in range(stage.settings.frames):
-            for camera, shot in _shots(stage, plates, stage.people, stage.poses(frame)):
+            for camera, shot in _shots(stage.scene, stage, plates, stage.people, stage.poses(frame)):
                 rng = _rng(stage, camera, _VIDEO, frame)
-                writers[camera].write(stage.sensors[camera].exposed(shot.light, rng))
+                writers[camera].write(stage.sensors[camera].exposed(_drifted(stage, shot, frame), rng))
                 yield
 
 
+def _drifted(stage: Stage, shot: Shot, frame: int) -> Float[np.ndarray, "row column 3"]:
+    """The light of a shot under the room's light at a frame."""
+    drift = stage.settings.light_drift
+    return shot.light * drifted(drift, frame / max(stage.settings.frames - 1, 1)) if drift else shot.light
+
+
 def _shots(
-    stage: Stage, plates: dict[int, Plate], people: Sequence[Person], poses: Sequence[Pose]
+    scene: Scene, stage: Stage, plates: dict[int, Plate], people: Sequence[Person], poses: Sequence[Pose]
 ) -> Iterator[tuple[int, Shot]]:
     """What each camera sees of people in poses; surface and shadows are made once for all cameras."""
     meshes = [person.figure.posed(pose) for person, pose in zip(people, poses, strict=True)]
-    shadows = Shadows.of(meshes) if stage.settings.shadows else None
+    furniture = None if scene.props is None else scene.shadow
+    shadows = Shadows.of(meshes, furniture) if stage.settings.shadows else None
     for camera, plate in plates.items():
         yield camera, shot_of(stage.views[camera], plate, people, meshes, shadows)
 

@@ -44,6 +44,15 @@ def srgb_from_linear(light: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 
     return np.clip(light, 0.0, 1.0) ** np.float32(1.0 / 2.2)
 
 
+def drifted(drift: float, share: float) -> Float[np.ndarray, "3"]:
+    """What is left of the room's red, green and blue light after a share (0..1) of a clip.
+
+    At the end there is less light by the share `drift`, and what there is is a little warmer.
+    """
+    change = 0.5 - 0.5 * np.cos(np.pi * share)
+    return (1.0 - drift * change * np.array([0.9, 1.0, 1.15])).astype(np.float32)
+
+
 @dataclass(frozen=True)
 class ShadowMap:
     """Distances along the light at which meshes first stop it, on a grid across it."""
@@ -69,6 +78,8 @@ class ShadowMap:
     ) -> "ShadowMap":
         """The map of some meshes, lit from the direction `towards`."""
         axes = frame(-towards, [1.0, 0.0, 0.0])
+        if not meshes:
+            return cls(axes, np.zeros(3), spacing, spread, bias, np.full((1, 1), _FAR, np.float32))
         points = [mesh.vertices @ axes for mesh in meshes]
         everything = np.concatenate(points)
         origin = everything.min(0) - np.array([spread, spread, 0.0]) - 2.0 * spacing

@@ -6,8 +6,16 @@ import numpy as np
 
 from sogjax.synth.anatomy import Anatomy, Pose
 from sogjax.synth.cartwheel import Cartwheel
+from sogjax.synth.contact import fighting, hugging
+from sogjax.synth.dancing import dance_keys
 from sogjax.synth.exercises import ARMS, Exercise, squat_kick_keys
+from sogjax.synth.furniture import Site
 from sogjax.synth.gait import Walk, circle, egg
+from sogjax.synth.rotations import Vector
+from sogjax.synth.settings import PAIRED
+from sogjax.synth.sitting import TABLE_AHEAD, sitting
+from sogjax.synth.sprint import Run
+from sogjax.synth.throwing import throw_keys
 
 Motion = Callable[[float], Pose]
 """The pose at a time in seconds."""
@@ -16,26 +24,72 @@ _LANE = 1.25
 """Metres between people who exercise beside or behind each other, where they have room for arms and legs."""
 _INNER, _OUTER = 0.84, 1.50
 """Radii of the two circles on which people walk past each other."""
+_RUNWAY = 1.6
+"""Radius of the circle on which people run."""
+_TABLES = {
+    "arms": (0.95, 0.0),
+    "cartwheel": (1.05, 0.0),
+    "squat_kick": (-0.90, 0.0),
+    "throw": (-0.90, 0.0),
+    "dance": (-1.15, 0.0),
+    "hug": (0.0, 0.95),
+    "fight": (0.0, 1.05),
+}
+"""Metres ahead and to the left of the people at which a table stands clear of what they do; else in the middle."""
+_BEHIND_EACH_OTHER = ("arms", "cartwheel")
 
 
-def motions_of(kind: str, anatomies: Sequence[Anatomy], rng: np.random.Generator) -> list[Motion]:
+def motions_of(
+    kind: str, anatomies: Sequence[Anatomy], rng: np.random.Generator, furnished: bool = False
+) -> list[Motion]:
     """One motion for each person.
 
     Args:
         kind: one of `sogjax.synth.settings.MOTIONS`.
         anatomies: the people.
         rng: draws headings and small differences.
+        furnished: whether furniture stands at the places of `furniture_sites`, which walkers go around.
     """
-    turn = float(rng.uniform(-np.pi, np.pi))
+    turn = _drawn_turn(rng)
     if kind in ("walk", "pass"):
         if len(anatomies) == 1:
-            return [Walk(anatomies[0], egg(2.2, 1.7, turn))]
+            return [Walk(anatomies[0], egg(3.1, 2.7, turn) if furnished else egg(2.2, 1.7, turn))]
         return _passing(anatomies, turn)
-    lanes = _LANE * (np.arange(len(anatomies)) - (len(anatomies) - 1) / 2.0)
+    if kind == "run":
+        starts = turn + 2.0 * np.pi * np.arange(len(anatomies)) / len(anatomies)
+        return [Run(a, circle((0.0, 0.0), _RUNWAY, float(s), 1.0)) for a, s in zip(anatomies, starts, strict=True)]
+    if kind in PAIRED:
+        return list((hugging if kind == "hug" else fighting)(anatomies, turn))
     return [
         _exercise(kind, anatomy, turn, lane, 0.35 * number)
-        for number, (anatomy, lane) in enumerate(zip(anatomies, lanes, strict=True))
+        for number, (anatomy, lane) in enumerate(zip(anatomies, _lanes(len(anatomies)), strict=True))
     ]
+
+
+def furniture_sites(kind: str, people: int, rng: np.random.Generator) -> list[Site]:
+    """Where furniture stands among people whose motions are drawn from the same random numbers."""
+    turn = _drawn_turn(rng)
+    ahead, aside = _axes(turn)
+    if kind == "sit":
+        return [Site(lane * aside + TABLE_AHEAD * ahead, turn - np.pi / 2, sitter=True) for lane in _lanes(people)]
+    if kind not in _TABLES:
+        return [Site(np.zeros(3), 0.0)]
+    along, across = _TABLES[kind]
+    last = float(_lanes(people)[-1]) if kind in _BEHIND_EACH_OTHER else 0.0
+    return [Site((along + last) * ahead + across * aside, turn + (np.pi / 2 if along else 0.0))]
+
+
+def _drawn_turn(rng: np.random.Generator) -> float:
+    return float(rng.uniform(-np.pi, np.pi))
+
+
+def _lanes(people: int) -> np.ndarray:
+    return _LANE * (np.arange(people) - (people - 1) / 2.0)
+
+
+def _axes(turn: float) -> tuple[Vector, Vector]:
+    """The directions ahead and to the left."""
+    return np.array([np.cos(turn), np.sin(turn), 0.0]), np.array([-np.sin(turn), np.cos(turn), 0.0])
 
 
 def _passing(anatomies: Sequence[Anatomy], turn: float) -> list[Motion]:
@@ -56,10 +110,13 @@ def _passing(anatomies: Sequence[Anatomy], turn: float) -> list[Motion]:
 
 def _exercise(kind: str, anatomy: Anatomy, turn: float, lane: float, delay: float) -> Motion:
     """Something done on the spot, or along a lane of one's own."""
-    ahead = np.array([np.cos(turn), np.sin(turn), 0.0])
-    aside = np.array([-np.sin(turn), np.cos(turn), 0.0])
+    ahead, aside = _axes(turn)
     if kind == "cartwheel":
         return Cartwheel(anatomy, lane * ahead, turn, delay)
     if kind == "arms":
         return Exercise(anatomy, ARMS, lane * ahead, turn, delay)
-    return Exercise(anatomy, squat_kick_keys(), lane * aside, turn, delay)
+    place = lane * aside
+    if kind == "sit":
+        return sitting(anatomy, place, turn, delay)
+    keys = {"squat_kick": squat_kick_keys, "throw": throw_keys, "dance": dance_keys}[kind]
+    return Exercise(anatomy, keys(), place, turn, delay)

@@ -38,12 +38,19 @@ class Shadows:
 
     lamp: light.ShadowMap
     above: light.ShadowMap
+    scene: light.ShadowMap | None = None
+    """Of what stands among the people and throws shadows on them."""
 
     @classmethod
-    def of(cls, meshes: Sequence[Mesh]) -> "Shadows":
-        """Shadows of people."""
+    def of(cls, meshes: Sequence[Mesh], scene: light.ShadowMap | None = None) -> "Shadows":
+        """Shadows of people, and on people those of the scene."""
         wide = light.ShadowMap.of(meshes, light.UP, spacing=0.03, spread=0.22, bias=0.02)
-        return cls(light.ShadowMap.of(meshes), wide)
+        return cls(light.ShadowMap.of(meshes), wide, scene)
+
+    def lit(self, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
+        """Share of the lamp's light that reaches points on people."""
+        share = self.lamp.lit(points)
+        return share if self.scene is None else share * self.scene.lit(points, taps=6)
 
 
 @dataclass(frozen=True)
@@ -59,12 +66,12 @@ class Shot:
 def shot_of(
     view: View, plate: Plate, people: Sequence[Person], meshes: Sequence[Mesh], shadows: Shadows | None
 ) -> Shot:
-    """Draw people into the empty scene."""
+    """Draw people into the empty scene, behind what stands in front of them."""
     picture = plate.total
     coverage = np.zeros(picture.shape[:2], np.float32)
     if shadows is not None:
         _darken(picture, view, plate, meshes, shadows)
-    colors, covered, window = _people_samples(view, people, meshes, shadows)
+    colors, covered, window = _people_samples(view, plate, people, meshes, shadows)
     if window.width and window.height:
         small = Window(*(value // OVERSAMPLING for value in (window.x, window.y, window.width, window.height)))
         share = averaged(covered)[..., 0]
@@ -74,7 +81,7 @@ def shot_of(
 
 
 def _people_samples(
-    view: View, people: Sequence[Person], meshes: Sequence[Mesh], shadows: Shadows | None
+    view: View, plate: Plate, people: Sequence[Person], meshes: Sequence[Mesh], shadows: Shadows | None
 ) -> tuple[np.ndarray, np.ndarray, Window]:
     """Light and coverage of the samples of the smallest window that holds all people."""
     limit = Window(0, 0, view.width * OVERSAMPLING, view.height * OVERSAMPLING)
@@ -83,7 +90,8 @@ def _people_samples(
     window = Window.around(visible, limit) if len(visible) else Window(0, 0, 0, 0)
     colors = np.zeros((window.height, window.width, 3), np.float32)
     covered = np.zeros((window.height, window.width, 1), np.float32)
-    nearest = np.full((window.height, window.width), np.inf)
+    empty = np.full((window.height, window.width), np.inf)
+    nearest = empty if plate.props is None else plate.props[window.slices].copy()
     for person, mesh, (pixels, depths) in zip(people, meshes, projected, strict=True):
         hits = rasterize(pixels, depths, mesh.faces, window)
         front = hits.depths < nearest[hits.rows, hits.columns]
@@ -103,7 +111,7 @@ def _shaded(person: Person, mesh: Mesh, hits: Hits, shadows: Shadows | None) -> 
     albedo = light.linear_from_srgb(person.wardrobe.colors(figure.face_part[hits.faces], rest))
     lamp = light.direct(normals)
     if shadows is not None:
-        lamp = lamp * shadows.lamp.lit(points + np.float32(0.02) * normals)[:, None]
+        lamp = lamp * shadows.lit(points + np.float32(0.02) * normals)[:, None]
     return albedo * (light.ambient(normals) + lamp)
 
 

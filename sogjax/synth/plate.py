@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sogjax.synth import light
-from sogjax.synth.raster import Window, rasterize
+from sogjax.synth.raster import Hits, Window, rasterize
 from sogjax.synth.scene import Scene
 from sogjax.synth.views import View
 
@@ -21,6 +21,8 @@ class Plate:
     ambient: Float[np.ndarray, "row column 3"]
     direct: Float[np.ndarray, "row column 3"]
     points: Float[np.ndarray, "row column 3"]
+    props: Float[np.ndarray, "y x"] | None = None
+    """Depth of the samples that show what stands among the people, infinite elsewhere; None where nothing does."""
 
     @property
     def total(self) -> Float[np.ndarray, "row column 3"]:
@@ -63,4 +65,14 @@ def plate_of(scene: Scene, view: View) -> Plate:
     points, upwards = (image(v)[::OVERSAMPLING, ::OVERSAMPLING] for v in (values[:, :3], normals))
     lit = scene.shadow.lit((points + np.float32(0.02) * upwards).reshape(-1, 3), taps=6)
     lamp = averaged(image(albedo * light.direct(normals))) * lit.reshape(view.height, view.width, 1)
-    return Plate(averaged(image(albedo * light.ambient(normals))), lamp, np.ascontiguousarray(points))
+    ambient = averaged(image(albedo * light.ambient(normals)))
+    return Plate(ambient, lamp, np.ascontiguousarray(points), _depths_of_props(scene, hits, window))
+
+
+def _depths_of_props(scene: Scene, hits: Hits, window: Window) -> Float[np.ndarray, "y x"] | None:
+    if scene.props is None:
+        return None
+    seen = hits.where(scene.props[hits.faces])
+    depths = np.full((window.height, window.width), np.inf)
+    depths[seen.rows, seen.columns] = seen.depths
+    return depths

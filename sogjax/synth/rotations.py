@@ -63,3 +63,9 @@ def partial_twist(rotation: Matrix, share: float) -> Matrix:
     # (1 + trace, R10 - R01) is 4 w (w, z) of the quaternion; half the twist angle is atan2(z, w).
     half = np.arctan2(rotation[1, 0] - rotation[0, 1], 1.0 + trace)
     return rotation @ about("z", -2.0 * (1.0 - share) * half)
+
+
+def between(a: Matrix, b: Matrix, share: float) -> Matrix:
+    """A rotation on the way from `a` to `b`."""
+    u, _, vt = np.linalg.svd((1.0 - share) * a + share * b)
+    return u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt

@@ -5,7 +5,12 @@ from dataclasses import dataclass
 from sogjax.errors import InputError
 from sogjax.settings.option import option
 
-MOTIONS = ("walk", "arms", "squat_kick", "cartwheel", "pass")
+MOTIONS = ("walk", "arms", "squat_kick", "cartwheel", "pass", "run", "sit", "throw", "dance", "hug", "fight")
+PAIRED = ("hug", "fight")
+"""Motions of two people in contact."""
+PROPS = ("auto", "none", "table", "chairs", "table_and_chairs")
+OUTFITS = ("random", "patterned", "striped", "plain", "black_suit", "long_sleeves")
+ROOMS = ("cluttered", "camouflage", "plain", "green")
 ACTOR_NAMES = ("anna", "ben", "cleo", "dan")
 
 
@@ -14,7 +19,9 @@ class SynthSettings:
     """A rendered recording; everything in it follows from these values."""
 
     motion: str = option(
-        "walk", "what the people do: walk, arms, squat_kick, cartwheel, or pass (several people pass closely)"
+        "walk",
+        "what the people do: walk, run, arms, squat_kick, cartwheel, throw, dance, sit (down at a table), pass (each "
+        "other closely), hug, fight (two people in contact)",
     )
     actors: int = option(1, "number of people, 1 to 4")
     cameras: int = option(12, "number of cameras in a ring around the people, at two heights in turn")
@@ -32,6 +39,23 @@ class SynthSettings:
     example_poses: bool = option(True, "whether four still poses of each actor are photographed too, with masks")
     background: bool = option(True, "whether the empty scene is photographed too")
     shadows: bool = option(True, "whether people throw shadows")
+    props: str = option(
+        "auto",
+        "furniture among the people, in the plates too but not in the example poses: none, table, chairs, "
+        "table_and_chairs; auto: table_and_chairs where somebody sits, else none",
+    )
+    outfit: str = option(
+        "random",
+        "clothes: random, patterned or striped (shirt and trousers), plain (one colour from neck to shoes), "
+        "black_suit, long_sleeves (random, with sleeves to the wrists)",
+    )
+    room: str = option(
+        "cluttered",
+        "room: cluttered, camouflage (cluttered, in the colours of the people's skin and clothes), plain, green",
+    )
+    light_drift: float = option(
+        0.0, "share of the light that is lost over the clip, 0 to 0.6, most of it blue; plates show the beginning"
+    )
 
     def check(self) -> None:
         """Refuse values that cannot be rendered.
@@ -39,11 +63,12 @@ class SynthSettings:
         Raises:
             InputError: naming the setting, its value and what is allowed.
         """
-        if self.motion not in MOTIONS:
-            raise InputError(f"motion={self.motion!r} is not known; choose one of {', '.join(MOTIONS)}")
-        if self.motion == "pass" and self.actors < 2:
-            raise InputError(f"actors={self.actors}: the motion pass needs two people or more; set actors=2")
+        for name, choices in (("motion", MOTIONS), ("props", PROPS), ("outfit", OUTFITS), ("room", ROOMS)):
+            if getattr(self, name) not in choices:
+                raise InputError(f"{name}={getattr(self, name)!r} is not known; choose one of {', '.join(choices)}")
         self._check_range("actors", 1, len(ACTOR_NAMES))
+        self._check_people()
+        self._check_props()
         self._check_range("cameras", 1, 200)
         self._check_range("width", 64, 4096)
         self._check_range("height", 64, 4096)
@@ -54,6 +79,7 @@ class SynthSettings:
         self._check_range("camera_variation", 0.0, 0.2)
         self._check_range("radius", 3.5, 4.5)
         self._check_range("distortion", -0.3, 0.1)
+        self._check_range("light_drift", 0.0, 0.6)
         for name in ("width", "height"):
             if getattr(self, name) % 2:
                 raise InputError(
@@ -64,6 +90,28 @@ class SynthSettings:
     def actor_names(self) -> tuple[str, ...]:
         """The people's names."""
         return ACTOR_NAMES[: self.actors]
+
+    @property
+    def furniture(self) -> str:
+        """What stands among the people: one of PROPS but auto."""
+        if self.props == "auto":
+            return "table_and_chairs" if self.motion == "sit" else "none"
+        return self.props
+
+    def _check_people(self) -> None:
+        if self.motion == "pass" and self.actors < 2:
+            raise InputError(f"actors={self.actors}: the motion pass needs two people or more; set actors=2")
+        if self.motion in PAIRED and self.actors != 2:
+            raise InputError(f"actors={self.actors}: the motion {self.motion} needs two people; set actors=2")
+
+    def _check_props(self) -> None:
+        if self.motion == "sit" and self.props in ("none", "table"):
+            raise InputError(f"props={self.props}: the motion sit needs a chair; leave props out or set props=chairs")
+        if self.furniture != "none" and (self.motion == "pass" or (self.motion == "walk" and self.actors > 1)):
+            raise InputError(
+                f"props={self.props}: people who walk past each other need the floor; set props=none, actors=1 with "
+                "motion=walk, or another motion"
+            )
 
     def _check_range(self, name: str, lowest: int | float, highest: int | float) -> None:
         value = getattr(self, name)

@@ -5,12 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from sogjax.synth.anatomy import Pose, anatomy_from_seed
-from sogjax.synth.clothes import outfits_from_seed
+from sogjax.synth.clothes import outfits_from_seed, without_green
 from sogjax.synth.exercises import EXAMPLE_POSES, standing_pose
 from sogjax.synth.figure import make_figure
-from sogjax.synth.motions import Motion, motions_of
+from sogjax.synth.furniture import furniture
+from sogjax.synth.motions import Motion, furniture_sites, motions_of
 from sogjax.synth.picture import Person
-from sogjax.synth.scene import Scene, cluttered_room
+from sogjax.synth.rooms import room_of
+from sogjax.synth.scene import Scene, assembled
 from sogjax.synth.sensor import Sensor
 from sogjax.synth.settings import SynthSettings
 from sogjax.synth.views import View, ring_of_views
@@ -27,6 +29,8 @@ class Stage:
     people: tuple[Person, ...]
     motions: tuple[Motion, ...]
     scene: Scene
+    bare: Scene
+    """The scene without furniture among the people."""
     views: tuple[View, ...]
     sensors: tuple[Sensor, ...]
 
@@ -44,17 +48,24 @@ class Stage:
 def stage_of(settings: SynthSettings) -> Stage:
     """Make everything; the same settings make the same things."""
     stream = lambda *key: np.random.default_rng([settings.seed, *key])
-    outfits = outfits_from_seed(stream(_PEOPLE, 100), settings.actors)
+    outfits = outfits_from_seed(stream(_PEOPLE, 100), settings.actors, settings.outfit)
+    if settings.room == "green":
+        outfits = [without_green(outfit) for outfit in outfits]
     people = []
     for number, outfit in enumerate(outfits):
         anatomy = anatomy_from_seed(stream(_PEOPLE, number))
         people.append(Person.dressed(make_figure(anatomy, outfit)))
     anatomies = [person.figure.anatomy for person in people]
+    room = room_of(settings.room, outfits, stream(_ROOM))
+    bare = assembled(room)
+    sites = furniture_sites(settings.motion, settings.actors, stream(_MOTIONS))
+    furnished = settings.furniture != "none"
     return Stage(
         settings=settings,
         people=tuple(people),
-        motions=tuple(motions_of(settings.motion, anatomies, stream(_MOTIONS))),
-        scene=cluttered_room(stream(_ROOM)),
+        motions=tuple(motions_of(settings.motion, anatomies, stream(_MOTIONS), furnished)),
+        scene=assembled(room, furniture(settings.furniture, sites)) if furnished else bare,
+        bare=bare,
         views=ring_of_views(settings, stream(_VIEWS)),
         sensors=tuple(_sensor(settings, stream(_SENSORS, k)) for k in range(settings.cameras)),
     )

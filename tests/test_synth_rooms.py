@@ -1,0 +1,177 @@
+"""Furniture among the people, clothes, rooms and light that drifts, as the cameras see them."""
+
+import hashlib
+import json
+from dataclasses import asdict, replace
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from sogjax.data.recording import open_recording
+from sogjax.data.video import read_frames, read_image
+from sogjax.errors import InputError
+from sogjax.synth import SynthSettings, render_recording
+from sogjax.synth.cache import cache_name
+from sogjax.synth.clothes import outfits_from_seed
+from sogjax.synth.filming import film
+from sogjax.synth.flesh import PARTS
+from sogjax.synth.picture import Shadows, mask_of, shot_of
+from sogjax.synth.plate import plate_of
+from sogjax.synth.stage import stage_of
+
+SMALL = SynthSettings(cameras=4, width=120, height=90, frames=3, seed=2, noise=0.0, camera_variation=0.0)
+
+
+@cache
+def stage(**changes):
+    return stage_of(replace(SMALL, **changes))
+
+
+@cache
+def plates(**changes):
+    made = stage(**changes)
+    return [plate_of(made.scene, view) for view in made.views]
+
+
+def masks(made, empty, frame):
+    """What is seen of the people by each camera."""
+    meshes = [person.figure.posed(pose) for person, pose in zip(made.people, made.poses(frame), strict=True)]
+    shadows = Shadows.of(meshes, made.scene.shadow)
+    return [mask_of(shot_of(view, p, made.people, meshes, shadows)) for view, p in zip(made.views, empty, strict=True)]
+
+
+def test_a_table_hides_legs_from_some_cameras_and_stands_in_the_plates():
+    made, bare = stage(motion="arms", props="table"), stage(motion="arms")
+    with_table, without = masks(made, plates(motion="arms", props="table"), 0), masks(bare, plates(motion="arms"), 0)
+    left = [np.sum(some) / np.sum(all_) for some, all_ in zip(with_table, without, strict=True)]
+    assert min(left) < 0.85  # somewhere legs are hidden
+    assert max(left) > 0.99  # and from elsewhere they are not
+    for some, all_ in zip(with_table, without, strict=True):
+        assert not (some & ~all_).any()
+        hidden = np.flatnonzero((all_ & ~some).any(1))
+        seen = np.flatnonzero(all_.any(1))
+        assert not len(hidden) or hidden.min() > seen.min() + 0.3 * np.ptp(seen)  # never head or chest
+    for one, other in zip(plates(motion="arms", props="table"), plates(motion="arms"), strict=True):
+        assert np.mean(np.abs(one.total - other.total).max(-1) > 0.05) > 0.02
+
+
+def test_a_person_before_the_table_is_not_hidden_by_it():
+    """A camera sees either the person or the table, whichever is nearer: checked against the table's depth."""
+    made, empty = stage(motion="arms", props="table"), plates(motion="arms", props="table")
+    mesh = made.people[0].figure.posed(made.poses(0)[0])
+    for view, plate, mask in zip(made.views, empty, masks(made, empty, 0), strict=True):
+        pixels, depths = view.project(mesh.vertices)
+        column, row = np.clip(np.round(pixels).astype(int), 0, [view.width - 1, view.height - 1]).T
+        assert plate.props is not None
+        table = plate.props[2 * row, 2 * column]
+        before = depths < table - 0.3
+        assert mask[row, column][before].mean() > 0.9
+        behind = depths > table + 0.05
+        if behind.sum() > 50:
+            assert mask[row, column][behind].mean() < 0.35
+
+
+def test_furniture_throws_shadows_on_legs():
+    made = stage(motion="sit")
+    mesh = made.people[0].figure.posed(made.motions[0](1.5))
+    low = mesh.vertices[mesh.vertices[:, 2] < 0.3].astype(np.float32)
+    alone, among = Shadows.of([mesh]), Shadows.of([mesh], made.scene.shadow)
+    assert among.lit(low).mean() < 0.8 * alone.lit(low).mean()
+
+
+def test_example_poses_are_taken_without_furniture(tmp_path):
+    settings = replace(SMALL, motion="sit", cameras=1, frames=1)
+    made = stage_of(settings)
+    assert made.bare.props is None
+    assert made.scene.props is not None
+    pictures = len(list(film(made, [0], tmp_path)))
+    assert pictures == 1 + 4 + 1
+
+
+@pytest.mark.parametrize("kind", ["cluttered", "camouflage", "plain", "green"])
+def test_rooms(kind):
+    picture = np.concatenate([plate.total for plate in plates(room=kind)])
+    greenish = np.mean(picture[..., 1] > 1.5 * picture[..., [0, 2]].max(-1))
+    assert (greenish > 0.6) == (kind == "green")
+    edges = np.mean(np.abs(np.diff(picture, axis=1)).max(-1) > 0.1)
+    assert (edges > 0.02) == (kind in ("cluttered", "camouflage"))
+    red, green, blue = stage(room=kind).people[0].figure.outfit.shirt[0]
+    assert kind != "green" or green <= max(red, blue)
+
+
+def test_camouflage_has_the_colors_of_the_people():
+    """Most of what is seen of a camouflage room is as near to skin or clothes as their patterns are; another is not."""
+    outfit = stage(room="camouflage").people[0].figure.outfit
+    worn = np.array([outfit.skin, *outfit.shirt, outfit.trousers, outfit.shoes, outfit.hair])
+    textures = {k: [c for t in stage(room=k).scene.textures for c in t.colors] for k in ("camouflage", "cluttered")}
+    near = {k: np.mean([np.abs(worn - c).max(1).min() < 1e-9 for c in cs]) for k, cs in textures.items()}
+    assert near["camouflage"] > 0.9
+    assert near["cluttered"] < 0.1
+
+
+@pytest.mark.parametrize("kind", ["random", "patterned", "striped", "plain", "black_suit", "long_sleeves"])
+def test_outfits(kind):
+    made = stage_of(replace(SMALL, outfit=kind, actors=2, motion="pass", cameras=1))
+    for person in made.people:
+        figure = person.figure
+        centres = figure.rest[figure.faces].mean(1)
+        colors = person.wardrobe.colors(figure.face_part, centres)
+        leg, arm = (figure.face_part == PARTS.index(f"left_{name}") for name in ("leg", "arm"))
+        thigh = colors[leg & (centres[:, 2] > 0.28 * figure.anatomy.stature)]
+        assert (thigh.std(0).max() > 0.05) == (kind in ("patterned", "striped"))
+        bare = np.mean(np.abs(colors[arm] - figure.outfit.skin).max(1) < 0.01)
+        assert (bare < 0.45) == (kind != "random" or figure.outfit.sleeve > 1.0)
+        if kind == "black_suit":
+            assert np.median(colors[leg]) < 0.12
+        if kind in ("plain", "black_suit"):
+            assert figure.outfit.shirt[0] == figure.outfit.shirt[1] == figure.outfit.trousers == figure.outfit.shoes
+
+
+def test_other_clothes_are_worn_by_the_same_people():
+    usual, striped = (outfits_from_seed(np.random.default_rng(7), 3, kind) for kind in ("random", "striped"))
+    assert [(o.skin, o.hair, o.shirt) for o in usual] == [(o.skin, o.hair, o.shirt) for o in striped]
+
+
+def test_the_light_drifts_slowly_from_what_the_plates_show(tmp_path):
+    settings = replace(SMALL, cameras=1, frames=5, light_drift=0.4, example_poses=False)
+    recording = open_recording(render_recording(settings, tmp_path / "dusk", workers=1))
+    plate = read_image(next(iter(recording.background.values()))).astype(float)
+    frames = [frame[0].astype(float) for frame in read_frames(recording)]
+    ceiling = (slice(0, 12), slice(None))
+    level = [frame[ceiling].mean() / plate[ceiling].mean() for frame in frames]
+    assert level[0] == pytest.approx(1.0, abs=0.04)
+    assert level[-1] == pytest.approx(0.6 ** (1 / 2.2), abs=0.05)
+    assert all(before > after - 1e-3 for before, after in pairwise(level))
+    blue_to_red = [frame[ceiling][..., 0].mean() / frame[ceiling][..., 2].mean() for frame in (frames[0], frames[-1])]
+    assert blue_to_red[1] < 0.97 * blue_to_red[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"props": "sofa"}, "props='sofa' is not known; choose one of auto, none, table"),
+        ({"outfit": "tuxedo"}, "outfit='tuxedo' is not known; choose one of random"),
+        ({"room": "forest"}, "room='forest' is not known; choose one of cluttered"),
+        ({"light_drift": 0.9}, "light_drift=0.9 is out of range"),
+        ({"light_drift": float("nan")}, "light_drift=nan is out of range"),
+        ({"motion": "hug"}, "actors=1: the motion hug needs two people; set actors=2"),
+        ({"motion": "fight", "actors": 3}, "actors=3: the motion fight needs two people; set actors=2"),
+        ({"motion": "sit", "props": "none"}, "props=none: the motion sit needs a chair"),
+        ({"motion": "pass", "actors": 2, "props": "table"}, "props=table: people who walk past each other"),
+    ],
+)
+def test_settings_that_cannot_be_rendered_are_refused(change, message):
+    with pytest.raises(InputError, match=message):
+        replace(SMALL, **change).check()
+
+
+def test_recordings_rendered_before_there_was_a_choice_keep_their_names():
+    """The name is a hash of the settings; those of the first version were fewer."""
+    first = ("motion", "actors", "cameras", "width", "height", "fps", "frames", "seed", "noise", "camera_variation")
+    first += ("radius", "distortion", "example_poses", "background", "shadows")
+    content = {"version": 2, **{name: asdict(SMALL)[name] for name in first}}
+    digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:12]
+    assert cache_name(SMALL) == f"walk1-{digest}"
+    assert len({cache_name(replace(SMALL, **c)) for c in ({}, {"room": "green"}, {"props": "table"})}) == 3
