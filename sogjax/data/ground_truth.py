@@ -14,7 +14,7 @@ from sogjax.sentences import counted
 
 @dataclass
 class GroundTruth:
-    """Measured markers and joints, in metres in the calibration's world; NaN where a marker is missing.
+    """Measured markers and joints, in metres in the calibration's world; NaN where a point is not known.
 
     With several subjects the names carry the prefix `SUBJECT/`.
     """
@@ -62,8 +62,8 @@ def load_ground_truth(path: Path) -> GroundTruth:
         raise InputError(f"{path}: fps = {fps} is not positive; give the frames per second")
     markers, marker_names = _points(path, arrays, "markers", "marker_names")
     joints, joint_names = _points(path, arrays, "joints", "joint_names")
-    if joints is not None and np.isnan(joints).any():
-        raise InputError(f"{path}: 'joints' holds NaN; only markers may be missing, so leave the joint out")
+    if joints is not None and not np.isfinite(joints).any():
+        raise InputError(f"{path}: 'joints' holds NaN only; label some of them, or leave them out")
     if markers is None and joints is None:
         raise InputError(f"{path}: holds neither 'markers' nor 'joints'; add one of them")
     if markers is not None and joints is not None and len(markers) != len(joints):
@@ -94,7 +94,7 @@ def _points(
         twice = next(name for name in names if names.count(name) > 1)
         raise InputError(f"{path}: {names_key!r} holds {twice!r} twice; give every point its own name")
     if np.isinf(points).any():
-        raise InputError(f"{path}: {key!r} holds infinite numbers; write NaN where a marker is missing")
+        raise InputError(f"{path}: {key!r} holds infinite numbers; write NaN where a point is not known")
     return points, names
 
 

@@ -29,6 +29,10 @@ class ImageFolder:
         self._shape = image.shape
         return image
 
+    def skip(self) -> None:
+        """Pass over the next image."""
+        next(self._paths, None)
+
     def close(self) -> None:
         """Leave out what is left."""
         self._paths = iter(())

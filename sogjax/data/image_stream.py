@@ -14,6 +14,10 @@ class ImageStream(Protocol):
         """The next image (BGR), or None after the last."""
         ...
 
+    def skip(self) -> None:
+        """Pass over the next image."""
+        ...
+
     def close(self) -> None:
         """Release the file."""
         ...

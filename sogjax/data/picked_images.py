@@ -61,10 +61,17 @@ class PickedImages:
         number = next(self._numbers, None)
         if number is None:
             return None
-        while self._next <= number:
+        while self._next < number:
+            self._images.skip()
+            self._next += 1
+        if self._next == number:
             self._image = self._images.read()
             self._next += 1
         return self._image
+
+    def skip(self) -> None:
+        """Pass over the next image, which may be wanted again later."""
+        self.read()
 
     def close(self) -> None:
         """Release the file."""

@@ -129,7 +129,9 @@ def open_recording(path: Path) -> Recording:
         sources=sources,
         frame_offset=offsets,
         background=find_background(path / "background", rig, calibrated.names),
-        example_poses=find_example_poses(path / "example_poses", rig, calibrated.names, settings.example_poses),
+        example_poses=find_example_poses(
+            path / "example_poses", rig, calibrated.names, settings.example_poses, range(first, first + count)
+        ),
         initial_poses=_initial_poses(path / "initial_pose.yaml"),
         ground_truth=_ground_truth(path / "ground_truth.npz"),
         warnings=(*warnings, *_doubts(path, settings, rig), *uneven(sources, infos, timed, settings.fewest_cameras)),

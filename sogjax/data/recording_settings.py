@@ -6,8 +6,8 @@ from typing import Any
 
 from sogjax.data.calibration.rig import METRES_PER_UNIT
 from sogjax.data.color_gains import ColorGains
+from sogjax.data.example_settings import ExampleSettings, read_examples
 from sogjax.data.file_names import objection
-from sogjax.data.initial_pose import InitialPose, parse_initial_pose
 from sogjax.data.yaml_entry import Entry, read_yaml
 from sogjax.model.frames import UP_AXES
 
@@ -32,15 +32,6 @@ _KEYS = (
     "color_gains",
     "example_poses",
 )
-
-
-@dataclass(frozen=True)
-class ExampleSettings:
-    """An entry of `example_poses`."""
-
-    name: str
-    actor: str | None = None
-    initial_pose: InitialPose | None = None
 
 
 @dataclass(frozen=True)
@@ -92,7 +83,7 @@ def read_recording_settings(path: Path) -> RecordingSettings:
         fewest_cameras=_count(given["fewest_cameras"]) if "fewest_cameras" in given else None,
         missing=_missing(given["missing"]) if "missing" in given else {},
         color_gains=_gains(given["color_gains"]) if "color_gains" in given else {},
-        example_poses=_examples(given["example_poses"]) if "example_poses" in given else None,
+        example_poses=read_examples(given["example_poses"]) if "example_poses" in given else None,
     )
 
 
@@ -162,24 +153,3 @@ def _span(entry: Entry) -> tuple[int, int]:
     if len(ends) != 2 or ends[1] < ends[0]:
         raise entry.error("the first and the last frame of a while, such as [120, 180]")
     return ends[0], ends[1]
-
-
-def _examples(entry: Entry) -> tuple[ExampleSettings, ...]:
-    examples = tuple(_example(item) for item in entry.items())
-    for example, item in zip(examples, entry.items(), strict=True):
-        if [other.name for other in examples].count(example.name) > 1:
-            raise item.fields(("name",), ("actor", "initial_pose"))["name"].error("each folder once")
-    return examples
-
-
-def _example(entry: Entry) -> ExampleSettings:
-    fields = entry.fields(("name",), ("actor", "initial_pose"))
-    given = {key: value for key, value in fields.items() if value.value is not None}
-    name = fields["name"].text()
-    if objection(name) is not None:
-        raise fields["name"].error("the name of a folder in example_poses/")
-    return ExampleSettings(
-        name=name,
-        actor=_file_name(given["actor"]) if "actor" in given else None,
-        initial_pose=parse_initial_pose(given["initial_pose"]) if "initial_pose" in given else None,
-    )

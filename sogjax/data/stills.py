@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sogjax.data.calibration import CameraRig
+from sogjax.data.example_settings import ExampleSettings
 from sogjax.data.image_file import IMAGE_SUFFIXES, read_image, read_mask
 from sogjax.data.initial_pose import InitialPose
-from sogjax.data.recording_settings import ExampleSettings
 from sogjax.errors import InputError
 
 _MASK_SUFFIX = ".mask.png"
@@ -25,6 +25,8 @@ class ExamplePose:
     masks: dict[str, Path]
     """By camera; white = subject. A camera may have none."""
     initial_pose: InitialPose | None
+    frame: int | None = None
+    """Of the videos, counted from the recording's first, where the images are of one; None: they are files."""
 
 
 def find_background(folder: Path, rig: CameraRig, calibrated: Iterable[str]) -> dict[str, Path]:
@@ -40,18 +42,44 @@ def find_background(folder: Path, rig: CameraRig, calibrated: Iterable[str]) -> 
 
 
 def find_example_poses(
-    folder: Path, rig: CameraRig, calibrated: Iterable[str], settings: tuple[ExampleSettings, ...] | None
+    folder: Path,
+    rig: CameraRig,
+    calibrated: Iterable[str],
+    settings: tuple[ExampleSettings, ...] | None,
+    frames: range | None,
 ) -> tuple[ExamplePose, ...]:
-    """The example poses in `folder`: those that `settings` list, else one for every folder in it.
+    """The example poses: those that `settings` list, else one for every folder in `folder`.
+
+    Args:
+        folder: where their images are.
+        rig: the cameras.
+        calibrated: names of all cameras of the calibration.
+        settings: what recording.yaml lists.
+        frames: the numbers of the frames of the videos; None: not known.
 
     Raises:
-        InputError: a listed one is missing or empty, or an image or mask does not fit its camera.
+        InputError: a listed one is missing or empty, an image or mask does not fit its camera, or there is no such
+            frame.
     """
     if settings is None:
         folders = sorted(path.name for path in folder.iterdir() if path.is_dir()) if folder.is_dir() else []
         settings = tuple(ExampleSettings(name) for name in folders if not name.startswith("."))
     known = set(calibrated)
-    return tuple(_example_pose(folder / entry.name, rig, known, entry) for entry in settings)
+    return tuple(
+        _example_pose(folder / entry.name, rig, known, entry)
+        if entry.frame is None
+        else _of_frame(folder, entry, entry.frame, frames or range(entry.frame, entry.frame + 1))
+        for entry in settings
+    )
+
+
+def _of_frame(folder: Path, entry: ExampleSettings, frame: int, frames: range) -> ExamplePose:
+    if frame not in frames:
+        raise InputError(
+            f"{folder.parent / 'recording.yaml'}: example_poses: there is no frame {frame}; "
+            f"the frames are {frames[0]} to {frames[-1]}"
+        )
+    return ExamplePose(entry.name, entry.actor, {}, {}, entry.initial_pose, frame - frames[0])
 
 
 def _example_pose(folder: Path, rig: CameraRig, calibrated: set[str], entry: ExampleSettings) -> ExamplePose:

@@ -35,6 +35,10 @@ class VideoFile:
         ok, image = self._capture.read()
         return image if ok else None
 
+    def skip(self) -> None:
+        """Pass over the next image: it is decoded, but its colours are not converted."""
+        self._capture.grab()
+
     def close(self) -> None:
         """Release the file."""
         self._capture.release()

@@ -10,6 +10,8 @@ WORKING_SIZE = 648
 """Pixels. Pictures are scaled down until their longer side is at most this: averaging removes noise."""
 CHANGED = 8.0
 """Squared differences to the plate above this, in units of the noise, are a change."""
+UNDECIDED = 0.5 * CHANGED
+"""What is said of a pixel whose plate is unknown: neither a change nor none."""
 DIFFERENT = 4.5
 """The same for what is left when the plate may be darker or a little brighter."""
 SHADOW_RANGE = (0.4, 1.1)
@@ -37,6 +39,13 @@ class Difference:
     """Subject or shadow, without what is certainly a shadow by its pattern."""
     different: Bool[np.ndarray, "rows columns"]
     """Subject: the colour is another one."""
+    unknown: Bool[np.ndarray, "rows columns"]
+    """Where the plate says nothing."""
+
+    @property
+    def open(self) -> Bool[np.ndarray, "rows columns"]:
+        """Where the subject may be."""
+        return self.changed | self.unknown
 
 
 def working_size(width: int, height: int) -> tuple[int, int]:
@@ -52,13 +61,18 @@ def reduced_mask(mask: Bool[np.ndarray, "height width"]) -> Bool[np.ndarray, "ro
 
 
 def plate_difference(
-    image: UInt8[np.ndarray, "height width 3"], plate: UInt8[np.ndarray, "height width 3"]
+    image: UInt8[np.ndarray, "height width 3"],
+    plate: UInt8[np.ndarray, "plate_height plate_width 3"],
+    unknown: Bool[np.ndarray, "_rows _columns"] | None = None,
 ) -> Difference:
     """Compare a picture with the empty scene, seen by the same camera under an exposure that may differ.
 
+    Where the scene is not `known` (None: it is everywhere), the picture counts as changed, as the subject may be there,
+    but not as different.
+
     A shadow is the plate, darker: Horprasert, Harwood and Davis, "A Statistical Approach for Real-time Robust
     Background Subtraction and Shadow Detection" (1999). Where a brown trouser leg before a brown floor looks like one,
-    the pattern may tell: a shadow keeps the floor's.
+    the pattern may tell: a shadow keeps the floor's. Where the plate is `unknown`, nothing is said.
     """
     size = working_size(image.shape[1], image.shape[0])
     small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
@@ -73,7 +87,11 @@ def plate_difference(
     different = opened(unexplained > DIFFERENT, 3)
     shadow = _keeps_pattern(light, expected, noise) & (brightness < 1.0) & ~different
     changed = opened(change > CHANGED, 3) & ~opened(shadow, 5)
-    return Difference(small, change, unexplained, changed, different)
+    if unknown is None:
+        return Difference(small, change, unexplained, changed, different, np.zeros_like(changed))
+    unknown = cv2.resize(unknown.astype(np.float32), size, interpolation=cv2.INTER_AREA) > 0.5
+    change, unexplained = np.where(unknown, UNDECIDED, change), np.where(unknown, 0.0, unexplained)
+    return Difference(small, change, unexplained, changed & ~unknown, different & ~unknown, unknown)
 
 
 def opened(mask: Bool[np.ndarray, "rows columns"], width: int) -> Bool[np.ndarray, "rows columns"]:
@@ -91,11 +109,14 @@ def disc(width: int) -> np.ndarray:
     return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (width, width))
 
 
-def _same_exposure(
-    light: Float[np.ndarray, "rows columns 3"], plate: Float[np.ndarray, "rows columns 3"]
-) -> Float[np.ndarray, "rows columns 3"]:
-    """The plate with the gain and offset of each channel that make it most like the picture's background."""
-    seen, empty = (part[::3, ::3].reshape(-1, 3).astype(float) for part in (light, plate))
+def same_exposure(
+    light: np.ndarray, plate: np.ndarray, every: int = 3
+) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+    """Gain and offset of each channel that make a plate most like a picture's background.
+
+    What differs for another reason is left out by itself; of rows and columns only one in `every` is looked at.
+    """
+    seen, empty = (part[::every, ::every].reshape(-1, 3).astype(float) for part in (light, plate))
     low, high = SATURATED
     usable = ((seen > low) & (seen < high) & (empty > low) & (empty < high)).all(axis=1)
     gain, offset = np.ones(3), np.zeros(3)
@@ -109,6 +130,14 @@ def _same_exposure(
         covariance = ((seen[kept] - middle_seen) * (empty[kept] - middle_empty)).mean(axis=0)
         gain = np.where(spread > 1.0, np.clip(covariance / spread, 0.3, 3.0), 1.0)
         offset = middle_seen - gain * middle_empty
+    return gain, offset
+
+
+def _same_exposure(
+    light: Float[np.ndarray, "rows columns 3"], plate: Float[np.ndarray, "rows columns 3"]
+) -> Float[np.ndarray, "rows columns 3"]:
+    """The plate under the picture's exposure."""
+    gain, offset = same_exposure(light, plate)
     return np.clip(gain * plate + offset, 0.0, 255.0).astype(np.float32)
 
 

@@ -6,7 +6,8 @@ from the blob centres once per recording.
 """
 
 from collections.abc import Sequence
-from functools import partial
+from functools import partial, reduce
+from operator import add
 
 import equinox as eqx
 import jax
@@ -93,7 +94,7 @@ def quadtree(
 def quadtree_of_planes(
     cells: Planes, candidates: Candidates, color_tolerance: Float[Array, ""]
 ) -> tuple[list[Float[Array, "candidate"]], Bool[Array, "candidate"]]:
-    """The same, of colours that lie channel by channel, which is quicker."""
+    """The same, of colours that lie channel by channel, which is quicker; any number of channels."""
     running = ~jnp.isnan(color_tolerance)
     levels = computed_once(running, partial(_levels, shape=candidates.shape, num_levels=candidates.num_levels), cells)
     inside = jnp.split(candidates.inside, np.cumsum([planes[0].size for planes in levels])[:-1])
@@ -110,7 +111,7 @@ def quadtree_of_planes(
 
 
 def _levels(cells: Planes, shape: tuple[int, int], num_levels: int) -> list[Planes]:
-    """Means over the nodes of every level, from the cells upwards: three colour channels and the squared length."""
+    """Means over the nodes of every level, from the cells upwards: the channels and the squared length."""
     height, width = cells[0].shape
     padded = [jnp.pad(plane, ((0, shape[0] - height), (0, shape[1] - width))) for plane in cells]
     levels = [[*padded, _squared_length(padded)]]
@@ -121,7 +122,7 @@ def _levels(cells: Planes, shape: tuple[int, int], num_levels: int) -> list[Plan
 
 def _node_colors(levels: list[Planes]) -> list[Float[Array, "candidate"]]:
     """The mean colours of all nodes, channel by channel, in the order of the candidates."""
-    return [jnp.concatenate([level[k].reshape(-1) for level in levels]) for k in range(3)]
+    return [jnp.concatenate([level[k].reshape(-1) for level in levels]) for k in range(len(levels[0]) - 1)]
 
 
 def _parents(plane: Float[Array, "rows columns"]) -> Float[Array, "half_rows half_columns"]:
@@ -136,12 +137,12 @@ def _children(plane: Bool[Array, "rows columns"]) -> Bool[Array, "two_rows two_c
 
 
 def _uniform(planes: Planes, color_tolerance: Float[Array, ""]) -> Bool[Array, "rows columns"]:
-    variance = planes[3] - _squared_length(planes[:3])
+    variance = planes[-1] - _squared_length(planes[:-1])
     return (color_tolerance >= 0.0) & (variance <= color_tolerance**2)
 
 
 def _squared_length(planes: Planes) -> Float[Array, "rows columns"]:
-    return planes[0] ** 2 + planes[1] ** 2 + planes[2] ** 2
+    return reduce(add, [plane * plane for plane in planes])
 
 
 def keep_blobs(

@@ -32,6 +32,7 @@ def masks_from_plates(
     known: Mapping[int, Mask],
     cameras: Mapping[int, Camera],
     up: Float[np.ndarray, "3"],
+    unknown: Mapping[int, Mask] | None = None,
 ) -> dict[int, Mask]:
     """Masks of the cameras that have a picture of the empty scene, at the pictures' size.
 
@@ -44,12 +45,15 @@ def masks_from_plates(
         known: masks of other cameras, which help.
         cameras: all of these cameras.
         up: the world's vertical.
+        unknown: where the empty scene is not known, by camera at any size; None: it is known everywhere. There the
+            other cameras decide.
 
     Returns:
         Masks by camera; a camera is absent if no subject could be told apart from its plate.
     """
     with ThreadPoolExecutor() as pool:
-        found = pool.map(lambda camera: plate_difference(images[camera], plates[camera]), plates)
+        compare = lambda k: plate_difference(images[k], plates[k], (unknown or {}).get(k))
+        found = pool.map(compare, plates)
         differences = dict(zip(plates, found, strict=True))
         guesses = {camera: first_guess(difference) for camera, difference in differences.items()}
         guesses = {camera: guess for camera, guess in guesses.items() if is_subject(guess)}
@@ -115,9 +119,10 @@ def _seen_together(
     subjects = {**guesses, **small_known}
     if len(subjects) < 2 or not guesses:
         return {}
-    regions = {c: differences[c].changed | guesses[c] if c in guesses else small_known[c] for c in subjects}
+    regions = {c: differences[c].open | guesses[c] if c in guesses else small_known[c] for c in subjects}
     small = {c: resized(cameras[c], (mask.shape[1], mask.shape[0])) for c, mask in subjects.items()}
-    cube = cube_around([largest_parts(regions[c]) for c in subjects], [small[c] for c in subjects])
+    seen = {c: differences[c].changed | guesses[c] if c in guesses else small_known[c] for c in subjects}
+    cube = cube_around([largest_parts(seen[c]) for c in subjects], [small[c] for c in subjects])
     pixels = {c: voxel_pixels(cube, small[c], mask.shape) for c, mask in subjects.items()}
     misses = np.sum([~pixels[c].hits(_widened(region, 1)) for c, region in regions.items()], axis=0)
     hull = misses <= (1 if len(subjects) >= MANY else 0)
@@ -132,7 +137,7 @@ def _confirmed(difference: Difference, pixels: VoxelPixels, hull: np.ndarray, ab
     low = pixels.footprint * LOW_VOXELS  # feet are as near as this to what stands, the rim of a shadow seldom is
     near = _widened(pixels.silhouette_of(hull), pixels.footprint) & _widened(stands, low)
     different = closed(difference.different & near, 5) & difference.changed
-    return largest_parts(different | (difference.changed & stands))
+    return largest_parts(different | (difference.open & stands))
 
 
 def _widened(mask: Mask, pixels: int) -> Mask:

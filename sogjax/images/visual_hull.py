@@ -66,8 +66,8 @@ class VoxelPixels:
         return cv2.morphologyEx(canvas, cv2.MORPH_CLOSE, element) > 0
 
 
-def resized(camera: Camera, size: tuple[int, int]) -> Camera:
-    """The camera of the same pictures at another width and height."""
+def resized(camera: Camera, size: tuple[float | int, float | int]) -> Camera:
+    """The camera of the same pictures at another width and height, in whatever these are counted."""
     scale = jnp.asarray(size, camera.image_size.dtype) / camera.image_size
     matrix = camera.intrinsics
     focal = matrix[:2, :2] * scale[:, None]

@@ -43,7 +43,7 @@ def mean_chart(panels: Sequence[Means], *, axis: str, value: str, paper: Mapping
         paper: the paper's figures by row, in a panel of their own.
     """
     ratios = [2.0] * len(panels) + [1.0] * bool(paper)
-    figure = _figure((max(_SIZE[0], 1.5 * sum(ratios)), _SIZE[1]))
+    figure = new_figure((max(_SIZE[0], 1.5 * sum(ratios)), _SIZE[1]))
     drawn = figure.subplots(1, len(ratios), squeeze=False, width_ratios=ratios)[0]
     for panel, content in zip(drawn, panels, strict=False):
         _draw_means(panel, content.means, content.intervals, content.members)
@@ -52,14 +52,14 @@ def mean_chart(panels: Sequence[Means], *, axis: str, value: str, paper: Mapping
     if paper:
         drawn[-1].plot(range(len(paper)), list(paper.values()), "s-", color=PAPER)
         _finish(drawn[-1], list(paper), axis, value, "the paper")
-    return _png(figure)
+    return png_of(figure)
 
 
 def calibration_chart(
     expected: Mapping[str, Float[np.ndarray, "bin"]], found: Mapping[str, Float[np.ndarray, "bin"]], title: str
 ) -> bytes:
     """Predicted against actual errors by name, drawn in millimetres from metres (PNG)."""
-    figure = _figure((4.2, 3.6))
+    figure = new_figure((4.2, 3.6))
     panel = figure.subplots()
     top = 0.0
     for name, values in expected.items():
@@ -68,7 +68,7 @@ def calibration_chart(
     panel.plot([0.0, top], [0.0, top], "--", color=PAPER, linewidth=1)
     panel.set(xlabel="predicted standard deviation, mm", ylabel="root mean square error, mm", title=title)
     panel.legend(fontsize=8, frameon=False)
-    return _png(figure)
+    return png_of(figure)
 
 
 def _draw_means(
@@ -119,7 +119,7 @@ def _finish(panel: Any, names: Sequence[str], axis: str, value: str, title: str)
     panel.grid(axis="y", color="#e4e4e4")
 
 
-def _figure(size: tuple[float, float] = _SIZE) -> Any:
+def new_figure(size: tuple[float, float] = _SIZE) -> Any:
     """An empty figure that needs no display.
 
     Raises:
@@ -134,7 +134,8 @@ def _figure(size: tuple[float, float] = _SIZE) -> Any:
         return Figure(figsize=size, dpi=_DPI, layout="constrained")
 
 
-def _png(figure: Any) -> bytes:
+def png_of(figure: Any) -> bytes:
+    """The picture of a figure."""
     stream = io.BytesIO()
     figure.savefig(stream, format="png")
     return stream.getvalue()

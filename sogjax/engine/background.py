@@ -1,0 +1,112 @@
+"""Which background a run uses: photographs of the empty scene, else what the clip itself shows, else none."""
+
+import json
+from collections.abc import Sequence
+from threading import Lock
+
+from sogjax.data.background_cache import Arrays, background_origin, kept_background
+from sogjax.data.recording import Recording
+from sogjax.data.video import read_still
+from sogjax.engine.clip_learning import PARTS, LeftOut, UnsuitableError, learn
+from sogjax.engine.terminal import say
+from sogjax.errors import InputError
+from sogjax.images.background import CameraBackground, stack_background
+from sogjax.images.background_cells import BackgroundCells
+from sogjax.images.cells import CellGrid
+from sogjax.settings import ImagesConfig
+
+CHOICES = ("auto", "pictures", "clip", "none")
+_made: dict[str, Arrays | str] = {}
+_making = Lock()
+_said: set[str] = set()
+
+
+def background_cells(recording: Recording, grids: Sequence[CellGrid], images: ImagesConfig) -> BackgroundCells | None:
+    """The background of all cameras as cells; None: without one.
+
+    Raises:
+        InputError: as `backgrounds`.
+    """
+    found = backgrounds(recording, images)
+    return None if found is None else stack_background(found, grids)
+
+
+def backgrounds(recording: Recording, images: ImagesConfig) -> tuple[CameraBackground, ...] | None:
+    """The background of every camera, as `images.background` asks for; None: without one, which `auto` says.
+
+    Raises:
+        InputError: as `background_or_reason`.
+    """
+    found = background_or_reason(recording, images)
+    if not isinstance(found, str):
+        return found
+    sentence = f"{recording.path}: no background is used, since {found}"
+    if images.background == "auto" and sentence not in _said:
+        _said.add(sentence)
+        say(sentence)
+    return None
+
+
+def background_or_reason(recording: Recording, images: ImagesConfig) -> tuple[CameraBackground, ...] | str:
+    """The same, or why there is none, with the remedy.
+
+    With `auto`, photographs count if every camera has one, else the clip, if it is suitable.
+
+    Raises:
+        InputError: pictures are asked for and missing, the clip is asked for and unsuitable, a video cannot be read,
+            or the cache's folder cannot be written.
+    """
+    if images.background not in CHOICES:
+        raise InputError(f"images.background={images.background}: no such choice; use one of {', '.join(CHOICES)}")
+    missing = [name for name in recording.rig.names if name not in recording.background]
+    if images.background == "pictures" and missing:
+        raise InputError(
+            f"{recording.path}: images.background=pictures, but background/ has no picture of "
+            f"{', '.join(missing)}; add it, or set images.background=auto to learn it from the clip"
+        )
+    if images.background == "none":
+        return "images.background=none"
+    if images.background == "pictures" or (images.background == "auto" and not missing):
+        return tuple(
+            CameraBackground.from_plate(read_still(recording, name, recording.background[name]))
+            for name in recording.rig.names
+        )
+    learnt = clip_backgrounds(recording, images.cache)
+    if images.background == "clip" and isinstance(learnt, str):
+        raise InputError(f"{recording.path}: images.background=clip, but {learnt}, or set images.background=none")
+    return learnt
+
+
+def clip_backgrounds(recording: Recording, cache: str | None) -> tuple[CameraBackground, ...] | str:
+    """The backgrounds learnt from the clip, or why it is unsuitable (with the remedy); made once for each process."""
+    key = json.dumps([str(recording.path.resolve()), background_origin(recording)])
+    with _making:
+        found = _made.get(key)
+        if found is None or (cache is not None and not isinstance(found, str)):
+            found = _made[key] = _kept_or_learnt(recording, cache, found)
+    return found if isinstance(found, str) else _from_arrays(recording, found)
+
+
+def _kept_or_learnt(recording: Recording, cache: str | None, known: Arrays | None) -> Arrays | str:
+    """From the cache's folder, else what is known already, else learnt now; or why it cannot be."""
+    try:
+        return kept_background(cache, recording, lambda: learn(recording, None) if known is None else known, say)
+    except UnsuitableError as reason:
+        return str(reason)
+
+
+def clip_backgrounds_without(recording: Recording, left_out: LeftOut) -> tuple[CameraBackground, ...]:
+    """The same once the subject was tracked: where it is, widened, no sample counts. `sampled_frames` says which.
+
+    Raises:
+        InputError: a video cannot be read, or the clip is unsuitable.
+    """
+    try:
+        return _from_arrays(recording, learn(recording, left_out))
+    except UnsuitableError as reason:
+        raise InputError(f"{recording.path}: no background can be learnt, since {reason}") from reason
+
+
+def _from_arrays(recording: Recording, arrays: Arrays) -> tuple[CameraBackground, ...]:
+    parts = [[arrays[f"{name}.{part}"] for part in PARTS] for name in recording.rig.names]
+    return tuple(CameraBackground(picture, spread, known, "clip") for picture, spread, known in parts)

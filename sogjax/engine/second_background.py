@@ -1,0 +1,149 @@
+"""A background that is learnt a second time, once the subject was tracked: where its body is, no sample counts.
+
+Somebody who stays in one place hides what is around: a trunk that never moves and a wall look alike, so nothing around
+it counts as background at first. When the body was followed, it does.
+"""
+
+from typing import Protocol, runtime_checkable
+
+import cv2
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from sogjax.data.recording import Recording
+from sogjax.engine.background import clip_backgrounds_without
+from sogjax.engine.backwards import frames_backwards, tracked_backwards
+from sogjax.engine.clip_learning import LeftOut, sampled_frames
+from sogjax.engine.pipeline import PictureReader, Preparation, cells_of_frame
+from sogjax.engine.terminal import progress, say
+from sogjax.engine.timing import StageTimes
+from sogjax.images.background import stack_background
+from sogjax.images.cells import CellGrid
+from sogjax.images.foreground import EmptyScene
+from sogjax.images.plate_difference import working_size
+from sogjax.model.body import Body
+from sogjax.settings import ImagesConfig
+from sogjax.tracking.tracker import Tracker, track
+from sogjax.view.projection import picture_points
+
+MUCH_UNKNOWN = 0.1
+"""Share of the pictures from which on the background is learnt again."""
+BORDER = 0.25
+"""Metres around a blob that are left out, too: the body may be a little off."""
+DISC = 1.35
+"""Radius of what a blob of sigma 1 stands for."""
+
+
+@runtime_checkable
+class Clip(Protocol):
+    """Frames to be tracked, from one of them in both directions."""
+
+    @property
+    def recording(self) -> Recording:
+        """The recording."""
+        ...
+
+    @property
+    def grids(self) -> tuple[CellGrid, ...]:
+        """How its pictures are cut into cells."""
+        ...
+
+    @property
+    def tracker(self) -> Tracker:
+        """What finds the poses."""
+        ...
+
+    @property
+    def frames(self) -> tuple[int, int]:
+        """First and one after the last, counted from the recording's first."""
+        ...
+
+    @property
+    def begin(self) -> int:
+        """Where tracking begins."""
+        ...
+
+    @property
+    def start(self) -> Float[Array, "dof"]:
+        """The rough pose there."""
+        ...
+
+
+def learnt_again(job: Clip, images: ImagesConfig, read: PictureReader) -> Tracker:
+    """The job's tracker, with a background that was learnt again where the first one left much open.
+
+    Raises:
+        InputError: a video cannot be read, or a picture has too many image blobs.
+    """
+    tracker, empty = job.tracker, job.tracker.reader.empty
+    if empty is None or _from_pictures(job.recording, images):
+        return tracker
+    inside = np.zeros(np.asarray(empty.known).shape, bool)
+    for k, grid in enumerate(job.grids):
+        inside[k, : grid.rows, : grid.columns] = True
+    if np.asarray(empty.known)[inside].mean() >= 1.0 - MUCH_UNKNOWN:
+        return tracker
+    say("much of the background is unknown: the clip is tracked once to learn it where the body is not, then again")
+    poses = _first_pass(job, images, read)
+    learnt = clip_backgrounds_without(job.recording, body_masks(job.recording, tracker.body, poses))
+    again = EmptyScene.from_background(stack_background(learnt, job.grids))
+    return eqx.tree_at(lambda t: t.reader.empty, tracker, again)
+
+
+def body_masks(recording: Recording, body: Body, poses: dict[int, Array]) -> LeftOut:
+    """Where a body is in the sampled frames, widened; a frame whose pose is not known is left out as a whole.
+
+    Args:
+        recording: with the cameras.
+        body: upright in the recording's world.
+        poses: by frame, counted from the recording's first.
+    """
+    frames = sampled_frames(recording)
+    known = [frame for frame in frames if frame in poses]
+    blobs = eqx.filter_jit(lambda body, pose: body.posed_blobs(pose))
+    means = np.stack([np.asarray(blobs(body, jnp.asarray(poses[frame])).means, float) for frame in known])
+    pixels, depths = picture_points(recording.rig, means)
+    radii = DISC * np.asarray(body.blob_sigmas, float) + BORDER
+    masks: dict[str, dict[int, Bool[np.ndarray, "rows columns"]]] = {}
+    for k, name in enumerate(recording.rig.names):
+        width, height = working_size(*recording.rig.image_size(name))
+        focal = float(recording.rig.camera(name).focal_length)
+        scale = width / recording.rig.image_size(name)[0]
+        masks[name] = {frame: np.ones((height, width), bool) for frame in frames if frame not in poses}
+        for at, frame in enumerate(known):
+            sizes = radii * focal / np.maximum(depths[k, at], 0.1)
+            masks[name][frame] = _discs((height, width), scale * pixels[k, at], scale * sizes)
+    return masks
+
+
+def _discs(
+    shape: tuple[int, int], centres: Float[np.ndarray, "blob 2"], radii: Float[np.ndarray, "blob"]
+) -> Bool[np.ndarray, "rows columns"]:
+    mask = np.zeros(shape, np.uint8)
+    for centre, radius in zip(centres, radii, strict=True):
+        if np.isfinite(centre).all():
+            cv2.circle(mask, (round(float(centre[0])), round(float(centre[1]))), round(float(radius)), 1, -1)
+    return mask > 0
+
+
+def _from_pictures(recording: Recording, images: ImagesConfig) -> bool:
+    """Whether the background was photographed."""
+    photographed = all(name in recording.background for name in recording.rig.names)
+    return images.background == "pictures" or (images.background == "auto" and photographed)
+
+
+def _first_pass(job: Clip, images: ImagesConfig, read: PictureReader) -> dict[int, Array]:
+    """The poses of all frames, by frame."""
+    poses: dict[int, Array] = {}
+    if job.begin > job.frames[0]:
+        frames = frames_backwards(job.recording, job.grids, images, job.frames[0], job.begin + 1)
+        prefix = tracked_backwards(job.tracker, job.start, frames, job.begin + 1 - job.frames[0], StageTimes())
+        poses = {job.frames[0] + k: jnp.asarray(prefix.pose(k)) for k in range(prefix.num_frames)}
+    pictures = read(job.recording, Preparation(job.grids), job.begin, job.frames[1])
+    cells = (cells_of_frame([picture.cells for picture in frame]) for frame in pictures)
+    shown = progress(cells, job.frames[1] - job.begin, "tracking, to learn the background")
+    for done in track(job.tracker, job.start, shown):
+        poses[job.begin + done.index] = jnp.asarray(done.result.pose)
+    return poses

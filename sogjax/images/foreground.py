@@ -1,0 +1,139 @@
+"""Foreground against background: what the colour of a cell says about whether somebody is seen there."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from sogjax.images.background_cells import BackgroundCells
+
+LARGEST = 2.0
+"""No cell says more than this: what disturbs one (a reflection, a wrong plate) disturbs its neighbours too."""
+SMALLEST_SPREAD = 0.015
+"""Of a channel: even the same place under the same light differs by so much (compression, a lens that breathes)."""
+SHADOW = 0.25
+"""Standard deviation of the light that a shadow or a reflection takes or adds, as a part of the background's."""
+SUBJECT_SPREAD = 0.07
+"""Of a channel: how far what is seen of a subject lies from the colours of its blobs."""
+SUBJECT_SHADING = 0.25
+"""The same in brightness, as a part of it: folds, and limbs that turn away from the light."""
+SUBJECT_UNKNOWN = 0.3
+"""Share of a subject whose colours are none of its blobs': any colour."""
+COLOR_BINS = 32
+"""Of each channel, in the table of a subject's colours."""
+TEMPER = 0.5
+"""Part of the logarithm that counts: neighbouring cells err together."""
+_LIGHT_STEPS = (0.15, 0.08, 0.05)
+"""How far cells may be off to count in each estimate of a frame's light."""
+_LIGHT_STRIDE = 3
+"""Every so many rows and columns are enough for it."""
+_NORMAL = (2.0 * np.pi) ** 1.5
+
+Cells = Float[Array, "camera rows columns"]
+SubjectColors = Float[Array, "bin bin bin"]
+"""Logarithm of the density of a subject's colours at the middle of each bin of sRGB; 0 is that of any colour."""
+
+
+def subject_colors(
+    colors: Float[np.ndarray, "blob 3"], areas: Float[np.ndarray, "blob"]
+) -> Float[np.ndarray, "bin bin bin"]:
+    """The colours of a subject, from those of its blobs (sRGB) and how much of it each is."""
+    middle = (np.arange(COLOR_BINS) + 0.5) / COLOR_BINS
+    places = np.stack(np.meshgrid(middle, middle, middle, indexing="ij"), axis=-1).reshape(-1, 3)
+    density = np.full(len(places), SUBJECT_UNKNOWN)
+    for color, share in zip(np.asarray(colors, float), np.asarray(areas, float) / np.sum(areas), strict=True):
+        off = places - color
+        along, squared, length = off @ color, (off**2).sum(axis=1), float(color @ color)
+        variance, shaded = SUBJECT_SPREAD**2, SUBJECT_SPREAD**2 + SUBJECT_SHADING**2 * length
+        distance = (squared - along**2 / (variance / SUBJECT_SHADING**2 + length)) / variance
+        peak = 1.0 / (_NORMAL * variance * np.sqrt(shaded))
+        density += (1.0 - SUBJECT_UNKNOWN) * share * peak * np.exp(-0.5 * distance)
+    return np.log(density).reshape(COLOR_BINS, COLOR_BINS, COLOR_BINS)
+
+
+class EmptyScene(eqx.Module):
+    """What is compared with every frame: the background channel by channel, and what follows from it alone."""
+
+    planes: tuple[Cells, Cells, Cells]
+    """Red, green and blue of the background, sRGB, 0 to 1."""
+    precision: Cells
+    """1 / variance of a channel."""
+    shade: Cells
+    """Share of the way along its own colour that a shadow explains, divided by the colour's squared length."""
+    volume: Cells
+    """Logarithm of the Gaussian's volume in colours."""
+    known: Bool[Array, "camera rows columns"]
+
+    @classmethod
+    def from_background(cls, background: BackgroundCells) -> "EmptyScene":
+        """The background may be darker or brighter by a factor (a shadow), at a cost: a longer Gaussian that way."""
+        dtype = jnp.result_type(float)
+        variance = jnp.maximum(jnp.asarray(background.spread, dtype), SMALLEST_SPREAD) ** 2
+        red, green, blue = (jnp.asarray(background.colors[..., k], dtype) / 255.0 for k in range(3))
+        planes = (red, green, blue)
+        length = sum(plane * plane for plane in planes)
+        volume = jnp.log(_NORMAL * variance * jnp.sqrt(variance + SHADOW**2 * length))
+        return cls(planes, 1.0 / variance, 1.0 / (variance / SHADOW**2 + length), volume, jnp.asarray(background.known))
+
+
+def log_odds(
+    cells: Float[Array, "camera rows columns 3"], empty: EmptyScene, subject: SubjectColors | None
+) -> Float[Array, "camera rows columns"]:
+    """Logarithm of foreground over background, within `LARGEST`; 0 where the background is unknown.
+
+    Each is the density of the cell's colour: a place of the subject's own colours says little either way. Colours are
+    sRGB, 0 to 1; slow changes of the light are taken out first. A subject that is None may have any colours.
+    """
+    seen = [cells[..., k] for k in range(3)]
+    odds = _surprise(seen, empty)
+    if subject is not None:
+        red, green, blue = color_bins(cells)
+        place = (red * COLOR_BINS + green) * COLOR_BINS + blue
+        odds = odds + subject.reshape(-1).at[place].get(mode="promise_in_bounds")
+    return jnp.where(empty.known, jnp.clip(TEMPER * odds, -LARGEST, LARGEST), 0.0)
+
+
+def background_surprise(
+    cells: Float[Array, "camera rows columns 3"], empty: EmptyScene
+) -> Float[Array, "camera rows columns"]:
+    """Minus the logarithm of the density of each cell's colour, if the background is seen there."""
+    return _surprise([cells[..., k] for k in range(3)], empty)
+
+
+def _surprise(seen: list[Cells], empty: EmptyScene) -> Cells:
+    gains = _light(seen, empty)
+    expected = [gain[:, None, None] * plane for gain, plane in zip(gains, empty.planes, strict=True)]
+    off = [s - e for s, e in zip(seen, expected, strict=True)]
+    squared = sum(o * o for o in off)
+    along = sum(o * e for o, e in zip(off, expected, strict=True))
+    return 0.5 * (squared - along * along * empty.shade) * empty.precision + empty.volume
+
+
+def color_bins(cells: Float[Array, "*cell 3"]) -> tuple[Array, Array, Array]:
+    """The bin of each cell's colour in a table of colours."""
+    red, green, blue = (jnp.clip(cells[..., k] * COLOR_BINS, 0, COLOR_BINS - 1).astype(jnp.int32) for k in range(3))
+    return red, green, blue
+
+
+def foreground_weights(odds: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
+    """How much the colour of a cell counts: 1 where it may be foreground, down to 0 where it is background."""
+    return jnp.clip(1.0 + odds / LARGEST, 0.0, 1.0)
+
+
+def _light(seen: list[Cells], empty: EmptyScene) -> list[Float[Array, "camera"]]:
+    """The gain of each channel that makes the background most like a frame, wherever that shows it."""
+    part = lambda values: values[:, ::_LIGHT_STRIDE, ::_LIGHT_STRIDE]
+    seen, planes, known = [part(s) for s in seen], [part(plane) for plane in empty.planes], part(empty.known)
+    gains = [jnp.ones(known.shape[0], known_as.dtype) for known_as in seen]
+    for step in _LIGHT_STEPS:
+        rest = [s - gain[:, None, None] * plane for s, gain, plane in zip(seen, gains, planes, strict=True)]
+        weight = jnp.where(known, jnp.exp(-0.5 / step**2 * sum(r * r for r in rest)), 0.0)
+        gains = [_gain(weight, s, plane) for s, plane in zip(seen, planes, strict=True)]
+    return gains
+
+
+def _gain(weight: Cells, seen: Cells, plane: Cells) -> Float[Array, "camera"]:
+    """By least squares; 1 where nothing tells."""
+    total = jnp.sum(weight * plane * plane, axis=(1, 2))
+    found = jnp.sum(weight * plane * seen, axis=(1, 2)) / jnp.maximum(total, 1e-6)
+    return jnp.where(total > 1e-2, found, 1.0)

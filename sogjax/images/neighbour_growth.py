@@ -1,0 +1,114 @@
+"""Choosing among the colours that a pixel showed: the background continues the background beside it.
+
+A pixel that was covered for a long time shows the subject's colour more often than the background's. What tells them
+apart is the outline: the background goes on beyond it, the subject ends there. So the known background grows inwards,
+pixel by pixel; across an edge of the background itself it grows where both sides were seen at the same times.
+"""
+
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt8
+
+from sogjax.images.sample_modes import MODES, Modes
+
+MOST_APART = 60.0
+"""Grey levels: larger steps of colour say no more."""
+FEWEST_NEIGHBOURS = 3
+"""Known neighbours that a pixel must suit."""
+_STEPS = [(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)]
+
+
+def grown(
+    modes: Modes,
+    zone: Bool[np.ndarray, "rows columns"],
+    picture: Float[np.ndarray, "rows columns 3"],
+    tolerance: UInt8[np.ndarray, "rows columns"],
+    fewest: int,
+) -> Int[np.ndarray, "pixel"]:
+    """Which mode of each of the zone's pixels is the background, -1 where that is unknown.
+
+    A step of colour to a neighbour counts as far as the two were not seen at the same times: 0 where they always were.
+
+    Args:
+        modes: of the pixels of the zone.
+        zone: the background is known around it.
+        picture: the background there.
+        tolerance: for each pixel, the step of colour up to which it continues its neighbour.
+        fewest: samples that must show a colour.
+    """
+    field = _Field(modes, zone, picture, fewest)
+    front = field.beside_known()
+    while len(front):
+        cost = field.costs(front)
+        best = cost.argmin(axis=0)
+        accepted = cost[best, np.arange(len(front))] <= tolerance[field.rows[front], field.columns[front]]
+        front = field.take(front[accepted], best[accepted])
+    return field.chosen
+
+
+class _Field:
+    """The known background, which grows; with a border of one pixel around the picture."""
+
+    def __init__(
+        self,
+        modes: Modes,
+        zone: Bool[np.ndarray, "rows columns"],
+        picture: Float[np.ndarray, "rows columns 3"],
+        fewest: int,
+    ):
+        num_samples = modes.members.shape[1]
+        bits = np.uint64(1) << np.arange(num_samples, dtype=np.uint64)
+        self.rows, self.columns = np.nonzero(zone)
+        self.chosen = np.full(len(self.rows), -1)
+        self._colors = modes.colors
+        self._seen = (modes.members * bits[None, :, None]).sum(axis=1, dtype=np.uint64)
+        self._enough = (modes.counts >= fewest) & (
+            modes.counts < num_samples
+        )  # nothing tells whose a colour is that is always there
+        self._number = np.pad(np.full(zone.shape, -1), 1, constant_values=-1)
+        self._number[self.rows + 1, self.columns + 1] = np.arange(len(self.rows))
+        self._known = np.pad(~zone, 1)
+        self._picture = np.pad(picture, ((1, 1), (1, 1), (0, 0)))
+        self._all = bits.sum(dtype=np.uint64)
+        self._times = np.full(self._known.shape, self._all)
+
+    def beside_known(self) -> Int[np.ndarray, "pixel"]:
+        """Pixels of the zone that lie beside known background."""
+        near = np.zeros_like(self._known)
+        for down, right in _STEPS:
+            near |= np.roll(self._known, (down, right), (0, 1))
+        return np.flatnonzero(near[self.rows + 1, self.columns + 1])
+
+    def costs(self, front: Int[np.ndarray, "pixel"]) -> Float[np.ndarray, "mode pixel"]:
+        """Mean step of colour from each mode to the known neighbours that it suits best."""
+        found = np.full((len(_STEPS), MODES, len(front)), MOST_APART, np.float32)
+        for k, (down, right) in enumerate(_STEPS):
+            row, column = self.rows[front] + 1 + down, self.columns[front] + 1 + right
+            step = np.abs(self._colors[:, :, front] - self._picture[row, column].T[None]).max(axis=1)
+            cost = np.minimum(step, MOST_APART) * (1.0 - self._together(front, self._times[row, column]))
+            found[k] = np.where(self._known[row, column], cost, MOST_APART)
+        nearest = np.partition(found, FEWEST_NEIGHBOURS - 1, axis=0)[:FEWEST_NEIGHBOURS].mean(axis=0)
+        return np.where(self._enough[:, front], nearest, np.inf)
+
+    def _together(
+        self, front: Int[np.ndarray, "pixel"], times: UInt8[np.ndarray, "pixel"] | np.ndarray
+    ) -> Float[np.ndarray, "mode pixel"]:
+        """How much both were seen, and both hidden, at the same times: the smaller of the two overlaps."""
+        seen = self._seen[:, front]
+        return np.minimum(_overlap(seen, times), _overlap(~seen & self._all, ~times & self._all))
+
+    def take(self, pixels: Int[np.ndarray, "pixel"], modes: Int[np.ndarray, "pixel"]) -> Int[np.ndarray, "next"]:
+        """Add pixels to the known background; returns the undecided ones beside them."""
+        row, column = self.rows[pixels] + 1, self.columns[pixels] + 1
+        self.chosen[pixels] = modes
+        self._known[row, column] = True
+        self._picture[row, column] = self._colors[modes, :, pixels]
+        self._times[row, column] = self._seen[modes, pixels]
+        around = np.concatenate([self._number[row + down, column + right] for down, right in _STEPS])
+        around = np.unique(around[around >= 0])
+        return around[self.chosen[around] < 0]
+
+
+def _overlap(a: np.ndarray, b: np.ndarray) -> Float[np.ndarray, "mode pixel"]:
+    """Samples that both sets have, as a share of those that one of them has."""
+    both, either = np.bitwise_count(a & b), np.bitwise_count(a | b)
+    return both / np.maximum(either, 1).astype(np.float32)
