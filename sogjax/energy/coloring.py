@@ -26,6 +26,8 @@ class Coloring(eqx.Module):
     """eps_sim."""
     space: str = eqx.field(static=True)
     """Of the images' colours; a body's are sRGB."""
+    weights: Float[Array, "camera image"] | None = None
+    """What similarities are multiplied by, the same for all body blobs; None: 1."""
 
 
 def colored_similarities(
@@ -35,48 +37,55 @@ def colored_similarities(
     images: Sog,
 ) -> Float[Array, "camera body image"]:
     """The similarities as they are, but with derivatives by the colours."""
-    radius = None if coloring is None else coloring.radius
-    space = None if coloring is None else coloring.space
-    return _following(_all_pairs, space, similarities, (body_colors, images.colors, radius))
+    space, radius, weights = _parts(coloring)
+    return _following(_all_pairs, space, similarities, (body_colors, images.colors, radius), (None, weights))
 
 
 def colored_pairs(
     pairs: SparsePairs, coloring: Coloring | None, body_colors: Float[Array, "body 3"], images: Sog
 ) -> SparsePairs:
     """The pairs as they are, but their amplitudes with derivatives by the colours."""
-    radius = None if coloring is None else coloring.radius
-    space = None if coloring is None else coloring.space
+    space, radius, weights = _parts(coloring)
     extra = pairs.image_shape[1] - images.capacity
     image_colors = jnp.pad(images.colors, ((0, 0), (0, extra), (0, 0)))
+    weights = None if weights is None else jnp.pad(weights, ((0, 0), (0, extra)))
     colors = (body_colors, image_colors, radius)
-    amplitudes = _following(_listed_pairs, space, pairs.amplitudes, colors, pairs)
+    amplitudes = _following(_listed_pairs, space, pairs.amplitudes, colors, (pairs, weights))
     return eqx.tree_at(lambda p: p.amplitudes, pairs, amplitudes)
 
 
-def _all_pairs(space: str, colors: Any, _: None) -> Float[Array, "camera body image"]:
-    """Eq. 7 for all pairs."""
+def _parts(coloring: Coloring | None) -> tuple[str | None, Array | None, Array | None]:
+    """Space, radius and weights, where they are known."""
+    return (None, None, None) if coloring is None else (coloring.space, coloring.radius, coloring.weights)
+
+
+def _all_pairs(space: str, colors: Any, fixed: Any) -> Float[Array, "camera body image"]:
+    """Eq. 7 for all pairs, with their weights."""
     body_colors, image_colors, radius = colors
-    return color_similarity(image_colors[:, None], from_rgb(body_colors, space)[None, :, None], space, radius)
+    similarities = color_similarity(image_colors[:, None], from_rgb(body_colors, space)[None, :, None], space, radius)
+    return similarities if fixed[1] is None else similarities * fixed[1][:, None, :]
 
 
-def _listed_pairs(space: str, colors: Any, pairs: SparsePairs) -> Float[Array, "member slot block"]:
+def _listed_pairs(space: str, colors: Any, fixed: Any) -> Float[Array, "member slot block"]:
     """The amplitudes of listed pairs."""
     body_colors, image_colors, radius = colors
+    pairs, weights = fixed
     of_body = from_rgb(body_colors, space)[pairs.body_index % pairs.body_shape[1]]
     slots = jnp.arange(TILE, dtype=pairs.tile_index.dtype)[:, None]
-    of_image = image_colors.reshape(-1, 3)[pairs.tile_index[None, :] * TILE + slots]
-    similarities = color_similarity(of_image[None], of_body[:, None], space, radius)
-    return similarities * 2.0 * jnp.pi * pairs.variances
+    of_image = pairs.tile_index[None, :] * TILE + slots
+    similarities = color_similarity(image_colors.reshape(-1, 3)[of_image][None], of_body[:, None], space, radius)
+    scale = 2.0 * jnp.pi * pairs.variances
+    return similarities * (scale if weights is None else scale * weights.reshape(-1)[of_image][None])
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0, 1))
-def _following(function: Any, space: str | None, stored: Array, colors: Any, pairs: SparsePairs | None = None) -> Array:
-    """What is stored of `function(space, colors, pairs)`, differentiated as the function is; 0 stays 0."""
+def _following(function: Any, space: str | None, stored: Array, colors: Any, fixed: Any) -> Array:
+    """What is stored of `function(space, colors, fixed)`, differentiated by the colours as it is; 0 stays 0."""
     return stored
 
 
 def _rates(function, space, primals, tangents):
-    stored, colors, pairs = primals
+    stored, colors, fixed = primals
     stored_rate, color_rates, _ = tangents
     solid = lambda rate, like: jnp.zeros_like(like) if isinstance(rate, SymbolicZero) else rate
     rate = solid(stored_rate, stored)
@@ -88,7 +97,7 @@ def _rates(function, space, primals, tangents):
             "so nothing can be differentiated by colours; make the views with Views.from_images"
         )
     rates = jax.tree.map(solid, color_rates, colors)
-    by_colors = jax.jvp(lambda colors: function(space, colors, pairs), (colors,), (rates,))[1]
+    by_colors = jax.jvp(lambda colors: function(space, colors, fixed), (colors,), (rates,))[1]
     return stored, rate + jnp.where(stored != 0.0, by_colors, 0.0)
 
 

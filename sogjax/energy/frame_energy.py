@@ -8,6 +8,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
+from sogjax.energy.foreground import Foreground
 from sogjax.energy.limits import LimitPenalty
 from sogjax.energy.overlap import EXACT_EXPONENT, GradientMode
 from sogjax.energy.posed import Frame, History, Posed
@@ -86,10 +87,13 @@ def standard_terms(
     exponent: float | Array = EXACT_EXPONENT,
     capped: bool = True,
     gradient: GradientMode = "forward",
-) -> tuple[Similarity, LimitPenalty, AccelerationPenalty]:
-    """The terms of Eq. 10, with the commands' defaults."""
+    foreground_weight: float | Array = 0.0,
+) -> Terms:
+    """The terms of Eq. 10, with the commands' defaults, and the foreground's where it has a weight."""
     similarity = Similarity(1.0, exponent=exponent, capped=capped, gradient=gradient)
-    return similarity, LimitPenalty(limit_weight), AccelerationPenalty(acceleration_weight)
+    terms = (similarity, LimitPenalty(limit_weight), AccelerationPenalty(acceleration_weight))
+    counts = not isinstance(foreground_weight, int | float) or foreground_weight != 0.0
+    return (*terms, Foreground(foreground_weight)) if counts else terms
 
 
 def still_energy(body: Body, pose: Float[Array, "dof"], views: Views, terms: Terms) -> Float[Array, ""]:

@@ -6,7 +6,7 @@ derivatives follow from it. `gradient="autodiff"` differentiates the plain formu
 """
 
 from functools import partial
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import jax
 import jax.numpy as jnp
@@ -14,6 +14,7 @@ from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, Float
 
 from sogjax.energy.pairs import DensePairs, Disks, Pairs, separations
+from sogjax.energy.pulls import ImagePulls
 from sogjax.model.color import color_similarity
 from sogjax.model.sog import Sog
 
@@ -23,17 +24,6 @@ EXACT_EXPONENT = 0.5
 """Eq. 6 as Eq. 2 implies it: `exp(-|d|^2 / (2 (si^2 + sj^2)))`."""
 PRINTED_EXPONENT = 1.0
 """Eq. 6 as printed, without the 1/2."""
-
-
-class Pulls(NamedTuple):
-    """Value of Eq. 8 and how it changes with the projected body blobs, image blobs at the cap left out."""
-
-    value: Float[Array, "*camera"]
-    by_mean: Float[Array, "*camera body 2"]
-    by_sigma: Float[Array, "*camera body"]
-    stiffness: Float[Array, "*camera body"]
-    """2 k sum_i E_ij / (si^2 + sj^2): the curvature of the value by a mean with its sign turned, where the weights
-    E_ij are held fixed; the same in both directions of the image."""
 
 
 def pair_color_similarities(
@@ -91,14 +81,17 @@ def overlap_of_pairs(
 
 def overlap_pulls(
     pairs: Pairs, caps: Float[Array, "*camera image"], body: Sog, exponent: Float[Array, ""], *, capped: bool = True
-) -> Pulls:
-    """Eq. 8 with its derivatives by the projected body blobs, and its curvature for Gauss-Newton steps."""
+) -> ImagePulls:
+    """Eq. 8 with its derivatives by the projected body blobs, image blobs at the cap left out, and its curvature.
+
+    The stiffness is 2 k sum_i E_ij / (si^2 + sj^2): the weights E_ij are held fixed.
+    """
     disks = _disks(body)
     overlaps, weights = pairs.staged(_overlaps_and_weights, pairs, body, exponent)
     total = pairs.sum_over_body(overlaps)
     live = (total < caps) if capped else jnp.ones_like(total, dtype=bool)
     moments = pairs.moments(live, weights, disks)
-    return Pulls(
+    return ImagePulls(
         value=jnp.sum(_apply_cap(total, caps, capped), axis=-1),
         by_mean=2.0 * exponent * moments.away,
         by_sigma=2.0 * (moments.variance / _safe_sigmas(body) + exponent * moments.spread * body.sigmas),

@@ -13,7 +13,6 @@ from sogjax.energy.coloring import colored_pairs, colored_similarities
 from sogjax.energy.overlap import (
     EXACT_EXPONENT,
     GradientMode,
-    Pulls,
     capped_overlap,
     overlap_of_pairs,
     overlap_pulls,
@@ -21,9 +20,11 @@ from sogjax.energy.overlap import (
 )
 from sogjax.energy.pairs import DensePairs
 from sogjax.energy.posed import Frame, Posed
+from sogjax.energy.pulls import ImagePulls
+from sogjax.energy.springs import springs_model
 from sogjax.energy.term import Term, Terms
 from sogjax.energy.views import Views
-from sogjax.model.camera import project, projection_jacobian
+from sogjax.model.camera import project
 from sogjax.model.sog import Sog
 from sogjax.solve.quadratic import QuadraticModel
 
@@ -57,42 +58,18 @@ class Similarity(Term):
 
     def quadratic(self, posed: Posed, frame: Frame) -> QuadraticModel:
         """Value, gradient and the curvature of the springs, the exponentials computed once."""
-        value, by_mean, stiffness = self._springs(posed.blobs, _colored(frame.views, posed.blobs.colors))
-        jacobian = posed.point_jacobian()
-        stretched = jnp.einsum("bij,bjd->bid", stiffness, jacobian, precision="highest")
-        flat = lambda array: array.reshape(-1, array.shape[-1])
-        return QuadraticModel(
-            value=self.weight * value,
-            gradient=self.weight * jnp.matmul(by_mean.reshape(-1), flat(jacobian), precision="highest"),
-            curvature=self.weight * jnp.matmul(flat(jacobian).T, flat(stretched), precision="highest"),
-        )
+        views = _colored(frame.views, posed.blobs.colors)
+        pulls_of = lambda seen: self._pulls(seen, views)
+        model = springs_model(posed, views.cameras, pulls_of, views.normalizers)
+        return jax.tree.map(lambda part: self.weight * part, model)
 
-    def _springs(
-        self, blobs: Sog, views: Views
-    ) -> tuple[Float[Array, ""], Float[Array, "blob 3"], Float[Array, "blob 3 3"]]:
-        """Eq. 9 with its gradient and its stiffness by the blobs' means in the world."""
-
-        def projected(means: Float[Array, "blob 3"]) -> tuple[tuple[Array, Array], Sog]:
-            seen = jax.vmap(project, in_axes=(0, None))(views.cameras, eqx.tree_at(lambda b: b.means, blobs, means))
-            return (seen.means, seen.sigmas), seen
-
-        _, pull_back, seen = jax.vjp(projected, blobs.means, has_aux=True)
-        pulls = self._pulls(seen, views)
-        scale = 1.0 / (views.normalizers * views.normalizers.shape[0])
-        (by_mean,) = pull_back((pulls.by_mean * scale[:, None, None], pulls.by_sigma * scale[:, None]))
-        across = jax.vmap(projection_jacobian, in_axes=(0, None))(views.cameras, blobs.means)
-        springs = jnp.where(seen.mask, pulls.stiffness, 0.0) * scale[:, None]
-        stretched = across * springs[:, :, None, None]
-        stiffness = jnp.einsum("cbki,cbkj->bij", across, stretched, precision="highest")
-        return jnp.sum(pulls.value * scale), by_mean, stiffness
-
-    def _pulls(self, seen: Sog, views: Views) -> Pulls:
+    def _pulls(self, seen: Sog, views: Views) -> ImagePulls:
         """Pulls of the image blobs at the projected body blobs, for each camera."""
         if views.pairs is not None:
             caps = views.image_caps(views.pairs)
             return overlap_pulls(views.pairs, caps, seen, self.exponent, capped=self.capped)
 
-        def one_camera(image: Sog, similarities: Float[Array, "blob image"], seen: Sog) -> Pulls:
+        def one_camera(image: Sog, similarities: Float[Array, "blob image"], seen: Sog) -> ImagePulls:
             pairs = DensePairs.from_image(image, similarities)
             return overlap_pulls(pairs, self_overlaps(image), seen, self.exponent, capped=self.capped)
 

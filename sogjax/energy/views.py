@@ -1,5 +1,7 @@
 """What the cameras see at one time, as the energy takes it."""
 
+from dataclasses import replace
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -9,6 +11,7 @@ from sogjax.energy.coloring import Coloring
 from sogjax.energy.neighbours import margins, near_pairs
 from sogjax.energy.overlap import pair_color_similarities, self_overlaps
 from sogjax.energy.pairs import SparsePairs
+from sogjax.energy.windows import Windows
 from sogjax.model.camera import Camera, project
 from sogjax.model.sog import Sog
 
@@ -26,6 +29,8 @@ class Views(eqx.Module):
     """The pairs that matter near some pose; None: all pairs are compared."""
     coloring: Coloring | None = None
     """How the similarities follow from colours; None: not by Eq. 7 alone, so nothing is differentiated by colours."""
+    windows: Windows | None = None
+    """Foreground against background around the body; None: no background is known."""
 
     @classmethod
     def from_images(
@@ -45,8 +50,7 @@ class Views(eqx.Module):
         """The same views with only the pairs that matter near `blobs` (world), and how many blocks those are."""
         seen = jax.vmap(project, in_axes=(0, None))(self.cameras, blobs)
         pairs, count = near_pairs(self.images, self.color_similarities, seen, margins(self.cameras), exponent, capacity)
-        views = Views(self.cameras, self.images, self.color_similarities, self.normalizers, pairs, self.coloring)
-        return views, count
+        return replace(self, pairs=pairs), count
 
     def image_caps(self, pairs: SparsePairs) -> Float[Array, "camera image"]:
         """Caps of Eq. 8 of the image blobs that pairs count, which fill whole tiles."""

@@ -1,0 +1,186 @@
+"""How well a body explains what is seen around it, by colours and background, with what is in front seen first.
+
+For searches: grids around a place, on which a body in any pose there is compared with the pictures in a few matrix
+products, whatever its distance from the truth.
+"""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int
+
+from sogjax.energy.posed import Frame, Posed
+from sogjax.energy.pulls import ImagePulls
+from sogjax.energy.springs import springs_model
+from sogjax.energy.term import Term
+from sogjax.model.camera import project
+from sogjax.model.sog import Sog
+from sogjax.solve.quadratic import QuadraticModel
+
+DEPTH_SCALE = 0.06
+"""Metres: a blob that much nearer to a camera than another counts e times as much where both lie."""
+
+
+class ColorWindows(eqx.Module):
+    """A grid in each camera, undistorted pixels, and what each kind of blob would explain of its cells."""
+
+    x: Float[Array, "*camera column"]
+    """Centres of the cells."""
+    y: Float[Array, "*camera row"]
+    step: Float[Array, "*camera 2"]
+    """Width and height of a cell."""
+    odds: Float[Array, "*camera kind column row"]
+    """Log odds of a kind of blob against the background; 0 where nothing is known."""
+    free: Float[Array, "*camera column row"]
+    """1 where a body may gain and lose; 0 where another one is seen."""
+
+    scale: Float[Array, "*camera"]
+    """Pixels for each metre at the middle of the grid."""
+
+    @property
+    def areas(self) -> Float[Array, "*camera"]:
+        """E_ii of Eq. 8 of a cell: (pi/4) times its area."""
+        return jnp.pi / 4.0 * self.step[..., 0] * self.step[..., 1]
+
+
+class BlobKinds(eqx.Module):
+    """Which blobs are of a kind, as arrays of one shape for all actors: a large kind is several."""
+
+    members: Int[Array, "kind slot"]
+    """Blobs of each kind."""
+    real: Float[Array, "kind slot"]
+    """1, and 0 for padding."""
+    slots: Int[Array, "blob"]
+    """Where each blob is among the members."""
+
+    def grouped(self, values: Float[Array, "n blob"]) -> Float[Array, "kind n slot"]:
+        """Values of the blobs by kind; 0 in the padding."""
+        return jnp.swapaxes(values[:, self.members] * self.real[None], 0, 1)
+
+    def spread(self, values: Float[Array, "kind n slot"]) -> Float[Array, "n blob"]:
+        """Values by kind for the blobs in their order."""
+        return jnp.swapaxes(values, 0, 1).reshape(values.shape[1], -1)[:, self.slots]
+
+
+class Appearance(Term):
+    """Log likelihood of the cells with the body before them, less that of the background alone.
+
+    A cell is covered by `C = 1 - exp(-sum_q A_q)`, and what is seen there is shared by the kinds of blobs as their
+    densities are, the nearer ones before those behind: `sum_i a_i log(1 - C_i + C_i sum_k share_ik odds_ik)`, the mean
+    over the cameras, in units of the whole picture as in Eq. 9.
+    """
+
+    windows: ColorWindows
+    kinds: BlobKinds
+    density: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=2.0)
+    """A_q in the middle of a blob, as in the foreground term."""
+
+    def value(self, posed: Posed, frame: Frame) -> Float[Array, ""]:
+        """Of the posed blobs."""
+        cameras = frame.views.cameras
+        seen = jax.vmap(project, in_axes=(0, None))(cameras, posed.blobs)
+        nearness = _nearness(posed.blobs, seen, cameras.focal_length)
+        of_camera = lambda windows, seen, near: _value(self._maps(windows, seen, near)[1], windows)
+        values = jax.vmap(of_camera)(self.windows, seen, nearness)
+        return jnp.mean(values / frame.views.normalizers)
+
+    def quadratic(self, posed: Posed, frame: Frame) -> QuadraticModel:
+        """Gradient in closed form, who is in front taken as it is; springs where more cover is wanted."""
+        cameras = frame.views.cameras
+
+        def pulls_of(seen: Sog) -> ImagePulls:
+            nearness = _nearness(posed.blobs, seen, cameras.focal_length)
+            return jax.vmap(self._pulls)(self.windows, seen, nearness)
+
+        model = springs_model(posed, cameras, pulls_of, frame.views.normalizers)
+        return jax.tree.map(lambda part: self.weight * part, model)
+
+    def covered(self, posed: Posed, frame: Frame) -> tuple[Float[Array, "camera column row"], Array]:
+        """How far cells are covered, and what the body gains there (log likelihood)."""
+        cameras = frame.views.cameras
+        seen = jax.vmap(project, in_axes=(0, None))(cameras, posed.blobs)
+        nearness = _nearness(posed.blobs, seen, cameras.focal_length)
+        maps = jax.vmap(lambda *each: self._maps(*each)[1])(self.windows, seen, nearness)
+        return 1.0 - maps.left, jnp.log(maps.likelihood)
+
+    def _maps(
+        self, windows: ColorWindows, seen: Sog, nearness: Float[Array, "blob"]
+    ) -> tuple[tuple[Array, Array, Array, Array, Array, Array], "_Maps"]:
+        rows = _rows(windows, seen, self.density)
+        of_x, of_y = rows[0], rows[1]
+        total = jnp.matmul(of_x, of_y.T)
+        shares = jnp.matmul(self.kinds.grouped(of_x * nearness[None, :]), jnp.swapaxes(self.kinds.grouped(of_y), 1, 2))
+        whole = jnp.sum(shares, axis=0) + 1e-6
+        ratios = jnp.exp(windows.odds)
+        mean = (jnp.sum(shares * ratios, axis=0) + 1e-6) / whole
+        left = jnp.exp(-total)
+        return rows, _Maps(left, whole, ratios, mean, left + (1.0 - left) * mean)
+
+    def _pulls(self, windows: ColorWindows, seen: Sog, nearness: Float[Array, "blob"]) -> ImagePulls:
+        (of_x, of_y, dx, dy, variance_x, variance_y), maps = self._maps(windows, seen, nearness)
+        gain = windows.areas * windows.free / maps.likelihood
+        by_total = gain * maps.left * (maps.mean - 1.0)
+        by_share = gain[None] * (1.0 - maps.left)[None] * (maps.ratios - maps.mean[None]) / maps.whole[None]
+
+        def summed(slope: Array, slopes: Array) -> tuple[Array, Array]:
+            """For each blob sums along y of the slopes times its rows, and along x of its columns."""
+            shared_y = self.kinds.spread(jnp.matmul(slopes, self.kinds.grouped(of_y)))
+            shared_x = self.kinds.spread(jnp.matmul(jnp.swapaxes(slopes, 1, 2), self.kinds.grouped(of_x)))
+            near = nearness[None, :]
+            return jnp.matmul(slope, of_y) + near * shared_y, jnp.matmul(slope.T, of_x) + near * shared_x
+
+        along_y, along_x = summed(by_total, by_share)
+        wanted, _ = summed(jnp.maximum(by_total, 0.0), jnp.maximum(by_share, 0.0))
+        over_x = lambda values: jnp.sum(of_x * along_y * values, axis=0)
+        over_y = lambda values: jnp.sum(of_y * along_x * values, axis=0)
+        inverse_x, inverse_y = 1.0 / variance_x[0], 1.0 / variance_y[0]
+        mass = over_x(1.0)
+        spread = over_x(dx**2) * inverse_x**2 + over_y(dy**2) * inverse_y**2
+        by_sigma = mass * (2.0 / seen.sigmas - seen.sigmas * (inverse_x + inverse_y)) + seen.sigmas * spread
+        stiffness = jnp.sum(of_x * wanted, axis=0) * 0.5 * (inverse_x + inverse_y)
+        return ImagePulls(
+            value=_value(maps, windows),
+            by_mean=jnp.stack([over_x(dx) * inverse_x, over_y(dy) * inverse_y], axis=-1),
+            by_sigma=by_sigma,
+            stiffness=stiffness,
+        )
+
+
+class _Maps(NamedTuple):
+    """In every cell: exp(-sum A), the nearness-weighted density, odds of the kinds, their mean, the likelihood."""
+
+    left: Float[Array, "*camera column row"]
+    whole: Float[Array, "*camera column row"]
+    ratios: Float[Array, "*camera kind column row"]
+    mean: Float[Array, "*camera column row"]
+    likelihood: Float[Array, "*camera column row"]
+
+
+def _value(maps: _Maps, windows: ColorWindows) -> Float[Array, ""]:
+    return windows.areas * jnp.sum(windows.free * jnp.log(maps.likelihood))
+
+
+def _nearness(blobs: Sog, seen: Sog, focal_length: Float[Array, "camera"]) -> Float[Array, "camera blob"]:
+    """How much each blob counts where several lie behind each other."""
+    depths = jnp.where(seen.mask, blobs.sigmas[None, :] * focal_length[:, None] / seen.sigmas, jnp.inf)
+    nearest = jnp.min(depths, axis=1, keepdims=True)
+    nearest = jnp.where(jnp.isfinite(nearest), nearest, 0.0)
+    weights = jnp.exp(-(jnp.where(seen.mask, depths, nearest) - nearest) / DEPTH_SCALE)
+    return jax.lax.stop_gradient(jnp.maximum(weights, 1e-6))
+
+
+def _rows(
+    windows: ColorWindows, seen: Sog, density: Float[Array, ""]
+) -> tuple[Array, Array, Array, Array, Array, Array]:
+    """The factors of A_q along x and y, how far cells are from the blobs, and the variances."""
+    squared = (jnp.where(seen.mask, seen.sigmas, 1.0) ** 2)[None, :]
+    variance_x = squared + windows.step[0] ** 2 / 12.0
+    variance_y = squared + windows.step[1] ** 2 / 12.0
+    dx = windows.x[:, None] - seen.means[None, :, 0]
+    dy = windows.y[:, None] - seen.means[None, :, 1]
+    height = jnp.where(seen.mask, density, 0.0)[None, :]
+    of_x = height * jnp.sqrt(squared / variance_x) * jnp.exp(-0.5 * dx * dx / variance_x)
+    of_y = jnp.sqrt(squared / variance_y) * jnp.exp(-0.5 * dy * dy / variance_y)
+    return of_x, of_y, dx, dy, variance_x, variance_y

@@ -1,0 +1,115 @@
+"""The foreground term: a body is to cover what is not background, and nothing that is."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from sogjax.energy.posed import Frame, Posed
+from sogjax.energy.pulls import ImagePulls
+from sogjax.energy.springs import springs_model
+from sogjax.energy.term import Term
+from sogjax.energy.windows import Windows
+from sogjax.model.camera import project
+from sogjax.model.sog import Sog
+from sogjax.solve.quadratic import QuadraticModel
+
+
+class Foreground(Term):
+    """Sum over the cells of `a_i l_i C_i`, the mean over the cameras, in units of the whole picture as in Eq. 9.
+
+    `a_i` is the cell's E_ii, `l_i` the log odds of foreground against background there, and `C_i = 1 - exp(-sum_q
+    A_q(i))` how far the blobs cover it: smooth, at most 1, whatever their colours and however many there are.
+    """
+
+    density: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=2.0)
+    """A_q in the middle of a blob: 2 makes a silhouette end where the Gaussians sum to about a half."""
+
+    def value(self, posed: Posed, frame: Frame) -> Float[Array, ""]:
+        """Of the posed blobs in all windows; 0 where no background is known."""
+        views = frame.views
+        if views.windows is None:
+            return jnp.zeros((), posed.pose.dtype)
+        seen = jax.vmap(project, in_axes=(0, None))(views.cameras, posed.blobs)
+        return jnp.mean(jax.vmap(self._of_camera)(views.windows, seen) / views.normalizers)
+
+    def quadratic(self, posed: Posed, frame: Frame) -> QuadraticModel:
+        """Gradient in closed form; the springs are those of the cells that want to be covered."""
+        views, windows = frame.views, frame.views.windows
+        if windows is None:
+            size = posed.pose.shape[0]
+            nothing = jnp.zeros((size,), posed.pose.dtype)
+            return QuadraticModel(nothing.sum(), nothing, jnp.zeros((size, size), posed.pose.dtype))
+        pulls_in = jax.vmap(self._pulls)
+        model = springs_model(posed, views.cameras, lambda seen: pulls_in(windows, seen), views.normalizers)
+        return jax.tree.map(lambda part: self.weight * part, model)
+
+    def _of_camera(self, windows: Windows, seen: Sog) -> Float[Array, ""]:
+        rows = _rows(windows, seen, self.density)
+        total = jnp.einsum("wxb,wyb->wxy", rows.of_x, rows.of_y)
+        gain = windows.areas[:, None, None] * windows.odds
+        return jnp.sum(gain * -jnp.expm1(-total))
+
+    def _pulls(self, windows: Windows, seen: Sog) -> ImagePulls:
+        """Value and derivatives of one camera: every sum over cells is a product of small matrices."""
+        rows = _rows(windows, seen, self.density)
+        total = jnp.einsum("wxb,wyb->wxy", rows.of_x, rows.of_y)
+        left = jnp.exp(-total)
+        gain = windows.areas[:, None, None] * windows.odds
+        slope = gain * left
+        weights_x = rows.of_x * jnp.einsum("wxy,wyb->wxb", slope, rows.of_y)
+        weights_y = rows.of_y * jnp.einsum("wxy,wxb->wyb", slope, rows.of_x)
+        wanted = rows.of_x * jnp.einsum("wxy,wyb->wxb", jnp.maximum(slope, 0.0), rows.of_y)
+        mass, away_x, spread_x = _moments(weights_x, windows.x, seen.means[:, 0])
+        _, away_y, spread_y = _moments(weights_y, windows.y, seen.means[:, 1])
+        inverse_x, inverse_y = 1.0 / rows.variance_x[:, 0], 1.0 / rows.variance_y[:, 0]
+        sigma = seen.sigmas[None, :]
+        # A_q is density sigma^2 / sqrt(vx vy) exp(...), and both variances grow with sigma^2.
+        by_sigma = mass * (2.0 / sigma - sigma * (inverse_x + inverse_y))
+        by_sigma = by_sigma + sigma * (spread_x * inverse_x**2 + spread_y * inverse_y**2)
+        stiffness = jnp.einsum("wxb->wb", wanted) * 0.5 * (inverse_x + inverse_y)
+        return ImagePulls(
+            value=jnp.sum(gain * (1.0 - left)),
+            by_mean=jnp.sum(jnp.stack([away_x * inverse_x, away_y * inverse_y], axis=-1), axis=0),
+            by_sigma=jnp.sum(by_sigma, axis=0),
+            stiffness=jnp.sum(stiffness, axis=0),
+        )
+
+
+def _moments(
+    weights: Float[Array, "window cell blob"], places: Float[Array, "window cell"], means: Float[Array, "blob"]
+) -> tuple[Float[Array, "window blob"], Float[Array, "window blob"], Float[Array, "window blob"]]:
+    """For each blob the sums over cells of weights, and times how far the cells are from it, and times its square.
+
+    As one product with powers of the places, counted from the window's middle: sums along an axis are slow.
+    """
+    middle = jnp.mean(places, axis=1, keepdims=True)
+    at, mean = places - middle, means[None, :] - middle
+    powers = jnp.stack([jnp.ones_like(at), at, at * at], axis=-1)
+    sums = jnp.einsum("wcb,wck->wkb", weights, powers)
+    away = sums[:, 1] - mean * sums[:, 0]
+    return sums[:, 0], away, sums[:, 2] - mean * (2.0 * sums[:, 1] - mean * sums[:, 0])
+
+
+class _Rows(NamedTuple):
+    """The factors of A_q along x and y, and its variances."""
+
+    of_x: Float[Array, "window column blob"]
+    of_y: Float[Array, "window row blob"]
+    variance_x: Float[Array, "window 1 blob"]
+    variance_y: Float[Array, "window 1 blob"]
+
+
+def _rows(windows: Windows, seen: Sog, density: Float[Array, ""]) -> _Rows:
+    squared = (jnp.where(seen.mask, seen.sigmas, 1.0) ** 2)[None, None, :]
+    # The mean of a Gaussian over a cell, about: a cell has the variance of its width.
+    variance = lambda axis: squared + windows.step[:, axis, None, None] ** 2 / 12.0
+    variance_x, variance_y = variance(0), variance(1)
+    dx = windows.x[..., None] - seen.means[None, None, :, 0]
+    dy = windows.y[..., None] - seen.means[None, None, :, 1]
+    height = jnp.where(seen.mask, density, 0.0)[None, None, :]
+    of_x = height * jnp.sqrt(squared / variance_x) * jnp.exp(-0.5 * dx * dx / variance_x)
+    of_y = jnp.sqrt(squared / variance_y) * jnp.exp(-0.5 * dy * dy / variance_y)
+    return _Rows(of_x, of_y, variance_x, variance_y)
