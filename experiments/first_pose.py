@@ -1,77 +1,90 @@
-"""How far off is the first pose that is found without a hint?
+"""Is a first pose that is called sure right?
 
-For every motion and seed the actors are made from their example poses, and frame 0 is searched.
+    python experiments/first_pose.py [limit=200] [minutes=60] [out=outputs/first_pose] [sequences=[walk,hug]]
 
-    python experiments/first_pose.py seeds=10 motions=[walk,arms,squat_kick,cartwheel,pass]
+Frames of the yardstick sequences are drawn at random, with 3 to 12 cameras, with plates and without, and searched
+without a hint. A pose is right if its joints are within 10 cm of the truth on average, left and right are not
+exchanged, and it is not taken back to front. Searches that were made are kept, and not made again by the same program.
+Writes `searches.csv` and `reliability.png`.
 """
 
+import time
 from dataclasses import dataclass, field
+from pathlib import Path
 
-import numpy as np
-
-from sogjax.data.ground_truth import load_ground_truth
-from sogjax.data.motion import motion_from_poses
-from sogjax.engine.first_pose import searched_poses
-from sogjax.engine.recordings import actors_of, opened, upright
-from sogjax.evaluation.markers import joint_errors
-from sogjax.settings.compose import track_config
+from sogjax.data.atomic import atomic_path
+from sogjax.engine.terminal import say
+from sogjax.errors import InputError
+from sogjax.study.experiment import Experiment
 from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from
-from sogjax.synth import SynthSettings, cached_recording
-from sogjax.synth.settings import MOTIONS
+from sogjax.study.search_tables import kinds_line, reliability, sure_table, write_searches, wrong_table
+from sogjax.study.searches import Search, Searches, drawn_trials
+from sogjax.study.study import Study
+from sogjax.view.reliability_chart import reliability_chart
 
-ALLOWED = 0.06
-"""Metres."""
+SEQUENCES = "sequences"
+"""The experiment whose recordings are searched."""
 
 
 @dataclass
 class Settings:
-    """What is tried."""
+    """What is searched, as `key=value` on the command line."""
 
-    motions: list[str] = field(default_factory=lambda: list(MOTIONS))
-    seeds: int = 10
-    frames: int = 2
-    cameras: int = 12
-    plates: bool = True
+    limit: int = 200
+    """Searches, of all that are drawn."""
+    minutes: float = 0.0
+    """After which no further search is begun; 0: no bound."""
+    sequences: list[str] = field(default_factory=list)
+    """Rows of the experiment; none: all."""
+    cameras: list[int] = field(default_factory=lambda: list(range(3, 13)))
+    frames: int = 60
+    """Of each recording, of which one is drawn."""
+    seed: int = 0
+    """From which searches are drawn."""
+    body: str = "human"
+    overrides: list[str] = field(default_factory=list)
+    """Of track."""
+    out: str = "outputs/first_pose"
+    """Where searches, actors and results are kept."""
 
 
 def main() -> None:
-    """Print one line per recording and actor, then a summary."""
+    """Search, print the tables, and write the files."""
     settings = settings_from(Settings)
-    errors = []
-    for motion in settings.motions:
-        for seed in range(settings.seeds):
-            errors += errors_of(motion, seed, settings)
-    millimetres = 1000.0 * np.array(errors)
-    good = int(np.sum(millimetres <= 1000.0 * ALLOWED))
-    print(
-        f"{good} of {len(errors)} within {1000.0 * ALLOWED:.0f} mm; "
-        f"median {np.median(millimetres):.1f} mm, worst {millimetres.max():.1f} mm"
-    )
-    print(machine_line())
+    out = Path(settings.out)
+    searches = [*_searched(settings, out)]
+    if not searches:
+        raise InputError(f"minutes={settings.minutes:g}: no search was made; give more time")
+    print(machine_line(), sure_table(searches), kinds_line(searches), wrong_table(searches), sep="\n\n")
+    write_searches(out / "searches.csv", searches)
+    with atomic_path(out / "reliability.png") as temporary:
+        temporary.write_bytes(reliability_chart(reliability(searches)))
+    print(f"\n{out / 'searches.csv'}\n{out / 'reliability.png'}")
 
 
-def errors_of(motion: str, seed: int, settings: Settings) -> list[float]:
-    """Mean distance of the joints from the truth in frame 0 (metres), for every actor."""
-    actors = 2 if motion == "pass" else 1
-    folder = cached_recording(
-        SynthSettings(motion=motion, actors=actors, seed=seed, frames=settings.frames, cameras=settings.cameras)
-    )
-    config = track_config(recording=folder, images={"use_plates": settings.plates})
-    recording = opened(str(folder))
-    bodies, _ = actors_of(recording, None, config.body, config.color)
-    bodies = [upright(body, recording) for body in bodies]
-    truth = load_ground_truth(folder / "ground_truth.npz")
-    errors = []
-    for body, found in zip(bodies, searched_poses(recording, bodies, config, 0), strict=True):
-        motion_of_one = motion_from_poses(body, found.pose[None], recording.fps)
-        of_body = truth.subject(body.name) if actors > 1 else truth
-        distances = joint_errors(motion_of_one, of_body)
-        assert distances is not None
-        errors.append(float(np.nanmean(distances.errors)))
-        line = f"{motion:<10} seed {seed} {body.name:<5} {1000.0 * errors[-1]:7.1f} mm"
-        print(f"{line}, margin {100.0 * found.margin:.1f} %", flush=True)
-    return errors
+def _searched(settings: Settings, out: Path) -> list[Search]:
+    """The searches that were made before or can be made in the time."""
+    study = Study(out, ["walk:0"], settings.frames, body=settings.body)
+    folder = Searches(study, settings.overrides)
+    begin, found = time.perf_counter(), []
+    trials = drawn_trials(_recordings(settings), settings.cameras, settings.frames, settings.limit, settings.seed)
+    for trial in trials:
+        late = settings.minutes > 0.0 and time.perf_counter() - begin > 60.0 * settings.minutes
+        found += folder.of(trial, do=not late)
+    if len({search.trial.number for search in found}) < settings.limit:
+        say(f"{len({search.trial.number for search in found})} of {settings.limit} searches are done")
+    return found
+
+
+def _recordings(settings: Settings) -> dict[str, dict[str, object]]:
+    """The settings of the rendered recordings, by the names of their rows."""
+    rows = Experiment.named(SEQUENCES).config.rows
+    whole = {name: row.synth for name, row in rows.items() if row.synth is not None and row.methods is None}
+    unknown = [name for name in settings.sequences if name not in whole]
+    if unknown:
+        raise InputError(f"sequences: {unknown[0]}: is none of {', '.join(whole)}")
+    return {name: whole[name] for name in settings.sequences or whole}
 
 
 if __name__ == "__main__":

@@ -2,27 +2,26 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, UInt8
 
 from sogjax.data.recording import Recording
-from sogjax.data.video import read_still
 from sogjax.energy.added import added_terms
 from sogjax.energy.frame_energy import standard_terms
 from sogjax.energy.overlap import EXACT_EXPONENT, PRINTED_EXPONENT
 from sogjax.energy.term import Term, Terms
 from sogjax.energy.views import whole_image_overlap
+from sogjax.engine.background import CHOICES, background_cells
 from sogjax.errors import InputError
 from sogjax.evaluation.markers import MARKER_RULES, MarkerRule
-from sogjax.images.cells import CellGrid, stack_cells
-from sogjax.images.quadtree import Candidates, quadtree
+from sogjax.images.cells import CellGrid
+from sogjax.images.foreground import EmptyScene, SubjectColors, subject_colors
+from sogjax.images.quadtree import Candidates
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
-from sogjax.model.color import COLOR_RADIUS, averaging_space, from_rgb
+from sogjax.model.color import COLOR_RADIUS
 from sogjax.settings import ColorConfig, EnergyConfig, ImagesConfig, OutputsConfig, SolverConfig, TrackConfig
 from sogjax.solve import ConditionedAscent, GaussNewton, OptimistixSolver, Scales, Solver
 from sogjax.tracking.confidence import Laplace
@@ -86,7 +85,7 @@ def check(config: TrackConfig) -> None:
         raise InputError(f"images.color_tolerance={config.images.color_tolerance}: must be a number")
     at_least("images.box_enlargement", config.images.box_enlargement, 0.0)
     box_around(config.images)
-    at_least("images.plate_tolerance", config.images.plate_tolerance, 0.0)
+    one_of("images.background", config.images.background, CHOICES)
     confidence(config.outputs)
     marker_rule(config.outputs.markers, "outputs.markers")
     at_least("outputs.overlay_width", config.outputs.overlay_width, 64)
@@ -114,6 +113,7 @@ def energy_terms(config: EnergyConfig, further: Sequence[Term] = ()) -> Terms:
         exponent=EXACT_EXPONENT if exponent == "exact" else PRINTED_EXPONENT,
         capped=config.capped,
         gradient="forward" if gradient == "forward" else "autodiff",
+        foreground_weight=at_least("energy.foreground_weight", config.foreground_weight, 0.0),
     )
     terms = (*standard, *added_terms("energy.terms", config.terms, [term.name for term in standard]), *further)
     for term in further:
@@ -185,11 +185,13 @@ def cell_grids(recording: Recording, depth: int) -> tuple[CellGrid, ...]:
     return tuple(CellGrid.from_depth(int(w), int(h), depth) for w, h in sizes)
 
 
-def image_reader(recording: Recording, grids: tuple[CellGrid, ...], config: TrackConfig) -> ImageReader:
-    """What turns the cells of a frame into image blobs.
+def image_reader(
+    recording: Recording, grids: tuple[CellGrid, ...], config: TrackConfig, bodies: Sequence[Body] = ()
+) -> ImageReader:
+    """What turns the cells of a frame into image blobs, with the colours of the actors, if there are any.
 
     Raises:
-        InputError: plates are requested, but a camera has none or one of the wrong size.
+        InputError: the background that the settings ask for cannot be had.
     """
     space, radius = color_space_and_radius(config.color)
     candidates = Candidates.from_grids(grids, device_cameras(recording))
@@ -200,8 +202,8 @@ def image_reader(recording: Recording, grids: tuple[CellGrid, ...], config: Trac
         box_enlargement=at_least("images.box_enlargement", config.images.box_enlargement, 0.0),
         color_space=space,
         box_around=box_around(config.images),
-        plate_colors=_plate_colors(recording, grids, candidates, space, config.images),
-        plate_tolerance=at_least("images.plate_tolerance", config.images.plate_tolerance, 0.0),
+        empty=_empty_scene(recording, grids, config.images),
+        subject=_subject(bodies) if bodies else None,
     )
 
 
@@ -214,7 +216,7 @@ def tracker(
         body=body,
         cameras=cameras,
         normalizers=whole_image_overlap(cameras.image_size),
-        reader=image_reader(recording, grids, config),
+        reader=image_reader(recording, grids, config, [body]),
         terms=energy_terms(config.energy, terms),
         solver=solver(config.solver),
         scales=solver_scales(config.solver, body),
@@ -237,7 +239,6 @@ def varied(tracker: Tracker, config: TrackConfig) -> Tracker:
         color_tolerance=config.images.color_tolerance,
         box_enlargement=config.images.box_enlargement,
         box_around=box_around(config.images),
-        plate_tolerance=config.images.plate_tolerance,
     )
     return replace(
         tracker,
@@ -251,34 +252,18 @@ def varied(tracker: Tracker, config: TrackConfig) -> Tracker:
     )
 
 
-def _plate_colors(
-    recording: Recording,
-    grids: tuple[CellGrid, ...],
-    candidates: Candidates,
-    space: str,
-    config: ImagesConfig,
-) -> Float[Array, "camera candidate 3"] | None:
-    """Colours of the quad-tree nodes of the empty background.
+def _subject(bodies: Sequence[Body]) -> SubjectColors:
+    """The colours of all actors."""
+    colors = np.concatenate([np.asarray(body.blob_colors) for body in bodies])
+    areas = np.concatenate([np.asarray(body.blob_sigmas) ** 2 for body in bodies])
+    return jnp.asarray(subject_colors(colors, areas), jnp.result_type(float))
+
+
+def _empty_scene(recording: Recording, grids: tuple[CellGrid, ...], config: ImagesConfig) -> EmptyScene | None:
+    """What frames are compared with; None: nothing is known of the background.
 
     Raises:
-        InputError: plates are requested, but a camera has none or one of the wrong size.
+        InputError: the background that the settings ask for cannot be had.
     """
-    missing = [name for name in recording.rig.names if name not in recording.background]
-    if config.use_plates is False or (config.use_plates is None and missing):
-        return None
-    if missing:
-        raise InputError(
-            f"{recording.path}: images.use_plates=true, but background/ has no picture of "
-            f"{', '.join(missing)}; add it, or set images.use_plates=false"
-        )
-    images = [read_still(recording, name, recording.background[name]) for name in recording.rig.names]
-    return _node_colors(jnp.asarray(stack_cells(images, grids)), candidates, space)
-
-
-@partial(jax.jit, static_argnames="space")
-def _node_colors(
-    cells: UInt8[Array, "camera rows columns 3"], candidates: Candidates, space: str
-) -> Float[Array, "camera candidate 3"]:
-    colors = from_rgb(cells.astype(candidates.sigmas.dtype) / 255.0, averaging_space(space))
-    tolerance = jnp.asarray(0.0, colors.dtype)
-    return jax.vmap(quadtree, in_axes=(0, 0, None))(colors, candidates, tolerance)[0]
+    found = background_cells(recording, grids, config)
+    return None if found is None else EmptyScene.from_background(found)

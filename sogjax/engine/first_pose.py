@@ -1,30 +1,25 @@
-"""The poses of the actors in the first frame of a track: from a file, or searched for."""
+"""The poses of the actors in the first frame of a track: from a file, or searched for where they are clear."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import jax.numpy as jnp
-import numpy as np
-from jaxtyping import Array, Float, UInt8
+from jaxtyping import Array, Float
 
+from sogjax.actor.make import MadeActor
 from sogjax.data.initial_pose import load_initial_poses
 from sogjax.data.recording import Recording
-from sogjax.data.video import read_frames
 from sogjax.energy import Term
-from sogjax.engine import build
+from sogjax.engine.pose_search import Beginning, PoseSearch, tried_frames
 from sogjax.engine.terminal import say
+from sogjax.engine.unsure_picture import write_unsure_picture
 from sogjax.errors import InputError
-from sogjax.images.cells import stack_cells
 from sogjax.model.body import Body
 from sogjax.settings import TrackConfig
-from sogjax.tracking.frame_views import FrameViews, levels
+from sogjax.tracking.found_pose import FoundPose
 from sogjax.tracking.initial_pose import rough_pose
-from sogjax.tracking.pose_search import FoundPose, search_poses
 
 AUTO = "auto"
-SURE = 0.005
-"""A margin below this gets a warning."""
 
 
 def initial_pose_file(recording: Recording, config: TrackConfig) -> Path | None:
@@ -43,22 +38,46 @@ def initial_pose_file(recording: Recording, config: TrackConfig) -> Path | None:
     return path
 
 
+def known_opening(
+    recording: Recording, made: Sequence[MadeActor], config: TrackConfig
+) -> tuple[Float[Array, "dof"], int] | None:
+    """A frame of the videos that an actor was made of, the one where it fits best, and its pose there.
+
+    None where tracking begins otherwise: with a rough pose from a file, or with a search, since no such frame is among
+    those to be tracked.
+    """
+    if len(made) != 1 or initial_pose_file(recording, config) is not None:
+        return None
+    last = recording.num_frames if config.stop is None else config.stop
+    shown = {name: frame for name, frame in made[0].frames.items() if config.start <= frame < last}
+    if not shown:
+        return None
+    best = max(shown, key=made[0].agreement)
+    say(f"tracking begins in frame {shown[best] + recording.first_frame}, whose pose is known, and goes both ways")
+    return made[0].example_poses[best], shown[best]
+
+
 def first_poses(
-    recording: Recording, bodies: Sequence[Body], config: TrackConfig, frame: int, terms: Sequence[Term] = ()
+    recording: Recording,
+    bodies: Sequence[Body],
+    config: TrackConfig,
+    frame: int,
+    terms: Sequence[Term] = (),
+    last: int | None = None,
 ) -> list[Float[Array, "dof"]]:
     """The poses of bodies, upright in the recording's world, in a frame counted from the recording's first.
 
+    Where they are searched for and not clear in that frame, they are searched for in later ones (before `last`) and
+    followed back.
+
     Raises:
-        InputError: the file is invalid, or an actor is not found in the pictures.
+        InputError: the file is invalid, or the actors are not found in the pictures.
     """
     path = initial_pose_file(recording, config)
     if path is None:
-        found = searched_poses(recording, bodies, config, frame, terms)
-        for body, pose in zip(bodies, found, strict=True):
-            say(f"first pose of {body.name} found; the next different one is {100.0 * pose.margin:.1f} % worse")
-            if pose.margin < SURE:
-                say(f"warning: uncertain; check the first frame of the overlay, or write {_remedy(recording)}")
-        return [pose.pose for pose in found]
+        search = PoseSearch(recording, bodies, config, terms)
+        beginning = clear_beginning(search, frame, recording.num_frames if last is None else last)
+        return [jnp.asarray(pose) for pose in search.carried(beginning, frame)]
     if frame + recording.first_frame > 0:
         say(f"warning: the rough pose of {path} is used for frame {frame + recording.first_frame}")
     descriptions = load_initial_poses(path, [body.name for body in bodies])
@@ -71,23 +90,49 @@ def first_poses(
     return poses
 
 
+def clear_beginning(search: PoseSearch, first: int, last: int, picture: Path | None = None) -> Beginning:
+    """The first of some frames from `first` up to `last` in which the poses of all actors are sure.
+
+    Raises:
+        InputError: there is none; a picture of the best guess is written to `picture`, or else beside the program's
+            other outputs.
+    """
+    recording = search.recording
+    guesses: list[Beginning] = []
+    for frame in tried_frames(first, last, recording.fps):
+        found = search.poses(frame)
+        guesses.append(Beginning(frame, found))
+        for body, pose in zip(search.bodies, found, strict=True):
+            say(
+                f"pose of {body.name} in frame {frame + recording.first_frame}: "
+                f"{'sure' if pose.sure else 'not sure'} ({100.0 * pose.confidence:.0f} %)"
+            )
+        if guesses[-1].sure:
+            return guesses[-1]
+    best = max(guesses, key=lambda guess: guess.confidence)
+    frames = ", ".join(str(guess.frame + recording.first_frame) for guess in guesses)
+    if all(pose.energy <= 0.0 for pose in best.poses):
+        names = ", ".join(body.name for body in search.bodies)
+        raise InputError(
+            f"{recording.path}: nothing like {names} is seen in frame {frames}; write {_remedy(recording)}, "
+            "or begin with another frame (start=)"
+        )
+    path = write_unsure_picture(recording, search.bodies, best, picture)
+    raise InputError(
+        f"{recording.path}: no pose is sure in frame {frames}: the best guess is drawn in {path}; if it is right, or "
+        f"else as it should be, write {_remedy(recording)}{_background_remedy(search)}"
+    )
+
+
 def searched_poses(
     recording: Recording, bodies: Sequence[Body], config: TrackConfig, frame: int, terms: Sequence[Term] = ()
 ) -> list[FoundPose]:
-    """The poses that fit the pictures of a frame best, in the order of the bodies.
+    """The poses that fit the pictures of a frame best, in the order of the bodies, sure or not.
 
     Raises:
         InputError: the pictures show nothing in an actor's colours where the cameras look.
     """
-    recording, pictures = _seen(recording, frame)
-    depths = levels(config.images.depth)
-    grids = [build.cell_grids(recording, depth) for depth in depths]
-    views = FrameViews(
-        build.device_cameras(recording),
-        tuple(build.image_reader(recording, grid, config) for grid in grids),
-        tuple(jnp.asarray(stack_cells(pictures, grid)) for grid in grids),
-    )
-    found = search_poses(bodies, views, build.energy_terms(config.energy, terms), recording.up)
+    found = PoseSearch(recording, bodies, config, terms).poses(frame)
     lost = [body.name for body, pose in zip(bodies, found, strict=True) if not pose.energy > 0.0]
     if lost:
         raise InputError(
@@ -97,16 +142,9 @@ def searched_poses(
     return found
 
 
-def _seen(recording: Recording, frame: int) -> tuple[Recording, list[UInt8[np.ndarray, "_h _w 3"]]]:
-    """The recording with the cameras that have a frame, and their pictures of it."""
-    pictures = dict(zip(recording.rig.names, next(iter(read_frames(recording, frame, frame + 1))), strict=True))
-    present = {name: picture for name, picture in pictures.items() if picture is not None}
-    if not present:
-        raise InputError(f"{recording.path}: no camera has frame {frame + recording.first_frame}; begin later (start=)")
-    if len(present) == len(pictures):
-        return recording, list(present.values())
-    return replace(recording, rig=recording.rig.select(tuple(present))), list(present.values())
-
-
 def _remedy(recording: Recording) -> str:
     return f"the rough pose into {recording.path / 'initial_pose.yaml'}"
+
+
+def _background_remedy(search: PoseSearch) -> str:
+    return "" if search.has_background else "; pictures of the empty scene (background/) help most"

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import jax.numpy as jnp
@@ -15,6 +15,7 @@ from sogjax.data.recording import Recording
 from sogjax.data.stages import Behind
 from sogjax.energy import Term
 from sogjax.engine import build
+from sogjax.engine.backwards import frames_backwards, tracked_backwards
 from sogjax.engine.cells import picture_reader
 from sogjax.engine.first_pose import first_poses
 from sogjax.engine.kept_run import KeptRun
@@ -22,6 +23,7 @@ from sogjax.engine.pipeline import FrameTracker, PictureReader, tracked_frames
 from sogjax.engine.recordings import upright
 from sogjax.engine.resume import resumed
 from sogjax.engine.run import Run
+from sogjax.engine.second_background import learnt_again
 from sogjax.engine.streams import Streams, readable_frames
 from sogjax.engine.terminal import say
 from sogjax.engine.timing import StageTimes
@@ -29,7 +31,7 @@ from sogjax.errors import InputError
 from sogjax.images.cells import CellGrid, stack_shape
 from sogjax.model.body import Body, concatenate
 from sogjax.sentences import counted
-from sogjax.settings import OutputsConfig, TrackConfig
+from sogjax.settings import ImagesConfig, OutputsConfig, TrackConfig
 from sogjax.tracking.tracker import Tracker, compile_counts, track
 
 FRAMES_BEHIND = 8
@@ -48,7 +50,14 @@ class Job:
     grids: tuple[CellGrid, ...]
     tracker: Tracker
     start: Float[Array, "dof"]
-    """The rough pose of the first frame."""
+    """The rough pose of the frame where tracking begins."""
+    begin: int = 0
+    """That frame, counted from the recording's first; those before it are tracked backwards."""
+
+    @property
+    def num_before(self) -> int:
+        """Frames that are tracked backwards."""
+        return max(self.begin - self.frames[0], 0)
 
     @classmethod
     def from_config(
@@ -58,23 +67,26 @@ class Job:
         config: TrackConfig,
         kept: KeptRun | None = None,
         terms: Sequence[Term] = (),
+        start: Float[Array, "dof"] | None = None,
     ) -> "Job":
         """The job of tracking actors (in their own upright frames), from the first pose that was kept, if any.
 
-        `terms` are added to those of the settings.
+        `terms` are added to those of the settings; a first pose that is given as `start` is neither read nor searched.
         """
         bodies = [upright(body, recording) for body in bodies]
         frames = frame_range(recording, config)
         grids = build.cell_grids(recording, config.images.depth)
         with ThreadPoolExecutor(1) as beside:  # both compile for seconds
             building = beside.submit(_tracker, recording, bodies, grids, config, terms)
-            start = None if kept is None else kept.start()
+            begin = frames[0]
+            if start is None and kept is not None and (opening := kept.start()) is not None:
+                start, begin = opening
             if start is None:
-                start = jnp.concatenate(first_poses(recording, bodies, config, frames[0], terms))
+                start = jnp.concatenate(first_poses(recording, bodies, config, begin, terms))
                 if kept is not None:
-                    kept.keep_start(start)
+                    kept.keep_start(start, begin)
             tracker = building.result()
-        return cls(recording, bodies, frames, grids, tracker, start)
+        return cls(recording, bodies, frames, grids, tracker, start, begin)
 
 
 @contextmanager
@@ -89,7 +101,9 @@ def tracking(
 ) -> Iterator[Run]:
     """Track, resuming what was kept; the motions are in files that are removed when the block ends without an error."""
     job = Job.from_config(recording, bodies, config, kept, terms)
-    with run_job(job, outputs, out, picture_reader(config.images), kept=kept) as result:
+    read = picture_reader(config.images)
+    job = replace(job, tracker=learnt_again(job, config.images, read))
+    with run_job(job, outputs, out, read, kept=kept, images=config.images) as result:
         yield result
 
 
@@ -101,15 +115,21 @@ def run_job(
     read: PictureReader,
     follow: FrameTracker = track,
     kept: KeptRun | None = None,
+    images: ImagesConfig | None = None,
 ) -> Iterator[Run]:
-    """Run a job, with a reader of pictures and a tracker of their cells."""
+    """Run a job, with a reader of pictures and a tracker of their cells; `images` says how they are read backwards."""
     first, last = job.frames
     times = StageTimes()
-    prefix = None if kept is None else kept.prefix(readable_frames(out, job.bodies), last - first)
+    prefix = None if kept is None else kept.prefix(readable_frames(out, job.bodies), last - first, job.num_before)
     num_kept = 0 if prefix is None else prefix.num_frames
     streams = Streams(out, job.recording, job.bodies, job.recording.first_frame + first, outputs, times, kept, num_kept)
     if prefix is not None:
         say(f"{out}: {num_kept} of {counted(last - first, 'frame')} are done; resuming after them")
+    elif job.num_before:
+        frames = frames_backwards(job.recording, job.grids, images or ImagesConfig(), first, job.begin + 1)
+        prefix = tracked_backwards(job.tracker, job.start, frames, job.num_before + 1, times)
+    start = job.start if prefix is None or not job.num_before else prefix.pose(0)
+    if prefix is not None:
         follow = resumed(prefix, shown=not streams.num_skipped, with_images=outputs.rerun)
     used: list[float] = []
     missing = Counter(job.recording.num_missing(range(first, first + streams.num_skipped)))
@@ -117,7 +137,7 @@ def run_job(
         with streams:
             count = last - first - streams.num_skipped
             pictures = read(job.recording, streams.preparation(job.grids), last - count, last) if count else iter(())
-            frames = tracked_frames(pictures, count, job.tracker, job.start, times, follow)
+            frames = tracked_frames(pictures, count, job.tracker, start, times, follow)
             with closing(frames), Behind(streams.consume, FRAMES_BEHIND) as behind:
                 for done in frames:
                     used.append(float(np.mean(done.tracked.result.num_matching)))

@@ -2,7 +2,7 @@
 
 import json
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -47,6 +47,16 @@ class Prefix:
     def num_frames(self) -> int:
         """How many."""
         return len(self.rows["pose"])
+
+    @classmethod
+    def from_frames(cls, frames: Iterable[TrackedFrame]) -> "Prefix":
+        """Of frames that were tracked backwards: in the order of the clip, without their image blobs."""
+        rows = [rows_of([frame]) for frame in frames][::-1]
+        return cls({name: np.concatenate([row[name] for row in rows]) for name in rows[0]})
+
+    def pose(self, frame: int) -> Float[Array, "dof"]:
+        """Of one frame."""
+        return jnp.asarray(self.rows["pose"][frame])
 
     @property
     def capacities(self) -> Capacities:
@@ -120,19 +130,24 @@ class KeptRun:
             bodies.append(jax.tree.unflatten(structure, kept))
         return bodies
 
-    def keep_start(self, start: Float[Array, "dof"]) -> None:
-        """Keep the rough pose of the first frame."""
-        _save(self.folder / START, {"start": np.asarray(start)})
+    def keep_start(self, start: Float[Array, "dof"], frame: int) -> None:
+        """Keep the rough pose of the frame where tracking begins, counted from the recording's first."""
+        _save(self.folder / START, {"start": np.asarray(start), "frame": np.array(frame)})
 
-    def start(self) -> Float[Array, "dof"] | None:
-        """The rough pose that was kept."""
+    def start(self) -> tuple[Float[Array, "dof"], int] | None:
+        """The rough pose that was kept, and its frame."""
         kept = _read(self.folder / START)
-        return None if kept is None else jnp.asarray(finite_array(self.folder / START, kept, "start", (None,)))
+        if kept is None:
+            return None
+        pose = finite_array(self.folder / START, kept, "start", (None,))
+        frame = finite_array(self.folder / START, kept, "frame", ())
+        return jnp.asarray(pose), int(frame)
 
-    def prefix(self, readable: int, total: int) -> Prefix | None:
+    def prefix(self, readable: int, total: int, num_before: int = 0) -> Prefix | None:
         """The frames to resume after: at most `readable` of `total`, a multiple of the frames written at once.
 
-        So the frames after them are written in the same blocks as in an uninterrupted run.
+        So the frames after them are written in the same blocks as in an uninterrupted run. Unless they are more than
+        the `num_before` frames that are tracked backwards, all is done again.
         """
         rows = None
         with suppress(InputError):
@@ -141,14 +156,14 @@ class KeptRun:
             return None
         whole = min(readable, len(rows["pose"]))
         count = whole if whole == total else whole - whole % FRAMES_AT_ONCE
-        if not count:
+        if count <= num_before:
             return None
         self.num_kept = count
         return Prefix({name: column[:count] for name, column in rows.items()})
 
     def append(self, frames: Sequence[TrackedFrame]) -> None:
         """Keep the results of the frames that follow."""
-        rows = _rows(frames)
+        rows = rows_of(frames)
         if self._log is None:
             self._log = ArrayLog(self.folder, {}, rows, self.num_kept)
         else:
@@ -180,7 +195,8 @@ def write_note(path: Path, note: dict[str, Any]) -> None:
         temporary.write_text(json.dumps(note, indent=1) + "\n", encoding="utf-8")
 
 
-def _rows(frames: Sequence[TrackedFrame]) -> dict[str, np.ndarray]:
+def rows_of(frames: Sequence[TrackedFrame]) -> dict[str, np.ndarray]:
+    """What is kept of frames, a row each."""
     results = [frame.result for frame in frames]
     column = lambda parts, name: np.stack([np.asarray(getattr(part, name)) for part in parts])
     capacity = lambda name: np.array([getattr(frame.capacities, name) for frame in frames])

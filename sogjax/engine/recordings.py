@@ -8,15 +8,16 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from sogjax.actor.make import make_actor, subjects_of
+from sogjax.actor.make import MadeActor, make_actor, subjects_of
 from sogjax.data.actor_file import load_body, named_body
 from sogjax.data.recording import Recording, open_recording
 from sogjax.engine.build import color_space_and_radius, energy_terms
+from sogjax.engine.example_frames import with_examples
 from sogjax.engine.terminal import progress, say
 from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.model.frames import world_from_upright
-from sogjax.settings import ColorConfig, EnergyConfig
+from sogjax.settings import ColorConfig, EnergyConfig, ImagesConfig
 
 
 def opened(path: str, cameras: Sequence[str] | None = None) -> Recording:
@@ -69,11 +70,14 @@ def file_list(value: Any) -> list[Path]:
     return [Path(str(item)) for item in values]
 
 
-def actors_of(recording: Recording, files: Any, body: str, color: ColorConfig) -> tuple[list[Body], bool]:
-    """The actors of a recording, and whether they were just made from its example poses.
+def actors_of(
+    recording: Recording, files: Any, body: str, color: ColorConfig, images: ImagesConfig | None = None
+) -> tuple[list[Body], list[MadeActor]]:
+    """The actors of a recording, and what was found where they are made of its example poses or its videos.
 
     Raises:
-        InputError: an invalid actor file, two actors with one name, or unsuitable example poses.
+        InputError: an invalid actor file, two actors with one name, unsuitable example poses, or videos that none can
+            be taken from.
     """
     if files is not None:
         actors = [load_body(path) for path in file_list(files)]
@@ -82,29 +86,30 @@ def actors_of(recording: Recording, files: Any, body: str, color: ColorConfig) -
             raise InputError(
                 f"actor={files}: two actors are named {max(names, key=names.count)!r}; give each its own `name`"
             )
-        return actors, False
+        return actors, []
     space, _ = color_space_and_radius(color)
-    cameras = recording.rig.names
-    subjects = subjects_of(recording)
-    return [_made_actor(str(recording.path), cameras, body, subject, space) for subject in subjects], True
+    images = images or ImagesConfig()
+    made = _made_actors(str(recording.path), recording.rig.names, body, space, images.background, images.cache)
+    return [actor.body for actor in made], list(made)
 
 
 @cache
-def _made_actor(path: str, cameras: tuple[str, ...], body: str, subject: str | None, space: str) -> Body:
-    """The actor of a recording, made once per process: the members of a sweep share it."""
+def _made_actors(
+    path: str, cameras: tuple[str, ...], body: str, space: str, background: str, cells: str | None
+) -> tuple[MadeActor, ...]:
+    """The actors of a recording, made once per process: the members of a sweep share them."""
+    start = body_named(body)
     recording = open_recording(Path(path))
     recording = replace(recording, rig=recording.rig.select(cameras))
-    label = "actor" if subject is None else f"actor {subject}"
+    start = body_named(body)
+    recording, learnt, best = with_examples(recording, ImagesConfig(background=background, cache=cells))
     terms = energy_terms(EnergyConfig())
-    return make_actor(
-        recording,
-        body_named(body),
-        subject,
-        space,
-        terms,
-        report=lambda stage: say(f"{label}: {stage}"),
-        progress=progress,
-    ).body
+    made = []
+    for subject in subjects_of(recording):
+        label = "actor" if subject is None else f"actor {subject}"
+        report = lambda stage, label=label: say(f"{label}: {stage}")
+        made.append(make_actor(recording, start, subject, space, terms, report, progress, learnt=learnt, best=best))
+    return tuple(made)
 
 
 def upright(body: Body, recording: Recording) -> Body:

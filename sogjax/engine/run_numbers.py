@@ -3,6 +3,7 @@
 import numpy as np
 
 from sogjax.engine.run import Run
+from sogjax.evaluation import summarize
 
 COLUMNS = ("mean mm", "std mm", "joints mm", "lost", "swaps", "iterations", "not converged", "frames/s")
 OBJECTIVE = "mean mm"
@@ -24,7 +25,7 @@ def row_numbers(result: Run) -> Numbers:
         numbers["mean mm"], numbers["std mm"] = 1000.0 * summary.mean, 1000.0 * summary.std
         joints = [e.joints.errors for e in result.evaluation.evaluations.values() if e.joints is not None]
         if joints:
-            numbers["joints mm"] = 1000.0 * float(np.nanmean(np.concatenate(joints, axis=1)))
+            numbers["joints mm"] = 1000.0 * summarize(np.concatenate(joints, axis=1)).mean
         numbers["swaps"] = len(result.evaluation.swaps)
         numbers["lost"] = sum(len(e.lost) for e in result.evaluation.evaluations.values())
     numbers["iterations"] = float(np.mean(result.iterations))

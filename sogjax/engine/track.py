@@ -9,18 +9,21 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from omegaconf import OmegaConf
 
+from sogjax.actor.make import MadeActor
 from sogjax.data.motion import arrays_of, load_motion
 from sogjax.data.motion_log import PER_FRAME, SOMETIMES_PER_FRAME
 from sogjax.data.recording import Recording
 from sogjax.energy import Term
 from sogjax.engine import build
-from sogjax.engine.first_pose import initial_pose_file
+from sogjax.engine.actor_report import report_folder, write_actor_report
+from sogjax.engine.first_pose import initial_pose_file, known_opening
 from sogjax.engine.job import frame_range, tracking
 from sogjax.engine.origin import origin_of
 from sogjax.engine.outputs import actor_name, evaluate, export_endings, write_results
 from sogjax.engine.recordings import actors_of, file_list, opened
 from sogjax.engine.run import Run
 from sogjax.engine.run_folder import RunFolder, run_folder
+from sogjax.engine.streams import file_name
 from sogjax.engine.terminal import say
 from sogjax.engine.timing import StageTimes
 from sogjax.model.body import Body
@@ -47,7 +50,7 @@ def track_to_folder(config: TrackConfig, command: str = "track") -> Run:
 
 def _run_in(folder: RunFolder, recording: Recording, config: TrackConfig, command: str) -> Run:
     """Track into this run's own folder, or resume there."""
-    actors = partial(actors_of, recording, config.actor, config.body, config.color)
+    actors = partial(actors_of, recording, config.actor, config.body, config.color, config.images)
     made = config.actor is None
     bodies = None if made else actors()[0]
     origin = origin_of(recording, config, bodies)
@@ -56,16 +59,30 @@ def _run_in(folder: RunFolder, recording: Recording, config: TrackConfig, comman
         return _ended(folder, recording, config.outputs)
     if bodies is None and going_on:
         bodies = kept.actors()
-    anew = bodies is None
-    bodies = actors()[0] if bodies is None else bodies
+    anew, found = bodies is None, []
+    if bodies is None:
+        bodies, found = actors()
     if not going_on:
         folder.begin(command, origin, [] if made else file_list(config.actor))
     if anew:
         kept.keep_actors(bodies)
+        _report_actors(recording, found, folder.path)
+        if (opening := known_opening(recording, found, config)) is not None:
+            kept.keep_start(*opening)
     with tracking(recording, bodies, config, config.outputs, folder.path, kept=kept) as result:
         write_results(result, folder.path, config.outputs, OmegaConf.structured(config), bodies if made else [])
         folder.finish(command, origin, result.files)
     return result
+
+
+def _report_actors(recording: Recording, made: Sequence[MadeActor], out: Path) -> None:
+    """Write how actors fit the frames of the videos that they were made of, for the user to judge."""
+    for actor in (actor for actor in made if actor.frames):
+        folder = report_folder(out / file_name("actor", ".yaml", actor.body.name, len(made)))
+        for older in folder.glob("silhouettes_*.png"):
+            older.unlink()
+        report = write_actor_report(folder, actor, recording.rig)
+        say(f"{actor.body.name}: silhouettes and masks agree to {report.mean_iou:.2f}; see {folder / 'report.md'}")
 
 
 def _ended(folder: RunFolder, recording: Recording, wanted: OutputsConfig) -> Run:

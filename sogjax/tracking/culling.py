@@ -12,7 +12,9 @@ from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.compiled.once import computed_once
 from sogjax.energy.overlap import pair_color_similarities
+from sogjax.energy.windows import Windows, windows_around
 from sogjax.errors import InputError
+from sogjax.images.foreground import EmptyScene, SubjectColors, foreground_weights, log_odds
 from sogjax.images.quadtree import Candidates, keep_blobs, keep_blobs_of_planes, quadtree_of_planes
 from sogjax.model.camera import Camera, project
 from sogjax.model.color import averaging_space, convert, from_rgb
@@ -25,6 +27,12 @@ CAPACITIES = (256, 512, 768, 1024, 1536, 2048, 3072, 4096, 6144, 8192, 16384, 32
 BLOB_RADIUS = 3.0
 """Sigmas around a blob's centre that belong to the box of a body."""
 
+
+FOREGROUND_CONTRAST = 0.3
+"""What the whole range of weights counts beside colours (0 to 1) when a quad-tree decides on a node: blobs do not cross
+the edge between foreground and background."""
+NEGLIGIBLE_WEIGHT = 0.05
+"""Image blobs of less weight are left out: what is certainly background."""
 
 BoxAround = Literal["last", "predicted"]
 
@@ -78,17 +86,30 @@ class ImageReader(eqx.Module):
     color_space: str = eqx.field(static=True)
     box_around: BoxAround = eqx.field(static=True, default="predicted")
     """Whether boxes hold the last pose only, or the predicted one too."""
-    plate_colors: Float[Array, "camera candidate 3"] | None = None
-    """Colours of every node of the empty background, in the averaging space; None: plates are not used."""
-    plate_tolerance: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=0.1)
-    """Image blobs whose colour is nearer than this to the plate's are left out."""
+    empty: EmptyScene | None = None
+    """The empty scene, so that image blobs count by how little they look like it; None: all count fully."""
+    subject: SubjectColors | None = None
+    """The colours that the actors have; None: any."""
 
     def leaves(
         self, cells: Float[Array, "camera rows columns 3"]
     ) -> tuple[Float[Array, "camera candidate 3"], Bool[Array, "camera candidate"]]:
         """Colours (averaging space) and leaves of the quad-trees of all cameras, from sRGB cells in 0..1."""
-        planes, leaves = self._leaf_planes(cells)
-        return jnp.stack(planes, axis=-1), leaves
+        planes, leaves = self._leaf_planes(cells, self.odds(cells))
+        return jnp.stack(planes[:3], axis=-1), leaves
+
+    def odds(self, cells: Float[Array, "camera rows columns 3"]) -> Float[Array, "camera rows columns"] | None:
+        """Log odds of foreground against background of all cells; None where no background is known."""
+        if self.empty is None:
+            return None
+        return computed_once(self.true_at_run_time, log_odds, cells, self.empty, self.subject)
+
+    def windows(
+        self, odds: Float[Array, "camera rows columns"], cameras: Camera, boxes: Float[Array, "camera actor 2 2"]
+    ) -> Windows:
+        """The log odds of cells in the boxes."""
+        sizes = jnp.asarray([grid.cell_size for grid in self.candidates.grids], odds.dtype)
+        return computed_once(self.true_at_run_time, windows_around, odds, sizes, cameras, boxes)
 
     @property
     def true_at_run_time(self) -> Bool[Array, ""]:
@@ -96,52 +117,63 @@ class ImageReader(eqx.Module):
         return ~jnp.isnan(self.color_tolerance)
 
     def _leaf_planes(
-        self, cells: Float[Array, "camera rows columns 3"]
+        self, cells: Float[Array, "camera rows columns 3"], odds: Float[Array, "camera rows columns"] | None
     ) -> tuple[list[Float[Array, "camera candidate"]], Bool[Array, "camera candidate"]]:
-        """The same, the colours channel by channel."""
+        """The same, the colours channel by channel, then the weights of `foreground_weights`, if there are odds."""
         space = averaging_space(self.color_space)
-        converted = computed_once(self.true_at_run_time, partial(_color_planes, space=space), cells)
-        planes, leaves = jax.vmap(quadtree_of_planes, in_axes=(0, 0, None))(
-            converted, self.candidates, self.color_tolerance
+        planes = computed_once(self.true_at_run_time, partial(_color_planes, space=space), cells)
+        if odds is not None:
+            planes = [*planes, FOREGROUND_CONTRAST * foreground_weights(odds)]
+        means, leaves = jax.vmap(quadtree_of_planes, in_axes=(0, 0, None))(
+            planes, self.candidates, self.color_tolerance
         )
-        if self.plate_colors is not None:
-            squared = sum((plane - self.plate_colors[..., k]) ** 2 for k, plane in enumerate(planes))
-            leaves = leaves & (squared > self.plate_tolerance**2)
-        return planes, leaves
+        if odds is not None:
+            means[3] = means[3] / FOREGROUND_CONTRAST
+            leaves = leaves & (means[3] > NEGLIGIBLE_WEIGHT)
+        return means, leaves
 
     def near_blobs(
         self,
         cells: Float[Array, "camera rows columns 3"],
+        odds: Float[Array, "camera rows columns"] | None,
         boxes: Float[Array, "camera actor 2 2"],
         capacity: int,
-    ) -> tuple[Sog, Int[Array, "camera"]]:
-        """Image blobs inside the boxes, coloured in the working space, and how many there are for each camera."""
-        colors, leaves = self._leaf_planes(cells)
+    ) -> tuple[Sog, Float[Array, "camera image"] | None, Int[Array, "camera"]]:
+        """Image blobs inside the boxes, coloured in the working space, their weights, and how many for each camera."""
+        planes, leaves = self._leaf_planes(cells, odds)
         keep = leaves & jax.vmap(_in_boxes)(self.candidates.means, self.candidates.sigmas, boxes)
         select = jax.vmap(keep_blobs_of_planes, in_axes=(0, 0, 0, 0, None))
-        near, _, counts = select(self.candidates.means, self.candidates.sigmas, colors, keep, capacity)
+        near, chosen, counts = select(self.candidates.means, self.candidates.sigmas, planes[:3], keep, capacity)
         working = convert(near.colors, averaging_space(self.color_space), self.color_space)
-        return eqx.tree_at(lambda sog: sog.colors, near, working), counts
+        weights = None if odds is None else jnp.take_along_axis(planes[3], chosen, axis=1)
+        return eqx.tree_at(lambda sog: sog.colors, near, working), weights, counts
 
     def matching_blobs(
-        self, near: Sog, body: Sog, capacity: int
-    ) -> tuple[Sog, Float[Array, "camera body image"], Int[Array, "camera"]]:
-        """The near blobs whose colour resembles some blob of the body, with all colour similarities."""
+        self, near: Sog, weights: Float[Array, "camera image"] | None, body: Sog, capacity: int
+    ) -> tuple[Sog, Float[Array, "camera body image"], Float[Array, "camera image"] | None, Int[Array, "camera"]]:
+        """The near blobs whose colour resembles some blob of the body, with all colour similarities and weights."""
 
-        def one_camera(image: Sog):
+        def one_camera(image: Sog, weights: Float[Array, "image"] | None):
             similarities = pair_color_similarities(image, body, self.color_space, self.color_radius)
             keep = jnp.any(similarities > 0.0, axis=0) & image.mask
             kept, chosen, count = keep_blobs(image.means, image.sigmas, image.colors, keep, capacity)
-            return kept, jnp.where(kept.mask[None, :], similarities[:, chosen], 0.0), count
+            similarities = jnp.where(kept.mask[None, :], similarities[:, chosen], 0.0)
+            if weights is None:
+                return kept, similarities, None, count
+            return kept, similarities * weights[chosen], weights[chosen], count
 
-        return jax.vmap(one_camera)(near)
+        return jax.vmap(one_camera)(near, weights)
 
     def compared_blobs(
-        self, near: Sog, body: Sog
+        self, near: Sog, weights: Float[Array, "camera image"] | None, body: Sog
     ) -> tuple[Sog, Float[Array, "camera body image"], Int[Array, "camera"]]:
         """The near blobs in their places, those masked out that resemble no blob of the body; the same otherwise."""
-        compare = lambda image: pair_color_similarities(image, body, self.color_space, self.color_radius)
-        similarities = computed_once(self.true_at_run_time, jax.vmap(compare), near)
+
+        def compare(image: Sog, weights: Float[Array, "image"] | None) -> Float[Array, "body image"]:
+            similarities = pair_color_similarities(image, body, self.color_space, self.color_radius)
+            return similarities if weights is None else similarities * weights[None, :]
+
+        similarities = computed_once(self.true_at_run_time, jax.vmap(compare), near, weights)
         mask = near.mask & jnp.any(similarities > 0.0, axis=1)
         return eqx.tree_at(lambda sog: sog.mask, near, mask), similarities, jnp.sum(mask, axis=1)
 

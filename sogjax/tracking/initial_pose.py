@@ -38,7 +38,7 @@ def rough_pose(body: Body, description: InitialPose, up: str) -> Float[Array, "d
     if description.position is not None:
         start = placed(body, start, np.asarray(description.position, float))
     if description.heading is not None:
-        if not _can_turn(body, up):
+        if heading_dof(body, up) is None:
             raise InputError(
                 f"heading: the body {body.name!r} has no degree of freedom about the vertical {up}; leave it out"
             )
@@ -93,6 +93,11 @@ def root_position(body: Body, pose: Float[Array, "dof"]) -> Float[np.ndarray, "3
     return np.asarray(_joint_frames(body, pose)[last, :3, 3], float)
 
 
+def root_rotation(body: Body, pose: Float[Array, "dof"]) -> Float[np.ndarray, "3 3"]:
+    """How the trunk is turned in a pose: the rotation of the joint where the tree first branches."""
+    return np.asarray(_joint_frames(body, pose)[_root_joints(body)[-1], :3, :3], float)
+
+
 @jax.jit
 def _joint_frames(body: Body, pose: Float[Array, "dof"]) -> Float[Array, "joint 4 4"]:
     return body.skeleton.world_from_joint(pose)
@@ -100,18 +105,18 @@ def _joint_frames(body: Body, pose: Float[Array, "dof"]) -> Float[Array, "joint 
 
 def turned(body: Body, pose: Float[Array, "dof"], heading: float, up: str) -> Float[Array, "dof"]:
     """The pose turned to a heading (radians about the vertical; 0 is the rest pose's)."""
+    turn = heading_dof(body, up)
+    return pose if turn is None else pose.at[turn[0]].set(heading / turn[1])
+
+
+def heading_dof(body: Body, up: str) -> tuple[int, float] | None:
+    """The degree of freedom that turns the whole body about the vertical, and radians for each unit of it."""
     vertical = axis_vector(up)
     for joint, dof, weight in _root_dofs(body, revolute=True):
         along = float(np.asarray(body.skeleton.axes[joint], float) @ vertical)
         if abs(along) > VERTICAL:
-            return pose.at[dof].set(heading * np.sign(along) / weight)
-    return pose
-
-
-def _can_turn(body: Body, up: str) -> bool:
-    vertical = axis_vector(up)
-    axes = np.asarray(body.skeleton.axes, float)
-    return any(abs(float(axes[joint] @ vertical)) > VERTICAL for joint, _, _ in _root_dofs(body, revolute=True))
+            return dof, weight * float(np.sign(along))
+    return None
 
 
 def fit_landmarks(
@@ -229,4 +234,17 @@ def _root_dofs(body: Body, revolute: bool) -> list[tuple[int, int, float]]:
         if bool(kinds[joint]) is revolute and np.any(transform[joint]):
             dof = int(np.argmax(np.abs(transform[joint])))
             found.append((joint, dof, float(transform[joint, dof])))
+    return found
+
+
+def root_turns(body: Body) -> list[tuple[Float[np.ndarray, "3"], int, float]]:
+    """(axis in the rest pose, dof, weight) of the joints of the root that turn the whole body, in their order."""
+    axes = np.asarray(body.skeleton.axes, float)
+    branching = root_position(body, body.poses["rest"])
+    frames = np.asarray(_joint_frames(body, body.poses["rest"]), float)
+    found = []
+    for joint, dof, weight in _root_dofs(body, revolute=True):
+        at_root = np.linalg.norm(frames[joint, :3, 3] - branching) < 1e-6
+        if at_root:
+            found.append((frames[joint, :3, :3] @ axes[joint], dof, weight))
     return found

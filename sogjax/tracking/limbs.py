@@ -1,8 +1,7 @@
 """Limbs of a body, and poses that differ in one limb."""
 
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Float, Int
 
 from sogjax.model.body import Body
 from sogjax.model.skeleton import Skeleton
@@ -38,10 +37,12 @@ def _chain(joint: int, children: list[list[int]]) -> list[int] | None:
 
 
 def with_other_limb(
-    body: Body, pose: Float[Array, "dof"], limb: Int[np.ndarray, "limb"], others: Float[Array, "other dof"]
-) -> Float[Array, "variant dof"]:
+    body: Body, pose: Float[np.ndarray, "dof"], limb: Int[np.ndarray, "limb"], others: Float[np.ndarray, "other dof"]
+) -> Float[np.ndarray, "variant dof"]:
     """The pose itself, and with one limb as in every named pose and in some others, each once."""
-    sources = jnp.concatenate([pose[None], jnp.stack([*body.poses.values()]), others])
-    values = np.asarray(sources[:, limb])
+    sources = np.concatenate([pose[None], np.stack([np.asarray(named) for named in body.poses.values()]), others])
+    values = sources[:, limb]
     first = [k for k in range(len(values)) if not np.any(np.all(np.abs(values[:k] - values[k]) < SAME, axis=1))]
-    return jnp.tile(pose, (len(first), 1)).at[:, limb].set(jnp.asarray(values[first]))
+    variants = np.tile(pose, (len(first), 1))
+    variants[:, limb] = values[first]
+    return variants

@@ -1,195 +1,250 @@
-"""The pose of the first frame without a hint: places, headings and named poses tried at once, the best refined."""
+"""The pose of a body in one frame without a hint: places, turns and named poses tried at once, the best refined."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Float, Int
 
-from sogjax.energy.frame_energy import still_energy
-from sogjax.energy.term import Terms
-from sogjax.energy.views import Views
+from sogjax.energy.appearance import ColorWindows
+from sogjax.energy.term import Term
+from sogjax.images.kinds import Kinds, any_color, kinds_of
 from sogjax.model.body import Body
-from sogjax.model.camera import Camera
-from sogjax.model.skeleton import Skeleton
-from sogjax.solve import ConditionedAscent, Scales
-from sogjax.tracking.frame_views import FrameViews
-from sogjax.tracking.initial_pose import body_centre, placed, root_position, shifts, turned
+from sogjax.model.frames import axis_vector
+from sogjax.solve import Scales
+from sogjax.tracking.hull import Place, places
+from sogjax.tracking.initial_pose import shifts
 from sogjax.tracking.limbs import limbs, with_other_limb
-from sogjax.tracking.place_search import Slices, best_places, possible_places, well_seen
+from sogjax.tracking.mirrored import look_alikes, means_of
+from sogjax.tracking.rotations import turned_to, turns_with_vertical
 from sogjax.tracking.scales import pose_scales
+from sogjax.tracking.search_energy import LARGEST_ANGLE, LARGEST_TRANSLATION, SearchEnergy, climbed, scores
+from sogjax.tracking.seen_frame import SeenFrame
 
-NUM_PLACES = 12
+NUM_PLACES = 4
 NUM_HEADINGS = 12
-NUM_AT_PLACE, COARSE_ITERATIONS = 4, 25
-"""Starts at each place that are climbed a little way in the coarse picture."""
-NUM_MIDDLE, MIDDLE_ITERATIONS = 12, 50
-"""Starts that are climbed in the middle one."""
-NUM_FINE, FINE_ITERATIONS = 4, 120
-"""Starts that are climbed to the end in the fine one."""
-AT_ONCE = 4
-"""Poses that are climbed in one call."""
-LIMB_ITERATIONS = 25
-"""For each pose in which one limb is tried another way."""
-STRAIN_COST = 0.005
-"""Share of the energy that each joint at the end of its range costs. Two legs of one colour may be exchanged with
-hardly a difference in the pictures, but not without twisting the pelvis and the hips."""
-STRAINED, NARROWEST = 0.7, 0.5
-"""Part of a joint's range, from the rest pose, where strain begins; radians, the least range that is counted."""
+BODY_RADIUS = 1.15
+"""Metres around a place at which pictures are looked at."""
+UPRIGHT = 0.8
+"""Cosine of the angle between a body's longest direction and the vertical above which it is not lying."""
+SLENDER = 1.5
+"""A body less slender says nothing of its direction."""
+NUM_AT_PLACE, FIRST_ITERATIONS = (16, 8, 4, 4), 8
+"""Starts that are climbed a little way: at the best place, the next and so on."""
+NUM_SECOND, SECOND_ITERATIONS = 6, 10
+"""Those of them whose limbs are tried another way, and how far these are climbed."""
+NUM_LAST, LAST_ITERATIONS = 4, 25
+LIMBS_TRIED = (3, 1)
+"""Ways to hold a limb that are climbed, of all that are scored: of the best pose, of each other."""
+NUM_DRAWN = 16
+"""Ways to hold a limb that are drawn at random, beside those of the named poses."""
+LIMB_APART = 0.01
+"""`DIFFERENT`, for poses that differ in one limb."""
+POOR = 0.3
+"""Places that look less like the body than this part of the best are left out."""
 DIFFERENT = 0.1
 """Metres, mean distance of the blobs: poses farther apart are different optima."""
 
 
 @dataclass(frozen=True)
-class FoundPose:
-    """The best pose of a search and how far the next different one is behind."""
+class Optimum:
+    """A pose that nothing near is better than."""
 
-    pose: Float[Array, "dof"]
+    pose: Float[np.ndarray, "dof"]
     energy: float
-    margin: float
-    """(energy - energy of the next different optimum) / energy, less what strains cost; 1 where there is no other."""
 
 
-def search_pose(body: Body, frame: FrameViews, terms: Terms, up: str) -> FoundPose:
-    """The pose of a body (upright in the world) that suits the pictures of one frame best."""
-    coarse = frame.views(0, body)
-    scales = pose_scales(body.skeleton)
-    poses = _promising(body, _starts(body, coarse, terms, up), coarse, terms)
-    energies = jnp.zeros(poses.shape[0])
-    for level, keep, iterations in (
-        (0, NUM_MIDDLE, COARSE_ITERATIONS),
-        (1, NUM_FINE, MIDDLE_ITERATIONS),
-        (2, NUM_FINE, FINE_ITERATIONS),
-    ):
-        views = coarse if level == 0 else frame.views(level, body, poses)
-        poses, energies = _climbed(body, poses, views, terms, scales, iterations)
-        energies = jnp.where(_well_seen(body, poses, views.cameras), energies, -jnp.inf)
-        best = _different(body, poses, energies, keep)
-        poses, energies = poses[best], energies[best]
-    better = [_better_limbs(body, jnp.roll(poses, -k, axis=0), views, terms, scales) for k in range(len(poses))]
-    poses, energies = (jnp.stack(parts) for parts in zip(*better, strict=True))
-    likely = energies - STRAIN_COST * jnp.abs(energies) * jax.vmap(partial(strain, body.skeleton))(poses)
-    best = _different(body, poses, likely, NUM_FINE)
-    margin = 1.0 if len(best) < 2 else float((likely[best[0]] - likely[best[1]]) / jnp.abs(likely[best[0]]))
-    return FoundPose(poses[best[0]], float(energies[best[0]]), margin)
+@dataclass(frozen=True)
+class Searcher:
+    """What a search for one body needs beside the frame."""
+
+    body: Body
+    kinds: Kinds
+    terms: Sequence[Term]
+    up: str
+
+    @classmethod
+    def of_body(cls, body: Body, terms: Sequence[Term], up: str) -> "Searcher":
+        """For a body in its colours."""
+        return cls(body, kinds_of(np.asarray(body.blob_colors), np.asarray(body.blob_sigmas) ** 2), terms, up)
+
+    @classmethod
+    def of_silhouette(cls, body: Body, terms: Sequence[Term], up: str) -> "Searcher":
+        """For a body of unknown colours, in frames whose background is known."""
+        return cls(body, any_color(body.num_blobs), terms, up)
+
+    @property
+    def scales(self) -> Scales:
+        """Bounds on the steps of climbs."""
+        return pose_scales(self.body.skeleton, largest_angle=LARGEST_ANGLE, largest_translation=LARGEST_TRANSLATION)
+
+    def energy(self, frame: SeenFrame) -> SearchEnergy:
+        """Of poses in a frame."""
+        return SearchEnergy.from_terms(self.body, frame.cameras, self.terms, self.kinds)
 
 
-def strain(skeleton: Skeleton, pose: Float[Array, "dof"]) -> Float[Array, ""]:
-    """How many joints are near the end of their range: each counts from 0 at `STRAINED` of it to 1 at the end."""
-    bound = jnp.where(pose < 0.0, -skeleton.dof_lower, skeleton.dof_upper)
-    part = jnp.abs(pose) / jnp.maximum(bound, NARROWEST)
-    return jnp.sum((jnp.clip(part - STRAINED, 0.0, 1.0 - STRAINED) / (1.0 - STRAINED)) ** 2)
+def search(searcher: Searcher, frame: SeenFrame, count: int = NUM_LAST) -> list[Optimum]:
+    """The best different poses of a body in one frame, best first; none, if nothing looks like it."""
+    found = places(frame, searcher.up, NUM_PLACES)
+    if not found:
+        return []
+    found = [place for place in found if place.score >= POOR * found[0].score] or found[:1]
+    hunt = Hunt.of_places(searcher, frame, np.stack([place.centre for place in found]))
+    tried = _starts(searcher, found)
+    tried = hunt.climbed(_spread_best(searcher.body, hunt.scored(tried)), FIRST_ITERATIONS)
+    tried = _best(searcher.body, tried, NUM_SECOND)
+    for _ in range(2):
+        tried = _best(searcher.body, _with_better_limbs(hunt, tried), NUM_LAST)
+    tried = hunt.climbed(_with_look_alikes(hunt, tried), LAST_ITERATIONS)
+    best = _best(searcher.body, tried, count)
+    return [Optimum(pose, float(value)) for pose, value in zip(best.poses, best.values, strict=True)]
 
 
-def _better_limbs(
-    body: Body, poses: Float[Array, "start dof"], views: Views, terms: Terms, scales: Scales
-) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
-    """The first of some poses with each limb in turn tried as in the named poses and in the others, then climbed.
+@dataclass(frozen=True)
+class Tried:
+    """Poses that were tried, where, and their energies."""
 
-    A limb that lies before the trunk has an optimum of its own: what is right for the rest does not lead it out.
-    """
-    pose = poses[0]
-    for limb in limbs(body.skeleton):
-        variants = with_other_limb(body, pose, limb, poses[1:])
-        climbed, energies = _climbed(body, variants, views, terms, scales, LIMB_ITERATIONS)
-        pose = climbed[jnp.argmax(energies)]
-    climbed, energies = _climbed(body, pose[None], views, terms, scales, FINE_ITERATIONS)
-    return climbed[0], energies[0]
+    poses: Float[np.ndarray, "start dof"]
+    where: Int[np.ndarray, "start"]
+    """The number of the place."""
+    values: Float[np.ndarray, "start"]
 
+    def __getitem__(self, chosen: np.ndarray) -> "Tried":
+        """Some of them."""
+        return Tried(self.poses[chosen], self.where[chosen], self.values[chosen])
 
-def search_poses(bodies: Sequence[Body], frame: FrameViews, terms: Terms, up: str) -> list[FoundPose]:
-    """The poses of several bodies in one frame: the surest is found first, and what it covers is its own."""
-    found: dict[int, FoundPose] = {}
-    while len(found) < len(bodies):
-        open_ones = [k for k in range(len(bodies)) if k not in found]
-        candidates = {k: search_pose(bodies[k], frame, terms, up) for k in open_ones}
-        surest = max(open_ones, key=lambda k: candidates[k].margin)
-        found[surest] = candidates[surest]
-        frame = frame.with_found(bodies[surest], found[surest].pose)
-    return [found[k] for k in range(len(bodies))]
+    @classmethod
+    def of(cls, parts: Sequence["Tried"]) -> "Tried":
+        """All of several."""
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("poses", "where", "values")))
 
 
-def _promising(
-    body: Body, starts: Float[Array, "place start dof"], views: Views, terms: Terms
-) -> Float[Array, "promising dof"]:
-    """The best starts at each place: the best of all are often the same mistake many times."""
-    energies = _energies(body, starts.reshape(-1, starts.shape[-1]), views, terms).reshape(starts.shape[:2])
-    best = jnp.argsort(-energies, axis=1)[:, :NUM_AT_PLACE]
-    return jnp.take_along_axis(starts, best[:, :, None], axis=1).reshape(-1, starts.shape[-1])
+@dataclass(frozen=True)
+class Hunt:
+    """A search at some places of one frame."""
+
+    searcher: Searcher
+    energy: SearchEnergy
+    windows: ColorWindows
+
+    @classmethod
+    def of_places(cls, searcher: Searcher, frame: SeenFrame, centres: Float[np.ndarray, "place 3"]) -> "Hunt":
+        """Always the same number of places, so that one program serves all."""
+        padded = np.pad(centres, ((0, NUM_PLACES - len(centres)), (0, 0)), mode="edge")
+        return cls(searcher, searcher.energy(frame), _windows(frame, jnp.asarray(padded, frame.odds.dtype)))
+
+    def scored(self, tried: Tried) -> Tried:
+        """With their energies."""
+        return Tried(tried.poses, tried.where, scores(self.energy, self.windows, tried.where, tried.poses))
+
+    def climbed(self, tried: Tried, iterations: int) -> Tried:
+        """The tops of the hills that they are on, as far as so many iterations lead."""
+        scales = self.searcher.scales
+        poses, values = climbed(self.energy, self.windows, tried.where, tried.poses, scales, iterations)
+        return Tried(poses, tried.where, values)
 
 
-def _starts(body: Body, views: Views, terms: Terms, up: str) -> Float[Array, "place start dof"]:
-    """Every named pose at every heading, at each of the most promising places."""
-    root = root_position(body, body.poses["rest"])
-    slices = Slices.from_body(body, root, up)
-    places = best_places(slices, views, possible_places(views.cameras, up), terms, NUM_PLACES)
+def _starts(searcher: Searcher, found: Sequence[Place]) -> Tried:
+    """Every named pose in every direction at every place."""
+    body, up = searcher.body, axis_vector(searcher.up)
+    named = [np.asarray(pose) for pose in body.poses.values()]
     headings = np.arange(NUM_HEADINGS) * 2.0 * np.pi / NUM_HEADINGS - np.pi
-    standing = jnp.stack([placed(body, body.poses["rest"], place) for place in places])
-    turned_poses = jnp.stack(
-        [turned(body, pose, float(heading), up) for pose in body.poses.values() for heading in headings]
-    )
-    steps = _centres(body, standing)[:, None, :] - _centres(body, turned_poses)[None, :, :]
-    moves = jnp.einsum("dk,psk->psd", shifts(body), steps, precision="highest")
-    return turned_poses[None, :, :] + moves
+    upright = turned_to(body, named, headings, searcher.up)
+    parts = []
+    for k, place in enumerate(found):
+        directions = _other_verticals(place, up)
+        lying = [turns_with_vertical(body, named, up, direction) for direction in directions]
+        poses = _centred(body, np.concatenate([upright, *lying]), place.centre)
+        parts.append(Tried(poses, np.full(len(poses), k), np.zeros(len(poses))))
+    return Tried.of(parts)
+
+
+def _other_verticals(place: Place, up: Float[np.ndarray, "3"]) -> list[Float[np.ndarray, "3"]]:
+    """In which directions the body's vertical may point there, beside upwards."""
+    along = place.axis if place.axis @ up > 0.0 else -place.axis
+    lying = place.slenderness > SLENDER and along @ up < UPRIGHT
+    return [along, -along] if lying else [-up]
+
+
+def _centred(body: Body, poses: np.ndarray, centre: Float[np.ndarray, "3"]) -> Float[np.ndarray, "start dof"]:
+    """Poses moved so that their centre is at a point."""
+    return (poses + (centre[None] - centres_of(body, poses)) @ np.asarray(shifts(body)).T).astype(poses.dtype)
+
+
+def centres_of(body: Body, poses: Float[np.ndarray, "start dof"]) -> Float[np.ndarray, "start 3"]:
+    """The middle of a body in poses, weighted by area."""
+    areas = np.asarray(body.blob_sigmas) ** 2
+    return np.einsum("sbi,b->si", means_of(body, poses), areas / areas.sum())
 
 
 @eqx.filter_jit
-def _centres(body: Body, poses: Float[Array, "start dof"]) -> Float[Array, "start 3"]:
-    return jax.vmap(lambda pose: body_centre(body, pose))(poses)
+def _windows(frame: SeenFrame, centres: Float[Array, "place 3"]) -> ColorWindows:
+    radius = jnp.asarray(BODY_RADIUS, centres.dtype)
+    return jax.lax.map(lambda centre: frame.windows(centre, radius), centres)
 
 
-@eqx.filter_jit
-def _energies(body: Body, poses: Array, views: Views, terms: Terms) -> Float[Array, "start"]:
-    return jax.lax.map(lambda pose: still_energy(body, pose, views, terms), poses, batch_size=8)
+def _with_better_limbs(hunt: Hunt, tried: Tried) -> Tried:
+    """The poses, and each with one limb held in other ways, climbed if that looks promising."""
+    body, variants, source = hunt.searcher.body, [], []
+    every_limb = limbs(body.skeleton)
+    for k, pose in enumerate(tried.poses):
+        for j, limb in enumerate(every_limb):
+            others = np.concatenate([tried.poses, _drawn(body, limb, NUM_DRAWN)])
+            variants.append(with_other_limb(body, pose, limb, others)[1:])
+            source += [(k, j)] * len(variants[-1])
+    of_pose, of_limb = np.array(source).T
+    scored = hunt.scored(Tried(np.concatenate(variants), tried.where[of_pose], np.zeros(len(of_pose))))
+    chosen = []
+    for k, j in sorted(set(source)):
+        here = np.flatnonzero((of_pose == k) & (of_limb == j))
+        here = here[np.argsort(-scored.values[here])]
+        chosen.extend(
+            here[different(body, scored.poses[here], scored.values[here], LIMBS_TRIED[min(k, 1)], LIMB_APART)]
+        )
+    return hunt.climbed(Tried.of([tried, scored[np.array(chosen)]]), SECOND_ITERATIONS)
 
 
-def _climbed(
-    body: Body, poses: Array, views: Views, terms: Terms, scales: Scales, iterations: int
-) -> tuple[Float[Array, "start dof"], Float[Array, "start"]]:
-    """Every pose climbed and its energy; always the same number at once, so that one program serves all."""
-    count = poses.shape[0]
-    padded = jnp.concatenate([poses, jnp.tile(poses[-1], (-count % AT_ONCE, 1))])
-    parts = [
-        _climbed_together(body, padded[k : k + AT_ONCE], views, terms, scales, jnp.asarray(iterations))
-        for k in range(0, len(padded), AT_ONCE)
-    ]
-    climbed, energies = (jnp.concatenate(part)[:count] for part in zip(*parts, strict=True))
-    return climbed, energies
+def _drawn(body: Body, limb: Int[np.ndarray, "limb"], count: int) -> Float[np.ndarray, "start dof"]:
+    """Poses with a limb held at random within its limits."""
+    lower, upper = np.asarray(body.skeleton.dof_lower), np.asarray(body.skeleton.dof_upper)
+    poses = np.zeros((count, len(lower)), np.float32)
+    poses[:, limb] = np.random.default_rng(0).uniform(lower[limb], upper[limb], (count, len(limb)))
+    return poses
 
 
-@eqx.filter_jit
-def _climbed_together(
-    body: Body, poses: Array, views: Views, terms: Terms, scales: Scales, iterations: Int[Array, ""]
-) -> tuple[Float[Array, "start dof"], Float[Array, "start"]]:
-    solver = ConditionedAscent(max_iterations=iterations)
-
-    def climb(pose: Float[Array, "dof"]) -> tuple[Array, Array]:
-        solution = solver.maximize(lambda p: still_energy(body, p, views, terms), pose, scales)
-        return solution.params, solution.value
-
-    return jax.vmap(climb)(poses)
+def _with_look_alikes(hunt: Hunt, tried: Tried) -> Tried:
+    """The poses, and what looks like the best of them."""
+    others = look_alikes(hunt.searcher.body, tried.poses[0])
+    return Tried.of([tried, Tried(others, np.full(len(others), tried.where[0]), np.zeros(len(others)))])
 
 
-@eqx.filter_jit
-def _well_seen(body: Body, poses: Array, cameras: Camera) -> Bool[Array, "start"]:
-    return well_seen(cameras, _centres(body, poses))
+def _spread_best(body: Body, tried: Tried) -> Tried:
+    """The best at each place, not too many of them nearly the same; more at the better places."""
+    chosen = []
+    for place, count in zip(np.unique(tried.where), NUM_AT_PLACE, strict=False):
+        here = tried[tried.where == place]
+        likely = here[np.argsort(-here.values)[: 8 * count]]
+        chosen.append(_best(body, likely, count))
+    return Tried.of(chosen)
 
 
-def _different(body: Body, poses: Array, energies: Array, count: int) -> np.ndarray:
-    """Which poses are the best `count` that lie `DIFFERENT` from each other, best first."""
-    means = np.asarray(_means(body, poses))
-    left, best = np.argsort(-np.asarray(energies)), []
+def _best(body: Body, tried: Tried, count: int) -> Tried:
+    """The best different ones, best first."""
+    return tried[different(body, tried.poses, tried.values, count)]
+
+
+def different(
+    body: Body, poses: np.ndarray, values: np.ndarray, count: int, apart: float = DIFFERENT
+) -> Int[np.ndarray, "best"]:
+    """Which poses are the best `count` that lie so far (metres) from each other, best first."""
+    means = means_of(body, poses)
+    left, best = np.argsort(-values), []
+    left = left[np.isfinite(values[left])]
     while len(left) and len(best) < count:
         best.append(left[0])
         distances = np.linalg.norm(means[left] - means[left[0]], axis=-1).mean(axis=1)
-        left = left[distances >= DIFFERENT]
-    return np.array(best)
-
-
-@eqx.filter_jit
-def _means(body: Body, poses: Array) -> Float[Array, "start blob 3"]:
-    return jax.vmap(lambda pose: body.posed_blobs(pose).means)(poses)
+        left = left[distances >= apart]
+    return np.array(best, int)

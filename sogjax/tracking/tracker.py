@@ -105,21 +105,26 @@ class Tracker(eqx.Module):
         A camera that is not `present` (None: all are) sees nothing, and the similarity is the mean over the others.
         """
         rgb = cells.astype(self.cameras.intrinsics.dtype) / 255.0
+        odds, boxes = self.reader.odds(rgb), self.boxes(state)
         near_blobs = partial(self.reader.near_blobs, capacity=capacities.near)
-        near, num_near = computed_once(self.reader.true_at_run_time, near_blobs, rgb, self.boxes(state))
+        near, weights, num_near = computed_once(self.reader.true_at_run_time, near_blobs, rgb, odds, boxes)
+        windows = None if odds is None else self.reader.windows(odds, self.cameras, boxes)
         normalizers = self.normalizers
         if present is not None:
             near = eqx.tree_at(lambda sog: sog.mask, near, near.mask & present[:, None])
             num_near = jnp.where(present, num_near, 0)
             normalizers = normalizers * jnp.mean(present, dtype=normalizers.dtype)
+            windows = None if windows is None else windows.of_present(present)
         body_colors = from_rgb(self.body.blob_colors, self.reader.color_space)
         body = eqx.tree_at(lambda sog: sog.colors, self.body.posed_blobs(state.previous), body_colors)
         if self.pairs == "sparse":
-            images, similarities, num_matching = self.reader.compared_blobs(near, body)
+            images, similarities, num_matching = self.reader.compared_blobs(near, weights, body)
         else:
-            images, similarities, num_matching = self.reader.matching_blobs(near, body, capacities.matching)
-        coloring = Coloring(self.reader.color_radius, self.reader.color_space)
-        views = Views(self.cameras, images, similarities, normalizers, coloring=coloring)
+            images, similarities, weights, num_matching = self.reader.matching_blobs(
+                near, weights, body, capacities.matching
+            )
+        coloring = Coloring(self.reader.color_radius, self.reader.color_space, weights)
+        views = Views(self.cameras, images, similarities, normalizers, coloring=coloring, windows=windows)
         return views, num_near, num_matching
 
     def step(

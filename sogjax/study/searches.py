@@ -1,0 +1,155 @@
+"""Searches for first poses in rendered recordings: what was found and said, against the truth."""
+
+import hashlib
+import json
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+from sogjax.data.atomic import atomic_path
+from sogjax.data.recording import Recording
+from sogjax.engine.compiled_programs import forget_programs_if_many
+from sogjax.engine.first_pose import searched_poses
+from sogjax.engine.terminal import say
+from sogjax.errors import InputError
+from sogjax.settings.compose import track_config
+from sogjax.study.found_pose import FoundError, found_error
+from sogjax.study.record import program_digest
+from sogjax.study.source import Source
+from sogjax.study.study import Study
+
+SEARCH_FILES = "engine/first_pose*.py"
+"""Of the program that decide how a search ends, beside those of a run."""
+SURE_MARGIN = 0.005
+"""A pose that does not say itself whether it is sure is taken to be above this margin."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One search: in what it is made."""
+
+    number: int
+    sequence: str
+    synth: dict[str, Any]
+    """Settings of the rendered recording."""
+    cameras: int
+    turn: int
+    """Which camera is the first of those that are taken, evenly, from the ring."""
+    plates: bool
+    frame: int
+
+
+@dataclass(frozen=True)
+class Search:
+    """What was found of one actor in a trial."""
+
+    trial: Trial
+    actor: str
+    error: FoundError | None
+    """None: the search refused to name a pose."""
+    sure: bool
+    confidence: float
+    """What the search says of it; the margin to the next different pose where it says no more."""
+    seconds: float
+    """Of all the trial's actors together, with what had to be compiled."""
+    processor_seconds: float
+    """The same, of all cores together: what other programs do counts less."""
+    refused: str = ""
+
+    @property
+    def is_right(self) -> bool:
+        """Whether the pose is right; a refusal is not."""
+        return self.error is not None and self.error.is_right
+
+
+def drawn_trials(
+    sequences: Mapping[str, Mapping[str, Any]], cameras: Sequence[int], frames: int, count: int, seed: int = 0
+) -> Iterator[Trial]:
+    """So many trials, drawn at random; more of them begin with the same ones."""
+    names = [*sequences]
+    for number in range(count):
+        rng = np.random.default_rng([seed, number])
+        sequence = names[rng.integers(len(names))]
+        yield Trial(
+            number=number,
+            sequence=sequence,
+            synth=dict(sequences[sequence]),
+            cameras=_each_in_turn(cameras, number, seed),
+            turn=int(rng.integers(12)),
+            plates=bool(rng.integers(2)),
+            frame=int(rng.integers(frames)),
+        )
+
+
+def _each_in_turn(values: Sequence[int], number: int, seed: int) -> int:
+    """Each of the values once before any comes again, in an order that is drawn every time."""
+    turn, place = divmod(number, len(values))
+    return int(np.random.default_rng([seed, turn]).permutation(values)[place])
+
+
+@dataclass(frozen=True)
+class Searches:
+    """The folder of a calibration's searches, each of which is made once for a state of the program."""
+
+    study: Study
+    overrides: Sequence[str] = ()
+    """Of the track config."""
+
+    def of(self, trial: Trial, do: bool = True) -> list[Search]:
+        """What was found of every actor in a trial: read, or searched for now, if `do`."""
+        path = self._path(trial)
+        if path.is_file():
+            return [_read(each) for each in json.loads(path.read_text(encoding="utf-8"))]
+        if not do:
+            return []
+        found = self._made(trial)
+        with atomic_path(path) as temporary:
+            temporary.write_text(json.dumps([asdict(each) for each in found]), encoding="utf-8")
+        return found
+
+    def _made(self, trial: Trial) -> list[Search]:
+        source = self.study.source(trial.synth)
+        recording = seen_in(source, trial)
+        config = track_config(self.overrides, recording=source.path)
+        forget_programs_if_many()
+        names = [body.name for body in source.bodies]
+        say(f"{trial.number}: {trial.sequence}, {trial.cameras} cameras, frame {trial.frame}, plates: {trial.plates}")
+        begin, begin_processor = time.perf_counter(), time.process_time()
+        try:
+            found, refused = jax.block_until_ready(searched_poses(recording, source.bodies, config, trial.frame)), ""
+        except InputError as error:
+            found, refused = None, str(error).splitlines()[0]
+        took = time.perf_counter() - begin, time.process_time() - begin_processor
+        if found is None:
+            return [Search(trial, name, None, False, 0.0, *took, refused) for name in names]
+        searches = []
+        for body, pose in zip(source.bodies, found, strict=True):
+            error = found_error(body, np.asarray(pose.pose), source.truth, trial.frame + recording.first_frame)
+            confidence = float(getattr(pose, "confidence", getattr(pose, "margin", np.nan)))
+            sure = bool(getattr(pose, "sure", confidence >= SURE_MARGIN))
+            searches.append(Search(trial, body.name, error, sure, confidence, *took))
+        return searches
+
+    def _path(self, trial: Trial) -> Path:
+        content = [program_digest(SEARCH_FILES), asdict(trial), [*self.overrides], self.study.body]
+        key = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
+        return self.study.folder / "searches" / f"{key}.json"
+
+
+def seen_in(source: Source, trial: Trial) -> Recording:
+    """The recording of a trial, with its cameras, and with plates or without."""
+    names = source.recording.rig.names
+    places = sorted((trial.turn + k * len(names) // trial.cameras) % len(names) for k in range(trial.cameras))
+    recording = source.seen_by([names[place] for place in places])
+    return recording if trial.plates else replace(recording, background={})
+
+
+def _read(content: Mapping[str, Any]) -> Search:
+    error = content["error"]
+    parts = {"trial": Trial(**content["trial"]), "error": None if error is None else FoundError(**error)}
+    return Search(**{**content, **parts})

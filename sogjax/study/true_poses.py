@@ -1,0 +1,93 @@
+"""The poses of an actor's own skeleton that lie nearest to the truth of a recording."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from sogjax.data.ground_truth import GroundTruth
+from sogjax.data.motion import Motion, motion_from_poses
+from sogjax.errors import InputError
+from sogjax.evaluation.bone_lengths import landmark_named
+from sogjax.model.body import Attachments, Body
+from sogjax.tracking.initial_pose import MIN_LANDMARKS, fit_landmarks
+
+Points = Float[np.ndarray, "frame point 3"]
+Poses = Float[np.ndarray, "frame dof"]
+
+
+def true_poses(body: Body, truth: GroundTruth, up: str) -> Poses:
+    """Poses of a body (upright in the recording's world) for the truth of its subject; NaN where too little is known.
+
+    The truth's joints that are landmarks of the body are fitted first. Its other points (markers, and joints that the
+    body does not have) are then fixed to the body where they lie on average over the frames, and all are fitted.
+
+    Raises:
+        InputError: the truth and the body have fewer than four points in common.
+    """
+    points, names = known_points(truth)
+    common = [k for k, name in enumerate(names) if name in body.landmarks.names]
+    if len(common) < MIN_LANDMARKS:
+        raise InputError(
+            f"the truth's joints ({', '.join(truth.joint_names)}) have {len(common)} names in common with the "
+            f"landmarks of {body.name!r}; name at least {MIN_LANDMARKS} of them alike"
+        )
+    poses = _followed(body, up, points[:, common], [names[k] for k in common])
+    others = [k for k in range(len(names)) if k not in common and np.isfinite(points[:, k]).any()]
+    if not others:
+        return poses
+    marked = _with_landmarks(body, poses, points[:, others], [names[k] for k in others])
+    chosen = [*common, *others]
+    return _followed(marked, up, points[:, chosen], [names[k] for k in chosen])
+
+
+def known_points(truth: GroundTruth) -> tuple[Points, list[str]]:
+    """The truth's joints and markers with their names, those of joints as a body writes them."""
+    parts, names = [], []
+    if truth.joints is not None:
+        parts.append(truth.joints)
+        names += [landmark_named(name) for name in truth.joint_names]
+    if truth.markers is not None:
+        parts.append(truth.markers)
+        names += [f"marker {name}" for name in truth.marker_names]
+    return np.concatenate(parts, axis=1), names
+
+
+def _followed(body: Body, up: str, points: Points, names: Sequence[str]) -> Poses:
+    """The pose of every frame, fitted from that of the frame before; from all headings where there is none."""
+    poses = np.full((len(points), body.skeleton.num_dofs), np.nan)
+    for k, of_frame in enumerate(points):
+        known = np.flatnonzero(np.isfinite(of_frame).all(axis=1)).tolist()
+        if len(known) < MIN_LANDMARKS:
+            continue
+        landmarks = {names[i]: (float(x), float(y), float(z)) for i in known for x, y, z in [of_frame[i]]}
+        follows = k > 0 and bool(np.isfinite(poses[k - 1]).all())
+        start = jnp.asarray(poses[k - 1], body.skeleton.offsets.dtype) if follows else body.poses["rest"]
+        poses[k] = fit_landmarks(body, up, start, landmarks, keep_heading=follows)
+    return poses
+
+
+def _with_landmarks(body: Body, poses: Poses, points: Points, names: Sequence[str]) -> Body:
+    """The body with further landmarks, each fixed to the joint of the blob nearest to it, at its usual place."""
+    seen = np.isfinite(poses).all(axis=1)
+    motion = motion_from_poses(body, poses[seen], 1.0)
+    found = [_attached(motion, points[seen, k]) for k in range(len(names))]
+    old = body.landmarks
+    landmarks = Attachments(
+        names=(*old.names, *names),
+        joints=(*old.joints, *(joint for joint, _ in found)),
+        offsets=jnp.concatenate([old.offsets, jnp.asarray([offset for _, offset in found], old.offsets.dtype)]),
+    )
+    return replace(body, landmarks=landmarks)
+
+
+def _attached(motion: Motion, points: Float[np.ndarray, "frame 3"]) -> tuple[int, Float[np.ndarray, "3"]]:
+    """The joint that a point moves with, and where in its frame the point lies (metres)."""
+    present = np.isfinite(points).all(axis=1)
+    distances = np.linalg.norm(motion.blob_means[present] - points[present, None], axis=-1) / motion.blob_sigma
+    joint = int(motion.blob_joint[distances.mean(axis=0).argmin()])
+    frames = motion.world_from_joint[present, joint]
+    inside = np.einsum("tji,tj->ti", frames[:, :3, :3], points[present] - frames[:, :3, 3])
+    return joint, np.median(inside, axis=0)

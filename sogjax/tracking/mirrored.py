@@ -1,0 +1,111 @@
+"""Poses that look alike: back to front, or with limbs exchanged."""
+
+from functools import partial
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from sogjax.model.body import Body
+from sogjax.tracking.limbs import limbs
+
+SIDES = (("left", "right"), ("Left", "Right"), ("l_", "r_"), ("L_", "R_"))
+"""Beginnings or parts of names that tell the two sides."""
+ITERATIONS = 30
+POSED_AT_ONCE = 64
+POSE_SPREAD = 0.05
+"""Metres that a radian from the start counts as, in a fit to points."""
+
+
+def other_side(names: tuple[str, ...]) -> Int[np.ndarray, "name"]:
+    """For each name the index of its counterpart on the other side; itself, where it has none."""
+    index = {name: k for k, name in enumerate(names)}
+    return np.array([index.get(_exchanged(name), k) for k, name in enumerate(names)], int)
+
+
+def _exchanged(name: str) -> str:
+    for left, right in SIDES:
+        if left in name:
+            return name.replace(left, right)
+        if right in name:
+            return name.replace(right, left)
+    return name
+
+
+def look_alikes(body: Body, pose: Float[np.ndarray, "dof"]) -> Float[np.ndarray, "other dof"]:
+    """Poses whose silhouettes are nearly that of a pose.
+
+    Half turned with the sides exchanged, with one pair of limbs exchanged, and with all but one pair.
+    """
+    blobs = other_side(body.blobs.names)
+    means = means_of(body, pose[None])[0]
+    if np.all(blobs == np.arange(len(blobs))):
+        return pose[None][:0]
+    exchanged = [np.arange(len(blobs))]
+    for pair in _limb_pairs(body):
+        exchanged += [pair, np.setdiff1d(np.arange(len(blobs)), pair)]
+    targets = np.repeat(means[None], len(exchanged), axis=0)
+    for target, which in zip(targets, exchanged, strict=True):
+        target[which] = means[blobs[which]]
+    starts = np.stack([pose, pose[other_side(body.skeleton.dof_names)]])
+    fitted, costs = _fitted(
+        body, jnp.asarray(np.tile(starts, (len(targets), 1))), jnp.asarray(np.repeat(targets, 2, axis=0))
+    )
+    better = np.asarray(costs).reshape(-1, 2).argmin(axis=1)
+    return np.asarray(fitted).reshape(-1, 2, len(pose))[np.arange(len(better)), better]
+
+
+def _limb_pairs(body: Body) -> list[Int[np.ndarray, "blob"]]:
+    """The blobs of each pair of limbs that are each other's counterpart."""
+    dofs = other_side(body.skeleton.dof_names)
+    used = np.asarray(body.skeleton.parameter_transform) != 0.0
+    found = []
+    for limb in limbs(body.skeleton):
+        if np.all(dofs[limb] == limb) or limb.min() > dofs[limb].min():
+            continue
+        both = np.concatenate([limb, dofs[limb]])
+        joints = {int(j) for j in np.flatnonzero(used[:, both].any(axis=1))}
+        found.append(np.array([b for b, joint in enumerate(body.blobs.joints) if joint in joints], int))
+    return found
+
+
+def means_of(body: Body, poses: Float[np.ndarray, "start dof"]) -> Float[np.ndarray, "start blob 3"]:
+    """The blobs of a body in poses (metres, world)."""
+    size = POSED_AT_ONCE
+    padded = np.concatenate([poses, np.repeat(poses[-1:], -len(poses) % size, axis=0)])
+    parts = [np.asarray(_means(body, jnp.asarray(padded[k : k + size]))) for k in range(0, len(poses), size)]
+    return np.concatenate(parts)[: len(poses)]
+
+
+@eqx.filter_jit
+def _means(body: Body, poses: Array) -> Float[Array, "start blob 3"]:
+    return jax.vmap(lambda pose: body.posed_blobs(pose).means)(poses)
+
+
+@eqx.filter_jit
+def _fitted(
+    body: Body, starts: Float[Array, "start dof"], targets: Float[Array, "start blob 3"]
+) -> tuple[Float[Array, "start dof"], Float[Array, "start"]]:
+    """Poses whose blobs lie near some points, and how far off they are (metres, root of the mean square)."""
+    return jax.vmap(partial(_fit, body))(starts, targets)
+
+
+def _fit(body: Body, start: Array, target: Array) -> tuple[Array, Array]:
+    lower, upper = body.skeleton.dof_lower, body.skeleton.dof_upper
+
+    def step(_: Array, pose: Array) -> Array:
+        frames = body.skeleton.world_from_joint(pose)
+        means = body.blobs.points_world(frames)
+        jacobian = body.skeleton.point_jacobian(frames, body.blobs.joints, means).reshape(-1, pose.shape[0])
+        curvature = jnp.matmul(jacobian.T, jacobian, precision="highest")
+        curvature = curvature + POSE_SPREAD**2 * jnp.eye(pose.shape[0], dtype=pose.dtype)
+        pull = jnp.matmul(jacobian.T, (target - means).reshape(-1), precision="highest")
+        move = jnp.linalg.solve(curvature, pull)
+        move = move / jnp.maximum(jnp.max(jnp.abs(move)) / 0.5, 1.0)
+        return jnp.clip(pose + move, lower, upper)
+
+    pose = jax.lax.fori_loop(0, ITERATIONS, step, start)
+    off = body.blobs.points_world(body.skeleton.world_from_joint(pose)) - target
+    return pose, jnp.sqrt(jnp.mean(jnp.sum(off * off, axis=-1)))
