@@ -1,6 +1,6 @@
-"""The masks of an example pose: from files, else from pictures of the empty scene, without wrong ones."""
+"""The masks of an example pose: from files, else from the empty scene, without wrong ones."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,11 +12,12 @@ from sogjax.data.recording import ExamplePose, Recording
 from sogjax.data.video import read_still
 from sogjax.errors import InputError
 from sogjax.images.agreement import AGREEING, disagreeing_cameras, hull_coverage
+from sogjax.images.background import CameraBackground
 from sogjax.images.segmentation import masks_from_plates
 from sogjax.model.frames import axis_vector
 from sogjax.sentences import counted
 
-FROM_FILE, FROM_PLATE = "file", "plate"
+FROM_FILE, FROM_PLATE, FROM_CLIP = "file", "plate", "background from the clip"
 
 Mask = Bool[np.ndarray, "_h _w"]
 
@@ -27,7 +28,7 @@ class ExampleMasks:
 
     masks: dict[int, Mask]
     origins: dict[int, str]
-    """`FROM_FILE` or `FROM_PLATE`, of masks that are left out too."""
+    """`FROM_FILE`, `FROM_PLATE` or `FROM_CLIP`, of masks that are left out too."""
     left_out: dict[int, Mask]
     """Masks that do not agree with the others."""
     warnings: tuple[str, ...]
@@ -35,23 +36,40 @@ class ExampleMasks:
 
 
 def example_masks(
-    recording: Recording, example: ExamplePose, images: Mapping[int, UInt8[np.ndarray, "_h _w 3"]]
+    recording: Recording,
+    example: ExamplePose,
+    images: Mapping[int, UInt8[np.ndarray, "_h _w 3"]],
+    learnt: Sequence[CameraBackground] | None = None,
 ) -> ExampleMasks:
-    """Find the masks of one example pose; `images` has the pictures of all its cameras.
+    """Find the masks of one example pose.
+
+    Args:
+        recording: that has the example.
+        example: the example pose.
+        images: the pictures of all its cameras.
+        learnt: the background of all cameras of the recording, for those without a picture of the empty scene.
+
+    A camera with neither a mask nor a picture of the empty scene is given the background that was learnt from the clip.
 
     Raises:
         InputError: fewer than two cameras have a picture with a mask or a plate; a mask that is empty or full.
     """
     names = recording.rig.names
     files = {camera: _checked_mask(example.masks[names[camera]]) for camera in images if names[camera] in example.masks}
-    plates = {
+    photographed = {
         camera: read_still(recording, names[camera], recording.background[names[camera]])
         for camera in images
         if camera not in files and names[camera] in recording.background
     }
+    from_clip = {
+        camera: learnt[camera] for camera in images if learnt and camera not in files and camera not in photographed
+    }
+    plates = photographed | {camera: background.picture for camera, background in from_clip.items()}
+    unknown = {camera: ~background.known for camera, background in from_clip.items()}
     _check_count(recording, example, len(images), [*files, *plates])
     cameras = {camera: recording.rig.camera(names[camera]) for camera in images}
-    made = masks_from_plates(images, plates, files, cameras, axis_vector(recording.up)) if plates else {}
+    up = axis_vector(recording.up)
+    made = masks_from_plates(images, plates, files, cameras, up, unknown) if plates else {}
     found = dict(sorted({**files, **made}.items()))
     _check_found(recording, example, list(found), [camera for camera in plates if camera not in made])
     wrong = disagreeing_cameras(found, cameras)
@@ -66,7 +84,7 @@ def example_masks(
         )
     return ExampleMasks(
         masks=masks,
-        origins={camera: FROM_FILE if camera in files else FROM_PLATE for camera in found},
+        origins={k: FROM_FILE if k in files else FROM_CLIP if k in from_clip else FROM_PLATE for k in found},
         left_out={camera: found[camera] for camera in wrong},
         warnings=tuple(warnings),
     )
@@ -89,7 +107,8 @@ def _check_count(recording: Recording, example: ExamplePose, num_images: int, us
             f"{where} has pictures of {num_images} of the cameras {', '.join(recording.rig.names)}; "
             "give CAMERA.jpg of at least two, or remove the pose"
         )
-    missing = [name for k, name in enumerate(recording.rig.names) if name in example.images and k not in usable]
+    shown = recording.rig.names if example.frame is not None else example.images
+    missing = [name for k, name in enumerate(recording.rig.names) if name in shown and k not in usable]
     raise InputError(
         f"{where} has {counted(len(usable), 'picture')} with a mask or an empty background picture, and at least two "
         f"are needed; add CAMERA.mask.png (white = subject) beside the pictures, or the empty scene as "
@@ -116,7 +135,8 @@ def _unlike(example: ExamplePose, camera: str, share: float) -> str:
 
 
 def _no_subject(recording: Recording, example: ExamplePose, camera: str) -> str:
+    empty = recording.background.get(camera, "the background learnt from the clip")
     return (
-        f"example pose {example.name!r}: {camera} is left out, since no subject can be told apart from "
-        f"{recording.background[camera]}; give {camera}.mask.png"
+        f"example pose {example.name!r}: {camera} is left out, since no subject can be told apart from {empty}; "
+        f"give {camera}.mask.png"
     )

@@ -1,6 +1,7 @@
 """The pose of an example picture set, from the masks alone: place, heading and named pose, then refined."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -12,8 +13,9 @@ from sogjax.energy.frame_energy import still_energy
 from sogjax.energy.term import Terms
 from sogjax.energy.views import Views
 from sogjax.model.body import Body
+from sogjax.model.frames import world_from_upright
 from sogjax.solve import ConditionedAscent, Scales
-from sogjax.tracking.initial_pose import centred, turned
+from sogjax.tracking.initial_pose import centred, root_rotation, turned
 from sogjax.tracking.scales import pose_scales
 
 NUM_HEADINGS = 16
@@ -36,27 +38,47 @@ def starts_at(
     )
 
 
-def pose_from_silhouettes(
-    body: Body, views: Views, starts: Float[Array, "heading named dof"], terms: Terms
-) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
-    """The best pose by Eq. 9 and its energy.
+class Candidate(NamedTuple):
+    """A pose that fits, and how well (Eq. 9)."""
+
+    pose: Float[Array, "dof"]
+    energy: float
+
+
+def poses_from_silhouettes(
+    body: Body, views: Views, starts: Float[Array, "heading named dof"], terms: Terms, up: str
+) -> list[Candidate]:
+    """The best pose by Eq. 9, and after it the best of those that face the other way, if any was tried.
 
     Every named pose is climbed from the heading that suits it best and from the opposite one, since silhouettes hardly
-    tell front from back; the best few are climbed to the end. A single start is climbed to the end at once.
+    tell front from back; the best few of each way are climbed to the end. A single start is climbed to the end at once.
     """
     scales = pose_scales(body.skeleton)
     refined = lambda pose, iterations: _refined(body, pose, views, terms, scales, jnp.asarray(iterations))
+    candidate = lambda pose, iterations: Candidate((found := refined(pose, iterations))[0], float(found[1]))
     num_headings, num_named, num_dofs = starts.shape
-    candidates = starts.reshape(-1, num_dofs)
-    if len(candidates) > 1:
-        promise = _energies(body, candidates, views, terms).reshape(num_headings, num_named)
-        heading = jnp.argmax(promise, axis=0)
-        opposite = (heading + num_headings // 2) % num_headings
-        named = jnp.arange(num_named)
-        candidates = jnp.concatenate([starts[heading, named], starts[opposite, named]])
-        coarse = sorted((refined(pose, COARSE_ITERATIONS) for pose in candidates), key=lambda found: -float(found[1]))
-        candidates = [pose for pose, _ in coarse[:NUM_FINE]]
-    return max((refined(pose, FINE_ITERATIONS) for pose in candidates), key=lambda found: float(found[1]))
+    if num_headings * num_named == 1:
+        return [candidate(starts.reshape(num_dofs), FINE_ITERATIONS)]
+    promise = _energies(body, starts.reshape(-1, num_dofs), views, terms).reshape(num_headings, num_named)
+    heading = jnp.argmax(promise, axis=0)
+    opposite = (heading + num_headings // 2) % num_headings
+    named = jnp.arange(num_named)
+    tried = jnp.concatenate([starts[heading, named], starts[opposite, named]])
+    coarse = sorted((candidate(pose, COARSE_ITERATIONS) for pose in tried), key=lambda found: -found.energy)
+    like = [np.dot(forward(body, found.pose, up), forward(body, coarse[0].pose, up)) > 0.0 for found in coarse]
+    ways = [[found for found, same in zip(coarse, like, strict=True) if same == way] for way in (True, False)]
+    best = [
+        max((candidate(found.pose, FINE_ITERATIONS) for found in way[:NUM_FINE]), key=lambda c: c.energy)
+        for way in ways
+        if way
+    ]
+    return sorted(best, key=lambda found: -found.energy)
+
+
+def forward(body: Body, pose: Float[Array, "dof"], up: str) -> Float[np.ndarray, "3"]:
+    """Where the body's trunk faces (world); `body` stands upright in a world of vertical `up`."""
+    turn = root_rotation(body, pose) @ root_rotation(body, body.poses["rest"]).T
+    return turn @ world_from_upright(up)[:, 0]
 
 
 @eqx.filter_jit

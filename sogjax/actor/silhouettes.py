@@ -13,9 +13,10 @@ from jaxtyping import Array, Bool, Float, UInt8
 
 from sogjax.actor.example_masks import example_masks
 from sogjax.data.recording import ExamplePose, Recording
-from sogjax.data.video import read_still
+from sogjax.data.video import read_frames, read_still
 from sogjax.energy.views import Views, whole_image_overlap
 from sogjax.errors import InputError
+from sogjax.images.background import CameraBackground
 from sogjax.images.cells import CellGrid, stack_cells
 from sogjax.images.quadtree import Candidates, keep_blobs, quadtree
 from sogjax.model.camera import Camera
@@ -43,7 +44,10 @@ class PosedPictures:
 
 
 def load_pictures(
-    recording: Recording, example: ExamplePose, report: Callable[[str], None] = lambda _: None
+    recording: Recording,
+    example: ExamplePose,
+    report: Callable[[str], None] = lambda _: None,
+    learnt: Sequence[CameraBackground] | None = None,
 ) -> PosedPictures:
     """The pictures of an example pose that have masks, or for which masks can be made (`example_masks`).
 
@@ -52,7 +56,7 @@ def load_pictures(
             picture of another size.
     """
     images = load_images(recording, example)
-    masks = example_masks(recording, example, images)
+    masks = example_masks(recording, example, images, learnt)
     for warning in masks.warnings:
         report(f"warning: {warning}")
     return PosedPictures(example.name, {k: images[k] for k in masks.masks}, masks.masks, masks.warnings)
@@ -62,8 +66,11 @@ def load_images(recording: Recording, example: ExamplePose) -> dict[int, UInt8[n
     """All pictures (BGR) of an example pose, by camera (its index in the rig).
 
     Raises:
-        InputError: a picture of another size than the calibration's.
+        InputError: a picture of another size than the calibration's, or a video that cannot be read.
     """
+    if example.frame is not None:
+        shown = next(iter(read_frames(recording, example.frame, example.frame + 1)))
+        return {k: image for k, image in enumerate(shown) if image is not None}
     cameras = [(k, name) for k, name in enumerate(recording.rig.names) if name in example.images]
     with ThreadPoolExecutor() as pool:
         images = list(pool.map(lambda camera: read_still(recording, camera[1], example.images[camera[1]]), cameras))
