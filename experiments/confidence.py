@@ -13,7 +13,7 @@ import numpy as np
 from sogjax.settings import OutputsConfig
 from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from
-from sogjax.study.settings import ReportConfig
+from sogjax.study.settings import USUAL_FRAMES, ReportConfig
 from sogjax.study.stated_errors import StatedErrors, calibrated_temperature, stated_errors
 from sogjax.study.study import Study
 
@@ -24,7 +24,7 @@ class Settings:
 
     calibrate: list[str] = field(default_factory=lambda: ReportConfig().recordings[:1])
     check: list[str] = field(default_factory=lambda: ReportConfig().recordings[1:])
-    frames: int = ReportConfig().frames
+    frames: int = USUAL_FRAMES
     out: str = ReportConfig().out
     """Where actors and cells are kept."""
 

@@ -19,7 +19,7 @@ from sogjax.data.video import read_frames
 from sogjax.errors import InputError
 from sogjax.study.experiment import Experiment
 from sogjax.study.script import run_script, settings_from
-from sogjax.study.settings import ReportConfig
+from sogjax.study.settings import USUAL_FRAMES, ReportConfig
 from sogjax.study.side_by_side import of_experiment
 from sogjax.study.study import Study
 from sogjax.view.rerun import write_comparison
@@ -33,7 +33,7 @@ class Settings:
     sweep: str = ""
     """Folder of a sweep, whose members are shown instead."""
     recording: str = ReportConfig().recordings[0]
-    frames: int = ReportConfig().frames
+    frames: int = USUAL_FRAMES
     out: str = ReportConfig().out
     to: str = "side_by_side.rrd"
 

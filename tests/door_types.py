@@ -5,7 +5,7 @@ from typing import assert_type
 import sogjax
 from sogjax.data.ground_truth import GroundTruth
 from sogjax.evaluation import Evaluation, GroupEvaluation
-from sogjax.tracking.pose_search import FoundPose
+from sogjax.tracking.found_pose import FoundPose
 
 
 def one_actor(path: str) -> None:

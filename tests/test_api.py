@@ -22,7 +22,7 @@ from sogjax.api import tracking
 from sogjax.app.config.composition import composed
 from sogjax.engine.recordings import upright
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.pose_search import FoundPose
+from sogjax.tracking.found_pose import FoundPose
 
 ROOT = Path(__file__).parents[1]
 HEAVY = ("jax", "numpy", "cv2", "rerun", "hydra", "omegaconf", "yaml")
@@ -144,7 +144,7 @@ def test_a_first_pose_is_searched_for_in_the_first_frame_to_track(recording, act
 
     def searched(recording, bodies, config, frame, terms):
         asked.append((recording.rig.names, [body.name for body in bodies], frame))
-        return [FoundPose(body.poses["rest"], 1.0, 0.1) for body in bodies]
+        return [FoundPose(body.poses["rest"], 1.0, 0.1, True, 1.0) for body in bodies]
 
     monkeypatch.setattr(tracking, "searched_poses", searched)
     cameras = recording.rig.names[1:]

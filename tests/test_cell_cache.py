@@ -170,4 +170,5 @@ def test_a_cache_that_is_a_file_is_refused(capsys, tmp_path):
     (tmp_path / "cells").write_text("")
     walk = trackable(tmp_path / "walk")
     words = (f"actor={actor_file(tmp_path / 'a.yaml')}", f"images.cache={tmp_path / 'cells'}", f"out={tmp_path / 'o'}")
+    words = (*words, "images.background=none")
     assert "no folder can be made there" in refused(capsys, "track", f"recording={walk}", *words)

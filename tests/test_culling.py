@@ -12,6 +12,8 @@ from rig_cases import ring_rig
 from sogjax.energy.similarity import similarity_among
 from sogjax.energy.views import Views
 from sogjax.errors import InputError
+from sogjax.images.background_cells import BackgroundCells
+from sogjax.images.foreground import EmptyScene
 from sogjax.images.quadtree import keep_blobs
 from sogjax.model.body import concatenate
 from sogjax.model.camera import project
@@ -91,18 +93,37 @@ def test_counts_are_true_ones_whatever_the_capacity(scene):
     assert int(matching.min()) > 8
 
 
-def test_blobs_of_the_plate_are_left_out(scene):
-    """The plate is the picture itself, but for one quarter: only leaves there are left."""
+def test_blobs_of_the_background_are_left_out_and_others_weighted(scene):
+    """The background is the picture itself, but for one quarter, and another in which it is unknown."""
     tracker, cells, _ = scene
     rgb = cells.astype(jnp.float32) / 255.0
-    leaves_of = eqx.filter_jit(lambda reader, rgb: reader.leaves(rgb))
-    all_cells = eqx.tree_at(lambda r: r.color_tolerance, tracker.reader, jnp.asarray(-1.0))
-    colors, leaves = leaves_of(all_cells, rgb)
-    plate = np.array(colors)
-    corner = np.asarray(tracker.reader.candidates.means < jnp.array([[[80.0, 60.0]]])).all(axis=-1)
-    plate[corner] += 1.0
-    with_plate = eqx.tree_at(lambda r: r.plate_colors, all_cells, jnp.asarray(plate), is_leaf=lambda leaf: leaf is None)
-    np.testing.assert_array_equal(leaves_of(with_plate, rgb)[1], np.asarray(leaves) & corner)
+    rows, columns = rgb.shape[1] // 2, rgb.shape[2] // 2
+    background = BackgroundCells(
+        cells.at[:, :rows, :columns, 0].set(jnp.where(cells[:, :rows, :columns, 0] > 127, 20, 220)),
+        jnp.zeros(rgb.shape[:3]),
+        jnp.ones(rgb.shape[:3], bool).at[:, rows:, columns:].set(False),
+    )
+    reader = eqx.tree_at(
+        lambda r: (r.color_tolerance, r.empty),
+        tracker.reader,
+        (jnp.asarray(-1.0), EmptyScene.from_background(background)),
+        is_leaf=lambda leaf: leaf is None,
+    )
+    _, leaves = eqx.filter_jit(lambda reader, rgb: reader.leaves(rgb))(reader, rgb)
+    shape = reader.candidates.shape
+    of_cells = np.asarray(leaves)[:, : shape[0] * shape[1]].reshape(-1, *shape)
+    assert of_cells[:, :rows, :columns].mean() > 0.9
+    assert of_cells[:, rows : rgb.shape[1], columns : rgb.shape[2]].mean() > 0.9
+    assert not of_cells[:, rows:, :columns].any()
+    assert not of_cells[:, :rows, columns:].any()
+    everywhere = jnp.tile(jnp.array([[-1e4, -1e4], [1e4, 1e4]]), (rgb.shape[0], 1, 1, 1))
+    near, weights, counts = eqx.filter_jit(
+        lambda reader, rgb: reader.near_blobs(rgb, reader.odds(rgb), everywhere, 2048)
+    )(reader, rgb)
+    assert counts.tolist() == np.asarray(leaves).sum(axis=1).tolist()
+    weights = np.asarray(weights)[np.asarray(near.mask)]
+    assert (weights > 0.0).all()
+    assert weights.max() == 1.0
 
 
 @pytest.mark.slow

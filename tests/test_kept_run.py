@@ -15,7 +15,7 @@ from sogjax.errors import InputError
 def kept(tmp_path):
     run = KeptRun(tmp_path)
     run.keep_actors([load_body(actor_file(tmp_path / "a.yaml"))])
-    run.keep_start(jnp.linspace(-1.0, 1.0, 5))
+    run.keep_start(jnp.linspace(-1.0, 1.0, 5), 0)
     return run
 
 

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from motion_cases import points_on, walking_motion
 
 from sogjax.data.ground_truth import GroundTruth
+from sogjax.errors import InputError
 from sogjax.evaluation.metrics import lost_points, mean_per_frame, mean_per_point, std_per_point, summarize
-from sogjax.evaluation.report import evaluate_motion
+from sogjax.evaluation.report import evaluate_motion, evaluate_motions
 from sogjax.view.plots import plot_per_frame, plot_per_point, write_png
 
 
@@ -52,6 +53,20 @@ def test_a_point_is_lost_from_five_far_frames_on():
     lost = lost_points(errors, ("four", "five", "six"), np.arange(100, 120))
     assert [(p.name, p.first_frame, p.last_frame) for p in lost] == [("five", 103, 107), ("six", 110, 116)]
     assert lost[1].mean == pytest.approx(0.3)
+
+
+def test_only_labelled_frames_are_compared_and_their_number_is_said():
+    motion = walking_motion(num_frames=6)
+    joints = np.full((6, 1, 3), np.nan)
+    joints[[1, 4], 0] = motion.world_from_joint[[1, 4], 6, :3, 3] + [0.0, 0.03, 0.04]
+    truth = GroundTruth(motion.fps, joints=joints, joint_names=("left_elbow",))
+    found = evaluate_motions({"ann": motion}, truth).evaluations["ann"]
+    assert found.summary.mean == pytest.approx(0.05)
+    assert (found.num_labelled, found.as_dict()["num_labelled_frames"]) == (2, 2)
+    assert "6 frames, 0 to 5, of which 2 are labelled" in found.table()
+    truth.joints = np.full((6, 1, 3), np.nan)
+    with pytest.raises(InputError, match="knows no point in the motion's frames 0 to 5"):
+        evaluate_motions({"ann": motion}, truth)
 
 
 def test_json_and_table_tell_millimetres(tmp_path):

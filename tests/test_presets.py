@@ -54,7 +54,7 @@ def test_every_number_of_the_paper_reaches_the_tracker(recording, tmp_path):
     found = fields(tracker.reader, "color_radius", "color_tolerance")
     assert found == numbers(color_radius=0.15, color_tolerance=0.15)
     assert (tracker.reader.color_space, tracker.reader.box_around) == ("hsv", "last")
-    assert tracker.reader.plate_colors is None
+    assert tracker.reader.empty is None
     assert float(tracker.extrapolation) == 0.5
     assert tracker.pairs == "dense"
     # Pictures as large as the paper's: 162 x 121.5 cells of 8 pixels.
@@ -65,8 +65,8 @@ def test_every_number_of_the_paper_reaches_the_tracker(recording, tmp_path):
 def test_the_paper_uses_no_plates_where_there_are_some(recording, tmp_path):
     plates = {name: file for name in recording.rig.names for file in [still(tmp_path / f"{name}.png")]}
     recording = replace(recording, background=plates)
-    assert tracker_of(recording, tmp_path).reader.plate_colors is not None
-    assert tracker_of(recording, tmp_path, "preset=paper").reader.plate_colors is None
+    assert tracker_of(recording, tmp_path).reader.empty is not None
+    assert tracker_of(recording, tmp_path, "preset=paper").reader.empty is None
 
 
 def still(path):
@@ -79,7 +79,7 @@ def test_what_is_named_counts_more_than_a_preset():
     named = track_config([*words, "solver=lbfgs", "energy=uncapped", "images=grid", "energy.limit_weight=2"])
     assert (named.solver.method, named.energy.capped, named.images.depth) == ("lbfgs", False, 7)
     assert (named.energy.limit_weight, named.energy.overlap_exponent) == (2.0, "printed")
-    assert (named.images.use_plates, named.color.space) == (False, "hsv")
+    assert (named.images.background, named.color.space) == ("none", "hsv")
     assert track_config(preset="paper", energy={"limit_weight": 2.0}, recording="x").solver.epsilon == 0.002
 
 

@@ -15,6 +15,7 @@ from small_recording import (
     write_video,
 )
 
+from sogjax.actor.silhouettes import load_images
 from sogjax.data.recording import open_recording
 from sogjax.errors import InputError
 
@@ -143,6 +144,31 @@ def test_example_poses_and_backgrounds(folder):
     assert (pose.name, pose.actor) == ("tpose", "Ann")
     assert pose.initial_pose is not None
     assert pose.initial_pose.position == (1.0, 2.0, 3.0)
+
+
+def test_frames_of_the_videos_are_example_poses(folder):
+    settings(folder, "up: z\nfirst_frame: 1\nexample_poses: [1, {frame: 3, actor: Ann}]\n")
+    recording = open_recording(folder)
+    assert [(pose.name, pose.frame, pose.actor) for pose in recording.example_poses] == [
+        ("frame_1", 0, None),
+        ("frame_3", 2, "Ann"),
+    ]
+    assert load_images(recording, recording.example_poses[1]).keys() == {0, 1}
+
+
+@pytest.mark.parametrize(
+    ("entry", "parts"),
+    [
+        ("[0]", ["no frame 0", "1 to"]),
+        ("[1, {frame: 1}]", ["example_poses[1]", "once"]),
+        ("[1.5]", ["example_poses[0]", "frame"]),
+        ("[{frame: tpose}]", ["example_poses[0].frame", "'tpose'"]),
+        ("[{frame: 1, name: tpose}]", ["example_poses[0].name", "unknown"]),
+    ],
+)
+def test_wrong_frames_as_example_poses(folder, entry, parts):
+    settings(folder, f"up: z\nfirst_frame: 1\nexample_poses: {entry}\n")
+    refused(folder, "recording.yaml", *parts)
 
 
 def test_the_folder_and_its_parts_must_be_there(folder):

@@ -110,7 +110,7 @@ def test_a_searched_pose_and_a_made_actor_are_kept(capsys, tmp_path, monkeypatch
     opened = track_command.opened(str(recording))
     actor = track_command.actors_of(opened, actor_file(tmp_path / "a.yaml"), "", ColorConfig())[0]
     actor = [body.rotated(jnp.asarray(turn(0.3))) for body in actor]
-    monkeypatch.setattr(track_command, "actors_of", lambda *_: (actor, True))
+    monkeypatch.setattr(track_command, "actors_of", lambda *_: (actor, []))
     words = ["track", f"recording={recording}", *SMALL, *LIGHT]
     done(capsys, *words, "out=whole")
     with monkeypatch.context() as context:

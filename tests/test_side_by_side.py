@@ -15,6 +15,9 @@ from sogjax.study.study import Study
 
 BODY = make_body()
 
+OWN = RowConfig(synth={"motion": "pass", "actors": 2})
+"""Of a recording of its own."""
+
 
 @pytest.fixture
 def shown(monkeypatch, tmp_path):
@@ -39,13 +42,16 @@ def shown(monkeypatch, tmp_path):
 
 
 def test_only_rows_of_the_given_recording_are_shown(shown):
-    motions, errors = shown(["c"], a=RowConfig(), b=RowConfig(actors=2), c=RowConfig(), d=RowConfig())
+    motions, errors = shown(["c"], a=RowConfig(), b=OWN, c=RowConfig(), d=RowConfig())
     assert list(motions) == list(errors) == ["a", "d"]
     assert [motion.frame.tolist() for motion in motions["d"]] == [[0, 1]]
     np.testing.assert_allclose(errors["d"], [0.01, 0.02])
 
 
-@pytest.mark.parametrize(("row", "why"), [(RowConfig(), "nobody is there"), (RowConfig(actors=2), "several people")])
+@pytest.mark.parametrize(
+    ("row", "why"),
+    [(RowConfig(), "nobody is there"), (OWN, "recordings of their own")],
+)
 def test_an_experiment_of_which_nothing_can_be_shown_is_refused(shown, row, why):
     with pytest.raises(InputError, match=rf"small: no row worked on walk-seed3 \(.*{why}\)"):
         shown(["a"], a=row)

@@ -36,13 +36,14 @@ def test_a_solver_made_without_arguments_is_that_of_the_commands(name):
 
 
 def test_the_terms_made_without_arguments_are_those_of_the_commands():
-    assert_same(standard_terms(), build.energy_terms(config().energy))
+    weight = config().energy.foreground_weight
+    assert_same(standard_terms(foreground_weight=weight), build.energy_terms(config().energy))
 
 
 def test_a_term_of_ones_own_is_added_by_the_configuration():
     words = "energy.terms={ground:{term:test_terms.Floor,weight:2,height:0.1}}"
     *standard, ground = build.energy_terms(config(words).energy)
-    assert_same(tuple(standard), standard_terms())
+    assert_same(tuple(standard), standard_terms(foreground_weight=config().energy.foreground_weight))
     assert (ground.name, float(ground.weight)) == ("ground", 2.0)
     np.testing.assert_allclose(ground.height, 0.1, rtol=1e-6)
     assert eqx.is_array(ground.height)

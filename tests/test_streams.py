@@ -104,6 +104,6 @@ def test_an_error_in_the_first_frame_leaves_nothing(capsys, tmp_path, monkeypatc
         raise InputError("right.mp4: ends early")
 
     monkeypatch.setattr(pipeline, "padded_cells", padded_cells)
-    assert main([*command, "out=run"]) == 2
+    assert main([*command, "out=run", "images.background=none"]) == 2
     assert capsys.readouterr().err == "sogjax: right.mp4: ends early\n"
     assert not (tmp_path / "run").exists()

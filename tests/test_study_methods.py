@@ -71,6 +71,22 @@ def test_every_row_has_the_papers_figure_and_both_methods_in_one_line(study):
     assert (c["theirs: error, mm"], c["ours: error, mm"]) == ("", "11.0")
 
 
+def test_rows_of_recordings_of_their_own_have_joints_markers_and_losses_and_a_mean(study):
+    rows = {"a": RowConfig(cameras=12), "b": RowConfig(cameras=12), "c": RowConfig(cameras=4, methods=["ours"])}
+    which = experiment(reference=None, rows=rows)
+    table = comparison_table(which, summaries(study, which))
+    titles = cells(table, 0)
+    lines = {line[0]: dict(zip(titles, line, strict=True)) for line in (cells(table, k) for k in range(2, 7))}
+    assert (lines["a"]["theirs: markers, mm"], lines["a"]["ours: joints, mm"], lines["a"]["ours: lost"]) == (
+        *("41.0", "1.5", "7"),
+    )
+    assert (lines["b"]["theirs: joints, mm"], lines["b"]["theirs: lost"]) == ("failed", "")
+    assert lines["**all 1 that worked, 12 cameras**"]["ours: lost"] == "7"
+    assert (lines["c"]["theirs: lost"], lines["**all 1 that worked, 4 cameras**"]["ours: markers, mm"]) == ("", "11.0")
+    assert "difference" not in table
+    assert experiment_section(which, study, []).pictures[0].content.startswith(b"\x89PNG")
+
+
 def test_a_section_tells_the_failures_of_a_method(study):
     done = []
     section = experiment_section(experiment(), study, done)
@@ -105,11 +121,11 @@ def test_the_methods_are_told_by_their_settings():
     assert ours.startswith("Gauss-Newton")
     assert lines["weights"] == ["w_l 1, w_a 0.05", "w_l 1, w_a 0.01"]
     assert lines["colours"][0] == "hsv, eps_sim 0.15"
-    assert lines["empty background pictures (plates)"] == ["not used", "used where there are some"]
+    assert lines["background"] == ["not used", "empty background pictures (plates), else learnt from the clip"]
 
 
 def test_slow_experiments_are_run_on_one_seed_of_each_motion_and_on_folders(tmp_path, monkeypatch):
-    monkeypatch.setattr(Study, "source", lambda self, name, actors=1: Source(name, tmp_path, "", 2, tmp_path))
+    monkeypatch.setattr(Study, "source", lambda self, name, frames=None: Source(name, tmp_path, "", 2, tmp_path))
     names = ["walk:0", "walk:1", "arms:1", str(tmp_path)]
     study = Study(tmp_path, names, 4)
     tracked = lambda study, which: [source.name for source in study.sources_of(which, "a")]

@@ -7,11 +7,12 @@ from sogjax.actor import make
 from sogjax.data.actor_file import save_body
 from sogjax.data.recording import Recording
 from sogjax.engine.build import color_space_and_radius, energy_terms
+from sogjax.engine.example_frames import with_examples
 from sogjax.engine.recordings import body_named, with_cameras
 from sogjax.engine.terminal import progress, say
 from sogjax.errors import InputError
 from sogjax.model.body import Body
-from sogjax.settings import ActorConfig
+from sogjax.settings import ActorConfig, ImagesConfig
 from sogjax.settings.compose import composed_without_hydra
 
 
@@ -43,13 +44,14 @@ def make_actor(recording: Recording, subject: str | None = None, **settings: Any
     colour from the pictures. The same settings give what `sogjax actor` writes; it takes about half a minute.
 
     Args:
-        recording: with example poses, and masks or empty background pictures for them.
+        recording: with example poses, and masks or empty background pictures for them; without, frames of its videos
+            are used.
         subject: which one, where the example poses show several.
         settings: options of `sogjax actor`, such as `body="dog", symmetric=False, color="hsv"`.
 
     Raises:
-        InputError: no example poses of the subject, pictures without masks, a pose that was not found; an unknown
-            setting (with the nearest known one) or a wrong value.
+        InputError: no example poses of the subject, no frames that can be used, pictures without masks, a pose that was
+            not found; an unknown setting (with the nearest known one) or a wrong value.
     """
     return fit_actor(recording, subject, **settings).body
 
@@ -71,13 +73,17 @@ def fit_actor(recording: Recording, subject: str | None = None, **settings: Any)
     given = settings | {"recording": recording.path, "out": "", "subject": subject}
     config: ActorConfig = composed_without_hydra(ActorConfig, "actor", keywords=given)
     space, _ = color_space_and_radius(config.color)
+    body = body_named(config.body)
+    recording, learnt, best = with_examples(with_cameras(recording, config.cameras), ImagesConfig())
     return make.make_actor(
-        with_cameras(recording, config.cameras),
-        body_named(config.body),
+        recording,
+        body,
         config.subject,
         space,
         energy_terms(config.energy),
         say,
         progress,
         config.symmetric,
+        learnt,
+        best,
     )

@@ -13,7 +13,7 @@ from sogjax.engine.recordings import upright, with_cameras
 from sogjax.engine.track import track_recording
 from sogjax.errors import InputError
 from sogjax.model.body import Body
-from sogjax.tracking.pose_search import FoundPose
+from sogjax.tracking.found_pose import FoundPose
 
 
 @overload
@@ -76,8 +76,8 @@ def find_first_pose(
         settings: as in `track_settings`; `start` is the frame.
 
     Returns:
-        `pose` in radians and metres, its `energy`, and `margin`: by what share the next different pose is worse; below
-        0.005 the pose is not sure. For a list of actors a list in their order.
+        `pose` in radians and metres, whether it is `sure`, its `confidence` (0 to 1), its `energy`, and `margin`: by
+        what share the next different pose is worse. For a list of actors a list in their order.
 
     Raises:
         InputError: nothing like an actor is seen in the frame; no such frame; a wrong setting.

@@ -15,12 +15,13 @@ from sogjax.data.atomic import atomic_path
 from sogjax.data.recording import Recording
 from sogjax.engine.actor_report import report_folder, write_actor_report
 from sogjax.engine.build import color_space_and_radius, energy_terms
+from sogjax.engine.example_frames import with_examples
 from sogjax.engine.outputs import free_path, results_folder
 from sogjax.engine.recordings import body_named, opened
 from sogjax.engine.terminal import progress, say
 from sogjax.errors import InputError
 from sogjax.sentences import counted
-from sogjax.settings import ActorConfig
+from sogjax.settings import ActorConfig, ImagesConfig
 
 NOTICED = 0.15
 """Logarithm of a camera's gain above which it is reported."""
@@ -41,7 +42,8 @@ def run(config: ActorConfig) -> Path:
         raise InputError(f"out={out}: is a folder; give the actor file to write, such as out={out / 'actor.yaml'}")
     free_path("out", out, config.overwrite)
     with results_folder(out.parent):
-        made = make_actor(recording, body, config.subject, space, terms, say, progress, config.symmetric)
+        recording, learnt, best = with_examples(recording, ImagesConfig())
+        made = make_actor(recording, body, config.subject, space, terms, say, progress, config.symmetric, learnt, best)
         save_body(out, made.body)
         folder = report_folder(out)
         report = write_actor_report(folder, made, recording.rig)

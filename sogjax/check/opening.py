@@ -36,7 +36,7 @@ def opening_problems(path: Path, first: InputError) -> list[Finding]:
             tried(lambda camera=camera, source=source, info=info: check_size(source, info.size, rig, camera))
     if rig is not None:
         tried(lambda: find_background(path / "background", rig, rig.names))
-        tried(lambda: find_example_poses(path / "example_poses", rig, rig.names, settings.example_poses))
+        tried(lambda: find_example_poses(path / "example_poses", rig, rig.names, settings.example_poses, None))
     for name, read in (("initial_pose.yaml", read_initial_poses), ("ground_truth.npz", load_ground_truth)):
         if (path / name).exists():
             tried(lambda name=name, read=read: read(path / name))

@@ -36,7 +36,8 @@ class Moment:
 def example_moments(recording: Recording) -> list[Moment]:
     """The first few example poses, with their masks, or masks made from the empty background pictures."""
     plates = plates_of(recording)
-    return [_example_moment(recording, example, plates) for example in recording.example_poses[:MOST_POSES]]
+    pictured = [example for example in recording.example_poses if example.frame is None]
+    return [_example_moment(recording, example, plates) for example in pictured[:MOST_POSES]]
 
 
 def video_moments(clip: Clip, offsets: Sequence[int]) -> list[Moment]:

@@ -21,14 +21,14 @@ def bone_errors(body: Body, truth: GroundTruth) -> dict[str, float]:
     """Relative deviation of each bone's length from the mean distance of the truth's joints; 0.01 is 1 % too long."""
     assert truth.joints is not None
     landmarks = np.asarray(body.posed_landmarks(body.poses["rest"]), float)[None]
-    true_names = [_landmark_named(name) for name in truth.joint_names]
+    true_names = [landmark_named(name) for name in truth.joint_names]
     return {
         bone: _length(landmarks, body.landmarks.names, ends) / _length(truth.joints, true_names, ends) - 1.0
         for bone, ends in BONES.items()
     }
 
 
-def _landmark_named(joint: str) -> str:
+def landmark_named(joint: str) -> str:
     """`ACTOR/l_knee` is `left_knee`."""
     name = joint.split("/")[-1]
     sides = {"l_": "left_", "r_": "right_"}

@@ -52,6 +52,12 @@ class Evaluation:
         points = self.markers or self.joints
         return summarize(points.errors if points else np.zeros((len(self.frames), 0)))
 
+    @property
+    def num_labelled(self) -> int:
+        """In how many of the frames the truth knows a point."""
+        known = [np.isfinite(points.errors).any(axis=1) for points in (self.markers, self.joints) if points is not None]
+        return int(np.any(known, axis=0).sum())
+
     def as_dict(self) -> dict[str, Any]:
         """What `to_json` writes: millimetres, None where nothing was compared."""
         return {
@@ -59,6 +65,7 @@ class Evaluation:
             "num_frames": len(self.frames),
             "first_frame": int(self.frames[0]),
             "last_frame": int(self.frames[-1]),
+            "num_labelled_frames": self.num_labelled,
             "marker_rule": self.rule,
             "markers": points_dict(self.markers),
             "markers_by_rule": {rule: rule_dict([points]) for rule, points in self.markers_by_rule.items()},
@@ -78,7 +85,9 @@ class Evaluation:
                 lines.append(summary_row(f"all {title}", summarize(points.errors)))
                 rows = enumerate(points.names) if details else ()
                 lines += [summary_row(f"  {name}", summarize(points.errors[:, [k]])) for k, name in rows]
-        lines.append(f"{counted(len(self.frames), 'frame')}, {self.frames[0]} to {self.frames[-1]}; distances in mm")
+        labelled = "" if self.num_labelled == len(self.frames) else f", of which {self.num_labelled} are labelled"
+        frames = f"{counted(len(self.frames), 'frame')}, {self.frames[0]} to {self.frames[-1]}{labelled}"
+        lines.append(f"{frames}; distances in mm")
         if self.markers is not None:
             lines += self._about_markers()
         lines += [
@@ -189,11 +198,17 @@ def evaluate_motions(
     A truth without prefixes is that of the only actor.
 
     Raises:
-        InputError: an actor that the truth does not have; several actors, but a truth of one.
+        InputError: an actor that the truth does not have; several actors, but a truth of one; a truth that knows no
+            point in the motions' frames.
     """
     alone = len(motions) == 1 and not truth.subjects
     evaluations = {
         name: evaluate_motion(motion, truth if alone else truth.subject(name), name, joint_mapping, rule)
         for name, motion in motions.items()
     }
+    if not any(evaluation.num_labelled for evaluation in evaluations.values()):
+        frames = next(iter(evaluations.values())).frames
+        raise InputError(
+            f"the truth knows no point in the motion's frames {frames[0]} to {frames[-1]}; compare labelled frames"
+        )
     return GroupEvaluation(evaluations, identity_swaps(motions, truth) if len(motions) > 1 else ())

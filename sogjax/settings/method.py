@@ -24,10 +24,9 @@ class ImagesConfig:
     box_around: str = option(
         "predicted", "predicted: the box holds the last pose and the predicted one | last: the last"
     )
-    use_plates: bool | None = option(
-        None, "leave out image blobs that equal the empty background pictures; null: if every camera has one"
+    background: str = option(
+        "auto", "pictures: of the empty scene | clip: learnt from the clip | auto: pictures, else the clip | none"
     )
-    plate_tolerance: float = option(0.1, "colours nearer than this to the plate's are background")
     cache: str | None = option(None, "folder for averaged pictures, so that later runs decode no video; null: none")
 
 
@@ -37,6 +36,7 @@ class EnergyConfig:
 
     limit_weight: float = option(1.0, "[w_l] weight of the joint limits, 1/rad^2")
     acceleration_weight: float = option(0.01, "[w_a] weight of smooth motion, 1/rad^2")
+    foreground_weight: float = option(0.2, "weight of covering what is not background, and nothing that is; 0: off")
     overlap_exponent: str = option("exact", "exact | printed: Eq. 6 with or without the 1/2 that Eq. 2 implies")
     capped: bool = option(True, "the cap of Eq. 8 against blobs that hide each other")
     pairs: str = option("sparse", "dense: all pairs of blobs | sparse: pairs near each other, equal to 1e-4")

@@ -20,7 +20,8 @@ class Settings:
 
     recordings: list[str] = field(default_factory=lambda: ReportConfig().recordings)
     """Folders with ground truth, or MOTION:SEED of rendered ones."""
-    frames: int = ReportConfig().frames
+    frames: int | None = None
+    """At most; null: as many as the experiment asks for, or 40."""
     out: str = ReportConfig().out
     """Where runs are kept; a run that is there is not done again."""
     body: str = ReportConfig().body
@@ -55,4 +56,5 @@ def _print_tables(experiment: Experiment, settings: Settings) -> None:
         print(comparison_table(experiment, rows), end="\n\n")
     for method, of_method in rows.items():
         print(*([f"{method}:"] if method else []), markdown_table(experiment, of_method), sep="\n\n", end="\n\n")
-        print(recordings_table(experiment, of_method), *findings(experiment, of_method), sep="\n", end="\n\n")
+        recordings = [] if experiment.config.reference is None else [recordings_table(experiment, of_method)]
+        print(*recordings, *findings(experiment, of_method), sep="\n", end="\n\n")

@@ -1,15 +1,18 @@
 """What an experiment is: a question, rows of settings, and what the paper found. One YAML file each."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import yaml
 from omegaconf import MISSING, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from sogjax.errors import InputError
+from sogjax.settings.compose import composed_without_hydra
 from sogjax.settings.files import conf_dir
+from sogjax.synth import SynthSettings
 
 MEASURES = ("accuracy", "speed")
 OVERVIEW = "methods"
@@ -28,8 +31,9 @@ class RowConfig:
     """How many of the recording's cameras look on, evenly taken; None: all."""
     every: int = 1
     """Every so many frames are looked at."""
-    actors: int | None = None
-    """Rendered recordings of this many people passing each other take the place of the study's; None: the study's."""
+    synth: dict[str, Any] | None = None
+    """Settings of the rendered recording that takes the place of the study's, as `sogjax synth` takes them; it is made
+    when it is first needed and kept. None: the study's recordings."""
     methods: list[str] | None = None
     """Which of the experiment's methods it is run with; None: all."""
     paper: str = ""
@@ -46,14 +50,16 @@ class ExperimentConfig:
     question: str = MISSING
     axis: str = MISSING
     """What differs between the rows, with its unit."""
-    reference: str = MISSING
-    """The row that the others are compared with."""
+    reference: str | None = MISSING
+    """The row that the others are compared with; None: rows are not compared, as where each has its own recording."""
     methods: dict[str, list[str]] = field(default_factory=dict)
     """The methods that every row is run with, by name, and their overrides; none: the defaults only."""
     base: list[str] = field(default_factory=list)
     """Overrides of all rows."""
     measure: str = "accuracy"
     """accuracy: from kept cells, one frame after the other | speed: from the videos, all stages beside each other."""
+    frames: int | None = None
+    """Of each recording that are tracked where the study does not say; None: the usual number."""
     slow: bool = False
     """Whether it is run on the fewer recordings, as those with several methods are."""
     recordings: list[str] | None = None
@@ -139,6 +145,15 @@ class Experiment:
         return [*common, *of_method, *self.config.base, *self.config.rows[row].set]
 
 
+def synth_settings(chosen: Mapping[str, Any]) -> SynthSettings:
+    """The settings of a rendered recording, of which some are chosen.
+
+    Raises:
+        InputError: an unknown setting (with the nearest known one), or a value of the wrong type.
+    """
+    return composed_without_hydra(SynthSettings, "synth", keywords=chosen)
+
+
 def experiment_names() -> list[str]:
     """The experiments that come with the program, in the order of a report."""
     present = {path.stem for path in _folder().glob("*.yaml")}
@@ -164,6 +179,7 @@ _ORDER = (
     "extrapolation",
     "overlap_exponent",
     "throughput",
+    "sequences",
 )
 """The paper's own experiments first."""
 
@@ -173,7 +189,7 @@ def _folder() -> Path:
 
 
 def _checked(path: Path, config: ExperimentConfig) -> ExperimentConfig:
-    if config.reference not in config.rows:
+    if config.reference is not None and config.reference not in config.rows:
         raise InputError(f"{path}: reference: {config.reference!r} is not a row; choose from {', '.join(config.rows)}")
     if config.measure not in MEASURES:
         raise InputError(f"{path}: measure: {config.measure!r}: use one of {', '.join(MEASURES)}")
@@ -182,4 +198,8 @@ def _checked(path: Path, config: ExperimentConfig) -> ExperimentConfig:
             raise InputError(f"{path}: row {name!r}: methods: {unknown[0]!r} is none of {', '.join(config.methods)}")
         if row.every < 1 or (row.cameras is not None and row.cameras < 1):
             raise InputError(f"{path}: row {name!r}: every={row.every} cameras={row.cameras}: must be 1 or more")
+        try:
+            synth_settings(row.synth or {}).check()
+        except InputError as error:
+            raise InputError(f"{path}: row {name!r}: {error}") from error
     return config

@@ -15,6 +15,7 @@ from sogjax.study.record import RunRecord
 from sogjax.study.runner import motions_of
 from sogjax.study.source import Source
 from sogjax.study.summary import RowSummary
+from sogjax.view.bar_chart import Bars, bar_chart
 from sogjax.view.charts import Means, mean_chart
 from sogjax.view.overlay import overlay_frame, write_label
 from sogjax.view.projection import picture_points
@@ -30,6 +31,8 @@ def experiment_chart(experiment: Experiment, rows: Mapping[str, Sequence[RowSumm
     done = {method: [row for row in of_method if np.isfinite(row.mean)] for method, of_method in rows.items()}
     if not any(done.values()):
         return None
+    if experiment.config.reference is None:
+        return _bars(experiment, done)
     speed = experiment.config.measure == "speed"
     papers = {name: row.paper_value for name, row in experiment.config.rows.items() if row.paper_value is not None}
     content = mean_chart(
@@ -40,6 +43,22 @@ def experiment_chart(experiment: Experiment, rows: Mapping[str, Sequence[RowSumm
     )
     what = "frames per second" if speed else "mean error with its 95 % interval; thin lines: each recording"
     return Picture(f"{experiment.name}.png", content, f"{experiment.config.title}: {what}")
+
+
+def _bars(experiment: Experiment, rows: Mapping[str, Sequence[RowSummary]]) -> Picture:
+    """The joint errors of rows that are not compared with each other, a panel for each number of cameras."""
+    joints = {method: {row.name: row.joints for row in of_method} for method, of_method in rows.items()}
+    done = {
+        name: row.cameras for name, row in experiment.config.rows.items() if any(name in of for of in joints.values())
+    }
+    panels = []
+    for count in dict.fromkeys(done.values()):
+        names = [name for name in done if done[name] == count]
+        values = {method: [of_method.get(name, np.nan) for name in names] for method, of_method in joints.items()}
+        values = {method: of_rows for method, of_rows in values.items() if np.isfinite(of_rows).any()}
+        panels.append(Bars("all cameras" if count is None else f"{count} cameras", names, values))
+    content = bar_chart(panels, value="joint error, mm")
+    return Picture(f"{experiment.name}.png", content, f"{experiment.config.title}: mean error of the joints")
 
 
 def _panel(title: str, rows: Sequence[RowSummary], speed: bool) -> Means:

@@ -116,10 +116,11 @@ class RunRecord:
 
 
 @cache
-def program_digest() -> str:
-    """Of the files of the program that decide how a run comes out."""
+def program_digest(further: str = "") -> str:
+    """Of the files of the program that decide how a run comes out, and `further` ones (a pattern)."""
     package = Path(sogjax.__file__).parent
-    files = sorted(path for name in _DECIDE for path in (package / name).rglob("*.py"))
+    more = package.glob(further) if further else []
+    files = sorted({*more, *(path for name in _DECIDE for path in (package / name).rglob("*.py"))})
     content = hashlib.sha256()
     for path in files:
         content.update(f"{path.relative_to(package)}\n".encode() + path.read_bytes())

@@ -4,6 +4,9 @@ from dataclasses import dataclass
 
 from sogjax.settings.option import group, option
 
+USUAL_FRAMES = 40
+"""Of each recording that are tracked where neither the study nor the experiment says how many."""
+
 
 @dataclass
 class ReportConfig:
@@ -20,7 +23,9 @@ class ReportConfig:
     compared: list[str] | None = option(
         None, "recordings of the experiments with the paper's method, which is slow; null: one seed of each motion"
     )
-    frames: int = option(40, "frames of each recording to track, at most")
+    frames: int | None = option(
+        None, "frames of each recording to track, at most; null: 40, or as many as an experiment asks for"
+    )
     body: str = option("human", "body that the actors are made from, as for actor")
     overrides: list[str] = group(
         lambda: [], "options of track for all runs, of color, images, energy, solver or tracking: [solver=lbfgs]"

@@ -18,9 +18,9 @@ def of_experiment(
     Raises:
         InputError: there is none.
     """
-    motions, errors, failed = {}, {}, "all its rows are of several people"
+    motions, errors, failed = {}, {}, "all its rows have recordings of their own"
     for row, entry in experiment.config.rows.items():
-        if entry.actors is not None and entry.actors > 1:  # tracked on a recording of its own
+        if entry.synth is not None:  # tracked on a recording of its own
             continue
         record = run_row(experiment, row, source, study.runs, study.overrides)
         if record is None or record.failed:

@@ -1,10 +1,11 @@
 """The recordings of a study: opened once, their actor made once, their cells read once, for all runs."""
 
 import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -23,12 +24,14 @@ from sogjax.errors import InputError
 from sogjax.model.body import Body, concatenate
 from sogjax.settings import TrackConfig
 from sogjax.settings.compose import track_config
+from sogjax.study.experiment import synth_settings
 from sogjax.synth import SynthSettings, cached_recording
 from sogjax.synth.settings import MOTIONS
 from sogjax.tracking.tracker import Tracker
 
 PARTS = ("videos", "images", "background", "example_poses")
 """Folders of a recording."""
+_IN_NAME = ("motion", "seed", "actors", "frames")
 MOST_FRAMES = 60
 """That are rendered of a motion; a study of fewer frames tracks the first ones of the same recording."""
 
@@ -125,7 +128,7 @@ class Source:
 
     def tracker(self, config: TrackConfig, cameras: tuple[str, ...]) -> Tracker:
         """The tracker of a config; what does not depend on its numbers is made once."""
-        key = (cameras, config.images.depth, config.color.space, config.images.use_plates)
+        key = (cameras, config.images.depth, config.color.space, config.images.background)
         if key not in self._trackers:
             seen = self.seen_by(cameras)
             grids = build.cell_grids(seen, config.images.depth)
@@ -133,7 +136,7 @@ class Source:
         return build.varied(self._trackers[key], config)
 
 
-def source_named(name: str, num_frames: int, folder: Path, actors: int = 1, body: str = "human") -> Source:
+def source_named(name: str, num_frames: int, folder: Path, body: str = "human") -> Source:
     """A recording by its folder, or rendered now if it is not there yet: `walk:0` is a motion and a seed.
 
     Raises:
@@ -146,10 +149,22 @@ def source_named(name: str, num_frames: int, folder: Path, actors: int = 1, body
     motion, _, seed = name.partition(":")
     if motion not in MOTIONS or (seed and not seed.isdecimal()):
         raise InputError(f"{name}: is neither a folder nor MOTION:SEED (such as walk:0)")
-    frames = max(num_frames, MOST_FRAMES)
-    path = cached_recording(SynthSettings(motion, actors=actors, frames=frames, seed=int(seed or 0)), progress=progress)
-    people = f"-{actors}people" if actors > 1 else ""
-    return Source(f"{motion}-seed{int(seed or 0)}{people}", path, path.name, num_frames, folder, body)
+    return rendered_source({"motion": motion, "seed": int(seed or 0)}, num_frames, folder, body)
+
+
+def rendered_source(settings: Mapping[str, Any], num_frames: int, folder: Path, body: str = "human") -> Source:
+    """A rendered recording by settings of `sogjax synth`, made now if it is not there yet.
+
+    Raises:
+        InputError: it cannot be rendered so.
+    """
+    wanted = synth_settings({"frames": max(num_frames, MOST_FRAMES), **settings})
+    path = cached_recording(wanted, progress=progress)
+    usual = asdict(SynthSettings(wanted.motion, seed=wanted.seed))
+    chosen = [str(value) for key, value in settings.items() if key not in _IN_NAME and value != usual[key]]
+    people = [f"{wanted.actors}people"] if wanted.actors > 1 else []
+    name = "-".join([wanted.motion, f"seed{wanted.seed}", *people, *chosen])
+    return Source(name, path, path.name, min(num_frames, wanted.frames), folder, body)
 
 
 def _state_of(path: Path) -> str:

@@ -94,6 +94,8 @@ def stated_errors(source: Source, temperature: float, overrides: Sequence[str] =
     _, deviations = deviations_of(results)
     assert deviations is not None
     joints, errors = joint_offsets(motion, source.truth)
+    if not np.isfinite(errors).any():
+        raise InputError(f"{source.name}: no true joint is known in the frames that were tracked")
     rows, _ = common_frames(motion, source.truth)
     said, found = deviations[rows][:, joints].astype(float).ravel(), without_constant_offset(errors).ravel()
     known = np.isfinite(found)

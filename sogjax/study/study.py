@@ -1,16 +1,17 @@
 """A study: some experiments over some recordings, every run of them done once."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from sogjax.errors import InputError
 from sogjax.study.experiment import Experiment
 from sogjax.study.record import RunFolder, RunRecord
 from sogjax.study.runner import run_row
-from sogjax.study.settings import ReportConfig
-from sogjax.study.source import Source, source_named
+from sogjax.study.settings import USUAL_FRAMES, ReportConfig
+from sogjax.study.source import Source, rendered_source, source_named
 from sogjax.study.summary import RowSummary, summarized
 
 _GROUPS = ("color", "images", "energy", "solver", "tracking")
@@ -24,8 +25,8 @@ class Study:
     folder: Path
     recordings: Sequence[str]
     """Folders with ground truth, or MOTION:SEED."""
-    frames: int
-    """Tracked of each recording, at most."""
+    frames: int | None = None
+    """Tracked of each recording, at most; None: as many as the experiment asks for, or the usual number."""
     overrides: Sequence[str] = ()
     """Of the track config, for all runs."""
     do: bool = True
@@ -49,7 +50,7 @@ class Study:
         self._sources: dict[tuple[str, int], Source] = {}
         if not self.recordings:
             raise InputError("recordings=[]: name at least one, a folder or MOTION:SEED such as walk:0")
-        if self.frames < 2:
+        if self.frames is not None and self.frames < 2:
             raise InputError(f"frames={self.frames}: must be at least 2, since markers are attached in the first one")
         for word in self.overrides:
             if word.partition("=")[0].partition(".")[0] not in _GROUPS:
@@ -61,33 +62,42 @@ class Study:
         usual = ReportConfig()
         return (
             {*self.recordings} >= {*usual.recordings}
-            and self.frames == usual.frames
+            and self.frames in (None, USUAL_FRAMES)
             and not self.overrides
             and not self.compared
         )
 
-    def source(self, recording: str, actors: int = 1) -> Source:
-        """A recording, opened once.
+    def source(self, recording: str | Mapping[str, Any], frames: int | None = None) -> Source:
+        """A recording by its name, or by the settings of a rendered one, opened once.
+
+        Args:
+            recording: a name of the study's recordings, or settings of `sogjax synth`.
+            frames: that are tracked where the study does not say; None: the usual number.
 
         Raises:
-            InputError: there is none of that name.
+            InputError: there is none of that name, or it cannot be rendered so.
         """
-        key = (recording, actors)
+        count = self.frames or frames or USUAL_FRAMES
+        key = (str(recording), count)
         if key not in self._sources:
-            source = source_named(recording, self.frames, self.folder, actors, self.body)
-            alike = [other for other in self._sources.values() if other.name.partition(" ")[0] == source.name]
+            if isinstance(recording, str):
+                source = source_named(recording, count, self.folder, self.body)
+            else:
+                source = rendered_source(recording, count, self.folder, self.body)
+            others = [other for other in self._sources.values() if other.identity != source.identity]
+            alike = [other for other in others if other.name.partition(" ")[0] == source.name]
             name = f"{source.name} {len(alike) + 1}" if alike else source.name
             self._sources[key] = replace(source, name=name)
         return self._sources[key]
 
     def sources_of(self, experiment: Experiment, row: str) -> list[Source]:
         """The recordings that a row is tracked on."""
-        actors = experiment.config.rows[row].actors
-        if actors is not None and actors > 1:
-            return [self.source("pass:0", actors)]
+        own, frames = experiment.config.rows[row].synth, experiment.config.frames
+        if own is not None:
+            return [self.source(own, frames)]
         names = experiment.config.recordings if self.is_committed else None
         usual = self._compared if experiment.is_slow else self.recordings
-        return [self.source(name) for name in names or usual]
+        return [self.source(name, frames) for name in names or usual]
 
     @property
     def _compared(self) -> list[str]:

@@ -65,19 +65,19 @@ class RowSummary:
 
 
 def summarized(
-    rows: Mapping[str, Records], reference: str, papers: Mapping[str, tuple[str, float | None]]
+    rows: Mapping[str, Records], reference: str | None, papers: Mapping[str, tuple[str, float | None]]
 ) -> list[RowSummary]:
     """A summary of every row.
 
     Args:
         rows: the runs of each row.
-        reference: the row that the others are compared with; the first one with runs where it has none.
+        reference: the row that the others are compared with, the first one with runs where it has none; None: none is.
         papers: what the paper says of a row, in words and as a number.
     """
     worked = [name for name, records in rows.items() if any(not record.failed for record in records.values())]
-    compared = reference if reference in worked or not worked else worked[0]
+    compared = reference if reference is None or reference in worked or not worked else worked[0]
     return [
-        _summary(name, records, None if name == compared else rows[compared], papers[name])
+        _summary(name, records, {} if compared is None else None if name == compared else rows[compared], papers[name])
         for name, records in rows.items()
     ]
 

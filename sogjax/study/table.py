@@ -22,6 +22,7 @@ ACCURACY: dict[str, Cell] = {
     "ms per step": lambda row: f"{row.milliseconds:.0f}",
     "the paper": lambda row: row.paper or "",
 }
+_NOTHING = ("", "nan", "nan +- nan", "nan to nan")
 SPEED: dict[str, Cell] = {
     "tracking step, frames/s": lambda row: _rate(row, "step"),
     "whole, frames/s": lambda row: _rate(row, "whole"),
@@ -41,9 +42,7 @@ def markdown_table(experiment: Experiment, rows: Sequence[RowSummary]) -> str:
     columns = ACCURACY if experiment.config.measure == "accuracy" else SPEED
     columns = {title: cell for title, cell in columns.items() if title != "the paper" or not experiment.config.methods}
     texts = {title: [cell(row) if _done(row) else "" for row in rows] for title, cell in columns.items()}
-    texts = {
-        title: cells for title, cells in texts.items() if any(cell not in ("", "nan", "nan +- nan") for cell in cells)
-    }
+    texts = {title: cells for title, cells in texts.items() if any(cell not in _NOTHING for cell in cells)}
     lines = [f"| {in_cell(experiment.config.axis)} | " + " | ".join(texts) + " |", "|---" * (1 + len(texts)) + "|"]
     for k, row in enumerate(rows):
         lines.append(f"| {in_cell(row.name)} | " + " | ".join(cells[k] for cells in texts.values()) + " |")
@@ -138,3 +137,9 @@ def _waiting(row: RowSummary) -> str:
 def in_cell(text: str) -> str:
     """Without what would end a cell of a table."""
     return text.replace("|", "\\|")
+
+
+def ruled_table(lines: Sequence[Sequence[object]]) -> str:
+    """A table in Markdown of cells, whose first line are the titles."""
+    ruled = [lines[0], ["---"] * len(lines[0]), *lines[1:]]
+    return "\n".join(f"| {' | '.join(in_cell(str(cell)) for cell in line)} |" for line in ruled)

@@ -209,7 +209,7 @@ OPTIONS = (
     "stop=99",
     "stop=soon",
     "initial_pose=nowhere.yaml",
-    "images.use_plates=true",
+    "images.background=pictures",
     "+new=1",
     "start",
 )

@@ -85,7 +85,7 @@ def _runs(place: Path) -> dict[str, tuple[Path, Read]]:
     with_motion.close()
     kept.begin("track", {"version": "1"})
     kept.keep_actors([load_body(place / "actor.yaml")])
-    kept.keep_start(jnp.asarray(motion.pose[0]))
+    kept.keep_start(jnp.asarray(motion.pose[0]), 0)
     names = (*COLUMNS, f"{TERM}similarity", *(CAPACITY.format(name) for name in CAPACITIES))
     rows = dict.fromkeys(names, motion.iterations) | {"pose": motion.pose}
     ArrayLog(kept.folder, {}, rows).close()

@@ -27,10 +27,16 @@ class BodyConfig:
 
 @dataclass
 class SegmentConfig:
-    """Show the masks of the example poses: from files, or made from the empty background pictures."""
+    """Show what tells the subject from the room: masks of the example poses, and the background of every camera."""
 
     recording: str = option(REQUIRED, "folder of the recording")
-    out: str = option(REQUIRED, "folder for POSE/CAMERA.mask.png and one contact sheet per pose, POSE.png")
+    out: str = option(
+        REQUIRED, "folder for POSE/CAMERA.mask.png, a contact sheet per pose, POSE.png, and background/CAMERA.png"
+    )
+    frames: list[int] | None = option(
+        None, "frames whose probability of foreground is shown; null: none, or three if there are no example poses"
+    )
+    background: str = option("auto", "pictures: of the empty scene | clip: learnt from the clip | auto")
     subject: str | None = option(None, "which subject, if the recording has several")
     cameras: list[str] | None = option(None, "cameras to use; null: all")
     overwrite: bool = option(False, OVERWRITE)

@@ -35,6 +35,7 @@ READING = (
 def about_section(config: ReportConfig, done: Sequence[Done]) -> Section:
     """Where the runs were made, and how to read the tables."""
     seconds = sum({id(one.record): one.record.seconds for one in different(done)}.values())
+    frames = max((len(one.record.frame) for one in done), default=0)
     machines = dict.fromkeys(one.record.machine for one in done)
     return Section(
         "How this was made",
@@ -42,7 +43,7 @@ def about_section(config: ReportConfig, done: Sequence[Done]) -> Section:
             f"`{machine_line()}`",
             *([config.note] if config.note else []),
             "- " + "\n- ".join(f"Runs on: {machine}" for machine in machines),
-            f"{len(list(different(done)))} runs of at most {config.frames} frames, {seconds / 60.0:.0f} minutes in "
+            f"{len(list(different(done)))} runs of at most {frames} frames, {seconds / 60.0:.0f} minutes in "
             f"all with compilation and actors. {_recordings(done)}",
             *READING,
         ],

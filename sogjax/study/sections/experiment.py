@@ -52,7 +52,7 @@ def _of_method(experiment: Experiment, method: str, rows: Sequence[RowSummary]) 
     if not any(row.by_recording for row in rows):
         return [*parts, *(f"failed, {row.name}: {reason}" for row in rows for reason in row.failed)]
     parts += [] if experiment.name == OVERVIEW else [markdown_table(experiment, rows)]
-    if experiment.config.measure == "accuracy":
+    if experiment.config.measure == "accuracy" and experiment.config.reference is not None:
         parts += ["Mean error on each recording, mm:", recordings_table(experiment, rows)]
     if experiment.config.iterations_by_recording:
         parts += ["Iterations per frame on each recording:", iterations_table(experiment, rows)]

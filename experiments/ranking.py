@@ -1,0 +1,84 @@
+"""Is what was lost the objective's fault, or the search's?
+
+    python experiments/ranking.py recording=FOLDER motion=motion.npz [actor=actor.yaml] [out=ranking] [SET ...]
+
+From the tracked pose of every frame and from the true one (the actor's own skeleton, fitted to the truth) the tracker's
+solver climbs to an optimum, and the two are compared. Where a limb was lost, either the wrong pose is worth more, so
+no search can help, or the true one is, and was not reached. A SET is what `sogjax track` takes, in one word:
+
+    python experiments/ranking.py recording=R motion=M default "preset=paper energy.limit_weight=2"
+
+Several actors: `motion=[a.npz,b.npz]`. Writes `OUT.csv` and `OUT.png`.
+"""
+
+import json
+import sys
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from omegaconf import MISSING
+
+from sogjax.data.actor_file import load_body
+from sogjax.data.atomic import atomic_path
+from sogjax.data.motion import load_motion
+from sogjax.engine.recordings import file_list, opened
+from sogjax.engine.terminal import say
+from sogjax.model.body import Body
+from sogjax.study.machine import machine_line
+from sogjax.study.ranking import RankedTrack, ranking_of
+from sogjax.study.ranking_tables import curves_of, limbs_table, terms_table, verdicts_table, write_csv
+from sogjax.study.script import run_script, settings_from
+from sogjax.view.ranking_chart import ranking_chart
+
+
+@dataclass
+class Settings:
+    """What is compared, as `key=value` on the command line."""
+
+    recording: str = MISSING
+    motion: Any = MISSING
+    """A file, or a list of those of several actors."""
+    actor: Any = None
+    """Theirs; null: beside the motions."""
+    out: str = "ranking"
+    far: float = 0.1
+    """Metres: a limb that is farther off is lost."""
+    sets: list[str] = field(default_factory=lambda: ["default"])
+
+
+def main() -> None:
+    """Print the tables, and write the files."""
+    settings = settings_from(Settings, _with_sets(sys.argv[1:]))
+    motions = [load_motion(path) for path in file_list(settings.motion)]
+    recording = opened(settings.recording)
+    track = RankedTrack.of(recording, motions, [*_actors(settings)])
+    rankings = []
+    for words in settings.sets:
+        say(f"{words}: climbing in {len(track.frames)} frames")
+        rankings.append(ranking_of(track, words, settings.far))
+    print(machine_line(), verdicts_table(rankings), limbs_table(rankings), terms_table(rankings), sep="\n\n")
+    write_csv(Path(f"{settings.out}.csv"), rankings)
+    with atomic_path(Path(f"{settings.out}.png")) as temporary:
+        temporary.write_bytes(ranking_chart([curves_of(ranking) for ranking in rankings]))
+    print(f"\n{settings.out}.csv\n{settings.out}.png")
+
+
+def _actors(settings: Settings) -> list[Body]:
+    """The actors of the motions: their files, else those that the run wrote beside the motions."""
+    if settings.actor is not None:
+        return [load_body(path) for path in file_list(settings.actor)]
+    motions = file_list(settings.motion)
+    return [load_body(path.with_name(path.stem.replace("motion", "actor", 1) + ".yaml")) for path in motions]
+
+
+def _with_sets(words: list[str]) -> list[str]:
+    """The words of a command line, where those that are no setting of the script are its sets."""
+    known = {entry.name for entry in fields(Settings)}
+    own = [word for word in words if " " not in word and word.partition("=")[0] in known]
+    sets = [word for word in words if word not in own]
+    return [*own, f"sets={json.dumps(sets)}"] if sets else own
+
+
+if __name__ == "__main__":
+    run_script(main)
