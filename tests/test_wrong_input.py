@@ -116,7 +116,6 @@ def no_common_frame(folder):
         nan_in_initial_pose,
         unknown_landmark,
         unknown_pose,
-        pytest.param(no_initial_pose, marks=pytest.mark.slow),
         misspelt_setting,
         wrong_truth,
         no_common_frame,
@@ -125,6 +124,14 @@ def no_common_frame(folder):
 def test_a_recording_with_something_wrong(capsys, recording, tmp_path, change):
     words = change(recording)
     refused_track(capsys, recording, f"actor={actor_file(tmp_path / 'actor.yaml')}", words=words)
+
+
+@pytest.mark.slow
+def test_nothing_that_looks_like_the_actor(capsys, recording, tmp_path):
+    folder, remedy = no_initial_pose(recording)
+    refused = refused_track_lines(capsys, folder, f"actor={actor_file(tmp_path / 'actor.yaml')}")
+    assert str(folder) in refused[-1]
+    assert remedy in refused[-1]
 
 
 def test_no_such_folder(capsys, tmp_path, monkeypatch):
@@ -211,11 +218,11 @@ def test_an_example_pose_with_something_wrong(capsys, recording, command, change
     assert sorted(recording.parent.rglob("*")) == before
 
 
-def refused_track_lines(capsys, recording):
+def refused_track_lines(capsys, recording, *arguments):
     """As `refused_track`, where the work has begun to report what it does."""
     from sogjax.app.cli import main
 
-    assert main(["track", f"recording={recording}", f"out={recording.parent / 'new'}"]) == 2
+    assert main(["track", f"recording={recording}", f"out={recording.parent / 'new'}", *arguments]) == 2
     assert not (recording.parent / "new").exists()
     return capsys.readouterr().err.splitlines()
 

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from sogjax.actor.make import MadeActor
-from sogjax.data.initial_pose import load_initial_poses
+from sogjax.data.initial_pose import InitialPose, load_initial_poses
 from sogjax.data.recording import Recording
 from sogjax.energy import Term
 from sogjax.engine.pose_search import Beginning, PoseSearch, tried_frames
@@ -17,7 +17,7 @@ from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.settings import TrackConfig
 from sogjax.tracking.found_pose import FoundPose
-from sogjax.tracking.initial_pose import rough_pose
+from sogjax.tracking.initial_pose import check_rough_pose, rough_pose
 
 AUTO = "auto"
 
@@ -73,21 +73,35 @@ def first_poses(
     Raises:
         InputError: the file is invalid, or the actors are not found in the pictures.
     """
-    path = initial_pose_file(recording, config)
-    if path is None:
+    descriptions = rough_descriptions(recording, bodies, config)
+    if descriptions is None:
         search = PoseSearch(recording, bodies, config, terms)
         beginning = clear_beginning(search, frame, recording.num_frames if last is None else last)
         return [jnp.asarray(pose) for pose in search.carried(beginning, frame)]
     if frame + recording.first_frame > 0:
+        path = initial_pose_file(recording, config)
         say(f"warning: the rough pose of {path} is used for frame {frame + recording.first_frame}")
-    descriptions = load_initial_poses(path, [body.name for body in bodies])
-    poses = []
+    return [rough_pose(body, each, recording.up) for body, each in zip(bodies, descriptions, strict=True)]
+
+
+def rough_descriptions(
+    recording: Recording, bodies: Sequence[Body], config: TrackConfig
+) -> list[InitialPose] | None:
+    """What the file says of the poses of bodies, upright in the recording's world; None: they are searched for.
+
+    Raises:
+        InputError: the file is invalid.
+    """
+    path = initial_pose_file(recording, config)
+    if path is None:
+        return None
+    given = load_initial_poses(path, [body.name for body in bodies])
     for body in bodies:
         try:
-            poses.append(rough_pose(body, descriptions[body.name], recording.up))
+            check_rough_pose(body, given[body.name], recording.up)
         except InputError as error:
             raise InputError(f"{path}: {error}") from error
-    return poses
+    return [given[body.name] for body in bodies]
 
 
 def clear_beginning(search: PoseSearch, first: int, last: int, picture: Path | None = None) -> Beginning:

@@ -17,7 +17,7 @@ from sogjax.energy import Term
 from sogjax.engine import build
 from sogjax.engine.backwards import frames_backwards, tracked_backwards
 from sogjax.engine.cells import picture_reader
-from sogjax.engine.first_pose import first_poses
+from sogjax.engine.first_pose import first_poses, rough_descriptions
 from sogjax.engine.kept_run import KeptRun
 from sogjax.engine.pipeline import FrameTracker, PictureReader, tracked_frames
 from sogjax.engine.recordings import upright
@@ -76,6 +76,8 @@ class Job:
         bodies = [upright(body, recording) for body in bodies]
         frames = frame_range(recording, config)
         grids = build.cell_grids(recording, config.images.depth)
+        if start is None:
+            rough_descriptions(recording, bodies, config)  # what is wrong there is said before anything is learnt
         with ThreadPoolExecutor(1) as beside:  # both compile for seconds
             building = beside.submit(_tracker, recording, bodies, grids, config, terms)
             begin = frames[0]

@@ -32,25 +32,38 @@ def rough_pose(body: Body, description: InitialPose, up: str) -> Float[Array, "d
     """The pose that a description means; `body` stands upright in the recording's world (vertical `up`) already.
 
     Raises:
-        InputError: unknown pose, degree of freedom or landmark; too few landmarks; nothing that says where.
+        InputError: as `check_rough_pose`.
     """
+    check_rough_pose(body, description, up)
     start = _named_pose(body, description.pose)
     if description.position is not None:
         start = placed(body, start, np.asarray(description.position, float))
     if description.heading is not None:
-        if heading_dof(body, up) is None:
-            raise InputError(
-                f"heading: the body {body.name!r} has no degree of freedom about the vertical {up}; leave it out"
-            )
         start = turned(body, start, np.radians(description.heading), up)
     if description.landmarks:
         return fit_landmarks(body, up, start, description.landmarks, description.heading is not None)
-    if description.position is None:
+    return start
+
+
+def check_rough_pose(body: Body, description: InitialPose, up: str) -> None:
+    """Refuse a description that means no pose of a body.
+
+    Raises:
+        InputError: unknown pose, degree of freedom or landmark; too few landmarks; nothing that says where; a heading
+            for a body that cannot turn about the vertical.
+    """
+    _named_pose(body, description.pose)
+    if description.heading is not None and heading_dof(body, up) is None:
+        raise InputError(
+            f"heading: the body {body.name!r} has no degree of freedom about the vertical {up}; leave it out"
+        )
+    if description.landmarks:
+        landmark_targets(body, description.landmarks)
+    elif description.position is None:
         raise InputError(
             "the initial pose has neither `position` nor `landmarks`; give the root's position in metres, "
             f"or at least {MIN_LANDMARKS} landmarks"
         )
-    return start
 
 
 def placed(body: Body, pose: Float[Array, "dof"], position: Float[np.ndarray, "3"]) -> Float[Array, "dof"]:

@@ -1,7 +1,7 @@
 """Limbs of a body, and poses that differ in one limb."""
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from sogjax.model.body import Body
 from sogjax.model.skeleton import Skeleton
@@ -26,6 +26,13 @@ def limbs(skeleton: Skeleton) -> list[Int[np.ndarray, "limb"]]:
             if len(dofs):
                 found.append(dofs)
     return found
+
+
+def limb_blobs(body: Body) -> Bool[np.ndarray, "limb blob"]:
+    """Which blobs belong to each limb."""
+    used = np.asarray(body.skeleton.parameter_transform) != 0.0
+    moved = [used[:, limb].any(axis=1) for limb in limbs(body.skeleton)]
+    return np.array([joints[np.asarray(body.blobs.joints)] for joints in moved], bool).reshape(-1, body.num_blobs)
 
 
 def _chain(joint: int, children: list[list[int]]) -> list[int] | None:

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from sogjax.model.body import Body
-from sogjax.tracking.limbs import limbs
+from sogjax.tracking.limbs import limb_blobs, limbs
 
 SIDES = (("left", "right"), ("Left", "Right"), ("l_", "r_"), ("L_", "R_"))
 """Beginnings or parts of names that tell the two sides."""
@@ -60,14 +60,13 @@ def look_alikes(body: Body, pose: Float[np.ndarray, "dof"]) -> Float[np.ndarray,
 def _limb_pairs(body: Body) -> list[Int[np.ndarray, "blob"]]:
     """The blobs of each pair of limbs that are each other's counterpart."""
     dofs = other_side(body.skeleton.dof_names)
-    used = np.asarray(body.skeleton.parameter_transform) != 0.0
+    every_limb, blobs = limbs(body.skeleton), limb_blobs(body)
     found = []
-    for limb in limbs(body.skeleton):
+    for limb, of_limb in zip(every_limb, blobs, strict=True):
         if np.all(dofs[limb] == limb) or limb.min() > dofs[limb].min():
             continue
-        both = np.concatenate([limb, dofs[limb]])
-        joints = {int(j) for j in np.flatnonzero(used[:, both].any(axis=1))}
-        found.append(np.array([b for b, joint in enumerate(body.blobs.joints) if joint in joints], int))
+        others = [k for k, other in enumerate(every_limb) if np.isin(other, dofs[limb]).any()]
+        found.append(np.flatnonzero(of_limb | blobs[others].any(axis=0)))
     return found
 
 
