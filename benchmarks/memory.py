@@ -16,8 +16,8 @@ from tempfile import TemporaryDirectory
 from sogjax.data.recording import Recording
 from sogjax.data.source import open_source
 from sogjax.data.video import VideoWriter
-from sogjax.engine.job import tracking
 from sogjax.engine.recordings import actors_of, opened
+from sogjax.engine.run_job import tracking
 from sogjax.settings.compose import track_config
 from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from

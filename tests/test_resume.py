@@ -19,7 +19,7 @@ from small_recording import write_video
 from sogjax.app.cli import main
 from sogjax.data import array_log
 from sogjax.data.motion import Motion, load_motion
-from sogjax.engine import job, kept_run, streams
+from sogjax.engine import job, kept_run, run_job, streams
 from sogjax.engine import track as track_command
 from sogjax.settings import ColorConfig
 from sogjax.tracking import tracker
@@ -42,7 +42,7 @@ def command(recording, tmp_path):
 
 def stop_after(monkeypatch, frames):
     """As Ctrl-C while a frame is tracked."""
-    whole, seen = job.tracked_frames, []
+    whole, seen = run_job.tracked_frames, []
 
     def tracked_frames(*arguments):
         for found in whole(*arguments):
@@ -51,7 +51,7 @@ def stop_after(monkeypatch, frames):
             seen.append(found)
             yield found
 
-    monkeypatch.setattr(job, "tracked_frames", tracked_frames)
+    monkeypatch.setattr(run_job, "tracked_frames", tracked_frames)
 
 
 def assert_same(folder, other, name="motion.npz"):

@@ -10,7 +10,7 @@ from command_line import actor_file, trackable
 from sogjax.app.cli import main
 from sogjax.data.motion import Motion, load_motion
 from sogjax.data.source import look_at_source
-from sogjax.engine import job, pipeline
+from sogjax.engine import pipeline, run_job
 from sogjax.errors import InputError
 from sogjax.view.overlay_video import OverlayVideo
 
@@ -27,7 +27,7 @@ def command(tmp_path, monkeypatch):
 
 def interrupt_the_step(monkeypatch):
     """Ctrl-C reaches the main thread, where the step runs."""
-    whole = job.tracked_frames
+    whole = run_job.tracked_frames
 
     def tracked_frames(*arguments):
         for done in whole(*arguments):
@@ -35,7 +35,7 @@ def interrupt_the_step(monkeypatch):
                 raise KeyboardInterrupt
             yield done
 
-    monkeypatch.setattr(job, "tracked_frames", tracked_frames)
+    monkeypatch.setattr(run_job, "tracked_frames", tracked_frames)
     return 130
 
 

@@ -84,9 +84,7 @@ def first_poses(
     return [rough_pose(body, each, recording.up) for body, each in zip(bodies, descriptions, strict=True)]
 
 
-def rough_descriptions(
-    recording: Recording, bodies: Sequence[Body], config: TrackConfig
-) -> list[InitialPose] | None:
+def rough_descriptions(recording: Recording, bodies: Sequence[Body], config: TrackConfig) -> list[InitialPose] | None:
     """What the file says of the poses of bodies, upright in the recording's world; None: they are searched for.
 
     Raises:

@@ -4,8 +4,6 @@ Somebody who stays in one place hides what is around: a trunk that never moves a
 it counts as background at first. When the body was followed, it does.
 """
 
-from typing import Protocol, runtime_checkable
-
 import cv2
 import equinox as eqx
 import jax.numpy as jnp
@@ -16,15 +14,16 @@ from sogjax.data.recording import Recording
 from sogjax.engine.background import clip_backgrounds_without
 from sogjax.engine.backwards import frames_backwards, tracked_backwards
 from sogjax.engine.clip_learning import LeftOut, sampled_frames
+from sogjax.engine.job import Job
 from sogjax.engine.pipeline import PictureReader, Preparation, cells_of_frame
 from sogjax.engine.terminal import progress, say
 from sogjax.engine.timing import StageTimes
 from sogjax.images.background import stack_background
-from sogjax.images.cells import CellGrid
 from sogjax.images.foreground import EmptyScene
 from sogjax.images.plate_difference import working_size
 from sogjax.model.body import Body
 from sogjax.settings import ImagesConfig
+from sogjax.tracking.search_energy import DISC
 from sogjax.tracking.tracker import Tracker, track
 from sogjax.view.projection import picture_points
 
@@ -32,46 +31,9 @@ MUCH_UNKNOWN = 0.1
 """Share of the pictures from which on the background is learnt again."""
 BORDER = 0.25
 """Metres around a blob that are left out, too: the body may be a little off."""
-DISC = 1.35
-"""Radius of what a blob of sigma 1 stands for."""
 
 
-@runtime_checkable
-class Clip(Protocol):
-    """Frames to be tracked, from one of them in both directions."""
-
-    @property
-    def recording(self) -> Recording:
-        """The recording."""
-        ...
-
-    @property
-    def grids(self) -> tuple[CellGrid, ...]:
-        """How its pictures are cut into cells."""
-        ...
-
-    @property
-    def tracker(self) -> Tracker:
-        """What finds the poses."""
-        ...
-
-    @property
-    def frames(self) -> tuple[int, int]:
-        """First and one after the last, counted from the recording's first."""
-        ...
-
-    @property
-    def begin(self) -> int:
-        """Where tracking begins."""
-        ...
-
-    @property
-    def start(self) -> Float[Array, "dof"]:
-        """The rough pose there."""
-        ...
-
-
-def learnt_again(job: Clip, images: ImagesConfig, read: PictureReader) -> Tracker:
+def learnt_again(job: Job, images: ImagesConfig, read: PictureReader) -> Tracker:
     """The job's tracker, with a background that was learnt again where the first one left much open.
 
     Raises:
@@ -134,7 +96,7 @@ def _from_pictures(recording: Recording, images: ImagesConfig) -> bool:
     return images.background == "pictures" or (images.background == "auto" and photographed)
 
 
-def _first_pass(job: Clip, images: ImagesConfig, read: PictureReader) -> dict[int, Array]:
+def _first_pass(job: Job, images: ImagesConfig, read: PictureReader) -> dict[int, Array]:
     """The poses of all frames, by frame."""
     poses: dict[int, Array] = {}
     if job.begin > job.frames[0]:

@@ -17,12 +17,13 @@ from sogjax.energy import Term
 from sogjax.engine import build
 from sogjax.engine.actor_report import report_folder, write_actor_report
 from sogjax.engine.first_pose import initial_pose_file, known_opening
-from sogjax.engine.job import frame_range, tracking
+from sogjax.engine.job import frame_range
 from sogjax.engine.origin import origin_of
 from sogjax.engine.outputs import actor_name, evaluate, export_endings, write_results
 from sogjax.engine.recordings import actors_of, file_list, opened
 from sogjax.engine.run import Run
 from sogjax.engine.run_folder import RunFolder, run_folder
+from sogjax.engine.run_job import tracking
 from sogjax.engine.streams import file_name
 from sogjax.engine.terminal import say
 from sogjax.engine.timing import StageTimes

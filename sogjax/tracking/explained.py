@@ -39,9 +39,7 @@ def explained(searcher: Searcher, frame: SeenFrame, pose: Float[np.ndarray, "dof
 
 
 @eqx.filter_jit
-def _explained(
-    energy: SearchEnergy, windows: ColorWindows, limbs: Bool[Array, "limb blob"], pose: Array
-) -> Explained:
+def _explained(energy: SearchEnergy, windows: ColorWindows, limbs: Bool[Array, "limb blob"], pose: Array) -> Explained:
     here = jax.tree.map(lambda leaf: leaf[0], windows)
     objective, appearance = energy.of_windows(here), energy.appearance(here)
     posed = Posed.from_pose(energy.body, pose)

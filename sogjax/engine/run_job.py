@@ -1,0 +1,98 @@
+"""One run of the tracker over a recording: frames in, motions and files out, as far as they were not kept."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from sogjax.data.recording import Recording
+from sogjax.data.stages import Behind
+from sogjax.energy import Term
+from sogjax.engine.backwards import frames_backwards, tracked_backwards
+from sogjax.engine.cells import picture_reader
+from sogjax.engine.job import Job
+from sogjax.engine.kept_run import KeptRun
+from sogjax.engine.pipeline import FrameTracker, PictureReader, tracked_frames
+from sogjax.engine.resume import resumed
+from sogjax.engine.run import Run
+from sogjax.engine.second_background import learnt_again
+from sogjax.engine.streams import Streams, readable_frames
+from sogjax.engine.terminal import say
+from sogjax.engine.timing import StageTimes
+from sogjax.model.body import Body
+from sogjax.sentences import counted
+from sogjax.settings import ImagesConfig, OutputsConfig, TrackConfig
+from sogjax.tracking.tracker import track
+
+FRAMES_BEHIND = 8
+"""Tracked frames waiting to be written, at most."""
+
+
+@contextmanager
+def tracking(
+    recording: Recording,
+    bodies: list[Body],
+    config: TrackConfig,
+    outputs: OutputsConfig,
+    out: Path,
+    kept: KeptRun | None = None,
+    terms: Sequence[Term] = (),
+) -> Iterator[Run]:
+    """Track, resuming what was kept; the motions are in files that are removed when the block ends without an error."""
+    job = Job.from_config(recording, bodies, config, kept, terms)
+    read = picture_reader(config.images)
+    job = replace(job, tracker=learnt_again(job, config.images, read))
+    with run_job(job, outputs, out, read, kept=kept, images=config.images) as result:
+        yield result
+
+
+@contextmanager
+def run_job(
+    job: Job,
+    outputs: OutputsConfig,
+    out: Path,
+    read: PictureReader,
+    follow: FrameTracker = track,
+    kept: KeptRun | None = None,
+    images: ImagesConfig | None = None,
+) -> Iterator[Run]:
+    """Run a job, with a reader of pictures and a tracker of their cells; `images` says how they are read backwards."""
+    first, last = job.frames
+    times = StageTimes()
+    prefix = None if kept is None else kept.prefix(readable_frames(out, job.bodies), last - first, job.num_before)
+    num_kept = 0 if prefix is None else prefix.num_frames
+    streams = Streams(out, job.recording, job.bodies, job.recording.first_frame + first, outputs, times, kept, num_kept)
+    if prefix is not None:
+        say(f"{out}: {num_kept} of {counted(last - first, 'frame')} are done; resuming after them")
+    elif job.num_before:
+        frames = frames_backwards(job.recording, job.grids, images or ImagesConfig(), first, job.begin + 1)
+        prefix = tracked_backwards(job.tracker, job.start, frames, job.num_before + 1, times)
+    start = job.start if prefix is None or not job.num_before else prefix.pose(0)
+    if prefix is not None:
+        follow = resumed(prefix, shown=not streams.num_skipped, with_images=outputs.rerun)
+    used: list[float] = []
+    missing = Counter(job.recording.num_missing(range(first, first + streams.num_skipped)))
+    try:
+        with streams:
+            count = last - first - streams.num_skipped
+            pictures = read(job.recording, streams.preparation(job.grids), last - count, last) if count else iter(())
+            frames = tracked_frames(pictures, count, job.tracker, start, times, follow)
+            with closing(frames), Behind(streams.consume, FRAMES_BEHIND) as behind:
+                for done in frames:
+                    used.append(float(np.mean(done.tracked.result.num_matching)))
+                    missing.update(
+                        name
+                        for name, picture in zip(job.recording.rig.names, done.pictures, strict=True)
+                        if picture.cells is None
+                    )
+                    behind.put(done)
+        motions = streams.motions(mapped=True)
+        image_blobs = float(np.mean(used)) if used else float("nan")
+        yield Run(job.recording, job.bodies, motions, times, image_blobs, files=streams.files, missing=missing)
+        streams.remove_partial()
+    except BaseException:
+        streams.say_what_is_left()
+        raise
