@@ -11,13 +11,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
+from sogjax.energy.image_term import ImageTerm
 from sogjax.energy.posed import Frame, Posed
 from sogjax.energy.pulls import ImagePulls
-from sogjax.energy.springs import springs_model
-from sogjax.energy.term import Term
 from sogjax.model.camera import project
 from sogjax.model.sog import Sog
-from sogjax.solve.quadratic import QuadraticModel
 
 DEPTH_SCALE = 0.06
 """Metres: a blob that much nearer to a camera than another counts e times as much where both lie."""
@@ -64,7 +62,7 @@ class BlobKinds(eqx.Module):
         return jnp.swapaxes(values, 0, 1).reshape(values.shape[1], -1)[:, self.slots]
 
 
-class Appearance(Term):
+class Appearance(ImageTerm):
     """Log likelihood of the cells with the body before them, less that of the background alone.
 
     A cell is covered by `C = 1 - exp(-sum_q A_q)`, and what is seen there is shared by the kinds of blobs as their
@@ -86,16 +84,10 @@ class Appearance(Term):
         values = jax.vmap(of_camera)(self.windows, seen, nearness)
         return jnp.mean(values / frame.views.normalizers)
 
-    def quadratic(self, posed: Posed, frame: Frame) -> QuadraticModel:
+    def pulls(self, posed: Posed, seen: Sog, frame: Frame) -> ImagePulls:
         """Gradient in closed form, who is in front taken as it is; springs where more cover is wanted."""
-        cameras = frame.views.cameras
-
-        def pulls_of(seen: Sog) -> ImagePulls:
-            nearness = _nearness(posed.blobs, seen, cameras.focal_length)
-            return jax.vmap(self._pulls)(self.windows, seen, nearness)
-
-        model = springs_model(posed, cameras, pulls_of, frame.views.normalizers)
-        return jax.tree.map(lambda part: self.weight * part, model)
+        nearness = _nearness(posed.blobs, seen, frame.views.cameras.focal_length)
+        return jax.vmap(self._pulls)(self.windows, seen, nearness)
 
     def covered(self, posed: Posed, frame: Frame) -> tuple[Float[Array, "camera column row"], Array]:
         """How far cells are covered, and what the body gains there (log likelihood)."""

@@ -7,17 +7,15 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from sogjax.energy.image_term import ImageTerm
 from sogjax.energy.posed import Frame, Posed
 from sogjax.energy.pulls import ImagePulls
-from sogjax.energy.springs import springs_model
-from sogjax.energy.term import Term
 from sogjax.energy.windows import Windows
 from sogjax.model.camera import project
 from sogjax.model.sog import Sog
-from sogjax.solve.quadratic import QuadraticModel
 
 
-class Foreground(Term):
+class Foreground(ImageTerm):
     """Sum over the cells of `a_i l_i C_i`, the mean over the cameras, in units of the whole picture as in Eq. 9.
 
     `a_i` is the cell's E_ii, `l_i` the log odds of foreground against background there, and `C_i = 1 - exp(-sum_q
@@ -35,16 +33,12 @@ class Foreground(Term):
         seen = jax.vmap(project, in_axes=(0, None))(views.cameras, posed.blobs)
         return jnp.mean(jax.vmap(self._of_camera)(views.windows, seen) / views.normalizers)
 
-    def quadratic(self, posed: Posed, frame: Frame) -> QuadraticModel:
+    def pulls(self, posed: Posed, seen: Sog, frame: Frame) -> ImagePulls:
         """Gradient in closed form; the springs are those of the cells that want to be covered."""
-        views, windows = frame.views, frame.views.windows
-        if windows is None:
-            size = posed.pose.shape[0]
-            nothing = jnp.zeros((size,), posed.pose.dtype)
-            return QuadraticModel(nothing.sum(), nothing, jnp.zeros((size, size), posed.pose.dtype))
-        pulls_in = jax.vmap(self._pulls)
-        model = springs_model(posed, views.cameras, lambda seen: pulls_in(windows, seen), views.normalizers)
-        return jax.tree.map(lambda part: self.weight * part, model)
+        if frame.views.windows is None:
+            nothing = jnp.zeros_like(seen.sigmas)
+            return ImagePulls(nothing[:, 0], jnp.zeros_like(seen.means), nothing, nothing)
+        return jax.vmap(self._pulls)(frame.views.windows, seen)
 
     def _of_camera(self, windows: Windows, seen: Sog) -> Float[Array, ""]:
         rows = _rows(windows, seen, self.density)

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from sogjax.energy.foreground import Foreground
+from sogjax.energy.image_term import ImageTerm, images_model
 from sogjax.energy.limits import LimitPenalty
 from sogjax.energy.overlap import EXACT_EXPONENT, GradientMode
 from sogjax.energy.posed import Frame, History, Posed
@@ -48,7 +49,9 @@ class FrameEnergy(eqx.Module):
     def quadratic(self, pose: Float[Array, "dof"]) -> QuadraticModel:
         """Value, gradient and a positive semi-definite curvature at a pose."""
         posed = Posed.from_pose(self.body, pose)
-        return _total([term.quadratic(posed, self.frame) for term in self.terms])
+        of_images = [term for term in self.terms if isinstance(term, ImageTerm)]
+        others = [term.quadratic(posed, self.frame) for term in self.terms if not isinstance(term, ImageTerm)]
+        return _total([images_model(of_images, posed, self.frame), *others] if of_images else others)
 
     def values(self, pose: Float[Array, "dof"]) -> dict[str, Float[Array, ""]]:
         """The value of every term at a pose, without its weight, by name."""

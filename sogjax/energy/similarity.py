@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from sogjax.energy.coloring import colored_pairs, colored_similarities
+from sogjax.energy.image_term import ImageTerm
 from sogjax.energy.overlap import (
     EXACT_EXPONENT,
     GradientMode,
@@ -21,15 +22,13 @@ from sogjax.energy.overlap import (
 from sogjax.energy.pairs import DensePairs
 from sogjax.energy.posed import Frame, Posed
 from sogjax.energy.pulls import ImagePulls
-from sogjax.energy.springs import springs_model
-from sogjax.energy.term import Term, Terms
+from sogjax.energy.term import Terms
 from sogjax.energy.views import Views
 from sogjax.model.camera import project
 from sogjax.model.sog import Sog
-from sogjax.solve.quadratic import QuadraticModel
 
 
-class Similarity(Term):
+class Similarity(ImageTerm):
     """E(Theta) of Eq. 9: the mean over the cameras of the normalised similarity."""
 
     exponent: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=EXACT_EXPONENT)
@@ -56,15 +55,9 @@ class Similarity(Term):
         )
         return jnp.mean(jax.vmap(one_camera)(views.images, seen, similarities, views.normalizers))
 
-    def quadratic(self, posed: Posed, frame: Frame) -> QuadraticModel:
-        """Value, gradient and the curvature of the springs, the exponentials computed once."""
+    def pulls(self, posed: Posed, seen: Sog, frame: Frame) -> ImagePulls:
+        """Pulls of the image blobs at the projected body blobs, for each camera; the exponentials computed once."""
         views = _colored(frame.views, posed.blobs.colors)
-        pulls_of = lambda seen: self._pulls(seen, views)
-        model = springs_model(posed, views.cameras, pulls_of, views.normalizers)
-        return jax.tree.map(lambda part: self.weight * part, model)
-
-    def _pulls(self, seen: Sog, views: Views) -> ImagePulls:
-        """Pulls of the image blobs at the projected body blobs, for each camera."""
         if views.pairs is not None:
             caps = views.image_caps(views.pairs)
             return overlap_pulls(views.pairs, caps, seen, self.exponent, capped=self.capped)

@@ -13,8 +13,6 @@ from sogjax.model.camera import Camera, distort, near_picture
 
 COLUMNS, ROWS = 32, 48
 """Cells of a window. A standing person is about three times as tall as wide, and the box has a border."""
-SAMPLES = 2
-"""Places along each side of a cell at which the picture is looked at."""
 _BEYOND = 0.2
 """Of the picture's size, outside it, where the lens model still means something."""
 
@@ -59,11 +57,9 @@ def windows_around(
     step = (boxes[..., 1, :] - boxes[..., 0, :]) / jnp.array([[[COLUMNS, ROWS]]], boxes.dtype)
     along = lambda axis, places: boxes[..., 0, axis, None] + places[None, None, :] * step[..., axis, None]
     centres = lambda count, axis: along(axis, jnp.arange(count, dtype=boxes.dtype) + 0.5)
-    samples = lambda count, axis: along(axis, (jnp.arange(SAMPLES * count, dtype=boxes.dtype) + 0.5) / SAMPLES)
-    looked_at = jax.vmap(_looked_at)(odds, cell_sizes, cameras, samples(COLUMNS, 0), samples(ROWS, 1))
-    split = looked_at.reshape(*real.shape, COLUMNS, SAMPLES, ROWS, SAMPLES)
-    means = jnp.where(real[..., None, None], jnp.mean(split, axis=(3, 5)), 0.0)
-    return Windows(centres(COLUMNS, 0), centres(ROWS, 1), step, means)
+    x, y = centres(COLUMNS, 0), centres(ROWS, 1)
+    looked_at = jax.vmap(_looked_at)(odds, cell_sizes, cameras, x, y)
+    return Windows(x, y, step, jnp.where(real[..., None, None], looked_at, 0.0))
 
 
 def _looked_at(
