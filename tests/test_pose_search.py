@@ -14,14 +14,14 @@ from sogjax.energy.frame_energy import standard_terms
 from sogjax.images.cells import CellGrid, stack_cells
 from sogjax.images.quadtree import Candidates
 from sogjax.tracking.culling import ImageReader
-from sogjax.tracking.found_pose import search_pose, search_poses
+from sogjax.tracking.found_pose import FoundPose, search_pose, search_poses
 from sogjax.tracking.hull import nearest_point
 from sogjax.tracking.limbs import limbs, with_other_limb
-from sogjax.tracking.mirrored import look_alikes, other_side
+from sogjax.tracking.mirrored import look_alikes, other_side, sides_apart
 from sogjax.tracking.pose_search import Searcher
 from sogjax.tracking.rotations import turns_with_vertical
 from sogjax.tracking.seen_frame import SeenFrame
-from sogjax.tracking.sureness import SURE, Evidence, confidence
+from sogjax.tracking.sureness import SURE, Agreement, Evidence, agreed_confidence, confidence
 
 RIG = ring_rig(4, (320, 240), distance=2.5)
 TERMS = standard_terms()
@@ -120,6 +120,28 @@ def test_a_pose_is_sure_only_if_every_condition_is_met():
     # Where no background is known, less of what is seen looks like foreground.
     assert confidence(replace(good, foreground=0.5)) < 0.5
     assert confidence(replace(good, foreground=0.5, known=0.0)) > SURE
+
+
+def test_two_searches_that_agree_are_sure_unless_there_is_a_reason_why_both_may_be_wrong():
+    good = Agreement(apart=0.02, moved=0.3, sides=1.1, worst_limb=0.4)
+    assert agreed_confidence(good) > SURE
+    for worse in ({"apart": 0.12}, {"moved": 0.0}, {"sides": 0.6}, {"worst_limb": -0.3}):
+        assert agreed_confidence(replace(good, **worse)) < 0.7
+    unsure = FoundPose(np.zeros(3), 1.0, 0.0, False, 0.2)
+    assert unsure.with_agreement(good).sure
+    assert unsure.with_agreement(replace(good, apart=0.5)).confidence == 0.2
+
+
+def test_crossed_legs_are_nearer_to_each_other_than_in_any_named_pose():
+    human = shipped("human")
+    pose = np.asarray(human.poses["rest"], np.float32)
+    crossed = pose.copy()
+    names = human.skeleton.dof_names
+    for side in ("left", "right"):
+        crossed[names.index(f"{side}_hip_side")] = -0.2
+    apart = sides_apart(human, np.stack([pose, crossed]))
+    assert apart[0] >= 0.99
+    assert apart[1] < 0.8
 
 
 def test_the_look_alikes_of_a_pose_have_its_silhouette_and_other_sides():

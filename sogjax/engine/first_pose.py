@@ -112,9 +112,8 @@ def clear_beginning(search: PoseSearch, first: int, last: int, picture: Path | N
     recording = search.recording
     guesses: list[Beginning] = []
     for frame in tried_frames(first, last, recording.fps):
-        found = search.poses(frame)
-        guesses.append(Beginning(frame, found))
-        for body, pose in zip(search.bodies, found, strict=True):
+        guesses.append(search.beginning(frame))
+        for body, pose in zip(search.bodies, guesses[-1].poses, strict=True):
             say(
                 f"pose of {body.name} in frame {frame + recording.first_frame}: "
                 f"{'sure' if pose.sure else 'not sure'} ({100.0 * pose.confidence:.0f} %)"
@@ -144,7 +143,7 @@ def searched_poses(
     Raises:
         InputError: the pictures show nothing in an actor's colours where the cameras look.
     """
-    found = PoseSearch(recording, bodies, config, terms).poses(frame)
+    found = PoseSearch(recording, bodies, config, terms).beginning(frame).poses
     lost = [body.name for body, pose in zip(bodies, found, strict=True) if not pose.energy > 0.0]
     if lost:
         raise InputError(

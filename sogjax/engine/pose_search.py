@@ -17,13 +17,17 @@ from sogjax.model.body import Body
 from sogjax.settings import TrackConfig
 from sogjax.tracking.following import followed
 from sogjax.tracking.found_pose import FoundPose, search_poses
+from sogjax.tracking.mirrored import means_of, sides_apart
 from sogjax.tracking.pose_search import Optimum, Searcher
 from sogjax.tracking.seen_frame import SeenFrame
+from sogjax.tracking.sureness import Agreement
 
 NUM_FOLLOWED, SECONDS = 6, 0.07
 """Frames through which hypotheses are followed, and the time between them."""
-TRIES = (0.0, 0.3, 0.8, 1.6, 3.0, 6.0)
+TRIES = (0.0, 0.4, 0.8, 1.6, 3.0, 6.0)
 """Seconds after the first frame at which a search is tried again."""
+AGREEING = 0.4
+"""Seconds to the frame in which a search that is not sure by itself is to find the same."""
 
 
 @dataclass(frozen=True)
@@ -75,12 +79,60 @@ class PoseSearch:
         """Whether anything is known of the empty scene."""
         return self._reader.empty is not None
 
-    def poses(self, frame: int) -> list[FoundPose]:
-        """The best poses of all actors in a frame, counted from the recording's first.
+    @cached_property
+    def _searched(self) -> dict[int, list[FoundPose]]:
+        """What was found, by frame."""
+        return {}
+
+    def beginning(self, frame: int) -> Beginning:
+        """The best poses in a frame, and how sure they are: by themselves, or since a search in another one agrees.
 
         Raises:
             InputError: no camera has the frame.
         """
+        found = Beginning(frame, self.poses(frame))
+        other = self._agreeing_frame(frame)
+        if found.sure or other is None or not all(pose.energy > 0.0 for pose in found.poses):
+            return found
+        agreements = self._agreements(found, Beginning(other, self.poses(other)))
+        judged = [pose.with_agreement(each) for pose, each in zip(found.poses, agreements, strict=True)]
+        return Beginning(frame, judged)
+
+    def _agreeing_frame(self, frame: int) -> int | None:
+        """The frame some time later, or before, where the clip ends; None: the clip is too short."""
+        step = max(round(AGREEING * self.recording.fps), 1)
+        return next((other for other in (frame + step, frame - step) if 0 <= other < self.recording.num_frames), None)
+
+    def _agreements(self, first: Beginning, second: Beginning) -> list[Agreement]:
+        """Of each actor."""
+        agreements = []
+        followed_there = self.carried(first, second.frame)
+        for body, a, b, there in zip(self.bodies, first.poses, second.poses, followed_there, strict=True):
+            poses = np.stack([a.pose, there, b.pose]).astype(np.float32)
+            before, after, found = means_of(body, poses)
+            distance = lambda p, q: float(np.linalg.norm(p - q, axis=-1).mean())
+            limbs = [-np.inf if pose.evidence is None else pose.evidence.worst_limb for pose in (a, b)]
+            agreements.append(
+                Agreement(
+                    apart=distance(after, found),
+                    moved=distance(before, after),
+                    sides=float(sides_apart(body, poses).min()),
+                    worst_limb=min(limbs),
+                )
+            )
+        return agreements
+
+    def poses(self, frame: int) -> list[FoundPose]:
+        """The best poses of all actors in a frame, counted from the recording's first, by what is seen there.
+
+        Raises:
+            InputError: no camera has the frame.
+        """
+        if frame not in self._searched:
+            self._searched[frame] = self._search(frame)
+        return self._searched[frame]
+
+    def _search(self, frame: int) -> list[FoundPose]:
         frames = self._followed_frames(frame)
         cells = dict(self._cells(sorted(frames)))
         if not cells[frame][1].any():

@@ -4,7 +4,7 @@ import hashlib
 import json
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,10 +23,8 @@ from sogjax.study.record import program_digest
 from sogjax.study.source import Source
 from sogjax.study.study import Study
 
-SEARCH_FILES = "engine/first_pose*.py"
+SEARCH_FILES = "engine/*pose*.py"
 """Of the program that decide how a search ends, beside those of a run."""
-SURE_MARGIN = 0.005
-"""A pose that does not say itself whether it is sure is taken to be above this margin."""
 
 
 @dataclass(frozen=True)
@@ -54,12 +52,14 @@ class Search:
     """None: the search refused to name a pose."""
     sure: bool
     confidence: float
-    """What the search says of it; the margin to the next different pose where it says no more."""
+    """How likely right the search says it is."""
     seconds: float
     """Of all the trial's actors together, with what had to be compiled."""
     processor_seconds: float
     """The same, of all cores together: what other programs do counts less."""
     refused: str = ""
+    evidence: dict[str, float] = field(default_factory=dict)
+    """From which that follows, and from what a search in another frame says, if there was one."""
 
     @property
     def is_right(self) -> bool:
@@ -130,9 +130,13 @@ class Searches:
         searches = []
         for body, pose in zip(source.bodies, found, strict=True):
             error = found_error(body, np.asarray(pose.pose), source.truth, trial.frame + recording.first_frame)
-            confidence = float(getattr(pose, "confidence", getattr(pose, "margin", np.nan)))
-            sure = bool(getattr(pose, "sure", confidence >= SURE_MARGIN))
-            searches.append(Search(trial, body.name, error, sure, confidence, *took))
+            evidence = {
+                f"{name}.{part}": value
+                for name in ("evidence", "agreement")
+                if (said := getattr(pose, name)) is not None
+                for part, value in asdict(said).items()
+            }
+            searches.append(Search(trial, body.name, error, pose.sure, pose.confidence, *took, evidence=evidence))
         return searches
 
     def _path(self, trial: Trial) -> Path:

@@ -1,7 +1,7 @@
 """The poses of bodies in one frame without a hint, and whether they can be relied on."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Array, Float
@@ -11,7 +11,7 @@ from sogjax.tracking.explained import explained
 from sogjax.tracking.following import followed
 from sogjax.tracking.pose_search import Searcher, search
 from sogjax.tracking.seen_frame import SeenFrame
-from sogjax.tracking.sureness import SURE, Evidence, confidence
+from sogjax.tracking.sureness import SURE, Agreement, Evidence, agreed_confidence, confidence
 
 FrameMaker = Callable[[Searcher, int], SeenFrame]
 """A frame as it is compared with one body: that which is searched (0) and those that come next."""
@@ -32,6 +32,13 @@ class FoundPose:
     """How likely the pose is right, 0 to 1."""
     evidence: Evidence | None = None
     """What that follows from."""
+    agreement: Agreement | None = None
+    """With a search in another frame, if there was one."""
+
+    def with_agreement(self, agreement: Agreement) -> "FoundPose":
+        """The same pose, as likely right as the search or the agreement says, whichever says more."""
+        likely = max(self.confidence, agreed_confidence(agreement))
+        return replace(self, confidence=likely, sure=likely >= SURE, agreement=agreement)
 
 
 @dataclass(frozen=True)

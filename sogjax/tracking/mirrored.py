@@ -57,6 +57,22 @@ def look_alikes(body: Body, pose: Float[np.ndarray, "dof"]) -> Float[np.ndarray,
     return np.asarray(fitted).reshape(-1, 2, len(pose))[np.arange(len(better)), better]
 
 
+def sides_apart(body: Body, poses: Float[np.ndarray, "start dof"]) -> Float[np.ndarray, "start"]:
+    """How far the limbs of a pair are from each other, as a part of the least that they are in any named pose.
+
+    Mean distance of a limb's blobs from those of its counterpart, of the pair for which that is least; infinite for a
+    body without sides.
+    """
+    others, pairs = other_side(body.blobs.names), _limb_pairs(body)
+    if not pairs:
+        return np.full(len(poses), np.inf)
+    named = means_of(body, np.stack([np.asarray(pose) for pose in body.poses.values()]))
+    between = lambda means: np.stack(
+        [np.linalg.norm(means[:, pair] - means[:, others[pair]], axis=-1).mean(axis=1) for pair in pairs], axis=1
+    )
+    return (between(means_of(body, poses)) / between(named).min(axis=0)).min(axis=1)
+
+
 def _limb_pairs(body: Body) -> list[Int[np.ndarray, "blob"]]:
     """The blobs of each pair of limbs that are each other's counterpart."""
     dofs = other_side(body.skeleton.dof_names)

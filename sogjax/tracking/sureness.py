@@ -1,5 +1,6 @@
 """Is a pose that was found right? What tells, and how likely it is, calibrated on rendered recordings."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,6 +44,30 @@ CONDITIONS = (
 )
 """Found on searches in walks, exercises and cartwheels of rendered people: with a background 29 with 4 and 12 cameras,
 without one 50 with 3 to 12. None of those that meet all conditions is wrong; that is too few for a promise."""
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How a pose that was followed to another frame compares with what a search finds there."""
+
+    apart: float
+    """Metres, mean distance of the blobs."""
+    moved: float
+    """Metres, the same from one frame to the other: of somebody who stands still both searches see the same."""
+    sides: float
+    """How far the limbs of a pair are from each other, as `sides_apart` has it, the least of both frames."""
+    worst_limb: float
+    """As in `Evidence`, the least of both frames."""
+
+
+MOST_APART, APART_SCALE = 0.05, 0.03
+"""Metres: two searches that agree so well are right, and by how much more they are no more likely right than wrong."""
+LEAST_MOVED, MOVED_SCALE = 0.03, 0.03
+"""Metres: who moves less gives two searches the same reasons to be wrong."""
+LEAST_SIDES, SIDES_SCALE = 0.8, 0.2
+"""Limbs of a pair that cross are as near to each other as they never are in a pose with a name: they are exchanged."""
+LEAST_LIMB, LIMB_SCALE = 0.0, 0.2
+"""A limb that explains less than nothing is elsewhere."""
 
 
 @dataclass(frozen=True)
@@ -92,9 +117,23 @@ class Evidence:
 
 
 def confidence(evidence: Evidence) -> float:
-    """How likely the pose is right, as the condition has it that is met least."""
-    worst = min(each.shortfall(getattr(evidence, each.name), evidence.known) for each in CONDITIONS)
-    return float(1.0 / (1.0 + np.exp(-STEEPNESS * (1.0 + min(worst, 10.0)))))
+    """How likely the pose is right, from one search, as the condition has it that is met least."""
+    return _likely(each.shortfall(getattr(evidence, each.name), evidence.known) for each in CONDITIONS)
+
+
+def agreed_confidence(agreement: Agreement) -> float:
+    """The same from two searches in frames some time apart."""
+    conditions = (
+        (MOST_APART - agreement.apart) / APART_SCALE,
+        (agreement.moved - LEAST_MOVED) / MOVED_SCALE,
+        (agreement.sides - LEAST_SIDES) / SIDES_SCALE,
+        (agreement.worst_limb - LEAST_LIMB) / LIMB_SCALE,
+    )
+    return _likely(conditions)
+
+
+def _likely(shortfalls: Iterable[float]) -> float:
+    return float(1.0 / (1.0 + np.exp(-STEEPNESS * (1.0 + min(*shortfalls, 10.0)))))
 
 
 def _margin(energies: Float[np.ndarray, "hypothesis"], best: int, others: list[int]) -> float:
