@@ -13,7 +13,7 @@ from sogjax.data.calibration import write_toml
 from sogjax.data.ground_truth import GroundTruth, load_ground_truth, save_ground_truth
 from sogjax.data.motion import load_motion
 
-FRAMES = 5
+FRAMES = 12
 HEIGHT = 1.1
 """Metres: the cameras look at 1.2."""
 NOTHING_SHOWN = ("outputs.overlay=false", "outputs.rerun=false")
