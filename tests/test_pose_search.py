@@ -127,6 +127,9 @@ def test_two_searches_that_agree_are_sure_unless_there_is_a_reason_why_both_may_
     assert agreed_confidence(good) > SURE
     for worse in ({"apart": 0.12}, {"moved": 0.0}, {"sides": 0.6}, {"worst_limb": -0.3}):
         assert agreed_confidence(replace(good, **worse)) < 0.7
+    assert (
+        agreed_confidence(replace(good, apart=0.04)) > SURE > agreed_confidence(replace(good, apart=0.04, num_actors=2))
+    )
     unsure = FoundPose(np.zeros(3), 1.0, 0.0, False, 0.2)
     assert unsure.with_agreement(good).sure
     assert unsure.with_agreement(replace(good, apart=0.5)).confidence == 0.2

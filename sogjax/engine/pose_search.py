@@ -118,6 +118,7 @@ class PoseSearch:
                     moved=distance(before, after),
                     sides=float(sides_apart(body, poses).min()),
                     worst_limb=min(limbs),
+                    num_actors=len(self.bodies),
                 )
             )
         return agreements

@@ -58,10 +58,14 @@ class Agreement:
     """How far the limbs of a pair are from each other, as `sides_apart` has it, the least of both frames."""
     worst_limb: float
     """As in `Evidence`, the least of both frames."""
+    num_actors: int = 1
+    """That were searched for together."""
 
 
 MOST_APART, APART_SCALE = 0.05, 0.03
 """Metres: two searches that agree so well are right, and by how much more they are no more likely right than wrong."""
+MOST_APART_AMONG_OTHERS = 0.03
+"""The same where several actors are searched for: one of them taken for the other is seen in both frames, too."""
 LEAST_MOVED, MOVED_SCALE = 0.03, 0.03
 """Metres: who moves less gives two searches the same reasons to be wrong."""
 LEAST_SIDES, SIDES_SCALE = 0.8, 0.2
@@ -124,7 +128,7 @@ def confidence(evidence: Evidence) -> float:
 def agreed_confidence(agreement: Agreement) -> float:
     """The same from two searches in frames some time apart."""
     conditions = (
-        (MOST_APART - agreement.apart) / APART_SCALE,
+        ((MOST_APART if agreement.num_actors == 1 else MOST_APART_AMONG_OTHERS) - agreement.apart) / APART_SCALE,
         (agreement.moved - LEAST_MOVED) / MOVED_SCALE,
         (agreement.sides - LEAST_SIDES) / SIDES_SCALE,
         (agreement.worst_limb - LEAST_LIMB) / LIMB_SCALE,
