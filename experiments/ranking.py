@@ -28,7 +28,7 @@ from sogjax.model.body import Body
 from sogjax.study.machine import machine_line
 from sogjax.study.ranking import RankedTrack, ranking_of
 from sogjax.study.ranking_tables import curves_of, limbs_table, terms_table, verdicts_table, write_csv
-from sogjax.study.script import run_script, settings_from
+from sogjax.study.script import HELP, run_script, settings_from
 from sogjax.view.ranking_chart import ranking_chart
 
 
@@ -75,7 +75,7 @@ def _actors(settings: Settings) -> list[Body]:
 def _with_sets(words: list[str]) -> list[str]:
     """The words of a command line, where those that are no setting of the script are its sets."""
     known = {entry.name for entry in fields(Settings)}
-    own = [word for word in words if " " not in word and word.partition("=")[0] in known]
+    own = [word for word in words if word in HELP or (" " not in word and word.partition("=")[0] in known)]
     sets = [word for word in words if word not in own]
     return [*own, f"sets={json.dumps(sets)}"] if sets else own
 

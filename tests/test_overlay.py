@@ -152,6 +152,12 @@ def test_grids_hold_all_pictures_and_stay_within_the_width(count, size):
     assert max(fit.top + fit.height for fit in fits) <= grid.size[1]
 
 
+@pytest.mark.parametrize(("count", "shape"), [(1, (1, 1)), (4, (2, 2)), (9, (3, 3)), (12, (4, 3))])
+def test_a_grid_has_few_empty_places(count, shape):
+    grid = grid_for([(1296, 972)] * count, 1920)
+    assert (grid.columns, grid.rows) == shape
+
+
 def test_a_smaller_picture_keeps_its_mean_and_its_places():
     ramp = np.tile(np.linspace(0, 255, 1200).astype(np.uint8)[None, :, None], (900, 1, 3))
     small = shrink(ramp, (340, 255))

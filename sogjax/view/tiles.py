@@ -68,8 +68,9 @@ def grid_for(
     count = len(image_sizes)
     aspect = float(np.median([w / h for w, h in image_sizes]))
     if columns is None:
-        shape = lambda n: abs(np.log(n * aspect / -(-count // n) / widest))
-        columns = min(range(1, count + 1), key=shape)
+        rows = lambda n: -(-count // n)
+        empty = lambda n: (n * rows(n) - count) / count
+        columns = min(range(1, count + 1), key=lambda n: abs(np.log(n * aspect / rows(n) / widest)) + empty(n))
     tile = min(width // columns, max(w for w, _ in image_sizes))
     even = lambda side: max(2, int(side) // 2 * 2)
     return TileGrid(columns, -(-count // columns), (even(tile), even(round(tile / aspect))))
