@@ -30,6 +30,8 @@ def test_programs_are_kept_while_there_is_room_and_forgotten_when_there_is_not(l
     assert forget_programs_if_many(*limits(900, 1000))
     double(jnp.ones(3))
     assert len(compiled) == 2
+    assert not forget_programs_if_many(*limits(200, 1000), memory=0.05)
+    assert forget_programs_if_many(*limits(200, 1000), memory=0.5)
 
 
 def test_nothing_is_done_where_the_system_does_not_tell(tmp_path):

@@ -16,6 +16,8 @@ from sogjax.images.cells import CellGrid
 from sogjax.settings import ImagesConfig
 
 CHOICES = ("auto", "pictures", "clip", "none")
+MOST_MADE = 4
+"""Backgrounds that a process remembers: those of twelve cameras take 30 MB."""
 _made: dict[str, Arrays | str] = {}
 _making = Lock()
 _said: set[str] = set()
@@ -81,9 +83,12 @@ def clip_backgrounds(recording: Recording, cache: str | None) -> tuple[CameraBac
     """The backgrounds learnt from the clip, or why it is unsuitable (with the remedy); made once for each process."""
     key = json.dumps([str(recording.path.resolve()), background_origin(recording)])
     with _making:
-        found = _made.get(key)
+        found = _made.pop(key, None)
         if found is None or (cache is not None and not isinstance(found, str)):
-            found = _made[key] = _kept_or_learnt(recording, cache, found)
+            found = _kept_or_learnt(recording, cache, found)
+        _made[key] = found
+        for oldest in list(_made)[:-MOST_MADE]:
+            del _made[oldest]
     return found if isinstance(found, str) else _from_arrays(recording, found)
 
 

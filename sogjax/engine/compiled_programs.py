@@ -1,23 +1,32 @@
 """Compiled programs are dropped before a process holds more of them than it may.
 
 Each program takes some memory maps, of which Linux allows a process 65530 by default. A process that runs out of them
-is ended without an error that could be caught. Studies and sweeps over many settings can get that far.
+is ended without an error that could be caught. Studies and sweeps over many settings can get that far, and before that
+their programs may take more memory than a machine has to spare.
 """
 
 import gc
+import os
 from pathlib import Path
 
 import jax
 
 FULL = 0.4
 """Share of the allowed maps above which programs are dropped; one run may need a tenth."""
+MANY, LARGE = 0.1, 0.15
+"""Share of the allowed maps above which they are dropped if the process has this share of the machine's memory."""
 _MAPS, _MOST = Path("/proc/self/maps"), Path("/proc/sys/vm/max_map_count")
 
 
-def forget_programs_if_many(maps: Path = _MAPS, most: Path = _MOST) -> bool:
+def forget_programs_if_many(maps: Path = _MAPS, most: Path = _MOST, memory: float | None = None) -> bool:
     """Drop all compiled programs if the process has used many of its memory maps; returns whether it did.
 
     They are compiled again when needed. Does nothing where the system does not report its maps.
+
+    Args:
+        maps: the file that lists them.
+        most: the file with how many are allowed.
+        memory: the process's share of the machine's memory; None: as the system reports it.
     """
     try:
         with maps.open("rb") as lines:
@@ -25,8 +34,14 @@ def forget_programs_if_many(maps: Path = _MAPS, most: Path = _MOST) -> bool:
         allowed = int(most.read_text())
     except (OSError, ValueError):
         return False
-    if used < FULL * allowed:
+    memory = _memory_share() if memory is None else memory
+    if used < (MANY if memory > LARGE else FULL) * allowed:
         return False
     jax.clear_caches()
     gc.collect()
     return True
+
+
+def _memory_share() -> float:
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages / os.sysconf("SC_PHYS_PAGES")
