@@ -74,7 +74,8 @@ def fit_actor(recording: Recording, subject: str | None = None, **settings: Any)
     config: ActorConfig = composed_without_hydra(ActorConfig, "actor", keywords=given)
     space, _ = color_space_and_radius(config.color)
     body = body_named(config.body)
-    recording, learnt, best = with_examples(with_cameras(recording, config.cameras), ImagesConfig())
+    chosen = with_cameras(recording, config.cameras)
+    recording, learnt, best = with_examples(chosen, ImagesConfig(), config.actors)
     return make.make_actor(
         recording,
         body,
