@@ -59,8 +59,8 @@ def check_actors(recording: Recording, actors: int | None, num_files: int | None
     if num_files is not None:
         if num_files != actors:
             raise InputError(
-                f"actors={actors}: actor= gives {counted(num_files, 'actor file')}, which count; leave actors out, or "
-                f"give {counted(actors, 'file')}"
+                f"actors={actors}: the actors come from actor=, which gives {counted(num_files, 'file')}; leave actors "
+                f"out, or give {counted(actors, 'file')}"
             )
         return
     subjects = subjects_of(recording) if recording.example_poses else ()
