@@ -37,14 +37,18 @@ def test_frames_are_chosen_for_worth_and_for_shapes_not_seen_before():
 
 @pytest.mark.parametrize(
     ("values", "words"),
-    [({"num_bodies": 2}, "more than one person"), ({"known": 0.3}, "same place"), ({"agreement": 0.2}, "nobody")],
+    [({"num_bodies": 2}, "2 people"), ({"known": 0.3}, "same place"), ({"agreement": 0.2}, "nobody")],
 )
 def test_clips_that_show_no_one_person_apart_are_refused(values, words):
     shapes = [shape(k, k % 8) for k in range(9)]
-    assert unsuitable(shapes) is None
-    problem = unsuitable([replace(one, **values) for one in shapes])
+    assert unsuitable(shapes, lambda: 0) is None
+    problem = unsuitable([replace(one, **values) for one in shapes], lambda: 2)
     assert problem is not None
     assert words in problem
+
+
+def test_one_person_seen_in_parts_is_no_reason_to_refuse():
+    assert unsuitable([shape(k, k, num_bodies=2) for k in range(8)], lambda: 1) is None
 
 
 @pytest.mark.parametrize(("seen", "first"), [(0, "actors=2"), (2, "actors=2"), (3, "actors=3")])

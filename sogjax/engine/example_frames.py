@@ -1,6 +1,6 @@
 """Example poses from the frames of the videos, where a recording has none."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -97,9 +97,7 @@ def with_example_frames(
 
 def _person_examples(recording: Recording, learnt: Sequence[CameraBackground]) -> tuple[ExamplePose, ...]:
     shapes = seen_shapes(recording, learnt)
-    if show_several(shapes) and (people := num_people_seen(recording, learnt)) != 1:
-        raise _no_examples(recording, several_people(people))
-    if (problem := unsuitable(shapes)) is not None:
+    if (problem := unsuitable(shapes, lambda: num_people_seen(recording, learnt))) is not None:
         raise _no_examples(recording, problem)
     chosen = spread_choice([shape for shape in shapes if shape.agreement > AGREEING], NUM_TRIED)
     _say_chosen(recording, [shape.frame for shape in chosen], len(shapes))
@@ -137,10 +135,13 @@ def _background(recording: Recording, images: ImagesConfig) -> tuple[CameraBackg
     return found
 
 
-def unsuitable(shapes: Sequence[SeenShape]) -> str | None:
-    """Why no example poses can be taken from frames, and the remedy; None: they can."""
-    if show_several(shapes):
-        return several_people(0)
+def unsuitable(shapes: Sequence[SeenShape], num_people: Callable[[], int]) -> str | None:
+    """Why no example poses of one person can be taken from frames, and the remedy; None: they can.
+
+    `num_people` counts better than the parts of the hulls do, but takes seconds: a body may be seen in parts.
+    """
+    if show_several(shapes) and (people := num_people()) != 1:
+        return several_people(people)
     if shapes and np.median([shape.known for shape in shapes]) < LEAST_KNOWN:
         return (
             "the subject stands in the same place throughout, and what is behind is never seen; give pictures of the "

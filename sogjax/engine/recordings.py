@@ -12,7 +12,7 @@ from sogjax.actor.make import MadeActor, make_actor, subjects_of
 from sogjax.data.actor_file import load_body, named_body
 from sogjax.data.recording import Recording, open_recording
 from sogjax.engine.build import color_space_and_radius, energy_terms
-from sogjax.engine.example_frames import with_examples
+from sogjax.engine.example_frames import check_actors, with_examples
 from sogjax.engine.terminal import progress, say
 from sogjax.errors import InputError
 from sogjax.model.body import Body
@@ -80,7 +80,7 @@ def actors_of(
 ) -> tuple[list[Body], list[MadeActor]]:
     """The actors of a recording, and what was found where they are made of its example poses or its videos.
 
-    `actors` is how many are made of its videos; None: one.
+    `actors` is how many are made of its videos, None one; files and example poses must be as many.
 
     Raises:
         InputError: an invalid actor file, two actors with one name, unsuitable example poses, or videos that none can
@@ -93,6 +93,7 @@ def actors_of(
             raise InputError(
                 f"actor={files}: two actors are named {max(names, key=names.count)!r}; give each its own `name`"
             )
+        check_actors(recording, actors, len(bodies))
         return bodies, []
     space, _ = color_space_and_radius(color)
     images = images or ImagesConfig()
