@@ -317,7 +317,7 @@ def test_a_body_to_start_from_with_something_wrong(capsys, recording, tmp_path):
     ],
 )
 def test_an_option_with_something_wrong(capsys, recording, tmp_path, argument, words):
-    actor = [] if argument.startswith(("actor", "body")) else [f"actor={actor_file(tmp_path / 'actor.yaml')}"]
+    actor = [] if argument.startswith(("actor=", "body")) else [f"actor={actor_file(tmp_path / 'actor.yaml')}"]
     refused_track(capsys, recording, *actor, *argument.split(), words=words)
 
 
