@@ -57,7 +57,7 @@ def track_repeatedly(settings: Settings, repeats: int) -> None:
     """The first frames of the recording forwards and backwards, so many times, into a folder that is removed."""
     config = track_config(settings.overrides, recording=settings.recording, actor=settings.actor)
     recording = opened(config.recording, config.cameras)
-    bodies, _ = actors_of(recording, config.actor, config.body, config.color)
+    bodies, _ = actors_of(recording, config.actor, config.body, config.color, actors=config.actors)
     with TemporaryDirectory() as folder:
         longer = longer_recording(recording, settings.frames, repeats, Path(folder))
         with tracking(longer, bodies, config, config.outputs, Path(folder)) as result:

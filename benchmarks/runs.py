@@ -44,7 +44,7 @@ class Scene:
         folder = demo_recording()
         recording = opened(str(folder))
         config: TrackConfig = track_config(recording=folder)
-        bodies, _ = actors_of(recording, config.actor, config.body, config.color)
+        bodies, _ = actors_of(recording, config.actor, config.body, config.color, actors=config.actors)
         return cls(folder, recording, bodies, min(frames, recording.num_frames))
 
     def config(self, *overrides: str, frames: int | None = None) -> TrackConfig:

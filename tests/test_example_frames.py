@@ -2,12 +2,19 @@
 
 from dataclasses import replace
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
+from rig_cases import recording_of, ring_rig
 
 from sogjax.actor.facing import consistent_ways, disagreement
 from sogjax.actor.frame_choice import SHAPE_VOXELS, SeenShape, spread_choice, unlikeness
-from sogjax.engine.example_frames import most_helpful, unsuitable
+from sogjax.actor.make import MadeActor
+from sogjax.data.recording import ExamplePose
+from sogjax.engine.example_frames import check_actors, most_helpful, several_people, unsuitable
+from sogjax.engine.first_pose import known_opening
+from sogjax.errors import InputError
+from sogjax.settings import TrackConfig
 
 
 def shape(frame, part, **values):
@@ -30,14 +37,70 @@ def test_frames_are_chosen_for_worth_and_for_shapes_not_seen_before():
 
 @pytest.mark.parametrize(
     ("values", "words"),
-    [({"num_bodies": 2}, "more than one person"), ({"known": 0.3}, "same place"), ({"agreement": 0.2}, "nobody")],
+    [({"num_bodies": 2}, "2 people"), ({"known": 0.3}, "same place"), ({"agreement": 0.2}, "nobody")],
 )
 def test_clips_that_show_no_one_person_apart_are_refused(values, words):
     shapes = [shape(k, k % 8) for k in range(9)]
-    assert unsuitable(shapes) is None
-    problem = unsuitable([replace(one, **values) for one in shapes])
+    assert unsuitable(shapes, lambda: 0) is None
+    problem = unsuitable([replace(one, **values) for one in shapes], lambda: 2)
     assert problem is not None
     assert words in problem
+
+
+def test_one_person_seen_in_parts_is_no_reason_to_refuse():
+    assert unsuitable([shape(k, k, num_bodies=2) for k in range(8)], lambda: 1) is None
+
+
+@pytest.mark.parametrize(("seen", "first"), [(0, "actors=2"), (2, "actors=2"), (3, "actors=3")])
+def test_the_first_remedy_for_several_people_is_an_actor_of_each(seen, first):
+    sentence = several_people(seen)
+    assert sentence.index(first) < sentence.index("example_poses")
+
+
+@pytest.mark.parametrize(
+    ("actors", "files", "words"),
+    [
+        (0, None, ("actors=0", "at least 1")),
+        (3, 2, ("actors=3", "2 files", "leave actors out")),
+        (3, None, ("actors=3", "2 actors (anna, ben)", "leave actors out")),
+        (1, None, ("actors=1", "2 actors (anna, ben)")),
+    ],
+)
+def test_another_number_of_actors_than_files_or_poses_have_is_refused(actors, files, words):
+    poses = tuple(ExamplePose(name, name, {}, {}, None, k) for k, name in enumerate(("anna", "ben")))
+    recording = replace(recording_of(ring_rig(2), 9), example_poses=poses)
+    for right in (None, 2):
+        check_actors(recording, right, files)
+    with pytest.raises(InputError) as refusal:
+        check_actors(recording, actors, files)
+    for word in words:
+        assert word in str(refusal.value)
+
+
+class Made(MadeActor):
+    """An actor that fits its frames to a given degree."""
+
+    def __init__(self, fits, poses):
+        object.__setattr__(self, "fits", fits)
+        object.__setattr__(self, "frames", {f"frame_{frame}": frame for frame in fits})
+        object.__setattr__(self, "example_poses", {f"frame_{k}": jnp.asarray(pose) for k, pose in poses.items()})
+
+    def agreement(self, name):
+        return self.fits[self.frames[name]]
+
+
+def test_several_actors_begin_where_all_poses_are_known_and_the_worst_fits_best():
+    recording, config = recording_of(ring_rig(2), 99), TrackConfig(recording="walk")
+    anna = Made({3: 0.9, 8: 0.8, 20: 0.99}, {3: [3.0], 8: [8.0], 20: [20.0]})
+    ben = Made({3: 0.6, 8: 0.7}, {3: [30.0, 31.0], 8: [80.0, 81.0]})
+    opening = known_opening(recording, [anna, ben], config)
+    assert opening is not None
+    assert opening[1] == 8
+    np.testing.assert_array_equal(opening[0], [8.0, 80.0, 81.0])
+    assert known_opening(recording, [anna, ben], replace(config, start=9)) is None
+    alone = known_opening(recording, [anna], config)
+    assert alone is not None
+    assert alone[1] == 20
 
 
 def test_what_would_help_most():

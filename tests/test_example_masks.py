@@ -67,6 +67,19 @@ def test_plates_alone_suffice(tmp_path):
         assert iou(mask, TRUTH[k]) > 0.85
 
 
+def test_only_the_part_of_a_mask_that_the_subject_is_in_counts(tmp_path):
+    recording = example_recording(tmp_path, masks=(0, 1, 2, 3))
+    example = recording.example_poses[0]
+    left = np.zeros((60, 80), bool)
+    left[:, :40] = True
+    within = {"cam0": left, "cam1": np.ones((120, 160), bool), "cam2": np.ones((60, 80), bool)}
+    found = example_masks(recording, replace(example, within=within), load_images(recording, example))
+    everything = found.masks | found.left_out
+    assert sorted(everything) == [0, 1, 2], "cam3 shows others before it"
+    assert not everything[0][:, 80:].any()
+    np.testing.assert_array_equal(everything[1], TRUTH[1])
+
+
 def test_a_mask_of_something_else_is_left_out_and_said(tmp_path):
     recording = example_recording(tmp_path, masks=(0, 1, 2, 3))
     wrong = np.zeros((120, 160), np.uint8)

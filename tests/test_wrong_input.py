@@ -302,6 +302,10 @@ def test_a_body_to_start_from_with_something_wrong(capsys, recording, tmp_path):
         ("cameras=[]", ("cameras=[]", "at least one", "left, right")),
         ("cameras=[left,left]", ("cameras=[left,left]", "once")),
         ("energy.pairs=some", ("energy.pairs=some", "sparse")),
+        ("actors=0", ("actors=0", "at least 1")),
+        ("actors=-2", ("actors=-2", "at least 1")),
+        ("actors=1.5", ("actors=1.5", "whole number")),
+        ("actors=2", ("actors=2", "actor=", "1 file", "leave actors out")),
         ("start=4", ("start=4", "0 to 3")),
         ("start=-1", ("start=-1",)),
         ("stop=5", ("stop=5", "0 to 3")),
@@ -313,7 +317,7 @@ def test_a_body_to_start_from_with_something_wrong(capsys, recording, tmp_path):
     ],
 )
 def test_an_option_with_something_wrong(capsys, recording, tmp_path, argument, words):
-    actor = [] if argument.startswith(("actor", "body")) else [f"actor={actor_file(tmp_path / 'actor.yaml')}"]
+    actor = [] if argument.startswith(("actor=", "body")) else [f"actor={actor_file(tmp_path / 'actor.yaml')}"]
     refused_track(capsys, recording, *actor, *argument.split(), words=words)
 
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 from jaxtyping import Bool, UInt8
 
@@ -13,7 +14,7 @@ from sogjax.data.video import read_still
 from sogjax.errors import InputError
 from sogjax.images.agreement import AGREEING, disagreeing_cameras, hull_coverage
 from sogjax.images.background import CameraBackground
-from sogjax.images.segmentation import masks_from_plates
+from sogjax.images.segmentation import largest_parts, masks_from_plates
 from sogjax.model.frames import axis_vector
 from sogjax.sentences import counted
 
@@ -70,8 +71,8 @@ def example_masks(
     cameras = {camera: recording.rig.camera(names[camera]) for camera in images}
     up = axis_vector(recording.up)
     made = masks_from_plates(images, plates, files, cameras, up, unknown) if plates else {}
-    found = dict(sorted({**files, **made}.items()))
-    _check_found(recording, example, list(found), [camera for camera in plates if camera not in made])
+    found = _subject_alone(example, names, dict(sorted({**files, **made}.items())))
+    _check_found(recording, example, list(found), [camera for camera in plates if camera not in found])
     wrong = disagreeing_cameras(found, cameras)
     masks = {camera: mask for camera, mask in found.items() if camera not in wrong}
     warnings = [_unlike(example, names[camera], share) for camera, share in wrong.items()]
@@ -88,6 +89,19 @@ def example_masks(
         left_out={camera: found[camera] for camera in wrong},
         warnings=tuple(warnings),
     )
+
+
+def _subject_alone(example: ExamplePose, names: Sequence[str], masks: Mapping[int, Mask]) -> dict[int, Mask]:
+    """The masks without other people, of the cameras that show the subject apart from them."""
+    if example.within is None:
+        return dict(masks)
+    alone: dict[int, Mask] = {}
+    for camera, mask in masks.items():
+        if (region := example.within.get(names[camera])) is not None:
+            size = (mask.shape[1], mask.shape[0])
+            enlarged = cv2.resize(region.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
+            alone[camera] = largest_parts(mask & enlarged)
+    return {camera: mask for camera, mask in alone.items() if mask.any()}
 
 
 def _checked_mask(path: Path) -> Mask:

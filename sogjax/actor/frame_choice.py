@@ -82,7 +82,7 @@ def seen_shape(
         up: the world's vertical.
     """
     pixels = {k: voxel_pixels(cube, cameras[k], mask.shape) for k, mask in masks.items()}
-    hits = {k: pixels[k].hits(_widened(masks[k] | unknown[k])) for k in masks}
+    hits = {k: pixels[k].hits(widened(masks[k] | unknown[k])) for k in masks}
     hull = np.sum([~hit for hit in hits.values()], axis=0) <= (1 if len(masks) >= MANY else 0)
     connected: Any = label(hull.reshape(VOXELS, VOXELS, VOXELS))
     labels, count = connected
@@ -105,13 +105,20 @@ def seen_shape(
 
 def spread_choice(shapes: Sequence[SeenShape], count: int) -> list[SeenShape]:
     """The best frame, then one after the other the one that serves best and is least like those before."""
-    left = sorted(shapes, key=lambda shape: -shape.worth)
-    chosen: list[SeenShape] = []
+    return [shape for (shape,) in spread_moments([(shape,) for shape in shapes], count)]
+
+
+def spread_moments(moments: Sequence[tuple[SeenShape, ...]], count: int) -> list[tuple[SeenShape, ...]]:
+    """The same for frames that show several people, who all count: their shapes are in one order."""
+    worth = lambda moment: float(np.prod([shape.worth for shape in moment]))
+    unlike = lambda one, other: float(np.mean([unlikeness(a, b) for a, b in zip(one, other, strict=True)]))
+    left = sorted(moments, key=lambda moment: -worth(moment))
+    chosen: list[tuple[SeenShape, ...]] = []
     while left and len(chosen) < count:
-        novelty = lambda shape: min((unlikeness(shape, other) for other in chosen), default=1.0)
-        chosen.append(max(left, key=lambda shape: shape.worth * novelty(shape)))
-        left.remove(chosen[-1])
-    return sorted(chosen, key=lambda shape: shape.frame)
+        novelty = [min((unlike(moment, other) for other in chosen), default=1.0) for moment in left]
+        best = int(np.argmax([worth(moment) * new for moment, new in zip(left, novelty, strict=True)]))
+        chosen.append(left.pop(best))
+    return sorted(chosen, key=lambda moment: moment[0].frame)
 
 
 def unlikeness(one: SeenShape, other: SeenShape) -> float:
@@ -119,7 +126,8 @@ def unlikeness(one: SeenShape, other: SeenShape) -> float:
     return 1.0 - float((one.voxels & other.voxels).sum() / max((one.voxels | other.voxels).sum(), 1))
 
 
-def _widened(mask: Mask) -> Mask:
+def widened(mask: Mask) -> Mask:
+    """The mask and the cells beside it."""
     return cv2.dilate(mask.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
 
 

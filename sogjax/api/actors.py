@@ -46,7 +46,8 @@ def make_actor(recording: Recording, subject: str | None = None, **settings: Any
     Args:
         recording: with example poses, and masks or empty background pictures for them; without, frames of its videos
             are used.
-        subject: which one, where the example poses show several.
+        subject: which one, where the example poses show several; `person_1`, `person_2` ... where there are none, and
+            `actors=2` says how many people the videos show.
         settings: options of `sogjax actor`, such as `body="dog", symmetric=False, color="hsv"`.
 
     Raises:
@@ -74,7 +75,8 @@ def fit_actor(recording: Recording, subject: str | None = None, **settings: Any)
     config: ActorConfig = composed_without_hydra(ActorConfig, "actor", keywords=given)
     space, _ = color_space_and_radius(config.color)
     body = body_named(config.body)
-    recording, learnt, best = with_examples(with_cameras(recording, config.cameras), ImagesConfig())
+    chosen = with_cameras(recording, config.cameras)
+    recording, learnt, best = with_examples(chosen, ImagesConfig(), config.actors)
     return make.make_actor(
         recording,
         body,

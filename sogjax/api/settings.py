@@ -12,6 +12,7 @@ from sogjax.settings.compose import track_config
 _NOT_HERE = {
     "recording": "is a separate argument, not a setting",
     "actor": "is a separate argument, not a setting",
+    "actors": "is a setting of make_actor; give track a list of actors",
     "body": "is a setting of make_actor",
     "out": "no file is written; use motion.save(path)",
     "resume": "no file is written, so nothing can be resumed; use the command `sogjax track`",

@@ -42,7 +42,7 @@ def run(config: ActorConfig) -> Path:
         raise InputError(f"out={out}: is a folder; give the actor file to write, such as out={out / 'actor.yaml'}")
     free_path("out", out, config.overwrite)
     with results_folder(out.parent):
-        recording, learnt, best = with_examples(recording, ImagesConfig())
+        recording, learnt, best = with_examples(recording, ImagesConfig(), config.actors)
         made = make_actor(recording, body, config.subject, space, terms, say, progress, config.symmetric, learnt, best)
         save_body(out, made.body)
         folder = report_folder(out)

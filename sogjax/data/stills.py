@@ -5,6 +5,9 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from jaxtyping import Bool
+
 from sogjax.data.calibration import CameraRig
 from sogjax.data.example_settings import ExampleSettings
 from sogjax.data.image_file import IMAGE_SUFFIXES, read_image, read_mask
@@ -27,6 +30,9 @@ class ExamplePose:
     initial_pose: InitialPose | None
     frame: int | None = None
     """Of the videos, counted from the recording's first, where the images are of one; None: they are files."""
+    within: dict[str, Bool[np.ndarray, "_rows _columns"]] | None = None
+    """By camera, at any size: where the subject is, if others are seen too; a camera without an entry is not used.
+    None: nobody else is seen."""
 
 
 def find_background(folder: Path, rig: CameraRig, calibrated: Iterable[str]) -> dict[str, Path]:

@@ -41,20 +41,25 @@ def initial_pose_file(recording: Recording, config: TrackConfig) -> Path | None:
 def known_opening(
     recording: Recording, made: Sequence[MadeActor], config: TrackConfig
 ) -> tuple[Float[Array, "dof"], int] | None:
-    """A frame of the videos that an actor was made of, the one where it fits best, and its pose there.
+    """A frame of the videos that every actor was made of, the one where all fit best, and their poses there.
 
     None where tracking begins otherwise: with a rough pose from a file, or with a search, since no such frame is among
     those to be tracked.
     """
-    if len(made) != 1 or initial_pose_file(recording, config) is not None:
+    if not made or initial_pose_file(recording, config) is not None:
         return None
     last = recording.num_frames if config.stop is None else config.stop
-    shown = {name: frame for name, frame in made[0].frames.items() if config.start <= frame < last}
+    shown = {
+        name: frame
+        for name, frame in made[0].frames.items()
+        if config.start <= frame < last and all(name in actor.frames for actor in made)
+    }
     if not shown:
         return None
-    best = max(shown, key=made[0].agreement)
-    say(f"tracking begins in frame {shown[best] + recording.first_frame}, whose pose is known, and goes both ways")
-    return made[0].example_poses[best], shown[best]
+    best = max(shown, key=lambda name: min(actor.agreement(name) for actor in made))
+    known = "whose pose is known" if len(made) == 1 else "where all poses are known"
+    say(f"tracking begins in frame {shown[best] + recording.first_frame}, {known}, and goes both ways")
+    return jnp.concatenate([actor.example_poses[best] for actor in made]), shown[best]
 
 
 def first_poses(

@@ -12,7 +12,7 @@ from sogjax.actor.make import MadeActor, make_actor, subjects_of
 from sogjax.data.actor_file import load_body, named_body
 from sogjax.data.recording import Recording, open_recording
 from sogjax.engine.build import color_space_and_radius, energy_terms
-from sogjax.engine.example_frames import with_examples
+from sogjax.engine.example_frames import check_actors, with_examples
 from sogjax.engine.terminal import progress, say
 from sogjax.errors import InputError
 from sogjax.model.body import Body
@@ -71,38 +71,45 @@ def file_list(value: Any) -> list[Path]:
 
 
 def actors_of(
-    recording: Recording, files: Any, body: str, color: ColorConfig, images: ImagesConfig | None = None
+    recording: Recording,
+    files: Any,
+    body: str,
+    color: ColorConfig,
+    images: ImagesConfig | None = None,
+    actors: int | None = None,
 ) -> tuple[list[Body], list[MadeActor]]:
     """The actors of a recording, and what was found where they are made of its example poses or its videos.
+
+    `actors` is how many are made of its videos, None one; files and example poses must be as many.
 
     Raises:
         InputError: an invalid actor file, two actors with one name, unsuitable example poses, or videos that none can
             be taken from.
     """
     if files is not None:
-        actors = [load_body(path) for path in file_list(files)]
-        names = [actor.name for actor in actors]
+        bodies = [load_body(path) for path in file_list(files)]
+        names = [body.name for body in bodies]
         if len(set(names)) < len(names):
             raise InputError(
                 f"actor={files}: two actors are named {max(names, key=names.count)!r}; give each its own `name`"
             )
-        return actors, []
+        check_actors(recording, actors, len(bodies))
+        return bodies, []
     space, _ = color_space_and_radius(color)
     images = images or ImagesConfig()
-    made = _made_actors(str(recording.path), recording.rig.names, body, space, images.background, images.cache)
+    made = _made_actors(str(recording.path), recording.rig.names, body, space, images.background, images.cache, actors)
     return [actor.body for actor in made], list(made)
 
 
 @cache
 def _made_actors(
-    path: str, cameras: tuple[str, ...], body: str, space: str, background: str, cells: str | None
+    path: str, cameras: tuple[str, ...], body: str, space: str, background: str, cells: str | None, actors: int | None
 ) -> tuple[MadeActor, ...]:
     """The actors of a recording, made once per process: the members of a sweep share them."""
     start = body_named(body)
     recording = open_recording(Path(path))
     recording = replace(recording, rig=recording.rig.select(cameras))
-    start = body_named(body)
-    recording, learnt, best = with_examples(recording, ImagesConfig(background=background, cache=cells))
+    recording, learnt, best = with_examples(recording, ImagesConfig(background=background, cache=cells), actors)
     terms = energy_terms(EnergyConfig())
     made = []
     for subject in subjects_of(recording):

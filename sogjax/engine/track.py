@@ -16,6 +16,7 @@ from sogjax.data.recording import Recording
 from sogjax.energy import Term
 from sogjax.engine import build
 from sogjax.engine.actor_report import report_folder, write_actor_report
+from sogjax.engine.example_frames import check_actors
 from sogjax.engine.first_pose import initial_pose_file, known_opening
 from sogjax.engine.job import frame_range
 from sogjax.engine.origin import origin_of
@@ -42,6 +43,7 @@ def track_to_folder(config: TrackConfig, command: str = "track") -> Run:
     build.check(config)
     export_endings(config.outputs)
     recording = opened(config.recording, config.cameras)
+    check_actors(recording, config.actors, None if config.actor is None else len(file_list(config.actor)))
     frame_range(recording, config)
     initial_pose_file(recording, config)
     path = Path(config.out or f"outputs/{recording.name}")
@@ -51,7 +53,7 @@ def track_to_folder(config: TrackConfig, command: str = "track") -> Run:
 
 def _run_in(folder: RunFolder, recording: Recording, config: TrackConfig, command: str) -> Run:
     """Track into this run's own folder, or resume there."""
-    actors = partial(actors_of, recording, config.actor, config.body, config.color, config.images)
+    actors = partial(actors_of, recording, config.actor, config.body, config.color, config.images, config.actors)
     made = config.actor is None
     bodies = None if made else actors()[0]
     origin = origin_of(recording, config, bodies)

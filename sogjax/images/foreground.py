@@ -65,15 +65,18 @@ class EmptyScene(eqx.Module):
     known: Bool[Array, "camera rows columns"]
 
     @classmethod
-    def from_background(cls, background: BackgroundCells) -> "EmptyScene":
-        """The background may be darker or brighter by a factor (a shadow), at a cost: a longer Gaussian that way."""
+    def from_background(cls, background: BackgroundCells, shadow: float = SHADOW) -> "EmptyScene":
+        """The background may be darker or brighter by a factor (a shadow), at a cost: a longer Gaussian that way.
+
+        `shadow` is that factor's standard deviation.
+        """
         dtype = jnp.result_type(float)
         variance = jnp.maximum(jnp.asarray(background.spread, dtype), SMALLEST_SPREAD) ** 2
         red, green, blue = (jnp.asarray(background.colors[..., k], dtype) / 255.0 for k in range(3))
         planes = (red, green, blue)
         length = sum(plane * plane for plane in planes)
-        volume = jnp.log(_NORMAL * variance * jnp.sqrt(variance + SHADOW**2 * length))
-        return cls(planes, 1.0 / variance, 1.0 / (variance / SHADOW**2 + length), volume, jnp.asarray(background.known))
+        volume = jnp.log(_NORMAL * variance * jnp.sqrt(variance + shadow**2 * length))
+        return cls(planes, 1.0 / variance, 1.0 / (variance / shadow**2 + length), volume, jnp.asarray(background.known))
 
 
 def log_odds(

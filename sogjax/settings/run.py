@@ -37,6 +37,9 @@ class TrackConfig:
     recording: str = option(REQUIRED, "folder of the recording")
     out: str = option("", "folder for the results; default: outputs/RECORDING")
     actor: Any = option(None, "actor file, or a list of them; null: make it from the example poses")
+    actors: int | None = option(
+        None, "how many people to make actors of, without example poses; null: one, or as many as files or poses name"
+    )
     body: str = option("human", "body that actors are made from: human, dog, or a body file")
     initial_pose: str | None = option(
         None, "auto: search | file with a rough pose; null: the recording's initial_pose.yaml, else auto"
@@ -61,6 +64,9 @@ class ActorConfig:
     recording: str = option(REQUIRED, "folder of the recording")
     out: str = option(REQUIRED, "actor file to write")
     subject: str | None = option(None, "which subject, if the recording has several")
+    actors: int | None = option(
+        None, "how many people the videos show, without example poses: subject=person_1, person_2, ...; null: one"
+    )
     symmetric: bool = option(True, "left and right limbs have the same lengths and sizes")
     body: str = option("human", "body to start from: human, dog, or a body file")
     cameras: list[str] | None = option(None, "cameras to use; null: all")

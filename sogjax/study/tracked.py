@@ -28,7 +28,7 @@ def track_folder(folder: Path, overrides: Sequence[str] = ()) -> Run:
     """Track a recording with overrides of the track config, and evaluate it where there is ground truth."""
     config = track_config(overrides, recording=folder)
     recording = opened(config.recording, config.cameras)
-    bodies, _ = actors_of(recording, config.actor, config.body, config.color)
+    bodies, _ = actors_of(recording, config.actor, config.body, config.color, actors=config.actors)
     result = track_recording(recording, bodies, config)
     if recording.ground_truth is not None:
         result.evaluation = evaluate_motions(result.motions, load_ground_truth(recording.ground_truth))

@@ -1,0 +1,171 @@
+"""Several people in a clip: parts of the hull that stand apart, who is who, and the example poses that they give."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from rig_cases import opencv_pixels, recording_of, ring_rig
+
+from sogjax.actor.frame_choice import subject_cubes
+from sogjax.actor.people_apart import PersonSeen, people_apart
+from sogjax.actor.who_is_who import matched, runs_by_place, told_apart, unlike
+from sogjax.engine import example_people
+from sogjax.engine.example_people import people_examples
+from sogjax.engine.sampled_masks import SampledMasks
+from sogjax.images.cells import CellGrid
+
+SIZE = (320, 240)
+RIG = ring_rig(6, SIZE, distance=4.0)
+CAMERAS = {k: RIG.camera(name) for k, name in enumerate(RIG.names)}
+UP = np.array([0.0, 0.0, 1.0])
+NOTHING = {k: np.zeros(SIZE[::-1], bool) for k in CAMERAS}
+RED, BLUE = (30, 30, 200), (200, 40, 30)
+ALONG, ACROSS = np.array([np.cos(0.3), np.sin(0.3)]), np.array([-np.sin(0.3), np.cos(0.3)])
+"""Directions on the floor: towards camera 0 and away from camera 3, and at right angles."""
+
+
+def box(place, low=0.0, high=1.7, half=0.2):
+    """The corners of an upright box on a place of the floor (metres)."""
+    steps = [(x, y, z) for x in (-half, half) for y in (-half, half) for z in (low, high)]
+    return np.array([*place, 0.0]) + np.array(steps)
+
+
+def seen_boxes(boxes):
+    """Masks and pictures of boxes in their colours, by camera; a later one is in front."""
+    masks, pictures = {}, {}
+    for k, name in enumerate(RIG.names):
+        picture = np.zeros((*SIZE[::-1], 3), np.uint8)
+        for corners, color in boxes:
+            outline = cv2.convexHull(opencv_pixels(RIG, name, corners).round().astype(np.int32))
+            cv2.fillConvexPoly(picture, outline, color)
+        masks[k], pictures[k] = picture.any(axis=-1), picture
+    return masks, pictures
+
+
+def people_of(boxes, frame=0):
+    masks, pictures = seen_boxes(boxes)
+    (cube,) = subject_cubes([masks], CAMERAS)
+    assert cube is not None
+    return people_apart(frame, masks, NOTHING, pictures, CAMERAS, cube, UP)
+
+
+def test_two_people_are_two_parts_with_their_own_places_regions_and_colours():
+    people = people_of([(box(-0.7 * ALONG), RED), (box(0.7 * ALONG), BLUE)])
+    first, second = sorted(people, key=lambda person: float(person.place[:2] @ ALONG))
+    np.testing.assert_allclose(first.place[:2], -0.7 * ALONG, atol=0.06)
+    np.testing.assert_allclose(second.place[:2], 0.7 * ALONG, atol=0.06)
+    assert unlike(first.colors, second.colors) > 0.8
+    both = set(first.regions) & set(second.regions)
+    assert both == {1, 2, 4, 5}, "cameras 0 and 3 see one behind the other"
+    for k in both:
+        assert not (first.regions[k] & second.regions[k]).any()
+    masks, _ = seen_boxes([(box(-0.7 * ALONG), RED)])
+    for k in both:
+        overlap = (first.masks[k] & masks[k]).sum() / (first.masks[k] | masks[k]).sum()
+        assert overlap > 0.9
+
+
+def test_shadows_on_the_floor_join_nobody():
+    floor = np.array([[x, y, z] for x in (-0.7, 0.7) for y in (-0.15, 0.15) for z in (0.0, 0.01)])
+    assert len(people_of([(floor, (9, 9, 9)), (box((-0.7, 0.0)), RED), (box((0.7, 0.0)), BLUE)])) == 2
+
+
+def test_a_gap_at_the_belt_makes_no_two_people():
+    halves = [box((0.0, 0.0), 0.0, 0.9), box((0.0, 0.0), 1.0, 1.7)]
+    assert len(people_of([(half, RED) for half in halves])) == 1
+
+
+def moment(frame, *people):
+    """People at places (metres along a line) with a share of the first of two colours."""
+    empty = {}
+    return [PersonSeen(frame, np.array([x, 0.0, 1.0]), empty, empty, np.array([c, 1.0 - c])) for x, c in people]
+
+
+def test_places_tell_while_nobody_can_have_changed_places():
+    moments = [moment(0, (0.0, 0.5), (2.0, 0.5)), moment(3, (2.1, 0.5), (0.1, 0.5)), moment(6, (0.2, 0.5), (2.2, 0.5))]
+    (run,) = runs_by_place(moments, 30.0)
+    assert [[round(float(person.place[0]), 1) for person in people] for people in run] == [
+        [0.0, 2.0],
+        [0.1, 2.1],
+        [0.2, 2.2],
+    ]
+    assert len(runs_by_place([moments[0], moment(60, (0.0, 0.5), (2.0, 0.5))], 30.0)) == 2
+
+
+def test_colours_tell_after_a_while_and_people_alike_are_left_out():
+    early = [moment(k, (0.0, 0.9), (2.0, 0.1)) for k in range(3)]
+    late = [moment(300, (0.0, 0.2), (2.0, 0.8))]
+    told = told_apart([*early, *late], 30.0)
+    assert [float(people[0].colors[0]) for people in told] == [0.9, 0.9, 0.9, 0.8]
+    alike = [moment(300, (0.0, 0.5), (2.0, 0.52))]
+    assert [people[0].frame for people in told_apart([*early, *alike], 30.0)] == [0, 1, 2]
+    assert told_apart([], 30.0) == []
+
+
+def test_the_margin_is_what_exchanging_two_would_cost():
+    order, margin = matched(np.array([[0.9, 0.1, 0.9], [0.2, 0.9, 0.9], [0.9, 0.9, 0.3]]))
+    assert order == [1, 0, 2]
+    assert margin == pytest.approx(0.9 + 0.9 - 0.3 - 0.2)
+
+
+def sampled(clip):
+    """What would be sampled of a clip of boxes, a list of them for each frame."""
+    seen = [seen_boxes(boxes) for boxes in clip]
+    return SampledMasks(
+        frames=list(range(len(clip))),
+        masks=[masks for masks, _ in seen],
+        pictures=[pictures for _, pictures in seen],
+        unknown=NOTHING,
+        cameras=CAMERAS,
+        grids=tuple(CellGrid(*SIZE, 1) for _ in CAMERAS),
+    )
+
+
+def passing(count):
+    """Two people who go past each other, beside each other for all cameras in some frames."""
+    away = np.linspace(-0.2, 0.2, count)
+    return [[(box(-0.7 * ACROSS + a * ALONG), RED), (box(0.7 * ACROSS - a * ALONG), BLUE)] for a in away]
+
+
+def test_each_person_has_example_poses_in_the_same_frames(monkeypatch):
+    monkeypatch.setattr(example_people, "sampled_masks", lambda *_: sampled(passing(4)))
+    recording = recording_of(RIG, 4, first_frame=10)
+    examples = people_examples(recording, (), 2, 3)
+    assert not isinstance(examples, str)
+    assert [example.actor for example in examples] == ["person_1"] * 3 + ["person_2"] * 3
+    frames = [example.frame for example in examples]
+    assert frames[:3] == frames[3:] == sorted(frames[:3])
+    assert examples[0].name == f"frame_{frames[0] + 10}"
+    for one, other in zip(examples[:3], examples[3:], strict=True):
+        assert one.within is not None
+        assert other.within is not None
+        for camera in set(one.within) & set(other.within):
+            assert one.within[camera].shape == SIZE[::-1]
+            assert not (one.within[camera] & other.within[camera]).any()
+
+
+@pytest.mark.parametrize(
+    ("clip", "actors", "words"),
+    [
+        (passing(3), 3, ("actors=3", "2 people in 3", "give actors=2")),
+        ([boxes[:1] for boxes in passing(3)], 2, ("actors=2", "one person in 3", "give actors=1")),
+        ([[(corners, RED) for corners, _ in passing(5)[2]]], 2, ("in 1 of 1 frame",)),
+    ],
+)
+def test_clips_that_show_other_numbers_of_people_are_refused(monkeypatch, clip, actors, words):
+    monkeypatch.setattr(example_people, "sampled_masks", lambda *_: sampled(clip))
+    problem = people_examples(recording_of(RIG, len(clip)), (), actors, 3)
+    assert isinstance(problem, str)
+    for word in words:
+        assert word in problem
+
+
+def test_people_in_the_same_clothes_are_refused_where_places_do_not_tell(monkeypatch):
+    clip = [[(corners, RED) for corners, _ in boxes] for boxes in passing(4)]
+    monkeypatch.setattr(example_people, "sampled_masks", lambda *_: sampled(clip))
+    recording = recording_of(RIG, 4)
+    assert not isinstance(people_examples(recording, (), 2, 3), str)
+    problem = people_examples(replace(recording, fps=0.5), (), 2, 3)
+    assert isinstance(problem, str)
+    assert "who is who" in problem
