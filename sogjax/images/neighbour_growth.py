@@ -14,6 +14,9 @@ MOST_APART = 60.0
 """Grey levels: larger steps of colour say no more."""
 FEWEST_NEIGHBOURS = 3
 """Known neighbours that a pixel must suit."""
+SHARES = (0.25, 0.5, 1.0)
+"""Of the tolerance, one after the other: what clearly continues the background is taken first, so that the subject is
+not entered through the one place where it looks like what is beside it."""
 _STEPS = [(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)]
 
 
@@ -36,12 +39,13 @@ def grown(
         fewest: samples that must show a colour.
     """
     field = _Field(modes, zone, picture, fewest)
-    front = field.beside_known()
-    while len(front):
-        cost = field.costs(front)
-        best = cost.argmin(axis=0)
-        accepted = cost[best, np.arange(len(front))] <= tolerance[field.rows[front], field.columns[front]]
-        front = field.take(front[accepted], best[accepted])
+    for share in SHARES:
+        front = field.beside_known()
+        while len(front):
+            cost = field.costs(front)
+            best = cost.argmin(axis=0)
+            accepted = cost[best, np.arange(len(front))] <= share * tolerance[field.rows[front], field.columns[front]]
+            front = field.take(front[accepted], best[accepted])
     return field.chosen
 
 
@@ -72,11 +76,11 @@ class _Field:
         self._times = np.full(self._known.shape, self._all)
 
     def beside_known(self) -> Int[np.ndarray, "pixel"]:
-        """Pixels of the zone that lie beside known background."""
+        """Undecided pixels of the zone that lie beside known background."""
         near = np.zeros_like(self._known)
         for down, right in _STEPS:
             near |= np.roll(self._known, (down, right), (0, 1))
-        return np.flatnonzero(near[self.rows + 1, self.columns + 1])
+        return np.flatnonzero(near[self.rows + 1, self.columns + 1] & (self.chosen < 0))
 
     def costs(self, front: Int[np.ndarray, "pixel"]) -> Float[np.ndarray, "mode pixel"]:
         """Mean step of colour from each mode to the known neighbours that it suits best."""
