@@ -113,7 +113,7 @@ def test_variants_differ_in_one_limb_only_and_are_all_different():
 
 
 def test_a_pose_is_sure_only_if_every_condition_is_met():
-    good = Evidence(1.5, 0.03, 0.03, 0.9, 0.87, 0.85, 1.3, 0.9, 0.85, 0.7, known=1.0)
+    good = Evidence(1.5, 0.03, 0.03, 0.9, 0.87, 0.85, 1.3, 0.7, known=1.0)
     assert confidence(good) > SURE
     for name in ("energy", "margin", "later_margin", "foreground", "worst_foreground", "not_background", "gain"):
         assert confidence(replace(good, **{name: 0.0})) < 0.99 * SURE

@@ -26,8 +26,6 @@ class Explained(eqx.Module):
     """What the body covers that looks like background, as a part of what it covers."""
     gain: Float[Array, "camera"]
     """Mean log likelihood gained where the body covers."""
-    colors: Float[Array, "camera"]
-    """The same, as a part of what blobs of the best colour would gain where the body covers foreground."""
     limbs: Float[Array, "limb"]
     """What is lost without a limb, for its size, as a part of what the whole body gains for its own."""
 
@@ -62,6 +60,5 @@ def _explained(energy: SearchEnergy, windows: ColorWindows, limbs: Bool[Array, "
         foreground=total(wanted * cover) / (total(wanted) + 1e-6),
         background=total(unwanted * cover) / whole,
         gain=total(gain) / whole,
-        colors=total(gain) / (total(cover * wanted) + 1e-6),
         limbs=of_limb,
     )

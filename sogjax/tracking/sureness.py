@@ -92,10 +92,6 @@ class Evidence:
     """Part of what the body covers that does not look like background, mean over the cameras."""
     gain: float
     """Log likelihood gained per covered cell, mean over the cameras."""
-    colors: float
-    """The same, as a part of what the best colours would gain, mean over the cameras."""
-    worst_colors: float
-    """The same of the camera in which it is least."""
     worst_limb: float
     """What the limb explains that explains least, for its size, as a part of what the body does."""
     known: float
@@ -113,8 +109,6 @@ class Evidence:
             worst_foreground=float(np.min(seen.foreground)),
             not_background=1.0 - float(np.mean(seen.background)),
             gain=float(np.mean(seen.gain)),
-            colors=float(np.mean(seen.colors)),
-            worst_colors=float(np.min(seen.colors)),
             worst_limb=float(np.min(seen.limbs, initial=1.0)),
             known=known,
         )
