@@ -14,9 +14,9 @@ MOST_APART = 60.0
 """Grey levels: larger steps of colour say no more."""
 FEWEST_NEIGHBOURS = 3
 """Known neighbours that a pixel must suit."""
-SHARES = (0.25, 0.5, 1.0)
-"""Of the tolerance, one after the other: what clearly continues the background is taken first, so that the subject is
-not entered through the one place where it looks like what is beside it."""
+SHARE = 0.25
+"""Of the tolerance, within which a colour clearly continues the background: with all of it, the subject is entered
+through the one place where it looks like what is beside it, and then taken as a whole."""
 _STEPS = [(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)]
 
 
@@ -35,17 +35,16 @@ def grown(
         modes: of the pixels of the zone.
         zone: the background is known around it.
         picture: the background there.
-        tolerance: for each pixel, the step of colour up to which it continues its neighbour.
+        tolerance: for each pixel, the step of colour up to which it may show the same thing as its neighbour.
         fewest: samples that must show a colour.
     """
     field = _Field(modes, zone, picture, fewest)
-    for share in SHARES:
-        front = field.beside_known()
-        while len(front):
-            cost = field.costs(front)
-            best = cost.argmin(axis=0)
-            accepted = cost[best, np.arange(len(front))] <= share * tolerance[field.rows[front], field.columns[front]]
-            front = field.take(front[accepted], best[accepted])
+    front = field.beside_known()
+    while len(front):
+        cost = field.costs(front)
+        best = cost.argmin(axis=0)
+        accepted = cost[best, np.arange(len(front))] <= SHARE * tolerance[field.rows[front], field.columns[front]]
+        front = field.take(front[accepted], best[accepted])
     return field.chosen
 
 
