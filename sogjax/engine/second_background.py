@@ -4,6 +4,8 @@ Somebody who stays in one place hides what is around: a trunk that never moves a
 it counts as background at first. When the body was followed, it does.
 """
 
+from collections.abc import Mapping, Sequence
+
 import cv2
 import equinox as eqx
 import jax.numpy as jnp
@@ -19,6 +21,7 @@ from sogjax.engine.pipeline import PictureReader, Preparation, cells_of_frame
 from sogjax.engine.terminal import progress, say
 from sogjax.engine.timing import StageTimes
 from sogjax.images.background import stack_background
+from sogjax.images.cells import CellGrid
 from sogjax.images.foreground import EmptyScene
 from sogjax.images.plate_difference import working_size
 from sogjax.model.body import Body
@@ -27,8 +30,8 @@ from sogjax.tracking.search_energy import DISC
 from sogjax.tracking.tracker import Tracker, track
 from sogjax.view.projection import picture_points
 
-MUCH_UNKNOWN = 0.1
-"""Share of the pictures from which on the background is learnt again."""
+MUCH_UNKNOWN = 0.015
+"""Share of the pictures from which on the background is learnt again; a subject covers some 0.05 of them."""
 BORDER = 0.25
 """Metres around a blob that are left out, too: the body may be a little off."""
 
@@ -39,22 +42,47 @@ def learnt_again(job: Job, images: ImagesConfig, read: PictureReader) -> Tracker
     Raises:
         InputError: a video cannot be read, or a picture has too many image blobs.
     """
-    tracker, empty = job.tracker, job.tracker.reader.empty
-    if empty is None or _from_pictures(job.recording, images):
-        return tracker
+    unknown = unknown_share(job.tracker, job.recording, job.grids, images)
+    if unknown < MUCH_UNKNOWN:
+        return job.tracker
+    say(
+        f"{unknown:.1%} of the background is unknown: the clip is tracked once to learn it where the body is not, "
+        "then again"
+    )
+    return knowing_the_body(job.tracker, job.recording, job.grids, _first_pass(job, images, read))
+
+
+def unknown_share(tracker: Tracker, recording: Recording, grids: Sequence[CellGrid], images: ImagesConfig) -> float:
+    """How much of the pictures a background that was learnt from the clip leaves open; 0 without such a one."""
+    empty = tracker.reader.empty
+    if empty is None or _from_pictures(recording, images):
+        return 0.0
     inside = np.zeros(np.asarray(empty.known).shape, bool)
-    for k, grid in enumerate(job.grids):
+    for k, grid in enumerate(grids):
         inside[k, : grid.rows, : grid.columns] = True
-    if np.asarray(empty.known)[inside].mean() >= 1.0 - MUCH_UNKNOWN:
-        return tracker
-    say("much of the background is unknown: the clip is tracked once to learn it where the body is not, then again")
-    poses = _first_pass(job, images, read)
-    learnt = clip_backgrounds_without(job.recording, body_masks(job.recording, tracker.body, poses))
-    again = EmptyScene.from_background(stack_background(learnt, job.grids))
+    return 1.0 - float(np.asarray(empty.known)[inside].mean())
+
+
+def knowing_the_body(
+    tracker: Tracker, recording: Recording, grids: Sequence[CellGrid], poses: Mapping[int, Array]
+) -> Tracker:
+    """The tracker with a background that is learnt where the body is not.
+
+    Args:
+        tracker: with a background learnt from the clip.
+        recording: with the cameras.
+        grids: of their pictures.
+        poses: that the tracker found, by frame, counted from the recording's first.
+
+    Raises:
+        InputError: a video cannot be read.
+    """
+    learnt = clip_backgrounds_without(recording, body_masks(recording, tracker.body, poses))
+    again = EmptyScene.from_background(stack_background(learnt, grids))
     return eqx.tree_at(lambda t: t.reader.empty, tracker, again)
 
 
-def body_masks(recording: Recording, body: Body, poses: dict[int, Array]) -> LeftOut:
+def body_masks(recording: Recording, body: Body, poses: Mapping[int, Array]) -> LeftOut:
     """Where a body is in the sampled frames, widened; a frame whose pose is not known is left out as a whole.
 
     Args:

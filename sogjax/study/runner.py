@@ -7,9 +7,11 @@ from dataclasses import asdict, replace
 import numpy as np
 from jaxtyping import Float
 
+from sogjax.data.cell_cache import CellsOfClip
 from sogjax.data.motion import Motion, motion_from_poses
 from sogjax.engine import build
 from sogjax.engine.compiled_programs import forget_programs_if_many
+from sogjax.engine.second_background import MUCH_UNKNOWN, knowing_the_body, unknown_share
 from sogjax.engine.terminal import say
 from sogjax.engine.timing import StageTimes
 from sogjax.engine.track import track_recording
@@ -25,7 +27,7 @@ from sogjax.study.record import RunFolder, RunPlan, RunRecord
 from sogjax.study.source import Source
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import FrameResult
-from sogjax.tracking.tracker import track
+from sogjax.tracking.tracker import TrackedFrame, Tracker, track
 
 STAGES = ("decode", "step", "whole")
 
@@ -90,14 +92,17 @@ def motions_of(record: RunRecord, bodies: Sequence[Body], fps: float) -> dict[st
 def _accuracy(
     record: RunRecord, source: Source, config: TrackConfig, cameras: tuple[str, ...], every: int
 ) -> RunRecord:
-    """Track from kept cells, from the start pose that all runs share."""
-    tracker = source.tracker(config, cameras)
+    """Track from kept cells, from the start pose that all runs share; twice where the clip's background asks for it."""
+    tracker, recording = source.tracker(config, cameras), source.seen_by(cameras)
     cells = source.cells(config.images.depth, cameras, every)
     kind = _program(config, cameras)
-    tracked = list(track(tracker, source.start, cells, _capacities.get(kind)))
-    _capacities[kind] = tracked[-1].capacities
+    tracked = _tracked(tracker, source, cells, kind)
+    grids = build.cell_grids(recording, config.images.depth)
+    if unknown_share(tracker, recording, grids, config.images) >= MUCH_UNKNOWN:
+        poses = {every * k: frame.result.pose for k, frame in enumerate(tracked)}
+        tracked = _tracked(knowing_the_body(tracker, recording, grids, poses), source, cells, kind)
     results = [frame.result for frame in tracked]
-    frames = source.recording.first_frame + every * np.arange(len(cells))
+    frames = recording.first_frame + every * np.arange(len(cells))
     record = replace(
         record,
         frame=frames.tolist(),
@@ -106,6 +111,13 @@ def _accuracy(
         **_of_solver(results),
     )
     return _evaluated(record, source)
+
+
+def _tracked(tracker: Tracker, source: Source, cells: CellsOfClip, kind: tuple[object, ...]) -> list[TrackedFrame]:
+    """All frames; beginning with the capacities that sufficed for the last run of the same kind."""
+    tracked = list(track(tracker, source.start, cells, _capacities.get(kind)))
+    _capacities[kind] = tracked[-1].capacities
+    return tracked
 
 
 _capacities: dict[tuple[object, ...], Capacities] = {}
