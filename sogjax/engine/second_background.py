@@ -32,8 +32,8 @@ from sogjax.view.projection import picture_points
 
 MUCH_UNKNOWN = 0.015
 """Share of the pictures from which on the background is learnt again; a subject covers some 0.05 of them."""
-BORDER = 0.25
-"""Metres around a blob that are left out, too: the body may be a little off."""
+BORDER = 0.15
+"""Metres around a blob that are left out, too: the body may be a little off. With 0.25 too little is left to learn."""
 
 
 def learnt_again(job: Job, images: ImagesConfig, read: PictureReader) -> Tracker:
@@ -66,7 +66,7 @@ def unknown_share(tracker: Tracker, recording: Recording, grids: Sequence[CellGr
 def knowing_the_body(
     tracker: Tracker, recording: Recording, grids: Sequence[CellGrid], poses: Mapping[int, Array]
 ) -> Tracker:
-    """The tracker with a background that is learnt where the body is not.
+    """The tracker with a background that is learnt where the body is not; elsewhere it is what it was.
 
     Args:
         tracker: with a background learnt from the clip.
@@ -78,8 +78,9 @@ def knowing_the_body(
         InputError: a video cannot be read.
     """
     learnt = clip_backgrounds_without(recording, body_masks(recording, tracker.body, poses))
-    again = EmptyScene.from_background(stack_background(learnt, grids))
-    return eqx.tree_at(lambda t: t.reader.empty, tracker, again)
+    again, before = EmptyScene.from_background(stack_background(learnt, grids)), tracker.reader.empty
+    assert before is not None
+    return eqx.tree_at(lambda t: t.reader.empty, tracker, again.filled_by(before))
 
 
 def body_masks(recording: Recording, body: Body, poses: Mapping[int, Array]) -> LeftOut:

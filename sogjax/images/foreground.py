@@ -1,6 +1,7 @@
 """Foreground against background: what the colour of a cell says about whether somebody is seen there."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
@@ -63,6 +64,10 @@ class EmptyScene(eqx.Module):
     volume: Cells
     """Logarithm of the Gaussian's volume in colours."""
     known: Bool[Array, "camera rows columns"]
+
+    def filled_by(self, other: "EmptyScene") -> "EmptyScene":
+        """The same, with what another background of the same cells knows where this one knows nothing."""
+        return jax.tree.map(lambda own, others: jnp.where(self.known, own, others), self, other)
 
     @classmethod
     def from_background(cls, background: BackgroundCells, shadow: float = SHADOW) -> "EmptyScene":
