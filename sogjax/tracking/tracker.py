@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Literal
 
@@ -14,14 +15,13 @@ from jaxtyping import Array, Bool, Float, Int, UInt8
 from sogjax.compiled.once import computed_once
 from sogjax.energy.coloring import Coloring
 from sogjax.energy.frame_energy import FrameEnergy
-from sogjax.energy.posed import History
+from sogjax.energy.posed import History, Posed
 from sogjax.energy.term import Terms
 from sogjax.energy.views import Views
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.color import from_rgb
 from sogjax.solve import Scales, Solution, Solver
-from sogjax.tracking.confidence import Deviations, Laplace
 from sogjax.tracking.culling import (
     CAPACITIES,
     Capacities,
@@ -33,6 +33,9 @@ from sogjax.tracking.culling import (
     union_boxes,
 )
 from sogjax.tracking.frame import FrameCells, FrameResult, PartialCells, TrackedFrame, TrackState, on_device, on_host
+from sogjax.tracking.judged_limbs import JudgedLimbs
+from sogjax.tracking.limb_doubt import judgement
+from sogjax.tracking.limb_evidence import blob_evidence
 from sogjax.tracking.rounds import solve_near
 
 HEADROOM = 1.4
@@ -60,8 +63,8 @@ class Tracker(eqx.Module):
     """alpha of Section 5.3."""
     pairs: PairChoice = eqx.field(static=True, default="dense")
     """Whether all pairs of blobs are compared, or those near each other."""
-    confidence: Laplace | None = None
-    """How standard deviations are found; None: they are not."""
+    limbs: JudgedLimbs | None = None
+    """Which are judged in every frame; None: none."""
     capacities: Capacities | None = None
     """Room for image blobs of a step that is given none."""
     first_pose: Float[Array, "dof"] | None = None
@@ -76,7 +79,13 @@ class Tracker(eqx.Module):
         pose = self.first_pose if pose is None else pose
         if pose is None:
             raise ValueError("the tracker knows no first pose; give one: tracker.start(pose)")
-        return TrackState.from_pose(jnp.asarray(pose, self.body.skeleton.offsets.dtype))
+        return self.with_memory(TrackState.from_pose(jnp.asarray(pose, self.body.skeleton.offsets.dtype)))
+
+    def with_memory(self, state: TrackState) -> TrackState:
+        """The state with all that a step hands on to the next one, so that every step takes the same."""
+        if self.limbs is None or self.reader.subject is None or state.usual is not None:
+            return state
+        return replace(state, usual=jnp.full_like(self.body.blob_sigmas, jnp.nan))
 
     def predicted(self, state: TrackState) -> Float[Array, "dof"]:
         """Theta_0 of Section 5.3: linear extrapolation of the last two poses."""
@@ -145,7 +154,8 @@ class Tracker(eqx.Module):
         if isinstance(cells, PartialCells):
             cells, present = jnp.asarray(cells.cells), jnp.asarray(cells.present)
         if capacities is not None:
-            return self.found(state, self.views(cells, state, capacities, present), capacities)
+            seen = self.views(cells, state, capacities, present)
+            return self._judged(*self.found(state, seen, capacities), seen[0], cells, present)
         if self.capacities is None:
             raise ValueError("the tracker has no capacities; give some, or take one of sogjax.make_tracker")
         state, result = self.step(state, cells, self.capacities, present)
@@ -165,7 +175,6 @@ class Tracker(eqx.Module):
         history = History(state.previous, state.before_previous, state.num_known == 2)
         objective = FrameEnergy(self.body, views, history, self.terms)
         solution, num_blocks = self._solved(objective, self.predicted(state), capacities)
-        deviations, num_blocks = self._deviations(objective, solution.params, capacities, num_blocks)
         result = FrameResult(
             pose=solution.params,
             energy=solution.value,
@@ -176,10 +185,30 @@ class Tracker(eqx.Module):
             num_near=num_near,
             num_matching=num_matching,
             num_blocks=num_blocks,
-            deviations=deviations,
+            limbs=None,
             images=views.images,
         )
         return state.advanced(solution.params), result
+
+    def _judged(
+        self,
+        state: TrackState,
+        result: FrameResult,
+        views: Views,
+        cells: UInt8[Array, "camera rows columns 3"],
+        present: Bool[Array, "camera"] | None,
+    ) -> tuple[TrackState, FrameResult]:
+        """The same with what the cameras say of the limbs, if they are to be judged."""
+        if self.limbs is None or self.reader.subject is None:
+            return state, result
+        posed, sizes = Posed.from_pose(self.body, result.pose), self.reader.cell_sizes
+        evidence = blob_evidence(
+            self.limbs, posed, self.cameras, views.windows, cells, sizes, self.reader.subject, present
+        )
+        usual = self.with_memory(state).usual
+        assert usual is not None
+        found = judgement(self.limbs, evidence, usual, views.windows is not None)
+        return replace(state, usual=found.usual), replace(result, limbs=found)
 
     def _solved(
         self, objective: FrameEnergy, start: Float[Array, "dof"], capacities: Capacities
@@ -187,18 +216,6 @@ class Tracker(eqx.Module):
         if self.pairs == "sparse":
             return solve_near(self.solver, objective, start, self.scales, capacities.blocks)
         return self.solver.maximize(objective, start, self.scales), jnp.asarray(0)
-
-    def _deviations(
-        self, objective: FrameEnergy, pose: Float[Array, "dof"], capacities: Capacities, num_blocks: Int[Array, ""]
-    ) -> tuple[Deviations | None, Int[Array, ""]]:
-        """How sure the pose is, from the pairs that are near there, and the most blocks of pairs so far."""
-        if self.confidence is None:
-            return None, num_blocks
-        if self.pairs == "sparse":
-            objective, count = objective.near(pose, capacities.blocks)
-            num_blocks = jnp.maximum(num_blocks, count)
-        curvature = objective.quadratic(pose).curvature
-        return self.confidence.deviations(self.body.skeleton, curvature, pose), num_blocks
 
 
 _step = eqx.filter_jit(Tracker.step)
@@ -220,7 +237,7 @@ def track(
     Raises:
         InputError: more image blobs than the largest capacity.
     """
-    state = start if isinstance(start, TrackState) else TrackState.from_pose(start)
+    state = tracker.with_memory(start if isinstance(start, TrackState) else TrackState.from_pose(start))
     for index, frame in enumerate(frames):
         begin = time.perf_counter()
         cells, present = on_device(frame)

@@ -1,0 +1,117 @@
+"""Is a limb that is in doubt lost, and one that is not in its place?
+
+    python experiments/limb_doubt.py [cameras=[4,12]] [backgrounds=[pictures,clip,none]] [sequences=[walk,run]]
+
+The yardstick sequences are tracked as recorded, with two of three frames left out, and with each limb displaced by 20
+to 30 cm on purpose, for 10 frames each. A limb is lost if its joints are more than 10 cm off on average. The weights of
+`sogjax/tracking/limb_doubt.py` come from the sequences of even number (`fit=true` prints them anew); the tables are
+those of the others. Trials that were made are kept, and not made again by the same program. Writes `limb_doubt.png`.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from sogjax.data.atomic import atomic_path
+from sogjax.engine.compiled_programs import forget_programs_if_many
+from sogjax.errors import InputError
+from sogjax.study.experiment import Experiment
+from sogjax.study.limb_calibration import area_table, calibration_table, fitted, limb_curve
+from sogjax.study.limb_trials import PLAIN, JudgedLimb, LimbTrial, LimbTrials
+from sogjax.study.machine import machine_line
+from sogjax.study.script import run_script, settings_from
+from sogjax.study.study import Study
+from sogjax.view.limb_chart import limb_chart
+
+SEQUENCES = "sequences"
+"""The experiment whose recordings are tracked."""
+
+
+@dataclass
+class Settings:
+    """What is tracked, as `key=value` on the command line."""
+
+    sequences: list[str] = field(default_factory=list)
+    """Rows of the experiment; none: all."""
+    cameras: list[int] = field(default_factory=lambda: [4, 12])
+    backgrounds: list[str] = field(default_factory=lambda: ["pictures", "clip", "none"])
+    frames: int = 60
+    fit: bool = True
+    do: bool = True
+    """Whether trials that are missing are made."""
+    body: str = "human"
+    overrides: list[str] = field(default_factory=list)
+    """Of track."""
+    out: str = "outputs/limb_doubt"
+    """Where trials, actors and results are kept."""
+
+
+def main() -> None:
+    """Track, print the tables, and write the picture."""
+    settings = settings_from(Settings)
+    names, found = _recordings(settings), []
+    trials = LimbTrials(Study(Path(settings.out), ["walk:0"], settings.frames, body=settings.body), settings.overrides)
+    for sequence, synth in names.items():
+        for cameras in settings.cameras:
+            for background in settings.backgrounds:
+                forget_programs_if_many()
+                found += trials.of(LimbTrial(sequence, synth, cameras, background), settings.do)
+    if not found:
+        raise InputError("no trial was made; do=true makes them")
+    _print(found, [*names], settings)
+
+
+def _print(found: list[JudgedLimb], names: list[str], settings: Settings) -> None:
+    """The weights, the tables and the picture."""
+    known = [limb for limb in found if limb.trial.background != "none"]
+    unknown = [limb for limb in found if limb.trial.background == "none"]
+    even = lambda limb: names.index(limb.trial.sequence) % 2 == 0
+    print(machine_line())
+    for title, group in (("with a background", known), ("without", unknown)):
+        if settings.fit and (half := [limb for limb in group if even(limb)]):
+            print(f"{title}: {fitted(half)}; from all sequences: {fitted(group)}")
+    shown = [limb for limb in found if not even(limb)]
+    settings_of = {
+        f"{cameras} cameras, {background}": lambda limb, c=cameras, b=background: (
+            (limb.trial.cameras, limb.trial.background) == (c, b)
+        )
+        for cameras in settings.cameras
+        for background in settings.backgrounds
+    }
+    kinds = {
+        "with a background": lambda limb: limb.trial.background != "none",
+        "without": lambda limb: limb.trial.background == "none",
+        "with a background, as recorded": lambda limb: limb.trial.background != "none" and limb.kind == PLAIN,
+        "without, as recorded": lambda limb: limb.trial.background == "none" and limb.kind == PLAIN,
+    }
+    sequences = {
+        name: lambda limb, n=name: limb.trial.sequence == n and limb.trial.background != "none" for name in names
+    }
+    for title, limbs, groups in (
+        ("Sequences that the weights do not come from", shown, kinds | settings_of),
+        ("All sequences", found, kinds | settings_of),
+        ("All sequences, with a background", found, sequences),
+    ):
+        print(f"\n{title}:\n", area_table(limbs, groups), sep="\n")
+    curves = {}
+    for title, belongs in (("with a background", kinds["with a background"]), ("without", kinds["without"])):
+        if group := [limb for limb in shown if belongs(limb)]:
+            print(f"\nSaid and found, {title}:\n", calibration_table(group), sep="\n")
+            curves[title] = limb_curve(group)
+    path = Path(settings.out) / "limb_doubt.png"
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(limb_chart(curves))
+    print(f"\n{path}")
+
+
+def _recordings(settings: Settings) -> dict[str, dict[str, object]]:
+    """The settings of the rendered recordings, by the names of their rows."""
+    rows = Experiment.named(SEQUENCES).config.rows
+    whole = {name: row.synth for name, row in rows.items() if row.synth is not None and row.methods is None}
+    unknown = [name for name in settings.sequences if name not in whole]
+    if unknown:
+        raise InputError(f"sequences: {unknown[0]}: is none of {', '.join(whole)}")
+    return {name: whole[name] for name in settings.sequences or whole}
+
+
+if __name__ == "__main__":
+    run_script(main)
