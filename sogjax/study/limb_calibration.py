@@ -35,7 +35,7 @@ def lost(limbs: Sequence[JudgedLimb]) -> Bool[np.ndarray, "value"]:
 
 
 def fitted(limbs: Sequence[JudgedLimb]) -> Weights:
-    """The weights that suit some limbs best (maximum likelihood, with a little of a ridge)."""
+    """The weights that suit some limbs best (maximum likelihood, with a little of a ridge); no measure may reassure."""
     rows = np.concatenate([np.stack([np.ones_like(limb.worse), limb.worse, limb.contradicted]) for limb in limbs], 1)
     sign = np.where(lost(limbs), 1.0, -1.0)
 
@@ -46,7 +46,8 @@ def fitted(limbs: Sequence[JudgedLimb]) -> Weights:
             [0.0, 1.0, 1.0]
         ) * weights
 
-    return Weights(*minimize(loss, np.zeros(3), jac=True).x.tolist())
+    bounds = [(None, None), (0.0, None), (0.0, None)]
+    return Weights(*minimize(loss, np.zeros(3), jac=True, bounds=bounds).x.tolist())
 
 
 def area_under_roc(said: Float[np.ndarray, "value"], lost: Bool[np.ndarray, "value"]) -> float:

@@ -157,7 +157,7 @@ class LimbTrials:
 
     def path(self, trial: LimbTrial) -> Path:
         """Where a trial is kept."""
-        content = [program_digest("study/*limb*.py"), asdict(trial), self.overrides, self.study.body]
+        content = [program_digest("study/limb_trials.py"), asdict(trial), self.overrides, self.study.body]
         key = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
         return self.study.folder / "limbs" / f"{key}.npz"
 
