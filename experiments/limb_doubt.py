@@ -4,8 +4,9 @@
 
 The yardstick sequences are tracked as recorded, with two of three frames left out, and with each limb displaced by 20
 to 30 cm on purpose, for 10 frames each. A limb is lost if its joints are more than 10 cm off on average. The weights of
-`sogjax/tracking/limb_doubt.py` come from the sequences of even number (`fit=true` prints them anew); the tables are
-those of the others. Trials that were made are kept, and not made again by the same program. Writes `limb_doubt.png`.
+`sogjax/tracking/limb_doubt.py` come from all sequences; in the tables and the picture every other sequence is judged by
+weights that come from the rest. Trials that were made are kept, and not made again by the same program. Writes
+`limb_doubt.png`.
 """
 
 from dataclasses import dataclass, field
@@ -15,11 +16,12 @@ from sogjax.data.atomic import atomic_path
 from sogjax.engine.compiled_programs import forget_programs_if_many
 from sogjax.errors import InputError
 from sogjax.study.experiment import Experiment
-from sogjax.study.limb_calibration import area_table, calibration_table, fitted, limb_curve
+from sogjax.study.limb_calibration import area_table, calibration_table, fitted, limb_curve, regained_table
 from sogjax.study.limb_trials import PLAIN, JudgedLimb, LimbTrial, LimbTrials
 from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from
 from sogjax.study.study import Study
+from sogjax.tracking.limb_doubt import Weights
 from sogjax.view.limb_chart import limb_chart
 
 SEQUENCES = "sequences"
@@ -35,7 +37,6 @@ class Settings:
     cameras: list[int] = field(default_factory=lambda: [4, 12])
     backgrounds: list[str] = field(default_factory=lambda: ["pictures", "clip", "none"])
     frames: int = 60
-    fit: bool = True
     do: bool = True
     """Whether trials that are missing are made."""
     body: str = "human"
@@ -62,14 +63,18 @@ def main() -> None:
 
 def _print(found: list[JudgedLimb], names: list[str], settings: Settings) -> None:
     """The weights, the tables and the picture."""
-    known = [limb for limb in found if limb.trial.background != "none"]
-    unknown = [limb for limb in found if limb.trial.background == "none"]
-    even = lambda limb: names.index(limb.trial.sequence) % 2 == 0
+    half = lambda limb: names.index(limb.trial.sequence) % 2
+    known = lambda limb: limb.trial.background != "none"
+    weights: dict[tuple[int, bool], Weights] = {}
     print(machine_line())
-    for title, group in (("with a background", known), ("without", unknown)):
-        if settings.fit and (half := [limb for limb in group if even(limb)]):
-            print(f"{title}: {fitted(half)}; from all sequences: {fitted(group)}")
-    shown = [limb for limb in found if not even(limb)]
+    for has in sorted({known(limb) for limb in found}, reverse=True):
+        group = [limb for limb in found if known(limb) == has]
+        print(f"{'with a background' if has else 'without'}: {fitted(group)}")
+        for number in (0, 1):
+            rest = [limb for limb in group if half(limb) != number]
+            weights[number, has] = fitted(rest or group)
+            print(f"    for half {number}: {weights[number, has]}")
+    of_rest = lambda limb: weights[half(limb), known(limb)]
     settings_of = {
         f"{cameras} cameras, {background}": lambda limb, c=cameras, b=background: (
             (limb.trial.cameras, limb.trial.background) == (c, b)
@@ -86,17 +91,14 @@ def _print(found: list[JudgedLimb], names: list[str], settings: Settings) -> Non
     sequences = {
         name: lambda limb, n=name: limb.trial.sequence == n and limb.trial.background != "none" for name in names
     }
-    for title, limbs, groups in (
-        ("Sequences that the weights do not come from", shown, kinds | settings_of),
-        ("All sequences", found, kinds | settings_of),
-        ("All sequences, with a background", found, sequences),
-    ):
-        print(f"\n{title}:\n", area_table(limbs, groups), sep="\n")
+    for title, groups in (("Areas under the ROC", kinds | settings_of), ("With a background", sequences)):
+        print(f"\n{title}:\n", area_table(found, groups, of_rest), sep="\n")
+    print("\nLimbs displaced by 20 to 30 cm:\n", regained_table(found, kinds | settings_of, of_rest), sep="\n")
     curves = {}
-    for title, belongs in (("with a background", kinds["with a background"]), ("without", kinds["without"])):
-        if group := [limb for limb in shown if belongs(limb)]:
-            print(f"\nSaid and found, {title}:\n", calibration_table(group), sep="\n")
-            curves[title] = limb_curve(group)
+    for title in ("with a background", "without"):
+        if group := [limb for limb in found if kinds[title](limb)]:
+            print(f"\nSaid and found, {title}:\n", calibration_table(group, of_rest), sep="\n")
+            curves[title] = limb_curve(group, of_rest)
     path = Path(settings.out) / "limb_doubt.png"
     with atomic_path(path) as temporary:
         temporary.write_bytes(limb_chart(curves))
