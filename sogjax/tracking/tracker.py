@@ -18,6 +18,7 @@ from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History, Posed
 from sogjax.energy.term import Terms
 from sogjax.energy.views import Views
+from sogjax.energy.windows import Windows
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.color import from_rgb
@@ -34,8 +35,9 @@ from sogjax.tracking.culling import (
 )
 from sogjax.tracking.frame import FrameCells, FrameResult, PartialCells, TrackedFrame, TrackState, on_device, on_host
 from sogjax.tracking.judged_limbs import JudgedLimbs
-from sogjax.tracking.limb_doubt import judgement
+from sogjax.tracking.limb_doubt import Judgement, judgement
 from sogjax.tracking.limb_evidence import blob_evidence
+from sogjax.tracking.repair import Repair
 from sogjax.tracking.rounds import solve_near
 
 HEADROOM = 1.4
@@ -65,6 +67,8 @@ class Tracker(eqx.Module):
     """Whether all pairs of blobs are compared, or those near each other."""
     limbs: JudgedLimbs | None = None
     """Which are judged in every frame; None: none."""
+    repairs: bool = eqx.field(static=True, default=False)
+    """Whether `track` tries limbs in doubt in other places; a step alone does not."""
     capacities: Capacities | None = None
     """Room for image blobs of a step that is given none."""
     first_pose: Float[Array, "dof"] | None = None
@@ -201,14 +205,25 @@ class Tracker(eqx.Module):
         """The same with what the cameras say of the limbs, if they are to be judged."""
         if self.limbs is None or self.reader.subject is None:
             return state, result
-        posed, sizes = Posed.from_pose(self.body, result.pose), self.reader.cell_sizes
-        evidence = blob_evidence(
-            self.limbs, posed, self.cameras, views.windows, cells, sizes, self.reader.subject, present
-        )
         usual = self.with_memory(state).usual
         assert usual is not None
-        found = judgement(self.limbs, evidence, usual, views.windows is not None)
+        found = self.judged(result.pose, usual, views.windows, cells, present)
         return replace(state, usual=found.usual), replace(result, limbs=found)
+
+    def judged(
+        self,
+        pose: Float[Array, "dof"],
+        usual: Float[Array, "blob"],
+        windows: Windows | None,
+        cells: UInt8[Array, "camera rows columns 3"],
+        present: Bool[Array, "camera"] | None = None,
+    ) -> Judgement:
+        """What the cameras say of the limbs of a pose."""
+        assert self.limbs is not None
+        assert self.reader.subject is not None
+        posed, sizes = Posed.from_pose(self.body, pose), self.reader.cell_sizes
+        evidence = blob_evidence(self.limbs, posed, self.cameras, windows, cells, sizes, self.reader.subject, present)
+        return judgement(self.limbs, evidence, usual, windows is not None)
 
     def _solved(
         self, objective: FrameEnergy, start: Float[Array, "dof"], capacities: Capacities
@@ -238,6 +253,7 @@ def track(
         InputError: more image blobs than the largest capacity.
     """
     state = tracker.with_memory(start if isinstance(start, TrackState) else TrackState.from_pose(start))
+    repair = Repair(tracker.body) if tracker.repairs else None
     for index, frame in enumerate(frames):
         begin = time.perf_counter()
         cells, present = on_device(frame)
@@ -250,9 +266,44 @@ def track(
             if capacities.hold(near, matching, blocks):
                 break
             capacities = larger_capacities(capacities, near, matching, blocks)
+        if repair is not None:
+            step = partial(_step_within, tracker, cells, capacities, present)
+            judge = partial(_doubts, tracker, cells, present)
+            next_state, result = repair.after(state, (next_state, result), step, judge)
         state = next_state
         seconds = time.perf_counter() - begin
         yield TrackedFrame(index, on_host(result), capacities, tracker.reader.color_space, seconds)
+
+
+def _step_within(
+    tracker: Tracker,
+    cells: UInt8[Array, "camera rows columns 3"],
+    capacities: Capacities,
+    present: Bool[Array, "camera"] | None,
+    state: TrackState,
+) -> tuple[TrackState, FrameResult] | None:
+    """A step, unless it needs more room."""
+    found, result = _step(tracker, state, cells, capacities, present)
+    needed = jax.device_get((result.num_near, result.num_matching, result.num_blocks))
+    return (found, result) if capacities.hold(*(int(count.max()) for count in needed)) else None
+
+
+@eqx.filter_jit
+def _doubts(
+    tracker: Tracker,
+    cells: UInt8[Array, "camera rows columns 3"],
+    present: Bool[Array, "camera"] | None,
+    state: TrackState,
+    poses: Float[Array, "try dof"],
+) -> Float[Array, "try limb"]:
+    """The doubt about the limbs of many poses, seen from a state."""
+    odds = tracker.reader.odds(cells.astype(poses.dtype) / 255.0)
+    windows = None if odds is None else tracker.reader.windows(odds, tracker.cameras, tracker.boxes(state))
+    if windows is not None and present is not None:
+        windows = windows.of_present(present)
+    usual = tracker.with_memory(state).usual
+    assert usual is not None
+    return jax.lax.map(lambda pose: tracker.judged(pose, usual, windows, cells, present).doubt, poses)
 
 
 def larger_capacities(capacities: Capacities, near: int, matching: int, blocks: int) -> Capacities:
