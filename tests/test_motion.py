@@ -76,20 +76,25 @@ def test_poses_on_the_device_are_as_good_as_numpys():
     assert isinstance(motion, Motion)
     known = {name: value for name, value in vars(motion).items() if value is not None}
     assert all(isinstance(value, np.ndarray | float | str) for value in known.values())
-    assert vars(motion).keys() - known.keys() == {"pose_std", "joint_std"}
+    assert vars(motion).keys() - known.keys() == {"limb_names", "joint_limb", "limb_doubt"}
 
 
-def test_standard_deviations_are_kept_and_files_without_them_are_read(tmp_path):
+def test_doubts_about_limbs_are_kept_and_files_without_them_are_read(tmp_path):
     plain = motion_from_poses(BODY, np.zeros((3, BODY.skeleton.num_dofs)), 25.0)
-    assert "pose_std" not in np.load(_saved(tmp_path / "plain.npz", plain))
-    assert load_motion(tmp_path / "plain.npz").joint_std is None
-    deviations = np.linspace(0.0, 1.0, 3 * BODY.skeleton.num_dofs).reshape(3, -1)
-    sure = replace(plain, pose_std=deviations)
-    np.testing.assert_array_equal(load_motion(_saved(tmp_path / "sure.npz", sure)).pose_std, deviations)
-    arrays = dict(np.load(tmp_path / "sure.npz"))
-    np.savez(tmp_path / "wrong.npz", **arrays | {"pose_std": deviations[:, 1:]})
-    with pytest.raises(InputError, match="'pose_std' has the shape"):
-        load_motion(tmp_path / "wrong.npz")
+    assert "limb_doubt" not in np.load(_saved(tmp_path / "plain.npz", plain))
+    assert load_motion(tmp_path / "plain.npz").limb_doubt is None
+    doubt, of_joint = np.linspace(0.0, 1.0, 6).reshape(3, 2), np.full(BODY.skeleton.num_joints, -1)
+    of_joint[-1] = 1
+    judged = replace(plain, limb_names=np.array(["arm", "leg"]), joint_limb=of_joint, limb_doubt=doubt)
+    found = load_motion(_saved(tmp_path / "judged.npz", judged))
+    np.testing.assert_array_equal(found.limb_doubt, doubt)
+    assert found.limb_names.tolist() == ["arm", "leg"]
+    arrays = dict(np.load(tmp_path / "judged.npz"))
+    wrong = {"limb_doubt": (doubt[:, 1:], "'limb_doubt' has the shape"), "joint_limb": (of_joint + 1, "holds 2")}
+    for name, (array, sentence) in wrong.items():
+        np.savez(tmp_path / "wrong.npz", **arrays | {name: array})
+        with pytest.raises(InputError, match=sentence):
+            load_motion(tmp_path / "wrong.npz")
 
 
 def _saved(path, motion):

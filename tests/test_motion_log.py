@@ -24,9 +24,11 @@ def assert_same(one, other):
         np.testing.assert_array_equal(getattr(one, entry.name), getattr(other, entry.name), entry.name)
 
 
-def test_standard_deviations_grow_with_the_motion(tmp_path):
+def test_doubts_about_limbs_grow_with_the_motion(tmp_path):
     motion = walking_motion(6)
-    motion = replace(motion, pose_std=0.1 + motion.pose**2, joint_std=np.abs(motion.pose))
+    of_joint = np.arange(len(motion.joint_names)) % 2
+    doubt = np.linspace(0.0, 1.0, 12).reshape(6, 2)
+    motion = replace(motion, limb_names=np.array(["arm", "leg"]), joint_limb=of_joint, limb_doubt=doubt)
     log = MotionLog(tmp_path / "motion.partial")
     for first, stop in ((0, 4), (4, 6)):
         log.append(part(motion, slice(first, stop)))

@@ -1,5 +1,6 @@
 """The overlay: what is drawn, and that it lies where OpenCV projects it."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -11,7 +12,7 @@ from rig_cases import black, opencv_pixels, recording_of, ring_rig
 from sogjax.data.recording import open_recording
 from sogjax.data.video import read_frames
 from sogjax.errors import InputError
-from sogjax.view.bones import LEFT, MIDDLE, RIGHT, bones_from_motion, sides_of
+from sogjax.view.bones import _PALETTE, LEFT, MIDDLE, RIGHT, bones_from_motion, sides_of
 from sogjax.view.overlay import Overlay, overlay_frame, write_overlay
 from sogjax.view.projection import picture_points
 from sogjax.view.tiles import grid_for, shrink
@@ -194,3 +195,17 @@ def test_a_recordings_own_pictures_are_drawn_on():
     for k in range(len(images)):
         x, y = Overlay(recording.rig, [], width=800).grid.corner(k)
         assert canvas[y + 30 : y + 150, x : x + 150].std() > 5.0
+
+
+def test_a_limb_in_doubt_is_dashed():
+    """Its line is broken, so that it can be told without colours."""
+    rig, motion = ring_rig(1), walking_motion(2)
+    left = np.array([0 if "left" in name else -1 for name in motion.joint_names])
+    judged = replace(motion, limb_names=np.array(["left arm"]), joint_limb=left, limb_doubt=np.array([[0.0], [0.9]]))
+    drawn = lambda motion, frame: overlay_frame(black(rig), rig, [motion], int(motion.frame[frame]))
+    np.testing.assert_array_equal(drawn(judged, 0), drawn(motion, 0))
+    colors = _PALETTE[0][[LEFT, RIGHT], ::-1].astype(int)
+    near = lambda image, color: int((np.abs(image.astype(int) - color).max(axis=-1) < 40).sum())
+    whole, dashed = ([near(drawn(one, 1), color) for color in colors] for one in (motion, judged))
+    assert dashed[1] == pytest.approx(whole[1], rel=0.02)
+    assert 0.2 * whole[0] < dashed[0] < 0.75 * whole[0]

@@ -13,6 +13,7 @@ from rig_cases import black, opencv_pixels, recording_of, ring_rig
 
 from sogjax.data.ground_truth import GroundTruth
 from sogjax.errors import InputError
+from sogjax.view.bones import bones_from_motion
 from sogjax.view.rerun import ImageBlobs, view_command, write_comparison, write_iterations, write_rerun
 from sogjax.view.rerun.curves import plots_with
 
@@ -157,14 +158,18 @@ def test_iterations_have_a_timeline_of_their_own(tmp_path, motion):
     assert np.ravel(found["/curves/energy/energy"]["Scalars:scalars"]).tolist() == list(range(6))
 
 
-def test_deviations_are_balls_around_the_joints(tmp_path, motion):
-    sure = replace(motion, joint_std=np.full(motion.world_from_joint.shape[:2], 0.03))
-    write_rerun(tmp_path / "sure.rrd", recording_of(ring_rig(), 10), [sure], names=["ann"])
-    found = read_back(tmp_path / "sure.rrd")
-    radii = [row for row in found["/world/actors/ann/deviations"]["Points3D:radii"] if row]
-    assert len(radii) == 6
-    np.testing.assert_allclose(radii, 0.03, rtol=1e-6)
-    assert np.allclose(np.ravel(found["/curves/deviations/deviation_mm"]["Scalars:scalars"]), 30.0)
+def test_limbs_in_doubt_have_balls_around_their_joints(tmp_path, motion):
+    left = np.array([0 if "left" in name else -1 for name in motion.joint_names])
+    doubt = np.linspace(0.0, 1.0, motion.num_frames)[:, None]
+    judged = replace(motion, limb_names=np.array(["left arm"]), joint_limb=left, limb_doubt=doubt)
+    write_rerun(tmp_path / "judged.rrd", recording_of(ring_rig(), 10), [judged], names=["ann"])
+    found = read_back(tmp_path / "judged.rrd")
+    radii = [row for row in found["/world/actors/ann/doubtful"]["Points3D:radii"] if row]
+    drawn = bones_from_motion(motion).joints
+    assert len(radii) == int((doubt > 0.5).sum())
+    assert {len(row) for row in radii} == {int((left[drawn] == 0).sum())}
+    assert radii[-1] == pytest.approx([0.06] * len(radii[-1]))
+    assert np.allclose(np.ravel(found["/curves/doubts/doubt_left_arm"]["Scalars:scalars"]), doubt.ravel())
 
 
 @pytest.mark.parametrize("size", [20, 3000, 20_000, 40_000])

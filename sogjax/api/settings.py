@@ -19,7 +19,7 @@ _NOT_HERE = {
     "overwrite": "no file is written, so nothing is overwritten",
 }
 """Options of the command that have no meaning without its files, and why."""
-_KEPT_OUTPUTS = ("confidence", "temperature")
+_KEPT_OUTPUTS = ("confidence",)
 """Outputs that are a part of the motion, and no files."""
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from sogjax.data.doubtful import doubtful_limbs
 from sogjax.engine.run import Run
 from sogjax.engine.terminal import say
 from sogjax.engine.track import track_to_folder
@@ -32,6 +33,10 @@ def say_results(result: Run) -> None:
     frames = counted(len(result.converged), "frame")
     for camera, count in result.missing.items():
         say(f"warning: {camera} had no picture in {count} of {frames}; the other cameras were used")
+    for name, motion in result.motions.items():
+        whose = f"{name}'s " if len(result.motions) > 1 else ""
+        for limb in doubtful_limbs(motion):
+            say(f"warning: {whose}{limb}")
     not_converged = int(np.sum(~result.converged))
     if not_converged:
         say(

@@ -1,6 +1,7 @@
 """Motion: what tracking finds, one pose per frame and all that follows from it."""
 
 import difflib
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from importlib import import_module
 from pathlib import Path
@@ -64,10 +65,12 @@ class Motion:
     """The world's vertical, one of `sogjax.model.frames.UP_AXES`."""
     actor: str = ""
     """Whose motion it is; empty if the file does not say."""
-    pose_std: Float[np.ndarray, "frame dof"] | None = None
-    """Standard deviation of each degree of freedom; None where it was not computed, as in `joint_std`."""
-    joint_std: Float[np.ndarray, "frame joint"] | None = None
-    """Expected root mean square error of each joint, metres."""
+    limb_names: Shaped[np.ndarray, "limb"] | None = None
+    """None where limbs were not judged, as in the other two."""
+    joint_limb: Int[np.ndarray, "joint"] | None = None
+    """The limb that each joint belongs to; -1 for the trunk's."""
+    limb_doubt: Float[np.ndarray, "frame limb"] | None = None
+    """How likely each limb is more than 10 cm off, 0 to 1."""
 
     landmark_names: Shaped[np.ndarray, "landmark"] | None = None
     """Of points fixed to joints; None where the file does not have them, as in the other two."""
@@ -127,8 +130,9 @@ def motion_from_poses(
     iterations: Int[np.ndarray, "frame"] | None = None,
     converged: Bool[np.ndarray, "frame"] | None = None,
     up: str = DEFAULT_UP,
-    pose_std: Float[np.ndarray, "frame dof"] | None = None,
-    joint_std: Float[np.ndarray, "frame joint"] | None = None,
+    limb_names: Sequence[str] | None = None,
+    joint_limb: Int[np.ndarray, "joint"] | None = None,
+    limb_doubt: Float[np.ndarray, "frame limb"] | None = None,
 ) -> Motion:
     """The motion of `body`, which stands upright in a world with the vertical `up`, through `poses`.
 
@@ -161,8 +165,9 @@ def motion_from_poses(
         converged=np.ones(count, bool) if converged is None else converged,
         up=up,
         actor=body.name,
-        pose_std=pose_std,
-        joint_std=joint_std,
+        limb_names=None if limb_names is None else np.array(limb_names, str),
+        joint_limb=joint_limb,
+        limb_doubt=limb_doubt,
         landmark_names=np.array(body.landmarks.names, str),
         landmark_joint=np.array(body.landmarks.joints, int),
         landmark_offset=np.asarray(body.landmarks.offsets),
@@ -230,19 +235,27 @@ def checked_motion(path: Path, arrays: dict[str, np.ndarray]) -> Motion:
         converged=bool_array(path, arrays, "converged", (frames,)),
         up=str(text_array(path, arrays, "up", ())) if "up" in arrays else DEFAULT_UP,
         actor=str(text_array(path, arrays, "actor", ())) if "actor" in arrays else "",
-        pose_std=_if_there(path, arrays, "pose_std", (frames, len(dof_names))),
-        joint_std=_if_there(path, arrays, "joint_std", (frames, joints)),
+        **_limbs(path, arrays, frames, joints),
         **_landmarks(path, arrays),
     )
     _check(path, motion)
     return motion
 
 
-def _if_there(
-    path: Path, arrays: dict[str, np.ndarray], key: str, shape: tuple[int | None, ...]
-) -> Float[np.ndarray, "..."] | None:
-    """An array that a file need not have."""
-    return finite_array(path, arrays, key, shape) if key in arrays else None
+def _limbs(path: Path, arrays: dict[str, np.ndarray], frames: int, joints: int) -> dict[str, Any]:
+    """What was judged of the limbs, which a file need not have."""
+    if "limb_doubt" not in arrays:
+        return {}
+    names = text_array(path, arrays, "limb_names", (None,))
+    found = {
+        "limb_names": names,
+        "joint_limb": int_array(path, arrays, "joint_limb", (joints,)),
+        "limb_doubt": finite_array(path, arrays, "limb_doubt", (frames, len(names))),
+    }
+    wrong = (found["joint_limb"] < -1) | (found["joint_limb"] >= len(names))
+    if wrong.any():
+        raise InputError(f"{path}: 'joint_limb' holds {found['joint_limb'][wrong][0]}, which is not a limb; correct it")
+    return found
 
 
 def _landmarks(path: Path, arrays: dict[str, np.ndarray]) -> dict[str, Any]:

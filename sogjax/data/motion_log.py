@@ -21,7 +21,7 @@ PER_FRAME = (
     "converged",
 )
 """The fields of a `Motion` that have a row for each frame."""
-SOMETIMES_PER_FRAME = ("pose_std", "joint_std")
+SOMETIMES_PER_FRAME = ("limb_doubt",)
 """Further ones, which a motion need not have."""
 
 

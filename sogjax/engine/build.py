@@ -22,10 +22,10 @@ from sogjax.images.quadtree import Candidates
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.color import COLOR_RADIUS
-from sogjax.settings import ColorConfig, EnergyConfig, ImagesConfig, OutputsConfig, SolverConfig, TrackConfig
+from sogjax.settings import ColorConfig, EnergyConfig, ImagesConfig, SolverConfig, TrackConfig
 from sogjax.solve import ConditionedAscent, GaussNewton, OptimistixSolver, Scales, Solver
-from sogjax.tracking.confidence import Laplace
 from sogjax.tracking.culling import BoxAround, ImageReader
+from sogjax.tracking.judged_limbs import JudgedLimbs
 from sogjax.tracking.scales import pose_scales
 from sogjax.tracking.tracker import PairChoice, Tracker
 
@@ -81,12 +81,16 @@ def check(config: TrackConfig) -> None:
         at_least(f"solver.{key}", getattr(config.solver, key), 1e-6)
     between("images.depth", config.images.depth, 1, MAX_DEPTH)
     between("tracking.extrapolation", config.tracking.extrapolation, 0.0, 2.0)
+    if config.tracking.repair and not config.outputs.confidence:
+        raise InputError(
+            "tracking.repair=true outputs.confidence=false: limbs that are not judged cannot be repaired; leave one of "
+            "the two out"
+        )
     if not np.isfinite(config.images.color_tolerance):
         raise InputError(f"images.color_tolerance={config.images.color_tolerance}: must be a number")
     at_least("images.box_enlargement", config.images.box_enlargement, 0.0)
     box_around(config.images)
     one_of("images.background", config.images.background, CHOICES)
-    confidence(config.outputs)
     marker_rule(config.outputs.markers, "outputs.markers")
     at_least("outputs.overlay_width", config.outputs.overlay_width, 64)
 
@@ -222,13 +226,9 @@ def tracker(
         scales=solver_scales(config.solver, body),
         extrapolation=config.tracking.extrapolation,
         pairs=pair_choice(config.energy),
-        confidence=confidence(config.outputs),
+        limbs=JudgedLimbs.from_body(body) if config.outputs.confidence else None,
+        repairs=config.tracking.repair,
     )
-
-
-def confidence(config: OutputsConfig) -> Laplace | None:
-    """How standard deviations are found; None: they are not computed."""
-    return Laplace(at_least("outputs.temperature", config.temperature, 1e-12)) if config.confidence else None
 
 
 def varied(tracker: Tracker, config: TrackConfig) -> Tracker:
@@ -248,7 +248,8 @@ def varied(tracker: Tracker, config: TrackConfig) -> Tracker:
         scales=solver_scales(config.solver, tracker.body),
         extrapolation=config.tracking.extrapolation,
         pairs=pair_choice(config.energy),
-        confidence=confidence(config.outputs),
+        limbs=JudgedLimbs.from_body(tracker.body) if config.outputs.confidence else None,
+        repairs=config.tracking.repair,
     )
 
 

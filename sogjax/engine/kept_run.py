@@ -4,7 +4,7 @@ import json
 import shutil
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,16 +22,17 @@ from sogjax.engine.origin import Origin
 from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.model.sog import Sog
-from sogjax.tracking.confidence import Deviations
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import FrameResult, TrackedFrame, TrackState
+from sogjax.tracking.limb_doubt import Judgement
 
 FOLDER = "run.partial"
 NOTE, START, ACTOR = "run.json", "start.npz", "actor"
 TERM = "term_"
 """Before the name of a term of the energy, in the names of columns."""
-DEVIATIONS = {"pose_std": "pose", "joint_std": "joints"}
 COLUMNS = ("pose", "energy", "iterations", "evaluations", "converged", "num_near", "num_matching", "num_blocks")
+JUDGEMENT = {"limb_doubt": "doubt", "limb_usual": "usual"}
+"""Columns of runs whose limbs are judged."""
 CAPACITY, CAPACITIES = "capacity_{}", ("near", "matching", "blocks")
 _NEEDED = {*COLUMNS, *(CAPACITY.format(name) for name in CAPACITIES)}
 
@@ -68,15 +69,16 @@ class Prefix:
         state = TrackState.from_pose(start)
         for pose in self.rows["pose"][-2:]:
             state = state.advanced(jnp.asarray(pose))
-        return state
+        usual = self.rows.get("limb_usual")
+        return state if usual is None else replace(state, usual=jnp.asarray(usual[-1]))
 
     def result(self, frame: int, images: Sog) -> FrameResult:
         """The result of one frame; image blobs are not kept."""
         values = {name: jnp.asarray(column[frame]) for name, column in self.rows.items()}
-        sure = {name: values[key] for key, name in DEVIATIONS.items() if key in values}
+        judged = {name: values[key] for key, name in JUDGEMENT.items() if key in values}
         return FrameResult(
             terms={name.removeprefix(TERM): value for name, value in values.items() if name.startswith(TERM)},
-            deviations=Deviations(**sure) if sure else None,
+            limbs=Judgement(**judged) if judged else None,
             images=images,
             **{name: values[name] for name in COLUMNS},
         )
@@ -200,10 +202,10 @@ def rows_of(frames: Sequence[TrackedFrame]) -> dict[str, np.ndarray]:
     results = [frame.result for frame in frames]
     column = lambda parts, name: np.stack([np.asarray(getattr(part, name)) for part in parts])
     capacity = lambda name: np.array([getattr(frame.capacities, name) for frame in frames])
-    sure = [result.deviations for result in results if result.deviations is not None]
+    judged = [result.limbs for result in results if result.limbs is not None]
     return (
         {name: column(results, name) for name in COLUMNS}
-        | {key: column(sure, name) for key, name in DEVIATIONS.items() if sure}
+        | {key: column(judged, name) for key, name in JUDGEMENT.items() if judged}
         | {TERM + name: np.stack([np.asarray(r.terms[name]) for r in results]) for name in results[0].terms}
         | {CAPACITY.format(name): capacity(name) for name in CAPACITIES}
     )

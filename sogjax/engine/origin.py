@@ -41,7 +41,6 @@ def origin_of(recording: Recording, config: TrackConfig, given_actors: Sequence[
         **_settings(config, ""),
         **_code_of_terms(config),
         "outputs.confidence": config.outputs.confidence,
-        "outputs.temperature": config.outputs.temperature,
         **_of_recording(recording),
         "the actors": None if given_actors is None else [digest(actor) for actor in given_actors],
         "the rough pose": None if poses is None else hashlib.sha256(poses.read_bytes()).hexdigest(),

@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from sogjax.data.doubtful import doubtful_limbs
 from sogjax.engine.run import Run
 from sogjax.evaluation import summarize
 
-COLUMNS = ("mean mm", "std mm", "joints mm", "lost", "swaps", "iterations", "not converged", "frames/s")
+COLUMNS = ("mean mm", "std mm", "joints mm", "lost", "doubtful", "swaps", "iterations", "not converged", "frames/s")
 OBJECTIVE = "mean mm"
 """What a searching sweeper minimises."""
 
@@ -28,6 +29,7 @@ def row_numbers(result: Run) -> Numbers:
             numbers["joints mm"] = 1000.0 * summarize(np.concatenate(joints, axis=1)).mean
         numbers["swaps"] = len(result.evaluation.swaps)
         numbers["lost"] = sum(len(e.lost) for e in result.evaluation.evaluations.values())
+    numbers["doubtful"] = sum(len(doubtful_limbs(motion)) for motion in result.motions.values())
     numbers["iterations"] = float(np.mean(result.iterations))
     numbers["not converged"] = int(np.sum(~result.converged))
     numbers["frames/s"] = result.times.frames_per_second("step")

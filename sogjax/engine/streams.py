@@ -24,11 +24,11 @@ from sogjax.engine.terminal import say
 from sogjax.engine.timing import StageTimes
 from sogjax.errors import InputError
 from sogjax.images.cells import CellGrid
-from sogjax.model.body import Body, dof_slices, joint_slices
+from sogjax.model.body import Body, dof_slices
 from sogjax.model.color import to_rgb
 from sogjax.sentences import counted
 from sogjax.settings import OutputsConfig
-from sogjax.tracking.frame import FrameResult
+from sogjax.tracking.limbs import joint_limbs, limb_names, limb_slices
 
 PARTIAL = ".partial"
 """Ending of the folder of an incomplete motion."""
@@ -180,7 +180,7 @@ class Streams:
         """One motion per actor; similarity, energy and iterations are those of all actors together."""
         results = [done.tracked.result for done in block]
         poses = np.stack([np.asarray(result.pose) for result in results])
-        pose_std, joint_std = deviations_of(results)
+        judgements = [np.asarray(result.limbs.doubt, float) for result in results if result.limbs is not None]
         return {
             body.name: motion_from_poses(
                 body,
@@ -192,12 +192,9 @@ class Streams:
                 iterations=np.array([result.iterations for result in results], int),
                 converged=np.array([result.converged for result in results], bool),
                 up=self._recording.up,
-                pose_std=None if pose_std is None else pose_std[:, part],
-                joint_std=None if joint_std is None else joint_std[:, joints],
+                **(judged(body, np.stack(judgements)[:, limbs]) if judgements else {}),
             )
-            for body, part, joints in zip(
-                self._bodies, dof_slices(self._bodies), joint_slices(self._bodies), strict=True
-            )
+            for body, part, limbs in zip(self._bodies, dof_slices(self._bodies), limb_slices(self._bodies), strict=True)
         }
 
     def _write_rerun(self, block: list[FrameDone], motions: list[Motion], first: int) -> None:
@@ -208,14 +205,9 @@ class Streams:
             self._rerun.write_pictures(frame, _jpegs(done.pictures), image_blobs(done))
 
 
-def deviations_of(
-    results: Sequence[FrameResult],
-) -> tuple[Float[np.ndarray, "frame dof"] | None, Float[np.ndarray, "frame joint"] | None]:
-    """The standard deviations of all actors' poses and joints, where they were computed."""
-    parts = [result.deviations for result in results if result.deviations is not None]
-    if not parts:
-        return None, None
-    return np.stack([np.asarray(part.pose) for part in parts]), np.stack([np.asarray(part.joints) for part in parts])
+def judged(body: Body, doubt: Float[np.ndarray, "frame limb"]) -> dict[str, Any]:
+    """What a motion says of its limbs."""
+    return {"limb_names": limb_names(body), "joint_limb": joint_limbs(body.skeleton), "limb_doubt": doubt}
 
 
 def _jpegs(pictures: list[Picture]) -> list[Any]:

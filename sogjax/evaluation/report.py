@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Int
 
+from sogjax.data.doubtful import DoubtfulLimb, doubtful_limbs
 from sogjax.data.ground_truth import GroundTruth
 from sogjax.data.motion import Motion
 from sogjax.errors import InputError
@@ -42,6 +43,8 @@ class Evaluation:
     """How `markers` were attached."""
     markers_by_rule: Mapping[str, PointErrors] = field(default_factory=dict)
     """The markers attached by either rule; empty where the truth has none."""
+    doubtful: tuple[DoubtfulLimb, ...] = ()
+    """What tracking itself doubted, without knowing the truth."""
 
     def __str__(self) -> str:
         return self.table(details=False)
@@ -71,6 +74,7 @@ class Evaluation:
             "markers_by_rule": {rule: rule_dict([points]) for rule, points in self.markers_by_rule.items()},
             "joints": points_dict(self.joints),
             "lost": [in_mm(asdict(point), "mean") for point in self.lost],
+            "doubtful": [asdict(limb) for limb in self.doubtful],
         }
 
     def to_json(self, path: Path) -> None:
@@ -184,7 +188,7 @@ def evaluate_motion(
         )
     points = markers or joints
     lost = lost_points(points.errors, points.names, frames) if points else ()
-    return Evaluation(name, frames, markers, joints, lost, rule, by_rule)
+    return Evaluation(name, frames, markers, joints, lost, rule, by_rule, doubtful_limbs(motion))
 
 
 def evaluate_motions(

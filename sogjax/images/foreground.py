@@ -1,5 +1,7 @@
 """Foreground against background: what the colour of a cell says about whether somebody is seen there."""
 
+from typing import Any
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -43,13 +45,35 @@ def subject_colors(
     places = np.stack(np.meshgrid(middle, middle, middle, indexing="ij"), axis=-1).reshape(-1, 3)
     density = np.full(len(places), SUBJECT_UNKNOWN)
     for color, share in zip(np.asarray(colors, float), np.asarray(areas, float) / np.sum(areas), strict=True):
-        off = places - color
-        along, squared, length = off @ color, (off**2).sum(axis=1), float(color @ color)
-        variance, shaded = SUBJECT_SPREAD**2, SUBJECT_SPREAD**2 + SUBJECT_SHADING**2 * length
-        distance = (squared - along**2 / (variance / SUBJECT_SHADING**2 + length)) / variance
-        peak = 1.0 / (_NORMAL * variance * np.sqrt(shaded))
+        distance, peak = _color_gaussian(places, color)
         density += (1.0 - SUBJECT_UNKNOWN) * share * peak * np.exp(-0.5 * distance)
     return np.log(density).reshape(COLOR_BINS, COLOR_BINS, COLOR_BINS)
+
+
+def _color_gaussian(colors: Any, color: Any) -> tuple[Any, Any]:
+    """Squared distances of colours from those of a blob, in standard deviations, and the density there.
+
+    A Gaussian that is longer along the blob's own colour, as shading makes that darker or brighter. Arrays of numpy or
+    jax that broadcast, channels last.
+    """
+    off, length = colors - color, (color * color).sum(axis=-1)
+    along, squared = (off * color).sum(axis=-1), (off * off).sum(axis=-1)
+    variance = SUBJECT_SPREAD**2
+    distance = (squared - along**2 / (variance / SUBJECT_SHADING**2 + length)) / variance
+    return distance, 1.0 / (_NORMAL * variance * (variance + SUBJECT_SHADING**2 * length) ** 0.5)
+
+
+def own_density(colors: Float[Array, "*#place 3"], color: Float[Array, "*#place 3"]) -> Float[Array, "*place"]:
+    """Logarithm of the density of colours (sRGB) where blobs of some colours are seen; 0 is that of any colour."""
+    distance, peak = _color_gaussian(colors, color)
+    return jnp.log((1.0 - SUBJECT_UNKNOWN) * peak * jnp.exp(-0.5 * distance) + SUBJECT_UNKNOWN)
+
+
+def subject_density(colors: Float[Array, "*place 3"], subject: SubjectColors) -> Float[Array, "*place"]:
+    """The same where some blob of a subject is seen."""
+    red, green, blue = color_bins(colors)
+    place = (red * COLOR_BINS + green) * COLOR_BINS + blue
+    return subject.reshape(-1).at[place].get(mode="promise_in_bounds")
 
 
 class EmptyScene(eqx.Module):
@@ -95,9 +119,7 @@ def log_odds(
     seen = [cells[..., k] for k in range(3)]
     odds = _surprise(seen, empty)
     if subject is not None:
-        red, green, blue = color_bins(cells)
-        place = (red * COLOR_BINS + green) * COLOR_BINS + blue
-        odds = odds + subject.reshape(-1).at[place].get(mode="promise_in_bounds")
+        odds = odds + subject_density(cells, subject)
     return jnp.where(empty.known, jnp.clip(TEMPER * odds, -LARGEST, LARGEST), 0.0)
 
 

@@ -67,3 +67,4 @@ class TrackingConfig:
     """Prediction and the first frame (Section 5.3)."""
 
     extrapolation: float = option(0.5, "[alpha] share of the last motion that is added to predict the next pose")
+    repair: bool = option(False, "try limbs in doubt in other places, and keep them there if that lasts")

@@ -21,11 +21,7 @@ class OutputsConfig:
     formats: list[str] | None = option(None, "further formats of the motion, some of [trc,c3d,glb,csv]; null: none")
     markers: str = option("scaled", "scaled | closest: how markers are attached for metrics.json, as for evaluate")
     confidence: bool = option(
-        False, "standard deviations of the pose and the joints, in motion.npz; rough, see experiments/confidence.py"
-    )
-    temperature: float = option(
-        1e-5,
-        "energy per unit of log-likelihood, for the standard deviations; from experiments/confidence.py",
+        True, "how likely each limb is more than 10 cm off: in motion.npz, motion.rrd, the overlay and the summary"
     )
 
 

@@ -17,15 +17,15 @@ from sogjax.study.sections.about import (
     own_section,
     versions_section,
 )
-from sogjax.study.sections.confidence import confidence_section
 from sogjax.study.sections.experiment import experiment_section
+from sogjax.study.sections.limbs import limbs_section
 from sogjax.study.sections.worst import worst_section
 from sogjax.study.settings import ReportConfig
 from sogjax.study.study import Study
 
 TITLE = "Section 6 again"
-CONFIDENCE = "confidence"
-"""Beside the experiments of `conf/experiment/`: standard deviations against true errors."""
+LIMBS = "limbs"
+"""Beside the experiments of `conf/experiment/`: doubts about limbs against true errors."""
 
 
 def write_report(config: ReportConfig) -> list[Path]:
@@ -34,8 +34,8 @@ def write_report(config: ReportConfig) -> list[Path]:
     Raises:
         InputError: an experiment or recording that is not there, or a folder that cannot be written.
     """
-    names = config.only or [*experiment_names(), CONFIDENCE]
-    experiments = [Experiment.named(name) for name in names if name != CONFIDENCE]
+    names = config.only or [*experiment_names(), LIMBS]
+    experiments = [Experiment.named(name) for name in names if name != LIMBS]
     _check_matplotlib()
     with results_folder(Path(config.out)) as out:
         study = Study.from_config(config, out)
@@ -45,7 +45,7 @@ def write_report(config: ReportConfig) -> list[Path]:
         if not any(not one.record.failed for one in done) and experiments:
             reason = done[0].record.failed if done else "do=false, and none was done before"
             raise InputError(f"{out}: no run worked: {reason}")
-        sections += [confidence_section(study)] if CONFIDENCE in names else []
+        sections += [limbs_section(study)] if LIMBS in names else []
         say(f"runs done or read in {time.perf_counter() - begin:.0f} s")
         sections += [worst_section(done, config.pictures)] if config.pictures else []
         sections += [about_section(config, done), versions_section(config)]

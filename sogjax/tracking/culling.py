@@ -108,8 +108,12 @@ class ImageReader(eqx.Module):
         self, odds: Float[Array, "camera rows columns"], cameras: Camera, boxes: Float[Array, "camera actor 2 2"]
     ) -> Windows:
         """The log odds of cells in the boxes."""
-        sizes = jnp.asarray([grid.cell_size for grid in self.candidates.grids], odds.dtype)
-        return computed_once(self.true_at_run_time, windows_around, odds, sizes, cameras, boxes)
+        return computed_once(self.true_at_run_time, windows_around, odds, self.cell_sizes, cameras, boxes)
+
+    @property
+    def cell_sizes(self) -> Float[Array, "camera"]:
+        """The sides of cells, pixels."""
+        return jnp.asarray([grid.cell_size for grid in self.candidates.grids], self.color_radius.dtype)
 
     @property
     def true_at_run_time(self) -> Bool[Array, ""]:

@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int, UInt8
 
 from sogjax.model.sog import Sog
-from sogjax.tracking.confidence import Deviations
 from sogjax.tracking.culling import Capacities
+from sogjax.tracking.limb_doubt import Judgement
 
 
 class PartialCells(NamedTuple):
@@ -34,11 +34,13 @@ def on_device(
 
 
 class TrackState(eqx.Module):
-    """The poses of the two frames before, and how many of them are known (0, 1, 2)."""
+    """The poses of the two frames before, how many of them are known (0, 1, 2), and what limbs are judged by."""
 
     previous: Float[Array, "dof"]
     before_previous: Float[Array, "dof"]
     num_known: Int[Array, ""]
+    usual: Float[Array, "blob"] | None = None
+    """How well the blobs' colours fitted so far (`Judgement.usual`); NaN where nothing is known, None: not judged."""
 
     @classmethod
     def from_pose(cls, pose: Float[Array, "dof"]) -> "TrackState":
@@ -48,7 +50,8 @@ class TrackState(eqx.Module):
     def advanced(self, pose: Float[Array, "dof"]) -> "TrackState":
         """The state after a frame whose pose was found; the first one has no history but itself."""
         first = self.num_known == 0
-        return TrackState(pose, jnp.where(first, pose, self.previous), jnp.minimum(self.num_known + 1, 2))
+        before = jnp.where(first, pose, self.previous)
+        return TrackState(pose, before, jnp.minimum(self.num_known + 1, 2), self.usual)
 
 
 class FrameResult(eqx.Module):
@@ -66,8 +69,8 @@ class FrameResult(eqx.Module):
     num_matching: Int[Array, "camera"]
     num_blocks: Int[Array, ""]
     """Blocks of near pairs; 0 where all pairs were compared."""
-    deviations: Deviations | None
-    """How sure the pose is; None: it was not asked for."""
+    limbs: Judgement | None
+    """What is thought of the limbs; None: they are not judged."""
     images: Sog
     """The image blobs that were used, for each camera (working colour space)."""
 

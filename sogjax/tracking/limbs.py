@@ -1,11 +1,21 @@
 """Limbs of a body, and poses that differ in one limb."""
 
+from collections.abc import Sequence
+from itertools import pairwise
+
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from sogjax.model.body import Body
 from sogjax.model.skeleton import Skeleton
 
+LIMB_OF_END = {
+    **dict.fromkeys(("elbow", "wrist", "hand"), "arm"),
+    **dict.fromkeys(("knee", "ankle", "foot", "toe", "toes", "paw"), "leg"),
+    **dict.fromkeys(("top", "tip"), ""),
+    "nose": "head",
+}
+"""What a limb is called whose end is called so."""
 SAME = 1e-3
 """Radians: values of a limb that differ by less are the same."""
 
@@ -26,6 +36,35 @@ def limbs(skeleton: Skeleton) -> list[Int[np.ndarray, "limb"]]:
             if len(dofs):
                 found.append(dofs)
     return found
+
+
+def limb_names(body: Body) -> tuple[str, ...]:
+    """What to call each limb: by the landmark at its end, or else by its last joint."""
+    used = np.asarray(body.skeleton.parameter_transform) != 0.0
+    names = []
+    for limb in limbs(body.skeleton):
+        moved = used[:, limb].any(axis=1)
+        last = [name for name, joint in zip(body.landmarks.names, body.landmarks.joints, strict=True) if moved[joint]]
+        end = last[-1] if last else body.skeleton.names[int(np.flatnonzero(moved)[-1])]
+        actor, slash, end = end.rpartition("/")
+        words = [LIMB_OF_END.get(word, word) for word in end.split("_")]
+        names.append(actor + slash + " ".join(word for word in words if word))
+    return tuple(names)
+
+
+def joint_limbs(skeleton: Skeleton) -> Int[np.ndarray, "joint"]:
+    """The limb that each joint belongs to; -1 for the trunk's."""
+    used = np.asarray(skeleton.parameter_transform) != 0.0
+    found = np.full(skeleton.num_joints, -1)
+    for k, limb in enumerate(limbs(skeleton)):
+        found[used[:, limb].any(axis=1)] = k
+    return found
+
+
+def limb_slices(bodies: Sequence[Body]) -> list[slice]:
+    """Where each body's limbs lie among those of the concatenated model."""
+    ends = np.cumsum([0, *(len(limbs(body.skeleton)) for body in bodies)])
+    return [slice(int(first), int(stop)) for first, stop in pairwise(ends)]
 
 
 def limb_blobs(body: Body) -> Bool[np.ndarray, "limb blob"]:

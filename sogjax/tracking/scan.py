@@ -28,7 +28,7 @@ def scanned(tracker: Tracker, start: Float[Array, "dof"], cells: ClipCells, capa
         state, result = tracker.step(state, frame, capacities)
         return state, without_images(result)
 
-    return jax.lax.scan(one_frame, TrackState.from_pose(start), cells)[1]
+    return jax.lax.scan(one_frame, tracker.start(start), cells)[1]
 
 
 def without_images(result: FrameResult) -> FrameResult:

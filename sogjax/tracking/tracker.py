@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Literal
 
@@ -14,14 +15,14 @@ from jaxtyping import Array, Bool, Float, Int, UInt8
 from sogjax.compiled.once import computed_once
 from sogjax.energy.coloring import Coloring
 from sogjax.energy.frame_energy import FrameEnergy
-from sogjax.energy.posed import History
+from sogjax.energy.posed import History, Posed
 from sogjax.energy.term import Terms
 from sogjax.energy.views import Views
+from sogjax.energy.windows import Windows
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.color import from_rgb
 from sogjax.solve import Scales, Solution, Solver
-from sogjax.tracking.confidence import Deviations, Laplace
 from sogjax.tracking.culling import (
     CAPACITIES,
     Capacities,
@@ -33,6 +34,10 @@ from sogjax.tracking.culling import (
     union_boxes,
 )
 from sogjax.tracking.frame import FrameCells, FrameResult, PartialCells, TrackedFrame, TrackState, on_device, on_host
+from sogjax.tracking.judged_limbs import JudgedLimbs
+from sogjax.tracking.limb_doubt import Judgement, judgement
+from sogjax.tracking.limb_evidence import blob_evidence
+from sogjax.tracking.repair import Repair
 from sogjax.tracking.rounds import solve_near
 
 HEADROOM = 1.4
@@ -60,8 +65,10 @@ class Tracker(eqx.Module):
     """alpha of Section 5.3."""
     pairs: PairChoice = eqx.field(static=True, default="dense")
     """Whether all pairs of blobs are compared, or those near each other."""
-    confidence: Laplace | None = None
-    """How standard deviations are found; None: they are not."""
+    limbs: JudgedLimbs | None = None
+    """Which are judged in every frame; None: none."""
+    repairs: bool = eqx.field(static=True, default=False)
+    """Whether `track` tries limbs in doubt in other places; a step alone does not."""
     capacities: Capacities | None = None
     """Room for image blobs of a step that is given none."""
     first_pose: Float[Array, "dof"] | None = None
@@ -76,7 +83,13 @@ class Tracker(eqx.Module):
         pose = self.first_pose if pose is None else pose
         if pose is None:
             raise ValueError("the tracker knows no first pose; give one: tracker.start(pose)")
-        return TrackState.from_pose(jnp.asarray(pose, self.body.skeleton.offsets.dtype))
+        return self.with_memory(TrackState.from_pose(jnp.asarray(pose, self.body.skeleton.offsets.dtype)))
+
+    def with_memory(self, state: TrackState) -> TrackState:
+        """The state with all that a step hands on to the next one, so that every step takes the same."""
+        if self.limbs is None or self.reader.subject is None or state.usual is not None:
+            return state
+        return replace(state, usual=jnp.full_like(self.body.blob_sigmas, jnp.nan))
 
     def predicted(self, state: TrackState) -> Float[Array, "dof"]:
         """Theta_0 of Section 5.3: linear extrapolation of the last two poses."""
@@ -145,7 +158,8 @@ class Tracker(eqx.Module):
         if isinstance(cells, PartialCells):
             cells, present = jnp.asarray(cells.cells), jnp.asarray(cells.present)
         if capacities is not None:
-            return self.found(state, self.views(cells, state, capacities, present), capacities)
+            seen = self.views(cells, state, capacities, present)
+            return self._judged(*self.found(state, seen, capacities), seen[0], cells, present)
         if self.capacities is None:
             raise ValueError("the tracker has no capacities; give some, or take one of sogjax.make_tracker")
         state, result = self.step(state, cells, self.capacities, present)
@@ -165,7 +179,6 @@ class Tracker(eqx.Module):
         history = History(state.previous, state.before_previous, state.num_known == 2)
         objective = FrameEnergy(self.body, views, history, self.terms)
         solution, num_blocks = self._solved(objective, self.predicted(state), capacities)
-        deviations, num_blocks = self._deviations(objective, solution.params, capacities, num_blocks)
         result = FrameResult(
             pose=solution.params,
             energy=solution.value,
@@ -176,10 +189,41 @@ class Tracker(eqx.Module):
             num_near=num_near,
             num_matching=num_matching,
             num_blocks=num_blocks,
-            deviations=deviations,
+            limbs=None,
             images=views.images,
         )
         return state.advanced(solution.params), result
+
+    def _judged(
+        self,
+        state: TrackState,
+        result: FrameResult,
+        views: Views,
+        cells: UInt8[Array, "camera rows columns 3"],
+        present: Bool[Array, "camera"] | None,
+    ) -> tuple[TrackState, FrameResult]:
+        """The same with what the cameras say of the limbs, if they are to be judged."""
+        if self.limbs is None or self.reader.subject is None:
+            return state, result
+        usual = self.with_memory(state).usual
+        assert usual is not None
+        found = self.judged(result.pose, usual, views.windows, cells, present)
+        return replace(state, usual=found.usual), replace(result, limbs=found)
+
+    def judged(
+        self,
+        pose: Float[Array, "dof"],
+        usual: Float[Array, "blob"],
+        windows: Windows | None,
+        cells: UInt8[Array, "camera rows columns 3"],
+        present: Bool[Array, "camera"] | None = None,
+    ) -> Judgement:
+        """What the cameras say of the limbs of a pose."""
+        assert self.limbs is not None
+        assert self.reader.subject is not None
+        posed, sizes = Posed.from_pose(self.body, pose), self.reader.cell_sizes
+        evidence = blob_evidence(self.limbs, posed, self.cameras, windows, cells, sizes, self.reader.subject, present)
+        return judgement(self.limbs, evidence, usual, windows is not None)
 
     def _solved(
         self, objective: FrameEnergy, start: Float[Array, "dof"], capacities: Capacities
@@ -187,18 +231,6 @@ class Tracker(eqx.Module):
         if self.pairs == "sparse":
             return solve_near(self.solver, objective, start, self.scales, capacities.blocks)
         return self.solver.maximize(objective, start, self.scales), jnp.asarray(0)
-
-    def _deviations(
-        self, objective: FrameEnergy, pose: Float[Array, "dof"], capacities: Capacities, num_blocks: Int[Array, ""]
-    ) -> tuple[Deviations | None, Int[Array, ""]]:
-        """How sure the pose is, from the pairs that are near there, and the most blocks of pairs so far."""
-        if self.confidence is None:
-            return None, num_blocks
-        if self.pairs == "sparse":
-            objective, count = objective.near(pose, capacities.blocks)
-            num_blocks = jnp.maximum(num_blocks, count)
-        curvature = objective.quadratic(pose).curvature
-        return self.confidence.deviations(self.body.skeleton, curvature, pose), num_blocks
 
 
 _step = eqx.filter_jit(Tracker.step)
@@ -220,7 +252,8 @@ def track(
     Raises:
         InputError: more image blobs than the largest capacity.
     """
-    state = start if isinstance(start, TrackState) else TrackState.from_pose(start)
+    state = tracker.with_memory(start if isinstance(start, TrackState) else TrackState.from_pose(start))
+    repair = Repair(tracker.body) if tracker.repairs else None
     for index, frame in enumerate(frames):
         begin = time.perf_counter()
         cells, present = on_device(frame)
@@ -233,9 +266,44 @@ def track(
             if capacities.hold(near, matching, blocks):
                 break
             capacities = larger_capacities(capacities, near, matching, blocks)
+        if repair is not None:
+            step = partial(_step_within, tracker, cells, capacities, present)
+            judge = partial(_doubts, tracker, cells, present)
+            next_state, result = repair.after(state, (next_state, result), step, judge)
         state = next_state
         seconds = time.perf_counter() - begin
         yield TrackedFrame(index, on_host(result), capacities, tracker.reader.color_space, seconds)
+
+
+def _step_within(
+    tracker: Tracker,
+    cells: UInt8[Array, "camera rows columns 3"],
+    capacities: Capacities,
+    present: Bool[Array, "camera"] | None,
+    state: TrackState,
+) -> tuple[TrackState, FrameResult] | None:
+    """A step, unless it needs more room."""
+    found, result = _step(tracker, state, cells, capacities, present)
+    needed = jax.device_get((result.num_near, result.num_matching, result.num_blocks))
+    return (found, result) if capacities.hold(*(int(count.max()) for count in needed)) else None
+
+
+@eqx.filter_jit
+def _doubts(
+    tracker: Tracker,
+    cells: UInt8[Array, "camera rows columns 3"],
+    present: Bool[Array, "camera"] | None,
+    state: TrackState,
+    poses: Float[Array, "try dof"],
+) -> Float[Array, "try limb"]:
+    """The doubt about the limbs of many poses, seen from a state."""
+    odds = tracker.reader.odds(cells.astype(poses.dtype) / 255.0)
+    windows = None if odds is None else tracker.reader.windows(odds, tracker.cameras, tracker.boxes(state))
+    if windows is not None and present is not None:
+        windows = windows.of_present(present)
+    usual = tracker.with_memory(state).usual
+    assert usual is not None
+    return jax.lax.map(lambda pose: tracker.judged(pose, usual, windows, cells, present).doubt, poses)
 
 
 def larger_capacities(capacities: Capacities, near: int, matching: int, blocks: int) -> Capacities:

@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
+from sogjax.data.doubtful import in_doubt
 from sogjax.data.motion import Motion
 
 SAME_ORIGIN = 1e-4
@@ -40,6 +41,12 @@ class Bones:
     """LEFT, MIDDLE or RIGHT of each edge."""
 
     @property
+    def held_by(self) -> Int[np.ndarray, "edge"]:
+        """The motion's joint that each edge moves with: the farther one, or the one that a tip is fixed to."""
+        last = np.where(self.edges[:, 1] < self.num_joints, self.edges[:, 1], self.edges[:, 0])
+        return self.joints[last] if len(self.edges) else np.zeros(0, int)
+
+    @property
     def num_joints(self) -> int:
         """How many of the points are joints."""
         return len(self.joints)
@@ -48,6 +55,15 @@ class Bones:
         """Metres, world: the distinct joints, then the tips of the last ones."""
         parts = [motion.world_from_joint[:, self.joints][..., :3, 3], motion.blob_means[:, self.tips]]
         return np.concatenate(parts, axis=1).astype(np.float32)
+
+
+def doubtful_edges(motion: Motion, bones: Bones) -> Bool[np.ndarray, "frame edge"]:
+    """Which bones belong to a limb that is in doubt."""
+    doubt = in_doubt(motion)
+    if motion.joint_limb is None or doubt.shape[1] == 0:
+        return np.zeros((motion.num_frames, len(bones.edges)), bool)
+    limb = motion.joint_limb[bones.held_by]
+    return doubt[:, limb] & (limb >= 0)
 
 
 def bones_from_motion(motion: Motion) -> Bones:

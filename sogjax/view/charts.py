@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
 from sogjax.errors import InputError
 
@@ -52,22 +51,6 @@ def mean_chart(panels: Sequence[Means], *, axis: str, value: str, paper: Mapping
     if paper:
         drawn[-1].plot(range(len(paper)), list(paper.values()), "s-", color=PAPER)
         _finish(drawn[-1], list(paper), axis, value, "the paper")
-    return png_of(figure)
-
-
-def calibration_chart(
-    expected: Mapping[str, Float[np.ndarray, "bin"]], found: Mapping[str, Float[np.ndarray, "bin"]], title: str
-) -> bytes:
-    """Predicted against actual errors by name, drawn in millimetres from metres (PNG)."""
-    figure = new_figure((4.2, 3.6))
-    panel = figure.subplots()
-    top = 0.0
-    for name, values in expected.items():
-        panel.plot(1000.0 * values, 1000.0 * found[name], "o-", markersize=4, label=name)
-        top = max(top, 1000.0 * float(np.nanmax([values, found[name]])))
-    panel.plot([0.0, top], [0.0, top], "--", color=PAPER, linewidth=1)
-    panel.set(xlabel="predicted standard deviation, mm", ylabel="root mean square error, mm", title=title)
-    panel.legend(fontsize=8, frameon=False)
     return png_of(figure)
 
 

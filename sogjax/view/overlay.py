@@ -6,19 +6,23 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
 from sogjax.data.calibration import CameraRig
 from sogjax.data.motion import Motion
 from sogjax.data.recording import Recording
 from sogjax.data.video import VideoWriter, read_frames
 from sogjax.errors import InputError
-from sogjax.view.bones import Bones, actor_palette, blob_palette, bones_from_motion
+from sogjax.view.bones import Bones, actor_palette, blob_palette, bones_from_motion, doubtful_edges
 from sogjax.view.frames import frame_range
 from sogjax.view.projection import picture_points
 from sogjax.view.tiles import Fit, grid_for, shrink
 
 SUBPIXEL_BITS = 4
+DASH, MOST_DASHES = 3.0, 64
+"""Length of a dash in units of the line's width; how many a line has at most, wherever it goes."""
+Point = tuple[int, int]
+Color = tuple[int, int, int]
 WIDTH = 1920
 """Pixels; the grid's largest width."""
 
@@ -32,6 +36,8 @@ class _Drawing:
     bones: Bones
     pixels: Float[np.ndarray, "camera frame point 2"]
     colors: UInt8[np.ndarray, "3 3"]
+    doubtful: Bool[np.ndarray, "frame edge"]
+    """Which bones belong to a limb in doubt."""
     blob_pixels: Float[np.ndarray, "camera frame blob 2"] | None
     blob_radii: Float[np.ndarray, "camera frame blob"] | None
     blob_colors: UInt8[np.ndarray, "blob 3"]
@@ -177,6 +183,7 @@ def _drawing(rig: CameraRig, fits: list[Fit], motion: Motion, bones: Bones, acto
         bones=bones,
         pixels=_in_tiles(fits, pixels),
         colors=actor_palette(actor),
+        doubtful=doubtful_edges(motion, bones),
         blob_pixels=blob_pixels,
         blob_radii=blob_radii,
         blob_colors=blob_palette(motion, actor),
@@ -194,14 +201,29 @@ def _draw_actor(area: np.ndarray, drawing: _Drawing, camera: int, row: int) -> N
     if drawing.blob_pixels is not None and drawing.blob_radii is not None:
         _draw_blobs(area, drawing.blob_pixels[camera, row], drawing.blob_radii[camera, row], drawing.blob_colors)
     seen, points = _fixed_point(drawing.pixels[camera, row])
-    for (a, b), side in zip(drawing.bones.edges, drawing.bones.sides, strict=True):
+    lines = zip(drawing.bones.edges, drawing.bones.sides, drawing.doubtful[row], strict=True)
+    for (a, b), side, doubtful in lines:
         if seen[a] and seen[b]:
-            color = _bgr(drawing.colors[side])
-            cv2.line(area, points[a], points[b], color, thick, cv2.LINE_AA, SUBPIXEL_BITS)
+            draw = _dashed_line if doubtful else _line
+            draw(area, points[a], points[b], _bgr(drawing.colors[side]), thick)
     radius = int((0.5 * thick + 1.0) * 2**SUBPIXEL_BITS)
     for k in range(drawing.bones.num_joints):
         if seen[k]:
             cv2.circle(area, points[k], radius, (255, 255, 255), -1, cv2.LINE_AA, SUBPIXEL_BITS)
+
+
+def _line(area: np.ndarray, a: Point, b: Point, color: Color, thick: int) -> None:
+    cv2.line(area, a, b, color, thick, cv2.LINE_AA, SUBPIXEL_BITS)
+
+
+def _dashed_line(area: np.ndarray, a: Point, b: Point, color: Color, thick: int) -> None:
+    """Dashes on a black line, which differ from a limb that is not in doubt by their shape, too."""
+    _line(area, a, b, (0, 0, 0), thick + 2)
+    start, along = np.array(a, float), np.array(b, float) - np.array(a, float)
+    count = max(1, round(float(np.hypot(*along)) / (2.0 * DASH * thick * 2**SUBPIXEL_BITS)))
+    for k in range(min(count, MOST_DASHES)):
+        begin, end = (np.rint(start + (k + part) / count * along).astype(int) for part in (0.0, 0.5))
+        _line(area, (int(begin[0]), int(begin[1])), (int(end[0]), int(end[1])), color, thick)
 
 
 def _draw_blobs(

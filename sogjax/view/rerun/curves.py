@@ -16,9 +16,10 @@ _PLOT_OF = {
     "similarity": "energy",
     "energy": "energy",
     "iterations": "iterations",
-    "deviation_mm": "deviations",
     "error_mm": "errors",
 }
+DOUBT = "doubt_"
+"""Before a limb, in the name of its curve."""
 _SIDES = (LEFT, RIGHT, MIDDLE)
 _PLOTS = {
     "errors": "Error, mm",
@@ -26,15 +27,16 @@ _PLOTS = {
     "penalties": "Penalties",
     "terms": "Further terms of the energy",
     "iterations": "Iterations",
-    "deviations": "Mean standard deviation of joints, mm",
+    "doubts": "How likely limbs are more than 10 cm off",
 }
 
 
 def own_curves(motion: Motion) -> dict[str, np.ndarray]:
-    """The curves of a motion that are known; the mean standard deviation of its joints where that was computed."""
+    """The curves of a motion that are known; one for the doubt about each limb where these were judged."""
     curves = {"similarity": motion.similarity, "energy": motion.energy, "iterations": motion.iterations}
-    if motion.joint_std is not None:
-        curves["deviation_mm"] = 1000.0 * np.mean(motion.joint_std, axis=1)
+    if motion.limb_doubt is not None and motion.limb_names is not None:
+        for name, doubt in zip(motion.limb_names, motion.limb_doubt.T, strict=True):
+            curves[DOUBT + str(name).replace(" ", "_")] = doubt
     return {name: values for name, values in curves.items() if np.isfinite(values).any()}
 
 
@@ -93,4 +95,6 @@ def _curve(name: str, actor: str | None) -> str:
 
 def _plot(curve: str) -> str:
     """Which plot a curve belongs in; what is not known is a term that a user added."""
+    if curve.startswith(DOUBT):
+        return "doubts"
     return "penalties" if "penalty" in curve else _PLOT_OF.get(curve, "terms")

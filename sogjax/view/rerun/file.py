@@ -21,7 +21,7 @@ from sogjax.view.picture_camera import picture_camera
 from sogjax.view.rerun.curves import log_curve_looks, log_curves, log_traces, own_curves, plots_with
 from sogjax.view.rerun.layout import eye, tracking_layout
 from sogjax.view.rerun.names import FRAME, TIME, actor_entity, camera_entity, color_bytes
-from sogjax.view.rerun.scene import log_actor, log_cameras, log_deviations, log_look, log_markers, log_path
+from sogjax.view.rerun.scene import log_actor, log_cameras, log_doubts, log_look, log_markers, log_path
 from sogjax.view.rerun.stream import rerun_stream
 
 QUALITY = 80
@@ -133,7 +133,7 @@ class RerunFile:
             self._begin(motions, terms)
         for k, (name, motion) in enumerate(zip(self._names, motions, strict=True)):
             self._paths[k].append(log_actor(self._stream, actor_entity(name), motion, self._bones[k]))
-            log_deviations(self._stream, actor_entity(name), motion, self._bones[k])
+            log_doubts(self._stream, actor_entity(name), motion, self._bones[k])
             log_curves(self._stream, motion, self._curve_actor(name), own_curves(motion))
             self._lowest = np.minimum(self._lowest, motion.blob_means.min(axis=(0, 1)))
             self._highest = np.maximum(self._highest, motion.blob_means.max(axis=(0, 1)))

@@ -3,12 +3,16 @@
 import numpy as np
 import rerun as rr
 
+from sogjax.data.doubtful import in_doubt
 from sogjax.data.ground_truth import GroundTruth
 from sogjax.data.motion import Motion
 from sogjax.data.recording import Recording
 from sogjax.view.bones import Bones, actor_palette
 from sogjax.view.picture_camera import PictureCamera
 from sogjax.view.rerun.names import FRAME, TIME, camera_entity, time_columns
+
+LARGEST_DOUBT = 0.06
+"""Metres: the radius of the balls around the joints of a limb that is certainly lost."""
 
 
 def log_cameras(
@@ -75,16 +79,17 @@ def log_skeletons(
     stream.send_columns(f"{entity}/blobs", times, columns)
 
 
-def log_deviations(stream: rr.RecordingStream, entity: str, motion: Motion, bones: Bones) -> None:
-    """A ball around each joint, as large as its standard deviation, where that was computed."""
-    if motion.joint_std is None or not bones.num_joints:
+def log_doubts(stream: rr.RecordingStream, entity: str, motion: Motion, bones: Bones) -> None:
+    """White balls around the joints of limbs that are in doubt, the larger the doubt, where limbs were judged."""
+    if motion.limb_doubt is None or motion.joint_limb is None or not motion.limb_doubt.shape[1]:
         return
-    centers = motion.world_from_joint[:, bones.joints][..., :3, 3].reshape(-1, 3).astype(np.float32)
-    radii = motion.joint_std[:, bones.joints].ravel().astype(np.float32)
-    columns = rr.Points3D.columns(positions=centers, radii=radii, colors=[[255, 255, 255, 70]] * len(radii))
-    stream.send_columns(
-        f"{entity}/deviations", time_columns(motion), columns.partition([bones.num_joints] * motion.num_frames)
-    )
+    limb = motion.joint_limb[bones.joints]
+    doubtful = in_doubt(motion)[:, limb] & (limb >= 0)
+    places = motion.world_from_joint[:, bones.joints][..., :3, 3].astype(np.float32)
+    radii = (LARGEST_DOUBT * motion.limb_doubt[:, limb]).astype(np.float32)
+    colors = [[255, 255, 255, 110]] * int(doubtful.sum())
+    columns = rr.Points3D.columns(positions=places[doubtful], radii=radii[doubtful], colors=colors)
+    stream.send_columns(f"{entity}/doubtful", time_columns(motion), columns.partition(doubtful.sum(axis=1)))
 
 
 def log_path(stream: rr.RecordingStream, entity: str, path: np.ndarray, actor: int) -> None:

@@ -1,0 +1,119 @@
+"""Is a limb that is in doubt lost, and one that is not in its place?
+
+    python experiments/limb_doubt.py [cameras=[4,12]] [backgrounds=[pictures,clip,none]] [sequences=[walk,run]]
+
+The yardstick sequences are tracked as recorded, with two of three frames left out, and with each limb displaced by 20
+to 30 cm on purpose, for 10 frames each. A limb is lost if its joints are more than 10 cm off on average. The weights of
+`sogjax/tracking/limb_doubt.py` come from all sequences; in the tables and the picture every other sequence is judged by
+weights that come from the rest. Trials that were made are kept, and not made again by the same program. Writes
+`limb_doubt.png`.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from sogjax.data.atomic import atomic_path
+from sogjax.engine.compiled_programs import forget_programs_if_many
+from sogjax.errors import InputError
+from sogjax.study.experiment import Experiment
+from sogjax.study.limb_calibration import area_table, calibration_table, fitted, limb_curve, regained_table
+from sogjax.study.limb_trials import PLAIN, JudgedLimb, LimbTrial, LimbTrials
+from sogjax.study.machine import machine_line
+from sogjax.study.script import run_script, settings_from
+from sogjax.study.study import Study
+from sogjax.tracking.limb_doubt import Weights
+from sogjax.view.limb_chart import limb_chart
+
+SEQUENCES = "sequences"
+"""The experiment whose recordings are tracked."""
+
+
+@dataclass
+class Settings:
+    """What is tracked, as `key=value` on the command line."""
+
+    sequences: list[str] = field(default_factory=list)
+    """Rows of the experiment; none: all."""
+    cameras: list[int] = field(default_factory=lambda: [4, 12])
+    backgrounds: list[str] = field(default_factory=lambda: ["pictures", "clip", "none"])
+    frames: int = 60
+    do: bool = True
+    """Whether trials that are missing are made."""
+    body: str = "human"
+    overrides: list[str] = field(default_factory=list)
+    """Of track."""
+    out: str = "outputs/limb_doubt"
+    """Where trials, actors and results are kept."""
+
+
+def main() -> None:
+    """Track, print the tables, and write the picture."""
+    settings = settings_from(Settings)
+    names, found = _recordings(settings), []
+    trials = LimbTrials(Study(Path(settings.out), ["walk:0"], settings.frames, body=settings.body), settings.overrides)
+    for sequence, synth in names.items():
+        for cameras in settings.cameras:
+            for background in settings.backgrounds:
+                forget_programs_if_many()
+                found += trials.of(LimbTrial(sequence, synth, cameras, background), settings.do)
+    if not found:
+        raise InputError("no trial was made; do=true makes them")
+    _print(found, [*names], settings)
+
+
+def _print(found: list[JudgedLimb], names: list[str], settings: Settings) -> None:
+    """The weights, the tables and the picture."""
+    half = lambda limb: names.index(limb.trial.sequence) % 2
+    known = lambda limb: limb.trial.background != "none"
+    weights: dict[tuple[int, bool], Weights] = {}
+    print(machine_line())
+    for has in sorted({known(limb) for limb in found}, reverse=True):
+        group = [limb for limb in found if known(limb) == has]
+        print(f"{'with a background' if has else 'without'}: {fitted(group)}")
+        for number in (0, 1):
+            rest = [limb for limb in group if half(limb) != number]
+            weights[number, has] = fitted(rest or group)
+            print(f"    for half {number}: {weights[number, has]}")
+    of_rest = lambda limb: weights[half(limb), known(limb)]
+    settings_of = {
+        f"{cameras} cameras, {background}": lambda limb, c=cameras, b=background: (
+            (limb.trial.cameras, limb.trial.background) == (c, b)
+        )
+        for cameras in settings.cameras
+        for background in settings.backgrounds
+    }
+    kinds = {
+        "with a background": lambda limb: limb.trial.background != "none",
+        "without": lambda limb: limb.trial.background == "none",
+        "with a background, as recorded": lambda limb: limb.trial.background != "none" and limb.kind == PLAIN,
+        "without, as recorded": lambda limb: limb.trial.background == "none" and limb.kind == PLAIN,
+    }
+    sequences = {
+        name: lambda limb, n=name: limb.trial.sequence == n and limb.trial.background != "none" for name in names
+    }
+    for title, groups in (("Areas under the ROC", kinds | settings_of), ("With a background", sequences)):
+        print(f"\n{title}:\n", area_table(found, groups, of_rest), sep="\n")
+    print("\nLimbs displaced by 20 to 30 cm:\n", regained_table(found, kinds | settings_of, of_rest), sep="\n")
+    curves = {}
+    for title in ("with a background", "without"):
+        if group := [limb for limb in found if kinds[title](limb)]:
+            print(f"\nSaid and found, {title}:\n", calibration_table(group, of_rest), sep="\n")
+            curves[title] = limb_curve(group, of_rest)
+    path = Path(settings.out) / "limb_doubt.png"
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(limb_chart(curves))
+    print(f"\n{path}")
+
+
+def _recordings(settings: Settings) -> dict[str, dict[str, object]]:
+    """The settings of the rendered recordings, by the names of their rows."""
+    rows = Experiment.named(SEQUENCES).config.rows
+    whole = {name: row.synth for name, row in rows.items() if row.synth is not None and row.methods is None}
+    unknown = [name for name in settings.sequences if name not in whole]
+    if unknown:
+        raise InputError(f"sequences: {unknown[0]}: is none of {', '.join(whole)}")
+    return {name: whole[name] for name in settings.sequences or whole}
+
+
+if __name__ == "__main__":
+    run_script(main)

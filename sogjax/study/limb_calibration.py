@@ -1,0 +1,119 @@
+"""How well limbs that are lost are told from others: logistic regression, ROC, shares found against those said."""
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.optimize import minimize
+from scipy.special import expit
+from scipy.stats import rankdata
+
+from sogjax.study.limb_trials import FOLLOWED, JudgedLimb
+from sogjax.study.table import ruled_table
+from sogjax.tracking.limb_doubt import FAR, WITH_BACKGROUND, WITHOUT, Weights
+from sogjax.view.limb_chart import LimbCurve
+
+BINS = (0.0, 0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0)
+RIDGE = 1e-4
+
+
+WeightsOf = Callable[[JudgedLimb], Weights]
+
+
+def committed(limb: JudgedLimb) -> Weights:
+    """The weights that the tracker uses."""
+    return WITHOUT if limb.trial.background == "none" else WITH_BACKGROUND
+
+
+def said_of(
+    limbs: Sequence[JudgedLimb], weights: WeightsOf = committed
+) -> tuple[Float[np.ndarray, "value"], Bool[np.ndarray, "value"]]:
+    """The probabilities over all frames, and which limbs were lost."""
+    return expit(np.concatenate([score(limb, weights(limb)) for limb in limbs])), lost(limbs)
+
+
+def score(limb: JudgedLimb, weights: Weights) -> Float[np.ndarray, "frame"]:
+    """The logarithm of the odds that a limb is lost."""
+    return weights.constant + weights.worse * limb.worse + weights.contradicted * limb.contradicted
+
+
+def lost(limbs: Sequence[JudgedLimb]) -> Bool[np.ndarray, "value"]:
+    """Which limbs are farther off than `FAR`, over all frames."""
+    return np.concatenate([limb.error for limb in limbs]) > FAR
+
+
+def fitted(limbs: Sequence[JudgedLimb]) -> Weights:
+    """The weights that suit some limbs best (maximum likelihood, with a little of a ridge); no measure may reassure."""
+    rows = np.concatenate([np.stack([np.ones_like(limb.worse), limb.worse, limb.contradicted]) for limb in limbs], 1)
+    sign = np.where(lost(limbs), 1.0, -1.0)
+
+    def loss(weights: Float[np.ndarray, "3"]) -> tuple[float, Float[np.ndarray, "3"]]:
+        margin = sign * (weights @ rows)
+        value = np.mean(np.logaddexp(0.0, -margin)) + RIDGE * np.sum(weights[1:] ** 2)
+        return float(value), -rows @ (sign * expit(-margin)) / len(sign) + 2.0 * RIDGE * np.array(
+            [0.0, 1.0, 1.0]
+        ) * weights
+
+    bounds = [(None, None), (0.0, None), (0.0, None)]
+    return Weights(*minimize(loss, np.zeros(3), jac=True, bounds=bounds).x.tolist())
+
+
+def area_under_roc(said: Float[np.ndarray, "value"], lost: Bool[np.ndarray, "value"]) -> float:
+    """How often a lost limb is doubted more than one in its place; NaN where there is only one kind."""
+    count, others = int(lost.sum()), int((~lost).sum())
+    if not count or not others:
+        return float("nan")
+    return float((rankdata(said)[lost].sum() - count * (count + 1) / 2.0) / (count * others))
+
+
+def limb_curve(limbs: Sequence[JudgedLimb], weights: WeightsOf = committed) -> LimbCurve:
+    """What a chart shows of some limbs."""
+    said, wrong = said_of(limbs, weights)
+    order = np.argsort(-said)
+    share = lambda flags: np.concatenate([[0.0], np.cumsum(flags[order]) / max(int(flags.sum()), 1)])
+    inside = [(said >= low) & (said <= high) for low, high in pairwise(BINS)]
+    mean = lambda values: np.array([values[part].mean() for part in inside if part.any()])
+    return LimbCurve(share(~wrong), share(wrong), area_under_roc(said, wrong), mean(said), mean(wrong))
+
+
+def area_table(
+    limbs: Sequence[JudgedLimb], groups: dict[str, Callable[[JudgedLimb], bool]], weights: WeightsOf = committed
+) -> str:
+    """Areas under the curve and what a threshold of one half would notice, by group (Markdown)."""
+    lines = [["", "limbs x frames", "lost", "area under the ROC", "noticed", "false alarms"]]
+    for name, belongs in groups.items():
+        group = [limb for limb in limbs if belongs(limb)]
+        if group:
+            said, wrong = said_of(group, weights)
+            noticed, alarms = said[wrong] > 0.5, said[~wrong] > 0.5
+            shares = [f"{100.0 * flags.mean():.1f} %" if len(flags) else "" for flags in (noticed, alarms)]
+            lines.append([name, str(len(said)), str(int(wrong.sum())), f"{area_under_roc(said, wrong):.3f}", *shares])
+    return ruled_table(lines)
+
+
+def calibration_table(limbs: Sequence[JudgedLimb], weights: WeightsOf = committed) -> str:
+    """Shares found lost against the probability that was said (Markdown)."""
+    said, wrong = said_of(limbs, weights)
+    lines = [["said", "limbs x frames", "mean said", "found lost"]]
+    for low, high in pairwise(BINS):
+        part = (said >= low) & (said < high if high < 1.0 else said <= high)
+        if part.any():
+            shares = [f"{100.0 * values[part].mean():.1f} %" for values in (said, wrong)]
+            lines.append([f"{100.0 * low:.0f} to {100.0 * high:.0f} %", str(int(part.sum())), *shares])
+    return ruled_table(lines)
+
+
+def regained_table(
+    limbs: Sequence[JudgedLimb], groups: dict[str, Callable[[JudgedLimb], bool]], weights: WeightsOf = committed
+) -> str:
+    """Of limbs that were displaced on purpose, how many came back by themselves, and how many others were noticed."""
+    lines = [["", "displaced", f"back after {FOLLOWED} frames", "of the others in doubt then"]]
+    for name, belongs in groups.items():
+        group = [limb for limb in limbs if limb.kind == f"{limb.name} displaced" and belongs(limb)]
+        if group:
+            left = [limb for limb in group if limb.error[-1] > FAR]
+            noticed = [said_of([limb], weights)[0][-1] > 0.5 for limb in left]
+            back = f"{100.0 * (1.0 - len(left) / len(group)):.1f} %"
+            lines.append([name, str(len(group)), back, f"{100.0 * np.mean(noticed):.0f} %" if left else ""])
+    return ruled_table(lines)

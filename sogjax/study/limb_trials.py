@@ -1,0 +1,203 @@
+"""Tracks in which limbs were lost, by themselves or on purpose: what tells of it in each frame, against the truth."""
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from sogjax.data.atomic import atomic_path
+from sogjax.data.cell_cache import CellsOfClip
+from sogjax.energy.posed import Posed
+from sogjax.engine.terminal import say
+from sogjax.model.body import Body
+from sogjax.settings.compose import track_config
+from sogjax.study.displaced import displaced
+from sogjax.study.record import program_digest
+from sogjax.study.source import Source
+from sogjax.study.study import Study
+from sogjax.study.true_poses import true_poses
+from sogjax.study.verdicts import limb_errors
+from sogjax.tracking.culling import Capacities
+from sogjax.tracking.frame import TrackState
+from sogjax.tracking.limb_doubt import LimbMeasures, judgement, limb_measures
+from sogjax.tracking.limb_evidence import blob_evidence
+from sogjax.tracking.limbs import limb_blobs, limb_names, limbs
+from sogjax.tracking.tracker import Tracker, track
+
+PLAIN, SKIPPING = "as recorded", "every third frame"
+SKIPPED = 3
+DISPLACED_IN = (14, 40)
+"""Frames in which limbs are displaced, each in turn; the tracker knows no more of it than of a mistake of its own."""
+FOLLOWED = 10
+"""Frames after that."""
+
+
+@dataclass(frozen=True)
+class LimbTrial:
+    """What is tracked: a recording with some of its cameras."""
+
+    sequence: str
+    recording: str | Mapping[str, Any]
+    """Its name, or the settings of a rendered one."""
+    cameras: int | None
+    """None: all."""
+    background: str
+    """As `images.background`."""
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """Poses of some frames of a clip."""
+
+    kind: str
+    frames: Int[np.ndarray, "frame"]
+    poses: Float[np.ndarray, "frame dof"]
+    before: Float[np.ndarray, "frame dof"]
+    """Of the frames before."""
+    follows: int
+    """The frame of the plain run after which it goes on; 0: it begins with the clip."""
+
+
+@dataclass(frozen=True)
+class JudgedLimb:
+    """What was measured of one limb over the frames of a run, and how far it was off."""
+
+    trial: LimbTrial
+    kind: str
+    name: str
+    worse: Float[np.ndarray, "frame"]
+    contradicted: Float[np.ndarray, "frame"]
+    error: Float[np.ndarray, "frame"]
+    """Metres, mean over the limb's joints."""
+
+
+class LimbTrials:
+    """Trials that were made are kept in a folder, and not made again by the same program."""
+
+    def __init__(self, study: Study, overrides: Sequence[str] = ()):
+        self.study, self.overrides = study, [*overrides]
+
+    def of(self, trial: LimbTrial, do: bool = True) -> list[JudgedLimb]:
+        """The limbs of a trial; none where it was not made and is not to be."""
+        path = self.path(trial)
+        if not path.is_file():
+            if not do:
+                return []
+            cameras = "all" if trial.cameras is None else trial.cameras
+            say(f"limbs: {trial.sequence}, {cameras} cameras, background: {trial.background}")
+            self.keep(trial, [*self.tracked(trial)])
+        with np.load(path) as kept:
+            parts = zip(kept["kind"], kept["name"], kept["first"], kept["stop"], strict=True)
+            values = {name: kept[name] for name in ("worse", "contradicted", "error")}
+        return [
+            JudgedLimb(trial, str(kind), str(name), **{key: of[first:stop] for key, of in values.items()})
+            for kind, name, first, stop in parts
+        ]
+
+    def tracked(self, trial: LimbTrial) -> Iterator[Tracked]:
+        """The runs of a trial."""
+        source, tracker, cells = self._tracker(trial)
+        capacities: Capacities | None = None
+
+        def follow(start: Array | TrackState, frames: Int[np.ndarray, "frame"]) -> Float[np.ndarray, "frame dof"]:
+            nonlocal capacities
+            found = [*track(tracker, start, [cells[k] for k in frames], capacities)]
+            capacities = found[-1].capacities
+            return np.stack([np.asarray(frame.result.pose) for frame in found])
+
+        first = np.concatenate([_true_start(body, source) for body in source.bodies])
+        frames = np.arange(len(cells))
+        plain = follow(jnp.asarray(first), frames)
+        yield Tracked(PLAIN, frames, plain, np.concatenate([first[None], plain[:-1]]), 0)
+        skipping = frames[::SKIPPED]
+        poses = follow(jnp.asarray(first), skipping)
+        yield Tracked(SKIPPING, skipping, poses, np.concatenate([first[None], poses[:-1]]), 0)
+        body, random = tracker.body, np.random.default_rng(len(trial.sequence) * 100 + (trial.cameras or 0))
+        for at in DISPLACED_IN:
+            for name, limb, blobs in zip(limb_names(body), limbs(body.skeleton), limb_blobs(body), strict=True):
+                wrong = displaced(body, plain[at], limb, blobs, random)
+                if wrong is None:
+                    continue
+                before = plain[at - 1].copy()
+                before[limb] = wrong[limb]
+                after = at + 1 + np.arange(FOLLOWED)
+                poses = follow(TrackState(jnp.asarray(wrong), jnp.asarray(before), jnp.asarray(2)), after)
+                yield Tracked(f"{name} displaced", after, poses, np.concatenate([wrong[None], poses[:-1]]), at)
+
+    def keep(self, trial: LimbTrial, runs: Sequence[Tracked]) -> None:
+        """Measure the limbs in the frames of all runs, the plain one first, and keep that."""
+        source, tracker, cells = self._tracker(trial)
+        usual: Float[np.ndarray, "frame blob"] = np.zeros((0, tracker.body.num_blobs))
+        columns: dict[str, list[Any]] = {key: [] for key in ("kind", "name", "worse", "contradicted", "error")}
+        for run in runs:
+            start = usual[run.follows] if run.follows else np.full(tracker.body.num_blobs, np.nan, np.float32)
+            measures, before = measured(tracker, cells, run, start)
+            usual = before if run.kind == PLAIN else usual
+            errors = limb_errors(source.bodies, source.truth, run.frames, run.poses)
+            for k, name in enumerate(limb_names(tracker.body)):
+                if name in errors.names:
+                    columns["kind"].append(run.kind)
+                    columns["name"].append(name)
+                    columns["worse"].append(np.asarray(measures.worse[:, k]))
+                    columns["contradicted"].append(np.asarray(measures.contradicted[:, k]))
+                    columns["error"].append(errors.limbs[:, errors.names.index(name)])
+        stop = np.cumsum([len(error) for error in columns["error"]])
+        ends = {"first": np.concatenate([[0], stop[:-1]]), "stop": stop}
+        words = {key: np.array(columns.pop(key), str) for key in ("kind", "name")}
+        with atomic_path(self.path(trial)) as temporary, temporary.open("wb") as file:
+            np.savez(file, **words, **ends, **{key: np.concatenate(of) for key, of in columns.items()})  # pyright: ignore[reportArgumentType]
+
+    def path(self, trial: LimbTrial) -> Path:
+        """Where a trial is kept."""
+        content = [program_digest("study/limb_trials.py"), asdict(trial), self.overrides, self.study.body]
+        key = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
+        return self.study.folder / "limbs" / f"{key}.npz"
+
+    def _tracker(self, trial: LimbTrial) -> tuple[Source, Tracker, CellsOfClip]:
+        source = self.study.source(trial.recording)
+        cache = {"background": trial.background, "cache": str(self.study.folder / "cells")}
+        config = track_config(self.overrides, recording=source.path, images=cache)
+        cameras = source.cameras(trial.cameras)
+        return source, source.tracker(config, cameras), source.cells(config.images.depth, cameras, 1)
+
+
+def _true_start(body: Body, source: Source) -> Float[np.ndarray, "dof"]:
+    truth = source.truth.subject(body.name) if source.truth.subjects else source.truth
+    return true_poses(body, truth, source.recording.up)[0].astype(np.float32)
+
+
+def measured(
+    tracker: Tracker, cells: CellsOfClip, run: Tracked, usual: Float[np.ndarray, "blob"]
+) -> tuple[LimbMeasures, Float[np.ndarray, "frame blob"]]:
+    """What tells of the limbs in every frame of a run, and what was usual before it."""
+    found, history, now = [], [], jnp.asarray(usual)
+    for frame, pose, before in zip(run.frames, run.poses, run.before, strict=True):
+        history.append(np.asarray(now))
+        measures, now = _measured(tracker, jnp.asarray(cells[frame]), jnp.asarray(before), jnp.asarray(pose), now)
+        found.append(jax.device_get(measures))
+    return LimbMeasures(*(jnp.stack(part) for part in zip(*found, strict=True))), np.stack(history)
+
+
+@eqx.filter_jit
+def _measured(
+    tracker: Tracker, cells: Array, before: Array, pose: Array, usual: Array
+) -> tuple[LimbMeasures, Float[Array, "blob"]]:
+    """The step's own judgement of a pose that was found already."""
+    reader, limbs = tracker.reader, tracker.limbs
+    assert limbs is not None
+    assert reader.subject is not None
+    odds = reader.odds(cells.astype(before.dtype) / 255.0)
+    boxes = tracker.boxes(TrackState.from_pose(before))
+    windows = None if odds is None else reader.windows(odds, tracker.cameras, boxes)
+    posed = Posed.from_pose(tracker.body, pose)
+    evidence = blob_evidence(limbs, posed, tracker.cameras, windows, cells, reader.cell_sizes, reader.subject)
+    known = jnp.where(jnp.isfinite(usual), usual, evidence.own)
+    return limb_measures(limbs, evidence, known), judgement(limbs, evidence, usual, windows is not None).usual

@@ -1,0 +1,82 @@
+"""How likely a limb is far from where a pose puts it, calibrated on rendered recordings."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from sogjax.tracking.judged_limbs import JudgedLimbs
+from sogjax.tracking.limb_evidence import BlobEvidence
+
+FAR = 0.1
+"""Metres, mean over the limb's joints: farther off is lost."""
+LEAST_USUAL = 0.0
+"""A blob whose colours fit less than this from the beginning is measured against it: it may never have been right."""
+ADAPTATION, LARGEST_STEP = 0.1, 0.15
+"""How what is usual follows what is seen: a part of the difference, of which no more counts than the step."""
+UNSEEN = 0.02
+"""Part of a blob's area in the pictures below which what is seen of it says little."""
+
+
+class Weights(NamedTuple):
+    """Of a logistic regression."""
+
+    constant: float
+    worse: float
+    """By how much the colours fit worse than usual, log likelihood."""
+    contradicted: float
+
+
+WITH_BACKGROUND = Weights(-6.2, 4.1, 3.7)
+WITHOUT = Weights(-3.1, 3.7, 0.0)
+"""Both from `experiments/limb_doubt.py`, which judges each half of the sequences by weights from the other."""
+
+
+class LimbMeasures(NamedTuple):
+    """What tells whether a limb is lost: means of the third of its blobs that fits worst."""
+
+    worse: Float[Array, "*frame limb"]
+    contradicted: Float[Array, "*frame limb"]
+
+
+class Judgement(eqx.Module):
+    """What is thought of the limbs in one frame."""
+
+    doubt: Float[Array, "limb"]
+    """How likely each is more than `FAR` off."""
+    usual: Float[Array, "blob"]
+    """What `BlobEvidence.own` usually is, for the next frame; a limb in doubt keeps what it had."""
+
+
+def judgement(
+    limbs: JudgedLimbs, evidence: BlobEvidence, usual: Float[Array, "blob"], has_background: bool
+) -> Judgement:
+    """Of the limbs, from the evidence for their blobs and what was usual before (NaN in the first frame)."""
+    usual = jnp.where(jnp.isfinite(usual), usual, evidence.own)
+    measures = limb_measures(limbs, evidence, usual)
+    doubt = limb_doubt(measures, WITH_BACKGROUND if has_background else WITHOUT)
+    trust = 1.0 - jnp.max(jnp.where(limbs.members, doubt[:, None], 0.0), axis=0, initial=0.0)
+    step = jnp.clip(evidence.own - usual, -LARGEST_STEP, LARGEST_STEP)
+    return Judgement(doubt, usual + ADAPTATION * trust * _certainty(evidence) * step)
+
+
+def limb_measures(limbs: JudgedLimbs, evidence: BlobEvidence, usual: Float[Array, "blob"]) -> LimbMeasures:
+    """Of the limbs in one frame."""
+    certainty = _certainty(evidence)
+    return LimbMeasures(
+        worse=-limbs.mean_of_worst(certainty * (evidence.own - jnp.maximum(usual, LEAST_USUAL))),
+        contradicted=-limbs.mean_of_worst(-certainty * evidence.contradicted),
+    )
+
+
+def limb_doubt(measures: LimbMeasures, weights: Weights) -> Float[Array, "*frame limb"]:
+    """How likely limbs are more than `FAR` off."""
+    return jax.nn.sigmoid(
+        weights.constant + weights.worse * measures.worse + weights.contradicted * measures.contradicted
+    )
+
+
+def _certainty(evidence: BlobEvidence) -> Float[Array, "blob"]:
+    return evidence.seen / (evidence.seen + UNSEEN)

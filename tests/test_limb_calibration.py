@@ -1,0 +1,80 @@
+"""The figures about limbs in doubt: areas, shares and weights against cases that are known."""
+
+import numpy as np
+import pytest
+from scipy.special import expit
+
+from sogjax.study.limb_calibration import (
+    area_table,
+    area_under_roc,
+    calibration_table,
+    fitted,
+    limb_curve,
+    regained_table,
+    said_of,
+)
+from sogjax.study.limb_trials import PLAIN, JudgedLimb, LimbTrial
+from sogjax.tracking.limb_doubt import WITH_BACKGROUND, WITHOUT
+
+TRIAL = LimbTrial("walk", "walk:0", 4, "pictures")
+
+
+def drawn(count, seed=0):
+    """Limbs that are lost as often as a known logistic regression says."""
+    random = np.random.default_rng(seed)
+    worse, contradicted = random.uniform(0.0, 3.0, count), random.uniform(0.0, 1.0, count)
+    lost = random.uniform(size=count) < expit(-4.0 + 2.0 * worse + 3.0 * contradicted)
+    return JudgedLimb(TRIAL, PLAIN, "left arm", worse, contradicted, np.where(lost, 0.3, 0.02))
+
+
+def test_the_area_is_the_share_of_pairs_in_order():
+    random = np.random.default_rng(1)
+    said, lost = random.integers(0, 20, 200) / 20.0, random.uniform(size=200) < 0.3
+    pairs = [(a > b) + 0.5 * (a == b) for a in said[lost] for b in said[~lost]]
+    assert area_under_roc(said, lost) == pytest.approx(np.mean(pairs))
+    assert np.isnan(area_under_roc(said, np.zeros(200, bool)))
+
+
+def test_weights_that_limbs_were_drawn_with_are_found():
+    weights = fitted([drawn(40_000)])
+    assert weights.constant == pytest.approx(-4.0, abs=0.2)
+    assert weights.worse == pytest.approx(2.0, abs=0.1)
+    assert weights.contradicted == pytest.approx(3.0, abs=0.2)
+
+
+def test_a_measure_that_would_reassure_gets_no_weight():
+    limb = drawn(4000)
+    turned = JudgedLimb(TRIAL, PLAIN, "left arm", limb.worse, 1.0 - limb.contradicted, limb.error)
+    assert fitted([turned]).contradicted == pytest.approx(0.0, abs=1e-9)
+
+
+def test_other_weights_count_without_a_background():
+    values = np.array([0.1, 1.5]), np.array([0.2, 0.6]), np.array([0.01, 0.5])
+    for background, weights in (("clip", WITH_BACKGROUND), ("none", WITHOUT)):
+        limb = JudgedLimb(LimbTrial("walk", "walk:0", 4, background), PLAIN, "left arm", *values)
+        said, lost = said_of([limb])
+        score = weights.constant + weights.worse * values[0] + weights.contradicted * values[1]
+        np.testing.assert_allclose(said, expit(score))
+        assert lost.tolist() == [False, True]
+
+
+def test_tables_and_curve_count_all_frames():
+    limb = drawn(500)
+    assert f"| all | 500 | {int((limb.error > 0.1).sum())} |" in area_table([limb], {"all": lambda _: True})
+    rows = [line.split("|")[2] for line in calibration_table([limb]).splitlines()[2:]]
+    assert sum(map(int, rows)) == 500
+    curve = limb_curve([limb])
+    assert curve.false_alarms[-1] == curve.noticed[-1] == pytest.approx(1.0)
+    middle = 0.5 * (curve.noticed[1:] + curve.noticed[:-1])
+    area = np.sum(middle * np.diff(curve.false_alarms))
+    assert area == pytest.approx(curve.area, abs=0.01)
+
+
+def test_displaced_limbs_are_counted_once_by_their_last_frame():
+    ends = {"left arm": 0.02, "right arm": 0.4}
+    limbs = [
+        JudgedLimb(TRIAL, f"{moved} displaced", name, np.full(3, 9.0), np.ones(3), np.array([0.3, 0.2, end]))
+        for moved in ends
+        for name, end in ends.items()
+    ]
+    assert "| all | 2 | 50.0 % | 100 % |" in regained_table(limbs, {"all": lambda _: True})

@@ -1,0 +1,186 @@
+"""Limbs in doubt: what the pictures say of one that is elsewhere, and of one in its place."""
+
+from dataclasses import replace
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from body_cases import shipped
+from drawn_scene import BACKGROUND, cells_of, draw, in_colors, make_tracker, moved, standing
+from motion_cases import walking_motion
+from rig_cases import ring_rig
+
+from sogjax.data.doubtful import doubtful_limbs
+from sogjax.energy.posed import Posed
+from sogjax.images.background_cells import BackgroundCells
+from sogjax.images.foreground import EmptyScene, own_density, subject_colors, subject_density
+from sogjax.model.body import concatenate
+from sogjax.tracking.frame import PartialCells
+from sogjax.tracking.judged_limbs import JudgedLimbs
+from sogjax.tracking.limb_doubt import WITH_BACKGROUND, WITHOUT, LimbMeasures, judgement, limb_doubt
+from sogjax.tracking.limb_evidence import blob_evidence
+from sogjax.tracking.limbs import joint_limbs, limb_names, limb_slices
+from sogjax.tracking.scan import track_clip
+from sogjax.tracking.tracker import track
+
+DEPTH = 6
+LIMB = "left front leg"
+ELSEWHERE = {"left_front_swing": 0.9, "left_elbow": -0.4}
+
+
+def judging(body, rig, with_background):
+    """A tracker of a small scene that judges limbs."""
+    tracker = make_tracker(body, rig, DEPTH)
+    table = subject_colors(np.asarray(body.blob_colors), np.asarray(body.blob_sigmas) ** 2)
+    shape = cells_of(rig, draw(body, standing(body, 1.1), rig), DEPTH).shape
+    empty = BackgroundCells(
+        np.full(shape, BACKGROUND, np.uint8), np.full(shape[:3], 0.02, np.float32), np.ones(shape[:3], bool)
+    )
+    reader = replace(
+        tracker.reader,
+        subject=jnp.asarray(table, jnp.float32),
+        empty=EmptyScene.from_background(empty) if with_background else None,
+    )
+    return replace(tracker, reader=reader, limbs=JudgedLimbs.from_body(body), pairs="sparse")
+
+
+@pytest.fixture(scope="module", params=[True, False], ids=["background", "none"])
+def dog(request):
+    body = in_colors(shipped("dog"))
+    rig = ring_rig(5, (160, 120), distance=1.6)
+    pose = standing(body, 1.1)
+    return judging(body, rig, request.param), pose, cells_of(rig, draw(body, pose, rig), DEPTH)
+
+
+@eqx.filter_jit
+def evidence_of(tracker, pose, cells, present=None):
+    windows = None
+    if tracker.reader.empty is not None:
+        odds = tracker.reader.odds(cells.astype(jnp.float32) / 255.0)
+        windows = tracker.reader.windows(odds, tracker.cameras, tracker.boxes(tracker.start(pose)))
+    posed, reader = Posed.from_pose(tracker.body, pose), tracker.reader
+    return blob_evidence(
+        tracker.limbs, posed, tracker.cameras, windows, cells, reader.cell_sizes, reader.subject, present
+    )
+
+
+def judged(tracker, pose, cells, usual):
+    evidence = evidence_of(tracker, jnp.asarray(pose), jnp.asarray(cells))
+    return judgement(tracker.limbs, evidence, usual, tracker.reader.empty is not None)
+
+
+def test_only_a_limb_that_is_elsewhere_is_in_doubt(dog):
+    tracker, pose, cells = dog
+    names = limb_names(tracker.body)
+    before = judged(tracker, pose, cells, jnp.full(tracker.body.num_blobs, jnp.nan))
+    assert float(before.doubt.max()) < 0.1
+    after = judged(tracker, moved(tracker.body, pose, ELSEWHERE), cells, before.usual)
+    assert float(after.doubt[names.index(LIMB)]) > 0.5
+    others = np.delete(np.asarray(after.doubt), names.index(LIMB))
+    assert others.max() < 0.3
+
+
+def test_a_limb_in_doubt_does_not_become_usual(dog):
+    tracker, pose, cells = dog
+    usual = judged(tracker, pose, cells, jnp.full(tracker.body.num_blobs, jnp.nan)).usual
+    wrong, k = moved(tracker.body, pose, ELSEWHERE), limb_names(tracker.body).index(LIMB)
+    doubts = []
+    for _ in range(60):
+        found = judged(tracker, wrong, cells, usual)
+        usual = found.usual
+        doubts.append(float(found.doubt[k]))
+    assert doubts[-1] > 0.5 > 0.1 > doubts[0] - doubts[-1]
+
+
+def test_cameras_without_a_picture_say_nothing(dog):
+    tracker, pose, cells = dog
+    broken = np.array(cells)
+    broken[1] = 255
+    present = jnp.asarray([True, False, True, True, True])
+    whole, other = (evidence_of(tracker, jnp.asarray(pose), jnp.asarray(c), present) for c in (cells, broken))
+    np.testing.assert_allclose(other.own, whole.own, atol=1e-5)
+    if tracker.reader.empty is None:
+        np.testing.assert_allclose(other.contradicted, whole.contradicted, atol=1e-6)
+
+
+def test_the_step_judges_and_a_clip_in_one_call_says_the_same(dog):
+    tracker, pose, cells = dog
+    frames = [cells] * 3
+    one_by_one = [frame.result for frame in track(tracker, jnp.asarray(pose), frames)]
+    clip, _ = track_clip(tracker, jnp.asarray(pose), np.stack(frames))
+    doubts = np.stack([result.limbs.doubt for result in one_by_one])
+    assert doubts.shape == (3, len(limb_names(tracker.body)))
+    np.testing.assert_allclose(clip.limbs.doubt, doubts, atol=2e-3)  # a sample at the edge of a cell
+    unjudged = [f.result for f in track(replace(tracker, limbs=None), jnp.asarray(pose), frames)]
+    assert unjudged[-1].limbs is None
+    np.testing.assert_allclose(unjudged[-1].pose, one_by_one[-1].pose, atol=1e-5)
+    state, _ = eqx.filter_jit(tracker.step)(
+        tracker.start(pose),
+        PartialCells(cells, np.arange(5) != 1),
+        next(track(tracker, jnp.asarray(pose), frames)).capacities,
+    )
+    assert np.isfinite(np.asarray(state.usual)).all()
+
+
+def test_what_hides_a_limb_is_no_evidence_against_it():
+    """A limb behind the trunk is not seen; one beside it is."""
+    body = in_colors(shipped("dog"))
+    rig = ring_rig(1, (160, 120), distance=1.6)
+    tracker, pose = judging(body, rig, False), standing(body, 1.1)
+    cells = cells_of(rig, draw(body, pose, rig), DEPTH)
+    seen = np.asarray(evidence_of(tracker, jnp.asarray(pose), jnp.asarray(cells)).seen)
+    assert seen.min() < 0.2
+    assert seen.max() > 0.8
+
+
+def test_densities_of_colours_are_those_of_the_subjects_table():
+    """For a subject of one colour the table and the formula are the same, but for the width of the bins."""
+    color = np.array([[0.7, 0.3, 0.2]])
+    table = jnp.asarray(subject_colors(color, np.ones(1)), jnp.float32)
+    middles = (np.random.default_rng(0).integers(0, 32, (200, 3)) + 0.5) / 32
+    colors = jnp.asarray(middles, jnp.float32)
+    np.testing.assert_allclose(
+        own_density(colors, jnp.asarray(color, jnp.float32)), subject_density(colors, table), atol=1e-4
+    )
+
+
+def test_doubt_grows_with_every_measure():
+    for weights in (WITH_BACKGROUND, WITHOUT):
+        values = jnp.linspace(0.0, 1.0, 5)
+        worse = limb_doubt(LimbMeasures(values, jnp.full(5, 0.2)), weights)
+        against = limb_doubt(LimbMeasures(jnp.full(5, 0.2), values), weights)
+        assert (np.diff(worse) > 0.0).all()
+        assert (np.diff(against) >= 0.0).all()
+
+
+def test_limbs_are_called_by_their_ends():
+    human, dog = shipped("human"), shipped("dog")
+    assert set(limb_names(human)) == {"left arm", "right arm", "left leg", "right leg", "head"}
+    assert {"tail", "head", "left front leg", "right hind leg"} < set(limb_names(dog))
+    for body in (human, dog):
+        of_joint = joint_limbs(body.skeleton)
+        elbow = of_joint[list(body.skeleton.names).index("left_elbow")]
+        assert limb_names(body)[elbow] in ("left arm", "left front leg")
+        assert of_joint[0] == -1
+    both = concatenate([replace(human, name="ann"), replace(dog, name="rex")])
+    first, second = limb_slices([human, dog])
+    assert limb_names(both)[first] == tuple(f"ann/{name}" for name in limb_names(human))
+    assert limb_names(both)[second] == tuple(f"rex/{name}" for name in limb_names(dog))
+
+
+def test_stretches_join_over_short_gaps_and_short_ones_are_left_out():
+    motion = walking_motion(20)
+    doubt = np.zeros((20, 2))
+    doubt[[3, 4, 6, 7, 15], 0] = 0.9
+    doubt[10:14, 1] = 0.8
+    motion = replace(motion, limb_names=np.array(["arm", "leg"]), joint_limb=np.zeros(9, int), limb_doubt=doubt)
+    found = doubtful_limbs(motion)
+    first = int(motion.frame[0])
+    assert [(limb.name, limb.first_frame - first, limb.last_frame - first) for limb in found] == [
+        ("arm", 3, 7),
+        ("leg", 10, 13),
+    ]
+    assert found[1].doubt == pytest.approx(0.8)
+    assert str(found[1]).startswith(f"leg doubtful in frames {first + 10} to {first + 13}")
+    assert doubtful_limbs(walking_motion(3)) == ()
