@@ -33,8 +33,10 @@ BORDER = 0.25
 """Metres around a blob that are left out, too: the body may be a little off."""
 
 
-def learnt_again(job: Job, images: ImagesConfig, read: PictureReader) -> Tracker:
+def learnt_again(job: Job, images: ImagesConfig, read: PictureReader, poses: dict[int, Array] | None = None) -> Tracker:
     """The job's tracker, with a background that was learnt again where the first one left much open.
+
+    `poses` are those of the frames (counted from the recording's first), if they are known; None: they are tracked.
 
     Raises:
         InputError: a video cannot be read, or a picture has too many image blobs.
@@ -47,8 +49,9 @@ def learnt_again(job: Job, images: ImagesConfig, read: PictureReader) -> Tracker
         inside[k, : grid.rows, : grid.columns] = True
     if np.asarray(empty.known)[inside].mean() >= 1.0 - MUCH_UNKNOWN:
         return tracker
-    say("much of the background is unknown: the clip is tracked once to learn it where the body is not, then again")
-    poses = _first_pass(job, images, read)
+    if poses is None:
+        say("much of the background is unknown: the clip is tracked once to learn it where the body is not, then again")
+        poses = _first_pass(job, images, read)
     learnt = clip_backgrounds_without(job.recording, body_masks(job.recording, tracker.body, poses))
     again = EmptyScene.from_background(stack_background(learnt, job.grids))
     return eqx.tree_at(lambda t: t.reader.empty, tracker, again)
