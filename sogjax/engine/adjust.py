@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from omegaconf import OmegaConf
@@ -41,13 +42,19 @@ def adjust_to_folder(config: AdjustConfig) -> Run:
         origin: Origin = {"motion": str(tracked.path), "actor": digest(tracked.actor)}
         folder.begin("adjust", origin, tracked.files)
         with written(clip, path, config.outputs, tracked.config.images) as result:
-            write_results(result, path, config.outputs, OmegaConf.structured(config), [clip.actor])
-            write_json(path / NUMBERS, clip.numbers)
-            result.files.append(path / NUMBERS)
+            used = replace(tracked.config, recording=config.recording, out=config.out, actor=None, adjust=True)
+            write_results(result, path, config.outputs, OmegaConf.structured(used), [clip.actor])
+            write_numbers(clip, result, path)
             folder.finish("adjust", origin, result.files)
         folder.kept.remove()
-    print(sentence(clip.numbers))
     return result
+
+
+def write_numbers(clip: AdjustedClip, result: Run, out: Path) -> None:
+    """Write what was changed beside the other results, and print it."""
+    write_json(out / NUMBERS, clip.numbers)
+    result.files.append(out / NUMBERS)
+    print(sentence(clip.numbers))
 
 
 @contextmanager

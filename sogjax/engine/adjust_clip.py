@@ -10,6 +10,7 @@ from jaxtyping import Float, Int
 
 from sogjax.actor.bones import bone_lengths
 from sogjax.adjust import Adjusted, adjusted
+from sogjax.adjust.contact import floor_height, standing, undersides
 from sogjax.adjust.pictures import ClipPictures, Reader, bytes_of_frame
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.motion import Motion, motion_from_poses
@@ -26,12 +27,15 @@ from sogjax.errors import InputError
 from sogjax.evaluation import joint_errors
 from sogjax.images.cells import stack_shape
 from sogjax.model.body import Body
-from sogjax.model.frames import world_from_upright
+from sogjax.model.frames import axis_vector, world_from_upright
+from sogjax.sentences import counted
 from sogjax.settings import TrackConfig
 from sogjax.tracking.frame import FrameCells
 
 FEWEST_FRAMES = 5
 """Fewer say next to nothing about a shape, and have no motion to be smooth."""
+WINDOW = 60
+"""Frames that are adjusted together."""
 SPARE_MEMORY = 0.8
 """Part of the free memory that a window may take."""
 
@@ -52,7 +56,12 @@ class AdjustedClip:
 
 
 def adjusted_clip(
-    recording: Recording, actor: Body, motion: Motion, config: TrackConfig, window: int, with_shape: bool = True
+    recording: Recording,
+    actor: Body,
+    motion: Motion,
+    config: TrackConfig,
+    window: int = WINDOW,
+    with_shape: bool = True,
 ) -> AdjustedClip:
     """Poses of all frames and the shape of the actor, adjusted together.
 
@@ -92,17 +101,24 @@ def adjusted_clip(
     )
 
 
+def too_short(num_frames: int) -> str | None:
+    """Why a motion of so many frames cannot be adjusted, if it is too short."""
+    if num_frames >= FEWEST_FRAMES:
+        return None
+    return (
+        f"the motion has {counted(num_frames, 'frame')}, too few to adjust; it stays as it is (track at least "
+        f"{FEWEST_FRAMES})"
+    )
+
+
 def check_length(motion: Motion) -> None:
     """Check that there is something to adjust.
 
     Raises:
         InputError: there is not.
     """
-    if motion.num_frames < FEWEST_FRAMES:
-        raise InputError(
-            f"the motion has {motion.num_frames} frames, too few to adjust; it stays as it is (track at least "
-            f"{FEWEST_FRAMES})"
-        )
+    if (reason := too_short(motion.num_frames)) is not None:
+        raise InputError(reason)
 
 
 def check_window(job: Job, window: int) -> None:
@@ -217,6 +233,7 @@ def _numbers(job: Job, before: Motion, after: Motion, found: Adjusted, actor: Bo
         "energy_after": found.after,
         "bone_lengths_changed": {name: now[name] / was[name] - 1.0 for name in was if was[name] > 0.0},
     }
+    numbers |= _feet(before, after)
     if job.recording.ground_truth is not None:
         truth = load_ground_truth(job.recording.ground_truth)
         truth = truth.subject(actor.name) if actor.name in truth.subjects else truth
@@ -224,6 +241,15 @@ def _numbers(job: Job, before: Motion, after: Motion, found: Adjusted, actor: Bo
             errors = joint_errors(motion, truth)
             numbers[key] = None if errors is None else 1e3 * float(np.nanmean(errors.errors))
     return numbers
+
+
+def _feet(before: Motion, after: Motion) -> dict[str, float | None]:
+    """How far feet that stand move from frame to frame, on average: those that stand in the adjusted motion."""
+    heights = undersides(after.blob_means, after.blob_sigma, axis_vector(after.up))
+    stand = standing(after.blob_means, heights - floor_height(heights), after.frame, after.fps)[:-1]
+    moved = lambda motion: 1e3 * float(np.linalg.norm(np.diff(motion.blob_means, axis=0), axis=-1)[stand].mean())
+    found = [moved(motion) if stand.any() else None for motion in (before, after)]
+    return {"standing_foot_before_mm": found[0], "standing_foot_after_mm": found[1]}
 
 
 def sentence(numbers: dict[str, Any]) -> str:
