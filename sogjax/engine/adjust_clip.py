@@ -34,8 +34,8 @@ from sogjax.tracking.frame import FrameCells
 
 FEWEST_FRAMES = 5
 """Fewer say next to nothing about a shape, and have no motion to be smooth."""
-WINDOW = 60
-"""Frames that are adjusted together."""
+WINDOW, LEAST_WINDOW = 60, 20
+"""Frames that are adjusted together, by default and at least: windows overlap by ten."""
 SPARE_MEMORY = 0.8
 """Part of the free memory that a window may take."""
 
@@ -77,9 +77,9 @@ def adjusted_clip(
         InputError: the clip is too short, a window does not fit into memory, or a video cannot be read.
     """
     check_length(motion)
+    check_window(len(recording.rig.names), actor.num_blobs, window, motion.num_frames)
     read = picture_reader(config.images)
     job = _job(recording, actor, motion, config, read)
-    check_window(job, min(window, motion.num_frames))
     source = _Source(job, read, motion)
     found = adjusted(
         job.tracker,
@@ -121,22 +121,23 @@ def check_length(motion: Motion) -> None:
         raise InputError(reason)
 
 
-def check_window(job: Job, window: int) -> None:
-    """Check that a window's pictures fit into memory.
+def check_window(num_cameras: int, num_blobs: int, window: int, num_frames: int) -> None:
+    """Check that the pictures of a window of a clip fit into memory.
 
     Raises:
         InputError: they do not.
     """
-    build.at_least("window", window, FEWEST_FRAMES)
-    each = bytes_of_frame(len(job.grids), job.bodies[0].num_blobs)
+    build.at_least("window", window, LEAST_WINDOW)
+    each, together = bytes_of_frame(num_cameras, num_blobs), min(window, num_frames)
     try:
         free = SPARE_MEMORY * os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (ValueError, OSError, AttributeError):  # a system that does not say
         return
-    if window * each > free:
+    if together * each > free:
+        fits = max(int(free // each), LEAST_WINDOW)
         raise InputError(
-            f"window={window}: the pictures of so many frames take about {window * each / 1e9:.1f} GB, and "
-            f"{free / 1e9:.1f} GB are free; choose window={max(int(free // each), FEWEST_FRAMES)}"
+            f"window={window}: the pictures of {counted(together, 'frame')} take about {together * each / 1e9:.1f} GB, "
+            f"and {free / 1e9:.1f} GB are free; choose window={fits}"
         )
 
 
