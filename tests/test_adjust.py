@@ -69,7 +69,7 @@ def test_a_forearm_that_is_too_long_is_found_from_a_clip(scene):
     tracker, pose, rig = scene
     true_body = tracker.body
     poses = [
-        moved(true_body, pose, {"left_elbow": 0.1 * k, "right_elbow": 0.15 * k, "root_x": 0.01 * k}) for k in range(8)
+        moved(true_body, pose, {"left_elbow": 0.06 * k, "right_elbow": 0.09 * k, "root_x": 0.01 * k}) for k in range(16)
     ]
     cells = [cells_of(rig, draw(true_body, each, rig), DEPTH) for each in poses]
     shape = ClipShape.from_body(true_body, "z")

@@ -147,4 +147,8 @@ def track_recording(recording: Recording, bodies: list[Body], config: TrackConfi
             name: replace(motion, **{key: np.array(rows) for key, rows in arrays_of(motion).items() if key in _ROWS})
             for name, motion in result.motions.items()
         }
-        return replace(result, motions=motions)
+    result = replace(result, motions=motions)
+    if config.adjust and _adjustable(recording, bodies, config):
+        clip = adjusted_clip(recording, bodies[0], next(iter(motions.values())), config)
+        result = replace(result, bodies=clip.job.bodies, motions={bodies[0].name: clip.motion})
+    return result
