@@ -125,7 +125,9 @@ class ClipEnergy:
     ) -> dict[str, Float[np.ndarray, "frame"]]:
         """The value of each term of tracking in every frame, without its weight and without a history."""
         assert self.pairs is not None
-        found = _values(self.body(params), self.tracker.terms, self.pictures.views, self.pairs.pairs, _single(poses))
+        found = term_values(
+            self.body(params), self.tracker.terms, self.pictures.views, self.pairs.pairs, _single(poses)
+        )
         return {name: np.asarray(value, float) for name, value in found.items()}
 
     def moved(
@@ -185,9 +187,11 @@ def _frame_models(
 
 
 @eqx.filter_jit
-def _values(
+def term_values(
     body: Body, terms: Terms, views: Views, pairs: SparsePairs, poses: Float[Array, "frame dof"]
 ) -> dict[str, Float[Array, "frame"]]:
+    """The value of each term in every frame, without its weight and without a history."""
+
     def one(frame: tuple[Views, SparsePairs, Array]) -> dict[str, Float[Array, ""]]:
         seen, near, pose = frame
         return FrameEnergy(body, replace(seen, pairs=near), History.unknown(pose), terms).values(pose)

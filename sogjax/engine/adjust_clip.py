@@ -16,6 +16,7 @@ from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.motion import Motion, motion_from_poses
 from sogjax.data.recording import Recording
 from sogjax.engine import build
+from sogjax.engine.adjust_colors import color_rows, mean_similarity, measured_colors
 from sogjax.engine.cells import picture_reader
 from sogjax.engine.job import Job
 from sogjax.engine.kept_run import Prefix
@@ -36,6 +37,8 @@ FEWEST_FRAMES = 5
 """Fewer say next to nothing about a shape, and have no motion to be smooth."""
 WINDOW, LEAST_WINDOW = 60, 20
 """Frames that are adjusted together, by default and at least: windows overlap by ten."""
+CLEARLY = 1.01
+"""By which factor new colours must explain more to be taken: those of example poses were measured within masks."""
 SPARE_MEMORY = 0.8
 """Part of the free memory that a window may take."""
 
@@ -93,12 +96,12 @@ def adjusted_clip(
         with_shape=with_shape,
         report=lambda stage: say(f"adjusting: {stage}"),
     )
-    turn = jnp.asarray(world_from_upright(recording.up).T, actor.blob_sigmas.dtype)
     job = replace(job, bodies=[found.body], tracker=replace(job.tracker, body=found.body))
     after = _motion(found, job, motion)
-    return AdjustedClip(
-        job, _prefix(found, job, motion), found.body.rotated(turn), after, _numbers(job, motion, after, found, actor)
-    )
+    numbers, prefix = _numbers(job, motion, after, found, actor), _prefix(found, job, motion)
+    body, numbers["similarity_of_new_colors"] = _recolored(job, source, found, after, config)
+    turn = jnp.asarray(world_from_upright(recording.up).T, actor.blob_sigmas.dtype)
+    return AdjustedClip(replace(job, bodies=[body]), prefix, body.rotated(turn), after, numbers)
 
 
 def too_short(num_frames: int) -> str | None:
@@ -167,9 +170,10 @@ class _Source:
     def pictures(self, rows: Int[np.ndarray, "row"], poses: Float[np.ndarray, "row dof"]) -> ClipPictures:
         """Near given poses."""
         reader = Reader.from_tracker(self.job.tracker, stack_shape(self.job.grids))
-        return reader.pictures(self._cells(rows), poses)
+        return reader.pictures(self.cells(rows), poses)
 
-    def _cells(self, rows: Int[np.ndarray, "row"]) -> list[FrameCells]:
+    def cells(self, rows: Int[np.ndarray, "row"]) -> list[FrameCells]:
+        """Of the rows."""
         frames = (self.motion.frame[rows] - self.job.recording.first_frame).tolist()
         wanted, first, last = set(frames), min(frames), max(frames) + 1
         coming = self.read(self.job.recording, Preparation(self.job.grids), first, last)
@@ -179,6 +183,18 @@ class _Source:
             for frame, pictures in enumerate(shown, first)
             if frame in wanted
         ]
+
+
+def _recolored(job: Job, source: _Source, found: Adjusted, motion: Motion, config: TrackConfig) -> tuple[Body, float]:
+    """The adjusted body with the colours that the clip shows, if it is more similar so; and by which factor it is."""
+    say("adjusting: colours")
+    rows = color_rows(found.body, found.poses, motion.similarity)
+    poses, cells = found.poses[rows], source.cells(rows)
+    frames = (motion.frame[rows] - job.recording.first_frame).tolist()
+    space, _ = build.color_space_and_radius(config.color)
+    body = measured_colors(job.recording, found.body, frames, poses, space)
+    before, after = (mean_similarity(replace(job.tracker, body=each), cells, poses) for each in (found.body, body))
+    return (body if after > CLEARLY * before else found.body), after / before
 
 
 def _energies(found: Adjusted, job: Job) -> Float[np.ndarray, "frame"]:
