@@ -86,7 +86,7 @@ class Reader(eqx.Module):
             found.append(views)
         for frame, state in zip(map(on_device, cells), states, strict=True):
             present = jnp.ones(len(self.inside), bool) if frame[1] is None else frame[1]
-            shown = jnp.asarray(self.inside) * present[:, None, None]
+            shown = jnp.where(present[:, None, None], self.inside, 0.0)
             windows.append(_windows(self.tracker, frame[0], shown, tables, state.previous))
         stack = lambda *leaves: jnp.stack(leaves)
         kinds = blob_kinds(self.kinds, self.tracker.body.num_blobs)
