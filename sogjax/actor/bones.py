@@ -53,6 +53,13 @@ def bone_lengths(body: Body) -> dict[str, float]:
     return lengths | _widths(body, places)
 
 
+def turning_places(body: Body) -> list[tuple[str, list[int]]]:
+    """Where one bone turns against another: a name, and the one-axis joints at that place; roots are left out."""
+    places = _places(body)
+    ends = [k for k, place in enumerate(places) if place.parent is not None and not _passes_through(body, places, k)]
+    return [(places[k].name, places[k].joints) for k in ends]
+
+
 def _places(body: Body) -> list[_Place]:
     skeleton = body.skeleton
     offsets = np.linalg.norm(np.asarray(skeleton.offsets, float), axis=1)

@@ -21,7 +21,10 @@ from sogjax.model.body import Body
 from sogjax.settings import TrackConfig
 
 PACKAGES = ("jax", "jaxlib", "numpy", "equinox", "optimistix", "opencv-python-headless")
-NO_MATTER = ("preset", "recording", "out", "actor", "cameras", "outputs", "resume", "overwrite", "images.cache")
+NO_MATTER = (
+    *("preset", "recording", "out", "actor", "cameras", "outputs", "adjust", "resume", "overwrite"),
+    "images.cache",
+)
 """Settings that change no pose, or whose files are compared instead."""
 SHOWN = 60
 """Longest value that is quoted in a sentence, characters."""

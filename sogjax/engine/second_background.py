@@ -36,8 +36,10 @@ BORDER = 0.15
 """Metres around a blob that are left out, too: the body may be a little off. With 0.25 too little is left to learn."""
 
 
-def learnt_again(job: Job, images: ImagesConfig, read: PictureReader) -> Tracker:
+def learnt_again(job: Job, images: ImagesConfig, read: PictureReader, poses: dict[int, Array] | None = None) -> Tracker:
     """The job's tracker, with a background that was learnt again where the first one left much open.
+
+    `poses` are those of the frames (counted from the recording's first), if they are known; None: they are tracked.
 
     Raises:
         InputError: a video cannot be read, or a picture has too many image blobs.
@@ -45,11 +47,13 @@ def learnt_again(job: Job, images: ImagesConfig, read: PictureReader) -> Tracker
     unknown = unknown_share(job.tracker, job.recording, job.grids, images)
     if unknown < MUCH_UNKNOWN:
         return job.tracker
-    say(
-        f"{unknown:.1%} of the background is unknown: the clip is tracked once to learn it where the body is not, "
-        "then again"
-    )
-    return knowing_the_body(job.tracker, job.recording, job.grids, _first_pass(job, images, read))
+    if poses is None:
+        say(
+            f"{unknown:.1%} of the background is unknown: the clip is tracked once to learn it where the body is not, "
+            "then again"
+        )
+        poses = _first_pass(job, images, read)
+    return knowing_the_body(job.tracker, job.recording, job.grids, poses)
 
 
 def unknown_share(tracker: Tracker, recording: Recording, grids: Sequence[CellGrid], images: ImagesConfig) -> float:

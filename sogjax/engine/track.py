@@ -10,12 +10,15 @@ import numpy as np
 from omegaconf import OmegaConf
 
 from sogjax.actor.make import MadeActor
-from sogjax.data.motion import arrays_of, load_motion
+from sogjax.data.actor_file import save_body
+from sogjax.data.motion import arrays_of, load_motion, save_motion
 from sogjax.data.motion_log import PER_FRAME, SOMETIMES_PER_FRAME
 from sogjax.data.recording import Recording
 from sogjax.energy import Term
 from sogjax.engine import build
 from sogjax.engine.actor_report import report_folder, write_actor_report
+from sogjax.engine.adjust import write_numbers, written
+from sogjax.engine.adjust_clip import adjusted_clip, too_short
 from sogjax.engine.example_frames import check_actors
 from sogjax.engine.first_pose import initial_pose_file, known_opening
 from sogjax.engine.job import frame_range
@@ -28,9 +31,14 @@ from sogjax.engine.run_job import tracking
 from sogjax.engine.streams import file_name
 from sogjax.engine.terminal import say
 from sogjax.engine.timing import StageTimes
+from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.settings import OutputsConfig, TrackConfig
 
+NOTHING = OutputsConfig(overlay=False, rerun=False, bvh=False)
+UNADJUSTED = "unadjusted.npz"
+UNADJUSTED_ACTOR = "unadjusted_actor.yaml"
+"""The motion as it was tracked, and its actor, beside the adjusted ones."""
 _ROWS = (*PER_FRAME, *SOMETIMES_PER_FRAME)
 
 
@@ -72,10 +80,38 @@ def _run_in(folder: RunFolder, recording: Recording, config: TrackConfig, comman
         _report_actors(recording, found, folder.path)
         if (opening := known_opening(recording, found, config)) is not None:
             kept.keep_start(*opening)
-    with tracking(recording, bodies, config, config.outputs, folder.path, kept=kept) as result:
-        write_results(result, folder.path, config.outputs, OmegaConf.structured(config), bodies if made else [])
+    adjust = config.adjust and _adjustable(recording, bodies, config)
+    with tracking(recording, bodies, config, NOTHING if adjust else config.outputs, folder.path, kept=kept) as result:
+        if not adjust:
+            write_results(result, folder.path, config.outputs, OmegaConf.structured(config), bodies if made else [])
+            folder.finish(command, origin, result.files)
+            return result
+        unadjusted = [folder.path / UNADJUSTED, folder.path / UNADJUSTED_ACTOR]
+        save_motion(unadjusted[0], next(iter(result.motions.values())))
+        save_body(unadjusted[1], bodies[0])
+        clip = adjusted_clip(recording, bodies[0], load_motion(unadjusted[0]), config)
+    # The pictures are read once more, for the files that show the adjusted poses in them.
+    with written(clip, folder.path, config.outputs, config.images) as result:
+        write_results(result, folder.path, config.outputs, OmegaConf.structured(config), [clip.actor])
+        result.files += unadjusted
+        write_numbers(clip, result, folder.path)
         folder.finish(command, origin, result.files)
     return result
+
+
+def _adjustable(recording: Recording, bodies: Sequence[Body], config: TrackConfig) -> bool:
+    """Whether the clip is long enough to be adjusted; if not, that is said.
+
+    Raises:
+        InputError: there are several actors.
+    """
+    if len(bodies) > 1:
+        raise InputError("adjust=true: only a clip of one actor can be adjusted; leave adjust=true out")
+    first, last = frame_range(recording, config)
+    reason = too_short(last - first)
+    if reason is not None:
+        say(f"adjust=true: {reason}")
+    return reason is None
 
 
 def _report_actors(recording: Recording, made: Sequence[MadeActor], out: Path) -> None:
@@ -103,13 +139,16 @@ def _ended(folder: RunFolder, recording: Recording, wanted: OutputsConfig) -> Ru
 
 def track_recording(recording: Recording, bodies: list[Body], config: TrackConfig, terms: Sequence[Term] = ()) -> Run:
     """Track actors (in their own upright frames) without writing files; `terms` are added to those of the settings."""
-    nothing = OutputsConfig(overlay=False, rerun=False, bvh=False)
     with (
         TemporaryDirectory() as folder,
-        tracking(recording, bodies, config, nothing, Path(folder), terms=terms) as result,
+        tracking(recording, bodies, config, NOTHING, Path(folder), terms=terms) as result,
     ):
         motions = {
             name: replace(motion, **{key: np.array(rows) for key, rows in arrays_of(motion).items() if key in _ROWS})
             for name, motion in result.motions.items()
         }
-        return replace(result, motions=motions)
+    result = replace(result, motions=motions)
+    if config.adjust and _adjustable(recording, bodies, config):
+        clip = adjusted_clip(recording, bodies[0], next(iter(motions.values())), config)
+        result = replace(result, bodies=clip.job.bodies, motions={bodies[0].name: clip.motion})
+    return result

@@ -43,6 +43,9 @@ class TrackConfig:
     start: int = option(0, "first frame to track, counted from the recording's first")
     stop: int | None = option(None, "frame before which to stop; null: the end")
     cameras: list[str] | None = option(None, "cameras to use; null: all")
+    adjust: bool = option(
+        False, "adjust poses and the actor's shape together at the end, as sogjax adjust; the clip is read again"
+    )
     resume: bool = option(False, "resume the run that was stopped in this folder")
     overwrite: bool = option(False, OVERWRITE)
     color: ColorConfig = group(ColorConfig, "")
@@ -69,3 +72,17 @@ class ActorConfig:
     overwrite: bool = option(False, OVERWRITE)
     color: ColorConfig = group(ColorConfig, "")
     energy: EnergyConfig = group(EnergyConfig, "")
+
+
+@dataclass
+class AdjustConfig:
+    """Adjust a tracked motion and the actor's shape together, from all frames at once."""
+
+    motion: str = option(REQUIRED, "folder of a run of sogjax track, or its motion.npz")
+    recording: str = option(REQUIRED, "folder of the recording in which it was tracked")
+    out: str = option("", "folder for the results; default: outputs/RECORDING_adjusted")
+    actor: str | None = option(None, "actor file of the motion; null: the run's")
+    shape: bool = option(True, "adjust the shape, too; false: only the poses")
+    window: int = option(60, "frames adjusted together; their pictures are kept in memory")
+    overwrite: bool = option(False, OVERWRITE)
+    outputs: OutputsConfig = group(OutputsConfig, "")

@@ -13,7 +13,7 @@ from omegaconf.errors import OmegaConfBaseException
 from sogjax.app.config import schemas
 from sogjax.app.config.overrides import plain_sentence, ready_for_hydra
 from sogjax.errors import InputError
-from sogjax.settings import ActorConfig, TrackConfig
+from sogjax.settings import ActorConfig, AdjustConfig, TrackConfig
 from sogjax.settings.compose import as_object
 from sogjax.settings.files import choices_of, conf_dir, default_choices
 from sogjax.study.settings import ReportConfig
@@ -21,6 +21,7 @@ from sogjax.study.settings import ReportConfig
 SCHEMAS: dict[str, type] = {
     "demo": schemas.DemoConfig,
     "track": TrackConfig,
+    "adjust": AdjustConfig,
     "actor": ActorConfig,
     "body": schemas.BodyConfig,
     "segment": schemas.SegmentConfig,

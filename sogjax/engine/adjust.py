@@ -1,0 +1,65 @@
+"""Adjusted clips as the files of a run."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+from omegaconf import OmegaConf
+
+from sogjax.engine.adjust_clip import AdjustedClip, adjusted_clip, check_length, sentence
+from sogjax.engine.cells import picture_reader
+from sogjax.engine.origin import Origin, digest
+from sogjax.engine.outputs import export_endings, write_results
+from sogjax.engine.recordings import opened
+from sogjax.engine.resume import resumed
+from sogjax.engine.run import Run
+from sogjax.engine.run_folder import run_folder
+from sogjax.engine.run_job import run_job
+from sogjax.engine.tracked_motion import TrackedMotion
+from sogjax.evaluation.numbers import write_json
+from sogjax.settings import AdjustConfig, ImagesConfig, OutputsConfig
+
+NUMBERS = "adjustment.json"
+
+
+def adjust_to_folder(config: AdjustConfig) -> Run:
+    """Adjust a motion of one actor, and write it as a run does, with the actor that was learnt.
+
+    Raises:
+        InputError: a motion of another recording or body, a clip that is too short, a window that does not fit into
+            memory, or a folder whose results must stay.
+    """
+    export_endings(config.outputs)
+    recording = opened(config.recording)
+    path = Path(config.out or f"outputs/{recording.name}_adjusted")
+    tracked = TrackedMotion.from_files(config.motion, recording, config.actor)
+    if tracked.config.cameras is not None:
+        recording = opened(config.recording, tracked.config.cameras)
+    check_length(tracked.motion)
+    with run_folder(path, config.overwrite, command="adjust") as folder:
+        clip = adjusted_clip(recording, tracked.actor, tracked.motion, tracked.config, config.window, config.shape)
+        origin: Origin = {"motion": str(tracked.path), "actor": digest(tracked.actor)}
+        folder.begin("adjust", origin, tracked.files)
+        with written(clip, path, config.outputs, tracked.config.images) as result:
+            used = replace(tracked.config, recording=config.recording, out=config.out, actor=None, adjust=True)
+            write_results(result, path, config.outputs, OmegaConf.structured(used), [clip.actor])
+            write_numbers(clip, result, path)
+            folder.finish("adjust", origin, result.files)
+        folder.kept.remove()
+    return result
+
+
+def write_numbers(clip: AdjustedClip, result: Run, out: Path) -> None:
+    """Write what was changed beside the other results, and print it."""
+    write_json(out / NUMBERS, clip.numbers)
+    result.files.append(out / NUMBERS)
+    print(sentence(clip.numbers))
+
+
+@contextmanager
+def written(clip: AdjustedClip, out: Path, outputs: OutputsConfig, images: ImagesConfig) -> Iterator[Run]:
+    """The run of an adjusted clip, with the files that show its pictures; as `run_job`."""
+    follow = resumed(clip.prefix, shown=True, with_images=outputs.rerun)
+    with run_job(clip.job, outputs, out, picture_reader(images), follow, images=images) as result:
+        yield result

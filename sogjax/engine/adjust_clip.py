@@ -1,0 +1,283 @@
+"""Adjusting a tracked clip as a whole: its pictures read again, poses and shape climbed together, what came of it."""
+
+import os
+from dataclasses import dataclass, replace
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float, Int
+
+from sogjax.actor.bones import bone_lengths
+from sogjax.adjust import Adjusted, adjusted
+from sogjax.adjust.contact import floor_height, standing, undersides
+from sogjax.adjust.pictures import ClipPictures, Reader, bytes_of_frame
+from sogjax.data.ground_truth import load_ground_truth
+from sogjax.data.motion import Motion, motion_from_poses
+from sogjax.data.recording import Recording
+from sogjax.engine import build
+from sogjax.engine.adjust_colors import color_rows, mean_similarity, measured_colors
+from sogjax.engine.cells import picture_reader
+from sogjax.engine.job import Job
+from sogjax.engine.kept_run import Prefix
+from sogjax.engine.pipeline import PictureReader, Preparation, cells_of_frame
+from sogjax.engine.recordings import upright
+from sogjax.engine.second_background import learnt_again
+from sogjax.engine.terminal import progress, say
+from sogjax.errors import InputError
+from sogjax.evaluation import joint_errors
+from sogjax.images.cells import stack_shape
+from sogjax.model.body import Body
+from sogjax.model.frames import axis_vector, world_from_upright
+from sogjax.sentences import counted
+from sogjax.settings import TrackConfig
+from sogjax.tracking.frame import FrameCells
+
+FEWEST_FRAMES = 5
+"""Fewer say next to nothing about a shape, and have no motion to be smooth."""
+WINDOW, LEAST_WINDOW = 60, 20
+"""Frames that are adjusted together, by default and at least: windows overlap by ten."""
+CLEARLY = 1.01
+"""By which factor new colours must explain more to be taken: those of example poses were measured within masks."""
+SPARE_MEMORY = 0.8
+"""Part of the free memory that a window may take."""
+
+
+@dataclass(frozen=True)
+class AdjustedClip:
+    """An adjusted clip, ready to be written as a run is."""
+
+    job: Job
+    """Of the adjusted body."""
+    prefix: Prefix
+    """Its frames, as if they had been tracked."""
+    actor: Body
+    """Adjusted, in its own upright frame."""
+    motion: Motion
+    numbers: dict[str, Any]
+    """Before and after, for JSON."""
+
+
+def adjusted_clip(
+    recording: Recording,
+    actor: Body,
+    motion: Motion,
+    config: TrackConfig,
+    window: int = WINDOW,
+    with_shape: bool = True,
+) -> AdjustedClip:
+    """Poses of all frames and the shape of the actor, adjusted together.
+
+    Args:
+        recording: in which was tracked.
+        actor: that was tracked, in its own upright frame.
+        motion: as it was tracked.
+        config: with which it was.
+        window: frames that are adjusted together.
+        with_shape: whether the shape is adjusted.
+
+    Raises:
+        InputError: the clip is too short, a window does not fit into memory, or a video cannot be read.
+    """
+    check_length(motion)
+    check_window(len(recording.rig.names), actor.num_blobs, window, motion.num_frames)
+    read = picture_reader(config.images)
+    job = _job(recording, actor, motion, config, read)
+    source = _Source(job, read, motion)
+    found = adjusted(
+        job.tracker,
+        source.pictures,
+        motion.pose,
+        motion.frame,
+        motion.similarity,
+        motion.fps,
+        motion.up,
+        window,
+        with_shape=with_shape,
+        report=lambda stage: say(f"adjusting: {stage}"),
+    )
+    job = replace(job, bodies=[found.body], tracker=replace(job.tracker, body=found.body))
+    after = _motion(found, job, motion)
+    numbers, prefix = _numbers(job, motion, after, found, actor), _prefix(found, job, motion)
+    body, numbers["similarity_of_new_colors"] = _recolored(job, source, found, after, config)
+    turn = jnp.asarray(world_from_upright(recording.up).T, actor.blob_sigmas.dtype)
+    return AdjustedClip(replace(job, bodies=[body]), prefix, body.rotated(turn), after, numbers)
+
+
+def too_short(num_frames: int) -> str | None:
+    """Why a motion of so many frames cannot be adjusted, if it is too short."""
+    if num_frames >= FEWEST_FRAMES:
+        return None
+    return (
+        f"the motion has {counted(num_frames, 'frame')}, too few to adjust; it stays as it is (track at least "
+        f"{FEWEST_FRAMES})"
+    )
+
+
+def check_length(motion: Motion) -> None:
+    """Check that there is something to adjust.
+
+    Raises:
+        InputError: there is not.
+    """
+    if (reason := too_short(motion.num_frames)) is not None:
+        raise InputError(reason)
+
+
+def check_window(num_cameras: int, num_blobs: int, window: int, num_frames: int) -> None:
+    """Check that the pictures of a window of a clip fit into memory.
+
+    Raises:
+        InputError: they do not.
+    """
+    build.at_least("window", window, LEAST_WINDOW)
+    each, together = bytes_of_frame(num_cameras, num_blobs), min(window, num_frames)
+    try:
+        free = SPARE_MEMORY * os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (ValueError, OSError, AttributeError):  # a system that does not say
+        return
+    if together * each > free:
+        fits = max(int(free // each), LEAST_WINDOW)
+        raise InputError(
+            f"window={window}: the pictures of {counted(together, 'frame')} take about {together * each / 1e9:.1f} GB, "
+            f"and {free / 1e9:.1f} GB are free; choose window={fits}"
+        )
+
+
+def _job(recording: Recording, actor: Body, motion: Motion, config: TrackConfig, read: PictureReader) -> Job:
+    """What tracking would have been with, from the poses that are known."""
+    body = upright(actor, recording)
+    grids = build.cell_grids(recording, config.images.depth)
+    first = int(motion.frame[0]) - recording.first_frame
+    frames = (first, int(motion.frame[-1]) - recording.first_frame + 1)
+    tracker = build.tracker(recording, body, grids, config)
+    job = Job(recording, [body], frames, grids, tracker, jnp.asarray(motion.pose[0]), first)
+    poses = {
+        int(frame) - recording.first_frame: jnp.asarray(pose)
+        for frame, pose in zip(motion.frame, motion.pose, strict=True)
+    }
+    return replace(job, tracker=learnt_again(job, config.images, read, poses))
+
+
+@dataclass(frozen=True)
+class _Source:
+    """Reads the pictures of rows of a motion."""
+
+    job: Job
+    read: PictureReader
+    motion: Motion
+
+    def pictures(self, rows: Int[np.ndarray, "row"], poses: Float[np.ndarray, "row dof"]) -> ClipPictures:
+        """Near given poses."""
+        reader = Reader.from_tracker(self.job.tracker, stack_shape(self.job.grids))
+        return reader.pictures(self.cells(rows), poses)
+
+    def cells(self, rows: Int[np.ndarray, "row"]) -> list[FrameCells]:
+        """Of the rows."""
+        frames = (self.motion.frame[rows] - self.job.recording.first_frame).tolist()
+        wanted, first, last = set(frames), min(frames), max(frames) + 1
+        coming = self.read(self.job.recording, Preparation(self.job.grids), first, last)
+        shown = progress(coming, last - first, "reading")
+        return [
+            cells_of_frame([picture.cells for picture in pictures])
+            for frame, pictures in enumerate(shown, first)
+            if frame in wanted
+        ]
+
+
+def _recolored(job: Job, source: _Source, found: Adjusted, motion: Motion, config: TrackConfig) -> tuple[Body, float]:
+    """The adjusted body with the colours that the clip shows, if it is more similar so; and by which factor it is."""
+    say("adjusting: colours")
+    rows = color_rows(found.body, found.poses, motion.similarity)
+    poses, cells = found.poses[rows], source.cells(rows)
+    frames = (motion.frame[rows] - job.recording.first_frame).tolist()
+    space, _ = build.color_space_and_radius(config.color)
+    body = measured_colors(job.recording, found.body, frames, poses, space)
+    before, after = (mean_similarity(replace(job.tracker, body=each), cells, poses) for each in (found.body, body))
+    return (body if after > CLEARLY * before else found.body), after / before
+
+
+def _energies(found: Adjusted, job: Job) -> Float[np.ndarray, "frame"]:
+    """Of Eq. 10 without a history."""
+    parts = [float(term.signed_weight) * found.values[term.name] for term in job.tracker.terms]
+    return np.sum(parts, axis=0)
+
+
+def _motion(found: Adjusted, job: Job, before: Motion) -> Motion:
+    return motion_from_poses(
+        found.body,
+        found.poses,
+        before.fps,
+        frame=before.frame,
+        similarity=found.values["similarity"],
+        energy=_energies(found, job),
+        iterations=before.iterations,
+        converged=before.converged,
+        up=before.up,
+    )
+
+
+def _prefix(found: Adjusted, job: Job, before: Motion) -> Prefix:
+    """The adjusted frames as a run keeps them."""
+    count, cameras = len(found.poses), len(job.grids)
+    none = np.zeros((count, cameras), int)
+    return Prefix(
+        {
+            "pose": np.asarray(found.poses, np.float32),
+            "energy": _energies(found, job).astype(np.float32),
+            "iterations": before.iterations,
+            "evaluations": before.iterations,
+            "converged": before.converged,
+            "num_near": none,
+            "num_matching": none,
+            "num_blocks": np.zeros(count, int),
+            **{f"term_{name}": value.astype(np.float32) for name, value in found.values.items()},
+            "capacity_near": np.full(count, found.room),
+            "capacity_matching": np.full(count, found.room),
+            "capacity_blocks": np.zeros(count, int),
+        }
+    )
+
+
+def _numbers(job: Job, before: Motion, after: Motion, found: Adjusted, actor: Body) -> dict[str, Any]:
+    """What was changed, and what it was good for."""
+    was, now = bone_lengths(upright(actor, job.recording)), bone_lengths(found.body)
+    numbers: dict[str, Any] = {
+        "frames": before.num_frames,
+        "frames_for_shape": len(found.shape_frames),
+        "iterations": found.iterations,
+        "energy_before": found.before,
+        "energy_after": found.after,
+        "bone_lengths_changed": {name: now[name] / was[name] - 1.0 for name in was if was[name] > 0.0},
+    }
+    numbers |= _feet(before, after)
+    if job.recording.ground_truth is not None:
+        truth = load_ground_truth(job.recording.ground_truth)
+        truth = truth.subject(actor.name) if actor.name in truth.subjects else truth
+        for key, motion in (("joints_before_mm", before), ("joints_after_mm", after)):
+            errors = joint_errors(motion, truth)
+            numbers[key] = None if errors is None else 1e3 * float(np.nanmean(errors.errors))
+    return numbers
+
+
+def _feet(before: Motion, after: Motion) -> dict[str, float | None]:
+    """How far feet that stand move from frame to frame, on average: those that stand in the adjusted motion."""
+    heights = undersides(after.blob_means, after.blob_sigma, axis_vector(after.up))
+    stand = standing(after.blob_means, heights - floor_height(heights), after.frame, after.fps)[:-1]
+    moved = lambda motion: 1e3 * float(np.linalg.norm(np.diff(motion.blob_means, axis=0), axis=-1)[stand].mean())
+    found = [moved(motion) if stand.any() else None for motion in (before, after)]
+    return {"standing_foot_before_mm": found[0], "standing_foot_after_mm": found[1]}
+
+
+def sentence(numbers: dict[str, Any]) -> str:
+    """The numbers in a line or two."""
+    changes = numbers["bone_lengths_changed"]
+    most = max(changes, key=lambda name: abs(changes[name]))
+    mean = float(np.mean(np.abs(list(changes.values()))))
+    lines = (
+        f"adjusted: energy {numbers['energy_before']:.5f} to {numbers['energy_after']:.5f} a frame; bones changed by "
+        f"{mean:.1%} on average (most: {most} {changes[most]:+.1%})"
+    )
+    if numbers.get("joints_before_mm") is not None:
+        lines += f"\njoints {numbers['joints_before_mm']:.1f} mm to {numbers['joints_after_mm']:.1f} mm from the truth"
+    return lines
