@@ -50,7 +50,7 @@ def look_alikes(body: Body, pose: Float[np.ndarray, "dof"]) -> Float[np.ndarray,
     for target, which in zip(targets, exchanged, strict=True):
         target[which] = means[blobs[which]]
     starts = np.stack([pose, pose[other_side(body.skeleton.dof_names)]])
-    fitted, costs = _fitted(
+    fitted, costs = fitted_to_blobs(
         body, jnp.asarray(np.tile(starts, (len(targets), 1))), jnp.asarray(np.repeat(targets, 2, axis=0))
     )
     better = np.asarray(costs).reshape(-1, 2).argmin(axis=1)
@@ -100,7 +100,7 @@ def _means(body: Body, poses: Array) -> Float[Array, "start blob 3"]:
 
 
 @eqx.filter_jit
-def _fitted(
+def fitted_to_blobs(
     body: Body, starts: Float[Array, "start dof"], targets: Float[Array, "start blob 3"]
 ) -> tuple[Float[Array, "start dof"], Float[Array, "start"]]:
     """Poses whose blobs lie near some points, and how far off they are (metres, root of the mean square)."""

@@ -52,7 +52,7 @@ class Repair:
 
     def __init__(self, body: Body) -> None:
         self._body, self._limbs, self._blobs = body, limbs(body.skeleton), limb_blobs(body)
-        self._past: deque[Float[np.ndarray, "dof"]] = deque(maxlen=FRAMES_BEFORE + 1)
+        self._past: deque[np.ndarray] = deque(maxlen=FRAMES_BEFORE + 1)
         self._trial: OnTrial | None = None
         self._pause = 0
         self._random = np.random.default_rng(0)
