@@ -17,7 +17,7 @@ from sogjax.engine.timing import StageTimes
 from sogjax.errors import InputError
 from sogjax.images.cells import CellGrid, padded_cells, stack_shape
 from sogjax.tracking.frame import FrameCells, PartialCells, TrackedFrame
-from sogjax.tracking.tracker import Tracker, track
+from sogjax.tracking.tracker import Tracker
 
 FRAMES_AHEAD = 3
 """Decoded frames waiting for the tracking step, at most."""
@@ -52,6 +52,10 @@ PictureReader = Callable[[Recording, "Preparation", int, int], Iterator[list[Pic
 
 FrameTracker = Callable[[Tracker, Float[Array, "dof"], Iterable[FrameCells]], Iterator[TrackedFrame]]
 """Finds the poses of frames from their cells in turn, as `sogjax.tracking.tracker.track` does."""
+
+
+Follow = Callable[[Iterable[FrameCells]], Iterator[TrackedFrame]]
+"""The same with a tracker that knows where it begins."""
 
 
 def nothing(camera: int, image: np.ndarray) -> None:
@@ -98,10 +102,8 @@ def cells_of_frame(cells: Sequence[UInt8[np.ndarray, "rows columns 3"] | None]) 
 def tracked_frames(
     pictures: Iterator[list[Picture]],
     count: int,
-    tracker: Tracker,
-    start: Float[Array, "dof"],
     times: StageTimes,
-    follow: FrameTracker = track,
+    follow: Follow,
 ) -> Generator[FrameDone, None, None]:
     """Track `count` frames, while a thread reads the pictures of later ones.
 
@@ -118,7 +120,7 @@ def tracked_frames(
                 yield cells_of_frame([picture.cells for picture in frame])
 
         begin = time.perf_counter()
-        for tracked in follow(tracker, start, cells()):
+        for tracked in follow(cells()):
             if tracked.seconds > 0.0:  # not where a frame was tracked before
                 times.add("step", tracked.seconds)
             times.add("whole", time.perf_counter() - begin)

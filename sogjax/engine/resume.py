@@ -36,6 +36,13 @@ def resumed(prefix: Prefix, shown: bool, with_images: bool) -> FrameTracker:
     return follow
 
 
+def frames_of(prefix: Prefix, tracker: Tracker) -> Iterator[TrackedFrame]:
+    """The frames of a prefix without their image blobs."""
+    for index in range(prefix.num_frames):
+        result = prefix.result(index, _no_blobs(len(tracker.normalizers)))
+        yield TrackedFrame(index, result, prefix.capacities, tracker.reader.color_space, 0.0)
+
+
 def _again(
     prefix: Prefix, tracker: Tracker, start: Float[Array, "dof"], frames: Frames, with_images: bool
 ) -> Iterator[TrackedFrame]:

@@ -1,9 +1,10 @@
 """One run of the tracker over a recording: frames in, motions and files out, as far as they were not kept."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +15,10 @@ from sogjax.energy import Term
 from sogjax.engine.backwards import frames_backwards, tracked_backwards
 from sogjax.engine.cells import picture_reader
 from sogjax.engine.job import Job
-from sogjax.engine.kept_run import KeptRun
-from sogjax.engine.pipeline import FrameTracker, PictureReader, tracked_frames
-from sogjax.engine.resume import resumed
+from sogjax.engine.kept_run import KeptRun, Prefix
+from sogjax.engine.pipeline import Follow, FrameDone, FrameTracker, PictureReader, tracked_frames
+from sogjax.engine.resume import frames_of, resumed
+from sogjax.engine.revision import Reviser
 from sogjax.engine.run import Run
 from sogjax.engine.second_background import learnt_again
 from sogjax.engine.streams import Streams, readable_frames
@@ -29,6 +31,9 @@ from sogjax.tracking.tracker import track
 
 FRAMES_BEHIND = 8
 """Tracked frames waiting to be written, at most."""
+
+Revise = Callable[[Prefix], Prefix | None]
+"""What holds of the frames of a clip once all are known; None: what was found."""
 
 
 @contextmanager
@@ -45,7 +50,8 @@ def tracking(
     job = Job.from_config(recording, bodies, config, kept, terms)
     read = picture_reader(config.images)
     job = replace(job, tracker=learnt_again(job, config.images, read))
-    with run_job(job, outputs, out, read, kept=kept, images=config.images) as result:
+    revise = Reviser(job, config.images) if config.tracking.both_ways else None
+    with run_job(job, outputs, out, read, kept=kept, images=config.images, revise=revise) as result:
         yield result
 
 
@@ -58,8 +64,20 @@ def run_job(
     follow: FrameTracker = track,
     kept: KeptRun | None = None,
     images: ImagesConfig | None = None,
+    revise: Revise | None = None,
 ) -> Iterator[Run]:
-    """Run a job, with a reader of pictures and a tracker of their cells; `images` says how they are read backwards."""
+    """Run a job, with a reader of pictures and a tracker of their cells.
+
+    Args:
+        job: to run.
+        outputs: files to write.
+        out: their folder.
+        read: reads pictures.
+        follow: tracks.
+        kept: where results are kept, so that another process can resume.
+        images: says how pictures are read backwards.
+        revise: is asked once all frames are tracked, if they are kept; what it changes is written again.
+    """
     first, last = job.frames
     times = StageTimes()
     prefix = None if kept is None else kept.prefix(readable_frames(out, job.bodies), last - first, job.num_before)
@@ -73,22 +91,15 @@ def run_job(
     start = job.start if prefix is None or not job.num_before else prefix.pose(0)
     if prefix is not None:
         follow = resumed(prefix, shown=not streams.num_skipped, with_images=outputs.rerun)
-    used: list[float] = []
     missing = Counter(job.recording.num_missing(range(first, first + streams.num_skipped)))
     try:
-        with streams:
-            count = last - first - streams.num_skipped
-            pictures = read(job.recording, streams.preparation(job.grids), last - count, last) if count else iter(())
-            frames = tracked_frames(pictures, count, job.tracker, start, times, follow)
-            with closing(frames), Behind(streams.consume, FRAMES_BEHIND) as behind:
-                for done in frames:
-                    used.append(float(np.mean(done.tracked.result.num_matching)))
-                    missing.update(
-                        name
-                        for name, picture in zip(job.recording.rig.names, done.pictures, strict=True)
-                        if picture.cells is None
-                    )
-                    behind.put(done)
+        used = _streamed(job, streams, read, partial(follow, job.tracker, start), missing)
+        tracked = None if kept is None or revise is None else kept.prefix(last - first, last - first)
+        revised = None if tracked is None or revise is None else revise(tracked)
+        if revised is not None:
+            again = Streams(out, job.recording, job.bodies, job.recording.first_frame + first, outputs, times)
+            _write_again(job, again, read, revised, outputs)
+            streams.files = again.files
         motions = streams.motions(mapped=True)
         image_blobs = float(np.mean(used)) if used else float("nan")
         yield Run(job.recording, job.bodies, motions, times, image_blobs, files=streams.files, missing=missing)
@@ -96,3 +107,36 @@ def run_job(
     except BaseException:
         streams.say_what_is_left()
         raise
+
+
+def _streamed(
+    job: Job, streams: Streams, read: PictureReader, follow: Follow, missing: Counter[str] | None = None
+) -> list[float]:
+    """Track the frames that are left, and write them as they come; image blobs used in each."""
+    first, last = job.frames
+    used: list[float] = []
+    with streams:
+        count = last - first - streams.num_skipped
+        pictures = read(job.recording, streams.preparation(job.grids), last - count, last) if count else iter(())
+        frames = tracked_frames(pictures, count, streams.times, follow)
+        with closing(frames), Behind(streams.consume, FRAMES_BEHIND) as behind:
+            for done in frames:
+                used.append(float(np.mean(done.tracked.result.num_matching)))
+                if missing is not None:
+                    missing.update(
+                        name
+                        for name, picture in zip(job.recording.rig.names, done.pictures, strict=True)
+                        if picture.cells is None
+                    )
+                behind.put(done)
+    return used
+
+
+def _write_again(job: Job, streams: Streams, read: PictureReader, frames: Prefix, outputs: OutputsConfig) -> None:
+    """Write the files of frames whose poses are known; pictures are read only where a file shows them."""
+    if outputs.overlay or outputs.rerun:
+        follow = resumed(frames, shown=True, with_images=outputs.rerun)
+        _streamed(job, streams, read, partial(follow, job.tracker, frames.pose(0)))
+        return
+    with streams:
+        streams.consume(FrameDone(tracked, []) for tracked in frames_of(frames, job.tracker))

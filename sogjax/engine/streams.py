@@ -83,7 +83,7 @@ class Streams:
         kept: KeptRun | None = None,
         num_kept: int = 0,
     ):
-        self._recording, self._bodies, self._wanted, self._times = recording, bodies, wanted, times
+        self._recording, self._bodies, self._wanted, self.times = recording, bodies, wanted, times
         self._first_frame, self._first_new = first_frame, first_frame + num_kept
         self.num_skipped = 0 if wanted.overlay or wanted.rerun else num_kept
         """Frames at the beginning that can be skipped, since no output shows them."""
@@ -140,7 +140,7 @@ class Streams:
             self._write(block)
             seconds = time.perf_counter() - begin
             for _ in block:
-                self._times.add("outputs", seconds / len(block))
+                self.times.add("outputs", seconds / len(block))
 
     def motions(self, mapped: bool) -> dict[str, Motion]:
         """The motions by actor; `mapped`: they stay on disk, until `remove_partial`."""

@@ -22,6 +22,7 @@ from sogjax.engine.adjust_clip import adjusted_clip, too_short
 from sogjax.engine.example_frames import check_actors
 from sogjax.engine.first_pose import initial_pose_file, known_opening
 from sogjax.engine.job import frame_range
+from sogjax.engine.kept_run import KeptRun
 from sogjax.engine.origin import origin_of
 from sogjax.engine.outputs import actor_name, evaluate, export_endings, write_results
 from sogjax.engine.recordings import actors_of, file_list, opened
@@ -141,7 +142,7 @@ def track_recording(recording: Recording, bodies: list[Body], config: TrackConfi
     """Track actors (in their own upright frames) without writing files; `terms` are added to those of the settings."""
     with (
         TemporaryDirectory() as folder,
-        tracking(recording, bodies, config, NOTHING, Path(folder), terms=terms) as result,
+        tracking(recording, bodies, config, NOTHING, Path(folder), KeptRun(Path(folder)), terms) as result,
     ):
         motions = {
             name: replace(motion, **{key: np.array(rows) for key, rows in arrays_of(motion).items() if key in _ROWS})

@@ -67,4 +67,7 @@ class TrackingConfig:
     """Prediction and the first frame (Section 5.3)."""
 
     extrapolation: float = option(0.5, "[alpha] share of the last motion that is added to predict the next pose")
+    both_ways: bool = option(
+        True, "where limbs are in doubt, track backwards, too, and take each limb from the better pass"
+    )
     repair: bool = option(False, "try limbs in doubt in other places, and keep them there if that lasts")

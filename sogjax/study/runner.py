@@ -25,6 +25,8 @@ from sogjax.study.experiment import Experiment
 from sogjax.study.machine import machine_facts
 from sogjax.study.record import RunFolder, RunPlan, RunRecord
 from sogjax.study.source import Source
+from sogjax.tracking.backward_pass import Pass
+from sogjax.tracking.both_ways import told_both_ways
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import FrameResult
 from sogjax.tracking.tracker import TrackedFrame, Tracker, track
@@ -52,8 +54,9 @@ def run_row(
         InputError: an override that cannot be.
     """
     entry = experiment.config.rows[row]
+    judged = experiment.config.measure == "accuracy"  # limbs in doubt are tracked both ways
     config = track_config(
-        experiment.overrides(row, common, method), recording=source.path, outputs={"confidence": False}
+        experiment.overrides(row, common, method), recording=source.path, outputs={"confidence": judged}
     )
     build.check(config)
     if entry.cameras is not None and entry.cameras > len(source.recording.rig.names):
@@ -100,8 +103,11 @@ def _accuracy(
     grids = build.cell_grids(recording, config.images.depth)
     if unknown_share(tracker, recording, grids, config.images) >= MUCH_UNKNOWN:
         poses = {every * k: frame.result.pose for k, frame in enumerate(tracked)}
-        tracked = _tracked(knowing_the_body(tracker, recording, grids, poses), source, cells, kind)
+        tracker = knowing_the_body(tracker, recording, grids, poses)
+        tracked = _tracked(tracker, source, cells, kind)
     results = [frame.result for frame in tracked]
+    if config.tracking.both_ways and config.outputs.confidence:
+        results = _revised(tracker, tracked, cells)
     frames = recording.first_frame + every * np.arange(len(cells))
     record = replace(
         record,
@@ -118,6 +124,16 @@ def _tracked(tracker: Tracker, source: Source, cells: CellsOfClip, kind: tuple[o
     tracked = list(track(tracker, source.start, cells, _capacities.get(kind)))
     _capacities[kind] = tracked[-1].capacities
     return tracked
+
+
+def _revised(tracker: Tracker, tracked: Sequence[TrackedFrame], cells: CellsOfClip) -> list[FrameResult]:
+    """The results of the frames, told both ways as `track` does."""
+    results = [frame.result for frame in tracked]
+    passed = Pass.from_frames(tracked)
+    found = told_both_ways(tracker, passed, lambda first, stop: (cells[k] for k in range(stop - 1, first - 1, -1)))
+    for row, revised in found.frames.items():
+        results[row] = replace(results[row], pose=revised.pose)
+    return results
 
 
 _capacities: dict[tuple[object, ...], Capacities] = {}

@@ -1,13 +1,17 @@
 """The parts of a model of several actors that can be taken from another pose: whole actors, and their limbs."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.model.body import Body
 from sogjax.tracking.culling import actor_of_blobs
 from sogjax.tracking.limbs import limb_blobs, limb_names, limbs
+from sogjax.tracking.mirrored import fitted_to_blobs
 
 
 @dataclass(frozen=True)
@@ -38,3 +42,56 @@ def body_parts(body: Body) -> tuple[Part, ...]:
         if blobs.any():
             parts.append(Part(name, dofs, blobs, int(of_blob[blobs][0])))
     return tuple(parts)
+
+
+class PartArrays(eqx.Module):
+    """The parts as arrays: whole actors first, then limbs."""
+
+    dofs: Bool[Array, "whole dof"]
+    blobs: Bool[Array, "part blob"]
+
+    @classmethod
+    def of(cls, body: Body, parts: Sequence[Part]) -> "PartArrays":
+        """Of the parts of a body, which are in that order."""
+        whole = [part for part in parts if part.whole is None]
+        dofs = np.zeros((len(whole), body.skeleton.num_dofs), bool)
+        for k, part in enumerate(whole):
+            dofs[k, part.dofs] = True
+        return cls(jnp.asarray(dofs), jnp.asarray(np.stack([part.blobs for part in parts])))
+
+    def mixed(self, body: Body, pose: Float[Array, "dof"], other: Float[Array, "dof"]) -> Float[Array, "part dof"]:
+        """The pose with each part as it is in the other one."""
+        limbs = with_blobs(body, pose, other, self.blobs[len(self.dofs) :])
+        return jnp.concatenate([jnp.where(self.dofs, other, pose), limbs])
+
+
+def merged_pose(
+    body: Body,
+    parts: Sequence[Part],
+    pose: Float[np.ndarray, "dof"],
+    other: Float[np.ndarray, "dof"],
+    taken: Bool[np.ndarray, "part"],
+) -> Float[np.ndarray, "dof"]:
+    """A pose with the parts that are taken from another one: whole actors as they are there, limbs in their places."""
+    base, blobs = pose.copy(), np.zeros(body.num_blobs, bool)
+    for part, is_taken in zip(parts, taken, strict=True):
+        if is_taken and part.whole is None:
+            base[part.dofs] = other[part.dofs]
+        elif is_taken:
+            blobs |= part.blobs
+    if not blobs.any():
+        return base
+    return np.asarray(with_blobs(body, jnp.asarray(base), jnp.asarray(other), jnp.asarray(blobs[None]))[0])
+
+
+@eqx.filter_jit
+def with_blobs(
+    body: Body, pose: Float[Array, "dof"], other: Float[Array, "dof"], blobs: Bool[Array, "choice blob"]
+) -> Float[Array, "choice dof"]:
+    """The pose with some blobs where they are in the other one, for each choice of blobs.
+
+    Angles cannot just be exchanged: where the trunk is turned a little, a limb would go elsewhere.
+    """
+    means, others = (body.posed_blobs(each).means for each in (pose, other))
+    targets = jnp.where(blobs[..., None], others, means)
+    return fitted_to_blobs(body, jnp.broadcast_to(pose, (len(blobs), len(pose))), targets)[0]

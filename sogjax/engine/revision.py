@@ -1,0 +1,61 @@
+"""A run told both ways: what was kept of it is revised where a backward pass explains the body better."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sogjax.engine.backwards import frames_backwards
+from sogjax.engine.job import Job
+from sogjax.engine.kept_run import TERM, Prefix
+from sogjax.engine.terminal import say
+from sogjax.sentences import counted
+from sogjax.settings import ImagesConfig
+from sogjax.tracking.backward_pass import Pass
+from sogjax.tracking.both_ways import Revised, told_both_ways
+
+
+@dataclass(frozen=True)
+class Reviser:
+    """Revises the frames of a job once all are tracked."""
+
+    job: Job
+    images: ImagesConfig
+
+    def __call__(self, tracked: Prefix) -> Prefix | None:
+        """The frames with what was revised; None where nothing was.
+
+        Raises:
+            InputError: a video cannot be read.
+        """
+        rows, job = tracked.rows, self.job
+        if "limb_doubt" not in rows:
+            return None
+        energy = float(np.abs(rows["energy"]).mean())
+        passed = Pass(rows["pose"], rows["limb_doubt"], rows["limb_usual"], energy, tracked.capacities)
+        first = job.frames[0]
+        found = told_both_ways(
+            job.tracker,
+            passed,
+            lambda begin, stop: frames_backwards(job.recording, job.grids, self.images, first + begin, first + stop),
+            lambda begin, stop: say(f"limbs in doubt in {_frames(job, begin, stop)}: tracked backwards, too"),
+        )
+        if not found.frames:
+            return None
+        parts = ", ".join(f"{name} ({count})" for name, count in sorted(found.parts.items()))
+        say(f"taken from the backward pass in {counted(len(found.frames), 'frame')}: {parts}")
+        return Prefix(_revised(rows, found.frames))
+
+
+def _frames(job: Job, begin: int, stop: int) -> str:
+    first = job.recording.first_frame + job.frames[0]
+    return f"frame {first + begin}" if stop == begin + 1 else f"frames {first + begin} to {first + stop - 1}"
+
+
+def _revised(rows: dict[str, np.ndarray], frames: dict[int, Revised]) -> dict[str, np.ndarray]:
+    """The rows with what was found for some frames."""
+    changed = {name: np.array(column) for name, column in rows.items()}
+    for row, found in frames.items():
+        changed["pose"][row], changed["energy"][row], changed["limb_doubt"][row] = found.pose, found.energy, found.doubt
+        for name, value in found.terms.items():
+            changed[TERM + name][row] = value
+    return changed
