@@ -1,0 +1,81 @@
+"""Runs whose frames are revised once all are tracked: what is written is what holds then."""
+
+import numpy as np
+import pytest
+from command_line import actor_file, done, trackable
+
+from sogjax.app.cli import main
+from sogjax.data.motion import load_motion
+from sogjax.engine import revision, run_job
+from sogjax.tracking.both_ways import Revised, Revision
+
+FRAMES, ROW, FARTHER = 12, 5, 0.25
+SMALL = ("images.depth=4", "solver.max_iterations=3", "solver.min_iterations=1", "outputs.bvh=false")
+SHOWN = {"nothing shown": (False, False), "overlay": (True, False), "Rerun file": (False, True)}
+
+
+@pytest.fixture
+def command(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    recording = trackable(tmp_path / "walk", frames=FRAMES)
+    return ["track", f"recording={recording}", f"actor={actor_file(tmp_path / 'a.yaml')}", *SMALL]
+
+
+@pytest.fixture
+def farther(monkeypatch):
+    """One frame is found to be farther along the first axis."""
+
+    def told_both_ways(tracker, passed, frames, report):
+        assert len(list(frames(2, 6))) == 4
+        report(ROW, ROW + 1)
+        pose = passed.poses[ROW].copy()
+        pose[0] += FARTHER
+        return Revision({ROW: Revised(pose, 7.0, {"similarity": 8.0}, passed.doubts[ROW])}, {"left arm": 1})
+
+    monkeypatch.setattr(revision, "told_both_ways", told_both_ways)
+
+
+@pytest.mark.parametrize(("overlay", "rerun"), SHOWN.values(), ids=SHOWN)
+def test_the_motion_that_is_written_is_the_revised_one(capsys, tmp_path, request, command, overlay, rerun):
+    outputs = [f"outputs.overlay={overlay}", f"outputs.rerun={rerun}"]
+    done(capsys, *command, *outputs, "tracking.both_ways=false", "out=before")
+    request.getfixturevalue("farther")
+    _, err = done(capsys, *command, *outputs, "out=after")
+    assert f"limbs in doubt in frame {ROW}" in err
+    assert "taken from the backward pass in 1 frame: left arm (1)" in err
+    before, after = (load_motion(tmp_path / name / "motion.npz") for name in ("before", "after"))
+    moved = after.pose[:, 0] - before.pose[:, 0]
+    np.testing.assert_allclose(moved, FARTHER * (np.arange(FRAMES) == ROW), atol=1e-5)
+    np.testing.assert_allclose(
+        (after.blob_means - before.blob_means)[ROW],
+        np.tile([FARTHER, 0.0, 0.0], (after.blob_means.shape[1], 1)),
+        atol=1e-4,
+    )
+    assert (after.energy[ROW], after.similarity[ROW]) == (7.0, 8.0)
+    files = {path.name for path in (tmp_path / "after").iterdir()}
+    assert ("overlay.mp4" in files, "motion.rrd" in files) == (overlay, rerun)
+    assert not any(name.endswith(".partial") for name in files)
+
+
+def test_a_run_that_is_stopped_while_it_is_written_again_goes_on_to_the_same_end(
+    capsys, tmp_path, monkeypatch, command, farther
+):
+    shown = ["outputs.overlay=true", "outputs.rerun=false"]
+    done(capsys, *command, *shown, "out=whole")
+    whole, seen = run_job.tracked_frames, []
+
+    def tracked_frames(*arguments):
+        for found in whole(*arguments):
+            if len(seen) == FRAMES + 3:
+                raise KeyboardInterrupt
+            seen.append(found)
+            yield found
+
+    with monkeypatch.context() as context:
+        context.setattr(run_job, "tracked_frames", tracked_frames)
+        main([*command, *shown, "out=run", "resume=true"])
+    assert not (tmp_path / "run" / "motion.npz").exists()
+    done(capsys, *command, *shown, "out=run", "resume=true")
+    one, two = (load_motion(tmp_path / name / "motion.npz") for name in ("whole", "run"))
+    np.testing.assert_array_equal(one.pose, two.pose)
+    np.testing.assert_array_equal(one.energy, two.energy)
