@@ -146,7 +146,7 @@ class _Clip:
             self.tracker, self.shape, seen, self.frames[rows], self.fps, self.vertical, self.weights, self.floor
         )
         start = self.tracked[rows], np.zeros(self.shape.num_params)
-        return climbed(energy, poses[rows], params, with_shape, held, start)
+        return climbed(energy, poses[rows], params, np.full(self.shape.num_params, with_shape), held, start)
 
 
 def _windows(count: int, window: int) -> Iterator[tuple[Int[np.ndarray, "row"], Bool[np.ndarray, "row"]]]:

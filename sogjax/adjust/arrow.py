@@ -6,10 +6,10 @@ shape's Schur complement is solved. Blocks of this size stay below what BLAS sha
 Cholesky does not, and takes a hundred times as long on a busy machine.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 Blocks = Float[np.ndarray, "frame dof dof"]
 
@@ -47,6 +47,15 @@ class ArrowSystem:
         except np.linalg.LinAlgError:
             return None
         return alone - np.einsum("tis,s->ti", cross, shared), shared
+
+    def restricted(self, free: Bool[np.ndarray, "shared"]) -> "ArrowSystem":
+        """With only some of the shared parameters; the others stay as they are."""
+        return replace(
+            self,
+            cross=self.cross[..., free],
+            corner=self.corner[np.ix_(free, free)],
+            shared_gradient=self.shared_gradient[free],
+        )
 
     def expected_gain(self, poses: Float[np.ndarray, "frame dof"], shared: Float[np.ndarray, "shared"]) -> float:
         """How far the model rises along a step."""
