@@ -14,7 +14,7 @@ TURN, PLACE, TIME = slice(0, 3), slice(3, 6), slice(6, 7)
 MOVE = 7
 """Numbers of a move: a rotation vector (radians), the way of the centre (metres), both along the axes of the camera as
 it was calibrated, and by how many frames what it sees is later than its frame's number says."""
-SPREAD = np.array([np.deg2rad(0.3)] * 3 + [0.01] * 3 + [0.5])
+SPREAD = np.array([np.deg2rad(0.3)] * 3 + [0.01] * 3 + [1.0])
 """Expected deviation of each."""
 LARGEST_STEP = np.array([0.01] * 3 + [0.03] * 3 + [0.3])
 """Of one iteration."""

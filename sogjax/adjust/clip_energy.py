@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.adjust.arrow import ArrowSystem
-from sogjax.adjust.camera_moves import LARGEST_STEP, MOVE, SPREAD, Sights
+from sogjax.adjust.camera_moves import LARGEST_STEP, MOVE, SPREAD, Sights, moved_cameras
 from sogjax.adjust.clip_shape import ClipShape
 from sogjax.adjust.contact import ContactModel, MovingBlobs, contact_model, standing, undersides
 from sogjax.adjust.frame_models import FrameModels, blobs_by_shape, frame_model, shape_rates
@@ -50,7 +50,7 @@ class Weights:
     """Radians and metres for each squared frame: second differences above it count only linearly."""
     contact: float = 10.0
     """1/m^2: of how far a standing foot moves from frame to frame."""
-    cameras: float = 1e-6
+    cameras: float = 5e-6
     """Of half a squared number of a camera's move in units of its expected deviation."""
 
 
@@ -141,15 +141,9 @@ class ClipEnergy:
         Last, the curvatures by what is seen alone (and by the priors of the shape), by which damping is measured: feet
         that stand are so stiff that all else would hardly move.
         """
-        assert self.pairs is not None
         assert self.standing is not None
         dofs, weights = poses.shape[1], self.weights
-        appearance, rest = jnp.float32(weights.appearance), jnp.float32(weights.rest)
-        seen = _frame_models(
-            self.shape, _single(params[: self.shape.num_params]), self.tracker.terms, self.pictures, self.pairs.pairs,
-            _single(poses), appearance, rest, self._sights(params),
-        )  # fmt: skip
-        value, gradient, curvature = (np.asarray(part, float) for part in seen)
+        value, gradient, curvature = (np.asarray(part, float) for part in self._seen(poses, params)[:3])
         smooth = smooth_model(poses, self.frames, weights.smooth, weights.sudden)
         contact = contact_model(self.blobs(poses, params), self.floor, self.vertical, self.standing, weights.contact)
         contact = _padded(contact, self.num_shared)
@@ -172,14 +166,32 @@ class ClipEnergy:
         total = value.sum() + smooth.value + contact.value - 0.5 * np.sum(prior * params**2)
         return float(total), system, scale
 
+    def most(
+        self, poses: Float[np.ndarray, "frame dof"], params: Float[np.ndarray, "shared"]
+    ) -> Float[np.ndarray, "camera"]:
+        """What each camera would gain if every blob of every frame could move freely in its picture."""
+        return np.asarray(self._seen(poses, params).most, float).sum(axis=0)
+
+    def _seen(self, poses: Float[np.ndarray, "frame dof"], params: Float[np.ndarray, "shared"]) -> FrameModels:
+        assert self.pairs is not None
+        appearance, rest = jnp.float32(self.weights.appearance), jnp.float32(self.weights.rest)
+        return _frame_models(
+            self.shape, _single(params[: self.shape.num_params]), self.tracker.terms, self.pictures, self.pairs.pairs,
+            _single(poses), appearance, rest, self._sights(params),
+        )  # fmt: skip
+
     def values(
         self, poses: Float[np.ndarray, "frame dof"], params: Float[np.ndarray, "shared"]
     ) -> dict[str, Float[np.ndarray, "frame"]]:
-        """The value of each term of tracking in every frame, without its weight and without a history."""
+        """The value of each term of tracking in every frame, without its weight and without a history.
+
+        Cameras stand where they were moved to, and see when they are said to.
+        """
         assert self.pairs is not None
-        found = term_values(
-            self.body(params), self.tracker.terms, self.pictures.views, self.pairs.pairs, _single(poses)
-        )
+        views = self.pictures.views
+        if self.velocities is not None:
+            views = replace(views, cameras=_moved_in_frames(views.cameras, _single(self.moves(params))))
+        found = term_values(self.body(params), self.tracker.terms, views, self.pairs.pairs, _single(poses))
         return {name: np.asarray(value, float) for name, value in found.items()}
 
     def moved(
@@ -202,6 +214,9 @@ def _padded(contact: ContactModel, shared: int) -> ContactModel:
         shared_gradient=np.pad(contact.shared_gradient, (0, more)),
         corner=np.pad(contact.corner, (0, more)),
     )
+
+
+_moved_in_frames = eqx.filter_jit(jax.vmap(moved_cameras, in_axes=(0, None)))
 
 
 def _single(values: np.ndarray) -> Float[Array, "..."]:

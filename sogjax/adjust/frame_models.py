@@ -23,6 +23,9 @@ from sogjax.model.camera import Camera, project, projection_jacobian
 from sogjax.model.skeleton import Skeleton
 from sogjax.model.sog import Sog
 
+LOOSE = 0.1
+"""Of the mean stiffness of a picture's blobs: what holds each of them at least."""
+
 
 class FrameModels(NamedTuple):
     """Models of each frame by its pose, then the shape, then (if they may move) the cameras."""
@@ -31,6 +34,8 @@ class FrameModels(NamedTuple):
     gradient: Float[Array, "*frame param"]
     curvature: Float[Array, "*frame param param"]
     """Positive semi-definite."""
+    most: Float[Array, "*frame camera"] | None = None
+    """What each camera would gain if every blob could move freely in its picture; None: cameras do not move."""
 
 
 class ShapeRates(NamedTuple):
@@ -55,7 +60,7 @@ class SeenBy(NamedTuple):
 class SeenByCameras(NamedTuple):
     """What one frame's pictures say, by the moves of the cameras."""
 
-    value: Float[Array, "camera"]
+    most: Float[Array, "camera"]
     gradient: Float[Array, "camera 7"]
     curvature: Float[Array, "camera 7 7"]
     mixed: Float[Array, "blob 3 camera 7"]
@@ -109,7 +114,7 @@ def _with_cameras(
     own = apart.reshape(count * MOVE, count * MOVE)
     rows = [jnp.concatenate([model.curvature, across], axis=1), jnp.concatenate([across.T, own], axis=1)]
     gradient = jnp.concatenate([model.gradient, cameras.gradient.reshape(-1)])
-    return FrameModels(model.value, gradient, jnp.concatenate(rows))
+    return FrameModels(model.value, gradient, jnp.concatenate(rows), cameras.most)
 
 
 def _seen_by(terms: Sequence[ImageTerm], posed: Posed, frame: Frame, sights: Sights | None) -> SeenBy:
@@ -151,7 +156,13 @@ def _seen_by_cameras(
     held = springs[:, :, None, None] * rates.means
     sized = 2.0 * springs[:, :, None] * rates.sigmas
     curvature = dot("cbkm,cbkn->cmn", held, rates.means) + dot("cbm,cbn->cmn", sized, rates.sigmas)
-    return SeenByCameras(pulls.value, gradient, curvature, dot("cbki,cbkm->bicm", across, held))
+    return SeenByCameras(_most(pulls, springs), gradient, curvature, dot("cbki,cbkm->bicm", across, held))
+
+
+def _most(pulls: ImagePulls, springs: Float[Array, "camera blob"]) -> Float[Array, "camera"]:
+    """By the springs' own model; blobs that hardly any spring holds would move far for nothing."""
+    held = springs + LOOSE * jnp.mean(springs, axis=1, keepdims=True) + jnp.finfo(springs.dtype).tiny
+    return 0.5 * jnp.sum(jnp.sum(pulls.by_mean**2, axis=-1) / held, axis=1)
 
 
 def _weighted(term: ImageTerm, posed: Posed, seen: Sog, frame: Frame) -> ImagePulls:

@@ -1,0 +1,111 @@
+"""Which cameras stand elsewhere, or see at another time, than is said of them.
+
+The poses, and with them the shape, take part in every answer (they are eliminated from the quadratic model of the
+clip), so that a camera is judged by what the others say.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from sogjax.adjust.camera_moves import MOVE, PLACE, TIME, TURN
+
+PARTS = {"turn": TURN, "place": PLACE, "time": TIME}
+CLEARLY = {"turn": 0.25, "place": 0.25, "time": 0.08}
+"""Share of what a camera could gain at most, which a move must gain to be believed. What the body does not explain
+looks like a move, too."""
+TOGETHER = 0.3
+"""Part of the largest gain that others must have to be taken in the same round: a fault of one looks like smaller ones
+of its neighbours, opposite."""
+FEWEST_AGREEING = {"turn": 3, "place": 3, "time": 1}
+"""Cameras that hold the world: at least so many stay as they are."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One thing that may be wrong with one camera."""
+
+    camera: int
+    name: str
+    """One of `PARTS`."""
+
+    @property
+    def columns(self) -> slice:
+        """Among the moves of all cameras."""
+        part = PARTS[self.name]
+        return slice(MOVE * self.camera + part.start, MOVE * self.camera + part.stop)
+
+
+@dataclass(frozen=True)
+class CamerasModel:
+    """What the moves of all cameras are worth, everything else following them (and 0 = the moves as they are)."""
+
+    gradient: Float[np.ndarray, "move"]
+    curvature: Float[np.ndarray, "move move"]
+    moves: Float[np.ndarray, "move"]
+    """As they are."""
+    most: Float[np.ndarray, "camera"]
+    """What each camera would gain if every blob could move freely in its picture."""
+
+    def newly_told(self, free: list[Part], candidates: list[Part]) -> list[Part]:
+        """Candidates whose moves gain clearly, the best first; those that are free already move with them."""
+        found: list[Part] = []
+        first = 0.0
+        while True:
+            left = [part for part in candidates if part not in free + found and self._may_move(part, free + found)]
+            gains = {part: self._gain(part, free + found) for part in left}
+            clear = {part: gain for part, gain in gains.items() if gain > clearly(part) * self.most[part.camera]}
+            best = max(clear, key=lambda part: clear[part], default=None)
+            if best is None or clear[best] < TOGETHER * first:
+                return found
+            first = max(first, clear[best])
+            found.append(best)
+
+    def shares(self, free: list[Part]) -> dict[Part, float]:
+        """What each free move is worth now, as a share of what its camera could gain at most without it."""
+        found = {}
+        for part in free:
+            others = [other for other in free if other != part]
+            _, curvature = self._alone(part, others)
+            move = self.moves[part.columns]
+            worth = 0.5 * float(move @ curvature @ move)
+            found[part] = worth / (worth + self.most[part.camera])
+        return found
+
+    def _may_move(self, part: Part, free: list[Part]) -> bool:
+        moved = {other.camera for other in free if other.name == part.name}
+        return len(self.most) - len(moved) > FEWEST_AGREEING[part.name]
+
+    def _gain(self, part: Part, free: list[Part]) -> float:
+        gradient, curvature = self._alone(part, free)
+        return 0.5 * float(gradient @ np.linalg.solve(curvature, gradient))
+
+    def _alone(
+        self, part: Part, others: list[Part]
+    ) -> tuple[Float[np.ndarray, "number"], Float[np.ndarray, "number number"]]:
+        """Gradient and curvature by one part, others following it."""
+        own, rest = np.r_[part.columns], _columns(others)
+        curvature = self.curvature[np.ix_(own, own)]
+        gradient = self.gradient[own]
+        if len(rest):
+            cross = np.linalg.solve(self.curvature[np.ix_(rest, rest)], self.curvature[np.ix_(rest, own)])
+            curvature = curvature - self.curvature[np.ix_(own, rest)] @ cross
+            gradient = gradient - cross.T @ self.gradient[rest]
+        return gradient, curvature
+
+
+def clearly(part: Part) -> float:
+    """The share from which on a part is believed."""
+    return CLEARLY[part.name]
+
+
+def free_moves(parts: list[Part], num_cameras: int) -> Bool[np.ndarray, "move"]:
+    """Which numbers of the cameras' moves may change."""
+    free = np.zeros(MOVE * num_cameras, bool)
+    free[_columns(parts)] = True
+    return free
+
+
+def _columns(parts: list[Part]) -> np.ndarray:
+    return np.concatenate([np.r_[part.columns] for part in parts]) if parts else np.zeros(0, int)
