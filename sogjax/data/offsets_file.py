@@ -35,7 +35,7 @@ def with_entries(path: Path, text: str, lines: Mapping[str, str]) -> str:
     return text
 
 
-def write_frame_offsets(path: Path, offsets: Mapping[str, int]) -> Path | None:
+def write_frame_offsets(path: Path, offsets: Mapping[str, float]) -> Path | None:
     """Write `frame_offset` to `path`, replacing an older one; comments and other keys stay.
 
     Returns:

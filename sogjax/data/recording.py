@@ -51,7 +51,7 @@ class Recording:
     warnings: tuple[str, ...]
     """One sentence each."""
     frame_part: dict[str, float] = field(default_factory=dict)
-    """By camera what its offset is beyond `frame_offset`, -0.5 to 0.5: its frame shows what was so much earlier; without
+    """By camera what its offset is beyond `frame_offset`, -0.5 to 0.5: it shows what was so much earlier; without
     an entry 0."""
     num_images: dict[str, int] = field(default_factory=dict)
     """By camera the number of its images; a camera without an entry has one for every frame."""

@@ -54,7 +54,7 @@ def adjust_to_folder(config: AdjustConfig) -> Run:
             if in_question:
                 if clip.numbers["cameras"]:
                     result.files += write_cameras(recording, open_recording(Path(config.recording)), clip.moves, path)
-                print(camera_lines(clip.numbers["cameras"], recording.rig.names, in_question))
+                print(camera_lines(clip.numbers["cameras"], recording.rig.names))
             folder.finish("adjust", origin, result.files)
         folder.kept.remove()
     return result

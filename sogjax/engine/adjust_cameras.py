@@ -62,8 +62,8 @@ def check_cameras(recording: Recording, motion: Motion, cameras: bool, offsets: 
         speed = float(np.linalg.norm(velocities_of(motion.blob_means, motion.frame), axis=-1).mean())
         if speed < STILL:
             raise InputError(
-                f"offsets=true: hardly anybody moves in this motion ({1e3 * speed:.1f} mm a frame), which tells nothing "
-                "of times; give a clip in which somebody does, or leave offsets=true out"
+                f"offsets=true: hardly anybody moves in this motion ({1e3 * speed:.1f} mm a frame), which says "
+                "nothing of times; give a clip in which somebody does, or leave offsets=true out"
             )
 
 
@@ -98,7 +98,7 @@ def camera_numbers(recording: Recording, found: Adjusted) -> dict[str, dict[str,
     return numbers
 
 
-def camera_lines(numbers: dict[str, dict[str, Any]], names: tuple[str, ...], in_question: tuple[str, ...]) -> str:
+def camera_lines(numbers: dict[str, dict[str, Any]], names: tuple[str, ...]) -> str:
     """The same in lines."""
     lines = []
     for name in names:
@@ -115,9 +115,11 @@ def camera_lines(numbers: dict[str, dict[str, Any]], names: tuple[str, ...], in_
         ]
         lines.append(f"{name}: {', '.join(parts)}")
     rest = len(names) - len(lines)
-    asked = "as calibrated" if "time" not in in_question else "as they are"
-    asked = "in step" if in_question == ("time",) else asked
-    lines.append(f"{counted(rest, 'camera')} {'stays' if rest == 1 else 'stay'} {asked}")
+    if not lines:
+        return "no camera is clearly off: all stay as they are"
+    lines += [f"the other {counted(rest, 'camera')} {'stays as it is' if rest == 1 else 'stay as they are'}"] * (
+        rest > 0
+    )
     return "\n".join(lines)
 
 
@@ -144,7 +146,7 @@ def write_cameras(
     parts = {name: move[TIME.start] for name, move in zip(recording.rig.names, moves, strict=True)}
     offsets = {name: whole.frame_offset[name] - parts.get(name, 0.0) for name in whole.rig.names}
     if any(offsets.values()):
-        lines["frame_offset"] = offsets_line(offsets)
+        lines["frame_offset"] = offsets_line({name: offset for name, offset in offsets.items() if offset})
     with atomic_path(out / DESCRIPTION) as temporary:
         temporary.write_text(with_entries(own, text, lines), encoding="utf-8")
     return [out / CALIBRATION, out / DESCRIPTION]
