@@ -116,6 +116,21 @@ def test_only_what_gains_clearly_is_believed():
     assert shares[Part(4, "turn")] < 0.05
 
 
+def test_a_place_is_asked_for_once_its_camera_was_turned():
+    moves = np.zeros((5, MOVE))
+    moves[1, 3] = 0.05
+    model, questions = cameras_model(moves), [Part(1, "place")]
+    assert model.newly_told([], questions) == []
+    assert model.newly_told([Part(1, "turn")], questions) == [Part(1, "place")]
+
+
+def test_what_was_freed_is_kept_as_long_as_it_is_worth_it():
+    moves = np.zeros((5, MOVE))
+    moves[1, 0], moves[2, 0] = 0.006, 0.002
+    free = [Part(1, "turn"), Part(2, "turn")]
+    assert cameras_model(moves, at=moves).doubtful(free) == [Part(2, "turn")]
+
+
 def test_a_fault_that_another_one_explains_is_none_of_its_own():
     moves = np.zeros((5, MOVE))
     moves[1, 0] = 0.008
@@ -139,8 +154,10 @@ def test_three_cameras_always_hold_the_world():
 @pytest.mark.slow
 def test_a_turned_camera_and_a_late_one_are_found_in_a_drawn_clip(scene):
     tracker, pose, rig = scene
-    step = {"root_x": 0.04, "root_y": 0.02, "left_elbow": 0.05, "right_shoulder_raise": 0.06}
-    at = lambda t: moved(tracker.body, pose, {name: value * (t - 12.0) for name, value in step.items()})
+    # To and fro: what moves evenly in a straight line looks the same late as it does to a camera that is turned.
+    swings = {"root_x": (0.08, 12), "root_y": (0.16, 16), "left_elbow": (0.2, 9), "right_shoulder_raise": (0.24, 10)}
+    swing = lambda t: {name: far * np.sin(2.0 * np.pi * t / period) for name, (far, period) in swings.items()}
+    at = lambda t: moved(tracker.body, pose, swing(t))
     late = [draw(tracker.body, at(t + 0.4), rig) for t in range(24)]
     drawn = [draw(tracker.body, at(t), rig) for t in range(24)]
     cells = [cells_of(rig, [*one[:2], other[2], one[3]], DEPTH) for one, other in zip(drawn, late, strict=True)]
@@ -150,12 +167,10 @@ def test_a_turned_camera_and_a_late_one_are_found_in_a_drawn_clip(scene):
     reader = Reader.from_tracker(tracker, cells[0].shape[1:3])
     pictures = lambda rows, near: reader.pictures([cells[row] for row in rows], near)
     start, frames = np.stack([at(t) for t in range(24)]), np.arange(24)
-    asked = lambda *names: adjusted(
-        tracker, pictures, start, frames, np.full(24, np.nan), 30.0, "z", 60, with_shape=False, in_question=names
-    )
-    found = asked("turn", "place", "time")
+    names, unknown = ("turn", "place", "time"), np.full(24, np.nan)
+    found = adjusted(tracker, pictures, start, frames, unknown, 30.0, "z", 60, with_shape=False, in_question=names)
     assert {(part.camera, part.name) for part in found.told} == {(0, "turn"), (2, "time")}
-    np.testing.assert_allclose(np.rad2deg(found.moves[0, :2]), [-0.4, 0.6], atol=0.1)
+    np.testing.assert_allclose(np.rad2deg(found.moves[0, :2]), [-0.4, 0.6], atol=0.15)  # a pixel is 0.4 degrees
     assert found.moves[2, 6] == pytest.approx(0.4, abs=0.1)
     assert not found.moves[[1, 3]].any()
 

@@ -15,6 +15,8 @@ PARTS = {"turn": TURN, "place": PLACE, "time": TIME}
 CLEARLY = {"turn": 0.25, "place": 0.25, "time": 0.08}
 """Share of what a camera could gain at most, which a move must gain to be believed. What the body does not explain
 looks like a move, too."""
+KEPT = 0.6
+"""Part of that share which is enough to stay believed: the model of a move expects more than there is."""
 TOGETHER = 0.3
 """Part of the largest gain that others must have to be taken in the same round: a fault of one looks like smaller ones
 of its neighbours, opposite."""
@@ -53,9 +55,9 @@ class CamerasModel:
         found: list[Part] = []
         first = 0.0
         while True:
-            left = [part for part in candidates if part not in free + found and self._may_move(part, free + found)]
+            left = [part for part in candidates if part not in free + found and self._may_move(part, free + found, free)]
             gains = {part: self._gain(part, free + found) for part in left}
-            clear = {part: gain for part, gain in gains.items() if gain > clearly(part) * self.most[part.camera]}
+            clear = {part: gain for part, gain in gains.items() if gain > CLEARLY[part.name] * self.most[part.camera]}
             best = max(clear, key=lambda part: clear[part], default=None)
             if best is None or clear[best] < TOGETHER * first:
                 return found
@@ -73,8 +75,15 @@ class CamerasModel:
             found[part] = worth / (worth + self.most[part.camera])
         return found
 
-    def _may_move(self, part: Part, free: list[Part]) -> bool:
+    def doubtful(self, free: list[Part]) -> list[Part]:
+        """Free moves that are not worth it."""
+        return [part for part, share in self.shares(free).items() if share < KEPT * CLEARLY[part.name]]
+
+    def _may_move(self, part: Part, free: list[Part], known: list[Part]) -> bool:
+        """Somebody seen from afar hardly tells a camera that moved from one that turned: turns come first."""
         moved = {other.camera for other in free if other.name == part.name}
+        if part.name == "place" and Part(part.camera, "turn") not in known:
+            return False
         return len(self.most) - len(moved) > FEWEST_AGREEING[part.name]
 
     def _gain(self, part: Part, free: list[Part]) -> float:
@@ -93,11 +102,6 @@ class CamerasModel:
             curvature = curvature - self.curvature[np.ix_(own, rest)] @ cross
             gradient = gradient - cross.T @ self.gradient[rest]
         return gradient, curvature
-
-
-def clearly(part: Part) -> float:
-    """The share from which on a part is believed."""
-    return CLEARLY[part.name]
 
 
 def free_moves(parts: list[Part], num_cameras: int) -> Bool[np.ndarray, "move"]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from sogjax.adjust.camera_choice import CamerasModel, Part, clearly, free_moves
+from sogjax.adjust.camera_choice import CamerasModel, Part, free_moves
 from sogjax.adjust.camera_moves import MOVE
 from sogjax.adjust.climb import LEAST_DAMPING, Climbed, climbed
 from sogjax.adjust.clip_energy import ClipEnergy
@@ -53,7 +53,7 @@ def found_cameras(
     for _ in range(ROUNDS):
         energy = energy.near(poses, params)
         model = cameras_model(energy, poses, params, of_shape)
-        doubtful = [part for part, share in model.shares(free).items() if share < clearly(part)]
+        doubtful = model.doubtful(free)
         more = [] if doubtful else model.newly_told(free, in_question)
         if not doubtful and not more:
             break

@@ -185,12 +185,13 @@ class ClipEnergy:
     ) -> dict[str, Float[np.ndarray, "frame"]]:
         """The value of each term of tracking in every frame, without its weight and without a history.
 
-        Cameras stand where they were moved to, and see when they are said to.
+        Cameras stand where they were moved to; the times at which they see are left out.
         """
         assert self.pairs is not None
         views = self.pictures.views
         if self.velocities is not None:
-            views = replace(views, cameras=_moved_in_frames(views.cameras, _single(self.moves(params))))
+            cameras = _moved_in_frames(views.cameras, _single(self.moves(params)))
+            views = eqx.tree_at(lambda v: v.cameras, views, cameras)
         found = term_values(self.body(params), self.tracker.terms, views, self.pairs.pairs, _single(poses))
         return {name: np.asarray(value, float) for name, value in found.items()}
 
