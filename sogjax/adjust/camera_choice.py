@@ -55,7 +55,9 @@ class CamerasModel:
         found: list[Part] = []
         first = 0.0
         while True:
-            left = [part for part in candidates if part not in free + found and self._may_move(part, free + found, free)]
+            left = [
+                part for part in candidates if part not in free + found and self._may_move(part, free + found, free)
+            ]
             gains = {part: self._gain(part, free + found) for part in left}
             clear = {part: gain for part, gain in gains.items() if gain > CLEARLY[part.name] * self.most[part.camera]}
             best = max(clear, key=lambda part: clear[part], default=None)

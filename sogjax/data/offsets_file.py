@@ -13,7 +13,7 @@ from sogjax.errors import InputError
 KEY = "frame_offset"
 
 
-def offsets_line(offsets: Mapping[str, float]) -> str:
+def offsets_line(offsets: Mapping[str, float | int]) -> str:
     """What recording.yaml says of offsets: whole numbers where they are whole, else with two decimals."""
     shown = {name: int(offset) if float(offset).is_integer() else round(offset, 2) for name, offset in offsets.items()}
     return f"{KEY}: {{{', '.join(f'{json.dumps(name)}: {offset}' for name, offset in shown.items())}}}"
@@ -35,7 +35,7 @@ def with_entries(path: Path, text: str, lines: Mapping[str, str]) -> str:
     return text
 
 
-def write_frame_offsets(path: Path, offsets: Mapping[str, float]) -> Path | None:
+def write_frame_offsets(path: Path, offsets: Mapping[str, float | int]) -> Path | None:
     """Write `frame_offset` to `path`, replacing an older one; comments and other keys stay.
 
     Returns:
