@@ -6,30 +6,26 @@ What they share is the shape of the body and, where cameras may move, seven numb
 from dataclasses import dataclass, replace
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.adjust.arrow import ArrowSystem
-from sogjax.adjust.camera_moves import LARGEST_STEP, MOVE, SPREAD, Sights, moved_cameras
+from sogjax.adjust.camera_moves import LARGEST_STEP, MOVE, SPREAD, Sights
+from sogjax.adjust.clip_programs import (
+    frame_models,
+    moved_in_frames,
+    moved_in_pictures,
+    moving_blobs,
+    shaped,
+    term_values,
+)
 from sogjax.adjust.clip_shape import ClipShape
 from sogjax.adjust.contact import ContactModel, MovingBlobs, contact_model, standing, undersides
-from sogjax.adjust.frame_models import FrameModels, blobs_by_shape, frame_model, shape_rates
+from sogjax.adjust.frame_models import FrameModels
 from sogjax.adjust.pictures import ClipPictures, NearPairs
-from sogjax.adjust.rest import RestPenalty
 from sogjax.adjust.smoothness import smooth_model
-from sogjax.energy.appearance import Appearance, ColorWindows
-from sogjax.energy.foreground import Foreground
-from sogjax.energy.frame_energy import FrameEnergy
-from sogjax.energy.neighbours import displaced, margins
-from sogjax.energy.pairs import SparsePairs
-from sogjax.energy.posed import History
-from sogjax.energy.term import Terms
-from sogjax.energy.views import Views
 from sogjax.model.body import Body
-from sogjax.model.camera import Camera, project
-from sogjax.model.sog import Sog
 from sogjax.tracking.tracker import Tracker
 
 LARGEST_SHAPE_STEP = 0.05
@@ -120,7 +116,7 @@ class ClipEnergy:
 
     def body(self, params: Float[np.ndarray, "shared"]) -> Body:
         """The body with some shape parameters."""
-        return _shaped(self.shape, _single(params[: self.shape.num_params]))
+        return shaped(self.shape, _single(params[: self.shape.num_params]))
 
     def _sights(self, params: Float[np.ndarray, "shared"]) -> Sights | None:
         """How cameras see all frames; None: as calibrated."""
@@ -131,7 +127,7 @@ class ClipEnergy:
     def blobs(self, poses: Float[np.ndarray, "frame dof"], params: Float[np.ndarray, "shared"]) -> MovingBlobs:
         """Where the blobs are, and how they move."""
         shape = _single(params[: self.shape.num_params])
-        return MovingBlobs(*(np.asarray(part, float) for part in _blobs(self.shape, shape, _single(poses))))
+        return MovingBlobs(*(np.asarray(part, float) for part in moving_blobs(self.shape, shape, _single(poses))))
 
     def model(
         self, poses: Float[np.ndarray, "frame dof"], params: Float[np.ndarray, "shared"]
@@ -175,7 +171,7 @@ class ClipEnergy:
     def _seen(self, poses: Float[np.ndarray, "frame dof"], params: Float[np.ndarray, "shared"]) -> FrameModels:
         assert self.pairs is not None
         appearance, rest = jnp.float32(self.weights.appearance), jnp.float32(self.weights.rest)
-        return _frame_models(
+        return frame_models(
             self.shape, _single(params[: self.shape.num_params]), self.tracker.terms, self.pictures, self.pairs.pairs,
             _single(poses), appearance, rest, self._sights(params),
         )  # fmt: skip
@@ -190,7 +186,7 @@ class ClipEnergy:
         assert self.pairs is not None
         views = self.pictures.views
         if self.velocities is not None:
-            cameras = _moved_in_frames(views.cameras, _single(self.moves(params)))
+            cameras = moved_in_frames(views.cameras, _single(self.moves(params)))
             views = eqx.tree_at(lambda v: v.cameras, views, cameras)
         found = term_values(self.body(params), self.tracker.terms, views, self.pairs.pairs, _single(poses))
         return {name: np.asarray(value, float) for name, value in found.items()}
@@ -204,7 +200,7 @@ class ClipEnergy:
         (old, old_params), (new, new_params) = before, after
         bodies = self.body(old_params), self.body(new_params)
         sights = self._sights(old_params), self._sights(new_params)
-        return float(np.max(_moved(self.tracker.cameras, bodies, sights, (_single(old), _single(new)))))
+        return float(np.max(moved_in_pictures(self.tracker.cameras, bodies, sights, (_single(old), _single(new)))))
 
 
 def _padded(contact: ContactModel, shared: int) -> ContactModel:
@@ -217,83 +213,5 @@ def _padded(contact: ContactModel, shared: int) -> ContactModel:
     )
 
 
-_moved_in_frames = eqx.filter_jit(jax.vmap(moved_cameras, in_axes=(0, None)))
-
-
 def _single(values: np.ndarray) -> Float[Array, "..."]:
     return jnp.asarray(values, jnp.float32)
-
-
-@eqx.filter_jit
-def _shaped(shape: ClipShape, params: Float[Array, "shape"]) -> Body:
-    return shape.shaped(params)
-
-
-@eqx.filter_jit
-def _blobs(shape: ClipShape, params: Float[Array, "shape"], poses: Float[Array, "frame dof"]) -> tuple[Array, ...]:
-    body, rates = shape.shaped(params), shape_rates(shape, params)
-
-    def one(pose: Array) -> tuple[Array, Array, Array]:
-        frames = body.skeleton.world_from_joint(pose)
-        means = body.blobs.points_world(frames)
-        by_pose = body.skeleton.point_jacobian(frames, body.blobs.joints, means)
-        return means, by_pose, blobs_by_shape(body, rates, frames)
-
-    return (*jax.lax.map(one, poses), body.blob_sigmas, rates.blob_sigmas)
-
-
-@eqx.filter_jit
-def _frame_models(
-    shape: ClipShape,
-    params: Float[Array, "shape"],
-    terms: Terms,
-    pictures: ClipPictures,
-    pairs: SparsePairs,
-    poses: Float[Array, "frame dof"],
-    appearance: Float[Array, ""],
-    rest: Float[Array, ""],
-    sights: Sights | None,
-) -> FrameModels:
-    body, rates = shape.shaped(params), shape_rates(shape, params)
-
-    def one(frame: tuple[Views, ColorWindows, SparsePairs, Array, Array | None]) -> FrameModels:
-        views, windows, near, pose, velocities = frame
-        sight = None if sights is None or velocities is None else Sights(sights.moves, velocities)
-        added = (Appearance(appearance, windows, pictures.kinds), RestPenalty(rest))
-        # The foreground's part is in the appearance already.
-        kept = [term for term in terms if not isinstance(term, Foreground)]
-        return frame_model(body, rates, pose, replace(views, pairs=near), (*kept, *added), sight)
-
-    velocities = None if sights is None else sights.velocities
-    return jax.lax.map(one, (pictures.views, pictures.windows, pairs, poses, velocities))
-
-
-@eqx.filter_jit
-def term_values(
-    body: Body, terms: Terms, views: Views, pairs: SparsePairs, poses: Float[Array, "frame dof"]
-) -> dict[str, Float[Array, "frame"]]:
-    """The value of each term in every frame, without its weight and without a history."""
-
-    def one(frame: tuple[Views, SparsePairs, Array]) -> dict[str, Float[Array, ""]]:
-        seen, near, pose = frame
-        return FrameEnergy(body, replace(seen, pairs=near), History.unknown(pose), terms).values(pose)
-
-    return jax.lax.map(one, (views, pairs, poses))
-
-
-@eqx.filter_jit
-def _moved(
-    cameras: Camera, bodies: tuple[Body, Body], sights: tuple[Sights | None, Sights | None], poses: tuple[Array, Array]
-) -> Float[Array, "frame"]:
-    def seen(body: Body, sight: Sights | None, poses: Array) -> Sog:
-        def one(frame: tuple[Array, Array | None]) -> Sog:
-            pose, velocities = frame
-            blobs = body.posed_blobs(pose)
-            if sight is None or velocities is None:
-                return jax.vmap(project, in_axes=(0, None))(cameras, blobs)
-            return Sights(sight.moves, velocities).seen(cameras, blobs)
-
-        return jax.lax.map(one, (poses, None if sight is None else sight.velocities))
-
-    before, after = (seen(*each) for each in zip(bodies, sights, poses, strict=True))
-    return jax.vmap(displaced, in_axes=(0, 0, None))(before, after, margins(cameras))
