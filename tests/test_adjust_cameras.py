@@ -143,6 +143,19 @@ def test_a_fault_that_another_one_explains_is_none_of_its_own():
     assert model.newly_told([], questions[:1]) == [Part(0, "turn")]  # alone it would have been believed
 
 
+def test_a_fault_that_two_cameras_explain_alike_is_left_alone():
+    moves = np.zeros((5, MOVE))
+    moves[1, 0] = 0.008
+    model = cameras_model(moves)
+    coupled = model.curvature.copy()
+    coupled[0, MOVE] = coupled[MOVE, 0] = 3.9e4
+    questions = [Part(camera, "turn") for camera in range(5)]
+    model = replace(model, curvature=coupled, gradient=coupled @ moves.reshape(-1))
+    assert model.newly_told([], questions) == []
+    moves[0, 0] = 0.008  # both are wrong, each on its own
+    assert set(cameras_model(moves).newly_told([], questions)) == {Part(0, "turn"), Part(1, "turn")}
+
+
 def test_three_cameras_always_hold_the_world():
     moves = np.zeros((5, MOVE))
     moves[:, 0] = 0.01

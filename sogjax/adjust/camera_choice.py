@@ -4,6 +4,7 @@ The poses, and with them the shape, take part in every answer (they are eliminat
 clip), so that a camera is judged by what the others say.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,9 @@ KEPT = 0.6
 TOGETHER = 0.3
 """Part of the largest gain that others must have to be taken in the same round: a fault of one looks like smaller ones
 of its neighbours, opposite."""
+RIVAL, EXPLAINED = 0.8, 0.5
+"""A fault is not believed if another camera's gains so large a part of what it gains, and loses so much of that once
+the first is mended: either may be wrong then. Of four cameras those that face each other see alike."""
 FEWEST_AGREEING = {"turn": 3, "place": 3, "time": 1}
 """Cameras that hold the world: at least so many stay as they are."""
 
@@ -50,19 +54,26 @@ class CamerasModel:
     most: Float[np.ndarray, "camera"]
     """What each camera would gain if every blob could move freely in its picture."""
 
-    def newly_told(self, free: list[Part], candidates: list[Part]) -> list[Part]:
-        """Candidates whose moves gain clearly, the best first; those that are free already move with them."""
+    def newly_told(self, free: list[Part], candidates: list[Part], undone: Sequence[Part] = ()) -> list[Part]:
+        """Candidates whose moves gain clearly, the best first; those that are free already move with them.
+
+        `undone` were believed before, and turned out not to be worth it.
+        """
         found: list[Part] = []
+        undecided: list[Part] = []
         first = 0.0
         while True:
-            left = [
-                part for part in candidates if part not in free + found and self._may_move(part, free + found, free)
-            ]
+            left = [part for part in candidates if part not in free + found + undecided]
+            left = [part for part in left if self._may_move(part, free + found, free)]
             gains = {part: self._gain(part, free + found) for part in left}
             clear = {part: gain for part, gain in gains.items() if gain > CLEARLY[part.name] * self.most[part.camera]}
             best = max(clear, key=lambda part: clear[part], default=None)
             if best is None or clear[best] < TOGETHER * first:
                 return found
+            rivals = self._rivals(best, gains, free + found, undone)
+            if rivals:
+                undecided += [best, *rivals]
+                continue
             first = max(first, clear[best])
             found.append(best)
 
@@ -87,6 +98,16 @@ class CamerasModel:
         if part.name == "place" and Part(part.camera, "turn") not in known:
             return False
         return len(self.most) - len(moved) > FEWEST_AGREEING[part.name]
+
+    def _rivals(self, best: Part, gains: dict[Part, float], free: list[Part], undone: Sequence[Part]) -> list[Part]:
+        """The same of other cameras, which explains it as well; what was undone before rivals with less."""
+        tried = {part: self._gain(part, free) for part in undone if part.name == best.name}
+        if any(gain > EXPLAINED * gains[best] for gain in tried.values()):
+            return list(tried)
+        alike = [
+            part for part in gains if part.name == best.name and part != best and gains[part] > RIVAL * gains[best]
+        ]
+        return [part for part in alike if self._gain(part, [*free, best]) < EXPLAINED * gains[part]]
 
     def _gain(self, part: Part, free: list[Part]) -> float:
         gradient, curvature = self._alone(part, free)

@@ -50,13 +50,15 @@ def found_cameras(
     start, found = (poses, params), None
     in_question = [Part(camera, name) for camera in range(cameras) for name in names]
     free: list[Part] = []
+    undone: list[Part] = []
     for _ in range(ROUNDS):
         energy = energy.near(poses, params)
         model = cameras_model(energy, poses, params, of_shape)
         doubtful = model.doubtful(free)
-        more = [] if doubtful else model.newly_told(free, in_question)
+        more = [] if doubtful else model.newly_told(free, in_question, undone)
         if not doubtful and not more:
             break
+        undone += doubtful
         in_question = [part for part in in_question if part not in doubtful]
         free = [part for part in free if part not in doubtful] + more
         params = _undone(params, start[1], doubtful, shape)
