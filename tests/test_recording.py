@@ -258,7 +258,7 @@ def test_a_wrong_calibration_is_refused_at_the_door(folder):
         ("cameras: [1]", ("cameras", "1")),
         ("cameras: [left, door]", ("'door'",)),
         ("frame_offset: {door: 2}", ("frame_offset", "'door'", "left, right")),
-        ("frame_offset: {left: 0.5}", ("frame_offset.left", "0.5")),
+        ("frame_offset: {left: soon}", ("frame_offset.left", "soon")),
         ("frame_offset: 3", ("frame_offset", "3")),
         ("frame_offset: {left: 9}", ("no frame in common", "frame_offset")),
         ("first_frame: 4", ("first_frame", "4", "0 to 3")),

@@ -1,4 +1,4 @@
-"""The clip as a whole: poses of all frames and the shape of the body, adjusted together (bundle adjustment)."""
+"""The clip as a whole: poses of all frames, the shape of the body, and cameras (bundle adjustment)."""
 
 from sogjax.adjust.adjustment import Adjusted, adjusted
 from sogjax.adjust.clip_energy import Weights

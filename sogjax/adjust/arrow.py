@@ -6,10 +6,10 @@ shape's Schur complement is solved. Blocks of this size stay below what BLAS sha
 Cholesky does not, and takes a hundred times as long on a busy machine.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 Blocks = Float[np.ndarray, "frame dof dof"]
 
@@ -40,13 +40,33 @@ class ArrowSystem:
             alone, cross = solved[..., 0], solved[..., 1:]
             shared = np.zeros(count)
             if count:
-                schur = (
-                    self.corner + np.diag(shared_damping) - np.einsum("tis,tir->sr", self.cross, cross, optimize=True)
-                )
-                shared = np.linalg.solve(schur, self.shared_gradient - np.einsum("tis,ti->s", self.cross, alone))
+                gradient, curvature = self._followed(alone, cross)
+                shared = np.linalg.solve(curvature + np.diag(shared_damping), gradient)
         except np.linalg.LinAlgError:
             return None
         return alone - np.einsum("tis,s->ti", cross, shared), shared
+
+    def of_shared(
+        self, damping: Float[np.ndarray, "frame dof"]
+    ) -> tuple[Float[np.ndarray, "shared"], Float[np.ndarray, "shared shared"]]:
+        """Gradient and curvature by the shared parameters alone, the poses following them."""
+        solved = self._solved(damping)
+        return self._followed(solved[..., 0], solved[..., 1:])
+
+    def _followed(
+        self, alone: Float[np.ndarray, "frame dof"], cross: Float[np.ndarray, "frame dof shared"]
+    ) -> tuple[Float[np.ndarray, "shared"], Float[np.ndarray, "shared shared"]]:
+        gradient = self.shared_gradient - np.einsum("tis,ti->s", self.cross, alone)
+        return gradient, self.corner - np.einsum("tis,tir->sr", self.cross, cross, optimize=True)
+
+    def restricted(self, free: Bool[np.ndarray, "shared"]) -> "ArrowSystem":
+        """With only some of the shared parameters; the others stay as they are."""
+        return replace(
+            self,
+            cross=self.cross[..., free],
+            corner=self.corner[np.ix_(free, free)],
+            shared_gradient=self.shared_gradient[free],
+        )
 
     def expected_gain(self, poses: Float[np.ndarray, "frame dof"], shared: Float[np.ndarray, "shared"]) -> float:
         """How far the model rises along a step."""

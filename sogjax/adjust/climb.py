@@ -1,6 +1,6 @@
 """Climbing the energy of a clip: damped Gauss-Newton steps of all poses and the shape together."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -21,8 +21,6 @@ SMALL_GAIN = 1e-5
 """Part of the energy below which another step is not worth its time."""
 ROUND_GAIN = 1e-4
 """The same for another round."""
-LARGEST_SHAPE_STEP = 0.05
-"""Logarithms of scales, metres."""
 HELD = 1e9
 """Damping of poses that stay as they are, in units of their own."""
 
@@ -32,7 +30,7 @@ class Climbed:
     """Where a climb ended."""
 
     poses: Float[np.ndarray, "frame dof"]
-    params: Float[np.ndarray, "shape"]
+    params: Float[np.ndarray, "shared"]
     before: float
     """The energy of the clip."""
     after: float
@@ -47,10 +45,10 @@ class Climbed:
 def climbed(
     energy: ClipEnergy,
     poses: Float[np.ndarray, "frame dof"],
-    params: Float[np.ndarray, "shape"],
-    with_shape: bool = True,
+    params: Float[np.ndarray, "shared"],
+    free: Bool[np.ndarray, "shared"],
     held: Bool[np.ndarray, "frame"] | None = None,
-    tracked: tuple[Float[np.ndarray, "frame dof"], Float[np.ndarray, "shape"]] | None = None,
+    tracked: tuple[Float[np.ndarray, "frame dof"], Float[np.ndarray, "shared"]] | None = None,
 ) -> Climbed:
     """The poses and the shape of highest energy near a start; only steps that raise it are taken.
 
@@ -58,7 +56,7 @@ def climbed(
         energy: of the clip.
         poses: to begin with.
         params: of the shape, to begin with.
-        with_shape: whether the shape may change.
+        free: which shared parameters may change.
         held: frames whose poses stay.
         tracked: the poses and the shape whose energy is that before; None: those to begin with.
     """
@@ -71,7 +69,7 @@ def climbed(
             energy = energy.near(*first)
             before = energy.model(*first)[0]
         energy = energy.near(poses, params)
-        end = _Climb(energy, poses, params, with_shape, held).run()
+        end = _Climb(energy, poses, params, free, held).run()
         poses, params, value, iterations = end.poses, end.params, end.value, iterations + end.iterations
         if end.settled:
             break
@@ -84,12 +82,12 @@ class _State:
     """Where a round is."""
 
     poses: Float[np.ndarray, "frame dof"]
-    params: Float[np.ndarray, "shape"]
+    params: Float[np.ndarray, "shared"]
     value: float
     system: ArrowSystem
     scale: Float[np.ndarray, "frame dof"]
     """Curvatures by which damping is measured."""
-    shared_scale: Float[np.ndarray, "shape"]
+    shared_scale: Float[np.ndarray, "shared"]
     damping: float = FIRST_DAMPING
     iterations: int = 0
     settled: bool = False
@@ -102,7 +100,7 @@ class _Climb:
         energy: with its pairs.
         poses: to begin with.
         params: of the shape, to begin with.
-        with_shape: whether the shape may change.
+        free: which shared parameters may change.
         held: frames whose poses stay.
     """
 
@@ -110,12 +108,13 @@ class _Climb:
         self,
         energy: ClipEnergy,
         poses: Float[np.ndarray, "frame dof"],
-        params: Float[np.ndarray, "shape"],
-        with_shape: bool,
+        params: Float[np.ndarray, "shared"],
+        free: Bool[np.ndarray, "shared"],
         held: Bool[np.ndarray, "frame"],
     ):
-        self._energy, self._with_shape, self._held = energy, with_shape, held
+        self._energy, self._free, self._held = energy, free, held
         self._bounds = np.asarray(energy.tracker.scales.step_bounds, float)
+        self._shared_bounds = energy.largest_steps[free]
         self._start = (poses, params)
         value, system, scale = energy.model(poses, params)
         self.first = value
@@ -156,19 +155,14 @@ class _Climb:
         own = self._state.scale * self._bounds**2
         held = damping * (own + COMMON * own.mean(axis=1, keepdims=True))
         held[self._held] = HELD * np.maximum(own[self._held], own.mean())
-        shared = self._state.shared_scale
-        if not self._with_shape:
-            system, shared = _without_shape(system), shared[:0]
-        found = system.step(held / self._bounds**2, damping * shared)
+        found = system.restricted(self._free).step(
+            held / self._bounds**2, damping * self._state.shared_scale[self._free]
+        )
         if found is None:
             return None
-        poses, params = found
-        params = params if self._with_shape else np.zeros_like(self._start[1])
-        largest = max(np.abs(poses / self._bounds).max(), np.abs(params).max(initial=0.0) / LARGEST_SHAPE_STEP, 1.0)
+        poses, shared = found
+        largest = max(np.abs(poses / self._bounds).max(), np.abs(shared / self._shared_bounds).max(initial=0.0), 1.0)
         poses[self._held] = 0.0
+        params = np.zeros(len(self._free))
+        params[self._free] = shared
         return poses / largest, params / largest
-
-
-def _without_shape(system: ArrowSystem) -> ArrowSystem:
-    none = np.zeros(0)
-    return replace(system, cross=system.cross[..., :0], corner=np.zeros((0, 0)), shared_gradient=none)

@@ -1,31 +1,35 @@
-"""The energy of a clip as a function of all its poses and the shape of its body, with a quadratic model."""
+"""The energy of a clip as a function of all its poses and what they share, with a quadratic model.
+
+What they share is the shape of the body and, where cameras may move, seven numbers of each of these.
+"""
 
 from dataclasses import dataclass, replace
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.adjust.arrow import ArrowSystem
+from sogjax.adjust.camera_moves import LARGEST_STEP, MOVE, SPREAD, Sights
+from sogjax.adjust.clip_programs import (
+    frame_models,
+    moved_in_frames,
+    moved_in_pictures,
+    moving_blobs,
+    shaped,
+    term_values,
+)
 from sogjax.adjust.clip_shape import ClipShape
-from sogjax.adjust.contact import MovingBlobs, contact_model, standing, undersides
-from sogjax.adjust.frame_models import FrameModels, blobs_by_shape, frame_model, shape_rates
+from sogjax.adjust.contact import ContactModel, MovingBlobs, contact_model, standing, undersides
+from sogjax.adjust.frame_models import FrameModels
 from sogjax.adjust.pictures import ClipPictures, NearPairs
-from sogjax.adjust.rest import RestPenalty
 from sogjax.adjust.smoothness import smooth_model
-from sogjax.energy.appearance import Appearance, ColorWindows
-from sogjax.energy.foreground import Foreground
-from sogjax.energy.frame_energy import FrameEnergy
-from sogjax.energy.neighbours import displacement
-from sogjax.energy.pairs import SparsePairs
-from sogjax.energy.posed import History
-from sogjax.energy.term import Terms
-from sogjax.energy.views import Views
 from sogjax.model.body import Body
-from sogjax.model.camera import Camera
 from sogjax.tracking.tracker import Tracker
+
+LARGEST_SHAPE_STEP = 0.05
+"""Of an iteration: logarithms of scales, metres."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,8 @@ class Weights:
     """Radians and metres for each squared frame: second differences above it count only linearly."""
     contact: float = 10.0
     """1/m^2: of how far a standing foot moves from frame to frame."""
+    cameras: float = 5e-6
+    """Of half a squared number of a camera's move in units of its expected deviation."""
 
 
 @dataclass(frozen=True)
@@ -63,45 +69,81 @@ class ClipEnergy:
     """Blobs that stand from each frame to the next; None: they must be found first (`near`)."""
     pairs: NearPairs | None = None
     """None: they must be found first (`near`)."""
+    velocities: Float[np.ndarray, "frame blob 3"] | None = None
+    """Of the blobs, metres a frame; None: cameras do not move, and have no part in the parameters."""
 
-    def near(self, poses: Float[np.ndarray, "frame dof"], params: Float[np.ndarray, "shape"]) -> "ClipEnergy":
+    @property
+    def num_shared(self) -> int:
+        """Number of the parameters that all frames share."""
+        return self.shape.num_params + (
+            0 if self.velocities is None else MOVE * len(self.pictures.views.normalizers[0])
+        )
+
+    def moves(self, params: Float[np.ndarray, "shared"]) -> Float[np.ndarray, "camera 7"]:
+        """Those of the cameras."""
+        return params[self.shape.num_params :].reshape(-1, MOVE)
+
+    @property
+    def spread(self) -> Float[np.ndarray, "shared"]:
+        """Expected deviation of each shared parameter."""
+        cameras = (self.num_shared - self.shape.num_params) // MOVE
+        return np.concatenate([np.asarray(self.shape.spread, float), np.tile(SPREAD, cameras)])
+
+    @property
+    def largest_steps(self) -> Float[np.ndarray, "shared"]:
+        """Of each shared parameter in one iteration."""
+        shape = self.shape.num_params
+        return np.concatenate(
+            [np.full(shape, LARGEST_SHAPE_STEP), np.tile(LARGEST_STEP, (self.num_shared - shape) // MOVE)]
+        )
+
+    @property
+    def priors(self) -> Float[np.ndarray, "shared"]:
+        """Curvature of what holds the shared parameters at 0."""
+        shape = np.arange(self.num_shared) < self.shape.num_params
+        weights = np.where(shape, 2.0 * self.weights.shape, 2.0 * self.weights.cameras)
+        return weights * len(self.frames) / self.spread**2
+
+    def near(self, poses: Float[np.ndarray, "frame dof"], params: Float[np.ndarray, "shared"]) -> "ClipEnergy":
         """With the pairs of blobs that matter near some poses, and the feet that stand there."""
         capacity = 0 if self.pairs is None else self.pairs.capacity
         body = self.body(params)
-        found = NearPairs.of(self.tracker, body, self.pictures, _single(poses), capacity)
+        found = NearPairs.of(self.tracker, body, self.pictures, _single(poses), capacity, self._sights(params))
         blobs = self.blobs(poses, params)
         heights = undersides(blobs.means, blobs.sigmas, self.vertical) - self.floor
         feet = standing(blobs.means, heights, self.frames, self.fps)
         return replace(self, pairs=found, standing=feet)
 
-    def body(self, params: Float[np.ndarray, "shape"]) -> Body:
+    def body(self, params: Float[np.ndarray, "shared"]) -> Body:
         """The body with some shape parameters."""
-        return _shaped(self.shape, _single(params))
+        return shaped(self.shape, _single(params[: self.shape.num_params]))
 
-    def blobs(self, poses: Float[np.ndarray, "frame dof"], params: Float[np.ndarray, "shape"]) -> MovingBlobs:
+    def _sights(self, params: Float[np.ndarray, "shared"]) -> Sights | None:
+        """How cameras see all frames; None: as calibrated."""
+        if self.velocities is None:
+            return None
+        return Sights(_single(self.moves(params)), _single(self.velocities))
+
+    def blobs(self, poses: Float[np.ndarray, "frame dof"], params: Float[np.ndarray, "shared"]) -> MovingBlobs:
         """Where the blobs are, and how they move."""
-        return MovingBlobs(*(np.asarray(part, float) for part in _blobs(self.shape, _single(params), _single(poses))))
+        shape = _single(params[: self.shape.num_params])
+        return MovingBlobs(*(np.asarray(part, float) for part in moving_blobs(self.shape, shape, _single(poses))))
 
     def model(
-        self, poses: Float[np.ndarray, "frame dof"], params: Float[np.ndarray, "shape"]
-    ) -> tuple[float, ArrowSystem, tuple[Float[np.ndarray, "frame dof"], Float[np.ndarray, "shape"]]]:
+        self, poses: Float[np.ndarray, "frame dof"], params: Float[np.ndarray, "shared"]
+    ) -> tuple[float, ArrowSystem, tuple[Float[np.ndarray, "frame dof"], Float[np.ndarray, "shared"]]]:
         """The energy (to be maximised) and its model, near the poses that `near` was given.
 
         Last, the curvatures by what is seen alone (and by the priors of the shape), by which damping is measured: feet
         that stand are so stiff that all else would hardly move.
         """
-        assert self.pairs is not None
         assert self.standing is not None
-        dofs, weights, count = poses.shape[1], self.weights, len(poses)
-        appearance, rest = jnp.float32(weights.appearance), jnp.float32(weights.rest)
-        seen = _frame_models(
-            self.shape, _single(params), self.tracker.terms, self.pictures, self.pairs.pairs, _single(poses),
-            appearance, rest,
-        )  # fmt: skip
-        value, gradient, curvature = (np.asarray(part, float) for part in seen)
+        dofs, weights = poses.shape[1], self.weights
+        value, gradient, curvature = (np.asarray(part, float) for part in self._seen(poses, params)[:3])
         smooth = smooth_model(poses, self.frames, weights.smooth, weights.sudden)
         contact = contact_model(self.blobs(poses, params), self.floor, self.vertical, self.standing, weights.contact)
-        prior = 2.0 * weights.shape * count / np.asarray(self.shape.spread, float) ** 2
+        contact = _padded(contact, self.num_shared)
+        prior = self.priors
         diagonal = np.arange(dofs)
         seen_own = np.einsum("tii->ti", curvature)
         scale = seen_own[:, :dofs] + smooth.own, seen_own[:, dofs:].sum(axis=0) + prior
@@ -120,86 +162,56 @@ class ClipEnergy:
         total = value.sum() + smooth.value + contact.value - 0.5 * np.sum(prior * params**2)
         return float(total), system, scale
 
-    def values(
-        self, poses: Float[np.ndarray, "frame dof"], params: Float[np.ndarray, "shape"]
-    ) -> dict[str, Float[np.ndarray, "frame"]]:
-        """The value of each term of tracking in every frame, without its weight and without a history."""
+    def most(
+        self, poses: Float[np.ndarray, "frame dof"], params: Float[np.ndarray, "shared"]
+    ) -> Float[np.ndarray, "camera"]:
+        """What each camera would gain if every blob of every frame could move freely in its picture."""
+        return np.asarray(self._seen(poses, params).most, float).sum(axis=0)
+
+    def _seen(self, poses: Float[np.ndarray, "frame dof"], params: Float[np.ndarray, "shared"]) -> FrameModels:
         assert self.pairs is not None
-        found = term_values(
-            self.body(params), self.tracker.terms, self.pictures.views, self.pairs.pairs, _single(poses)
-        )
+        appearance, rest = jnp.float32(self.weights.appearance), jnp.float32(self.weights.rest)
+        return frame_models(
+            self.shape, _single(params[: self.shape.num_params]), self.tracker.terms, self.pictures, self.pairs.pairs,
+            _single(poses), appearance, rest, self._sights(params),
+        )  # fmt: skip
+
+    def values(
+        self, poses: Float[np.ndarray, "frame dof"], params: Float[np.ndarray, "shared"]
+    ) -> dict[str, Float[np.ndarray, "frame"]]:
+        """The value of each term of tracking in every frame, without its weight and without a history.
+
+        Cameras stand where they were moved to; the times at which they see are left out.
+        """
+        assert self.pairs is not None
+        views = self.pictures.views
+        if self.velocities is not None:
+            cameras = moved_in_frames(views.cameras, _single(self.moves(params)))
+            views = eqx.tree_at(lambda v: v.cameras, views, cameras)
+        found = term_values(self.body(params), self.tracker.terms, views, self.pairs.pairs, _single(poses))
         return {name: np.asarray(value, float) for name, value in found.items()}
 
     def moved(
         self,
-        before: tuple[Float[np.ndarray, "frame dof"], Float[np.ndarray, "shape"]],
-        after: tuple[Float[np.ndarray, "frame dof"], Float[np.ndarray, "shape"]],
+        before: tuple[Float[np.ndarray, "frame dof"], Float[np.ndarray, "shared"]],
+        after: tuple[Float[np.ndarray, "frame dof"], Float[np.ndarray, "shared"]],
     ) -> float:
         """How far blobs have moved in any picture, in units of the margin within which pairs hold."""
         (old, old_params), (new, new_params) = before, after
         bodies = self.body(old_params), self.body(new_params)
-        return float(np.max(_moved(self.tracker.cameras, *bodies, _single(old), _single(new))))
+        sights = self._sights(old_params), self._sights(new_params)
+        return float(np.max(moved_in_pictures(self.tracker.cameras, bodies, sights, (_single(old), _single(new)))))
+
+
+def _padded(contact: ContactModel, shared: int) -> ContactModel:
+    """With 0 for shared parameters that do not move the blobs."""
+    more = shared - len(contact.shared_gradient)
+    return contact._replace(
+        cross=np.pad(contact.cross, ((0, 0), (0, 0), (0, more))),
+        shared_gradient=np.pad(contact.shared_gradient, (0, more)),
+        corner=np.pad(contact.corner, (0, more)),
+    )
 
 
 def _single(values: np.ndarray) -> Float[Array, "..."]:
     return jnp.asarray(values, jnp.float32)
-
-
-@eqx.filter_jit
-def _shaped(shape: ClipShape, params: Float[Array, "shape"]) -> Body:
-    return shape.shaped(params)
-
-
-@eqx.filter_jit
-def _blobs(shape: ClipShape, params: Float[Array, "shape"], poses: Float[Array, "frame dof"]) -> tuple[Array, ...]:
-    body, rates = shape.shaped(params), shape_rates(shape, params)
-
-    def one(pose: Array) -> tuple[Array, Array, Array]:
-        frames = body.skeleton.world_from_joint(pose)
-        means = body.blobs.points_world(frames)
-        by_pose = body.skeleton.point_jacobian(frames, body.blobs.joints, means)
-        return means, by_pose, blobs_by_shape(body, rates, frames)
-
-    return (*jax.lax.map(one, poses), body.blob_sigmas, rates.blob_sigmas)
-
-
-@eqx.filter_jit
-def _frame_models(
-    shape: ClipShape,
-    params: Float[Array, "shape"],
-    terms: Terms,
-    pictures: ClipPictures,
-    pairs: SparsePairs,
-    poses: Float[Array, "frame dof"],
-    appearance: Float[Array, ""],
-    rest: Float[Array, ""],
-) -> FrameModels:
-    body, rates = shape.shaped(params), shape_rates(shape, params)
-
-    def one(frame: tuple[Views, ColorWindows, SparsePairs, Array]) -> FrameModels:
-        views, windows, near, pose = frame
-        added = (Appearance(appearance, windows, pictures.kinds), RestPenalty(rest))
-        # The foreground's part is in the appearance already.
-        kept = [term for term in terms if not isinstance(term, Foreground)]
-        return frame_model(body, rates, pose, replace(views, pairs=near), (*kept, *added))
-
-    return jax.lax.map(one, (pictures.views, pictures.windows, pairs, poses))
-
-
-@eqx.filter_jit
-def term_values(
-    body: Body, terms: Terms, views: Views, pairs: SparsePairs, poses: Float[Array, "frame dof"]
-) -> dict[str, Float[Array, "frame"]]:
-    """The value of each term in every frame, without its weight and without a history."""
-
-    def one(frame: tuple[Views, SparsePairs, Array]) -> dict[str, Float[Array, ""]]:
-        seen, near, pose = frame
-        return FrameEnergy(body, replace(seen, pairs=near), History.unknown(pose), terms).values(pose)
-
-    return jax.lax.map(one, (views, pairs, poses))
-
-
-@eqx.filter_jit
-def _moved(cameras: Camera, before: Body, after: Body, old: Array, new: Array) -> Float[Array, "frame"]:
-    one = lambda poses: displacement(cameras, before.posed_blobs(poses[0]), after.posed_blobs(poses[1]))
-    return jax.lax.map(one, (old, new))

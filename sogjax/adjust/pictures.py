@@ -8,13 +8,15 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int, UInt8
 
+from sogjax.adjust.camera_moves import Sights
 from sogjax.energy.appearance import BlobKinds, ColorWindows
+from sogjax.energy.neighbours import margins, near_pairs
 from sogjax.energy.pairs import SparsePairs
 from sogjax.energy.similarity import similarity_among
 from sogjax.energy.views import Views
 from sogjax.images.kinds import SLOTS, SPARE, Kinds, kind_odds, kinds_of
 from sogjax.model.body import Body
-from sogjax.model.camera import Camera
+from sogjax.model.camera import Camera, project
 from sogjax.tracking.culling import BLOCK_STEP, Capacities, actor_of_blobs, block_capacity, body_boxes
 from sogjax.tracking.frame import FrameCells, TrackState, on_device
 from sogjax.tracking.search_energy import blob_kinds
@@ -107,12 +109,18 @@ class NearPairs(eqx.Module):
 
     @classmethod
     def of(
-        cls, tracker: Tracker, body: Body, pictures: ClipPictures, poses: Float[Array, "frame dof"], capacity: int
+        cls,
+        tracker: Tracker,
+        body: Body,
+        pictures: ClipPictures,
+        poses: Float[Array, "frame dof"],
+        capacity: int,
+        sights: Sights | None = None,
     ) -> "NearPairs":
-        """With room for at least `capacity` blocks in each frame."""
+        """With room for at least `capacity` blocks in each frame; `sights` has a velocity of each frame's blobs."""
         exponent = similarity_among(tracker.terms).exponent
         while True:
-            pairs, count = _pairs(body, pictures.views, poses, exponent, max(capacity, BLOCK_STEP))
+            pairs, count = _pairs(body, pictures.views, poses, exponent, max(capacity, BLOCK_STEP), sights)
             most = int(jnp.max(count))
             if most <= capacity:
                 return cls(pairs, capacity)
@@ -132,14 +140,24 @@ def _views(
 
 @eqx.filter_jit
 def _pairs(
-    body: Body, views: Views, poses: Float[Array, "frame dof"], exponent: Float[Array, ""], capacity: int
+    body: Body,
+    views: Views,
+    poses: Float[Array, "frame dof"],
+    exponent: Float[Array, ""],
+    capacity: int,
+    sights: Sights | None,
 ) -> tuple[SparsePairs, Int[Array, "frame"]]:
-    def one(frame: tuple[Views, Array]) -> tuple[SparsePairs, Int[Array, ""]]:
-        near, count = frame[0].near(body.posed_blobs(frame[1]), exponent, capacity)
-        assert near.pairs is not None
-        return near.pairs, count
+    def one(frame: tuple[Views, Array, Array | None]) -> tuple[SparsePairs, Int[Array, ""]]:
+        seen_by, pose, velocities = frame
+        blobs, cameras = body.posed_blobs(pose), seen_by.cameras
+        if sights is None or velocities is None:
+            seen = jax.vmap(project, in_axes=(0, None))(cameras, blobs)
+        else:
+            seen = Sights(sights.moves, velocities).seen(cameras, blobs)
+        similarities = seen_by.color_similarities
+        return near_pairs(seen_by.images, similarities, seen, margins(cameras), exponent, capacity)
 
-    return jax.lax.map(one, (views, poses))
+    return jax.lax.map(one, (views, poses, None if sights is None else sights.velocities))
 
 
 @eqx.filter_jit

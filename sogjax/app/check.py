@@ -10,7 +10,7 @@ from sogjax.check.findings import SEVERITIES, Finding
 from sogjax.check.hypotheses import unit_rig
 from sogjax.check.opening import opening_problems
 from sogjax.data.atomic import atomic_path
-from sogjax.data.offsets_file import write_frame_offsets
+from sogjax.data.offsets_file import offsets_line, write_frame_offsets
 from sogjax.data.recording import Recording, open_recording
 from sogjax.engine.outputs import results_folder
 from sogjax.engine.terminal import progress, say
@@ -95,9 +95,9 @@ def _offer_offsets(config: CheckConfig, recording: Recording, found: Examination
         if config.write:
             say("write=true: no time offset was found, so recording.yaml stays as it is")
         return
-    inner = ", ".join(f"{json.dumps(name)}: {offset}" for name, offset in found.offsets.items() if offset)
-    print(f"frame_offset: {{{inner}}}")
+    offsets = {name: offset for name, offset in found.offsets.items() if offset}
+    print(offsets_line(offsets))
     if config.write:
         path = recording.path / "recording.yaml"
-        kept = write_frame_offsets(path, {name: offset for name, offset in found.offsets.items() if offset})
+        kept = write_frame_offsets(path, offsets)
         say(f"{path}: frame_offset was written{'' if kept is None else f'; the previous file is {kept}'}")

@@ -48,7 +48,7 @@ class Examination:
     geometry: RigGeometry
     pictures: tuple[np.ndarray, ...]
     """One of each camera (BGR), to draw on."""
-    offsets: dict[str, int]
+    offsets: dict[str, float]
     """By camera the whole `frame_offset` to be written, where any was found; else empty."""
 
 
@@ -110,7 +110,8 @@ def examined(recording: Recording, start: int, frames: int, largest_offset: int,
         "gains_blue_green_red": gains,
         "findings": [asdict(finding) for finding in worst_first(findings)],
     }
-    total = {name: recording.frame_offset[name] + offset for name, offset in zip(names, offsets, strict=True)}
+    known = {name: recording.frame_offset[name] + recording.frame_part.get(name, 0.0) for name in names}
+    total = {name: known[name] + offset for name, offset in zip(names, offsets, strict=True)}
     pictures = tuple(shown[k] if k in shown else black_picture(recording, k) for k in range(len(names)))
     return Examination(worst_first(findings), numbers, geometry, pictures, total if any(offsets) else {})
 

@@ -42,7 +42,7 @@ class Recording:
     sources: dict[str, Path]
     """By camera: a video, or a folder of images."""
     frame_offset: dict[str, int]
-    """By camera, 0 where the recording names none."""
+    """By camera, 0 where the recording names none; the nearest whole number."""
     background: dict[str, Path]
     """By camera: the empty scene, where there is such an image."""
     example_poses: tuple[ExamplePose, ...]
@@ -50,6 +50,9 @@ class Recording:
     ground_truth: Path | None
     warnings: tuple[str, ...]
     """One sentence each."""
+    frame_part: dict[str, float] = field(default_factory=dict)
+    """By camera what its offset is beyond `frame_offset`, -0.5 to 0.5: it shows what was so much earlier; without
+    an entry 0."""
     num_images: dict[str, int] = field(default_factory=dict)
     """By camera the number of its images; a camera without an entry has one for every frame."""
     picked: dict[str, tuple[int, ...]] = field(default_factory=dict)
@@ -108,7 +111,8 @@ def open_recording(path: Path) -> Recording:
                 f"{path / 'recording.yaml'}: {key}: there is no camera {strange!r} in the calibration; "
                 f"its cameras are: {', '.join(calibrated.names)}"
             )
-    offsets = {camera: settings.frame_offset.get(camera, 0) for camera in cameras}
+    exact = {camera: settings.frame_offset.get(camera, 0) for camera in cameras}
+    offsets = {camera: round(offset) for camera, offset in exact.items()}
     with ThreadPoolExecutor() as pool:
         infos = dict(zip(cameras, pool.map(look_at_source, sources.values()), strict=True))
     rig = rig.with_sizes({camera: info.size for camera, info in infos.items()})
@@ -128,6 +132,7 @@ def open_recording(path: Path) -> Recording:
         num_frames=count,
         sources=sources,
         frame_offset=offsets,
+        frame_part={camera: exact[camera] - offset for camera, offset in offsets.items() if exact[camera] != offset},
         background=find_background(path / "background", rig, calibrated.names),
         example_poses=find_example_poses(
             path / "example_poses", rig, calibrated.names, settings.example_poses, range(first, first + count)

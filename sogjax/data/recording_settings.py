@@ -17,6 +17,9 @@ LARGEST_GAIN = 8.0
 FASTEST = 10_000.0
 """Frames per second; a faster camera is taken for a mistake."""
 
+LARGEST_OFFSET = 1e6
+"""Frames; a larger one is taken for a mistake."""
+
 _KEYS = (
     "fps",
     "calibration",
@@ -43,7 +46,7 @@ class RecordingSettings:
     unit: str | None = None
     up: str | None = None
     cameras: tuple[str, ...] | None = None
-    frame_offset: dict[str, int] = field(default_factory=dict)
+    frame_offset: dict[str, float] = field(default_factory=dict)
     first_frame: int | None = None
     last_frame: int | None = None
     time_stamps: bool = False
@@ -122,8 +125,13 @@ def _camera_names(entry: Entry) -> tuple[str, ...]:
     return names
 
 
-def _offsets(entry: Entry) -> dict[str, int]:
-    return {camera: _whole(offset) for camera, offset in entry.mapping().items()}
+def _offsets(entry: Entry) -> dict[str, float]:
+    expected = f"a number of frames, at most {LARGEST_OFFSET:g}"
+    offsets = {camera: offset.number(expected) for camera, offset in entry.mapping().items()}
+    for camera, offset in entry.mapping().items():
+        if not abs(offsets[camera]) <= LARGEST_OFFSET:
+            raise offset.error(expected)
+    return offsets
 
 
 def _gains(entry: Entry) -> dict[str, ColorGains]:

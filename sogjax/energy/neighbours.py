@@ -33,13 +33,14 @@ def displacement(cameras: Camera, before: Sog, after: Sog) -> Float[Array, ""]:
 
     A blob that has become visible, or no longer is, has moved infinitely far.
     """
+    seen = jax.vmap(project, in_axes=(0, None))
+    return displaced(seen(cameras, before), seen(cameras, after), margins(cameras))
 
-    def one_camera(camera: Camera, margin: Float[Array, ""]) -> Float[Array, ""]:
-        old, new = project(camera, before), project(camera, after)
-        moved = jnp.linalg.norm(new.means - old.means, axis=-1) / margin
-        return jnp.max(jnp.where(old.mask == new.mask, jnp.where(old.mask, moved, 0.0), jnp.inf))
 
-    return jnp.max(jax.vmap(one_camera)(cameras, margins(cameras)))
+def displaced(before: Sog, after: Sog, margin: Float[Array, "camera"]) -> Float[Array, ""]:
+    """The same of what the cameras saw (projected) and see."""
+    moved = jnp.linalg.norm(after.means - before.means, axis=-1) / margin[:, None]
+    return jnp.max(jnp.where(before.mask == after.mask, jnp.where(before.mask, moved, 0.0), jnp.inf))
 
 
 def near_pairs(

@@ -7,6 +7,8 @@ from pathlib import Path
 
 from omegaconf import OmegaConf
 
+from sogjax.data.recording import open_recording
+from sogjax.engine.adjust_cameras import camera_lines, check_cameras, parts_in_question, write_cameras
 from sogjax.engine.adjust_clip import AdjustedClip, adjusted_clip, check_length, sentence
 from sogjax.engine.cells import picture_reader
 from sogjax.engine.origin import Origin, digest
@@ -37,14 +39,22 @@ def adjust_to_folder(config: AdjustConfig) -> Run:
     if tracked.config.cameras is not None:
         recording = opened(config.recording, tracked.config.cameras)
     check_length(tracked.motion)
+    check_cameras(recording, tracked.motion, config.cameras, config.offsets)
+    in_question = parts_in_question(config.cameras, config.offsets)
     with run_folder(path, config.overwrite, command="adjust") as folder:
-        clip = adjusted_clip(recording, tracked.actor, tracked.motion, tracked.config, config.window, config.shape)
+        clip = adjusted_clip(
+            recording, tracked.actor, tracked.motion, tracked.config, config.window, config.shape, in_question
+        )
         origin: Origin = {"motion": str(tracked.path), "actor": digest(tracked.actor)}
         folder.begin("adjust", origin, tracked.files)
         with written(clip, path, config.outputs, tracked.config.images) as result:
             used = replace(tracked.config, recording=config.recording, out=config.out, actor=None, adjust=True)
             write_results(result, path, config.outputs, OmegaConf.structured(used), [clip.actor])
             write_numbers(clip, result, path)
+            if in_question:
+                if clip.numbers["cameras"]:
+                    result.files += write_cameras(recording, open_recording(Path(config.recording)), clip.moves, path)
+                print(camera_lines(clip.numbers["cameras"], recording.rig.names))
             folder.finish("adjust", origin, result.files)
         folder.kept.remove()
     return result

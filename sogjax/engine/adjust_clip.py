@@ -16,6 +16,7 @@ from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.motion import Motion, motion_from_poses
 from sogjax.data.recording import Recording
 from sogjax.engine import build
+from sogjax.engine.adjust_cameras import camera_numbers, moved_rig, moves_of
 from sogjax.engine.adjust_colors import color_rows, mean_similarity, measured_colors
 from sogjax.engine.cells import picture_reader
 from sogjax.engine.job import Job
@@ -56,6 +57,8 @@ class AdjustedClip:
     motion: Motion
     numbers: dict[str, Any]
     """Before and after, for JSON."""
+    moves: Float[np.ndarray, "camera 7"]
+    """Of the job's cameras, which stand there already."""
 
 
 def adjusted_clip(
@@ -65,8 +68,9 @@ def adjusted_clip(
     config: TrackConfig,
     window: int = WINDOW,
     with_shape: bool = True,
+    in_question: tuple[str, ...] = (),
 ) -> AdjustedClip:
-    """Poses of all frames and the shape of the actor, adjusted together.
+    """Poses of all frames and the shape of the actor, adjusted together; then cameras, where they are in question.
 
     Args:
         recording: in which was tracked.
@@ -75,6 +79,7 @@ def adjusted_clip(
         config: with which it was.
         window: frames that are adjusted together.
         with_shape: whether the shape is adjusted.
+        in_question: parts of the cameras' moves (`parts_in_question`).
 
     Raises:
         InputError: the clip is too short, a window does not fit into memory, or a video cannot be read.
@@ -95,13 +100,17 @@ def adjusted_clip(
         window,
         with_shape=with_shape,
         report=lambda stage: say(f"adjusting: {stage}"),
+        moves=moves_of(recording),
+        in_question=in_question,
     )
-    job = replace(job, bodies=[found.body], tracker=replace(job.tracker, body=found.body))
+    job = _found_job(job, found)
     after = _motion(found, job, motion)
     numbers, prefix = _numbers(job, motion, after, found, actor), _prefix(found, job, motion)
+    if in_question:
+        numbers["cameras"] = camera_numbers(recording, found)
     body, numbers["similarity_of_new_colors"] = _recolored(job, source, found, after, config)
     turn = jnp.asarray(world_from_upright(recording.up).T, actor.blob_sigmas.dtype)
-    return AdjustedClip(replace(job, bodies=[body]), prefix, body.rotated(turn), after, numbers)
+    return AdjustedClip(replace(job, bodies=[body]), prefix, body.rotated(turn), after, numbers, found.moves)
 
 
 def too_short(num_frames: int) -> str | None:
@@ -157,6 +166,17 @@ def _job(recording: Recording, actor: Body, motion: Motion, config: TrackConfig,
         for frame, pose in zip(motion.frame, motion.pose, strict=True)
     }
     return replace(job, tracker=learnt_again(job, config.images, read, poses))
+
+
+def _found_job(job: Job, found: Adjusted) -> Job:
+    """With the body and the cameras that were found."""
+    tracker = replace(job.tracker, body=found.body)
+    if found.told:
+        rig = moved_rig(job.recording.rig, found.moves)
+        job = replace(job, recording=replace(job.recording, rig=rig))
+        cameras = replace(tracker.cameras, camera_from_world=rig.cameras.camera_from_world)
+        tracker = replace(tracker, cameras=cameras)
+    return replace(job, bodies=[found.body], tracker=tracker)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from sogjax.actor.colors import ColoredView, back_projected_colors, camera_of, colored
-from sogjax.adjust.clip_energy import term_values
+from sogjax.adjust.clip_programs import term_values
 from sogjax.adjust.frame_choice import frames_by_spread
 from sogjax.adjust.pictures import NearPairs, Reader
 from sogjax.data.recording import Recording

@@ -83,6 +83,8 @@ class AdjustConfig:
     out: str = option("", "folder for the results; default: outputs/RECORDING_adjusted")
     actor: str | None = option(None, "actor file of the motion; null: the run's")
     shape: bool = option(True, "adjust the shape, too; false: only the poses")
+    cameras: bool = option(False, "look for cameras that stand or look elsewhere than the calibration says, too")
+    offsets: bool = option(False, "look for cameras that are early or late by parts of a frame, too")
     window: int = option(60, "frames adjusted together; their pictures are kept in memory")
     overwrite: bool = option(False, OVERWRITE)
     outputs: OutputsConfig = group(OutputsConfig, "")
