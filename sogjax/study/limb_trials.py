@@ -135,10 +135,10 @@ class LimbTrials:
     def keep(self, trial: LimbTrial, runs: Sequence[Tracked]) -> None:
         """Measure the limbs in the frames of all runs, the plain one first, and keep that."""
         source, tracker, cells = self._tracker(trial)
-        usual: Float[np.ndarray, "frame blob"] = np.zeros((0, tracker.body.num_blobs))
+        usual: Float[np.ndarray, "frame 2 blob"] = np.zeros((0, 2, tracker.body.num_blobs))
         columns: dict[str, list[Any]] = {key: [] for key in ("kind", "name", "worse", "contradicted", "error")}
         for run in runs:
-            start = usual[run.follows] if run.follows else np.full(tracker.body.num_blobs, np.nan, np.float32)
+            start = usual[run.follows] if run.follows else np.full((2, tracker.body.num_blobs), np.nan, np.float32)
             measures, before = measured(tracker, cells, run, start)
             usual = before if run.kind == PLAIN else usual
             errors = limb_errors(source.bodies, source.truth, run.frames, run.poses)
@@ -175,8 +175,8 @@ def _true_start(body: Body, source: Source) -> Float[np.ndarray, "dof"]:
 
 
 def measured(
-    tracker: Tracker, cells: CellsOfClip, run: Tracked, usual: Float[np.ndarray, "blob"]
-) -> tuple[LimbMeasures, Float[np.ndarray, "frame blob"]]:
+    tracker: Tracker, cells: CellsOfClip, run: Tracked, usual: Float[np.ndarray, "2 blob"]
+) -> tuple[LimbMeasures, Float[np.ndarray, "frame 2 blob"]]:
     """What tells of the limbs in every frame of a run, and what was usual before it."""
     found, history, now = [], [], jnp.asarray(usual)
     for frame, pose, before in zip(run.frames, run.poses, run.before, strict=True):
@@ -189,7 +189,7 @@ def measured(
 @eqx.filter_jit
 def _measured(
     tracker: Tracker, cells: Array, before: Array, pose: Array, usual: Array
-) -> tuple[LimbMeasures, Float[Array, "blob"]]:
+) -> tuple[LimbMeasures, Float[Array, "2 blob"]]:
     """The step's own judgement of a pose that was found already."""
     reader, limbs = tracker.reader, tracker.limbs
     assert limbs is not None
@@ -199,5 +199,4 @@ def _measured(
     windows = None if odds is None else reader.windows(odds, tracker.cameras, boxes)
     posed = Posed.from_pose(tracker.body, pose)
     evidence = blob_evidence(limbs, posed, tracker.cameras, windows, cells, reader.cell_sizes, reader.subject)
-    known = jnp.where(jnp.isfinite(usual), usual, evidence.own)
-    return limb_measures(limbs, evidence, known), judgement(limbs, evidence, usual, windows is not None).usual
+    return limb_measures(limbs, evidence, usual), judgement(limbs, evidence, usual, windows is not None).usual

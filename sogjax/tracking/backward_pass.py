@@ -35,7 +35,7 @@ class Pass:
 
     poses: Float[np.ndarray, "frame dof"]
     doubts: Float[np.ndarray, "frame limb"]
-    usual: Float[np.ndarray, "frame blob"]
+    usual: Float[np.ndarray, "frame 2 blob"]
     """As in `Judgement`."""
     energy: float
     """Of a frame, the mean of its magnitude."""

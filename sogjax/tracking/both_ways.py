@@ -122,7 +122,7 @@ def _valued(
     present: Bool[Array, "camera"] | None,
     capacities: Capacities,
     pose: Float[Array, "dof"],
-    usual: Float[Array, "blob"],
+    usual: Float[Array, "2 blob"],
 ) -> tuple[Float[Array, ""], dict[str, Float[Array, ""]], Judgement]:
     """Energy, terms and doubts of a pose that is known."""
     views, _, _ = tracker.views(cells, TrackState.from_pose(pose), capacities, present)

@@ -39,8 +39,8 @@ class TrackState(eqx.Module):
     previous: Float[Array, "dof"]
     before_previous: Float[Array, "dof"]
     num_known: Int[Array, ""]
-    usual: Float[Array, "blob"] | None = None
-    """How well the blobs' colours fitted so far (`Judgement.usual`); NaN where nothing is known, None: not judged."""
+    usual: Float[Array, "2 blob"] | None = None
+    """What was seen in the blobs' places so far (`Judgement.usual`); NaN where nothing is known, None: not judged."""
 
     @classmethod
     def from_pose(cls, pose: Float[Array, "dof"]) -> "TrackState":

@@ -12,10 +12,11 @@ from sogjax.tracking.limb_evidence import BlobEvidence
 
 FAR = 0.1
 """Metres, mean over the limb's joints: farther off is lost."""
-LEAST_USUAL = 0.0
-"""A blob whose colours fit less than this from the beginning is measured against it: it may never have been right."""
-ADAPTATION, LARGEST_STEP = 0.1, 0.15
-"""How what is usual follows what is seen: a part of the difference, of which no more counts than the step."""
+LEAST_USUAL, MOST_USUAL = 0.0, 0.7
+"""A blob whose colours fit less than the one, or that is more often background than the other, from the beginning, is
+measured against these: it may never have been right."""
+ADAPTATION, LARGEST_STEPS = 0.1, (0.15, 0.1)
+"""How what is usual follows what is seen: a part of the difference, of which no more counts than the steps."""
 UNSEEN = 0.02
 """Part of a blob's area in the pictures below which what is seen of it says little."""
 
@@ -27,9 +28,10 @@ class Weights(NamedTuple):
     worse: float
     """By how much the colours fit worse than usual, log likelihood."""
     contradicted: float
+    """By how much more often than usual the background is seen in the limb's place."""
 
 
-WITH_BACKGROUND = Weights(-6.2, 4.1, 3.7)
+WITH_BACKGROUND = Weights(-6.4, 4.1, 8.8)
 WITHOUT = Weights(-3.1, 3.7, 0.0)
 """Both from `experiments/limb_doubt.py`, which judges each half of the sequences by weights from the other."""
 
@@ -46,28 +48,31 @@ class Judgement(eqx.Module):
 
     doubt: Float[Array, "limb"]
     """How likely each is more than `FAR` off."""
-    usual: Float[Array, "blob"]
-    """What `BlobEvidence.own` usually is, for the next frame; a limb in doubt keeps what it had."""
+    usual: Float[Array, "2 blob"]
+    """What `own` and `contradicted` of `BlobEvidence` usually are, for the next frame; a limb in doubt keeps what
+    it had."""
 
 
 def judgement(
-    limbs: JudgedLimbs, evidence: BlobEvidence, usual: Float[Array, "blob"], has_background: bool
+    limbs: JudgedLimbs, evidence: BlobEvidence, usual: Float[Array, "2 blob"], has_background: bool
 ) -> Judgement:
     """Of the limbs, from the evidence for their blobs and what was usual before (NaN in the first frame)."""
-    usual = jnp.where(jnp.isfinite(usual), usual, evidence.own)
     measures = limb_measures(limbs, evidence, usual)
     doubt = limb_doubt(measures, WITH_BACKGROUND if has_background else WITHOUT)
     trust = 1.0 - jnp.max(jnp.where(limbs.members, doubt[:, None], 0.0), axis=0, initial=0.0)
-    step = jnp.clip(evidence.own - usual, -LARGEST_STEP, LARGEST_STEP)
-    return Judgement(doubt, usual + ADAPTATION * trust * _certainty(evidence) * step)
+    rate = ADAPTATION * trust * _certainty(evidence)
+    seen, known = _seen(evidence), _known(evidence, usual)
+    largest = jnp.asarray(LARGEST_STEPS, known.dtype)[:, None]
+    return Judgement(doubt, known + rate[None] * jnp.clip(seen - known, -largest, largest))
 
 
-def limb_measures(limbs: JudgedLimbs, evidence: BlobEvidence, usual: Float[Array, "blob"]) -> LimbMeasures:
+def limb_measures(limbs: JudgedLimbs, evidence: BlobEvidence, usual: Float[Array, "2 blob"]) -> LimbMeasures:
     """Of the limbs in one frame."""
-    certainty = _certainty(evidence)
+    certainty, (own, contradicted) = _certainty(evidence), _known(evidence, usual)
+    more = evidence.contradicted - jnp.minimum(contradicted, MOST_USUAL)
     return LimbMeasures(
-        worse=-limbs.mean_of_worst(certainty * (evidence.own - jnp.maximum(usual, LEAST_USUAL))),
-        contradicted=-limbs.mean_of_worst(-certainty * evidence.contradicted),
+        worse=-limbs.mean_of_worst(certainty * (evidence.own - jnp.maximum(own, LEAST_USUAL))),
+        contradicted=-limbs.mean_of_worst(-certainty * more),
     )
 
 
@@ -76,6 +81,15 @@ def limb_doubt(measures: LimbMeasures, weights: Weights) -> Float[Array, "*frame
     return jax.nn.sigmoid(
         weights.constant + weights.worse * measures.worse + weights.contradicted * measures.contradicted
     )
+
+
+def _seen(evidence: BlobEvidence) -> Float[Array, "2 blob"]:
+    return jnp.stack([evidence.own, evidence.contradicted])
+
+
+def _known(evidence: BlobEvidence, usual: Float[Array, "2 blob"]) -> Float[Array, "2 blob"]:
+    """What is usual; what is seen where nothing is known yet."""
+    return jnp.where(jnp.isfinite(usual), usual, _seen(evidence))
 
 
 def _certainty(evidence: BlobEvidence) -> Float[Array, "blob"]:

@@ -9,7 +9,7 @@ from jaxtyping import Array, Bool, Float, UInt8
 
 from sogjax.energy.posed import Posed
 from sogjax.energy.windows import Windows
-from sogjax.images.foreground import SUBJECT_UNKNOWN, SubjectColors, own_density, subject_density
+from sogjax.images.foreground import SubjectColors, own_density, subject_density
 from sogjax.model.camera import Camera, distort, near_picture, project
 from sogjax.model.sog import Sog
 from sogjax.tracking.judged_limbs import JudgedLimbs
@@ -22,8 +22,6 @@ DENSITY = 2.0
 """Of a blob's middle along a ray, as in the foreground term."""
 BACKGROUND = -0.3
 """Log odds below which a sample speaks for the background."""
-FOREIGN = 0.1
-"""Where the logarithm of a colour's density is so little above that of any colour, it is not the blob's."""
 BEYOND = 0.2
 """Of the picture's size, outside it, where the lens model still means something."""
 
@@ -34,7 +32,7 @@ class BlobEvidence(NamedTuple):
     own: Float[Array, "blob"]
     """Log likelihood of the colours seen, as the blob's own against any of the subject's; mean of the samples."""
     contradicted: Float[Array, "blob"]
-    """Part of the samples that are background, or of a colour that is not the blob's."""
+    """Part of the samples that are background; 0 where none is known."""
     seen: Float[Array, "blob"]
     """Part of its area in all pictures that is seen."""
 
@@ -69,8 +67,7 @@ def blob_evidence(
     if present is not None:
         inside &= present[:, None, None]
     own = own_density(colors, posed.body.blob_colors[None, :, None])
-    foreign = own < np.log(SUBJECT_UNKNOWN) + FOREIGN
-    against = foreign if windows is None else foreign | (_odds_at(limbs, windows, places) < BACKGROUND)
+    against = jnp.zeros(inside.shape, bool) if windows is None else _odds_at(limbs, windows, places) < BACKGROUND
     areas = jnp.where(seen.mask, seen.sigmas, 0.0) ** 2
     weights = jnp.where(inside, (areas * _visible(limbs, posed.blobs, seen, cameras))[:, :, None], 0.0)
     whole = jnp.sum(weights, axis=(0, 2)) + 1e-6

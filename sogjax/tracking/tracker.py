@@ -89,7 +89,7 @@ class Tracker(eqx.Module):
         """The state with all that a step hands on to the next one, so that every step takes the same."""
         if self.limbs is None or self.reader.subject is None or state.usual is not None:
             return state
-        return replace(state, usual=jnp.full_like(self.body.blob_sigmas, jnp.nan))
+        return replace(state, usual=jnp.full((2, self.body.num_blobs), jnp.nan, self.body.blob_sigmas.dtype))
 
     def predicted(self, state: TrackState) -> Float[Array, "dof"]:
         """Theta_0 of Section 5.3: linear extrapolation of the last two poses."""
@@ -213,7 +213,7 @@ class Tracker(eqx.Module):
     def judged(
         self,
         pose: Float[Array, "dof"],
-        usual: Float[Array, "blob"],
+        usual: Float[Array, "2 blob"],
         windows: Windows | None,
         cells: UInt8[Array, "camera rows columns 3"],
         present: Bool[Array, "camera"] | None = None,
