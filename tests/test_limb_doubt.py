@@ -19,7 +19,7 @@ from sogjax.model.body import concatenate
 from sogjax.tracking.frame import PartialCells
 from sogjax.tracking.judged_limbs import JudgedLimbs
 from sogjax.tracking.limb_doubt import WITH_BACKGROUND, WITHOUT, LimbMeasures, judgement, limb_doubt
-from sogjax.tracking.limb_evidence import blob_evidence
+from sogjax.tracking.limb_evidence import BlobEvidence, blob_evidence
 from sogjax.tracking.limbs import joint_limbs, limb_names, limb_slices
 from sogjax.tracking.scan import track_clip
 from sogjax.tracking.tracker import track
@@ -182,3 +182,14 @@ def test_stretches_join_over_short_gaps_and_short_ones_are_left_out():
     assert found[1].doubt == pytest.approx(0.8)
     assert str(found[1]).startswith(f"leg doubtful in frames {first + 10} to {first + 13}")
     assert doubtful_limbs(walking_motion(3)) == ()
+
+
+def test_background_that_was_always_seen_in_a_limb_s_place_is_no_reason_for_doubt():
+    """Dark shoes on a dark floor: what counts is that more is seen than usual."""
+    limbs = JudgedLimbs.from_body(shipped("dog"))
+    blobs = limbs.members.shape[1]
+    evidence = BlobEvidence(jnp.full(blobs, 1.0), jnp.full(blobs, 0.6), jnp.ones(blobs))
+    fits = jnp.ones(blobs)
+    always = judgement(limbs, evidence, jnp.stack([fits, jnp.full(blobs, 0.6)]), True)
+    suddenly = judgement(limbs, evidence, jnp.stack([fits, jnp.zeros(blobs)]), True)
+    assert float(always.doubt.max()) < 0.05 < 0.2 < float(suddenly.doubt.min())
