@@ -17,8 +17,8 @@ from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import FrameCells, TrackedFrame, TrackState, on_device
 from sogjax.tracking.tracker import Tracker, track
 
-TOGETHER = 0.02
-"""Metres, mean over the blobs of a part: below which two passes agree."""
+TOGETHER, COMPARED = 0.02, 0.03
+"""Metres, mean over the blobs of a part: below the one two passes agree, above the other it is asked which is better."""
 SURE_FRAMES = 3
 """Frames without doubt that lie between two stretches, at least."""
 
@@ -91,7 +91,7 @@ def compared_backwards(
     for k, tracked in enumerate(track(tracker, start, coming(), passed.capacities)):
         row, both = begin - 1 - k, (jnp.asarray(passed.poses[begin - 1 - k]), jnp.asarray(tracked.result.pose))
         apart, gains = np.asarray(_apart(tracker.body, choices.blobs, *both)), np.zeros(len(parts))
-        if apart.max(initial=0.0) > TOGETHER:
+        if apart.max(initial=0.0) > COMPARED:
             cells, present = on_device(seen[k])
             gains = np.asarray(_gains(tracker, cells, tracked.capacities, present, choices, *both))
         found.cells.append(seen[k])

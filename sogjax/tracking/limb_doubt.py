@@ -31,8 +31,8 @@ class Weights(NamedTuple):
     """By how much more often than usual the background is seen in the limb's place."""
 
 
-WITH_BACKGROUND = Weights(-6.4, 4.1, 8.8)
-WITHOUT = Weights(-3.1, 3.7, 0.0)
+WITH_BACKGROUND = Weights(-5.9, 4.0, 5.9)
+WITHOUT = Weights(-3.2, 3.7, 0.0)
 """Both from `experiments/limb_doubt.py`, which judges each half of the sequences by weights from the other."""
 
 
