@@ -17,8 +17,11 @@ from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import FrameCells, TrackedFrame, TrackState, on_device
 from sogjax.tracking.tracker import Tracker, track
 
-TOGETHER, COMPARED = 0.02, 0.03
-"""Metres, mean over the blobs of a part: below the one two passes agree, above the other it is asked which is better."""
+COMPARED, TOGETHER = 0.03, 0.04
+"""Metres, mean over the blobs of a part: above the one it is asked which pass is better, below the other they agree.
+Passes of fast motions lag behind from both sides."""
+MOST_BEFORE = 45
+"""Frames before a stretch in doubt that are tracked backwards, at most."""
 SURE_FRAMES = 3
 """Frames without doubt that lie between two stretches, at least."""
 
@@ -80,7 +83,7 @@ def compared_backwards(
     known, usual = 2 if begin < total else 0, jnp.asarray(passed.usual[after[0]])
     start = TrackState(pose, before, jnp.asarray(known), usual)
     found, seen = Compared([], [], [], []), []
-    lowest = max(0, begin - MOST_FRAMES)
+    lowest = max(0, begin - MOST_FRAMES, first - MOST_BEFORE)
 
     def coming() -> Iterable[FrameCells]:
         for frame in frames(lowest, begin):

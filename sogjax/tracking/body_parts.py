@@ -13,6 +13,9 @@ from sogjax.tracking.culling import actor_of_blobs
 from sogjax.tracking.limbs import limb_blobs, limb_names, limbs
 from sogjax.tracking.mirrored import fitted_to_blobs
 
+ITERATIONS = 8
+"""Of putting a limb in its place: the two poses are near each other."""
+
 
 @dataclass(frozen=True)
 class Part:
@@ -94,4 +97,4 @@ def with_blobs(
     """
     means, others = (body.posed_blobs(each).means for each in (pose, other))
     targets = jnp.where(blobs[..., None], others, means)
-    return fitted_to_blobs(body, jnp.broadcast_to(pose, (len(blobs), len(pose))), targets)[0]
+    return fitted_to_blobs(body, jnp.broadcast_to(pose, (len(blobs), len(pose))), targets, ITERATIONS)[0]

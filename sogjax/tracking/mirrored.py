@@ -101,13 +101,13 @@ def _means(body: Body, poses: Array) -> Float[Array, "start blob 3"]:
 
 @eqx.filter_jit
 def fitted_to_blobs(
-    body: Body, starts: Float[Array, "start dof"], targets: Float[Array, "start blob 3"]
+    body: Body, starts: Float[Array, "start dof"], targets: Float[Array, "start blob 3"], iterations: int = ITERATIONS
 ) -> tuple[Float[Array, "start dof"], Float[Array, "start"]]:
     """Poses whose blobs lie near some points, and how far off they are (metres, root of the mean square)."""
-    return jax.vmap(partial(_fit, body))(starts, targets)
+    return jax.vmap(partial(_fit, body, iterations))(starts, targets)
 
 
-def _fit(body: Body, start: Array, target: Array) -> tuple[Array, Array]:
+def _fit(body: Body, iterations: int, start: Array, target: Array) -> tuple[Array, Array]:
     lower, upper = body.skeleton.dof_lower, body.skeleton.dof_upper
 
     def step(_: Array, pose: Array) -> Array:
@@ -121,6 +121,6 @@ def _fit(body: Body, start: Array, target: Array) -> tuple[Array, Array]:
         move = move / jnp.maximum(jnp.max(jnp.abs(move)) / 0.5, 1.0)
         return jnp.clip(pose + move, lower, upper)
 
-    pose = jax.lax.fori_loop(0, ITERATIONS, step, start)
+    pose = jax.lax.fori_loop(0, iterations, step, start)
     off = body.blobs.points_world(body.skeleton.world_from_joint(pose)) - target
     return pose, jnp.sqrt(jnp.mean(jnp.sum(off * off, axis=-1)))
