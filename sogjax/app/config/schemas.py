@@ -8,6 +8,7 @@ from typing import Any
 
 from sogjax.settings.option import REQUIRED, group, option
 from sogjax.settings.run import OVERWRITE, OutputsConfig
+from sogjax.synth.detector import DetectorSettings
 from sogjax.synth.settings import SynthSettings
 
 _RENDERED = SynthSettings()
@@ -56,7 +57,7 @@ class CheckConfig:
 
 
 @dataclass
-class SynthConfig(SynthSettings):
+class SynthConfig(DetectorSettings, SynthSettings):
     """Render a recording with ground truth."""
 
     out: str = option(REQUIRED, "folder to write")
