@@ -17,6 +17,9 @@ from sogjax.errors import InputError
 
 VIDEO_SUFFIXES = (".mp4", ".avi", ".mkv", ".mov")
 
+SYNCHRONIZED = "synchronized_videos"
+"""FreeMoCap's folder of videos."""
+
 
 @dataclass(frozen=True)
 class SourceInfo:
@@ -37,12 +40,13 @@ class SourceInfo:
 
 
 def find_sources(folder: Path) -> dict[str, Path]:
-    """By camera the video in `videos/` or the folder in `images/`.
+    """By camera the video in `videos/` (of a FreeMoCap recording `synchronized_videos/`) or the folder in `images/`.
 
     Raises:
         InputError: there are none, or a camera has two.
     """
-    found = videos_in(folder / "videos") + [path for path in visible_files(folder / "images") if path.is_dir()]
+    found = videos_in(folder / "videos") or videos_in(folder / SYNCHRONIZED)
+    found += [path for path in visible_files(folder / "images") if path.is_dir()]
     sources: dict[str, Path] = {}
     for path in found:
         camera = path.name if path.is_dir() else path.stem

@@ -37,7 +37,7 @@ def load_keypoints(recording: Recording, folder: Path | None = None, scheme: str
     Args:
         recording: whose cameras and frames count.
         folder: where the files are; None: where `find_keypoints` finds them.
-        scheme: name or file of the scheme; None: told by the content.
+        scheme: name or file of the scheme; None: what the recording says, else told by the content.
 
     Raises:
         InputError: no camera's files can be used, they are of other cameras, or the scheme is unknown.
@@ -47,6 +47,7 @@ def load_keypoints(recording: Recording, folder: Path | None = None, scheme: str
         if folder is not None:
             raise InputError(f"{folder}: holds no keypoints; put CAMERA/*.json, CAMERA.json or CAMERA.npy there")
         return None
+    scheme = scheme or recording.keypoint_scheme
     wanted = None if scheme is None else named_scheme(scheme)
     found, warnings = _read(recording, files)
     check_counts({camera.path: camera.people for camera in found.values()}, wanted)
