@@ -119,6 +119,10 @@ class ExportConfig:
     up: str | None = option(None, "vertical of the motion's world: x y z -x -y -z; null: what the motion says")
     actor: str | None = option(None, "actor or body file of the motion; only needed to read or write a .motion")
     fps: float | None = option(None, "frames per second; only needed to read a .motion")
+    markers: str | None = option(
+        None,
+        "keypoint scheme whose points a .trc has, by name or file: HALPE_26 for Pose2Sim's next steps; null: the bones",
+    )
     overwrite: bool = option(False, OVERWRITE)
 
 
