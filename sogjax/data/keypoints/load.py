@@ -94,7 +94,7 @@ def _of_all(recording: Recording, path: Path) -> dict[str, tuple[Path, Float[np.
     if len(videos) != len(array):
         cameras = counted(len(array), "camera")
         raise InputError(f"{path}: is of {cameras}, the recording has {len(videos)} videos; run the detector again")
-    return {camera: (path, array[videos.index(video)]) for camera, video in recording.sources.items()}
+    return {camera: (path, array[videos.index(recording.sources[camera])]) for camera in recording.rig.names}
 
 
 def _checked(recording: Recording, camera: str, source: Path | tuple[Path, np.ndarray]) -> CameraKeypoints:
