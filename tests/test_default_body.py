@@ -30,8 +30,8 @@ def test_the_papers_counts():
 
 
 def test_landmarks_of_the_file_format():
-    sides = ("shoulder", "elbow", "wrist", "hand", "hip", "knee", "ankle", "toe")
-    expected = {"pelvis", "chest", "neck", "head_top", *(f"{s}_{n}" for s in ("left", "right") for n in sides)}
+    sides = ("shoulder", "elbow", "wrist", "hand", "hip", "knee", "ankle", "heel", "small_toe", "toe", "eye", "ear")
+    expected = {"pelvis", "chest", "neck", "nose", "head_top", *(f"{s}_{n}" for s in ("left", "right") for n in sides)}
     assert set(shipped("human").landmarks.names) == expected
 
 

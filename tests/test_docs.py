@@ -5,6 +5,8 @@ from pathlib import Path
 
 from sogjax.app.config.composition import composed
 from sogjax.data.actor_file import load_body
+from sogjax.data.keypoints import shipped_schemes
+from sogjax.data.keypoints.scheme import load_scheme
 
 GUIDE = Path(__file__).parents[1] / "docs" / "guide"
 
@@ -26,3 +28,11 @@ def test_options_that_the_guide_names_exist():
     assert words
     for word in words:
         composed("track", ["recording=somewhere", word])
+
+
+def test_the_scheme_of_the_guide_is_one_and_all_others_are_named(tmp_path):
+    text = (GUIDE / "keypoints.md").read_text(encoding="utf-8")
+    path = tmp_path / "mine.yaml"
+    path.write_text(re.findall(r"```yaml\n(.*?)```", text, re.S)[0])
+    assert load_scheme(path).keypoints == ("LKnee", "Head")
+    assert all(f"`{name}`" in text and str(scheme.count) in text for name, scheme in shipped_schemes().items())

@@ -9,6 +9,7 @@ import numpy as np
 import pygltflib
 import pytest
 from body_cases import shipped
+from command_line import done, refused
 from scipy.spatial.transform import Rotation
 from test_bvh import BONES, y_up
 from tiny_body import make_body, random_poses
@@ -62,6 +63,35 @@ def test_the_names_that_opensim_knows_are_those_of_the_default_body(tmp_path):
     names = (tmp_path / "rest.trc").read_text().splitlines()[3].split("\t")
     both = [side + joint for side in "LR" for joint in ("Hip", "Knee", "Ankle", "Shoulder", "Elbow", "Wrist")]
     assert {"Hip", "Neck", *both} <= set(names)
+
+
+@pytest.mark.parametrize("up", UPS)
+def test_trc_with_pose2sims_markers(capsys, tmp_path, up):
+    body = shipped("human")
+    poses = np.random.default_rng(0).normal(0.0, 0.3, (5, body.skeleton.num_dofs))
+    motion = dataclasses.replace(motion_from_poses(body, poses, 30.0), up=up)
+    save_motion(tmp_path / "motion.npz", motion)
+    path = tmp_path / "pose-3d" / "trial_0-4.trc"
+    done(capsys, "export", f"motion={tmp_path / 'motion.npz'}", f"to={path}", "markers=HALPE_26")
+    # As Pose2Sim reads it: five lines of header, names in every third column, then numbers.
+    with path.open() as file:
+        header = [next(file).rstrip("\n").split("\t") for _ in range(5)]
+        table = np.loadtxt(file, delimiter="\t")
+    names = [name for name in header[3][2::3] if name.strip()]
+    assert {"Hip", "Neck", "Head", "Nose", "RBigToe", "LHeel", "LSmallToe", "RWrist"} <= set(names)
+    assert len(names) == 26
+    points = table[:, 2:].reshape(5, 26, 3)
+    for name, landmark in {"Hip": "pelvis", "RHeel": "right_heel", "LKnee": "left_knee", "Head": "head_top"}.items():
+        np.testing.assert_allclose(points[:, names.index(name)], y_up(motion.joint(landmark), up), atol=METRES)
+
+
+def test_markers_are_for_trc_and_of_a_known_scheme(capsys, tmp_path, motion):
+    save_motion(tmp_path / "motion.npz", motion)
+    source = f"motion={tmp_path / 'motion.npz'}"
+    assert "markers=HALPE_26" in refused(capsys, "export", source, f"to={tmp_path / 'a.bvh'}", "markers=HALPE_26")
+    assert "'HALPE'" in refused(capsys, "export", source, f"to={tmp_path / 'a.trc'}", "markers=HALPE")
+    assert "landmark 'nose'" in refused(capsys, "export", source, f"to={tmp_path / 'a.trc'}", "markers=HALPE_26")
+    assert not [*tmp_path.glob("a.*")]
 
 
 @pytest.mark.parametrize("up", UPS)

@@ -6,7 +6,8 @@ import jax.numpy as jnp
 
 from sogjax.app.config.schemas import ExportConfig
 from sogjax.data.calibration import CameraRig, load_calibration, save_calibration
-from sogjax.data.export import export_motion
+from sogjax.data.export import export_motion, write_markers
+from sogjax.data.keypoints import named_scheme
 from sogjax.data.motion import DEFAULT_UP, Motion, load_motion
 from sogjax.data.recording import open_recording
 from sogjax.data.skeletool_motion import read_skeletool_motion, write_skeletool_motion
@@ -41,8 +42,13 @@ def _rig(path: Path) -> CameraRig:
 def _export_motion(config: ExportConfig, source: Path, out: Path) -> None:
     if config.up not in (None, *UP_AXES):
         raise InputError(f"up={config.up}: must be one of {', '.join(UP_AXES)}")
+    if config.markers is not None and out.suffix.lower() != ".trc":
+        raise InputError(f"markers={config.markers}: only a .trc has markers; leave it out, or write to=NAME.trc")
+    scheme = None if config.markers is None else named_scheme(config.markers)
     motion = _read_motion(config, source)
-    if out.suffix.lower() == ".motion":
+    if scheme is not None:
+        write_markers(out, motion, scheme, config.up or motion.up)
+    elif out.suffix.lower() == ".motion":
         write_skeletool_motion(out, motion, _actor(config, out))
     else:
         export_motion(motion, out, config.up)

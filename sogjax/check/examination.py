@@ -23,6 +23,7 @@ from sogjax.check.frames import (
 )
 from sogjax.check.hypotheses import unit_rig
 from sogjax.check.jumps import Jump, find_jumps
+from sogjax.check.keypoints import keypoint_findings
 from sogjax.check.motion import motion_of, with_rig
 from sogjax.check.places import place_findings, references_of
 from sogjax.check.scale import scale_findings, subject_size
@@ -96,6 +97,7 @@ def examined(recording: Recording, start: int, frames: int, largest_offset: int,
     findings += scale_findings(size, geometry, unit)
     gains, told = _exposure(names, photographed, filmed)
     findings += told
+    findings += keypoint_findings(recording, start, clip.num_frames)
     numbers = {
         "recording": str(recording.path),
         "up": recording.up,

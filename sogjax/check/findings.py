@@ -14,7 +14,8 @@ class Finding:
     severity: str
     """One of `SEVERITIES`."""
     topic: str
-    """What was checked: files, cameras, unit, vertical, calibration, frames, synchronisation, exposure."""
+    """What was checked: files, cameras, unit, vertical, calibration, frames, synchronisation, exposure,
+    keypoints."""
     what: str
     cause: str = ""
     """The likely one; empty where nothing is wrong."""

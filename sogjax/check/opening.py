@@ -5,9 +5,10 @@ from pathlib import Path
 from typing import TypeVar
 
 from sogjax.check.findings import Finding
-from sogjax.data.calibration import CameraRig, find_calibrations, load_calibration
+from sogjax.data.calibration import CameraRig, load_calibration
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.initial_pose import read_initial_poses
+from sogjax.data.projects import Project, calibrations_of, named_as_sources, named_calibration, project_in
 from sogjax.data.recording_settings import RecordingSettings, read_recording_settings
 from sogjax.data.source import find_sources, look_at_source
 from sogjax.data.stills import check_size, find_background, find_example_poses
@@ -28,8 +29,11 @@ def opening_problems(path: Path, first: InputError) -> list[Finding]:
             return None
 
     settings = tried(lambda: read_recording_settings(path / "recording.yaml")) or RecordingSettings()
-    rig = tried(lambda: _rig(path, settings))
+    project = tried(lambda: project_in(path))
+    settings = project.filled_in(settings) if project else settings
     sources = tried(lambda: find_sources(path)) or {}
+    rig = tried(lambda: _rig(path, settings, project))
+    rig = named_as_sources(rig, sources, project) if rig is not None else None
     for camera, source in sources.items():
         info = tried(lambda source=source: look_at_source(source))
         if info is not None and rig is not None and camera in rig.names:
@@ -45,9 +49,10 @@ def opening_problems(path: Path, first: InputError) -> list[Finding]:
     return [_finding(sentence) for sentence in said]
 
 
-def _rig(path: Path, settings: RecordingSettings) -> CameraRig | None:
+def _rig(path: Path, settings: RecordingSettings, project: Project | None) -> CameraRig | None:
     """The cameras, where it is clear which calibration counts; the recording's own opening complains otherwise."""
-    named = [path / settings.calibration] if settings.calibration else find_calibrations(path)
+    given = settings.calibration
+    named = [named_calibration(path, given, project)] if given else calibrations_of(path, project)
     return load_calibration(named[0], settings.unit) if len(named) == 1 else None
 
 

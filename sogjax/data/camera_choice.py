@@ -64,8 +64,16 @@ def _refuse_other_name(
 
 def folder_around(path: Path) -> str:
     """The remedy if something inside a recording was given instead of it; else empty."""
-    inside = path.is_file() or path.name in ("videos", "images", "background", "example_poses")
+    inside = path.is_file() or path.name in (
+        "videos",
+        "images",
+        "background",
+        "example_poses",
+        "keypoints",
+        "pose",
+        "synchronized_videos",
+    )
     for folder in path.resolve().parents[:2] if inside else ():
-        if any((folder / name).is_dir() for name in ("videos", "images")):
+        if any((folder / name).is_dir() for name in ("videos", "images", "synchronized_videos")):
             return f"give the folder of the recording, {folder}"
     return ""

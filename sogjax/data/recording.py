@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from sogjax.data.calibration import CameraRig, find_calibrations, load_calibration
+from sogjax.data.calibration import CameraRig, load_calibration
 from sogjax.data.camera_choice import chosen_cameras, folder_around
 from sogjax.data.color_gains import ColorGains
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.initial_pose import read_initial_poses
+from sogjax.data.projects import Project, calibrations_of, named_as_sources, named_calibration, project_in
 from sogjax.data.recording_frames import TimedImages, frame_rate, frames_in_common, images_by_time, uneven
 from sogjax.data.recording_settings import RecordingSettings, read_recording_settings
 from sogjax.data.source import find_sources, look_at_source
@@ -62,6 +63,8 @@ class Recording:
     """By camera the first and last frame (its own numbers) of each while in which its pictures are not to be used."""
     color_gains: dict[str, ColorGains] = field(default_factory=dict)
     """By camera the factors of its pictures; without an entry they stay as recorded."""
+    keypoint_scheme: str | None = None
+    """Name or file of the scheme that keypoint files beside it follow; None: told by their content."""
     fewest_cameras: int | None = None
     """Frames that so many cameras have are used; None: only those that all have."""
 
@@ -97,10 +100,11 @@ def open_recording(path: Path) -> Recording:
     if not path.is_dir():
         what = "this is a file" if path.is_file() else "there is no such folder"
         raise InputError(f"{path}: {what}; {folder_around(path) or 'give the folder of a recording'}")
-    settings = read_recording_settings(path / "recording.yaml")
-    calibration = _calibration(path, settings)
-    calibrated = load_calibration(calibration, settings.unit)
+    given, project = read_recording_settings(path / "recording.yaml"), project_in(path)
+    settings = project.filled_in(given) if project else given
+    calibration = _calibration(path, settings, project)
     sources = find_sources(path)
+    calibrated = named_as_sources(load_calibration(calibration, settings.unit), sources, project)
     cameras = chosen_cameras(path, calibration, settings, calibrated.names, sources)
     rig = calibrated.select(cameras)
     sources = {camera: sources[camera] for camera in cameras}
@@ -139,22 +143,27 @@ def open_recording(path: Path) -> Recording:
         ),
         initial_poses=_initial_poses(path / "initial_pose.yaml"),
         ground_truth=_ground_truth(path / "ground_truth.npz"),
-        warnings=(*warnings, *_doubts(path, settings, rig), *uneven(sources, infos, timed, settings.fewest_cameras)),
+        warnings=(
+            *warnings,
+            *_doubts(path, given, rig, project),
+            *uneven(sources, infos, timed, settings.fewest_cameras),
+        ),
         num_images=counts,
         picked={camera: images.picked for camera, images in timed.items()},
         missing=_missing(settings, cameras, timed, offsets),
         color_gains={camera: settings.color_gains[camera] for camera in cameras if camera in settings.color_gains},
+        keypoint_scheme=_scheme(path, settings.keypoint_scheme),
         fewest_cameras=settings.fewest_cameras,
     )
 
 
-def _calibration(path: Path, settings: RecordingSettings) -> Path:
+def _calibration(path: Path, settings: RecordingSettings, project: Project | None) -> Path:
     if settings.calibration is not None:
-        named = path / settings.calibration
+        named = named_calibration(path, settings.calibration, project)
         if not named.is_file():
             raise InputError(f"{path / 'recording.yaml'}: calibration: there is no file {named}; correct the name")
         return named
-    found = find_calibrations(path)
+    found = calibrations_of(path, project)
     if not found:
         raise InputError(f"{path}: holds no calibration file; {folder_around(path) or 'add calibration.toml'}")
     if len(found) > 1:
@@ -175,6 +184,11 @@ def _missing(
     return missing
 
 
+def _scheme(path: Path, named: str | None) -> str | None:
+    """The scheme that recording.yaml names, a file beside it by its path."""
+    return str(path / named) if named is not None and (path / named).is_file() else named
+
+
 def _initial_poses(path: Path) -> Path | None:
     if not path.exists():
         return None
@@ -189,10 +203,12 @@ def _ground_truth(path: Path) -> Path | None:
     return path
 
 
-def _doubts(path: Path, settings: RecordingSettings, rig: CameraRig) -> tuple[str, ...]:
-    """Sentences on what may be wrong."""
+def _doubts(path: Path, settings: RecordingSettings, rig: CameraRig, project: Project | None) -> tuple[str, ...]:
+    """Sentences on what may be wrong; `settings` are those of recording.yaml alone."""
     doubts = []
-    if settings.up is None:
+    if project is not None and settings.up is None:
+        doubts += [project.doubt] if project.doubt else []
+    elif settings.up is None:
         doubts.append(f"{path}: does not give the vertical; {DEFAULT_UP} is assumed (`up:` in recording.yaml)")
     distances = np.linalg.norm(np.asarray(rig.cameras.camera_from_world)[:, :3, 3], axis=-1)
     if distances.max() > FAR_CAMERA:

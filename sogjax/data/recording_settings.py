@@ -34,6 +34,7 @@ _KEYS = (
     "missing",
     "color_gains",
     "example_poses",
+    "keypoint_scheme",
 )
 
 
@@ -57,6 +58,7 @@ class RecordingSettings:
     color_gains: dict[str, ColorGains] = field(default_factory=dict)
     """By camera."""
     example_poses: tuple[ExampleSettings, ...] | None = None
+    keypoint_scheme: str | None = None
 
     @property
     def by_camera(self) -> dict[str, dict[str, Any]]:
@@ -87,6 +89,7 @@ def read_recording_settings(path: Path) -> RecordingSettings:
         missing=_missing(given["missing"]) if "missing" in given else {},
         color_gains=_gains(given["color_gains"]) if "color_gains" in given else {},
         example_poses=read_examples(given["example_poses"]) if "example_poses" in given else None,
+        keypoint_scheme=_file_name(given["keypoint_scheme"]) if "keypoint_scheme" in given else None,
     )
 
 

@@ -17,6 +17,9 @@ from sogjax.errors import InputError
 
 VIDEO_SUFFIXES = (".mp4", ".avi", ".mkv", ".mov")
 
+SYNCHRONIZED = "synchronized_videos"
+"""FreeMoCap's folder of videos."""
+
 
 @dataclass(frozen=True)
 class SourceInfo:
@@ -37,14 +40,13 @@ class SourceInfo:
 
 
 def find_sources(folder: Path) -> dict[str, Path]:
-    """By camera the video in `videos/` or the folder in `images/`.
+    """By camera the video in `videos/` (of a FreeMoCap recording `synchronized_videos/`) or the folder in `images/`.
 
     Raises:
         InputError: there are none, or a camera has two.
     """
-    videos, images = folder / "videos", folder / "images"
-    found = [path for path in visible_files(videos) if path.is_file() and path.suffix.lower() in VIDEO_SUFFIXES]
-    found += [path for path in visible_files(images) if path.is_dir()]
+    found = videos_in(folder / "videos") or videos_in(folder / SYNCHRONIZED)
+    found += [path for path in visible_files(folder / "images") if path.is_dir()]
     sources: dict[str, Path] = {}
     for path in found:
         camera = path.name if path.is_dir() else path.stem
@@ -57,6 +59,11 @@ def find_sources(folder: Path) -> dict[str, Path]:
             f"{folder}: has no videos; put videos/CAMERA.mp4 ({endings}) or images/CAMERA/000000.png there"
         )
     return sources
+
+
+def videos_in(folder: Path) -> list[Path]:
+    """The videos in a folder, sorted by name."""
+    return [path for path in visible_files(folder) if path.is_file() and path.suffix.lower() in VIDEO_SUFFIXES]
 
 
 def open_source(path: Path, start: int = 0, threads: int = 1, picked: Sequence[int] | None = None) -> ImageStream:

@@ -10,6 +10,7 @@ from sogjax.actor.make import MadeActor
 from sogjax.data.initial_pose import InitialPose, load_initial_poses
 from sogjax.data.recording import Recording
 from sogjax.energy import Term
+from sogjax.engine.keypoint_start import keypoint_start
 from sogjax.engine.pose_search import Beginning, PoseSearch, tried_frames
 from sogjax.engine.terminal import say
 from sogjax.engine.unsure_picture import write_unsure_picture
@@ -72,13 +73,18 @@ def first_poses(
 ) -> list[Float[Array, "dof"]]:
     """The poses of bodies, upright in the recording's world, in a frame counted from the recording's first.
 
-    Where they are searched for and not clear in that frame, they are searched for in later ones (before `last`) and
+    Without a file, keypoints beside the recording give the pose of a single actor; all others are searched for. Where
+    they are searched for and not clear in that frame, they are searched for in later ones (before `last`) and
     followed back.
 
     Raises:
         InputError: the file is invalid, or the actors are not found in the pictures.
     """
     descriptions = rough_descriptions(recording, bodies, config)
+    if descriptions is None and config.initial_pose is None and len(bodies) == 1:
+        known = keypoint_start(recording, bodies[0], frame)
+        if known is not None:
+            return [known]
     if descriptions is None:
         search = PoseSearch(recording, bodies, config, terms)
         beginning = clear_beginning(search, frame, recording.num_frames if last is None else last)

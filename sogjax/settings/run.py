@@ -38,7 +38,9 @@ class TrackConfig:
     )
     body: str = option("human", "body that actors are made from: human, dog, or a body file")
     initial_pose: str | None = option(
-        None, "auto: search | file with a rough pose; null: the recording's initial_pose.yaml, else auto"
+        None,
+        "auto: search | file with a rough pose; null: the recording's initial_pose.yaml, else its keypoints if there "
+        "is one actor, else auto",
     )
     start: int = option(0, "first frame to track, counted from the recording's first")
     stop: int | None = option(None, "frame before which to stop; null: the end")

@@ -7,11 +7,17 @@ from dataclasses import asdict
 from pathlib import Path
 
 from sogjax.errors import InputError
+from sogjax.synth.detector import DetectorSettings
+from sogjax.synth.keypoints import write_simulated
 from sogjax.synth.render import Progress, render_recording, silent
 from sogjax.synth.settings import SynthSettings
+from sogjax.synth.stage import stage_of
 
 SYNTH_VERSION = 2
 """Raise it with every change that alters the pictures."""
+
+KEYPOINT_VERSION = 1
+"""Raise it with every change that alters simulated keypoints."""
 
 _CHOICES = ("props", "outfit", "room", "light_drift")
 """Settings that name no recording while they have their defaults."""
@@ -51,3 +57,21 @@ def cached_recording(settings: SynthSettings, cache_dir: Path | None = None, pro
         if folder.is_dir() and any(folder.iterdir()):  # another process was faster
             return folder
         raise
+
+
+def cached_keypoints(settings: SynthSettings, detector: DetectorSettings, cache_dir: Path | None = None) -> Path:
+    """The folder with the keypoint files of a rendered recording, simulated now if they are not there yet.
+
+    Raises:
+        InputError: a setting is wrong, or the folder cannot be written.
+    """
+    settings.check()
+    detector.check()
+    content = json.dumps({"version": KEYPOINT_VERSION, **asdict(detector)}, sort_keys=True)
+    name = f"{cache_name(settings)}-{hashlib.sha256(content.encode()).hexdigest()[:12]}"
+    folder = (cache_dir or default_cache_dir()) / "keypoints" / name
+    whole = folder / ".whole"
+    if not whole.is_file():
+        write_simulated(stage_of(settings), detector, folder)
+        whole.touch()
+    return folder

@@ -29,6 +29,15 @@ _SIDE_LANDMARKS: dict[str, tuple[str, Offset]] = {
 }
 """Landmark: joint and offset from it, metres on a person of average stature."""
 
+_FACE_AND_FEET: dict[str, tuple[str, Offset]] = {"nose": ("head", (0.118, 0.0, 0.025))}
+_SIDE_FACE_AND_FEET: dict[str, tuple[str, Offset]] = {
+    "eye": ("head", (0.096, 0.033, 0.058)),
+    "ear": ("head", (-0.004, 0.088, 0.04)),
+    "heel": ("ankle", (-0.066, 0.0, -0.045)),
+    "small_toe": ("toe", (0.0, 0.042, -0.004)),
+}
+"""What keypoint detectors find besides the landmarks."""
+
 _MARKERS: dict[str, tuple[str, str, Offset]] = {
     "head_front": ("head", "head", (0.11, 0.0, 0.09)),
     "head_back": ("head", "head", (-0.11, 0.0, 0.08)),
@@ -71,14 +80,34 @@ def _two_sided(centre: dict, side: dict) -> dict:
 
 
 LANDMARKS: dict[str, tuple[str, Offset]] = _two_sided(_LANDMARKS, _SIDE_LANDMARKS)
+KEYPOINTS: dict[str, tuple[str, Offset]] = LANDMARKS | _two_sided(_FACE_AND_FEET, _SIDE_FACE_AND_FEET)
+"""What the keypoints of a scheme are points of."""
 MARKERS: dict[str, tuple[str, str, Offset]] = _two_sided(_MARKERS, _SIDE_MARKERS)
 
 
 def landmark_points(anatomy: Anatomy, pose: Pose) -> Float[np.ndarray, "landmark 3"]:
     """The landmarks in the world, in the order of `LANDMARKS`."""
+    return _points(anatomy, pose, LANDMARKS)
+
+
+def keypoint_points(
+    anatomy: Anatomy, pose: Pose, shifts: Float[np.ndarray, "keypoint 3"]
+) -> Float[np.ndarray, "keypoint 3"]:
+    """What keypoints are of, in the world, in the order of `KEYPOINTS`; shifted in their joints' frames, metres."""
+    return _points(anatomy, pose, KEYPOINTS, shifts)
+
+
+def _points(
+    anatomy: Anatomy,
+    pose: Pose,
+    table: dict[str, tuple[str, Offset]],
+    shifts: Float[np.ndarray, "point 3"] | None = None,
+) -> Float[np.ndarray, "point 3"]:
     frames = anatomy.world_from_joint(pose)
     scale = anatomy.stature / _AVERAGE_STATURE
-    return np.stack([_point(frames, joint, scale * np.array(offset)) for joint, offset in LANDMARKS.values()])
+    moved = np.zeros((len(table), 3)) if shifts is None else shifts
+    places = zip(table.values(), moved, strict=True)
+    return np.stack([_point(frames, joint, scale * np.array(offset) + shift) for (joint, offset), shift in places])
 
 
 def marker_vertices(figure: Figure) -> Int[np.ndarray, "marker"]:

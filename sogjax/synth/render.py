@@ -14,8 +14,10 @@ from sogjax.data.ground_truth import GroundTruth, save_ground_truth
 from sogjax.errors import InputError
 from sogjax.synth.anatomy import Anatomy, Pose
 from sogjax.synth.crew import film_all, num_workers
+from sogjax.synth.detector import DetectorSettings
 from sogjax.synth.exercises import EXAMPLE_POSES
 from sogjax.synth.filming import example_folder, num_pictures
+from sogjax.synth.keypoints import keypoint_folder, write_simulated
 from sogjax.synth.landmarks import LANDMARKS, MARKERS, landmark_points, marker_vertices
 from sogjax.synth.settings import SynthSettings
 from sogjax.synth.stage import Stage, stage_of
@@ -35,7 +37,11 @@ def silent(items: Iterable, total: int, label: str) -> Iterable:
 
 
 def render_recording(
-    settings: SynthSettings, out: Path, progress: Progress = silent, workers: int | None = None
+    settings: SynthSettings,
+    out: Path,
+    progress: Progress = silent,
+    workers: int | None = None,
+    detector: DetectorSettings | None = None,
 ) -> Path:
     """Render a recording into the folder `out`, which appears when it is whole.
 
@@ -44,6 +50,7 @@ def render_recording(
         out: a folder that does not exist yet, or is empty.
         progress: wraps the pictures to count them.
         workers: processes to use; by default one per core, and one for short recordings.
+        detector: what finds keypoints in the pictures; None: nothing does.
 
     Raises:
         InputError: a setting is wrong, or `out` cannot be used.
@@ -55,6 +62,8 @@ def render_recording(
     temporary = _temporary_beside(out)
     try:
         _write_descriptions(stage, temporary)
+        if detector is not None and detector.keypoints != "none":
+            write_simulated(stage, detector, temporary / keypoint_folder(detector))
         pictures = num_pictures(settings)
         workers = workers or num_workers(pictures, settings.cameras)
         for _ in progress(film_all(stage, temporary, workers), pictures, "rendering"):

@@ -150,7 +150,7 @@ def fit_landmarks(
     start = placed(body, start, root_position(body, start) + np.asarray(centre - middle, float))
     headings = [None] if keep_heading else np.arange(NUM_HEADINGS) * 2.0 * np.pi / NUM_HEADINGS - np.pi
     starts = jnp.stack([start if h is None else turned(body, start, float(h), up) for h in headings])
-    fitted, costs = _fit_all(body, starts, indices, targets, _spread(body))
+    fitted, costs = _fit_all(body, starts, indices, targets, dof_spread(body))
     return fitted[jnp.argmin(jnp.where(jnp.isfinite(costs), costs, jnp.inf))]
 
 
@@ -178,7 +178,7 @@ def landmark_targets(
     return indices, jnp.array(list(landmarks.values()), body.landmarks.offsets.dtype)
 
 
-def _spread(body: Body) -> Float[Array, "dof"]:
+def dof_spread(body: Body) -> Float[Array, "dof"]:
     """How far each degree of freedom may lie from the start pose."""
     spread = jnp.full(body.skeleton.num_dofs, POSE_SPREAD, body.skeleton.offsets.dtype)
     root = [dof for revolute in (False, True) for _, dof, _ in _root_dofs(body, revolute)]

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import skeleton_cases
 from bad_inputs import make_workplace
+from keypoint_cases import write_keypoints
 
 from sogjax.data.actor_file import load_body
 from sogjax.data.array_log import ArrayLog
@@ -16,6 +17,9 @@ from sogjax.data.cell_cache import cell_cache
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.image_file import read_image, read_mask
 from sogjax.data.initial_pose import load_initial_poses
+from sogjax.data.keypoints.arrays import read_keypoint_array
+from sogjax.data.keypoints.camera_keypoints import read_camera
+from sogjax.data.keypoints.scheme import load_scheme
 from sogjax.data.motion import load_motion
 from sogjax.data.motion_log import MotionLog
 from sogjax.data.recording import open_recording
@@ -36,7 +40,8 @@ CELLS = np.arange(4 * 3 * 6 * 8 * 3, dtype=np.uint8).reshape(4, 3, 6, 8, 3)
 def readers(place: Path) -> dict[str, tuple[Path, Read]]:
     """By name: a good file in `place`, where it is written now, and what reads it."""
     make_workplace(place)
-    return _recordings(place) | _calibrations(place) | _skeletons(place) | _runs(place) | _pictures(place)
+    files = _recordings(place) | _calibrations(place) | _skeletons(place) | _keypoints(place)
+    return files | _runs(place) | _pictures(place)
 
 
 def _recordings(place: Path) -> dict[str, tuple[Path, Read]]:
@@ -75,6 +80,18 @@ def _skeletons(place: Path) -> dict[str, tuple[Path, Read]]:
         "skeleton, hierarchy of a BVH": (place / "its.bvh", lambda path: read_skeleton(path, unit="cm")),
         "motion, Skeletool .motion": (place / "its.motion", lambda path: read_skeletool_motion(path, body, 25.0)),
     }
+
+
+def _keypoints(place: Path) -> dict[str, tuple[Path, Read]]:
+    found: dict[str, tuple[Path, Read]] = {}
+    for program in ("openpose", "mmpose", "alphapose"):
+        write_keypoints(place / program, program, cameras=("a",), scheme="COCO_17", frames=1)
+        found[f"keypoints, {program}"] = (next((place / program).rglob("*.json")), read_camera)
+    write_keypoints(place / "mediapipe", "mediapipe", cameras=("a",))
+    found["keypoints, npy"] = (place / "mediapipe/a.npy", read_keypoint_array)
+    scheme = place / "scheme.yaml"
+    scheme.write_text("name: A\ncount: 2\nkeypoints:\n  - {name: N, index: 1, landmark: nose, within: 0.03}\n")
+    return found | {"keypoints, scheme": (scheme, load_scheme)}
 
 
 def _runs(place: Path) -> dict[str, tuple[Path, Read]]:

@@ -8,6 +8,7 @@ from typing import Any
 
 from sogjax.settings.option import REQUIRED, group, option
 from sogjax.settings.run import OVERWRITE, OutputsConfig
+from sogjax.synth.detector import DetectorSettings
 from sogjax.synth.settings import SynthSettings
 
 _RENDERED = SynthSettings()
@@ -56,7 +57,7 @@ class CheckConfig:
 
 
 @dataclass
-class SynthConfig(SynthSettings):
+class SynthConfig(DetectorSettings, SynthSettings):
     """Render a recording with ground truth."""
 
     out: str = option(REQUIRED, "folder to write")
@@ -118,6 +119,10 @@ class ExportConfig:
     up: str | None = option(None, "vertical of the motion's world: x y z -x -y -z; null: what the motion says")
     actor: str | None = option(None, "actor or body file of the motion; only needed to read or write a .motion")
     fps: float | None = option(None, "frames per second; only needed to read a .motion")
+    markers: str | None = option(
+        None,
+        "keypoint scheme whose points a .trc has, by name or file: HALPE_26 for Pose2Sim's next steps; null: the bones",
+    )
     overwrite: bool = option(False, OVERWRITE)
 
 

@@ -2,8 +2,12 @@
 
 from pathlib import Path
 
+import numpy as np
+from jaxtyping import Float
+
 from sogjax.data.atomic import atomic_path
-from sogjax.data.export.bones import bone_frames, bones_of, frame_time
+from sogjax.data.export.bones import bone_frames, bones_of, frame_time, world_turn
+from sogjax.data.keypoints.scheme import KeypointScheme
 from sogjax.data.motion import Motion
 
 _JOINTS = {"hip": "Hip", "knee": "Knee", "ankle": "Ankle", "shoulder": "Shoulder", "elbow": "Elbow", "wrist": "Wrist"}
@@ -22,7 +26,25 @@ def write_trc(path: Path, motion: Motion, up: str = "z") -> None:
     rate = 1.0 / frame_time(path, motion)
     bones = bones_of(motion)
     _, positions = bone_frames(motion, bones, up, "y")
-    names = [OPENSIM_NAMES.get(name, name) for name in bones.names]
+    _write(path, motion, rate, [OPENSIM_NAMES.get(name, name) for name in bones.names], positions)
+
+
+def write_markers(path: Path, motion: Motion, scheme: KeypointScheme, up: str = "z") -> None:
+    """Write the points of a keypoint scheme under its names, as Pose2Sim's triangulation does.
+
+    Its X, Y, Z are Y, Z, X of a world with z up.
+
+    Raises:
+        InputError: the motion lacks a point (one of an earlier version may), or what `write_trc` refuses.
+    """
+    rate = 1.0 / frame_time(path, motion)
+    points = np.stack([motion.joint(name).astype(float) for name in scheme.landmarks], axis=1)
+    _write(path, motion, rate, list(scheme.keypoints), points @ world_turn(up, "y").T)
+
+
+def _write(
+    path: Path, motion: Motion, rate: float, names: list[str], positions: Float[np.ndarray, "frame marker 3"]
+) -> None:
     count, first = motion.num_frames, int(motion.frame[0])
     header = [
         ["PathFileType", "4", "(X/Y/Z)", path.name],

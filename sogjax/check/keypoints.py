@@ -1,0 +1,90 @@
+"""Keypoint files beside a recording: what is there, and whether the cameras agree about the people."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from sogjax.check.findings import Finding, listed
+from sogjax.data.keypoints import Keypoints, load_keypoints
+from sogjax.data.recording import Recording
+from sogjax.errors import InputError
+from sogjax.tracking.keypoint_people import SAME_PERSON, triangulated_people
+from sogjax.tracking.triangulation import Rays, distances, poses_of, rays_of
+
+SURE = 0.3
+"""Confidence of the keypoints that are compared."""
+FEWEST = 20
+"""Keypoints of a camera that are compared at least."""
+AGREES, DISAGREES = 0.6, 0.3
+"""Shares of a camera's keypoints near the person whom all cameras see together: of most cameras, of a wrong one."""
+MOST_FRAMES = 30
+
+
+def keypoint_findings(recording: Recording, start: int, frames: int) -> list[Finding]:
+    """What there is of keypoints, what of it cannot be used, and cameras whose keypoints are of other pictures.
+
+    Args:
+        recording: whose files are looked at.
+        start: the first frame that is compared, counted from the recording's first.
+        frames: how many at most.
+    """
+    try:
+        keypoints = load_keypoints(recording)
+    except InputError as error:
+        return [Finding("warning", "keypoints", str(error))]
+    if keypoints is None:
+        return []
+    findings = [Finding("warning", "keypoints", warning) for warning in keypoints.warnings]
+    chosen = np.unique(np.linspace(start, start + frames - 1, min(frames, MOST_FRAMES)).astype(int))
+    shares = agreement(keypoints, recording, chosen)
+    wrong = suspects(keypoints.cameras, shares)
+    for name in wrong:
+        share = 100 * shares[keypoints.cameras.index(name)]
+        findings.append(
+            Finding(
+                "warning",
+                "keypoints",
+                f"only {share:.0f} % of the keypoints of {name} are on the person whom the other cameras see",
+                "files of another camera, clip or picture size, or a camera whose calibration or time is wrong",
+                f"run the detector on the recorded pictures of {name}, or remove its files",
+                (name,),
+            )
+        )
+    if not wrong:
+        seen = 100.0 * (keypoints.confidence > 0.0).any((2, 3)).mean()
+        found = f"{keypoints.scheme.name} of {listed(keypoints.seeing)}: somebody in {seen:.0f} % of the pictures"
+        findings.append(Finding("ok", "keypoints", found))
+    return findings
+
+
+def agreement(
+    keypoints: Keypoints, recording: Recording, frames: Sequence[int] | np.ndarray
+) -> Float[np.ndarray, "camera"]:
+    """By camera the share of its sure keypoints on the person whom all see together; NaN where too few are seen."""
+    rig = recording.rig
+    some = Keypoints(keypoints.scheme, keypoints.cameras, keypoints.points[:, np.asarray(frames, int)])
+    points = triangulated_people(some, rig).points[:, 0]
+    cameras, count, persons, number = some.confidence.shape
+    rays = rays_of(rig, some.pixels.reshape(cameras, -1, 2)).reshape(cameras, count, persons, number, 2)
+    near, total = np.zeros(cameras), np.zeros(cameras)
+    for camera, pose in enumerate(poses_of(rig)):
+        for frame in range(count):
+            known = np.isfinite(points[frame]).all(-1)
+            weights = some.confidence[camera, frame] * known
+            views = Rays(np.repeat(pose[None], persons, axis=0), rays[camera, frame], weights.astype(float))
+            misses = distances(views, np.where(known[:, None], points[frame], 0.0))
+            sure = weights >= SURE
+            hits = ((misses < SAME_PERSON) & sure).sum(-1)
+            best = int(hits.argmax())
+            near[camera] += hits[best]
+            total[camera] += sure[best].sum()
+    return np.where(total >= FEWEST, near / np.maximum(total, 1.0), np.nan)
+
+
+def suspects(cameras: Sequence[str], shares: Float[np.ndarray, "camera"]) -> list[str]:
+    """Cameras that disagree where most others agree; of two cameras nobody can tell which is wrong."""
+    told = shares[np.isfinite(shares)]
+    if len(told) < 3 or np.median(told) < AGREES:
+        return []
+    return [name for name, share in zip(cameras, shares, strict=True) if share < DISAGREES]

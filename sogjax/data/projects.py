@@ -1,0 +1,115 @@
+"""Folders of other programs that are recordings as they are: projects of Pose2Sim, recordings of FreeMoCap."""
+
+import tomllib
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from sogjax.data.calibration import CameraRig, find_calibrations
+from sogjax.data.name_match import matched_names
+from sogjax.data.recording_settings import FASTEST, RecordingSettings
+from sogjax.data.source import SYNCHRONIZED
+from sogjax.data.text_lines import read_text
+from sogjax.errors import InputError
+
+CONFIG = "Config.toml"
+"""Of Pose2Sim; a trial's stands in its folder, those of participant and session in the folders around it."""
+
+MAX_BYTES = 2**20
+
+
+@dataclass(frozen=True)
+class Project:
+    """What another program's folder says by its form, where recording.yaml does not."""
+
+    program: str
+    calibrations: tuple[Path, ...]
+    unit: str
+    """Of the calibration's lengths."""
+    up: str
+    fps: float | None = None
+    doubt: str = ""
+    """A sentence on what may be wrong."""
+
+    def filled_in(self, settings: RecordingSettings) -> RecordingSettings:
+        """The settings of recording.yaml with the project's where a key is absent."""
+        return replace(
+            settings,
+            unit=settings.unit or self.unit,
+            up=settings.up or self.up,
+            fps=settings.fps or self.fps,
+        )
+
+
+def project_in(path: Path) -> Project | None:
+    """The project of another program in a folder; None where it is none.
+
+    Raises:
+        InputError: its configuration cannot be read.
+    """
+    if (path / CONFIG).is_file():
+        return _pose2sim(path)
+    if (path / SYNCHRONIZED).is_dir():
+        return _freemocap(path)
+    return None
+
+
+def calibrations_of(path: Path, project: Project | None) -> list[Path]:
+    """The calibrations of a recording: in its folder, else where the project has them."""
+    return find_calibrations(path) or [*(project.calibrations if project else ())]
+
+
+def named_calibration(path: Path, name: str, project: Project | None) -> Path:
+    """The calibration that recording.yaml names: in the recording's folder, or where the project has it."""
+    others = project.calibrations if project else ()
+    return next((file for file in others if file.name == name and not (path / name).is_file()), path / name)
+
+
+def named_as_sources(rig: CameraRig, sources: dict[str, Path], project: Project | None) -> CameraRig:
+    """The rig of a project with cameras named as their videos are: `cam01` where the calibration has int_cam01_img."""
+    if project is None:
+        return rig
+    names = {calibrated: video for video, calibrated in matched_names(sources, rig.names).items()}
+    return CameraRig(tuple(names.get(name, name) for name in rig.names), rig.cameras)
+
+
+def _pose2sim(path: Path) -> Project:
+    settings = _toml(path / CONFIG).get("project", {})
+    rate = settings.get("frame_rate") if isinstance(settings, dict) else None
+    rate = float(rate) if isinstance(rate, int | float) else None  # else `auto`
+    if rate is not None and not 0.0 < rate <= FASTEST:
+        raise InputError(f"{path / CONFIG}: frame_rate = {rate} is no frame rate; write 'auto' or frames per second")
+    return Project("Pose2Sim", _pose2sim_calibrations(path), "m", "z", rate)
+
+
+def _pose2sim_calibrations(path: Path) -> tuple[Path, ...]:
+    """In a folder with `calib` in its name, of the project or of the session around it."""
+    here = path.resolve()
+    around = [folder for folder in here.parents[:2] if (folder / CONFIG).is_file()]
+    for folder in (path, *around):
+        inside = sorted(part for part in folder.iterdir() if part.is_dir() and "calib" in part.name.lower())
+        files = [file for part in inside for file in find_calibrations(part) if file.suffix.lower() == ".toml"]
+        if files:
+            return tuple(files)
+    return ()
+
+
+def _freemocap(path: Path) -> Project:
+    """Millimetres; the world is the board's on the floor, or the first camera's."""
+    tables = [_toml(file).get("metadata") for file in find_calibrations(path) if file.suffix.lower() == ".toml"]
+    if any(isinstance(table, dict) and table.get("groundplane_calibration") is True for table in tables):
+        return Project("FreeMoCap", (), "mm", "z")
+    doubt = (
+        f"{path}: was calibrated without a ground plane, so its first camera is taken to be level; write the vertical "
+        "as `up:` into recording.yaml if it is not -y"
+    )
+    return Project("FreeMoCap", (), "mm", "-y", doubt=doubt)
+
+
+def _toml(path: Path) -> dict[str, Any]:
+    text = read_text(path, MAX_BYTES)
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        reason = " ".join(str(error).split())
+        raise InputError(f"{path}: is not readable as TOML ({reason}); correct it") from error

@@ -1,0 +1,88 @@
+"""Pose2Sim projects and FreeMoCap recordings are recordings as they are."""
+
+import numpy as np
+import pytest
+from command_line import refused
+from project_cases import CAMERAS, freemocap, pose2sim
+from small_recording import FPS
+
+from sogjax.check.opening import opening_problems
+from sogjax.data.keypoints import load_keypoints
+from sogjax.data.recording import open_recording
+from sogjax.errors import InputError
+
+
+def test_a_pose2sim_project_is_a_recording(tmp_path):
+    folder, written = pose2sim(tmp_path / "trial")
+    recording = open_recording(folder)
+    assert recording.rig.names == CAMERAS
+    assert (recording.up, recording.fps, recording.num_frames, recording.warnings) == ("z", FPS, 4, ())
+    np.testing.assert_allclose(np.asarray(recording.rig.cameras.camera_from_world)[:, :3, 3], [[0.1, 0.2, 3.0]] * 2)
+    found = load_keypoints(recording)
+    assert found is not None
+    assert (found.scheme.name, found.warnings) == ("HALPE_26", ())
+    np.testing.assert_allclose(found.points[1], written, atol=1e-3)
+
+
+def test_the_calibration_may_stand_in_the_session(tmp_path):
+    folder, _ = pose2sim(tmp_path / "session/participant/trial")
+    for around in (tmp_path / "session", tmp_path / "session/participant"):
+        (around / "Config.toml").write_text("[project]\n")
+    (folder / "calibration").rename(tmp_path / "session/Calibration")
+    assert open_recording(folder).rig.names == CAMERAS
+
+
+def test_recording_yaml_completes_a_project(tmp_path):
+    folder, _ = pose2sim(tmp_path / "trial", "[project]\nframe_rate = 50\n")
+    assert open_recording(folder).fps == 50.0
+    (folder / "recording.yaml").write_text("up: y\nfps: 60\ncameras: [cam02]\nkeypoint_scheme: COCO_17\n")
+    recording = open_recording(folder)
+    assert (recording.up, recording.fps, recording.rig.names) == ("y", 60.0, ("cam02",))
+    with pytest.raises(InputError, match="26 keypoints, those of COCO_17 have 17"):
+        load_keypoints(recording)
+    other = folder / "calibration/Calib_other.toml"
+    other.write_text((folder / "calibration/Calib_scene.toml").read_text())
+    with pytest.raises(InputError, match=r"several calibrations \(Calib_other\.toml, Calib_scene\.toml\)"):
+        open_recording(folder)
+    (folder / "recording.yaml").write_text("calibration: Calib_other.toml\n")
+    assert open_recording(folder).rig.names == CAMERAS
+
+
+@pytest.mark.parametrize(
+    ("config", "said"), [("[project", "TOML"), ("[project]\nframe_rate = -1\n", "frame_rate = -1"), ("\0", "TOML")]
+)
+def test_a_configuration_that_is_none_is_refused(tmp_path, config, said):
+    folder, _ = pose2sim(tmp_path / "trial", config)
+    with pytest.raises(InputError, match=said) as error:
+        open_recording(folder)
+    assert "Config.toml" in str(error.value)
+    assert [finding.severity for finding in opening_problems(folder, error.value)] == ["error"]
+
+
+def test_projects_that_lack_something_are_refused(capsys, tmp_path):
+    folder, _ = pose2sim(tmp_path / "trial")
+    (folder / "videos/cam02.mp4").rename(folder / "videos/front.mp4")
+    for word in ("front", "int_cam02_img"):
+        assert word in refused(capsys, "check", f"recording={folder}", f"out={tmp_path / 'out'}")
+    (folder / "calibration/Calib_scene.toml").unlink()
+    assert "no calibration" in refused(capsys, "check", f"recording={folder}", f"out={tmp_path / 'out'}")
+
+
+def test_a_freemocap_recording_is_a_recording(tmp_path):
+    recording = open_recording(freemocap(tmp_path / "walk"))
+    assert recording.rig.names == ("Camera_000_synchronized", "Camera_001_synchronized")
+    assert (recording.up, recording.warnings) == ("z", ())
+    np.testing.assert_allclose(np.asarray(recording.rig.cameras.camera_from_world)[0, :3, 3], [0.1, 0.2, 3.0])
+    found = load_keypoints(recording)
+    assert found is not None
+    assert (found.scheme.name, found.seeing) == ("MEDIAPIPE_33", recording.rig.names)
+
+
+def test_without_a_ground_plane_the_vertical_is_the_first_cameras(tmp_path):
+    folder = freemocap(tmp_path / "walk", "false")
+    recording = open_recording(folder)
+    assert recording.up == "-y"
+    assert len(recording.warnings) == 1
+    assert "ground plane" in recording.warnings[0]
+    (folder / "recording.yaml").write_text("up: -y\n")
+    assert open_recording(folder).warnings == ()
