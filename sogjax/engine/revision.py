@@ -11,7 +11,7 @@ from sogjax.engine.terminal import say
 from sogjax.sentences import counted
 from sogjax.settings import ImagesConfig
 from sogjax.tracking.backward_pass import Pass
-from sogjax.tracking.both_ways import Revised, told_both_ways
+from sogjax.tracking.both_ways import Revised, in_doubt, told_both_ways
 
 
 @dataclass(frozen=True)
@@ -32,23 +32,19 @@ class Reviser:
             return None
         energy = float(np.abs(rows["energy"]).mean())
         passed = Pass(rows["pose"], rows["limb_doubt"], rows["limb_usual"], energy, tracked.capacities)
-        first = job.frames[0]
+        first, doubtful = job.frames[0], int(in_doubt(passed).sum())
+        if doubtful:
+            say(f"limbs in doubt in {counted(doubtful, 'frame')}: tracked backwards around them, too")
         found = told_both_ways(
             job.tracker,
             passed,
             lambda begin, stop: frames_backwards(job.recording, job.grids, self.images, first + begin, first + stop),
-            lambda begin, stop: say(f"limbs in doubt in {_frames(job, begin, stop)}: tracked backwards, too"),
         )
         if not found.frames:
             return None
         parts = ", ".join(f"{name} ({count})" for name, count in sorted(found.parts.items()))
         say(f"taken from the backward pass in {counted(len(found.frames), 'frame')}: {parts}")
         return Prefix(_revised(rows, found.frames))
-
-
-def _frames(job: Job, begin: int, stop: int) -> str:
-    first = job.recording.first_frame + job.frames[0]
-    return f"frame {first + begin}" if stop == begin + 1 else f"frames {first + begin} to {first + stop - 1}"
 
 
 def _revised(rows: dict[str, np.ndarray], frames: dict[int, Revised]) -> dict[str, np.ndarray]:

@@ -4,7 +4,6 @@ A limb that is lost is often found again by itself. Backwards from there it is f
 lost: what hid it, or moved too far for one frame, comes from the other side.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import equinox as eqx
@@ -28,9 +27,6 @@ DOUBTFUL = 0.3
 MOST_LOOKS = 2
 """Frames that are tracked backwards, at most, in lengths of the clip."""
 
-Report = Callable[[int, int], None]
-"""Is told of the rows that are looked at: the first one, and the one after the last."""
-
 
 @dataclass(frozen=True)
 class Revised:
@@ -50,20 +46,21 @@ class Revision:
     parts: dict[str, int] = field(default_factory=dict)
 
 
-def told_both_ways(
-    tracker: Tracker, passed: Pass, frames: FramesBackwards, report: Report = lambda first, stop: None
-) -> Revision:
+def in_doubt(passed: Pass) -> Bool[np.ndarray, "frame"]:
+    """The frames around which a clip is tracked backwards."""
+    return passed.doubts.max(axis=1, initial=0.0) > DOUBTFUL
+
+
+def told_both_ways(tracker: Tracker, passed: Pass, frames: FramesBackwards) -> Revision:
     """Where another pass explains parts of the body better, among the frames around those that are in doubt.
 
     Args:
         tracker: that judges limbs.
         passed: what it found.
         frames: reads cells backwards, by rows of `passed`.
-        report: is told of stretches in doubt.
     """
     revising = _Revising(tracker, replace(passed, poses=passed.poses.copy(), doubts=passed.doubts.copy()), frames)
     while (stretch := revising.next_stretch()) is not None:
-        report(stretch[0], stretch[1] + 1)
         revising.look_at(*stretch)
     return revising.revision
 
@@ -81,8 +78,7 @@ class _Revising:
         """First and last frame of the last stretch in doubt from behind which no pass has begun."""
         if self._looked_at > MOST_LOOKS * len(self.passed.poses):
             return None
-        doubtful = self.passed.doubts.max(axis=1, initial=0.0) > DOUBTFUL
-        left = [stretch for stretch in stretches(doubtful, SURE_FRAMES) if stretch[1] not in self._tried]
+        left = [stretch for stretch in stretches(in_doubt(self.passed), SURE_FRAMES) if stretch[1] not in self._tried]
         return left[-1] if left else None
 
     def look_at(self, first: int, last: int) -> None:
