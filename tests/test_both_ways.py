@@ -165,3 +165,17 @@ def test_actors_are_parts_of_their_own():
     assert all(
         part.name.split("/")[0] == parts[part.whole].name.split("/")[0] for part in parts if part.whole is not None
     )
+
+
+def test_a_limb_that_is_not_taken_stays_though_it_is_beyond_its_limits():
+    body = shipped("human")
+    parts, names = body_parts(body), list(body.skeleton.dof_names)
+    limb = next(k for k, part in enumerate(parts) if part.name == "left arm")
+    pose = np.asarray(body.poses["tpose"]).copy()
+    beyond = next(k for k in parts[1].dofs if np.isfinite(body.skeleton.dof_upper[k]))
+    assert beyond not in parts[limb].dofs, names[beyond]
+    pose[beyond] = float(body.skeleton.dof_upper[beyond]) + 0.2
+    other = pose.copy()
+    other[parts[limb].dofs[0]] += 0.3
+    found = merged_pose(body, parts, pose, other, np.arange(len(parts)) == limb)
+    assert found[beyond] == pytest.approx(pose[beyond], abs=0.02)

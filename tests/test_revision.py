@@ -7,6 +7,7 @@ from command_line import actor_file, done, trackable
 from sogjax.app.cli import main
 from sogjax.data.motion import load_motion
 from sogjax.engine import revision, run_job
+from sogjax.errors import InputError
 from sogjax.tracking.both_ways import Revised, Revision
 
 FRAMES, ROW, FARTHER = 12, 5, 0.25
@@ -77,3 +78,14 @@ def test_a_run_that_is_stopped_while_it_is_written_again_goes_on_to_the_same_end
     one, two = (load_motion(tmp_path / name / "motion.npz") for name in ("whole", "run"))
     np.testing.assert_array_equal(one.pose, two.pose)
     np.testing.assert_array_equal(one.energy, two.energy)
+
+
+def test_a_pass_backwards_that_fails_is_said_and_the_motion_stays(capsys, tmp_path, monkeypatch, command):
+    def told_both_ways(tracker, passed, frames):
+        raise InputError("a frame has too many image blobs")
+
+    monkeypatch.setattr(revision, "told_both_ways", told_both_ways)
+    shown = ["outputs.overlay=false", "outputs.rerun=false"]
+    _, err = done(capsys, *command, *shown, "out=run")
+    assert "warning: not told both ways, the first pass stays as it is: a frame has too many image blobs" in err
+    assert load_motion(tmp_path / "run" / "motion.npz").num_frames == FRAMES

@@ -144,7 +144,9 @@ def write_cameras(
     text = own.read_text(encoding="utf-8-sig") if own.is_file() else ""
     lines = {"calibration": f"calibration: {CALIBRATION}", "unit": "unit: m"}
     parts = {name: move[TIME.start] for name, move in zip(recording.rig.names, moves, strict=True)}
-    offsets = {name: whole.frame_offset[name] - parts.get(name, 0.0) for name in whole.rig.names}
+    offsets = {
+        name: whole.frame_offset[name] - parts.get(name, -whole.frame_part.get(name, 0.0)) for name in whole.rig.names
+    }
     if any(offsets.values()):
         lines["frame_offset"] = offsets_line({name: offset for name, offset in offsets.items() if offset})
     with atomic_path(out / DESCRIPTION) as temporary:

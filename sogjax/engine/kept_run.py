@@ -64,6 +64,11 @@ class Prefix:
         """Of the last one."""
         return Capacities(*(int(self.rows[CAPACITY.format(name)][-1]) for name in CAPACITIES))
 
+    @property
+    def most_capacities(self) -> Capacities:
+        """That suffice for every frame: those tracked backwards may have needed more than the last one."""
+        return Capacities(*(int(self.rows[CAPACITY.format(name)].max()) for name in CAPACITIES))
+
     def state(self, start: Float[Array, "dof"]) -> TrackState:
         """The tracker's state after these frames, if it began at `start`."""
         state = TrackState.from_pose(start)
@@ -154,7 +159,7 @@ class KeptRun:
         rows = None
         with suppress(InputError):
             rows = read_log(self.folder)
-        if rows is None or not rows.keys() >= _NEEDED:
+        if rows is None or not rows.keys() >= _NEEDED or _of_another_layout(rows):
             return None
         whole = min(readable, len(rows["pose"]))
         count = whole if whole == total else whole - whole % FRAMES_AT_ONCE
@@ -180,6 +185,11 @@ class KeptRun:
         """Remove the folder once the run has ended."""
         self.close()
         shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def _of_another_layout(rows: dict[str, np.ndarray]) -> bool:
+    """Whether the rows are of a program that kept only what colours were usual."""
+    return "limb_usual" in rows and rows["limb_usual"].ndim != 3
 
 
 def read_note(path: Path) -> dict[str, Any]:

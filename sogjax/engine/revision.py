@@ -1,5 +1,6 @@
 """A run told both ways: what was kept of it is revised where a backward pass explains the body better."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,10 +9,12 @@ from sogjax.engine.backwards import frames_backwards
 from sogjax.engine.job import Job
 from sogjax.engine.kept_run import TERM, Prefix
 from sogjax.engine.terminal import say
+from sogjax.errors import InputError
 from sogjax.sentences import counted
 from sogjax.settings import ImagesConfig
 from sogjax.tracking.backward_pass import Pass
 from sogjax.tracking.both_ways import Revised, in_doubt, told_both_ways
+from sogjax.tracking.frame import FrameCells
 
 
 @dataclass(frozen=True)
@@ -22,29 +25,30 @@ class Reviser:
     images: ImagesConfig
 
     def __call__(self, tracked: Prefix) -> Prefix | None:
-        """The frames with what was revised; None where nothing was.
-
-        Raises:
-            InputError: a video cannot be read.
-        """
+        """The frames with what was revised; None where nothing was, or the pass backwards failed, which is said."""
         rows, job = tracked.rows, self.job
         if "limb_doubt" not in rows:
             return None
         energy = float(np.abs(rows["energy"]).mean())
-        passed = Pass(rows["pose"], rows["limb_doubt"], rows["limb_usual"], energy, tracked.capacities)
-        first, doubtful = job.frames[0], int(in_doubt(passed).sum())
+        passed = Pass(rows["pose"], rows["limb_doubt"], rows["limb_usual"], energy, tracked.most_capacities)
+        doubtful = int(in_doubt(passed).sum())
         if doubtful:
             say(f"limbs in doubt in {counted(doubtful, 'frame')}: tracked backwards around them, too")
-        found = told_both_ways(
-            job.tracker,
-            passed,
-            lambda begin, stop: frames_backwards(job.recording, job.grids, self.images, first + begin, first + stop),
-        )
+        try:
+            found = told_both_ways(job.tracker, passed, self._backwards)
+        except InputError as error:
+            say(f"warning: not told both ways, the first pass stays as it is: {error}")
+            return None
         if not found.frames:
             return None
         parts = ", ".join(f"{name} ({count})" for name, count in sorted(found.parts.items()))
         say(f"taken from the backward pass in {counted(len(found.frames), 'frame')}: {parts}")
         return Prefix(_revised(rows, found.frames))
+
+    def _backwards(self, begin: int, stop: int) -> Iterator[FrameCells]:
+        """The cells of some rows, the last one first."""
+        first = self.job.frames[0]
+        return frames_backwards(self.job.recording, self.job.grids, self.images, first + begin, first + stop)
 
 
 def _revised(rows: dict[str, np.ndarray], frames: dict[int, Revised]) -> dict[str, np.ndarray]:

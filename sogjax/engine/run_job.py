@@ -97,7 +97,7 @@ def run_job(
         tracked = None if kept is None or revise is None else kept.prefix(last - first, last - first)
         revised = None if tracked is None or revise is None else revise(tracked)
         if revised is not None:
-            again = Streams(out, job.recording, job.bodies, job.recording.first_frame + first, outputs, times)
+            again = Streams(out, job.recording, job.bodies, job.recording.first_frame + first, outputs, StageTimes())
             _write_again(job, again, read, revised, outputs)
             streams.files = again.files
         motions = streams.motions(mapped=True)

@@ -22,6 +22,7 @@ from sogjax.engine.terminal import progress, say
 from sogjax.engine.timing import StageTimes
 from sogjax.images.background import stack_background
 from sogjax.images.cells import CellGrid
+from sogjax.images.clip_background import FEWEST_AGREEING
 from sogjax.images.foreground import EmptyScene
 from sogjax.images.plate_difference import working_size
 from sogjax.model.body import Body
@@ -45,7 +46,9 @@ def learnt_again(job: Job, images: ImagesConfig, read: PictureReader, poses: dic
         InputError: a video cannot be read, or a picture has too many image blobs.
     """
     unknown = unknown_share(job.tracker, job.recording, job.grids, images)
-    if unknown < MUCH_UNKNOWN:
+    first, stop = job.frames
+    samples = [frame for frame in sampled_frames(job.recording) if first <= frame < stop]
+    if unknown < MUCH_UNKNOWN or len(samples) < FEWEST_AGREEING:  # of a short part too little would be learnt
         return job.tracker
     if poses is None:
         say(

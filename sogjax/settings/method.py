@@ -68,6 +68,8 @@ class TrackingConfig:
 
     extrapolation: float = option(0.5, "[alpha] share of the last motion that is added to predict the next pose")
     both_ways: bool = option(
-        True, "where limbs are in doubt, track backwards, too, and take each limb from the better pass"
+        True,
+        "where limbs are in doubt, track backwards, too, and take each limb from the better pass; needs "
+        "outputs.confidence=true",
     )
     repair: bool = option(False, "try limbs in doubt in other places, and keep them there if that lasts")

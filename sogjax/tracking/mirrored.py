@@ -108,7 +108,8 @@ def fitted_to_blobs(
 
 
 def _fit(body: Body, iterations: int, start: Array, target: Array) -> tuple[Array, Array]:
-    lower, upper = body.skeleton.dof_lower, body.skeleton.dof_upper
+    # A tracked pose may be beyond a limit; what is not to move is not to be moved back either.
+    lower, upper = jnp.minimum(body.skeleton.dof_lower, start), jnp.maximum(body.skeleton.dof_upper, start)
 
     def step(_: Array, pose: Array) -> Array:
         frames = body.skeleton.world_from_joint(pose)
