@@ -11,8 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from sogjax.engine.compiled_programs import forget_programs_if_many
-from sogjax.errors import InputError
-from sogjax.study.experiment import Experiment
+from sogjax.study.experiment import yardsticks
 from sogjax.study.limb_calibration import area_table, regained_table
 from sogjax.study.limb_trials import PLAIN, SKIPPING, JudgedLimb, LimbTrial, LimbTrials
 from sogjax.study.machine import machine_line
@@ -41,17 +40,13 @@ class Settings:
 def main() -> None:
     """Track with either method, and print the tables."""
     settings = settings_from(Settings)
-    rows = Experiment.named("sequences").config.rows
-    whole = {name: row.synth for name, row in rows.items() if row.synth is not None and row.methods is None}
-    unknown = [name for name in settings.sequences if name not in whole]
-    if unknown:
-        raise InputError(f"sequences: {unknown[0]}: is none of {', '.join(whole)}")
+    recordings = yardsticks(settings.sequences)
     study = Study(Path(settings.out), ["walk:0"], settings.frames, body=settings.body)
     found: dict[str, list[JudgedLimb]] = {method: [] for method in METHODS}
-    for name in settings.sequences or whole:
+    for name, synth in recordings.items():
         for cameras in settings.cameras:
             for background in settings.backgrounds:
-                trial = LimbTrial(name, whole[name], cameras, background)
+                trial = LimbTrial(name, synth, cameras, background)
                 forget_programs_if_many()
                 tracked = [LimbTrials(study, words).of(trial, settings.do) for words in METHODS.values()]
                 for method, limbs in zip(METHODS, tracked, strict=True):

@@ -15,16 +15,13 @@ from pathlib import Path
 from sogjax.data.atomic import atomic_path
 from sogjax.engine.terminal import say
 from sogjax.errors import InputError
-from sogjax.study.experiment import Experiment
+from sogjax.study.experiment import yardsticks
 from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from
 from sogjax.study.search_tables import kinds_line, reliability, sure_table, write_searches, wrong_table
 from sogjax.study.searches import Search, Searches, drawn_trials
 from sogjax.study.study import Study
 from sogjax.view.reliability_chart import reliability_chart
-
-SEQUENCES = "sequences"
-"""The experiment whose recordings are searched."""
 
 
 @dataclass
@@ -68,23 +65,15 @@ def _searched(settings: Settings, out: Path) -> list[Search]:
     study = Study(out, ["walk:0"], settings.frames, body=settings.body)
     folder = Searches(study, settings.overrides)
     begin, found = time.perf_counter(), []
-    trials = drawn_trials(_recordings(settings), settings.cameras, settings.frames, settings.limit, settings.seed)
+    trials = drawn_trials(
+        yardsticks(settings.sequences), settings.cameras, settings.frames, settings.limit, settings.seed
+    )
     for trial in trials:
         late = settings.minutes > 0.0 and time.perf_counter() - begin > 60.0 * settings.minutes
         found += folder.of(trial, do=not late)
     if len({search.trial.number for search in found}) < settings.limit:
         say(f"{len({search.trial.number for search in found})} of {settings.limit} searches are done")
     return found
-
-
-def _recordings(settings: Settings) -> dict[str, dict[str, object]]:
-    """The settings of the rendered recordings, by the names of their rows."""
-    rows = Experiment.named(SEQUENCES).config.rows
-    whole = {name: row.synth for name, row in rows.items() if row.synth is not None and row.methods is None}
-    unknown = [name for name in settings.sequences if name not in whole]
-    if unknown:
-        raise InputError(f"sequences: {unknown[0]}: is none of {', '.join(whole)}")
-    return {name: whole[name] for name in settings.sequences or whole}
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from pathlib import Path
 from sogjax.data.atomic import atomic_path
 from sogjax.engine.compiled_programs import forget_programs_if_many
 from sogjax.errors import InputError
-from sogjax.study.experiment import Experiment
+from sogjax.study.experiment import yardsticks
 from sogjax.study.limb_calibration import area_table, calibration_table, fitted, limb_curve, regained_table
 from sogjax.study.limb_trials import PLAIN, JudgedLimb, LimbTrial, LimbTrials
 from sogjax.study.machine import machine_line
@@ -23,9 +23,6 @@ from sogjax.study.script import run_script, settings_from
 from sogjax.study.study import Study
 from sogjax.tracking.limb_doubt import Weights
 from sogjax.view.limb_chart import limb_chart
-
-SEQUENCES = "sequences"
-"""The experiment whose recordings are tracked."""
 
 
 @dataclass
@@ -49,7 +46,7 @@ class Settings:
 def main() -> None:
     """Track, print the tables, and write the picture."""
     settings = settings_from(Settings)
-    names, found = _recordings(settings), []
+    names, found = yardsticks(settings.sequences), []
     trials = LimbTrials(Study(Path(settings.out), ["walk:0"], settings.frames, body=settings.body), settings.overrides)
     for sequence, synth in names.items():
         for cameras in settings.cameras:
@@ -103,16 +100,6 @@ def _print(found: list[JudgedLimb], names: list[str], settings: Settings) -> Non
     with atomic_path(path) as temporary:
         temporary.write_bytes(limb_chart(curves))
     print(f"\n{path}")
-
-
-def _recordings(settings: Settings) -> dict[str, dict[str, object]]:
-    """The settings of the rendered recordings, by the names of their rows."""
-    rows = Experiment.named(SEQUENCES).config.rows
-    whole = {name: row.synth for name, row in rows.items() if row.synth is not None and row.methods is None}
-    unknown = [name for name in settings.sequences if name not in whole]
-    if unknown:
-        raise InputError(f"sequences: {unknown[0]}: is none of {', '.join(whole)}")
-    return {name: whole[name] for name in settings.sequences or whole}
 
 
 if __name__ == "__main__":

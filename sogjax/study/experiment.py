@@ -203,3 +203,17 @@ def _checked(path: Path, config: ExperimentConfig) -> ExperimentConfig:
         except InputError as error:
             raise InputError(f"{path}: row {name!r}: {error}") from error
     return config
+
+
+def yardsticks(names: Sequence[str] = ()) -> dict[str, dict[str, object]]:
+    """The settings of the rendered recordings of the experiment `sequences`, by the names of their rows; none: all.
+
+    Raises:
+        InputError: a name that is no row's.
+    """
+    rows = Experiment.named("sequences").config.rows
+    whole = {name: row.synth for name, row in rows.items() if row.synth is not None and row.methods is None}
+    unknown = [name for name in names if name not in whole]
+    if unknown:
+        raise InputError(f"sequences: {unknown[0]}: is none of {', '.join(whole)}")
+    return {name: whole[name] for name in names or whole}
