@@ -16,6 +16,7 @@ from sogjax.energy.posed import Frame, History, Posed
 from sogjax.energy.windows import COLUMNS, ROWS, Windows, windows_around
 from sogjax.images.background_cells import BackgroundCells
 from sogjax.images.foreground import LARGEST, EmptyScene, foreground_weights, log_odds, subject_colors
+from sogjax.images.kinds import kind_odds, odds_where_told
 
 WALL, SHIRT, SKIN = (0.5, 0.6, 0.7), (0.1, 0.2, 0.6), (0.6, 0.42, 0.33)
 odds_of = jax.jit(lambda cells, background, subject: log_odds(cells, EmptyScene.from_background(background), subject))
@@ -73,6 +74,17 @@ def test_a_hand_over_a_floor_of_its_colour_is_undecided():
     odds = odds_of(seen(floor, hand), floor, subject(SHIRT, SKIN))
     assert abs(float(odds[0, 5, 5])) < 1.5
     assert float(odds[0, 5, 5]) > float(certain[0, 5, 5]) + 0.5
+
+
+def test_nothing_is_held_against_a_shoe_on_a_floor_of_its_colour():
+    floor, shoe = wall(color=(0.1, 0.1, 0.11)), (0.13, 0.13, 0.13)
+    tables, empty = jnp.stack([subject(shoe), subject(SKIN)]), EmptyScene.from_background(floor)
+    cells = seen(floor, SKIN)
+    usual, told = (odds(cells, jnp.ones(floor.known.shape), empty, tables)[0] for odds in (kind_odds, odds_where_told))
+    assert float(usual[0, 10, 10]) < -1.0
+    assert abs(float(told[0, 10, 10])) < 0.3
+    assert float(told[1, 10, 10]) == float(usual[1, 10, 10]) == -LARGEST  # skin would be told
+    np.testing.assert_array_equal(told[:, 3:7, 3:7], usual[:, 3:7, 3:7])
 
 
 def test_slow_light_is_no_foreground():

@@ -14,7 +14,7 @@ from sogjax.energy.neighbours import margins, near_pairs
 from sogjax.energy.pairs import SparsePairs
 from sogjax.energy.similarity import similarity_among
 from sogjax.energy.views import Views
-from sogjax.images.kinds import SLOTS, SPARE, Kinds, kind_odds, kinds_of
+from sogjax.images.kinds import SLOTS, SPARE, Kinds, kinds_of, odds_where_told
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, project
 from sogjax.tracking.culling import BLOCK_STEP, Capacities, actor_of_blobs, block_capacity, body_boxes
@@ -170,7 +170,7 @@ def _windows(
 ) -> ColorWindows:
     """Grids around a body: what each kind of blob would explain there."""
     cameras, body = tracker.cameras, tracker.body
-    odds = kind_odds(cells.astype(tables.dtype) / 255.0, inside, tracker.reader.empty, tables[:-1])
+    odds = odds_where_told(cells.astype(tables.dtype) / 255.0, inside, tracker.reader.empty, tables[:-1])
     actors = actor_of_blobs(body.skeleton, body.blobs.joints)
     around = jax.vmap(body_boxes, in_axes=(None, 0, None, None))
     boxes = around(body.posed_blobs(pose), cameras, actors, jnp.asarray(BORDER, pose.dtype))[:, 0]

@@ -102,10 +102,19 @@ class EmptyScene(eqx.Module):
         dtype = jnp.result_type(float)
         variance = jnp.maximum(jnp.asarray(background.spread, dtype), SMALLEST_SPREAD) ** 2
         red, green, blue = (jnp.asarray(background.colors[..., k], dtype) / 255.0 for k in range(3))
-        planes = (red, green, blue)
+        return cls._of((red, green, blue), variance, shadow, jnp.asarray(background.known))
+
+    @classmethod
+    def _of(
+        cls, planes: tuple[Cells, Cells, Cells], variance: Cells, shadow: float, known: Bool[Array, "..."]
+    ) -> "EmptyScene":
         length = sum(plane * plane for plane in planes)
         volume = jnp.log(_NORMAL * variance * jnp.sqrt(variance + shadow**2 * length))
-        return cls(planes, 1.0 / variance, 1.0 / (variance / shadow**2 + length), volume, jnp.asarray(background.known))
+        return cls(planes, 1.0 / variance, 1.0 / (variance / shadow**2 + length), volume, known)
+
+    def blurred(self, spread: float) -> "EmptyScene":
+        """The same background, each channel of which is known no better than to a standard deviation."""
+        return self._of(self.planes, jnp.maximum(1.0 / self.precision, spread**2), SHADOW, self.known)
 
 
 def log_odds(

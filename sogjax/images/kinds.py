@@ -26,6 +26,8 @@ SPARE = 4
 """Kinds beside as many as the blobs would fill."""
 PICTURE_SMOOTHING = 0.05
 """Share of any colour in the colours of a picture whose background is not known."""
+ALIKE = 0.1
+"""Of a channel: colours this near to each other are taken for the same, in what speaks against a body."""
 UNKNOWN_BACKGROUND = 0.6
 """What colours count where the background is not known, as a part of what they count where it is."""
 
@@ -103,6 +105,25 @@ def kind_odds(
     densities = jax.lax.map(lambda table: table[bins], tables)
     odds = jnp.moveaxis(temper[None] * (surprise[None] + densities), 0, 1)
     return jnp.clip(odds, -LARGEST, LARGEST) * inside[:, None]
+
+
+def odds_where_told(
+    cells: Float[Array, "camera rows columns 3"],
+    inside: Float[Array, "camera rows columns"],
+    background: EmptyScene | None,
+    tables: Float[Array, "kind bin bin bin"],
+) -> Float[Array, "camera kind rows columns"]:
+    """`kind_odds`, but where a kind looks as the background does, nothing is held against it.
+
+    A black shoe on a black floor is the floor's black to a grey level, or is not, for all of its cells and in every
+    frame: such cells must not be counted as if each one told. Where the background is known no better than a kind's
+    own colours are (`ALIKE`), what is left speaks against the kind.
+    """
+    odds = kind_odds(cells, inside, background, tables)
+    if background is None:
+        return odds
+    least = kind_odds(cells, inside, background.blurred(ALIKE), tables)
+    return jnp.maximum(odds, jnp.minimum(least, 0.0))
 
 
 def picture_surprise(
