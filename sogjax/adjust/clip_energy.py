@@ -30,6 +30,8 @@ from sogjax.tracking.tracker import Tracker
 
 LARGEST_SHAPE_STEP = 0.05
 """Of an iteration: logarithms of scales, metres."""
+MANY_CAMERAS = 12
+"""For which the weight of the shape's prior is given. The energy is a mean over cameras: fewer say less than it seems."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,7 @@ class Weights:
     """Of what the cells say against the background, beside the terms of tracking."""
     rest: float = 2e-5
     shape: float = 3e-5
-    """Of half a squared shape parameter in units of its expected deviation."""
+    """Of half a squared shape parameter in units of its expected deviation, with `MANY_CAMERAS`."""
     smooth: float = 0.0025
     sudden: float = 0.05
     """Radians and metres for each squared frame: second differences above it count only linearly."""
@@ -101,7 +103,8 @@ class ClipEnergy:
     def priors(self) -> Float[np.ndarray, "shared"]:
         """Curvature of what holds the shared parameters at 0."""
         shape = np.arange(self.num_shared) < self.shape.num_params
-        weights = np.where(shape, 2.0 * self.weights.shape, 2.0 * self.weights.cameras)
+        of_shape = self.weights.shape * max(MANY_CAMERAS / len(self.tracker.normalizers), 1.0)
+        weights = np.where(shape, 2.0 * of_shape, 2.0 * self.weights.cameras)
         return weights * len(self.frames) / self.spread**2
 
     def near(self, poses: Float[np.ndarray, "frame dof"], params: Float[np.ndarray, "shared"]) -> "ClipEnergy":
