@@ -80,7 +80,7 @@ def test_what_holds_then_is_said_with_it(clip):
     passed, limb = with_lost_limb(clip)
     found = told_both_ways(tracker, passed, backwards(cells)).frames[LOST.start]
     assert found.terms["similarity"] > 0.9 * right.energy
-    assert found.doubt[limb] < 0.3
+    assert found.judged.doubt[limb] < 0.3
 
 
 def test_nothing_is_read_where_no_limb_is_in_doubt(clip):

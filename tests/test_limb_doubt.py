@@ -188,7 +188,7 @@ def test_background_that_was_always_seen_in_a_limb_s_place_is_no_reason_for_doub
     """Dark shoes on a dark floor: what counts is that more is seen than usual."""
     limbs = JudgedLimbs.from_body(shipped("dog"))
     blobs = limbs.members.shape[1]
-    evidence = BlobEvidence(jnp.full(blobs, 1.0), jnp.full(blobs, 0.9), jnp.ones(blobs))
+    evidence = BlobEvidence(jnp.full(blobs, 1.0), jnp.full(blobs, 0.9), jnp.ones(blobs), jnp.ones(blobs))
     fits = jnp.ones(blobs)
     always = judgement(limbs, evidence, jnp.stack([fits, jnp.full(blobs, 0.6)]), True)
     suddenly = judgement(limbs, evidence, jnp.stack([fits, jnp.zeros(blobs)]), True)

@@ -76,7 +76,9 @@ def test_poses_on_the_device_are_as_good_as_numpys():
     assert isinstance(motion, Motion)
     known = {name: value for name, value in vars(motion).items() if value is not None}
     assert all(isinstance(value, np.ndarray | float | str) for value in known.values())
-    assert vars(motion).keys() - known.keys() == {"limb_names", "joint_limb", "limb_doubt"}
+    assert vars(motion).keys() - known.keys() == {
+        *("limb_names", "joint_limb", "limb_doubt", "explained", "overlap", "camera_names")
+    }
 
 
 def test_doubts_about_limbs_are_kept_and_files_without_them_are_read(tmp_path):

@@ -1,5 +1,6 @@
 """Runs whose frames are revised once all are tracked: what is written is what holds then."""
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from command_line import actor_file, done, trackable
@@ -9,6 +10,7 @@ from sogjax.data.motion import load_motion
 from sogjax.engine import revision, run_job
 from sogjax.errors import InputError
 from sogjax.tracking.both_ways import Revised, Revision
+from sogjax.tracking.limb_doubt import Judgement
 
 FRAMES, ROW, FARTHER = 12, 5, 0.25
 SMALL = ("images.depth=4", "solver.max_iterations=3", "solver.min_iterations=1", "outputs.bvh=false")
@@ -28,9 +30,11 @@ def farther(monkeypatch):
 
     def told_both_ways(tracker, passed, frames):
         assert len(list(frames(2, 6))) == 4
-        pose = passed.poses[ROW].copy()
+        pose, cameras = passed.poses[ROW].copy(), len(tracker.normalizers)
         pose[0] += FARTHER
-        return Revision({ROW: Revised(pose, 7.0, {"similarity": 8.0}, passed.doubts[ROW])}, {"left arm": 1})
+        rows = passed.doubts[ROW], passed.usual[ROW], np.array([0.5]), np.full((1, cameras), 0.25)
+        judged = Judgement(*(jnp.asarray(row) for row in rows))
+        return Revision({ROW: Revised(pose, 7.0, {"similarity": 8.0}, judged)}, {"left arm": 1})
 
     monkeypatch.setattr(revision, "told_both_ways", told_both_ways)
 
@@ -51,6 +55,10 @@ def test_the_motion_that_is_written_is_the_revised_one(capsys, tmp_path, request
         atol=1e-4,
     )
     assert (after.energy[ROW], after.similarity[ROW]) == (7.0, 8.0)
+    assert after.explained is not None
+    assert after.overlap is not None
+    assert after.explained[ROW] == 0.5
+    assert (after.overlap[ROW] == 0.25).all()
     files = {path.name for path in (tmp_path / "after").iterdir()}
     assert ("overlay.mp4" in files, "motion.rrd" in files) == (overlay, rerun)
     assert not any(name.endswith(".partial") for name in files)

@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 
 from sogjax.actor.colors import back_projected_colors, colored
 from sogjax.actor.estimate import Estimate, estimate_shape
+from sogjax.actor.explained_examples import explained_examples
 from sogjax.actor.posed_examples import Progress, Report, agreement, colored_views, found_best, rough_poses
 from sogjax.actor.shape import ShapeModel
 from sogjax.actor.silhouette_cells import silhouettes_of
@@ -126,6 +127,8 @@ def make_actor(
         view for posed, pose in zip(pictures, estimate.poses, strict=True) for view in colored_views(posed, rig, pose)
     ]
     actor = replace(colored(shaped, back_projected_colors(shaped, shown, color_space)), name=subject or body.name)
+    explained = explained_examples(actor, list(estimate.poses), pictures, rig)
+    actor = replace(actor, explained=jnp.asarray(explained, jnp.float32))
     return MadeActor(
         body=actor.rotated(jnp.asarray(turn.T, body.blob_sigmas.dtype)),
         start=body,

@@ -31,7 +31,7 @@ from sogjax.tracking.tracker import Tracker
 LARGEST_SHAPE_STEP = 0.05
 """Of an iteration: logarithms of scales, metres."""
 MANY_CAMERAS = 12
-"""For which the weight of the shape's prior is given. The energy is a mean over cameras: fewer say less than it seems."""
+"""For which the weight of the shape's prior is given: the energy is a mean over cameras, of which few say little."""
 
 
 @dataclass(frozen=True)

@@ -43,3 +43,15 @@ def say_results(result: Run) -> None:
             f"warning: {not_converged} of {frames} did not converge within "
             "solver.max_iterations; check them in the overlay"
         )
+    say_verdicts(result)
+
+
+def say_verdicts(result: Run) -> None:
+    """Print in a line each whether the actors' motions look right; a warning where they cannot be relied on."""
+    for name, verdict in result.verdicts.items():
+        whose = f"{name}: " if len(result.verdicts) > 1 else ""
+        if verdict.wrong:
+            say(f"WARNING: {whose}{verdict.sentence}; see worst.png")
+        else:
+            see = "" if verdict.looks_right else "; see worst.png"
+            print(f"verdict: {whose}{verdict.sentence}{see}")

@@ -58,7 +58,7 @@ def body_from(content: Entry, metres: float | None = None) -> Body:
         InputError: it describes none; the message names the key, its value and what was expected.
     """
     document = content.fields(
-        ("name", "joints", "dofs", "blobs", "poses"), ("unit", "color_space", "landmarks", "shape")
+        ("name", "joints", "dofs", "blobs", "poses"), ("unit", "color_space", "landmarks", "shape", "explained")
     )
     name = actor_rows.plain_name(document["name"])
     metres = metres or 1.0
@@ -92,6 +92,7 @@ def body_from(content: Entry, metres: float | None = None) -> Body:
         shape_groups=tuple(
             actor_rows.shape_group(row, dict(zip(_SHAPE_FIELDS, known, strict=True))) for row in shape_rows
         ),
+        explained=jnp.asarray(_explained(document), jnp.float32),
     )
 
 
@@ -105,6 +106,15 @@ def save_body(path: Path, body: Body) -> None:
     text = "\n".join(_lines(body)) + "\n"
     with atomic_path(Path(path)) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def _explained(document: dict[str, Entry]) -> float:
+    if "explained" not in document:
+        return float("nan")
+    value = document["explained"].number()
+    if not 0.0 <= value <= 1.0:
+        raise document["explained"].error("a part of 1")
+    return value
 
 
 _SHAPE_FIELDS = ("joint_offsets", "blob_offsets", "blob_sigmas", "landmark_offsets")
@@ -152,7 +162,10 @@ def _attachments(rows: list[Row], joints: Sequence[str], metres: float) -> Attac
 
 def _lines(body: Body) -> Iterator[str]:
     skeleton = body.skeleton
-    yield from (f"name: {_flow(body.name)}", "unit: m", "color_space: rgb", "", "joints:")
+    yield from (f"name: {_flow(body.name)}", "unit: m", "color_space: rgb")
+    if np.isfinite(explained := float(body.explained)):
+        yield f"explained: {explained:.3f}  # of it in its example poses; what is tracked with it is held against this"
+    yield from ("", "joints:")
     offsets, axes, revolute = map(np.asarray, (skeleton.offsets, skeleton.axes, skeleton.revolute))
     for k, name in enumerate(skeleton.names):
         parent = skeleton.parents[k]

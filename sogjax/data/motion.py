@@ -71,6 +71,12 @@ class Motion:
     """The limb that each joint belongs to; -1 for the trunk's."""
     limb_doubt: Float[np.ndarray, "frame limb"] | None = None
     """How likely each limb is more than 10 cm off, 0 to 1."""
+    explained: Float[np.ndarray, "frame"] | None = None
+    """Part of the actor's visible area that shows its own colours and no background; None where it was not judged."""
+    overlap: Float[np.ndarray, "frame camera"] | None = None
+    """Of its silhouette with the foreground around it (intersection over union); NaN where no background is known."""
+    camera_names: Shaped[np.ndarray, "camera"] | None = None
+    """Of the columns of `overlap`."""
 
     landmark_names: Shaped[np.ndarray, "landmark"] | None = None
     """Of points fixed to joints; None where the file does not have them, as in the other two."""
@@ -133,6 +139,9 @@ def motion_from_poses(
     limb_names: Sequence[str] | None = None,
     joint_limb: Int[np.ndarray, "joint"] | None = None,
     limb_doubt: Float[np.ndarray, "frame limb"] | None = None,
+    explained: Float[np.ndarray, "frame"] | None = None,
+    overlap: Float[np.ndarray, "frame camera"] | None = None,
+    camera_names: Sequence[str] | None = None,
 ) -> Motion:
     """The motion of `body`, which stands upright in a world with the vertical `up`, through `poses`.
 
@@ -168,6 +177,9 @@ def motion_from_poses(
         limb_names=None if limb_names is None else np.array(limb_names, str),
         joint_limb=joint_limb,
         limb_doubt=limb_doubt,
+        explained=explained,
+        overlap=overlap,
+        camera_names=None if camera_names is None else np.array(camera_names, str),
         landmark_names=np.array(body.landmarks.names, str),
         landmark_joint=np.array(body.landmarks.joints, int),
         landmark_offset=np.asarray(body.landmarks.offsets),
@@ -236,6 +248,7 @@ def checked_motion(path: Path, arrays: dict[str, np.ndarray]) -> Motion:
         up=str(text_array(path, arrays, "up", ())) if "up" in arrays else DEFAULT_UP,
         actor=str(text_array(path, arrays, "actor", ())) if "actor" in arrays else "",
         **_limbs(path, arrays, frames, joints),
+        **_fit(path, arrays, frames),
         **_landmarks(path, arrays),
     )
     _check(path, motion)
@@ -256,6 +269,18 @@ def _limbs(path: Path, arrays: dict[str, np.ndarray], frames: int, joints: int) 
     if wrong.any():
         raise InputError(f"{path}: 'joint_limb' holds {found['joint_limb'][wrong][0]}, which is not a limb; correct it")
     return found
+
+
+def _fit(path: Path, arrays: dict[str, np.ndarray], frames: int) -> dict[str, Any]:
+    """How well the body lies on what is seen, which a file need not say."""
+    if "explained" not in arrays or "overlap" not in arrays:
+        return {}
+    names = text_array(path, arrays, "camera_names", (None,))
+    return {
+        "explained": finite_array(path, arrays, "explained", (frames,)),
+        "overlap": float_array(path, arrays, "overlap", (frames, len(names))),
+        "camera_names": names,
+    }
 
 
 def _landmarks(path: Path, arrays: dict[str, np.ndarray]) -> dict[str, Any]:

@@ -21,7 +21,7 @@ PER_FRAME = (
     "converged",
 )
 """The fields of a `Motion` that have a row for each frame."""
-SOMETIMES_PER_FRAME = ("limb_doubt",)
+SOMETIMES_PER_FRAME = ("limb_doubt", "explained", "overlap")
 """Further ones, which a motion need not have."""
 
 

@@ -41,10 +41,8 @@ class Foreground(ImageTerm):
         return jax.vmap(self._pulls)(frame.views.windows, seen)
 
     def _of_camera(self, windows: Windows, seen: Sog) -> Float[Array, ""]:
-        rows = _rows(windows, seen, self.density)
-        total = jnp.einsum("wxb,wyb->wxy", rows.of_x, rows.of_y)
         gain = windows.areas[:, None, None] * windows.odds
-        return jnp.sum(gain * -jnp.expm1(-total))
+        return jnp.sum(gain * cover(windows, seen, self.density))
 
     def _pulls(self, windows: Windows, seen: Sog) -> ImagePulls:
         """Value and derivatives of one camera: every sum over cells is a product of small matrices."""
@@ -70,6 +68,12 @@ class Foreground(ImageTerm):
             by_sigma=jnp.sum(by_sigma, axis=0),
             stiffness=jnp.sum(stiffness, axis=0),
         )
+
+
+def cover(windows: Windows, seen: Sog, density: Float[Array, ""]) -> Float[Array, "window column row"]:
+    """How far blobs cover the cells of one camera's windows: C_i of the foreground term."""
+    rows = _rows(windows, seen, density)
+    return -jnp.expm1(-jnp.einsum("wxb,wyb->wxy", rows.of_x, rows.of_y))
 
 
 def _moments(

@@ -31,8 +31,8 @@ NOTE, START, ACTOR = "run.json", "start.npz", "actor"
 TERM = "term_"
 """Before the name of a term of the energy, in the names of columns."""
 COLUMNS = ("pose", "energy", "iterations", "evaluations", "converged", "num_near", "num_matching", "num_blocks")
-JUDGEMENT = {"limb_doubt": "doubt", "limb_usual": "usual"}
-"""Columns of runs whose limbs are judged."""
+JUDGEMENT = {"limb_doubt": "doubt", "limb_usual": "usual", "explained": "explained", "overlap": "overlap"}
+"""Columns of runs whose frames are judged."""
 CAPACITY, CAPACITIES = "capacity_{}", ("near", "matching", "blocks")
 _NEEDED = {*COLUMNS, *(CAPACITY.format(name) for name in CAPACITIES)}
 
@@ -188,8 +188,8 @@ class KeptRun:
 
 
 def _of_another_layout(rows: dict[str, np.ndarray]) -> bool:
-    """Whether the rows are of a program that kept only what colours were usual."""
-    return "limb_usual" in rows and rows["limb_usual"].ndim != 3
+    """Whether the rows are of a program that judged frames by less."""
+    return "limb_usual" in rows and (rows["limb_usual"].ndim != 3 or "explained" not in rows)
 
 
 def read_note(path: Path) -> dict[str, Any]:

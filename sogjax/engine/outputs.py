@@ -17,6 +17,7 @@ from sogjax.engine.build import marker_rule
 from sogjax.engine.run import Run
 from sogjax.engine.streams import file_name
 from sogjax.engine.terminal import say
+from sogjax.engine.verdict import WORST, judge, write_metrics, write_worst
 from sogjax.errors import InputError
 from sogjax.evaluation import evaluate_motions
 from sogjax.model.body import Body
@@ -99,9 +100,11 @@ def write_results(result: Run, out: Path, wanted: OutputsConfig, config: Any, ma
         temporary.write_text(OmegaConf.to_yaml(config))
     result.files.append(out / "config.yaml")
     evaluate(result, wanted)
-    if result.evaluation is not None:
-        result.evaluation.to_json(out / "metrics.json")
-        result.files.append(out / "metrics.json")
+    judge(result)
+    write_metrics(out / "metrics.json", result)
+    result.files.append(out / "metrics.json")
+    if wanted.worst and write_worst(out / WORST, result):
+        result.files.append(out / WORST)
     result.files += streamed
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from sogjax.engine.backwards import frames_backwards
 from sogjax.engine.job import Job
-from sogjax.engine.kept_run import TERM, Prefix
+from sogjax.engine.kept_run import JUDGEMENT, TERM, Prefix
 from sogjax.engine.terminal import say
 from sogjax.errors import InputError
 from sogjax.sentences import counted
@@ -55,7 +55,9 @@ def _revised(rows: dict[str, np.ndarray], frames: dict[int, Revised]) -> dict[st
     """The rows with what was found for some frames."""
     changed = {name: np.array(column) for name, column in rows.items()}
     for row, found in frames.items():
-        changed["pose"][row], changed["energy"][row], changed["limb_doubt"][row] = found.pose, found.energy, found.doubt
+        changed["pose"][row], changed["energy"][row] = found.pose, found.energy
+        for name in ("limb_doubt", "explained", "overlap"):
+            changed[name][row] = getattr(found.judged, JUDGEMENT[name])
         for name, value in found.terms.items():
             changed[TERM + name][row] = value
     return changed

@@ -10,6 +10,7 @@ from sogjax.data.motion import Motion
 from sogjax.data.recording import Recording
 from sogjax.engine.timing import StageTimes
 from sogjax.evaluation import GroupEvaluation
+from sogjax.evaluation.verdict import Verdict
 from sogjax.model.body import Body
 
 
@@ -25,6 +26,8 @@ class Run:
     image_blobs: float
     """Used per frame and camera, on average."""
     evaluation: GroupEvaluation | None = None
+    verdicts: dict[str, Verdict] = field(default_factory=dict)
+    """What the run thinks of each actor's motion."""
     missing: dict[str, int] = field(default_factory=dict)
     """Frames of the motion in which a camera had no picture, by camera."""
     files: list[Path] = field(default_factory=list)

@@ -24,12 +24,15 @@ REPLACING_THEIR_OWN = ("demo",)
 """Commands whose own earlier runs are replaced unasked, since they can be repeated."""
 PARTIAL = ("motion.partial", "motion_*.partial", FOLDER)
 """Folders of a run that has not ended."""
-RESULTS = (*(f"motion{ending}" for ending in WRITERS), "config.yaml", "metrics.json", "overlay.mp4", "motion.rrd", NOTE)
+RESULTS = (
+    *(f"motion{ending}" for ending in WRITERS),
+    *("config.yaml", "metrics.json", "overlay.mp4", "motion.rrd", "worst.png", NOTE),
+)
 """Names of files that every run leaves."""
 OF_ACTORS = tuple(f"motion_*{ending}" for ending in WRITERS)
 """Names of several actors' files. A user's own files may match: only those listed in a run's note are removed."""
 _HALF_WRITTEN = re.compile(
-    r"\.(motion|overlay|config|metrics|run|actor)(_.*)?\.[0-9a-f]{8}\.tmp(\..*)?|\.probe-[0-9a-f]*"
+    r"\.(motion|overlay|config|metrics|worst|run|actor)(_.*)?\.[0-9a-f]{8}\.tmp(\..*)?|\.probe-[0-9a-f]*"
 )
 
 

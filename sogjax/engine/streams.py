@@ -11,13 +11,13 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
 
 from sogjax.data.array_log import read_log
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.motion import FRAMES_AT_ONCE, Motion, motion_from_poses
 from sogjax.data.motion_log import MotionLog
 from sogjax.data.recording import Recording
+from sogjax.engine.judged_frames import Judged
 from sogjax.engine.kept_run import KeptRun
 from sogjax.engine.pipeline import FrameDone, Picture, Preparation
 from sogjax.engine.terminal import say
@@ -28,7 +28,7 @@ from sogjax.model.body import Body, dof_slices
 from sogjax.model.color import to_rgb
 from sogjax.sentences import counted
 from sogjax.settings import OutputsConfig
-from sogjax.tracking.limbs import joint_limbs, limb_names, limb_slices
+from sogjax.tracking.limbs import limb_slices
 
 PARTIAL = ".partial"
 """Ending of the folder of an incomplete motion."""
@@ -180,7 +180,8 @@ class Streams:
         """One motion per actor; similarity, energy and iterations are those of all actors together."""
         results = [done.tracked.result for done in block]
         poses = np.stack([np.asarray(result.pose) for result in results])
-        judgements = [np.asarray(result.limbs.doubt, float) for result in results if result.limbs is not None]
+        judgements = [result.limbs for result in results if result.limbs is not None]
+        judged = Judged.of(judgements, self._recording.rig.names) if judgements else None
         return {
             body.name: motion_from_poses(
                 body,
@@ -192,9 +193,11 @@ class Streams:
                 iterations=np.array([result.iterations for result in results], int),
                 converged=np.array([result.converged for result in results], bool),
                 up=self._recording.up,
-                **(judged(body, np.stack(judgements)[:, limbs]) if judgements else {}),
+                **({} if judged is None else judged.of_actor(actor, body, limbs)),
             )
-            for body, part, limbs in zip(self._bodies, dof_slices(self._bodies), limb_slices(self._bodies), strict=True)
+            for actor, (body, part, limbs) in enumerate(
+                zip(self._bodies, dof_slices(self._bodies), limb_slices(self._bodies), strict=True)
+            )
         }
 
     def _write_rerun(self, block: list[FrameDone], motions: list[Motion], first: int) -> None:
@@ -203,11 +206,6 @@ class Streams:
         self._rerun.write(motions, others)
         for frame, done in enumerate(block, first):
             self._rerun.write_pictures(frame, _jpegs(done.pictures), image_blobs(done))
-
-
-def judged(body: Body, doubt: Float[np.ndarray, "frame limb"]) -> dict[str, Any]:
-    """What a motion says of its limbs."""
-    return {"limb_names": limb_names(body), "joint_limb": joint_limbs(body.skeleton), "limb_doubt": doubt}
 
 
 def _jpegs(pictures: list[Picture]) -> list[Any]:

@@ -69,6 +69,11 @@ def own_density(colors: Float[Array, "*#place 3"], color: Float[Array, "*#place 
     return jnp.log((1.0 - SUBJECT_UNKNOWN) * peak * jnp.exp(-0.5 * distance) + SUBJECT_UNKNOWN)
 
 
+def own_color(colors: Float[Array, "*#place 3"], color: Float[Array, "*#place 3"]) -> Float[Array, "*place"]:
+    """How far colours (sRGB) are those of blobs, lit as they may be: 1 for the same, towards 0 for others."""
+    return jnp.exp(-0.5 * _color_gaussian(colors, color)[0])
+
+
 def subject_density(colors: Float[Array, "*place 3"], subject: SubjectColors) -> Float[Array, "*place"]:
     """The same where some blob of a subject is seen."""
     red, green, blue = color_bins(colors)

@@ -14,6 +14,7 @@ class OutputsConfig:
     """Files to write beside the motion."""
 
     overlay: bool = option(True, "overlay.mp4, the skeleton on every camera's pictures")
+    worst: bool = option(True, "worst.png, the five frames that fit worst, to look at first")
     overlay_width: int = option(1920, "width of the overlay video, px")
     rerun: bool = option(True, "motion.rrd, for the Rerun viewer")
     rerun_images: bool = option(True, "put the pictures into motion.rrd")

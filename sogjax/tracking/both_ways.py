@@ -35,7 +35,7 @@ class Revised:
     pose: Float[np.ndarray, "dof"]
     energy: float
     terms: dict[str, float]
-    doubt: Float[np.ndarray, "limb"]
+    judged: Judgement
 
 
 @dataclass
@@ -107,7 +107,7 @@ class _Revising:
         energy, terms, judged = jax.device_get(value)
         self.passed.doubts[row] = judged.doubt
         values = {name: float(term) for name, term in terms.items()}
-        self.revision.frames[row] = Revised(poses[row].copy(), float(energy), values, judged.doubt)
+        self.revision.frames[row] = Revised(poses[row].copy(), float(energy), values, judged)
 
 
 @eqx.filter_jit

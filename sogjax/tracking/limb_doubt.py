@@ -44,13 +44,16 @@ class LimbMeasures(NamedTuple):
 
 
 class Judgement(eqx.Module):
-    """What is thought of the limbs in one frame."""
+    """What is thought of the bodies and their limbs in one frame."""
 
     doubt: Float[Array, "limb"]
     """How likely each is more than `FAR` off."""
     usual: Float[Array, "2 blob"]
     """What `own` and `contradicted` of `BlobEvidence` usually are, for the next frame; a limb in doubt keeps what
     it had."""
+    explained: Float[Array, "actor"] | None = None
+    """As `FrameFit` has it; None: not measured."""
+    overlap: Float[Array, "actor camera"] | None = None
 
 
 def judgement(

@@ -9,7 +9,7 @@ from jaxtyping import Array, Bool, Float, UInt8
 
 from sogjax.energy.posed import Posed
 from sogjax.energy.windows import Windows
-from sogjax.images.foreground import SubjectColors, own_density, subject_density
+from sogjax.images.foreground import SubjectColors, own_color, own_density, subject_density
 from sogjax.model.camera import Camera, distort, near_picture, project
 from sogjax.model.sog import Sog
 from sogjax.tracking.judged_limbs import JudgedLimbs
@@ -35,6 +35,8 @@ class BlobEvidence(NamedTuple):
     """Part of the samples that are background; 0 where none is known."""
     seen: Float[Array, "blob"]
     """Part of its area in all pictures that is seen."""
+    explained: Float[Array, "blob"]
+    """How far the samples show the blob's own colours (0 to 1), and no background; their mean."""
 
 
 def blob_evidence(
@@ -66,7 +68,8 @@ def blob_evidence(
     colors, inside = jax.vmap(_colors_at)(cameras, cell_sizes, places, cells)
     if present is not None:
         inside &= present[:, None, None]
-    own = own_density(colors, posed.body.blob_colors[None, :, None])
+    own_colors = posed.body.blob_colors[None, :, None]
+    own, alike = own_density(colors, own_colors), own_color(colors, own_colors)
     against = jnp.zeros(inside.shape, bool) if windows is None else _odds_at(limbs, windows, places) < BACKGROUND
     areas = jnp.where(seen.mask, seen.sigmas, 0.0) ** 2
     weights = jnp.where(inside, (areas * _visible(limbs, posed.blobs, seen, cameras))[:, :, None], 0.0)
@@ -76,6 +79,7 @@ def blob_evidence(
         own=mean(own - subject_density(colors, subject)),
         contradicted=mean(against.astype(own.dtype)),
         seen=whole / (len(SAMPLES) * jnp.sum(areas, axis=0) + 1e-6),
+        explained=mean(jnp.where(against, 0.0, alike)),
     )
 
 

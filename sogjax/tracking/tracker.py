@@ -34,6 +34,7 @@ from sogjax.tracking.culling import (
     union_boxes,
 )
 from sogjax.tracking.frame import FrameCells, FrameResult, PartialCells, TrackedFrame, TrackState, on_device, on_host
+from sogjax.tracking.frame_fit import frame_fit
 from sogjax.tracking.judged_limbs import JudgedLimbs
 from sogjax.tracking.limb_doubt import Judgement, judgement
 from sogjax.tracking.limb_evidence import blob_evidence
@@ -218,12 +219,14 @@ class Tracker(eqx.Module):
         cells: UInt8[Array, "camera rows columns 3"],
         present: Bool[Array, "camera"] | None = None,
     ) -> Judgement:
-        """What the cameras say of the limbs of a pose."""
+        """What the cameras say of a pose and its limbs."""
         assert self.limbs is not None
         assert self.reader.subject is not None
         posed, sizes = Posed.from_pose(self.body, pose), self.reader.cell_sizes
         evidence = blob_evidence(self.limbs, posed, self.cameras, windows, cells, sizes, self.reader.subject, present)
-        return judgement(self.limbs, evidence, usual, windows is not None)
+        fit = frame_fit(self.limbs, evidence, posed, self.cameras, windows)
+        found = judgement(self.limbs, evidence, usual, windows is not None)
+        return replace(found, explained=fit.explained, overlap=fit.overlap)
 
     def _solved(
         self, objective: FrameEnergy, start: Float[Array, "dof"], capacities: Capacities

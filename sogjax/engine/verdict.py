@@ -1,0 +1,63 @@
+"""What a run thinks of itself: its verdict in numbers and in a line, and a picture of its worst frames."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from sogjax.data.atomic import atomic_path
+from sogjax.data.video import read_frames
+from sogjax.engine.run import Run
+from sogjax.engine.terminal import say
+from sogjax.errors import InputError
+from sogjax.evaluation.numbers import write_json
+from sogjax.evaluation.verdict import NUM_WORST, verdicts
+from sogjax.model.body import Body
+from sogjax.view.closeups import closeups
+
+WORST = "worst.png"
+
+
+def judge(result: Run) -> None:
+    """Note what is thought of each actor's motion."""
+    result.verdicts = verdicts(result.motions, expected_of(result.bodies))
+
+
+def expected_of(bodies: Sequence[Body]) -> dict[str, float]:
+    """How much of each actor its example poses explain, where that is known."""
+    return {body.name: float(body.explained) for body in bodies if np.isfinite(float(body.explained))}
+
+
+def write_metrics(path: Path, result: Run) -> None:
+    """Write the comparison with the truth, if there is one, and the verdicts."""
+    compared: dict[str, Any] = {} if result.evaluation is None else result.evaluation.as_dict()
+    write_json(path, compared | {"verdicts": {name: found.as_dict() for name, found in result.verdicts.items()}})
+
+
+def write_worst(path: Path, result: Run) -> bool:
+    """Write a picture of the frames that fit worst; whether that could be done, which is said otherwise."""
+    frames = _worst(result)
+    try:
+        drawn = closeups(_pictures(result, frames), result.recording.rig, list(result.motions.values()))
+    except InputError as error:
+        say(f"warning: no {path.name}: {error}")
+        return False
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(cv2.imencode(".png", drawn)[1].tobytes())
+    return True
+
+
+def _worst(result: Run) -> list[int]:
+    """The worst frames of all actors in turn, each once, in the order of time."""
+    found: dict[int, None] = {}
+    for row in range(NUM_WORST):
+        found |= {verdict.worst[row]: None for verdict in result.verdicts.values() if row < len(verdict.worst)}
+    return sorted(list(found)[:NUM_WORST])
+
+
+def _pictures(result: Run, frames: Sequence[int]) -> Iterator[tuple[int, list[Any]]]:
+    first = result.recording.first_frame
+    for frame in frames:
+        yield frame, next(iter(read_frames(result.recording, frame - first, frame - first + 1)))

@@ -1,0 +1,103 @@
+"""Verdicts: what a run thinks of its own motion."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from motion_cases import walking_motion
+from rig_cases import ring_rig
+
+from sogjax.evaluation.verdict import verdicts, worst_frames
+from sogjax.view.closeups import HEIGHT, closeups
+
+CAMERAS = ("left", "right")
+
+
+def judged(motion, explained=0.7, overlap=0.7):
+    """A motion all of whose frames fit as well."""
+    count = motion.num_frames
+    return replace(
+        motion,
+        explained=np.full(count, explained),
+        overlap=np.full((count, len(CAMERAS)), overlap),
+        camera_names=np.array(CAMERAS),
+    )
+
+
+def of_one(motion, expected=0.75):
+    return verdicts({"anna": motion}, {} if expected is None else {"anna": expected})["anna"]
+
+
+@pytest.fixture(scope="module")
+def walk():
+    return walking_motion(num_frames=24)
+
+
+def test_what_is_explained_as_in_the_example_poses_looks_right(walk):
+    found = of_one(judged(walk))
+    assert found.looks_right
+    assert not found.wrong
+    assert found.sentence == "looks right"
+    assert found.overlap == dict.fromkeys(CAMERAS, 0.7)
+
+
+def test_another_subject_is_told_by_how_little_is_explained(walk):
+    found = of_one(judged(walk, explained=0.1))
+    assert found.wrong
+    assert "not the subject: 10.0% explained against 75.0%" in found.sentence
+    assert of_one(judged(walk, explained=0.1), expected=None).wrong
+    assert not of_one(judged(walk, explained=0.5), expected=None).wrong
+
+
+def test_a_body_beside_the_foreground_is_told_by_silhouettes(walk):
+    assert "silhouettes overlap to 20%" in of_one(judged(walk, overlap=0.2)).sentence
+    assert not of_one(judged(walk, overlap=np.nan)).wrong
+
+
+def test_frames_that_fit_badly_are_named(walk):
+    motion = judged(walk)
+    motion.explained[8:13] = 0.2
+    found = of_one(motion)
+    assert not found.wrong
+    assert found.sentence == f"look at frames {walk.frame[8]}-{walk.frame[12]}: the body fits badly"
+    assert set(found.worst) & set(walk.frame[8:13].tolist())
+
+
+def test_limbs_in_doubt_are_named(walk):
+    doubt = np.zeros((walk.num_frames, 2))
+    doubt[3:9, 1] = 0.9
+    motion = replace(judged(walk), limb_names=np.array(["head", "left arm"]), limb_doubt=doubt)
+    assert of_one(motion).sentence == f"look at frames {walk.frame[3]}-{walk.frame[8]}, left arm"
+
+
+def test_two_actors_in_one_place_are_told(walk):
+    apart = replace(walk, blob_means=walk.blob_means + 1.0)
+    assert not any(found.wrong for found in verdicts({"anna": walk, "ben": apart}, {}).values())
+    found = verdicts({"anna": walk, "ben": walk}, {})
+    assert found["anna"].wrong
+    assert found["ben"].wrong
+    assert "inside each other in 100% of the frames" in found["anna"].sentence
+
+
+def test_the_worst_frames_do_not_lie_side_by_side(walk):
+    motion = judged(walk)
+    motion.explained[4:7] = (0.3, 0.1, 0.3)
+    motion.explained[15] = 0.2
+    worst = [walk.frame.tolist().index(frame) for frame in worst_frames(motion, count=2)]
+    assert worst == [5, 15]
+
+
+def test_a_motion_that_was_not_judged_has_a_verdict_too(walk):
+    found = of_one(replace(walk, explained=None, overlap=None, camera_names=None, limb_doubt=None))
+    assert (found.explained, found.overlap, found.looks_right) == (None, {}, True)
+
+
+def test_closeups_show_the_body_in_each_frame(walk, tmp_path):
+    rig = ring_rig(6, (160, 120), distance=3.0)
+    grey = np.full((120, 160, 3), 90, np.uint8)
+    frames = [(int(walk.frame[k]), [grey] * 5 + [None]) for k in (2, 20)]
+    drawn = closeups(frames, rig, [walk])
+    assert drawn.shape[0] == 2 * HEIGHT
+    assert np.ptp(drawn, axis=(0, 1)).max() > 100
+    cv2.imwrite(str(tmp_path / "closeups.png"), drawn)
