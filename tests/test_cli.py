@@ -35,7 +35,7 @@ def test_from_a_recording_to_motion_and_pictures(capsys, tmp_path, monkeypatch, 
 
     out, _ = done(capsys, *track, "out=run", "start=1", "outputs.overlay_width=320", "outputs.formats=[trc,glb]")
     formats = ["motion.bvh", "motion.glb", "motion.npz", "motion.rrd", "motion.trc"]
-    names = ["config.yaml", "metrics.json", *formats, "overlay.mp4"]
+    names = ["config.yaml", "metrics.json", *formats, "overlay.mp4", "worst.png"]
     assert sorted(path.name for path in (tmp_path / "run").iterdir()) == sorted([*names, "run.json"])
     assert all((tmp_path / "run" / name).stat().st_size > 0 for name in names)
     for name in names:
@@ -48,6 +48,8 @@ def test_from_a_recording_to_motion_and_pictures(capsys, tmp_path, monkeypatch, 
     metrics = json.loads((tmp_path / "run" / "metrics.json").read_text())
     printed = float(re.search(r"all markers +([0-9.]+)", out)[1])
     assert metrics["all"]["mean_mm"] == pytest.approx(printed, abs=0.06)
+    assert 0.0 < metrics["verdicts"]["puppet"]["explained"] <= 1.0
+    assert len(metrics["verdicts"]["puppet"]["worst"]) == 3
 
     again, _ = done(capsys, "evaluate", "motion=run/motion.npz", f"truth={rendered / 'ground_truth.npz'}", "out=e.json")
     assert f"all markers{printed:21.1f}" in again

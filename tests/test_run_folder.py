@@ -34,7 +34,7 @@ def test_results_stay_unless_they_are_to_be_overwritten(capsys, tmp_path, comman
     done(capsys, *command)
     before = contents(tmp_path / "run")
     sentence = refused(capsys, *command, "stop=2")
-    for word in ("run", "motion.npz", "out=DIR", "overwrite=true"):
+    for word in ("run", "metrics.json", "out=DIR", "overwrite=true"):
         assert word in sentence
     assert contents(tmp_path / "run") == before
     done(capsys, *command, "stop=2", "overwrite=true")
@@ -53,7 +53,8 @@ def test_nothing_of_an_older_run_is_left_but_what_is_not_its_own(capsys, tmp_pat
     (run / "motion_anna.partial").mkdir()
     done(capsys, *command, "outputs.bvh=false", "overwrite=true")
     assert sorted(contents(run)) == [
-        *("config.yaml", "motion.npz", "motion_before.c3d", "motion_notes.csv", "notes.txt", "run.json")
+        *("config.yaml", "metrics.json", "motion.npz", "motion_before.c3d", "motion_notes.csv", "notes.txt"),
+        *("run.json", "worst.png"),
     ]
 
 

@@ -11,7 +11,7 @@ from sogjax.data.doubtful import DoubtfulLimb, doubtful_limbs
 from sogjax.data.motion import Motion
 from sogjax.evaluation.metrics import stretches
 
-OTHER_SUBJECT = 0.5
+OTHER_SUBJECT = 0.6
 """Of what an actor explains in its example poses: less, and it is another subject, or none."""
 LEAST_EXPLAINED = 0.25
 """The same for actors of which that is not known, as a part of all."""
