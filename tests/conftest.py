@@ -16,6 +16,14 @@ jax.config.update("jax_numpy_rank_promotion", "raise")
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 
 
+@pytest.fixture(scope="session")
+def walking_dog():
+    """A clip of a dog: its tracker, its cells, and what was found in them; see `walking_dog.py`."""
+    from walking_dog import walking
+
+    return walking()
+
+
 @pytest.fixture
 def plain_logging():
     """Hydra sets up logging for a sweep; put it back, so that no file stays open."""

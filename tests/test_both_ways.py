@@ -3,44 +3,19 @@
 from dataclasses import replace
 from itertools import product
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from body_cases import shipped
-from drawn_scene import cells_of, draw, in_colors, make_tracker, standing
-from rig_cases import ring_rig
+from walking_dog import FRAMES
 
-from sogjax.images.foreground import subject_colors
 from sogjax.model.body import concatenate
-from sogjax.solve import GaussNewton
-from sogjax.tracking.backward_pass import Pass
 from sogjax.tracking.body_parts import body_parts, merged_pose
 from sogjax.tracking.both_ways import told_both_ways
-from sogjax.tracking.judged_limbs import JudgedLimbs
 from sogjax.tracking.limbs import limb_names, limbs
 from sogjax.tracking.mirrored import means_of
 from sogjax.tracking.taken_parts import APART, BIAS, CHANGE, best_choice, stretches, taken_parts
-from sogjax.tracking.tracker import track
 
-DEPTH = 6
-FRAMES = 12
 LOST = slice(4, 7)
-
-
-@pytest.fixture(scope="module")
-def clip():
-    """A dog that walks on, as it was tracked, and its cells."""
-    body = in_colors(shipped("dog"))
-    rig = ring_rig(5, (160, 120), distance=1.6)
-    table = subject_colors(np.asarray(body.blob_colors), np.asarray(body.blob_sigmas) ** 2)
-    tracker = make_tracker(body, rig, DEPTH, solver=GaussNewton())
-    reader = replace(tracker.reader, subject=jnp.asarray(table, jnp.float32))
-    tracker = replace(tracker, reader=reader, limbs=JudgedLimbs.from_body(body), pairs="sparse")
-    poses = np.stack([np.asarray(standing(body, 1.1))] * FRAMES)
-    poses[:, 0] += 0.004 * np.arange(FRAMES)
-    cells = [cells_of(rig, draw(body, jnp.asarray(pose), rig), DEPTH) for pose in poses]
-    found = [*track(tracker, jnp.asarray(poses[0]), cells)]
-    return tracker, cells, Pass.from_frames(found)
 
 
 def backwards(cells, asked=None):
@@ -52,9 +27,9 @@ def backwards(cells, asked=None):
     return frames
 
 
-def with_lost_limb(clip, doubt=0.9):
+def with_lost_limb(walking_dog, doubt=0.9):
     """The pass with a leg bent far in some frames; the leg's number."""
-    tracker, _, passed = clip
+    tracker, _, passed = walking_dog
     limb = next(k for k, name in enumerate(limb_names(tracker.body)) if "leg" in name)
     poses, doubts = passed.poses.copy(), np.zeros_like(passed.doubts)
     poses[LOST, limbs(tracker.body.skeleton)[limb][0]] += 0.8
@@ -62,9 +37,9 @@ def with_lost_limb(clip, doubt=0.9):
     return replace(passed, poses=poses, doubts=doubts), limb
 
 
-def test_a_lost_limb_comes_back_from_the_other_side(clip):
-    tracker, cells, right = clip
-    passed, limb = with_lost_limb(clip)
+def test_a_lost_limb_comes_back_from_the_other_side(walking_dog):
+    tracker, cells, right = walking_dog
+    passed, limb = with_lost_limb(walking_dog)
     found = told_both_ways(tracker, passed, backwards(cells))
     rows = sorted(found.frames)
     assert {*range(LOST.start, LOST.stop)} <= {*rows} <= {*range(LOST.start - 1, LOST.stop + 1)}
@@ -75,24 +50,24 @@ def test_a_lost_limb_comes_back_from_the_other_side(clip):
     assert off(np.stack([found.frames[row].pose for row in rows])) < 0.01
 
 
-def test_what_holds_then_is_said_with_it(clip):
-    tracker, cells, right = clip
-    passed, limb = with_lost_limb(clip)
+def test_what_holds_then_is_said_with_it(walking_dog):
+    tracker, cells, right = walking_dog
+    passed, limb = with_lost_limb(walking_dog)
     found = told_both_ways(tracker, passed, backwards(cells)).frames[LOST.start]
     assert found.terms["similarity"] > 0.9 * right.energy
     assert found.judged.doubt[limb] < 0.3
 
 
-def test_nothing_is_read_where_no_limb_is_in_doubt(clip):
-    tracker, cells, _ = clip
+def test_nothing_is_read_where_no_limb_is_in_doubt(walking_dog):
+    tracker, cells, _ = walking_dog
     asked = []
-    passed, _ = with_lost_limb(clip, doubt=0.1)
+    passed, _ = with_lost_limb(walking_dog, doubt=0.1)
     assert not told_both_ways(tracker, passed, backwards(cells, asked)).frames
     assert asked == []
 
 
-def test_a_right_pass_stays_though_it_is_doubted(clip):
-    tracker, cells, right = clip
+def test_a_right_pass_stays_though_it_is_doubted(walking_dog):
+    tracker, cells, right = walking_dog
     doubts = np.zeros_like(right.doubts)
     doubts[LOST] = 0.9
     asked = []
@@ -100,8 +75,8 @@ def test_a_right_pass_stays_though_it_is_doubted(clip):
     assert asked == [(0, LOST.stop)]
 
 
-def test_a_clip_that_ends_in_doubt_is_looked_at_from_its_last_frame(clip):
-    tracker, cells, right = clip
+def test_a_clip_that_ends_in_doubt_is_looked_at_from_its_last_frame(walking_dog):
+    tracker, cells, right = walking_dog
     doubts = np.zeros_like(right.doubts)
     doubts[-2:] = 0.9
     asked = []

@@ -6,38 +6,29 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from body_cases import shipped
-from drawn_scene import cells_of, draw, in_colors, landmark_error, make_tracker, moved, standing
-from rig_cases import ring_rig
+from drawn_scene import landmark_error, moved, standing
+from walking_dog import HEIGHT
 
 from sogjax.engine import build
 from sogjax.errors import InputError
-from sogjax.images.foreground import subject_colors
 from sogjax.settings.compose import track_config
-from sogjax.solve import GaussNewton
 from sogjax.tracking.frame import TrackState
-from sogjax.tracking.judged_limbs import JudgedLimbs
 from sogjax.tracking.limb_doubt import Judgement
 from sogjax.tracking.limbs import limb_blobs, limb_names, limbs
 from sogjax.tracking.mirrored import means_of
 from sogjax.tracking.repair import LASTING, NUM_CLIMBED, NUM_TRIED, Repair
 from sogjax.tracking.tracker import track
 
-DEPTH = 6
 LIMB = 4
 
 
 @pytest.fixture(scope="module")
-def dog():
-    body = in_colors(shipped("dog"))
-    rig = ring_rig(5, (160, 120), distance=1.6)
-    table = subject_colors(np.asarray(body.blob_colors), np.asarray(body.blob_sigmas) ** 2)
-    tracker = make_tracker(body, rig, DEPTH, solver=GaussNewton())
-    reader = replace(tracker.reader, subject=jnp.asarray(table, jnp.float32))
-    tracker = replace(tracker, reader=reader, limbs=JudgedLimbs.from_body(body), pairs="sparse")
-    pose = standing(body, 1.1)
-    cells = cells_of(rig, draw(body, pose, rig), DEPTH)
-    return tracker, pose, cells, next(track(tracker, jnp.asarray(pose), [cells]))
+def dog(walking_dog):
+    """The tracker, and the first frame: its pose, its cells, and as it was tracked."""
+    tracker, cells, passed = walking_dog
+    pose = standing(tracker.body, HEIGHT)
+    first = next(track(tracker, jnp.asarray(pose), cells[:1], passed.capacities))
+    return tracker, pose, cells[0], first
 
 
 class Scripted:

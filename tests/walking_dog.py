@@ -1,0 +1,38 @@
+"""A dog that walks on before five cameras, whose limbs are judged while it is tracked."""
+
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+from body_cases import shipped
+from drawn_scene import cells_of, draw, in_colors, make_tracker, standing
+from rig_cases import ring_rig
+
+from sogjax.images.foreground import subject_colors
+from sogjax.solve import GaussNewton
+from sogjax.tracking.backward_pass import Pass
+from sogjax.tracking.judged_limbs import JudgedLimbs
+from sogjax.tracking.tracker import track
+
+DEPTH = 6
+FRAMES = 12
+HEIGHT = 1.1
+STEP = 0.004
+
+
+def judging_tracker(body, rig):
+    """A tracker that knows a body's colours, and judges its limbs."""
+    table = subject_colors(np.asarray(body.blob_colors), np.asarray(body.blob_sigmas) ** 2)
+    tracker = make_tracker(body, rig, DEPTH, solver=GaussNewton())
+    reader = replace(tracker.reader, subject=jnp.asarray(table, jnp.float32))
+    return replace(tracker, reader=reader, limbs=JudgedLimbs.from_body(body), pairs="sparse")
+
+
+def walking():
+    """The tracker, the cells of all frames, and what it found in them."""
+    body, rig = in_colors(shipped("dog")), ring_rig(5, (160, 120), distance=1.6)
+    tracker = judging_tracker(body, rig)
+    poses = np.stack([np.asarray(standing(body, HEIGHT))] * FRAMES)
+    poses[:, 0] += STEP * np.arange(FRAMES)
+    cells = [cells_of(rig, draw(body, jnp.asarray(pose), rig), DEPTH) for pose in poses]
+    return tracker, cells, Pass.from_frames([*track(tracker, jnp.asarray(poses[0]), cells)])
