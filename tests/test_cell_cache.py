@@ -1,6 +1,7 @@
 """Kept cells: the same as those of the videos, and made again where they may not be."""
 
 import json
+import zlib
 from collections.abc import Generator
 
 import numpy as np
@@ -8,8 +9,10 @@ import pytest
 from command_line import actor_file, done, refused, trackable
 from small_recording import make_recording, write_images, write_video
 
+from sogjax.data import cell_cache
 from sogjax.data.motion import load_motion
 from sogjax.data.recording import open_recording
+from sogjax.engine.backwards import frames_backwards
 from sogjax.engine.build import cell_grids
 from sogjax.engine.cells import cells_of, cells_of_clip, picture_reader
 from sogjax.engine.pipeline import Preparation
@@ -172,3 +175,15 @@ def test_a_cache_that_is_a_file_is_refused(capsys, tmp_path):
     words = (f"actor={actor_file(tmp_path / 'a.yaml')}", f"images.cache={tmp_path / 'cells'}", f"out={tmp_path / 'o'}")
     words = (*words, "images.background=none")
     assert "no folder can be made there" in refused(capsys, "track", f"recording={walk}", *words)
+
+
+def test_kept_cells_are_checked_once_for_many_parts_of_a_clip(walk, tmp_path, monkeypatch):
+    """Else a long clip would be read as a whole for each stretch that is tracked backwards."""
+    cells(walk, tmp_path / "cache")
+    checked, crc32 = [], zlib.crc32
+    monkeypatch.setattr(cell_cache.zlib, "crc32", lambda *found: checked.append(1) or crc32(*found))
+    recording = open_recording(walk)
+    images = ImagesConfig(depth=DEPTH, cache=str(tmp_path / "cache"))
+    for first in range(3):
+        assert len(list(frames_backwards(recording, cell_grids(recording, DEPTH), images, first, first + 1))) == 1
+    assert len(checked) == 1

@@ -10,7 +10,7 @@ import json
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -119,7 +119,8 @@ class CellCache:
             cells = np.load(array, mmap_mode="r", allow_pickle=False)
         except (OSError, ValueError, EOFError, InputError) as error:
             raise _UnusableError("is missing or cut short") from error
-        if _checksum(array, cells.offset) != checksum:
+        state = array.stat()
+        if _checksum(array, cells.offset, state.st_size, state.st_mtime_ns) != checksum:
             raise _UnusableError("is damaged")
         return begin, cells
 
@@ -143,8 +144,9 @@ def cell_cache(folder: str, recording: Recording, depth: int, say: Callable[[str
     return CellCache(path, recording, depth, say)
 
 
-def _checksum(path: Path, offset: int) -> int:
-    """Of a file from `offset` on, read piece by piece."""
+@lru_cache(maxsize=256)
+def _checksum(path: Path, offset: int, size: int, changed_at: int) -> int:
+    """Of a file from `offset` on, read piece by piece; once in a process, as long as size and time do not change."""
     checksum = 0
     with path.open("rb") as file:
         file.seek(offset)
