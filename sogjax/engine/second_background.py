@@ -133,15 +133,17 @@ def _from_pictures(recording: Recording, images: ImagesConfig) -> bool:
 
 
 def _first_pass(job: Job, images: ImagesConfig, read: PictureReader) -> dict[int, Array]:
-    """The poses of all frames, by frame."""
-    poses: dict[int, Array] = {}
+    """The poses of the sampled frames, by frame; the others are tracked, but not held in memory."""
+    sampled, poses = {*sampled_frames(job.recording)}, dict[int, Array]()
     if job.begin > job.frames[0]:
         frames = frames_backwards(job.recording, job.grids, images, job.frames[0], job.begin + 1)
         prefix = tracked_backwards(job.tracker, job.start, frames, job.begin + 1 - job.frames[0], StageTimes())
-        poses = {job.frames[0] + k: jnp.asarray(prefix.pose(k)) for k in range(prefix.num_frames)}
+        frame_of = range(job.frames[0], job.frames[0] + prefix.num_frames)
+        poses = {frame: prefix.pose(k) for k, frame in enumerate(frame_of) if frame in sampled}
     pictures = read(job.recording, Preparation(job.grids), job.begin, job.frames[1])
     cells = (cells_of_frame([picture.cells for picture in frame]) for frame in pictures)
     shown = progress(cells, job.frames[1] - job.begin, "tracking, to learn the background")
     for done in track(job.tracker, job.start, shown):
-        poses[job.begin + done.index] = jnp.asarray(done.result.pose)
+        if job.begin + done.index in sampled:
+            poses[job.begin + done.index] = jnp.asarray(done.result.pose)
     return poses
