@@ -3,17 +3,26 @@
 from dataclasses import replace
 from itertools import product
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from body_cases import shipped
-from walking_dog import FRAMES
+from drawn_scene import cells_of, draw, standing
+from rig_cases import ring_rig
+from walking_dog import DEPTH, FRAMES, HEIGHT, judging_tracker
 
 from sogjax.model.body import concatenate
-from sogjax.tracking.body_parts import body_parts, merged_pose
+from sogjax.tracking import both_ways
+from sogjax.tracking.backward_pass import Compared, Pass, part_gains
+from sogjax.tracking.body_parts import PartArrays, body_parts, merged_pose
 from sogjax.tracking.both_ways import told_both_ways
+from sogjax.tracking.culling import Capacities
+from sogjax.tracking.frame import PartialCells
 from sogjax.tracking.limbs import limb_names, limbs
 from sogjax.tracking.mirrored import means_of
+from sogjax.tracking.room import with_room
 from sogjax.tracking.taken_parts import APART, BIAS, CHANGE, best_choice, stretches, taken_parts
+from sogjax.tracking.tracker import track
 
 LOST = slice(4, 7)
 
@@ -43,7 +52,7 @@ def test_a_lost_limb_comes_back_from_the_other_side(walking_dog):
     found = told_both_ways(tracker, passed, backwards(cells))
     rows = sorted(found.frames)
     assert {*range(LOST.start, LOST.stop)} <= {*rows} <= {*range(LOST.start - 1, LOST.stop + 1)}
-    assert found.parts == {limb_names(tracker.body)[limb]: len(rows)}
+    assert found.parts == {limb_names(tracker.body)[limb]: {*rows}}
     body = tracker.body
     off = lambda poses: np.linalg.norm(means_of(body, poses) - means_of(body, right.poses[rows]), axis=-1).max()
     assert off(passed.poses[rows]) > 0.05
@@ -84,6 +93,99 @@ def test_a_clip_that_ends_in_doubt_is_looked_at_from_its_last_frame(walking_dog)
     assert asked == [(0, FRAMES)]
 
 
+def test_a_clip_of_one_frame_that_is_in_doubt_is_looked_at_once(walking_dog):
+    tracker, cells, right = walking_dog
+    only = replace(right, poses=right.poses[:1], doubts=np.full_like(right.doubts[:1], 0.9), usual=right.usual[:1])
+    asked = []
+    assert not told_both_ways(tracker, only, backwards(cells, asked)).frames
+    assert asked == [(0, 1)]
+
+
+def test_a_frame_that_two_passes_revise_counts_once(walking_dog, monkeypatch):
+    """A part that was taken in two overlapping passes was taken in as many frames as are said to be revised."""
+    tracker, cells, right = walking_dog
+    parts = body_parts(tracker.body)
+    doubts = np.zeros_like(right.doubts)
+    doubts[[2, 8]] = 0.9
+
+    def compared(tracker, passed, frames, parts, first, last):
+        begin = last + 1
+        column = lambda value: list(np.tile(np.where(np.arange(len(parts)) == 0, value, 0.0), (begin, 1)))
+        poses = [passed.poses[row] + 1e-3 for row in reversed(range(begin))]
+        return Compared(cells[:begin][::-1], poses, column(10.0 * right.energy), column(2.0 * APART)), begin
+
+    monkeypatch.setattr(both_ways, "compared_backwards", compared)
+    found = told_both_ways(tracker, replace(right, doubts=doubts), backwards(cells))
+    assert {*found.frames} == {*range(9)}
+    assert found.parts == {parts[0].name: {*range(9)}}
+
+
+def test_what_needs_more_room_is_computed_again():
+    rooms = []
+
+    def compute(room):
+        rooms.append(room)
+        return room.near, (jnp.asarray(300), jnp.asarray(200))
+
+    assert with_room(compute, Capacities(256, 256, 128)) == rooms[-1].near
+    assert len(rooms) == 2
+    assert rooms[-1].hold(300, 200, 128)
+
+
+@pytest.mark.slow
+def test_what_sees_more_image_blobs_than_there_is_room_for_is_valued_with_more_room(walking_dog, monkeypatch):
+    """Else blobs would be cut off, and poses valued by what is left."""
+    tracker, cells, right = walking_dog
+    passed, _ = with_lost_limb(walking_dog)
+    small, row = Capacities(8, 8, right.capacities.blocks), LOST.start
+    choices = PartArrays.of(tracker.body, body_parts(tracker.body))
+    poses = [jnp.asarray(each.poses[row]) for each in (passed, right)]
+    gains = [part_gains(tracker, cells[row], room, choices, *poses) for room in (small, right.capacities)]
+    np.testing.assert_allclose(*gains, rtol=1e-3, atol=1e-5 * right.energy)
+    compared = both_ways.compared_backwards
+    monkeypatch.setattr(
+        both_ways, "compared_backwards", lambda t, p, *rest: compared(t, replace(p, capacities=right.capacities), *rest)
+    )
+    one, two = (told_both_ways(tracker, each, backwards(cells)) for each in (replace(passed, capacities=small), passed))
+    assert one.parts == two.parts
+    assert one.frames[row].energy == pytest.approx(two.frames[row].energy, rel=1e-4)
+
+
+@pytest.mark.slow
+def test_a_lost_limb_comes_back_though_a_camera_is_missing_in_some_frames(walking_dog):
+    tracker, cells, _ = walking_dog
+    passed, limb = with_lost_limb(walking_dog)
+    present = np.arange(len(cells[0])) != 1
+    some = [PartialCells(frame, present) if LOST.start <= k < LOST.stop else frame for k, frame in enumerate(cells)]
+    found = told_both_ways(tracker, passed, backwards(some))
+    assert found.parts.keys() == {limb_names(tracker.body)[limb]}
+    assert {*range(LOST.start, LOST.stop)} <= {*found.frames}
+
+
+@pytest.mark.slow
+def test_a_limb_of_one_of_two_actors_comes_back(walking_dog):
+    """Two dogs as one model: the part is named with its actor, and the other one stays."""
+    dog = walking_dog[0].body
+    body = concatenate([replace(dog, name="rex"), replace(dog, name="bello")])
+    rig = ring_rig(5, (160, 120), distance=2.2)
+    tracker = judging_tracker(body, rig)
+    half = dog.skeleton.num_dofs
+    pose = np.concatenate([np.asarray(standing(dog, HEIGHT, (0.0, y))) for y in (-0.5, 0.5)])
+    cells = [cells_of(rig, draw(body, jnp.asarray(pose), rig), DEPTH)] * 8
+    right = Pass.from_frames([*track(tracker, jnp.asarray(pose), cells)])
+    limb = next(k for k, name in enumerate(limb_names(body)) if "bello" in name and "leg" in name)
+    poses, doubts = right.poses.copy(), np.zeros_like(right.doubts)
+    poses[LOST, limbs(body.skeleton)[limb][0]] += 0.8
+    doubts[LOST, limb] = 0.9
+    found = told_both_ways(tracker, replace(right, poses=poses, doubts=doubts), backwards(cells))
+    assert found.parts.keys() == {limb_names(body)[limb]}
+    assert {*range(LOST.start, LOST.stop)} <= {*found.frames}
+    for row, revised in found.frames.items():
+        assert np.abs(revised.pose[:half] - right.poses[row, :half]).max() < 0.02
+        off = means_of(body, revised.pose[None]) - means_of(body, right.poses[[row]])
+        assert np.linalg.norm(off, axis=-1).max() < 0.02
+
+
 def test_stretches_join_over_short_gaps():
     marked = np.array([0, 1, 1, 0, 1, 0, 0, 0, 1], bool)
     assert stretches(marked) == [(1, 2), (4, 4), (8, 8)]
@@ -92,15 +194,17 @@ def test_stretches_join_over_short_gaps():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_choice_over_time_is_the_best_of_all(seed):
+@pytest.mark.parametrize("open_ends", [(False, False), (True, False), (True, True)])
+def test_the_choice_over_time_is_the_best_of_all(seed, open_ends):
     random = np.random.default_rng(seed)
     worth, change = random.normal(size=9), random.uniform(0.0, 1.0, 9)
 
     def value(taken):
         inside = sum(0.5 * (change[t - 1] + change[t]) for t in range(1, 9) if taken[t] != taken[t - 1])
-        return worth @ taken - inside - change[0] * taken[0] - change[-1] * taken[-1]
+        ends = [cost * taken[t] for t, cost, free in zip((0, -1), change[[0, -1]], open_ends, strict=True) if not free]
+        return worth @ taken - inside - sum(ends)
 
-    found = best_choice(worth, change)
+    found = best_choice(worth, change, open_ends)
     assert value(found.astype(float)) == pytest.approx(
         max(value(np.array(way, float)) for way in product((0, 1), repeat=9))
     )

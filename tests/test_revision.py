@@ -34,7 +34,7 @@ def farther(monkeypatch):
         pose[0] += FARTHER
         rows = passed.doubts[ROW], passed.usual[ROW], np.array([0.5]), np.full((1, cameras), 0.25)
         judged = Judgement(*(jnp.asarray(row) for row in rows))
-        return Revision({ROW: Revised(pose, 7.0, {"similarity": 8.0}, judged)}, {"left arm": 1})
+        return Revision({ROW: Revised(pose, 7.0, {"similarity": 8.0}, judged)}, {"left arm": {ROW}})
 
     monkeypatch.setattr(revision, "told_both_ways", told_both_ways)
 

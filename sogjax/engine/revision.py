@@ -41,7 +41,7 @@ class Reviser:
             return None
         if not found.frames:
             return None
-        parts = ", ".join(f"{name} ({count})" for name, count in sorted(found.parts.items()))
+        parts = ", ".join(f"{name} ({len(taken)})" for name, taken in sorted(found.parts.items()))
         say(f"taken from the backward pass in {counted(len(found.frames), 'frame')}: {parts}")
         return Prefix(_revised(rows, found.frames))
 

@@ -15,6 +15,7 @@ from sogjax.model.body import Body
 from sogjax.tracking.body_parts import Part, PartArrays
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import FrameCells, TrackedFrame, TrackState, on_device
+from sogjax.tracking.room import Needed, with_room
 from sogjax.tracking.tracker import Tracker, track
 
 COMPARED, TOGETHER = 0.03, 0.04
@@ -95,8 +96,7 @@ def compared_backwards(
         row, both = begin - 1 - k, (jnp.asarray(passed.poses[begin - 1 - k]), jnp.asarray(tracked.result.pose))
         apart, gains = np.asarray(_apart(tracker.body, choices.blobs, *both)), np.zeros(len(parts))
         if apart.max(initial=0.0) > COMPARED:
-            cells, present = on_device(seen[k])
-            gains = np.asarray(_gains(tracker, cells, tracked.capacities, present, choices, *both))
+            gains = np.asarray(part_gains(tracker, seen[k], tracked.capacities, choices, *both))
         found.cells.append(seen[k])
         found.poses.append(np.asarray(both[1]))
         found.gains.append(gains)
@@ -117,6 +117,19 @@ def _apart(
     return jnp.mean(apart, axis=-1, where=blobs)
 
 
+def part_gains(
+    tracker: Tracker,
+    frame: FrameCells,
+    capacities: Capacities,
+    parts: PartArrays,
+    first: Float[Array, "dof"],
+    second: Float[Array, "dof"],
+) -> Float[Array, "part"]:
+    """The gains, with larger capacities where either pose sees more image blobs."""
+    cells, present = on_device(frame)
+    return with_room(lambda room: _gains(tracker, cells, room, present, parts, first, second), capacities)
+
+
 @eqx.filter_jit
 def _gains(
     tracker: Tracker,
@@ -126,18 +139,20 @@ def _gains(
     parts: PartArrays,
     first: Float[Array, "dof"],
     second: Float[Array, "dof"],
-) -> Float[Array, "part"]:
-    """By how much the energy rises with each part of the second pose instead of that of the first.
+) -> tuple[Float[Array, "part"], Needed]:
+    """By how much the energy rises with each part of the second pose instead of that of the first; and room needed.
 
     The mean over what holds around it: the rest of the first pose and that of the second, in what is seen near either.
     """
     mixed = jnp.concatenate([parts.mixed(tracker.body, first, second), parts.mixed(tracker.body, second, first)])
 
-    def seen_near(at: Float[Array, "dof"]) -> Float[Array, "part"]:
-        views, _, _ = tracker.views(cells, TrackState.from_pose(at), capacities, present)
+    def seen_near(at: Float[Array, "dof"]) -> tuple[Float[Array, "part"], Needed]:
+        views, near, matching = tracker.views(cells, TrackState.from_pose(at), capacities, present)
         energy = FrameEnergy(tracker.body, views, History.unknown(at), tracker.terms)
         values = jax.lax.map(energy, jnp.concatenate([first[None], second[None], mixed]))
         into_first, into_second = values[2:].reshape(2, -1)
-        return 0.5 * ((into_first - values[0]) + (values[1] - into_second))
+        gains = 0.5 * ((into_first - values[0]) + (values[1] - into_second))
+        return gains, (jnp.max(near), jnp.max(matching))
 
-    return 0.5 * (seen_near(first) + seen_near(second))
+    (one, needed), (other, needed_too) = seen_near(first), seen_near(second)
+    return 0.5 * (one + other), jax.tree.map(jnp.maximum, needed, needed_too)

@@ -19,6 +19,7 @@ from sogjax.tracking.body_parts import body_parts, merged_pose
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import FrameCells, TrackState, on_device
 from sogjax.tracking.limb_doubt import Judgement
+from sogjax.tracking.room import Needed, with_room
 from sogjax.tracking.taken_parts import stretches, taken_parts
 from sogjax.tracking.tracker import Tracker
 
@@ -40,10 +41,10 @@ class Revised:
 
 @dataclass
 class Revision:
-    """Frames that were revised, and which parts of the body were taken from the other pass in how many."""
+    """Frames that were revised, and in which of them each part of the body was taken from the other pass."""
 
     frames: dict[int, Revised] = field(default_factory=dict)
-    parts: dict[str, int] = field(default_factory=dict)
+    parts: dict[str, set[int]] = field(default_factory=dict)
 
 
 def in_doubt(passed: Pass) -> Bool[np.ndarray, "frame"]:
@@ -85,15 +86,16 @@ class _Revising:
         """Track backwards from behind a stretch, and revise what the pass explains better."""
         found, begin = compared_backwards(self.tracker, self.passed, self.frames, self.parts, first, last)
         rows = begin - 1 - np.arange(len(found.poses))
-        taken = taken_parts(self.parts, np.stack(found.apart), np.stack(found.gains), self.passed.energy)
+        ends = (begin == len(self.passed.poses), bool(rows[-1] == 0))
+        taken = taken_parts(self.parts, np.stack(found.apart), np.stack(found.gains), self.passed.energy, ends)
         changed, poses = np.flatnonzero(taken.any(axis=1)), self.passed.poses
         for k in changed:
             poses[rows[k]] = merged_pose(self.tracker.body, self.parts, poses[rows[k]], found.poses[k], taken[k])
         for k in changed:
             self._value(int(rows[k]), found.cells[k])
-        for part, count in zip(self.parts, taken.sum(axis=0), strict=True):
-            if count:
-                self.revision.parts[part.name] = self.revision.parts.get(part.name, 0) + int(count)
+        for part, of_part in zip(self.parts, taken.T, strict=True):
+            if of_part.any():
+                self.revision.parts.setdefault(part.name, set()).update(rows[of_part].tolist())
         self._tried.add(last)
         self._looked_at += len(rows)
 
@@ -103,7 +105,8 @@ class _Revising:
         before, before_that = (jnp.asarray(poses[max(row - j, 0)]) for j in (1, 2))
         history = History(before, before_that, jnp.asarray(row >= 2))
         pose, usual = jnp.asarray(poses[row]), jnp.asarray(self.passed.usual[row])
-        value = _valued(self.tracker, history, *on_device(cells), self.passed.capacities, pose, usual)
+        shown, room = on_device(cells), self.passed.capacities
+        value = with_room(lambda room: _valued(self.tracker, history, *shown, room, pose, usual), room)
         energy, terms, judged = jax.device_get(value)
         self.passed.doubts[row] = judged.doubt
         values = {name: float(term) for name, term in terms.items()}
@@ -119,8 +122,9 @@ def _valued(
     capacities: Capacities,
     pose: Float[Array, "dof"],
     usual: Float[Array, "2 blob"],
-) -> tuple[Float[Array, ""], dict[str, Float[Array, ""]], Judgement]:
-    """Energy, terms and doubts of a pose that is known."""
-    views, _, _ = tracker.views(cells, TrackState.from_pose(pose), capacities, present)
+) -> tuple[tuple[Float[Array, ""], dict[str, Float[Array, ""]], Judgement], Needed]:
+    """Energy, terms and doubts of a pose that is known; and the room that they need."""
+    views, near, matching = tracker.views(cells, TrackState.from_pose(pose), capacities, present)
     energy = FrameEnergy(tracker.body, views, history, tracker.terms)
-    return energy(pose), energy.values(pose), tracker.judged(pose, usual, views.windows, cells, present)
+    judged = tracker.judged(pose, usual, views.windows, cells, present)
+    return (energy(pose), energy.values(pose), judged), (jnp.max(near), jnp.max(matching))

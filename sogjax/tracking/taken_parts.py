@@ -27,6 +27,7 @@ def taken_parts(
     apart: Float[np.ndarray, "frame part"],
     gains: Float[np.ndarray, "frame part"],
     energy: float,
+    open_ends: tuple[bool, bool] = (False, False),
 ) -> Bool[np.ndarray, "frame part"]:
     """Which parts are taken from the other pass, in frames that follow each other; the pass itself holds around them.
 
@@ -39,24 +40,31 @@ def taken_parts(
         apart: metres between the passes.
         gains: of taking each part.
         energy: of a frame, for scale.
+        open_ends: whether the clip ends before the first and behind the last of the frames.
     """
     taken = np.zeros(apart.shape, bool)
     for k, part in enumerate(parts):
         whole = 0.0 if part.whole is None else apart[:, part.whole]
         worth = np.where(whole > APART, 0.0, gains[:, k] / energy) - BIAS
-        found = best_choice(worth, CHANGE * apart[:, k])
+        found = best_choice(worth, CHANGE * apart[:, k], open_ends)
         for first, last in stretches(found):
             stretch = slice(first, last + 1)
             taken[stretch, k] = apart[stretch, k].max() > APART
     return taken
 
 
-def best_choice(worth: Float[np.ndarray, "frame"], change: Float[np.ndarray, "frame"]) -> Bool[np.ndarray, "frame"]:
-    """Where to take the other pass, by dynamic programming: `worth` for each frame, less `change` at both ends."""
+def best_choice(
+    worth: Float[np.ndarray, "frame"], change: Float[np.ndarray, "frame"], open_ends: tuple[bool, bool] = (False, False)
+) -> Bool[np.ndarray, "frame"]:
+    """Where to take the other pass, by dynamic programming: `worth` for each frame, less `change` at both ends.
+
+    At an open end of the frames there is no frame beside, so that no change is made there.
+    """
+    at_ends = {0: 0.0 if open_ends[0] else change[0], len(worth): 0.0 if open_ends[1] else change[-1]}
     count = len(worth)
     best, chosen = np.array([0.0, -np.inf]), np.zeros((count + 1, 2), int)
     for t in range(count + 1):
-        cost = change[min(t, count - 1)] if t in (0, count) else 0.5 * (change[t - 1] + change[t])
+        cost = at_ends[t] if t in at_ends else 0.5 * (change[t - 1] + change[t])
         ways = best[:, None] - cost * (1.0 - np.eye(2))
         chosen[t], best = ways.argmax(axis=0), ways.max(axis=0)
         best = best + np.array([0.0, worth[t] if t < count else -np.inf])
