@@ -16,13 +16,16 @@ from rig_cases import ring_rig
 from sogjax.adjust import adjusted
 from sogjax.adjust.clip_shape import ClipShape
 from sogjax.adjust.frame_models import frame_model, shape_rates
-from sogjax.adjust.pictures import Reader
+from sogjax.adjust.pictures import Reader, bytes_of_frame
 from sogjax.adjust.rest import RestPenalty
 from sogjax.app.cli import main
 from sogjax.data.actor_file import load_body
 from sogjax.data.motion import load_motion, motion_from_poses, save_motion
 from sogjax.energy.frame_energy import FrameEnergy, standard_terms
 from sogjax.energy.posed import History
+from sogjax.engine import adjust_checks
+from sogjax.engine.memory import available_memory
+from sogjax.errors import InputError
 from sogjax.synth import SynthSettings, render_recording
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import TrackState
@@ -175,10 +178,36 @@ def test_several_actors_and_empty_folders_are_refused(capsys, tracked):
 
 
 def test_a_window_larger_than_memory_is_refused(capsys, tracked, monkeypatch):
-    monkeypatch.setattr("sogjax.engine.adjust_clip.os.sysconf", lambda name: 1000)
+    motion = tracked[1]
+    each = bytes_of_frame(2, motion.blob_means.shape[1])
+    monkeypatch.setattr("sogjax.engine.adjust_checks.available_memory", lambda: 30 * each)
+    monkeypatch.setattr("sogjax.engine.adjust_checks.bytes_of_frame", lambda *_: 5 * each)
     found = sentence(capsys, tracked, "window=24")
     assert "window=24" in found
-    assert "choose window=" in found
+    assert "fewer cameras" in found
+
+
+@pytest.mark.parametrize(("window", "remedy"), [(80, "choose window=40"), (None, "sogjax adjust ... window=40")])
+def test_what_fits_into_memory_is_said_with_a_setting_that_the_command_has(monkeypatch, window, remedy):
+    monkeypatch.setattr(adjust_checks, "available_memory", lambda: 50 * bytes_of_frame(4, 60))
+    adjust_checks.check_window(4, 60, 40, window)
+    with pytest.raises(InputError, match=remedy) as found:
+        adjust_checks.check_window(4, 60, 400, window)
+    assert str(found.value).startswith("adjust=true: " if window is None else "window=80: ")
+
+
+def test_memory_that_holds_files_counts_as_available(tmp_path):
+    (tmp_path / "meminfo").write_text("MemTotal:  24000 kB\nMemFree:    100 kB\nMemAvailable:   7000 kB\n")
+    assert available_memory(tmp_path / "meminfo") == 7000 * 1024
+    assert available_memory(tmp_path / "none") is None or available_memory(tmp_path / "none") > 0
+
+
+def test_tracking_does_not_begin_where_adjusting_would_not_fit(capsys, tracked, monkeypatch):
+    recording, _, folder = tracked
+    monkeypatch.setattr(adjust_checks, "available_memory", lambda: 1000)
+    words = ["track", f"recording={recording}", f"actor={folder / 'actor.yaml'}", f"out={folder / 'out'}"]
+    assert "adjust=true: " in refused(capsys, *words, "adjust=true")
+    assert not (folder / "out").exists()
 
 
 @pytest.mark.parametrize("window", [0, -3])

@@ -9,7 +9,8 @@ from omegaconf import OmegaConf
 
 from sogjax.data.recording import open_recording
 from sogjax.engine.adjust_cameras import camera_lines, check_cameras, parts_in_question, write_cameras
-from sogjax.engine.adjust_clip import AdjustedClip, adjusted_clip, check_length, sentence
+from sogjax.engine.adjust_checks import check_length, check_window
+from sogjax.engine.adjust_clip import AdjustedClip, adjusted_clip, sentence
 from sogjax.engine.cells import picture_reader
 from sogjax.engine.origin import Origin, digest
 from sogjax.engine.outputs import export_endings, write_results
@@ -39,6 +40,7 @@ def adjust_to_folder(config: AdjustConfig) -> Run:
     if tracked.config.cameras is not None:
         recording = opened(config.recording, tracked.config.cameras)
     check_length(tracked.motion)
+    check_window(len(recording.rig), tracked.actor.num_blobs, tracked.motion.num_frames, config.window)
     check_cameras(recording, tracked.motion, config.cameras, config.offsets)
     in_question = parts_in_question(config.cameras, config.offsets)
     with run_folder(path, config.overwrite, command="adjust") as folder:

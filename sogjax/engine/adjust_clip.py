@@ -1,6 +1,5 @@
 """Adjusting a tracked clip as a whole: its pictures read again, poses and shape climbed together, what came of it."""
 
-import os
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,12 +10,13 @@ from jaxtyping import Float, Int
 from sogjax.actor.bones import bone_lengths
 from sogjax.adjust import Adjusted, adjusted
 from sogjax.adjust.contact import floor_height, standing, undersides
-from sogjax.adjust.pictures import ClipPictures, Reader, bytes_of_frame
+from sogjax.adjust.pictures import ClipPictures, Reader
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.motion import Motion, motion_from_poses
 from sogjax.data.recording import Recording
 from sogjax.engine import build
 from sogjax.engine.adjust_cameras import camera_numbers, moved_rig, moves_of
+from sogjax.engine.adjust_checks import WINDOW, check_length
 from sogjax.engine.adjust_colors import color_rows, mean_similarity, measured_colors
 from sogjax.engine.cells import picture_reader
 from sogjax.engine.job import Job
@@ -25,23 +25,15 @@ from sogjax.engine.pipeline import PictureReader, Preparation, cells_of_frame
 from sogjax.engine.recordings import upright
 from sogjax.engine.second_background import learnt_again
 from sogjax.engine.terminal import progress, say
-from sogjax.errors import InputError
 from sogjax.evaluation import joint_errors
 from sogjax.images.cells import stack_shape
 from sogjax.model.body import Body
 from sogjax.model.frames import axis_vector, world_from_upright
-from sogjax.sentences import counted
 from sogjax.settings import TrackConfig
 from sogjax.tracking.frame import FrameCells
 
-FEWEST_FRAMES = 5
-"""Fewer say next to nothing about a shape, and have no motion to be smooth."""
-WINDOW, LEAST_WINDOW = 60, 20
-"""Frames that are adjusted together, by default and at least: windows overlap by ten."""
 CLEARLY = 1.01
 """By which factor new colours must explain more to be taken: those of example poses were measured within masks."""
-SPARE_MEMORY = 0.8
-"""Part of the free memory that a window may take."""
 
 
 @dataclass(frozen=True)
@@ -82,10 +74,9 @@ def adjusted_clip(
         in_question: parts of the cameras' moves (`parts_in_question`).
 
     Raises:
-        InputError: the clip is too short, a window does not fit into memory, or a video cannot be read.
+        InputError: the clip is too short, or a video cannot be read.
     """
     check_length(motion)
-    check_window(len(recording.rig.names), actor.num_blobs, window, motion.num_frames)
     read = picture_reader(config.images)
     job = _job(recording, actor, motion, config, read)
     source = _Source(job, read, motion)
@@ -111,46 +102,6 @@ def adjusted_clip(
     body, numbers["similarity_of_new_colors"] = _recolored(job, source, found, after, config)
     turn = jnp.asarray(world_from_upright(recording.up).T, actor.blob_sigmas.dtype)
     return AdjustedClip(replace(job, bodies=[body]), prefix, body.rotated(turn), after, numbers, found.moves)
-
-
-def too_short(num_frames: int) -> str | None:
-    """Why a motion of so many frames cannot be adjusted, if it is too short."""
-    if num_frames >= FEWEST_FRAMES:
-        return None
-    return (
-        f"the motion has {counted(num_frames, 'frame')}, too few to adjust; it stays as it is (track at least "
-        f"{FEWEST_FRAMES})"
-    )
-
-
-def check_length(motion: Motion) -> None:
-    """Check that there is something to adjust.
-
-    Raises:
-        InputError: there is not.
-    """
-    if (reason := too_short(motion.num_frames)) is not None:
-        raise InputError(reason)
-
-
-def check_window(num_cameras: int, num_blobs: int, window: int, num_frames: int) -> None:
-    """Check that the pictures of a window of a clip fit into memory.
-
-    Raises:
-        InputError: they do not.
-    """
-    build.at_least("window", window, LEAST_WINDOW)
-    each, together = bytes_of_frame(num_cameras, num_blobs), min(window, num_frames)
-    try:
-        free = SPARE_MEMORY * os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (ValueError, OSError, AttributeError):  # a system that does not say
-        return
-    if together * each > free:
-        fits = max(int(free // each), LEAST_WINDOW)
-        raise InputError(
-            f"window={window}: the pictures of {counted(together, 'frame')} take about {together * each / 1e9:.1f} GB, "
-            f"and {free / 1e9:.1f} GB are free; choose window={fits}"
-        )
 
 
 def _job(recording: Recording, actor: Body, motion: Motion, config: TrackConfig, read: PictureReader) -> Job:

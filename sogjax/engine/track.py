@@ -18,7 +18,8 @@ from sogjax.energy import Term
 from sogjax.engine import build
 from sogjax.engine.actor_report import report_folder, write_actor_report
 from sogjax.engine.adjust import write_numbers, written
-from sogjax.engine.adjust_clip import adjusted_clip, too_short
+from sogjax.engine.adjust_checks import check_window, too_short
+from sogjax.engine.adjust_clip import adjusted_clip
 from sogjax.engine.example_frames import check_actors
 from sogjax.engine.first_pose import initial_pose_file, known_opening
 from sogjax.engine.job import frame_range
@@ -104,7 +105,7 @@ def _adjustable(recording: Recording, bodies: Sequence[Body], config: TrackConfi
     """Whether the clip is long enough to be adjusted; if not, that is said.
 
     Raises:
-        InputError: there are several actors.
+        InputError: there are several actors, or its pictures do not fit into memory.
     """
     if len(bodies) > 1:
         raise InputError("adjust=true: only a clip of one actor can be adjusted; leave adjust=true out")
@@ -112,7 +113,9 @@ def _adjustable(recording: Recording, bodies: Sequence[Body], config: TrackConfi
     reason = too_short(last - first)
     if reason is not None:
         say(f"adjust=true: {reason}")
-    return reason is None
+        return False
+    check_window(len(recording.rig), bodies[0].num_blobs, last - first)
+    return True
 
 
 def _report_actors(recording: Recording, made: Sequence[MadeActor], out: Path) -> None:
