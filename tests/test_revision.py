@@ -5,10 +5,14 @@ import numpy as np
 import pytest
 from command_line import actor_file, done, trackable
 
-from sogjax.app.cli import main
 from sogjax.data.motion import load_motion
-from sogjax.engine import revision, run_job
+from sogjax.data.recording import open_recording
+from sogjax.engine import revision, track
+from sogjax.engine.build import cell_grids
+from sogjax.engine.cells import cells_of_clip
+from sogjax.engine.job import Job
 from sogjax.errors import InputError
+from sogjax.settings import ColorConfig, ImagesConfig, TrackConfig
 from sogjax.tracking.both_ways import Revised, Revision
 from sogjax.tracking.limb_doubt import Judgement
 
@@ -64,28 +68,32 @@ def test_the_motion_that_is_written_is_the_revised_one(capsys, tmp_path, request
     assert not any(name.endswith(".partial") for name in files)
 
 
-def test_a_run_that_is_stopped_while_it_is_written_again_goes_on_to_the_same_end(
-    capsys, tmp_path, monkeypatch, command, farther
-):
-    shown = ["outputs.overlay=true", "outputs.rerun=false"]
-    done(capsys, *command, *shown, "out=whole")
-    whole, seen = run_job.tracked_frames, []
+@pytest.mark.parametrize("begin", [None, 7], ids=["from its first frame", "from one in the middle"])
+def test_frames_read_backwards_are_those_of_the_part_that_is_tracked(capsys, tmp_path, monkeypatch, command, begin):
+    """Rows count from where tracking starts, also if it begins in the middle and goes both ways from there."""
+    recording, start, seen = open_recording(tmp_path / "walk"), 3, []
+    if begin is not None:
+        actors = track.actors_of(recording, tmp_path / "a.yaml", "", ColorConfig())[0]
+        opening = jnp.asarray(Job.from_config(recording, actors, TrackConfig()).start), begin
+        monkeypatch.setattr(track, "actors_of", lambda *_: (actors, []))
+        monkeypatch.setattr(track, "known_opening", lambda *_: opening)
+        command = [word for word in command if not word.startswith("actor=")]
 
-    def tracked_frames(*arguments):
-        for found in whole(*arguments):
-            if len(seen) == FRAMES + 3:
-                raise KeyboardInterrupt
-            seen.append(found)
-            yield found
+    def told_both_ways(tracker, passed, frames):
+        assert len(passed.poses) == FRAMES - start
+        seen.extend(frames(2, 6))
+        pose = passed.poses[ROW].copy()
+        pose[0] += FARTHER
+        return Revision({ROW: Revised(pose, 7.0, {"similarity": 8.0}, passed.doubts[ROW])}, {"left arm": {ROW}})
 
-    with monkeypatch.context() as context:
-        context.setattr(run_job, "tracked_frames", tracked_frames)
-        main([*command, *shown, "out=run", "resume=true"])
-    assert not (tmp_path / "run" / "motion.npz").exists()
-    done(capsys, *command, *shown, "out=run", "resume=true")
-    one, two = (load_motion(tmp_path / name / "motion.npz") for name in ("whole", "run"))
-    np.testing.assert_array_equal(one.pose, two.pose)
-    np.testing.assert_array_equal(one.energy, two.energy)
+    monkeypatch.setattr(revision, "told_both_ways", told_both_ways)
+    done(capsys, *command, "outputs.overlay=false", "outputs.rerun=false", f"start={start}", "out=run")
+    grids = cell_grids(recording, 4)
+    expected = cells_of_clip(recording, grids, ImagesConfig(depth=4), (start + 2, start + 6))
+    np.testing.assert_array_equal(seen, expected[::-1])
+    motion = load_motion(tmp_path / "run" / "motion.npz")
+    assert motion.frame.tolist() == [*range(start, FRAMES)]
+    assert np.flatnonzero(motion.energy == 7.0).tolist() == [ROW]
 
 
 def test_a_pass_backwards_that_fails_is_said_and_the_motion_stays(capsys, tmp_path, monkeypatch, command):

@@ -12,13 +12,13 @@ from sogjax.engine.adjust_cameras import camera_lines, check_cameras, parts_in_q
 from sogjax.engine.adjust_checks import check_length, check_window
 from sogjax.engine.adjust_clip import AdjustedClip, adjusted_clip, sentence
 from sogjax.engine.cells import picture_reader
+from sogjax.engine.kept_run import KeptRun
 from sogjax.engine.origin import Origin, digest
 from sogjax.engine.outputs import export_endings, write_results
 from sogjax.engine.recordings import opened
-from sogjax.engine.resume import resumed
 from sogjax.engine.run import Run
 from sogjax.engine.run_folder import run_folder
-from sogjax.engine.run_job import run_job
+from sogjax.engine.run_job import known_job
 from sogjax.engine.tracked_motion import TrackedMotion
 from sogjax.evaluation.numbers import write_json
 from sogjax.settings import AdjustConfig, ImagesConfig, OutputsConfig
@@ -70,8 +70,12 @@ def write_numbers(clip: AdjustedClip, result: Run, out: Path) -> None:
 
 
 @contextmanager
-def written(clip: AdjustedClip, out: Path, outputs: OutputsConfig, images: ImagesConfig) -> Iterator[Run]:
-    """The run of an adjusted clip, with the files that show its pictures; as `run_job`."""
-    follow = resumed(clip.prefix, shown=True, with_images=outputs.rerun)
-    with run_job(clip.job, outputs, out, picture_reader(images), follow, images=images) as result:
+def written(
+    clip: AdjustedClip, out: Path, outputs: OutputsConfig, images: ImagesConfig, kept: KeptRun | None = None
+) -> Iterator[Run]:
+    """The run of an adjusted clip, with the files that show its pictures; as `run_job`.
+
+    With the frames `kept` that were adjusted, a run that is stopped meanwhile can be resumed.
+    """
+    with known_job(clip.job, clip.prefix, outputs, out, picture_reader(images), kept) as result:
         yield result

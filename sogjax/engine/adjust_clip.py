@@ -20,8 +20,8 @@ from sogjax.engine.adjust_checks import WINDOW, check_length
 from sogjax.engine.adjust_colors import color_rows, mean_similarity, measured_colors
 from sogjax.engine.cells import picture_reader
 from sogjax.engine.job import Job
-from sogjax.engine.kept_run import Prefix
 from sogjax.engine.pipeline import PictureReader, Preparation, cells_of_frame
+from sogjax.engine.prefix import Prefix
 from sogjax.engine.recordings import upright
 from sogjax.engine.second_background import learnt_again
 from sogjax.engine.terminal import progress, say

@@ -7,8 +7,8 @@ from jaxtyping import Array, Float
 from sogjax.data.cell_cache import cell_cache
 from sogjax.data.recording import Recording
 from sogjax.data.video import read_prepared
-from sogjax.engine.kept_run import Prefix
 from sogjax.engine.pipeline import Preparation, cells_of_frame
+from sogjax.engine.prefix import Prefix
 from sogjax.engine.terminal import progress, say
 from sogjax.engine.timing import StageTimes
 from sogjax.images.cells import CellGrid

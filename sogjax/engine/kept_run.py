@@ -2,9 +2,8 @@
 
 import json
 import shutil
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,74 +18,14 @@ from sogjax.data.atomic import atomic_path
 from sogjax.data.motion import FRAMES_AT_ONCE
 from sogjax.data.npz_file import finite_array, read_npz
 from sogjax.engine.origin import Origin
+from sogjax.engine.prefix import Prefix, readable, rows_of
 from sogjax.errors import InputError
 from sogjax.model.body import Body
-from sogjax.model.sog import Sog
-from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import FrameResult, TrackedFrame, TrackState
-from sogjax.tracking.limb_doubt import Judgement
+from sogjax.tracking.frame import TrackedFrame
 
 FOLDER = "run.partial"
 NOTE, START, ACTOR = "run.json", "start.npz", "actor"
-TERM = "term_"
-"""Before the name of a term of the energy, in the names of columns."""
-COLUMNS = ("pose", "energy", "iterations", "evaluations", "converged", "num_near", "num_matching", "num_blocks")
-JUDGEMENT = {"limb_doubt": "doubt", "limb_usual": "usual", "explained": "explained", "overlap": "overlap"}
-"""Columns of runs whose frames are judged."""
-CAPACITY, CAPACITIES = "capacity_{}", ("near", "matching", "blocks")
-_NEEDED = {*COLUMNS, *(CAPACITY.format(name) for name in CAPACITIES)}
-
-
-@dataclass(frozen=True)
-class Prefix:
-    """The frames that were already tracked."""
-
-    rows: dict[str, np.ndarray]
-    """What was kept of each frame."""
-
-    @property
-    def num_frames(self) -> int:
-        """How many."""
-        return len(self.rows["pose"])
-
-    @classmethod
-    def from_frames(cls, frames: Iterable[TrackedFrame]) -> "Prefix":
-        """Of frames that were tracked backwards: in the order of the clip, without their image blobs."""
-        rows = [rows_of([frame]) for frame in frames][::-1]
-        return cls({name: np.concatenate([row[name] for row in rows]) for name in rows[0]})
-
-    def pose(self, frame: int) -> Float[Array, "dof"]:
-        """Of one frame."""
-        return jnp.asarray(self.rows["pose"][frame])
-
-    @property
-    def capacities(self) -> Capacities:
-        """Of the last one."""
-        return Capacities(*(int(self.rows[CAPACITY.format(name)][-1]) for name in CAPACITIES))
-
-    @property
-    def most_capacities(self) -> Capacities:
-        """That suffice for every frame: those tracked backwards may have needed more than the last one."""
-        return Capacities(*(int(self.rows[CAPACITY.format(name)].max()) for name in CAPACITIES))
-
-    def state(self, start: Float[Array, "dof"]) -> TrackState:
-        """The tracker's state after these frames, if it began at `start`."""
-        state = TrackState.from_pose(start)
-        for pose in self.rows["pose"][-2:]:
-            state = state.advanced(jnp.asarray(pose))
-        usual = self.rows.get("limb_usual")
-        return state if usual is None else replace(state, usual=jnp.asarray(usual[-1]))
-
-    def result(self, frame: int, images: Sog) -> FrameResult:
-        """The result of one frame; image blobs are not kept."""
-        values = {name: jnp.asarray(column[frame]) for name, column in self.rows.items()}
-        judged = {name: values[key] for key, name in JUDGEMENT.items() if key in values}
-        return FrameResult(
-            terms={name.removeprefix(TERM): value for name, value in values.items() if name.startswith(TERM)},
-            limbs=Judgement(**judged) if judged else None,
-            images=images,
-            **{name: values[name] for name in COLUMNS},
-        )
+SETTLED, SAMPLED = "settled.npz", "sampled.npz"
 
 
 class KeptRun:
@@ -96,14 +35,17 @@ class KeptRun:
 
     Args:
         folder: of the results.
+        lasts: whether it is there after the process, so that another one can resume.
 
     Raises:
         InputError: the folder cannot be written, here or later.
     """
 
-    def __init__(self, folder: Path):
-        self.folder = folder / FOLDER
+    def __init__(self, folder: Path, lasts: bool = True):
+        self.folder, self.lasts = folder / FOLDER, lasts
         self._log: ArrayLog | None = None
+        self.is_settled = False
+        """Whether all frames are known as they hold."""
         self.num_kept = 0
         """Frames that an earlier process tracked."""
 
@@ -150,8 +92,8 @@ class KeptRun:
         frame = finite_array(self.folder / START, kept, "frame", ())
         return jnp.asarray(pose), int(frame)
 
-    def prefix(self, readable: int, total: int, num_before: int = 0) -> Prefix | None:
-        """The frames to resume after: at most `readable` of `total`, a multiple of the frames written at once.
+    def prefix(self, num_readable: int, total: int, num_before: int = 0) -> Prefix | None:
+        """The frames to resume after: at most `num_readable` of `total`, a multiple of the frames written at once.
 
         So the frames after them are written in the same blocks as in an uninterrupted run. Unless they are more than
         the `num_before` frames that are tracked backwards, all is done again.
@@ -159,17 +101,47 @@ class KeptRun:
         rows = None
         with suppress(InputError):
             rows = read_log(self.folder)
-        if rows is None or not rows.keys() >= _NEEDED or _of_another_layout(rows):
+        if rows is None or not readable(rows):
             return None
-        whole = min(readable, len(rows["pose"]))
+        whole = min(num_readable, len(rows["pose"]))
         count = whole if whole == total else whole - whole % FRAMES_AT_ONCE
         if count <= num_before:
             return None
         self.num_kept = count
         return Prefix({name: column[:count] for name, column in rows.items()})
 
+    def settle(self, frames: Prefix) -> None:
+        """Keep all frames of the run as they hold: nothing is tracked after this, and nothing appended."""
+        _save(self.folder / SETTLED, frames.rows)
+        self.is_settled = True
+
+    def settled(self, total: int) -> Prefix | None:
+        """The frames that were settled, `total` of them, if the run came so far."""
+        rows = None
+        with suppress(InputError):
+            rows = _read(self.folder / SETTLED)
+        if rows is None or not readable(rows) or len(rows["pose"]) != total:
+            return None
+        self.is_settled = True
+        return Prefix(rows)
+
+    def keep_sampled(self, poses: Mapping[int, Float[Array, "dof"]]) -> None:
+        """Keep the poses, by frame, with which the background was learnt again."""
+        _save(self.folder / SAMPLED, {str(frame): np.asarray(pose) for frame, pose in poses.items()})
+
+    def sampled(self) -> dict[int, Float[Array, "dof"]] | None:
+        """Those poses, if they were kept."""
+        file = self.folder / SAMPLED
+        with suppress(InputError, ValueError):
+            kept = _read(file)
+            if kept is not None:
+                return {int(name): jnp.asarray(finite_array(file, kept, name, (None,))) for name in kept}
+        return None
+
     def append(self, frames: Sequence[TrackedFrame]) -> None:
-        """Keep the results of the frames that follow."""
+        """Keep the results of the frames that follow; those that are settled are not kept twice."""
+        if self.is_settled:
+            return
         rows = rows_of(frames)
         if self._log is None:
             self._log = ArrayLog(self.folder, {}, rows, self.num_kept)
@@ -187,11 +159,6 @@ class KeptRun:
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
-def _of_another_layout(rows: dict[str, np.ndarray]) -> bool:
-    """Whether the rows are of a program that judged frames by less."""
-    return "limb_usual" in rows and (rows["limb_usual"].ndim != 3 or "explained" not in rows)
-
-
 def read_note(path: Path) -> dict[str, Any]:
     """What `write_note` wrote; empty if there is no such file."""
     try:
@@ -205,20 +172,6 @@ def write_note(path: Path, note: dict[str, Any]) -> None:
     """Write a note on a run, as JSON."""
     with atomic_path(path) as temporary:
         temporary.write_text(json.dumps(note, indent=1) + "\n", encoding="utf-8")
-
-
-def rows_of(frames: Sequence[TrackedFrame]) -> dict[str, np.ndarray]:
-    """What is kept of frames, a row each."""
-    results = [frame.result for frame in frames]
-    column = lambda parts, name: np.stack([np.asarray(getattr(part, name)) for part in parts])
-    capacity = lambda name: np.array([getattr(frame.capacities, name) for frame in frames])
-    judged = [result.limbs for result in results if result.limbs is not None]
-    return (
-        {name: column(results, name) for name in COLUMNS}
-        | {key: column(judged, name) for key, name in JUDGEMENT.items() if judged}
-        | {TERM + name: np.stack([np.asarray(r.terms[name]) for r in results]) for name in results[0].terms}
-        | {CAPACITY.format(name): capacity(name) for name in CAPACITIES}
-    )
 
 
 def _save(path: Path, arrays: dict[str, np.ndarray]) -> None:

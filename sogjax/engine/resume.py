@@ -7,8 +7,8 @@ from itertools import islice
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from sogjax.engine.kept_run import Prefix
 from sogjax.engine.pipeline import FrameTracker
+from sogjax.engine.prefix import Prefix
 from sogjax.model.sog import Sog
 from sogjax.tracking.frame import FrameCells, TrackedFrame, TrackState, on_device
 from sogjax.tracking.scan import image_blobs

@@ -7,7 +7,7 @@ import numpy as np
 
 from sogjax.engine.backwards import frames_backwards
 from sogjax.engine.job import Job
-from sogjax.engine.kept_run import JUDGEMENT, TERM, Prefix
+from sogjax.engine.prefix import JUDGEMENT, TERM, Prefix
 from sogjax.engine.terminal import say
 from sogjax.errors import InputError
 from sogjax.sentences import counted

@@ -15,8 +15,9 @@ from sogjax.energy import Term
 from sogjax.engine.backwards import frames_backwards, tracked_backwards
 from sogjax.engine.cells import picture_reader
 from sogjax.engine.job import Job
-from sogjax.engine.kept_run import KeptRun, Prefix
+from sogjax.engine.kept_run import KeptRun
 from sogjax.engine.pipeline import Follow, FrameDone, FrameTracker, PictureReader, tracked_frames
+from sogjax.engine.prefix import Prefix
 from sogjax.engine.resume import frames_of, resumed
 from sogjax.engine.revision import Reviser
 from sogjax.engine.run import Run
@@ -45,13 +46,14 @@ def tracking(
     out: Path,
     kept: KeptRun | None = None,
     terms: Sequence[Term] = (),
+    stays: bool = False,
 ) -> Iterator[Run]:
-    """Track, resuming what was kept; the motions are in files that are removed when the block ends without an error."""
+    """Track, resuming what was kept, as `run_job`; with `terms` besides those of the settings."""
     job = Job.from_config(recording, bodies, config, kept, terms)
     read = picture_reader(config.images)
-    job = replace(job, tracker=learnt_again(job, config.images, read))
+    job = replace(job, tracker=learnt_again(job, config.images, read, kept=kept))
     revise = Reviser(job, config.images) if config.tracking.both_ways else None
-    with run_job(job, outputs, out, read, kept=kept, images=config.images, revise=revise) as result:
+    with run_job(job, outputs, out, read, kept=kept, images=config.images, revise=revise, stays=stays) as result:
         yield result
 
 
@@ -65,8 +67,11 @@ def run_job(
     kept: KeptRun | None = None,
     images: ImagesConfig | None = None,
     revise: Revise | None = None,
+    stays: bool = False,
 ) -> Iterator[Run]:
-    """Run a job, with a reader of pictures and a tracker of their cells.
+    """Run a job, with a reader of pictures and a tracker of their cells; one whose frames were settled is only written.
+
+    The motions are in files that are removed when the block ends without an error.
 
     Args:
         job: to run.
@@ -77,9 +82,85 @@ def run_job(
         kept: where results are kept, so that another process can resume.
         images: says how pictures are read backwards.
         revise: is asked once all frames are tracked, if they are kept; what it changes is written again.
+        stays: whether the motions and what was kept stay when the block ends, since more is to be made of them.
     """
-    first, last = job.frames
-    times = StageTimes()
+    total = job.frames[1] - job.frames[0]
+    settled = None if kept is None else kept.settled(total)
+    if settled is not None:
+        say(f"{out}: {counted(total, 'frame')} are done; the results are written")
+        with known_job(job, settled, outputs, out, read, kept, stays) as result:
+            yield result
+        return
+    streams, goes_on = _begun(job, outputs, out, follow, kept, images)
+    first = job.frames[0]
+    missing = Counter(job.recording.num_missing(range(first, first + streams.num_skipped)))
+    try:
+        used = _streamed(job, streams, read, goes_on, missing)
+        image_blobs = float(np.mean(used)) if used else float("nan")
+        revised = _revised(kept, total, revise, stays)
+        if revised is None:
+            yield Run(
+                job.recording,
+                job.bodies,
+                streams.motions(mapped=True),
+                streams.times,
+                image_blobs,
+                files=streams.files,
+                missing=missing,
+            )
+            streams.end(stays)
+            return
+    except BaseException:
+        streams.say_what_is_left()
+        raise
+    with known_job(job, revised, outputs, out, read, kept, stays) as result:
+        yield replace(result, times=streams.times, image_blobs=image_blobs, missing=missing)
+
+
+@contextmanager
+def known_job(
+    job: Job,
+    frames: Prefix,
+    outputs: OutputsConfig,
+    out: Path,
+    read: PictureReader,
+    kept: KeptRun | None = None,
+    stays: bool = False,
+) -> Iterator[Run]:
+    """The run of a job whose poses are known; pictures are read only where a file shows them. Else as `run_job`."""
+    recording, (first, last) = job.recording, job.frames
+    streams = Streams(out, recording, job.bodies, recording.first_frame + first, outputs, StageTimes(), kept)
+    try:
+        if outputs.overlay or outputs.rerun:
+            follow = resumed(frames, shown=True, with_images=outputs.rerun)
+            _streamed(job, streams, read, partial(follow, job.tracker, frames.pose(0)))
+        else:
+            with streams:
+                streams.consume(FrameDone(tracked, []) for tracked in frames_of(frames, job.tracker))
+        missing = recording.num_missing(range(first, last))
+        motions, used = streams.motions(mapped=True), float(np.mean(frames.rows["num_matching"]))
+        yield Run(recording, job.bodies, motions, streams.times, used, files=streams.files, missing=missing)
+        streams.end(stays)
+    except BaseException:
+        streams.say_what_is_left()
+        raise
+
+
+def _revised(kept: KeptRun | None, total: int, revise: Revise | None, stays: bool) -> Prefix | None:
+    """What holds of all frames where it is not what was tracked; settled, so that it is not asked for again."""
+    tracked = None if kept is None or not (revise or stays) else kept.prefix(total, total)
+    if kept is None or tracked is None:
+        return None
+    revised = None if revise is None else revise(tracked)
+    kept.settle(tracked if revised is None else revised)
+    return revised
+
+
+def _begun(
+    job: Job, outputs: OutputsConfig, out: Path, follow: FrameTracker, kept: KeptRun | None, images: ImagesConfig | None
+) -> tuple[Streams, Follow]:
+    """The files of a run, and what tracks the frames that are left, those before its first pose tracked already."""
+    (first, last), times = job.frames, StageTimes()
     prefix = None if kept is None else kept.prefix(readable_frames(out, job.bodies), last - first, job.num_before)
     num_kept = 0 if prefix is None else prefix.num_frames
     streams = Streams(out, job.recording, job.bodies, job.recording.first_frame + first, outputs, times, kept, num_kept)
@@ -91,22 +172,7 @@ def run_job(
     start = job.start if prefix is None or not job.num_before else prefix.pose(0)
     if prefix is not None:
         follow = resumed(prefix, shown=not streams.num_skipped, with_images=outputs.rerun)
-    missing = Counter(job.recording.num_missing(range(first, first + streams.num_skipped)))
-    try:
-        used = _streamed(job, streams, read, partial(follow, job.tracker, start), missing)
-        tracked = None if kept is None or revise is None else kept.prefix(last - first, last - first)
-        revised = None if tracked is None or revise is None else revise(tracked)
-        if revised is not None:
-            again = Streams(out, job.recording, job.bodies, job.recording.first_frame + first, outputs, StageTimes())
-            _write_again(job, again, read, revised, outputs)
-            streams.files = again.files
-        motions = streams.motions(mapped=True)
-        image_blobs = float(np.mean(used)) if used else float("nan")
-        yield Run(job.recording, job.bodies, motions, times, image_blobs, files=streams.files, missing=missing)
-        streams.remove_partial()
-    except BaseException:
-        streams.say_what_is_left()
-        raise
+    return streams, partial(follow, job.tracker, start)
 
 
 def _streamed(
@@ -130,13 +196,3 @@ def _streamed(
                     )
                 behind.put(done)
     return used
-
-
-def _write_again(job: Job, streams: Streams, read: PictureReader, frames: Prefix, outputs: OutputsConfig) -> None:
-    """Write the files of frames whose poses are known; pictures are read only where a file shows them."""
-    if outputs.overlay or outputs.rerun:
-        follow = resumed(frames, shown=True, with_images=outputs.rerun)
-        _streamed(job, streams, read, partial(follow, job.tracker, frames.pose(0)))
-        return
-    with streams:
-        streams.consume(FrameDone(tracked, []) for tracked in frames_of(frames, job.tracker))

@@ -17,6 +17,7 @@ from sogjax.engine.background import clip_backgrounds_without
 from sogjax.engine.backwards import frames_backwards, tracked_backwards
 from sogjax.engine.clip_learning import LeftOut, sampled_frames
 from sogjax.engine.job import Job
+from sogjax.engine.kept_run import KeptRun
 from sogjax.engine.pipeline import PictureReader, Preparation, cells_of_frame
 from sogjax.engine.terminal import progress, say
 from sogjax.engine.timing import StageTimes
@@ -37,10 +38,21 @@ BORDER = 0.15
 """Metres around a blob that are left out, too: the body may be a little off. With 0.25 too little is left to learn."""
 
 
-def learnt_again(job: Job, images: ImagesConfig, read: PictureReader, poses: dict[int, Array] | None = None) -> Tracker:
+def learnt_again(
+    job: Job,
+    images: ImagesConfig,
+    read: PictureReader,
+    poses: Mapping[int, Array] | None = None,
+    kept: KeptRun | None = None,
+) -> Tracker:
     """The job's tracker, with a background that was learnt again where the first one left much open.
 
-    `poses` are those of the frames (counted from the recording's first), if they are known; None: they are tracked.
+    Args:
+        job: whose tracker.
+        images: says how pictures are read backwards.
+        read: reads pictures.
+        poses: of the frames, counted from the recording's first, if they are known; None: they are tracked.
+        kept: where those that were tracked for this are kept, so that another process need not track them again.
 
     Raises:
         InputError: a video cannot be read, or a picture has too many image blobs.
@@ -50,12 +62,16 @@ def learnt_again(job: Job, images: ImagesConfig, read: PictureReader, poses: dic
     samples = [frame for frame in sampled_frames(job.recording) if first <= frame < stop]
     if unknown < MUCH_UNKNOWN or len(samples) < FEWEST_AGREEING:  # of a short part too little would be learnt
         return job.tracker
+    if poses is None and kept is not None:
+        poses = kept.sampled()
     if poses is None:
         say(
             f"{unknown:.1%} of the background is unknown: the clip is tracked once to learn it where the body is not, "
             "then again"
         )
         poses = _first_pass(job, images, read)
+        if kept is not None:
+            kept.keep_sampled(poses)
     return knowing_the_body(job.tracker, job.recording, job.grids, poses)
 
 

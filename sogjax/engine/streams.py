@@ -143,18 +143,25 @@ class Streams:
                 self.times.add("outputs", seconds / len(block))
 
     def motions(self, mapped: bool) -> dict[str, Motion]:
-        """The motions by actor; `mapped`: they stay on disk, until `remove_partial`."""
+        """The motions by actor; `mapped`: they stay on disk, until `end`."""
         return {name: log.motion(mapped) for name, log in self._logs.items()}
 
-    def remove_partial(self) -> None:
-        """Remove the growing motions once they have been written under their final names."""
+    def end(self, stays: bool = False) -> None:
+        """Remove the growing motions once they have been written under their final names, unless all `stays`."""
+        if stays:
+            return
         for log in self._logs.values():
             log.remove()
         if self._kept is not None:
             self._kept.remove()
 
     def say_what_is_left(self) -> None:
-        """After an error: print where the frames so far are."""
+        """After an error: print where the frames so far are, unless they go with the process."""
+        if self._kept is not None and not self._kept.lasts:
+            return
+        if self._kept is not None and self._kept.is_settled:
+            say("stopped when all frames were tracked; the same command with resume=true continues")
+            return
         count = max(self._next_frame, self._first_new) - self._first_frame
         if not count or not all(log.folder.is_dir() for log in self._logs.values()):
             return

@@ -83,7 +83,8 @@ def _run_in(folder: RunFolder, recording: Recording, config: TrackConfig, comman
         if (opening := known_opening(recording, found, config)) is not None:
             kept.keep_start(*opening)
     adjust = config.adjust and _adjustable(recording, bodies, config)
-    with tracking(recording, bodies, config, NOTHING if adjust else config.outputs, folder.path, kept=kept) as result:
+    shown = NOTHING if adjust else config.outputs
+    with tracking(recording, bodies, config, shown, folder.path, kept=kept, stays=adjust) as result:
         if not adjust:
             write_results(result, folder.path, config.outputs, OmegaConf.structured(config), bodies if made else [])
             folder.finish(command, origin, result.files)
@@ -93,7 +94,7 @@ def _run_in(folder: RunFolder, recording: Recording, config: TrackConfig, comman
         save_body(unadjusted[1], bodies[0])
         clip = adjusted_clip(recording, bodies[0], load_motion(unadjusted[0]), config)
     # The pictures are read once more, for the files that show the adjusted poses in them.
-    with written(clip, folder.path, config.outputs, config.images) as result:
+    with written(clip, folder.path, config.outputs, config.images, kept) as result:
         write_results(result, folder.path, config.outputs, OmegaConf.structured(config), [clip.actor])
         result.files += unadjusted
         write_numbers(clip, result, folder.path)
@@ -145,7 +146,7 @@ def track_recording(recording: Recording, bodies: list[Body], config: TrackConfi
     """Track actors (in their own upright frames) without writing files; `terms` are added to those of the settings."""
     with (
         TemporaryDirectory() as folder,
-        tracking(recording, bodies, config, NOTHING, Path(folder), KeptRun(Path(folder)), terms) as result,
+        tracking(recording, bodies, config, NOTHING, Path(folder), KeptRun(Path(folder), lasts=False), terms) as result,
     ):
         motions = {
             name: replace(motion, **{key: np.array(rows) for key, rows in arrays_of(motion).items() if key in _ROWS})

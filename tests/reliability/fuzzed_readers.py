@@ -27,7 +27,8 @@ from sogjax.data.recording_settings import read_recording_settings
 from sogjax.data.skeletons import read_skeleton
 from sogjax.data.skeletool_motion import read_skeletool_motion
 from sogjax.data.source import look_at_source, open_source
-from sogjax.engine.kept_run import CAPACITIES, CAPACITY, COLUMNS, FOLDER, NOTE, TERM, KeptRun
+from sogjax.engine.kept_run import FOLDER, NOTE, KeptRun
+from sogjax.engine.prefix import CAPACITIES, CAPACITY, COLUMNS, TERM, Prefix
 from sogjax.errors import InputError
 
 Read = Callable[[Path], object]
@@ -106,12 +107,16 @@ def _runs(place: Path) -> dict[str, tuple[Path, Read]]:
     names = (*COLUMNS, f"{TERM}similarity", *(CAPACITY.format(name) for name in CAPACITIES))
     rows = dict.fromkeys(names, motion.iterations) | {"pose": motion.pose}
     ArrayLog(kept.folder, {}, rows).close()
+    kept.settle(Prefix(rows))
+    kept.keep_sampled({0: jnp.asarray(motion.pose[0])})
     whole_motion = lambda path: load_motion(path.parent)
     return {
         "motion.partial, rows.npy": (place / "motion.partial/rows.npy", whole_motion),
         "motion.partial, constant.npz": (place / "motion.partial/constant.npz", whole_motion),
         "run.partial, run.json": (place / FOLDER / NOTE, lambda _: kept.note or _refused()),
         "run.partial, rows.npy": (place / FOLDER / "rows.npy", lambda _: kept.prefix(4, 4) or _refused()),
+        "run.partial, settled.npz": (place / FOLDER / "settled.npz", lambda _: kept.settled(4) or _refused()),
+        "run.partial, sampled.npz": (place / FOLDER / "sampled.npz", lambda _: kept.sampled() or _refused()),
         "run.partial, start.npz": (place / FOLDER / "start.npz", lambda _: kept.start()),
         "run.partial, actors.npz": (place / FOLDER / "actors.npz", lambda _: kept.actors()),
         "run.partial, actor_0.yaml": (place / FOLDER / "actor_0.yaml", lambda _: kept.actors()),

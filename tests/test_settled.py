@@ -1,0 +1,124 @@
+"""Runs that are stopped when all frames are tracked: the same command goes on, and tracks no frame again."""
+
+import numpy as np
+import pytest
+from command_line import actor_file, done, trackable
+from test_resume import SMALL, assert_same, stop_after
+
+from sogjax.adjust.adjustment import Adjusted
+from sogjax.app.cli import main
+from sogjax.data.actor_file import load_body
+from sogjax.data.motion import load_motion
+from sogjax.data.recording import open_recording
+from sogjax.engine import adjust_clip, revision, track
+from sogjax.settings.compose import track_config
+from sogjax.tracking import tracker
+from sogjax.tracking.both_ways import Revised, Revision
+
+FRAMES, ROW, FARTHER, HIGHER = 12, 5, 0.25, 0.125
+SHOWN = ("outputs.bvh=false", "outputs.rerun=false")
+
+
+@pytest.fixture
+def command(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    recording = trackable(tmp_path / "walk", frames=FRAMES)
+    return ["track", f"recording={recording}", f"actor={actor_file(tmp_path / 'a.yaml')}", *SMALL, *SHOWN]
+
+
+@pytest.fixture
+def farther(monkeypatch):
+    """One frame is found to be farther along the first axis."""
+
+    def told_both_ways(tracker, passed, frames):
+        pose = passed.poses[ROW].copy()
+        pose[0] += FARTHER
+        return Revision({ROW: Revised(pose, 7.0, {"similarity": 8.0}, passed.doubts[ROW])}, {"left arm": {ROW}})
+
+    monkeypatch.setattr(revision, "told_both_ways", told_both_ways)
+
+
+@pytest.fixture
+def higher(monkeypatch):
+    """Every frame is adjusted to be higher."""
+
+    def adjusted(tracker, pictures, poses, frames, similarity, *rest, moves, **_):
+        found = poses.copy()
+        found[:, 2] += HIGHER
+        values = {term.name: np.zeros(len(poses)) for term in tracker.terms} | {"similarity": np.asarray(similarity)}
+        return Adjusted(
+            found, np.zeros(0), tracker.body, 1.0, 2.0, np.arange(len(poses)), 1, values, 256, np.asarray(moves), {}
+        )
+
+    monkeypatch.setattr(adjust_clip, "adjusted", adjusted)
+    monkeypatch.setattr(adjust_clip, "_recolored", lambda job, source, found, after, config: (found.body, 1.0))
+
+
+def tracks_nothing(context):
+    context.setattr(tracker, "_step", lambda *_: pytest.fail("a frame was tracked again"))
+    context.setattr(revision, "told_both_ways", lambda *_: pytest.fail("told both ways again"))
+
+
+def test_a_run_stopped_while_its_revised_files_are_written(capsys, tmp_path, monkeypatch, command, farther):
+    done(capsys, *command, "out=whole")
+    with monkeypatch.context() as context:
+        stop_after(context, FRAMES + 3)
+        main([*command, "out=run"])
+    assert "all frames were tracked; the same command with resume=true" in capsys.readouterr().err
+    assert not (tmp_path / "run" / "motion.npz").exists()
+    with monkeypatch.context() as context:
+        tracks_nothing(context)
+        done(capsys, *command, "out=run", "resume=true")
+    assert_same(tmp_path / "run", tmp_path / "whole")
+    names = lambda folder: sorted(path.name for path in (tmp_path / folder).iterdir())
+    assert names("run") == names("whole")
+
+
+@pytest.mark.parametrize("both_ways", [True, False], ids=["both ways", "forwards"])
+def test_a_run_stopped_while_its_adjusted_files_are_written(
+    capsys, tmp_path, monkeypatch, command, farther, higher, both_ways
+):
+    """What is adjusted is the motion that was kept, the revised one; it stays beside the adjusted one."""
+    words = [*command, "adjust=true", f"tracking.both_ways={str(both_ways).lower()}"]
+    done(capsys, *words, "out=whole")
+    before, after = (load_motion(tmp_path / "whole" / name) for name in ("unadjusted.npz", "motion.npz"))
+    np.testing.assert_allclose(after.pose[:, 2] - before.pose[:, 2], HIGHER, atol=1e-5)
+    assert (before.energy[ROW] == 7.0) == both_ways
+    with monkeypatch.context() as context:
+        stop_after(context, FRAMES + 3)
+        main([*words, "out=run"])
+    assert "the same command with resume=true continues" in capsys.readouterr().err
+    assert not (tmp_path / "run" / "motion.npz").exists()
+    with monkeypatch.context() as context:
+        tracks_nothing(context)
+        done(capsys, *words, "out=run", "resume=true")
+    assert_same(tmp_path / "run", tmp_path / "whole")
+    assert_same(tmp_path / "run", tmp_path / "whole", "unadjusted.npz")
+    names = lambda folder: sorted(path.name for path in (tmp_path / folder).iterdir())
+    assert names("run") == names("whole")
+    assert not any(name.endswith(".partial") for name in names("run"))
+
+
+def test_a_run_stopped_while_it_is_adjusted(capsys, tmp_path, monkeypatch, command, higher):
+    words = [*command, "adjust=true", "outputs.overlay=false"]
+
+    def stop(*_, **__):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as context:
+        context.setattr(adjust_clip, "adjusted", stop)
+        main([*words, "out=run"])
+    with monkeypatch.context() as context:
+        tracks_nothing(context)
+        done(capsys, *words, "out=run", "resume=true")
+    before, after = (load_motion(tmp_path / "run" / name) for name in ("unadjusted.npz", "motion.npz"))
+    np.testing.assert_allclose(after.pose[:, 2] - before.pose[:, 2], HIGHER, atol=1e-5)
+
+
+def test_a_run_without_a_folder_that_is_stopped_does_not_advise_to_resume(capsys, tmp_path, monkeypatch, command):
+    recording, actor = open_recording(tmp_path / "walk"), load_body(tmp_path / "a.yaml")
+    config = track_config([*SMALL, *SHOWN], recording=tmp_path / "walk")
+    stop_after(monkeypatch, 10)
+    with pytest.raises(KeyboardInterrupt):
+        track.track_recording(recording, [actor], config)
+    assert "resume" not in capsys.readouterr().err
