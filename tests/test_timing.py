@@ -23,18 +23,17 @@ def test_work_is_a_rate_and_waiting_is_seconds():
     assert found["tracking step"] == ["4.0", "frames/s"]
     assert found["decoding to pose, together"] == ["1.3", "frames/s"]
     assert found["waiting for decoded pictures"] == ["1.5", "s", "in", "all"]
-    assert found["first frame, with compilation"] == ["10.8", "s"]
 
 
 @pytest.mark.parametrize("stage", ["decode", "cells"])
 def test_a_stage_that_takes_no_time_has_no_line(stage):
     found = rows(times(**{stage: 2e-5, "step": 0.25}))
-    assert list(found) == ["tracking step", "decoding to pose, together", "first frame, with compilation"]
+    assert list(found) == ["tracking step", "decoding to pose, together"]
 
 
-def test_one_frame_has_no_rate_and_none_has_no_table():
+def test_without_a_second_frame_there_are_no_rates():
     found = StageTimes()
     assert found.table() == ""
     for stage in ("decode", "step", "whole"):
         found.add(stage, 2.0)
-    assert rows(found) == {"first frame, with compilation": ["2.0", "s"]}
+    assert found.table() == ""

@@ -1,19 +1,22 @@
 """`sogjax adjust`: the poses of a tracked clip and the shape of its actor, adjusted together."""
 
 from sogjax.engine.adjust import adjust_to_folder
+from sogjax.engine.clock import clocked
 from sogjax.engine.run import Run
 from sogjax.settings import AdjustConfig
 
 
 def run(config: AdjustConfig) -> Run:
-    """Adjust into a folder, and print the results.
+    """Adjust into a folder, and print the results and how long each stage took.
 
     Raises:
         InputError: as `adjust_to_folder`.
     """
-    result = adjust_to_folder(config)
-    if result.evaluation is not None:
-        print(result.evaluation.table(details=False), end="\n\n")
-    for path in result.files:
-        print(path)
+    with clocked() as clock:
+        result = adjust_to_folder(config)
+        if result.evaluation is not None:
+            print(result.evaluation.table(details=False), end="\n\n")
+        for path in result.files:
+            print(path)
+        print(f"\n{clock.table()}")
     return result

@@ -12,8 +12,10 @@ USAGE = "usage: sogjax COMMAND [key=value ...] [-m for a sweep], sogjax COMMAND 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; 0: done, 2: the input was wrong (one sentence on standard error)."""
+    is_process = arguments is None
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     from sogjax.app.config.composition import SCHEMAS, composed
+    from sogjax.engine.clock import STARTING, age_of_process, clocked, stage
     from sogjax.engine.compilation_cache import use_compilation_cache
     from sogjax.engine.termination import TerminatedError, terminated_as_interrupted
     from sogjax.errors import InputError
@@ -39,8 +41,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
             return run_sweep(command, [word for word in overrides if word not in ("-m", "--multirun")])
         config = composed(command, overrides)
-        with terminated_as_interrupted():
-            importlib.import_module(f"sogjax.app.{command}").run(config)
+        with terminated_as_interrupted(), clocked(age_of_process() if is_process else 0.0):
+            with stage(STARTING):
+                module = importlib.import_module(f"sogjax.app.{command}")
+            module.run(config)
     except InputError as error:
         return _wrong_input(str(error))
     except KeyboardInterrupt as stop:

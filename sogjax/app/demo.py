@@ -1,10 +1,10 @@
 """`sogjax demo`: render a person, make the actor, track, evaluate; everything at once."""
 
-import time
 from pathlib import Path
 
 from sogjax.app.config.schemas import DemoConfig
 from sogjax.app.track import run as run_track
+from sogjax.engine.clock import RENDERING, clocked, stage
 from sogjax.engine.outputs import results_folder
 from sogjax.engine.run import Run
 from sogjax.engine.run_folder import run_folder
@@ -25,11 +25,11 @@ def run(config: DemoConfig) -> Run:
     with results_folder(out):
         with run_folder(out, config.overwrite, config.resume, COMMAND):
             pass  # found out before anything is rendered
-        return _run_in(config, out)
+        with clocked():
+            return _run_in(config, out)
 
 
 def _run_in(config: DemoConfig, out: Path) -> Run:
-    begin = time.perf_counter()
     settings = SynthSettings(
         motion=config.motion,
         cameras=config.cameras,
@@ -38,14 +38,9 @@ def _run_in(config: DemoConfig, out: Path) -> Run:
         height=config.height,
         seed=config.seed,
     )
-    recording = cached_recording(settings, default_cache_dir(), progress)
+    with stage(RENDERING):
+        recording = cached_recording(settings, default_cache_dir(), progress)
     say(f"rendered recording: {recording}")
-    rendered = time.perf_counter()
     track = track_config(recording=recording, out=out, initial_pose="auto")
     track.outputs, track.overwrite, track.resume = config.outputs, config.overwrite, config.resume
-    result = run_track(track, COMMAND)
-    print(
-        f"rendering {rendered - begin:.1f} s (0 if it was already there), "
-        f"actor, tracking and outputs {time.perf_counter() - rendered:.1f} s"
-    )
-    return result
+    return run_track(track, COMMAND)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from sogjax.data.doubtful import doubtful_limbs
+from sogjax.engine.clock import clocked
 from sogjax.engine.run import Run
 from sogjax.engine.terminal import say
 from sogjax.engine.track import track_to_folder
@@ -11,13 +12,15 @@ from sogjax.settings import TrackConfig
 
 
 def run(config: TrackConfig, command: str = "track") -> Run:
-    """Track into a folder, and print the results.
+    """Track into a folder, and print the results; at last how long each stage took.
 
     Raises:
         InputError: as `track_to_folder`.
     """
-    result = track_to_folder(config, command)
-    say_results(result)
+    with clocked() as clock:
+        result = track_to_folder(config, command)
+        say_results(result)
+        print(f"\n{clock.table()}")
     return result
 
 

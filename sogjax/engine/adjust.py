@@ -12,6 +12,7 @@ from sogjax.engine.adjust_cameras import camera_lines, check_cameras, parts_in_q
 from sogjax.engine.adjust_checks import check_length, check_window
 from sogjax.engine.adjust_clip import AdjustedClip, adjusted_clip, sentence
 from sogjax.engine.cells import picture_reader
+from sogjax.engine.clock import ADJUSTING, stage
 from sogjax.engine.kept_run import KeptRun
 from sogjax.engine.origin import Origin, digest
 from sogjax.engine.outputs import export_endings, write_results
@@ -44,9 +45,10 @@ def adjust_to_folder(config: AdjustConfig) -> Run:
     check_cameras(recording, tracked.motion, config.cameras, config.offsets)
     in_question = parts_in_question(config.cameras, config.offsets)
     with run_folder(path, config.overwrite, command="adjust") as folder:
-        clip = adjusted_clip(
-            recording, tracked.actor, tracked.motion, tracked.config, config.window, config.shape, in_question
-        )
+        with stage(ADJUSTING):
+            clip = adjusted_clip(
+                recording, tracked.actor, tracked.motion, tracked.config, config.window, config.shape, in_question
+            )
         origin: Origin = {"motion": str(tracked.path), "actor": digest(tracked.actor)}
         folder.begin("adjust", origin, tracked.files)
         with written(clip, path, config.outputs, tracked.config.images) as result:

@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 from sogjax.data.recording import Recording
 from sogjax.energy import Term
 from sogjax.engine import build
+from sogjax.engine.clock import FIRST_POSE, stage
 from sogjax.engine.first_pose import first_poses, rough_descriptions
 from sogjax.engine.kept_run import KeptRun
 from sogjax.engine.recordings import upright
@@ -66,7 +67,8 @@ class Job:
             if start is None and kept is not None and (opening := kept.start()) is not None:
                 start, begin = opening
             if start is None:
-                start = jnp.concatenate(first_poses(recording, bodies, config, begin, terms))
+                with stage(FIRST_POSE):
+                    start = jnp.concatenate(first_poses(recording, bodies, config, begin, terms))
                 if kept is not None:
                     kept.keep_start(start, begin)
             tracker = building.result()

@@ -14,6 +14,7 @@ from sogjax.data.export import WRITERS, export_motion, require_ezc3d
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.motion import Motion, save_motion
 from sogjax.engine.build import marker_rule
+from sogjax.engine.clock import WRITING, stage
 from sogjax.engine.run import Run
 from sogjax.engine.streams import file_name
 from sogjax.engine.terminal import say
@@ -85,6 +86,11 @@ def export_endings(wanted: OutputsConfig) -> list[str]:
 
 def write_results(result: Run, out: Path, wanted: OutputsConfig, config: Any, made_actors: Sequence[Body]) -> None:
     """Write the files that need whole motions; each appears under its name only when complete."""
+    with stage(WRITING):
+        _write_results(result, out, wanted, config, made_actors)
+
+
+def _write_results(result: Run, out: Path, wanted: OutputsConfig, config: Any, made_actors: Sequence[Body]) -> None:
     names = list(result.motions)
     streamed, result.files = result.files, []
     for actor in made_actors:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from sogjax.data.export import WRITERS
 from sogjax.data.file_names import objection
+from sogjax.engine.clock import seconds_so_far
 from sogjax.engine.kept_run import FOLDER, NOTE, KeptRun, read_note, write_note
 from sogjax.engine.origin import Origin, difference
 from sogjax.engine.outputs import results_folder
@@ -130,11 +131,13 @@ class RunFolder:
                 path.unlink(missing_ok=True)
 
     def finish(self, command: str, origin: Origin, files: Sequence[Path]) -> None:
-        """Write down that the run has ended, and its files."""
+        """Write down that the run has ended, its files, and the seconds of its stages on the clock that runs."""
         for path in half_written(self.path):
             path.unlink(missing_ok=True)
         names = [path.name for path in files]
-        write_note(self.path / NOTE, {"command": command, "files": names, "origin": origin})
+        note = {"command": command, "files": names, "origin": origin}
+        seconds = seconds_so_far()
+        write_note(self.path / NOTE, note | ({"seconds": seconds} if seconds else {}))
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from sogjax.data.stages import Behind
 from sogjax.energy import Term
 from sogjax.engine.backwards import frames_backwards, tracked_backwards
 from sogjax.engine.cells import picture_reader
+from sogjax.engine.clock import BACKGROUND, BEFORE, BOTH_WAYS, FIRST_FRAME, PREPARING, TRACKING, WRITING, stage
 from sogjax.engine.job import Job
 from sogjax.engine.kept_run import KeptRun
 from sogjax.engine.pipeline import Follow, FrameDone, FrameTracker, PictureReader, tracked_frames
@@ -49,9 +50,11 @@ def tracking(
     stays: bool = False,
 ) -> Iterator[Run]:
     """Track, resuming what was kept, as `run_job`; with `terms` besides those of the settings."""
-    job = Job.from_config(recording, bodies, config, kept, terms)
+    with stage(PREPARING):
+        job = Job.from_config(recording, bodies, config, kept, terms)
     read = picture_reader(config.images)
-    job = replace(job, tracker=learnt_again(job, config.images, read, kept=kept))
+    with stage(BACKGROUND):
+        job = replace(job, tracker=learnt_again(job, config.images, read, kept=kept))
     revise = Reviser(job, config.images) if config.tracking.both_ways else None
     with run_job(job, outputs, out, read, kept=kept, images=config.images, revise=revise, stays=stays) as result:
         yield result
@@ -133,9 +136,9 @@ def known_job(
     try:
         if outputs.overlay or outputs.rerun:
             follow = resumed(frames, shown=True, with_images=outputs.rerun)
-            _streamed(job, streams, read, partial(follow, job.tracker, frames.pose(0)))
+            _streamed(job, streams, read, partial(follow, job.tracker, frames.pose(0)), stages=(WRITING, WRITING))
         else:
-            with streams:
+            with stage(WRITING), streams:
                 streams.consume(FrameDone(tracked, []) for tracked in frames_of(frames, job.tracker))
         missing = recording.num_missing(range(first, last))
         motions, used = streams.motions(mapped=True), float(np.mean(frames.rows["num_matching"]))
@@ -151,8 +154,9 @@ def _revised(kept: KeptRun | None, total: int, revise: Revise | None, stays: boo
     tracked = None if kept is None or not (revise or stays) else kept.prefix(total, total)
     if kept is None or tracked is None:
         return None
-    revised = None if revise is None else revise(tracked)
-    kept.settle(tracked if revised is None else revised)
+    with stage(BOTH_WAYS):
+        revised = None if revise is None else revise(tracked)
+        kept.settle(tracked if revised is None else revised)
     return revised
 
 
@@ -168,7 +172,8 @@ def _begun(
         say(f"{out}: {num_kept} of {counted(last - first, 'frame')} are done; resuming after them")
     elif job.num_before:
         frames = frames_backwards(job.recording, job.grids, images or ImagesConfig(), first, job.begin + 1)
-        prefix = tracked_backwards(job.tracker, job.start, frames, job.num_before + 1, times)
+        with stage(BEFORE):
+            prefix = tracked_backwards(job.tracker, job.start, frames, job.num_before + 1, times)
     start = job.start if prefix is None or not job.num_before else prefix.pose(0)
     if prefix is not None:
         follow = resumed(prefix, shown=not streams.num_skipped, with_images=outputs.rerun)
@@ -176,12 +181,20 @@ def _begun(
 
 
 def _streamed(
-    job: Job, streams: Streams, read: PictureReader, follow: Follow, missing: Counter[str] | None = None
+    job: Job,
+    streams: Streams,
+    read: PictureReader,
+    follow: Follow,
+    missing: Counter[str] | None = None,
+    stages: tuple[str, str] = (FIRST_FRAME, TRACKING),
 ) -> list[float]:
-    """Track the frames that are left, and write them as they come; image blobs used in each."""
+    """Track the frames that are left, and write them as they come; image blobs used in each.
+
+    The clock counts the first frame and the others as two `stages`.
+    """
     first, last = job.frames
     used: list[float] = []
-    with streams:
+    with stage(stages[0]) as turn, streams:
         count = last - first - streams.num_skipped
         pictures = read(job.recording, streams.preparation(job.grids), last - count, last) if count else iter(())
         frames = tracked_frames(pictures, count, streams.times, follow)
@@ -195,4 +208,6 @@ def _streamed(
                         if picture.cells is None
                     )
                 behind.put(done)
+                turn(stages[1])
+            turn(WRITING)
     return used

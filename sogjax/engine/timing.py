@@ -1,6 +1,5 @@
-"""How long the stages of a run take, without the first frames, which compile."""
+"""How fast the stages of tracking are that run beside each other, without the first frames, which compile."""
 
-import math
 import time
 from array import array
 from collections.abc import Iterable, Iterator
@@ -54,7 +53,7 @@ class StageTimes:
         return float(sum(self.seconds.get(stage, array("f"))[skipped:]))
 
     def table(self) -> str:
-        """A line per stage with its rate, or the seconds spent waiting, and the first frame's time."""
+        """A line per stage with its rate, or the seconds spent waiting; stages run beside each other."""
         lines, least = [], LEAST_SHARE * self.total("whole")
         for stage, text in STAGES.items():
             total, rate = self.total(stage), self.frames_per_second(stage)
@@ -62,10 +61,4 @@ class StageTimes:
                 lines.append(
                     f"{text:<32}{total:10.1f} s in all" if stage in WAITING else f"{text:<32}{rate:10.1f} frames/s"
                 )
-        if not math.isnan(first := self.first("whole")):
-            lines.append(f"{'first frame, with compilation':<32}{first:10.1f} s")
         return "\n".join(lines)
-
-    def first(self, stage: str) -> float:
-        """Seconds of the first frame, which compiles."""
-        return self.seconds.get(stage, array("f", [float("nan")]))[0]

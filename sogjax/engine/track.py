@@ -20,6 +20,7 @@ from sogjax.engine.actor_report import report_folder, write_actor_report
 from sogjax.engine.adjust import write_numbers, written
 from sogjax.engine.adjust_checks import check_window, too_short
 from sogjax.engine.adjust_clip import adjusted_clip
+from sogjax.engine.clock import ACTORS, ADJUSTING, stage
 from sogjax.engine.example_frames import check_actors
 from sogjax.engine.first_pose import initial_pose_file, known_opening
 from sogjax.engine.job import frame_range
@@ -65,7 +66,8 @@ def _run_in(folder: RunFolder, recording: Recording, config: TrackConfig, comman
     """Track into this run's own folder, or resume there."""
     actors = partial(actors_of, recording, config.actor, config.body, config.color, config.images, config.actors)
     made = config.actor is None
-    bodies = None if made else actors()[0]
+    with stage(ACTORS):
+        bodies = None if made else actors()[0]
     origin = origin_of(recording, config, bodies)
     going_on, kept = folder.goes_on(origin), folder.kept
     if folder.ended:
@@ -74,12 +76,14 @@ def _run_in(folder: RunFolder, recording: Recording, config: TrackConfig, comman
         bodies = kept.actors()
     anew, found = bodies is None, []
     if bodies is None:
-        bodies, found = actors()
+        with stage(ACTORS):
+            bodies, found = actors()
     if not going_on:
         folder.begin(command, origin, [] if made else file_list(config.actor))
     if anew:
         kept.keep_actors(bodies)
-        _report_actors(recording, found, folder.path)
+        with stage(ACTORS):
+            _report_actors(recording, found, folder.path)
         if (opening := known_opening(recording, found, config)) is not None:
             kept.keep_start(*opening)
     adjust = config.adjust and _adjustable(recording, bodies, config)
@@ -92,11 +96,14 @@ def _run_in(folder: RunFolder, recording: Recording, config: TrackConfig, comman
         unadjusted = [folder.path / UNADJUSTED, folder.path / UNADJUSTED_ACTOR]
         save_motion(unadjusted[0], next(iter(result.motions.values())))
         save_body(unadjusted[1], bodies[0])
-        clip = adjusted_clip(recording, bodies[0], load_motion(unadjusted[0]), config)
+        with stage(ADJUSTING):
+            clip = adjusted_clip(recording, bodies[0], load_motion(unadjusted[0]), config)
+    times = result.times
     # The pictures are read once more, for the files that show the adjusted poses in them.
     with written(clip, folder.path, config.outputs, config.images, kept) as result:
         write_results(result, folder.path, config.outputs, OmegaConf.structured(config), [clip.actor])
         result.files += unadjusted
+        result.times = times
         write_numbers(clip, result, folder.path)
         folder.finish(command, origin, result.files)
     return result
@@ -154,6 +161,7 @@ def track_recording(recording: Recording, bodies: list[Body], config: TrackConfi
         }
     result = replace(result, motions=motions)
     if config.adjust and _adjustable(recording, bodies, config):
-        clip = adjusted_clip(recording, bodies[0], next(iter(motions.values())), config)
+        with stage(ADJUSTING):
+            clip = adjusted_clip(recording, bodies[0], next(iter(motions.values())), config)
         result = replace(result, bodies=clip.job.bodies, motions={bodies[0].name: clip.motion})
     return result

@@ -26,6 +26,7 @@ _NOTHING = ("", "nan", "nan +- nan", "nan to nan")
 SPEED: dict[str, Cell] = {
     "tracking step, frames/s": lambda row: _rate(row, "step"),
     "whole, frames/s": lambda row: _rate(row, "whole"),
+    "from start to end, frames/s": lambda row: _rate(row, "all"),
     "waiting for pictures, ms": lambda row: _waiting(row),
     "image blobs": lambda row: f"{row.image_blobs:.0f}",
     "iterations": lambda row: f"{row.iterations:.1f}",
