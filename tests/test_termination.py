@@ -2,6 +2,7 @@
 
 import os
 import signal
+import time
 
 import pytest
 
@@ -26,3 +27,19 @@ def test_the_handler_of_before_is_put_back():
     with pytest.raises(TerminatedError), terminated_as_interrupted():
         terminate()
     assert signal.getsignal(signal.SIGTERM) is before
+
+
+def test_a_signal_that_comes_where_errors_are_ignored_is_not_lost():
+    """As while JAX is told of a garbage collection: the error would only be printed, and the run go on."""
+
+    class Collected:
+        def __del__(self):
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(0.01)
+
+    def collect():
+        Collected()
+        time.sleep(5.0)
+
+    with pytest.raises(TerminatedError), terminated_as_interrupted():
+        collect()

@@ -90,7 +90,7 @@ def run_job(
     total = job.frames[1] - job.frames[0]
     settled = None if kept is None else kept.settled(total)
     if settled is not None:
-        say(f"{out}: {counted(total, 'frame')} are done; the results are written")
+        say(f"{out}: all of {counted(total, 'frame')} are tracked; going on after them")
         with known_job(job, settled, outputs, out, read, kept, stays) as result:
             yield result
         return

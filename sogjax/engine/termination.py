@@ -1,9 +1,16 @@
 """SIGTERM, as sent by batch systems and `kill`, ends a run as tidily as Ctrl-C."""
 
+import os
 import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import FrameType
+
+_DEAF = ("_xla_gc_callback", "__del__")
+"""Functions that the interpreter calls between two lines of others, and whose errors it ignores."""
+_LATER = 0.05
+"""Seconds after which a signal that came there is sent again."""
 
 
 class TerminatedError(KeyboardInterrupt):
@@ -26,5 +33,8 @@ def terminated_as_interrupted() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
 
 
-def _terminate(number: int, frame: object) -> None:
+def _terminate(number: int, frame: FrameType | None) -> None:
+    if frame is not None and frame.f_code.co_name in _DEAF:
+        threading.Timer(_LATER, os.kill, (os.getpid(), number)).start()
+        return
     raise TerminatedError
