@@ -98,8 +98,8 @@ def test_track_ends_with_its_times_which_are_those_of_the_clock(capsys, tmp_path
     assert [*lines][-2:] == [OTHER, TOTAL]
     total = lines.pop(TOTAL)
     assert sum(lines.values()) == pytest.approx(total, abs=1e-9)
-    assert seconds - 1.0 < total < seconds + 0.1
-    assert lines[FIRST_FRAME] > 0.0
+    assert total == pytest.approx(seconds, abs=0.1 + 0.1 * seconds)
     noted = json.loads((tmp_path / "run" / "run.json").read_text())["seconds"]
-    assert noted[FIRST_FRAME] == pytest.approx(lines[FIRST_FRAME], abs=0.2)
+    assert noted[FIRST_FRAME] > 0.0
+    assert noted[FIRST_FRAME] == pytest.approx(lines.get(FIRST_FRAME, 0.0), abs=0.2)
     assert noted.pop(TOTAL) == pytest.approx(sum(noted.values()), abs=0.01)

@@ -3,6 +3,7 @@
 import importlib
 import sys
 import textwrap
+import time
 from collections.abc import Sequence
 
 INTERRUPTED, TERMINATED = 130, 143
@@ -12,7 +13,7 @@ USAGE = "usage: sogjax COMMAND [key=value ...] [-m for a sweep], sogjax COMMAND 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; 0: done, 2: the input was wrong (one sentence on standard error)."""
-    is_process = arguments is None
+    begin, is_process = time.perf_counter(), arguments is None
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     from sogjax.app.config.composition import SCHEMAS, composed
     from sogjax.engine.clock import STARTING, age_of_process, clocked, stage
@@ -41,7 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
             return run_sweep(command, [word for word in overrides if word not in ("-m", "--multirun")])
         config = composed(command, overrides)
-        with terminated_as_interrupted(), clocked(age_of_process() if is_process else 0.0):
+        begun = max(time.perf_counter() - begin, age_of_process() if is_process else 0.0)
+        with terminated_as_interrupted(), clocked(begun):
             with stage(STARTING):
                 module = importlib.import_module(f"sogjax.app.{command}")
             module.run(config)
