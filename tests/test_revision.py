@@ -28,17 +28,22 @@ def command(tmp_path, monkeypatch):
     return ["track", f"recording={recording}", f"actor={actor_file(tmp_path / 'a.yaml')}", *SMALL]
 
 
+def moved_farther(tracker, passed):
+    """What is found where one frame is farther along the first axis."""
+    pose, cameras = passed.poses[ROW].copy(), len(tracker.normalizers)
+    pose[0] += FARTHER
+    rows = passed.doubts[ROW], passed.usual[ROW], np.array([0.5]), np.full((1, cameras), 0.25)
+    judged = Judgement(*(jnp.asarray(row) for row in rows))
+    return Revision({ROW: Revised(pose, 7.0, {"similarity": 8.0}, judged)}, {"left arm": {ROW}})
+
+
 @pytest.fixture
 def farther(monkeypatch):
     """One frame is found to be farther along the first axis."""
 
     def told_both_ways(tracker, passed, frames):
         assert len(list(frames(2, 6))) == 4
-        pose, cameras = passed.poses[ROW].copy(), len(tracker.normalizers)
-        pose[0] += FARTHER
-        rows = passed.doubts[ROW], passed.usual[ROW], np.array([0.5]), np.full((1, cameras), 0.25)
-        judged = Judgement(*(jnp.asarray(row) for row in rows))
-        return Revision({ROW: Revised(pose, 7.0, {"similarity": 8.0}, judged)}, {"left arm": {ROW}})
+        return moved_farther(tracker, passed)
 
     monkeypatch.setattr(revision, "told_both_ways", told_both_ways)
 
@@ -82,9 +87,7 @@ def test_frames_read_backwards_are_those_of_the_part_that_is_tracked(capsys, tmp
     def told_both_ways(tracker, passed, frames):
         assert len(passed.poses) == FRAMES - start
         seen.extend(frames(2, 6))
-        pose = passed.poses[ROW].copy()
-        pose[0] += FARTHER
-        return Revision({ROW: Revised(pose, 7.0, {"similarity": 8.0}, passed.doubts[ROW])}, {"left arm": {ROW}})
+        return moved_farther(tracker, passed)
 
     monkeypatch.setattr(revision, "told_both_ways", told_both_ways)
     done(capsys, *command, "outputs.overlay=false", "outputs.rerun=false", f"start={start}", "out=run")

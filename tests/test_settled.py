@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from command_line import actor_file, done, trackable
 from test_resume import SMALL, assert_same, stop_after
+from test_revision import ROW, moved_farther
 
 from sogjax.adjust.adjustment import Adjusted
 from sogjax.app.cli import main
@@ -13,9 +14,8 @@ from sogjax.data.recording import open_recording
 from sogjax.engine import adjust_clip, revision, track
 from sogjax.settings.compose import track_config
 from sogjax.tracking import tracker
-from sogjax.tracking.both_ways import Revised, Revision
 
-FRAMES, ROW, FARTHER, HIGHER = 12, 5, 0.25, 0.125
+FRAMES, HIGHER = 12, 0.125
 SHOWN = ("outputs.bvh=false", "outputs.rerun=false")
 
 
@@ -29,13 +29,7 @@ def command(tmp_path, monkeypatch):
 @pytest.fixture
 def farther(monkeypatch):
     """One frame is found to be farther along the first axis."""
-
-    def told_both_ways(tracker, passed, frames):
-        pose = passed.poses[ROW].copy()
-        pose[0] += FARTHER
-        return Revision({ROW: Revised(pose, 7.0, {"similarity": 8.0}, passed.doubts[ROW])}, {"left arm": {ROW}})
-
-    monkeypatch.setattr(revision, "told_both_ways", told_both_ways)
+    monkeypatch.setattr(revision, "told_both_ways", lambda tracker, passed, frames: moved_farther(tracker, passed))
 
 
 @pytest.fixture
