@@ -54,6 +54,10 @@ def stop_after(monkeypatch, frames):
     monkeypatch.setattr(run_job, "tracked_frames", tracked_frames)
 
 
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
 def assert_same(folder, other, name="motion.npz"):
     one, two = load_motion(folder / name), load_motion(other / name)
     for entry in fields(Motion):
@@ -69,7 +73,8 @@ def test_the_end_is_that_of_a_run_that_was_not_stopped(capsys, tmp_path, monkeyp
             main([*command, "out=run", "resume=true"])
     done(capsys, *command, "out=run", "resume=true")
     assert_same(tmp_path / "run", tmp_path / "whole")
-    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["config.yaml", "motion.npz", "run.json"]
+    assert names(tmp_path / "run") == names(tmp_path / "whole")
+    assert not [name for name in names(tmp_path / "run") if name.endswith(".partial")]
     _, err = done(capsys, *command, "out=run", "resume=true")
     assert "already ended" in err
 
@@ -253,4 +258,5 @@ def test_killed_at_random_moments(tmp_path, command):
     _, err = process.communicate()
     assert process.returncode == 0, err
     assert_same(tmp_path / "run", tmp_path / "whole")
-    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["config.yaml", "motion.npz", "run.json"]
+    assert names(tmp_path / "run") == names(tmp_path / "whole")
+    assert not [name for name in names(tmp_path / "run") if name.endswith(".partial")]

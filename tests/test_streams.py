@@ -94,7 +94,8 @@ def assert_resumed(folder, whole):
     again = load_motion(folder / "motion.npz")
     for entry in fields(Motion):
         np.testing.assert_array_equal(getattr(again, entry.name), getattr(whole, entry.name), entry.name)
-    names = ["config.yaml", "motion.bvh", "motion.npz", "motion.rrd", "overlay.mp4", "run.json"]
+    names = ["config.yaml", "metrics.json", "motion.bvh", "motion.npz", "motion.rrd", "overlay.mp4", "run.json"]
+    names.append("worst.png")
     assert sorted(path.name for path in folder.iterdir()) == names
     assert look_at_source(folder / "overlay.mp4").num_frames == FRAMES
 
