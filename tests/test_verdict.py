@@ -55,6 +55,16 @@ def test_a_body_beside_the_foreground_is_told_by_silhouettes(walk):
     assert not of_one(judged(walk, overlap=np.nan)).wrong
 
 
+def test_silhouettes_that_overlap_less_than_usual_must_be_looked_at(walk):
+    found = of_one(judged(walk, overlap=0.5))
+    assert not found.wrong
+    assert found.sentence == "look at all of it: silhouettes overlap to 50% (65 % is usual)"
+    motion = judged(walk)
+    motion.overlap[:, 1] = 0.3
+    motion = replace(motion, overlap=np.repeat(motion.overlap, (2, 1), axis=1), camera_names=np.array(["a", "b", "c"]))
+    assert of_one(motion).sentence == "look at c: overlaps to 30%, others to 70%"
+
+
 def test_frames_that_fit_badly_are_named(walk):
     motion = judged(walk)
     motion.explained[8:13] = 0.2

@@ -15,8 +15,9 @@ OTHER_SUBJECT = 0.6
 """Of what an actor explains in its example poses: less, and it is another subject, or none."""
 LEAST_EXPLAINED = 0.25
 """The same for actors of which that is not known, as a part of all."""
-LEAST_OVERLAP = 0.45
-"""Of silhouettes with the foreground, the median over frames and cameras: followed bodies have 0.6 to 0.75."""
+LEAST_OVERLAP, GOOD_OVERLAP = 0.45, 0.57
+"""Of silhouettes with the foreground, the median over frames and cameras: bodies that are followed have 0.6 to 0.75.
+Less than the one is nobody; less than the other must be looked at."""
 WORSE = 0.7
 """Of what is explained, or overlaps, in most frames: frames below it must be looked at."""
 AT_LEAST = 3
@@ -74,7 +75,7 @@ def _verdict(name: str, motion: Motion, expected: float | None, inside: Sequence
     overlap = _overlaps(motion)
     wrong = [*_wrong(explained, expected, overlap), *inside]
     doubtful = doubtful_limbs(motion)
-    look = [] if wrong else [*_bad_stretches(motion), *_limbs(doubtful)]
+    look = [] if wrong else [*_bad_overlaps(overlap), *_bad_stretches(motion), *_limbs(doubtful)]
     return Verdict(
         actor=name,
         wrong=bool(wrong),
@@ -110,6 +111,17 @@ def _wrong(explained: float | None, expected: float | None, overlap: Mapping[str
             "(65 % is usual)"
         )
     return found
+
+
+def _bad_overlaps(overlap: Mapping[str, float]) -> list[str]:
+    """Silhouettes that overlap little in all cameras, or in some."""
+    if not overlap:
+        return []
+    usual = float(np.median(list(overlap.values())))
+    if usual < GOOD_OVERLAP:
+        return [f"look at all of it: silhouettes overlap to {usual:.0%} (65 % is usual)"]
+    worse = [name for name, value in overlap.items() if value < WORSE * usual]
+    return _shortened([f"look at {name}: overlaps to {overlap[name]:.0%}, others to {usual:.0%}" for name in worse])
 
 
 def _inside(name: str, motions: Mapping[str, Motion]) -> list[str]:
