@@ -107,6 +107,10 @@ def test_a_track_is_adjusted_and_its_actor_learnt(tmp_path):
     assert {"motion.npz", "unadjusted.npz", "actor.yaml", "overlay.mp4", "metrics.json"} <= written
     motion, before = load_motion(out / "motion.npz"), load_motion(out / "unadjusted.npz")
     assert np.abs(motion.pose - before.pose).max() > 1e-3
+    assert motion.explained is not None
+    assert before.explained is not None
+    assert np.median(motion.explained) > np.median(before.explained) - 0.05
+    assert json.loads((out / "metrics.json").read_text())["verdicts"]["anna"]["looks_right"]
     actor = load_body(out / "actor.yaml")
     posed = motion_from_poses(actor, motion.pose[:1], motion.fps)
     np.testing.assert_allclose(posed.blob_means[0], motion.blob_means[0], atol=2e-3)

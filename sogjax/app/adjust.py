@@ -1,5 +1,6 @@
 """`sogjax adjust`: the poses of a tracked clip and the shape of its actor, adjusted together."""
 
+from sogjax.app.track import say_verdicts
 from sogjax.engine.adjust import adjust_to_folder
 from sogjax.engine.clock import clocked
 from sogjax.engine.run import Run
@@ -19,4 +20,5 @@ def run(config: AdjustConfig) -> Run:
         for path in result.files:
             print(path)
         print(f"\n{clock.table()}")
+    say_verdicts(result)
     return result

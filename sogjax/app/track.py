@@ -21,6 +21,7 @@ def run(config: TrackConfig, command: str = "track") -> Run:
         result = track_to_folder(config, command)
         say_results(result)
         print(f"\n{clock.table()}")
+    say_verdicts(result)
     return result
 
 
@@ -46,7 +47,6 @@ def say_results(result: Run) -> None:
             f"warning: {not_converged} of {frames} did not converge within "
             "solver.max_iterations; check them in the overlay"
         )
-    say_verdicts(result)
 
 
 def say_verdicts(result: Run) -> None:

@@ -1,5 +1,6 @@
 """Adjusting a tracked clip as a whole: its pictures read again, poses and shape climbed together, what came of it."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,8 +21,9 @@ from sogjax.engine.adjust_checks import WINDOW, check_length
 from sogjax.engine.adjust_colors import color_rows, mean_similarity, measured_colors
 from sogjax.engine.cells import picture_reader
 from sogjax.engine.job import Job
+from sogjax.engine.judged_frames import Judged
 from sogjax.engine.pipeline import PictureReader, Preparation, cells_of_frame
-from sogjax.engine.prefix import Prefix
+from sogjax.engine.prefix import JUDGEMENT, Prefix
 from sogjax.engine.recordings import upright
 from sogjax.engine.second_background import learnt_again
 from sogjax.engine.terminal import progress, say
@@ -31,6 +33,7 @@ from sogjax.model.body import Body
 from sogjax.model.frames import axis_vector, world_from_upright
 from sogjax.settings import TrackConfig
 from sogjax.tracking.frame import FrameCells
+from sogjax.tracking.judged_poses import judged_poses
 
 CLEARLY = 1.01
 """By which factor new colours must explain more to be taken: those of example poses were measured within masks."""
@@ -100,8 +103,10 @@ def adjusted_clip(
     if in_question:
         numbers["cameras"] = camera_numbers(recording, found)
     body, numbers["similarity_of_new_colors"] = _recolored(job, source, found, after, config)
+    job = replace(job, bodies=[body], tracker=replace(job.tracker, body=body))
+    prefix, after = _judged(job, source, prefix, after)
     turn = jnp.asarray(world_from_upright(recording.up).T, actor.blob_sigmas.dtype)
-    return AdjustedClip(replace(job, bodies=[body]), prefix, body.rotated(turn), after, numbers, found.moves)
+    return AdjustedClip(job, prefix, body.rotated(turn), after, numbers, found.moves)
 
 
 def _job(recording: Recording, actor: Body, motion: Motion, config: TrackConfig, read: PictureReader) -> Job:
@@ -145,15 +150,17 @@ class _Source:
 
     def cells(self, rows: Int[np.ndarray, "row"]) -> list[FrameCells]:
         """Of the rows."""
+        return list(self.coming(rows))
+
+    def coming(self, rows: Int[np.ndarray, "row"]) -> Iterator[FrameCells]:
+        """Of the rows, one after the other."""
         frames = (self.motion.frame[rows] - self.job.recording.first_frame).tolist()
         wanted, first, last = set(frames), min(frames), max(frames) + 1
         coming = self.read(self.job.recording, Preparation(self.job.grids), first, last)
         shown = progress(coming, last - first, "reading")
-        return [
-            cells_of_frame([picture.cells for picture in pictures])
-            for frame, pictures in enumerate(shown, first)
-            if frame in wanted
-        ]
+        for frame, pictures in enumerate(shown, first):
+            if frame in wanted:
+                yield cells_of_frame([picture.cells for picture in pictures])
 
 
 def _recolored(job: Job, source: _Source, found: Adjusted, motion: Motion, config: TrackConfig) -> tuple[Body, float]:
@@ -186,6 +193,18 @@ def _motion(found: Adjusted, job: Job, before: Motion) -> Motion:
         converged=before.converged,
         up=before.up,
     )
+
+
+def _judged(job: Job, source: _Source, prefix: Prefix, motion: Motion) -> tuple[Prefix, Motion]:
+    """The frames and the motion with what the cameras say of the adjusted poses."""
+    say("adjusting: what the cameras say of it")
+    cells = source.coming(np.arange(motion.num_frames))
+    found = list(judged_poses(job.tracker, np.asarray(motion.pose), cells))
+    if not found:
+        return prefix, motion
+    rows = {key: np.stack([np.asarray(getattr(each, name)) for each in found]) for key, name in JUDGEMENT.items()}
+    said = Judged.of(found, job.recording.rig.names).of_actor(0, job.bodies[0], slice(None))
+    return Prefix(prefix.rows | rows), replace(motion, **{key: np.asarray(value) for key, value in said.items()})
 
 
 def _prefix(found: Adjusted, job: Job, before: Motion) -> Prefix:
