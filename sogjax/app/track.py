@@ -57,4 +57,4 @@ def say_verdicts(result: Run) -> None:
             say(f"WARNING: {whose}{verdict.sentence}; see worst.png")
         else:
             see = "" if verdict.looks_right else "; see worst.png"
-            print(f"verdict: {whose}{verdict.sentence}{see}")
+            print(f"\nverdict: {whose}{verdict.sentence}{see}")
