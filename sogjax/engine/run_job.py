@@ -16,6 +16,7 @@ from sogjax.engine.backwards import frames_backwards, tracked_backwards
 from sogjax.engine.cells import picture_reader
 from sogjax.engine.job import Job
 from sogjax.engine.kept_run import KeptRun, Prefix
+from sogjax.engine.keypoint_offsets import told_offsets
 from sogjax.engine.pipeline import Follow, FrameDone, FrameTracker, PictureReader, tracked_frames
 from sogjax.engine.resume import frames_of, resumed
 from sogjax.engine.revision import Reviser
@@ -50,6 +51,7 @@ def tracking(
     job = Job.from_config(recording, bodies, config, kept, terms)
     read = picture_reader(config.images)
     job = replace(job, tracker=learnt_again(job, config.images, read))
+    job = replace(job, tracker=told_offsets(job, read))
     revise = Reviser(job, config.images) if config.tracking.both_ways else None
     with run_job(job, outputs, out, read, kept=kept, images=config.images, revise=revise) as result:
         yield result
@@ -87,6 +89,7 @@ def run_job(
         say(f"{out}: {num_kept} of {counted(last - first, 'frame')} are done; resuming after them")
     elif job.num_before:
         frames = frames_backwards(job.recording, job.grids, images or ImagesConfig(), first, job.begin + 1)
+        frames = job.with_keypoints(frames, range(job.begin, first - 1, -1))
         prefix = tracked_backwards(job.tracker, job.start, frames, job.num_before + 1, times)
     start = job.start if prefix is None or not job.num_before else prefix.pose(0)
     if prefix is not None:
@@ -118,7 +121,8 @@ def _streamed(
     with streams:
         count = last - first - streams.num_skipped
         pictures = read(job.recording, streams.preparation(job.grids), last - count, last) if count else iter(())
-        frames = tracked_frames(pictures, count, streams.times, follow)
+        known = lambda cells: follow(job.with_keypoints(cells, range(last - count, last)))
+        frames = tracked_frames(pictures, count, streams.times, known)
         with closing(frames), Behind(streams.consume, FRAMES_BEHIND) as behind:
             for done in frames:
                 used.append(float(np.mean(done.tracked.result.num_matching)))

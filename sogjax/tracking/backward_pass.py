@@ -14,7 +14,7 @@ from sogjax.energy.posed import History
 from sogjax.model.body import Body
 from sogjax.tracking.body_parts import Part, PartArrays
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import FrameCells, TrackedFrame, TrackState, on_device
+from sogjax.tracking.frame import Beside, FrameCells, TrackedFrame, TrackState, on_device
 from sogjax.tracking.tracker import Tracker, track
 
 COMPARED, TOGETHER = 0.03, 0.04
@@ -95,8 +95,8 @@ def compared_backwards(
         row, both = begin - 1 - k, (jnp.asarray(passed.poses[begin - 1 - k]), jnp.asarray(tracked.result.pose))
         apart, gains = np.asarray(_apart(tracker.body, choices.blobs, *both)), np.zeros(len(parts))
         if apart.max(initial=0.0) > COMPARED:
-            cells, present = on_device(seen[k])
-            gains = np.asarray(_gains(tracker, cells, tracked.capacities, present, choices, *both))
+            cells, beside = on_device(seen[k])
+            gains = np.asarray(_gains(tracker, cells, tracked.capacities, beside, choices, *both))
         found.cells.append(seen[k])
         found.poses.append(np.asarray(both[1]))
         found.gains.append(gains)
@@ -122,7 +122,7 @@ def _gains(
     tracker: Tracker,
     cells: UInt8[Array, "camera rows columns 3"],
     capacities: Capacities,
-    present: Bool[Array, "camera"] | None,
+    beside: Beside,
     parts: PartArrays,
     first: Float[Array, "dof"],
     second: Float[Array, "dof"],
@@ -134,7 +134,7 @@ def _gains(
     mixed = jnp.concatenate([parts.mixed(tracker.body, first, second), parts.mixed(tracker.body, second, first)])
 
     def seen_near(at: Float[Array, "dof"]) -> Float[Array, "part"]:
-        views, _, _ = tracker.views(cells, TrackState.from_pose(at), capacities, present)
+        views, _, _ = tracker.views(cells, TrackState.from_pose(at), capacities, beside)
         energy = FrameEnergy(tracker.body, views, History.unknown(at), tracker.terms)
         values = jax.lax.map(energy, jnp.concatenate([first[None], second[None], mixed]))
         into_first, into_second = values[2:].reshape(2, -1)
