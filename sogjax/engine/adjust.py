@@ -12,7 +12,7 @@ from sogjax.engine.adjust_cameras import camera_lines, check_cameras, parts_in_q
 from sogjax.engine.adjust_clip import AdjustedClip, adjusted_clip, check_length, sentence
 from sogjax.engine.cells import picture_reader
 from sogjax.engine.origin import Origin, digest
-from sogjax.engine.outputs import export_endings, write_results
+from sogjax.engine.outputs import check_pose2sim, export_endings, write_results
 from sogjax.engine.recordings import opened
 from sogjax.engine.resume import resumed
 from sogjax.engine.run import Run
@@ -39,6 +39,9 @@ def adjust_to_folder(config: AdjustConfig) -> Run:
     if tracked.config.cameras is not None:
         recording = opened(config.recording, tracked.config.cameras)
     check_length(tracked.motion)
+    if config.outputs.pose2sim:
+        first, last = int(tracked.motion.frame[0]), int(tracked.motion.frame[-1])
+        check_pose2sim(recording, (first, last), [tracked.actor], config.overwrite)
     check_cameras(recording, tracked.motion, config.cameras, config.offsets)
     in_question = parts_in_question(config.cameras, config.offsets)
     with run_folder(path, config.overwrite, command="adjust") as folder:
