@@ -109,7 +109,7 @@ def check_pose2sim(recording: Recording, frames: tuple[int, int], bodies: Sequen
         lacking = set(named_scheme(POSE2SIM_SCHEME).landmarks) - {*body.landmarks.names, *body.skeleton.names}
         if lacking:
             raise InputError(
-                f"outputs.pose2sim=true: {body.name} has no landmark {min(lacking)}, which {POSE2SIM_SCHEME} has; leave "
+                f"outputs.pose2sim=true: {body.name} has no landmark {min(lacking)}, one of {POSE2SIM_SCHEME}; leave "
                 "it out, or add the landmark to the body file"
             )
 
