@@ -16,6 +16,7 @@ from sogjax.engine.recordings import opened
 from sogjax.engine.terminal import progress, say
 from sogjax.errors import InputError
 from sogjax.study.experiment import Experiment, synth_settings
+from sogjax.study.few_cameras import evenly
 from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from
 from sogjax.study.triangulation_trials import JointErrors, together, triangulation_errors
@@ -58,13 +59,6 @@ def main() -> None:
                 print(_row(name, count, errors), flush=True)
     for count, rows in total.items():
         print(_row("all", count, together(rows)))
-
-
-def evenly(names: tuple[str, ...], count: int) -> tuple[str, ...]:
-    """So many of a ring of cameras; two of them a third of the ring apart, as opposite ones see the same outline."""
-    if count == 2:
-        return names[0], names[len(names) // 3]
-    return tuple(names[k * len(names) // count] for k in range(count))
 
 
 def _recordings(settings: Settings) -> dict[str, tuple[Recording, Keypoints]]:

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from command_line import refused
+from command_line import actor_file, done, refused, trackable
 from project_cases import CAMERAS, freemocap, pose2sim
 from small_recording import FPS
 
 from sogjax.check.opening import opening_problems
+from sogjax.data.actor_file import load_body, named_body, save_body
 from sogjax.data.keypoints import load_keypoints
 from sogjax.data.recording import open_recording
 from sogjax.errors import InputError
@@ -49,7 +50,58 @@ def test_recording_yaml_completes_a_project(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("config", "said"), [("[project", "TOML"), ("[project]\nframe_rate = -1\n", "frame_rate = -1"), ("\0", "TOML")]
+    ("asked", "frames"),
+    [("[1, 3]", (1, 2)), ("[2, 90]", (2, 2)), ("[]", (0, 4)), ("'all'", (0, 4)), ("[50, 90]", (0, 4))],
+)
+def test_the_frames_of_a_project_are_used(tmp_path, asked, frames):
+    folder, written = pose2sim(tmp_path / "trial", f"[project]\nframe_range = {asked}\n")
+    recording = open_recording(folder)
+    assert (recording.first_frame, recording.num_frames) == frames
+    found = load_keypoints(recording)
+    assert found is not None
+    np.testing.assert_allclose(found.points[0], written[frames[0] : frames[0] + frames[1]], atol=1e-3)
+    (folder / "recording.yaml").write_text("first_frame: 3\n")
+    assert open_recording(folder).first_frame == 3
+
+
+@pytest.mark.slow
+def test_points_are_written_where_the_next_steps_look(tmp_path, capsys):
+    """Read back by hand: names, rate, numbers of frames and points."""
+    folder, _ = pose2sim(tmp_path / "trial")
+    (folder / "initial_pose.yaml").write_text("pose: rest\nposition: [0.0, 0.0, 1.0]\nheading: 0.0\n")
+    command = ["track", f"recording={folder}", "actor=human", f"out={tmp_path / 'out'}", "outputs.pose2sim=true"]
+    command += ["images.depth=4", "solver.max_iterations=1", "outputs.overlay=false", "outputs.rerun=false"]
+    body = tmp_path / "human.yaml"
+    save_body(body, load_body(named_body("human")))
+    command[2] = f"actor={body}"
+    done(capsys, *command)
+    lines = (folder / "pose-3d" / "trial_0-3.trc").read_text().splitlines()
+    assert lines[2].split("\t")[2:5] == ["4", "26", "m"]
+    assert {"LHeel", "RBigToe", "Nose"} <= set(lines[3].split("\t"))
+    numbers = np.array([line.split("\t") for line in lines[6:]], float)
+    assert numbers.shape == (4, 2 + 3 * 26)
+    assert np.isfinite(numbers).all()
+    assert "already exists" in refused(capsys, *command[:3], f"out={tmp_path / 'other'}", *command[4:])
+
+
+def test_points_are_written_into_projects_only(tmp_path, capsys):
+    recording = trackable(tmp_path / "walk")
+    command = ["track", f"recording={recording}", f"actor={actor_file(tmp_path / 'a.yaml')}", "outputs.pose2sim=true"]
+    assert "is no Pose2Sim project" in refused(capsys, *command, f"out={tmp_path / 'out'}")
+    folder, _ = pose2sim(tmp_path / "trial")
+    (folder / "initial_pose.yaml").write_text("pose: rest\nposition: [0.0, 0.0, 1.0]\nheading: 0.0\n")
+    command[1] = f"recording={folder}"
+    assert "has no landmark" in refused(capsys, *command, f"out={tmp_path / 'out'}")
+
+
+@pytest.mark.parametrize(
+    ("config", "said"),
+    [
+        ("[project", "TOML"),
+        ("[project]\nframe_rate = -1\n", "frame_rate = -1"),
+        ("\0", "TOML"),
+        ("[project]\nframe_range = [3, 1]\n", "frame_range"),
+    ],
 )
 def test_a_configuration_that_is_none_is_refused(tmp_path, config, said):
     folder, _ = pose2sim(tmp_path / "trial", config)

@@ -6,7 +6,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int, UInt8
+from jaxtyping import Array, Float, Int, UInt8
 
 from sogjax.adjust.camera_moves import Sights
 from sogjax.energy.appearance import BlobKinds, ColorWindows
@@ -18,7 +18,7 @@ from sogjax.images.kinds import SLOTS, SPARE, Kinds, kinds_of, odds_where_told
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, project
 from sogjax.tracking.culling import BLOCK_STEP, Capacities, actor_of_blobs, block_capacity, body_boxes
-from sogjax.tracking.frame import FrameCells, TrackState, on_device
+from sogjax.tracking.frame import Beside, FrameCells, TrackState, on_device
 from sogjax.tracking.search_energy import blob_kinds
 from sogjax.tracking.seen_frame import cells_at
 from sogjax.tracking.tracker import Tracker, first_capacities, larger_capacities
@@ -87,7 +87,7 @@ class Reader(eqx.Module):
                 continue
             found.append(views)
         for frame, state in zip(map(on_device, cells), states, strict=True):
-            present = jnp.ones(len(self.inside), bool) if frame[1] is None else frame[1]
+            present = jnp.ones(len(self.inside), bool) if frame[1].present is None else frame[1].present
             shown = jnp.where(present[:, None, None], self.inside, 0.0)
             windows.append(_windows(self.tracker, frame[0], shown, tables, state.previous))
         stack = lambda *leaves: jnp.stack(leaves)
@@ -131,11 +131,11 @@ class NearPairs(eqx.Module):
 def _views(
     tracker: Tracker,
     cells: UInt8[Array, "camera rows columns 3"],
-    present: Bool[Array, "camera"] | None,
+    beside: Beside,
     state: TrackState,
     capacities: Capacities,
 ) -> tuple[Views, Int[Array, "camera"], Int[Array, "camera"]]:
-    return tracker.views(cells, state, capacities, present)
+    return tracker.views(cells, state, capacities, beside)
 
 
 @eqx.filter_jit

@@ -8,7 +8,8 @@ from sogjax.data.actor_file import save_body
 from sogjax.data.recording import Recording
 from sogjax.engine.build import color_space_and_radius, energy_terms
 from sogjax.engine.example_frames import with_examples
-from sogjax.engine.recordings import body_named, with_cameras
+from sogjax.engine.keypoint_actor import with_rough_poses
+from sogjax.engine.recordings import body_named, keypoint_actor_or, with_cameras
 from sogjax.engine.terminal import progress, say
 from sogjax.errors import InputError
 from sogjax.model.body import Body
@@ -45,7 +46,7 @@ def make_actor(recording: Recording, subject: str | None = None, **settings: Any
 
     Args:
         recording: with example poses, and masks or empty background pictures for them; without, frames of its videos
-            are used.
+            are used, or where these do not suit, keypoints beside them.
         subject: which one, where the example poses show several; `person_1`, `person_2` ... where there are none, and
             `actors=2` says how many people the videos show.
         settings: options of `sogjax actor`, such as `body="dog", symmetric=False, color="hsv"`.
@@ -54,7 +55,13 @@ def make_actor(recording: Recording, subject: str | None = None, **settings: Any
         InputError: no example poses of the subject, no frames that can be used, pictures without masks, a pose that was
             not found; an unknown setting (with the nearest known one) or a wrong value.
     """
-    return fit_actor(recording, subject, **settings).body
+    try:
+        return fit_actor(recording, subject, **settings).body
+    except InputError as error:
+        config = _config(recording, subject, settings)
+        space, _ = color_space_and_radius(config.color)
+        chosen, start = with_cameras(recording, config.cameras), body_named(config.body)
+        return keypoint_actor_or(error, chosen, start, space, config.actors, config.symmetric)
 
 
 def fit_actor(recording: Recording, subject: str | None = None, **settings: Any) -> make.MadeActor:
@@ -68,15 +75,12 @@ def fit_actor(recording: Recording, subject: str | None = None, **settings: Any)
     Raises:
         InputError: as there.
     """
-    for key in ("out", "overwrite"):
-        if key in settings:
-            raise InputError(f"{key}: make_actor writes no file; use sogjax.save_actor(path, actor)")
-    given = settings | {"recording": recording.path, "out": "", "subject": subject}
-    config: ActorConfig = composed_without_hydra(ActorConfig, "actor", keywords=given)
+    config = _config(recording, subject, settings)
     space, _ = color_space_and_radius(config.color)
     body = body_named(config.body)
     chosen = with_cameras(recording, config.cameras)
     recording, learnt, best = with_examples(chosen, ImagesConfig(), config.actors)
+    recording = with_rough_poses(recording, body)
     return make.make_actor(
         recording,
         body,
@@ -89,3 +93,11 @@ def fit_actor(recording: Recording, subject: str | None = None, **settings: Any)
         learnt,
         best,
     )
+
+
+def _config(recording: Recording, subject: str | None, settings: dict[str, Any]) -> ActorConfig:
+    for key in ("out", "overwrite"):
+        if key in settings:
+            raise InputError(f"{key}: make_actor writes no file; use sogjax.save_actor(path, actor)")
+    given = settings | {"recording": recording.path, "out": "", "subject": subject}
+    return composed_without_hydra(ActorConfig, "actor", keywords=given)

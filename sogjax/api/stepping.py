@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-import jax.numpy as jnp
 from jaxtyping import Array, UInt8
 
 from sogjax.api.settings import track_settings
@@ -12,13 +11,17 @@ from sogjax.api.tracking import actor_list
 from sogjax.data.recording import Recording
 from sogjax.data.video import read_prepared
 from sogjax.energy import Term
+from sogjax.energy.keypoints import keypoint_pull_among
+from sogjax.engine.cells import picture_reader
+from sogjax.engine.clip_keypoints import ClipKeypoints, with_keypoints
 from sogjax.engine.job import Job
+from sogjax.engine.keypoint_offsets import told_offsets
 from sogjax.engine.pipeline import Preparation, cells_of_frame
 from sogjax.engine.recordings import with_cameras
 from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.tracking.culling import Capacities, capacity_for
-from sogjax.tracking.frame import PartialCells, on_device
+from sogjax.tracking.frame import PartialCells, WithKeypoints, on_device
 from sogjax.tracking.tracker import Tracker, first_capacities
 
 ROOM = 2
@@ -54,15 +57,15 @@ def make_tracker(
     config, actors = track_settings(**settings), actor_list(actor)
     recording = with_cameras(recording, config.cameras)
     job = Job.from_config(recording, actors, config, terms=terms)
-    tracker = replace(job.tracker, first_pose=job.start)
+    tracker = replace(told_offsets(job, picture_reader(config.images)), first_pose=job.start)
     cells = next(read_cells(recording, tracker, job.frames[0], job.frames[0] + 1))
-    seen = jnp.asarray(cells.cells) if isinstance(cells, PartialCells) else cells
+    seen, _ = on_device(cells)
     return replace(tracker, capacities=_with_more_room(first_capacities(tracker, tracker.start(), seen)))
 
 
 def read_cells(
     recording: Recording, tracker: Tracker, start: int = 0, stop: int | None = None
-) -> Iterator[UInt8[Array, "camera rows columns 3"] | PartialCells]:
+) -> Iterator[UInt8[Array, "camera rows columns 3"] | PartialCells | WithKeypoints]:
     """What a tracker's step takes of each frame: the pictures of all cameras, averaged to cells (sRGB).
 
     Args:
@@ -73,7 +76,7 @@ def read_cells(
 
     Returns:
         An iterator with the cells of each frame, as bytes; where a camera has no picture, they say so too
-        (`PartialCells`).
+        (`PartialCells`), and where the recording has keypoints that count, these are with them (`WithKeypoints`).
 
     Raises:
         InputError: a picture cannot be read, another number of cameras, or no such frames.
@@ -90,15 +93,18 @@ def read_cells(
             f"start={start} stop={stop}: {recording.path} has the frames 0 to {recording.num_frames - 1}; choose "
             f"0 <= start < stop <= {recording.num_frames}"
         )
-    return _cells(recording, Preparation(grids), start, last)
+    cells = _cells(recording, Preparation(grids), start, last)
+    pulled = keypoint_pull_among(tracker.terms) is not None
+    keypoints = ClipKeypoints.of_recording(recording) if pulled else None
+    return iter(with_keypoints(keypoints, cells, range(start, last)))  # pyright: ignore[reportReturnType]
 
 
 def _cells(
     recording: Recording, preparation: Preparation, start: int, stop: int
 ) -> Iterator[UInt8[Array, "camera rows columns 3"] | PartialCells]:
     for pictures in read_prepared(recording, preparation, start, stop):
-        cells, present = on_device(cells_of_frame([picture.cells for picture in pictures]))
-        yield cells if present is None else PartialCells(cells, present)
+        cells, beside = on_device(cells_of_frame([picture.cells for picture in pictures]))
+        yield cells if beside.present is None else PartialCells(cells, beside.present)
 
 
 def _with_more_room(first: Capacities) -> Capacities:

@@ -16,10 +16,12 @@ from sogjax.data.recording import Recording
 from sogjax.engine.actor_report import report_folder, write_actor_report
 from sogjax.engine.build import color_space_and_radius, energy_terms
 from sogjax.engine.example_frames import with_examples
+from sogjax.engine.keypoint_actor import with_rough_poses
 from sogjax.engine.outputs import free_path, results_folder
-from sogjax.engine.recordings import body_named, opened
+from sogjax.engine.recordings import body_named, keypoint_actor_or, opened
 from sogjax.engine.terminal import progress, say
 from sogjax.errors import InputError
+from sogjax.model.body import Body
 from sogjax.sentences import counted
 from sogjax.settings import ActorConfig, ImagesConfig
 
@@ -34,7 +36,6 @@ def run(config: ActorConfig) -> Path:
         InputError: an invalid recording, example pose or body, or an actor file that already exists.
     """
     space, _ = color_space_and_radius(config.color)
-    terms = energy_terms(config.energy)
     recording = opened(config.recording, config.cameras)
     body = body_named(config.body)
     out = Path(config.out)
@@ -42,8 +43,13 @@ def run(config: ActorConfig) -> Path:
         raise InputError(f"out={out}: is a folder; give the actor file to write, such as out={out / 'actor.yaml'}")
     free_path("out", out, config.overwrite)
     with results_folder(out.parent):
-        recording, learnt, best = with_examples(recording, ImagesConfig(), config.actors)
-        made = make_actor(recording, body, config.subject, space, terms, say, progress, config.symmetric, learnt, best)
+        try:
+            recording, made = _made(recording, body, config)
+        except InputError as error:
+            actor = keypoint_actor_or(error, recording, body, space, config.actors, config.symmetric)
+            save_body(out, actor)
+            print(out)
+            return out
         save_body(out, made.body)
         folder = report_folder(out)
         report = write_actor_report(folder, made, recording.rig)
@@ -56,6 +62,16 @@ def run(config: ActorConfig) -> Path:
     print(out)
     print(folder / "report.md")
     return out
+
+
+def _made(recording: Recording, body: Body, config: ActorConfig) -> tuple[Recording, MadeActor]:
+    """The actor of the example poses, the recording's own or frames of its videos, and the recording with these."""
+    space, _ = color_space_and_radius(config.color)
+    terms = energy_terms(config.energy)
+    recording, learnt, best = with_examples(recording, ImagesConfig(), config.actors)
+    recording = with_rough_poses(recording, body)
+    made = make_actor(recording, body, config.subject, space, terms, say, progress, config.symmetric, learnt, best)
+    return recording, made
 
 
 def say_gains(recording: Recording, made: MadeActor, folder: Path) -> None:

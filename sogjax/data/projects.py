@@ -30,6 +30,8 @@ class Project:
     fps: float | None = None
     doubt: str = ""
     """A sentence on what may be wrong."""
+    frame_range: tuple[int, int] | None = None
+    """First frame to use and the one after the last; None: all."""
 
     def filled_in(self, settings: RecordingSettings) -> RecordingSettings:
         """The settings of recording.yaml with the project's where a key is absent."""
@@ -39,6 +41,13 @@ class Project:
             up=settings.up or self.up,
             fps=settings.fps or self.fps,
         )
+
+    def within(self, settings: RecordingSettings, num_frames: int) -> RecordingSettings:
+        """The same with the project's frames, as far as there are so many, where recording.yaml names none."""
+        if self.frame_range is None or settings.first_frame is not None or settings.last_frame is not None:
+            return settings
+        first, stop = self.frame_range[0], min(self.frame_range[1], num_frames)
+        return replace(settings, first_frame=first, last_frame=stop - 1) if first < stop else settings
 
 
 def project_in(path: Path) -> Project | None:
@@ -79,7 +88,18 @@ def _pose2sim(path: Path) -> Project:
     rate = float(rate) if isinstance(rate, int | float) else None  # else `auto`
     if rate is not None and not 0.0 < rate <= FASTEST:
         raise InputError(f"{path / CONFIG}: frame_rate = {rate} is no frame rate; write 'auto' or frames per second")
-    return Project("Pose2Sim", _pose2sim_calibrations(path), "m", "z", rate)
+    frames = _frame_range(path / CONFIG, settings.get("frame_range") if isinstance(settings, dict) else None)
+    return Project("Pose2Sim", _pose2sim_calibrations(path), "m", "z", rate, frame_range=frames)
+
+
+def _frame_range(path: Path, value: Any) -> tuple[int, int] | None:
+    """`[10, 300]`, the second not included; 'all', 'auto' and an empty list are all frames."""
+    if not isinstance(value, list) or not value:
+        return None
+    whole = all(isinstance(number, int) and not isinstance(number, bool) for number in value)
+    if len(value) != 2 or not whole or not 0 <= value[0] < value[1]:
+        raise InputError(f"{path}: frame_range = {value} is none; write [FIRST, STOP] with 0 <= FIRST < STOP, or 'all'")
+    return value[0], value[1]
 
 
 def _pose2sim_calibrations(path: Path) -> tuple[Path, ...]:

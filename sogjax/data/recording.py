@@ -125,6 +125,8 @@ def open_recording(path: Path) -> Recording:
     fps = frame_rate(path, settings, infos)
     timed = images_by_time(sources, infos, fps) if settings.time_stamps else {}
     counts = {camera: len(timed[camera].picked) if camera in timed else infos[camera].num_frames for camera in cameras}
+    if project is not None:
+        settings = project.within(settings, min(counts[camera] - offsets[camera] for camera in cameras))
     first, count, warnings = frames_in_common(path, settings, counts, offsets)
     return Recording(
         path=path,

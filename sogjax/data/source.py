@@ -101,6 +101,10 @@ def look_at_source(path: Path) -> SourceInfo:
 
 def fingerprint(source: Path) -> str:
     """Of a video or a folder of images: names, sizes and times of last change of its files."""
-    files = numbered_images(source) if source.is_dir() else [source]
+    return files_fingerprint(numbered_images(source) if source.is_dir() else [source])
+
+
+def files_fingerprint(files: Sequence[Path]) -> str:
+    """Of files: their names, sizes and times of last change."""
     looked = [(file.name, (state := file.stat()).st_size, state.st_mtime_ns) for file in files]
     return hashlib.sha256(json.dumps(looked).encode()).hexdigest()

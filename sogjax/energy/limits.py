@@ -17,12 +17,16 @@ class LimitPenalty(Penalty):
 
     def quadratic(self, posed: Posed, frame: Frame) -> QuadraticModel:
         """Exact: the penalty is quadratic beyond a limit, and 0 within."""
+        return self.model(posed)
+
+    def model(self, posed: Posed) -> QuadraticModel:
+        """The same, whatever the frame."""
         lower, upper = posed.body.skeleton.joint_limits()
         beyond = posed.joint_params - jnp.clip(posed.joint_params, lower, upper)
         transform = posed.body.skeleton.parameter_transform
         bends = jnp.where(beyond != 0.0, 2.0, 0.0)[:, None] * transform
         return QuadraticModel(
-            value=self.part(posed, frame),
+            value=self.signed_weight * limit_penalty(posed.joint_params, lower, upper),
             gradient=-self.weight * jnp.matmul(transform.T, 2.0 * beyond, precision="highest"),
             curvature=self.weight * jnp.matmul(transform.T, bends, precision="highest"),
         )

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from sogjax.energy.coloring import Coloring
+from sogjax.energy.keypoint_views import KeypointViews
 from sogjax.energy.neighbours import margins, near_pairs
 from sogjax.energy.overlap import pair_color_similarities, self_overlaps
 from sogjax.energy.pairs import SparsePairs
@@ -31,6 +32,8 @@ class Views(eqx.Module):
     """How the similarities follow from colours; None: not by Eq. 7 alone, so nothing is differentiated by colours."""
     windows: Windows | None = None
     """Foreground against background around the body; None: no background is known."""
+    keypoints: KeypointViews | None = None
+    """What detectors saw; None: nothing is known of that."""
 
     @classmethod
     def from_images(

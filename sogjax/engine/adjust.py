@@ -15,7 +15,7 @@ from sogjax.engine.cells import picture_reader
 from sogjax.engine.clock import ADJUSTING, stage
 from sogjax.engine.kept_run import KeptRun
 from sogjax.engine.origin import Origin, digest
-from sogjax.engine.outputs import export_endings, write_results
+from sogjax.engine.outputs import check_pose2sim, export_endings, write_results
 from sogjax.engine.recordings import opened
 from sogjax.engine.run import Run
 from sogjax.engine.run_folder import run_folder
@@ -42,6 +42,9 @@ def adjust_to_folder(config: AdjustConfig) -> Run:
         recording = opened(config.recording, tracked.config.cameras)
     check_length(tracked.motion)
     check_window(len(recording.rig), tracked.actor.num_blobs, tracked.motion.num_frames, config.window)
+    if config.outputs.pose2sim:
+        first, last = int(tracked.motion.frame[0]), int(tracked.motion.frame[-1])
+        check_pose2sim(recording, (first, last), [tracked.actor], config.overwrite)
     check_cameras(recording, tracked.motion, config.cameras, config.offsets)
     in_question = parts_in_question(config.cameras, config.offsets)
     with run_folder(path, config.overwrite, command="adjust") as folder:

@@ -15,13 +15,16 @@ from sogjax.adjust.pictures import ClipPictures, Reader
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.motion import Motion, motion_from_poses
 from sogjax.data.recording import Recording
+from sogjax.energy.keypoints import keypoint_pull_among
 from sogjax.engine import build
 from sogjax.engine.adjust_cameras import camera_numbers, moved_rig, moves_of
 from sogjax.engine.adjust_checks import WINDOW, check_length
 from sogjax.engine.adjust_colors import color_rows, mean_similarity, measured_colors
 from sogjax.engine.cells import picture_reader
+from sogjax.engine.clip_keypoints import clip_keypoints, keypoint_terms
 from sogjax.engine.job import Job
 from sogjax.engine.judged_frames import Judged
+from sogjax.engine.keypoint_offsets import FRAMES, knowing_offsets
 from sogjax.engine.pipeline import PictureReader, Preparation, cells_of_frame
 from sogjax.engine.prefix import JUDGEMENT, Prefix
 from sogjax.engine.recordings import upright
@@ -115,8 +118,13 @@ def _job(recording: Recording, actor: Body, motion: Motion, config: TrackConfig,
     grids = build.cell_grids(recording, config.images.depth)
     first = int(motion.frame[0]) - recording.first_frame
     frames = (first, int(motion.frame[-1]) - recording.first_frame + 1)
-    tracker = build.tracker(recording, body, grids, config)
-    job = Job(recording, [body], frames, grids, tracker, jnp.asarray(motion.pose[0]), first)
+    keypoints = clip_keypoints(recording, config)
+    tracker = build.tracker(recording, body, grids, config, keypoint_terms(keypoints, body, config))
+    if keypoints is not None and keypoint_pull_among(tracker.terms) is not None:
+        rows = np.unique(np.linspace(0, motion.num_frames - 1, FRAMES).astype(int))
+        told = motion.frame[rows] - recording.first_frame
+        tracker = knowing_offsets(tracker, keypoints, told, motion.pose[rows])
+    job = Job(recording, [body], frames, grids, tracker, jnp.asarray(motion.pose[0]), first, keypoints)
     poses = {
         int(frame) - recording.first_frame: jnp.asarray(pose)
         for frame, pose in zip(motion.frame, motion.pose, strict=True)
@@ -158,9 +166,9 @@ class _Source:
         wanted, first, last = set(frames), min(frames), max(frames) + 1
         coming = self.read(self.job.recording, Preparation(self.job.grids), first, last)
         shown = progress(coming, last - first, "reading")
-        for frame, pictures in enumerate(shown, first):
-            if frame in wanted:
-                yield cells_of_frame([picture.cells for picture in pictures])
+        cells = (cells_of_frame([picture.cells for picture in pictures]) for pictures in shown)
+        known = self.job.with_keypoints(cells, range(first, last))
+        yield from (frame for number, frame in enumerate(known, first) if number in wanted)
 
 
 def _recolored(job: Job, source: _Source, found: Adjusted, motion: Motion, config: TrackConfig) -> tuple[Body, float]:

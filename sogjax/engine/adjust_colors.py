@@ -12,7 +12,7 @@ from sogjax.adjust.pictures import NearPairs, Reader
 from sogjax.data.recording import Recording
 from sogjax.data.video import read_frames
 from sogjax.model.body import Body
-from sogjax.tracking.frame import FrameCells
+from sogjax.tracking.frame import FrameCells, on_device
 from sogjax.tracking.tracker import Tracker
 
 NUM_FRAMES = 6
@@ -59,7 +59,7 @@ def measured_colors(
 
 def mean_similarity(tracker: Tracker, cells: list[FrameCells], poses: Float[np.ndarray, "chosen dof"]) -> float:
     """Of the tracker's body in some frames."""
-    shape = cells[0].shape[1:3] if isinstance(cells[0], np.ndarray) else cells[0].cells.shape[1:3]
+    shape = on_device(cells[0])[0].shape[1:3]
     pictures = Reader.from_tracker(tracker, (int(shape[0]), int(shape[1]))).pictures(cells, poses)
     at = jnp.asarray(poses, jnp.float32)
     pairs = NearPairs.of(tracker, tracker.body, pictures, at, 0)

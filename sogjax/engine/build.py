@@ -10,6 +10,7 @@ import numpy as np
 from sogjax.data.recording import Recording
 from sogjax.energy.added import added_terms
 from sogjax.energy.frame_energy import standard_terms
+from sogjax.energy.keypoints import KeypointPull
 from sogjax.energy.overlap import EXACT_EXPONENT, PRINTED_EXPONENT
 from sogjax.energy.term import Term, Terms
 from sogjax.energy.views import whole_image_overlap
@@ -89,6 +90,7 @@ def check(config: TrackConfig) -> None:
     if not np.isfinite(config.images.color_tolerance):
         raise InputError(f"images.color_tolerance={config.images.color_tolerance}: must be a number")
     at_least("images.box_enlargement", config.images.box_enlargement, 0.0)
+    at_least("energy.keypoint_weight", config.energy.keypoint_weight, 0.0)
     box_around(config.images)
     one_of("images.background", config.images.background, CHOICES)
     marker_rule(config.outputs.markers, "outputs.markers")
@@ -243,7 +245,7 @@ def varied(tracker: Tracker, config: TrackConfig) -> Tracker:
     return replace(
         tracker,
         reader=reader,
-        terms=energy_terms(config.energy),
+        terms=energy_terms(config.energy, [term for term in tracker.terms if isinstance(term, KeypointPull)]),
         solver=solver(config.solver),
         scales=solver_scales(config.solver, tracker.body),
         extrapolation=config.tracking.extrapolation,

@@ -10,7 +10,8 @@ from sogjax.actor.make import MadeActor
 from sogjax.data.initial_pose import InitialPose, load_initial_poses
 from sogjax.data.recording import Recording
 from sogjax.energy import Term
-from sogjax.engine.keypoint_start import keypoint_start
+from sogjax.engine.clip_keypoints import ClipKeypoints
+from sogjax.engine.keypoint_start import keypoint_starts
 from sogjax.engine.pose_search import Beginning, PoseSearch, tried_frames
 from sogjax.engine.terminal import say
 from sogjax.engine.unsure_picture import write_unsure_picture
@@ -70,21 +71,22 @@ def first_poses(
     frame: int,
     terms: Sequence[Term] = (),
     last: int | None = None,
+    keypoints: ClipKeypoints | None = None,
 ) -> list[Float[Array, "dof"]]:
     """The poses of bodies, upright in the recording's world, in a frame counted from the recording's first.
 
-    Without a file, keypoints beside the recording give the pose of a single actor; all others are searched for. Where
-    they are searched for and not clear in that frame, they are searched for in later ones (before `last`) and
-    followed back.
+    Without a file, keypoints beside the recording give the poses; without these they are searched for. Where they are
+    searched for and not clear in that frame, they are searched for in later ones (before `last`) and
+    followed back. `keypoints` are those of the recording, if they were read already.
 
     Raises:
         InputError: the file is invalid, or the actors are not found in the pictures.
     """
     descriptions = rough_descriptions(recording, bodies, config)
-    if descriptions is None and config.initial_pose is None and len(bodies) == 1:
-        known = keypoint_start(recording, bodies[0], frame)
+    if descriptions is None and config.initial_pose is None:
+        known = keypoint_starts(recording, bodies, config, frame, None if keypoints is None else keypoints.found)
         if known is not None:
-            return [known]
+            return known
     if descriptions is None:
         search = PoseSearch(recording, bodies, config, terms)
         beginning = clear_beginning(search, frame, recording.num_frames if last is None else last)

@@ -1,6 +1,6 @@
 """What tracking a recording needs, made before it begins: the tracker, the frames and the first pose."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 from sogjax.data.recording import Recording
 from sogjax.energy import Term
 from sogjax.engine import build
+from sogjax.engine.clip_keypoints import ClipKeypoints, clip_keypoints, keypoint_terms, with_keypoints
 from sogjax.engine.clock import FIRST_POSE, stage
 from sogjax.engine.first_pose import first_poses, rough_descriptions
 from sogjax.engine.kept_run import KeptRun
@@ -18,6 +19,7 @@ from sogjax.errors import InputError
 from sogjax.images.cells import CellGrid, stack_shape
 from sogjax.model.body import Body, concatenate
 from sogjax.settings import TrackConfig
+from sogjax.tracking.frame import FrameCells
 from sogjax.tracking.tracker import Tracker, compile_counts
 
 
@@ -36,6 +38,8 @@ class Job:
     """The rough pose of the frame where tracking begins."""
     begin: int = 0
     """That frame, counted from the recording's first; those before it are tracked backwards."""
+    keypoints: ClipKeypoints | None = None
+    """What detectors saw; None: there are no files, or they do not count."""
 
     @property
     def num_before(self) -> int:
@@ -59,26 +63,39 @@ class Job:
         bodies = [upright(body, recording) for body in bodies]
         frames = frame_range(recording, config)
         grids = build.cell_grids(recording, config.images.depth)
+        keypoints = clip_keypoints(recording, config)
         if start is None:
             rough_descriptions(recording, bodies, config)  # what is wrong there is said before anything is learnt
         with ThreadPoolExecutor(1) as beside:  # both compile for seconds
-            building = beside.submit(_tracker, recording, bodies, grids, config, terms)
+            building = beside.submit(_tracker, recording, bodies, grids, config, terms, keypoints)
             begin = frames[0]
             if start is None and kept is not None and (opening := kept.start()) is not None:
                 start, begin = opening
             if start is None:
                 with stage(FIRST_POSE):
-                    start = jnp.concatenate(first_poses(recording, bodies, config, begin, terms))
+                    poses = first_poses(recording, bodies, config, begin, terms, keypoints=keypoints)
+                start = jnp.concatenate(poses)
                 if kept is not None:
                     kept.keep_start(start, begin)
             tracker = building.result()
-        return cls(recording, bodies, frames, grids, tracker, start, begin)
+        return cls(recording, bodies, frames, grids, tracker, start, begin, keypoints)
+
+    def with_keypoints(self, frames: Iterable[FrameCells], numbers: Iterable[int]) -> Iterable[FrameCells]:
+        """Frames with what detectors saw in them; `numbers` counts them from the recording's first."""
+        return with_keypoints(self.keypoints, frames, numbers)
 
 
 def _tracker(
-    recording: Recording, bodies: list[Body], grids: tuple[CellGrid, ...], config: TrackConfig, terms: Sequence[Term]
+    recording: Recording,
+    bodies: list[Body],
+    grids: tuple[CellGrid, ...],
+    config: TrackConfig,
+    terms: Sequence[Term],
+    keypoints: ClipKeypoints | None,
 ) -> Tracker:
-    tracker = build.tracker(recording, concatenate(bodies), grids, config, terms)
+    body = concatenate(bodies)
+    terms = (*terms, *keypoint_terms(keypoints, body, config))
+    tracker = build.tracker(recording, body, grids, config, terms)
     compile_counts(tracker, (len(grids), *stack_shape(grids), 3))
     return tracker
 

@@ -13,8 +13,9 @@ import jax.numpy as jnp
 import numpy as np
 
 import sogjax
+from sogjax.data.keypoints import find_keypoints
 from sogjax.data.recording import Recording
-from sogjax.data.source import fingerprint
+from sogjax.data.source import files_fingerprint, fingerprint
 from sogjax.engine import build
 from sogjax.engine.first_pose import initial_pose_file
 from sogjax.model.body import Body
@@ -45,6 +46,7 @@ def origin_of(recording: Recording, config: TrackConfig, given_actors: Sequence[
         **_code_of_terms(config),
         "outputs.confidence": config.outputs.confidence,
         **_of_recording(recording),
+        **_of_keypoints(recording),
         "the actors": None if given_actors is None else [digest(actor) for actor in given_actors],
         "the rough pose": None if poses is None else hashlib.sha256(poses.read_bytes()).hexdigest(),
     }
@@ -84,6 +86,19 @@ def _code_of_terms(config: TrackConfig) -> Origin:
     files = {term.name: Path(getattr(sys.modules[type(term).__module__], "__file__", None) or "") for term in added}
     digests = {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in files.items() if path.is_file()}
     return {f"the code of energy.terms.{name}": content for name, content in digests.items()}
+
+
+def _of_keypoints(recording: Recording) -> Origin:
+    """Of recordings that have keypoints; files that appear later are a difference."""
+    found = find_keypoints(recording.path)
+    if found is None:
+        return {}
+    scheme = recording.keypoint_scheme
+    own = scheme is not None and Path(scheme).is_file()
+    return {
+        "the keypoints": files_fingerprint(found.files),
+        "keypoint_scheme": hashlib.sha256(Path(str(scheme)).read_bytes()).hexdigest() if own else scheme,
+    }
 
 
 def _of_recording(recording: Recording) -> Origin:

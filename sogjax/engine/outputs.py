@@ -10,9 +10,12 @@ from omegaconf import OmegaConf
 
 from sogjax.data.actor_file import save_body
 from sogjax.data.atomic import atomic_path
-from sogjax.data.export import WRITERS, export_motion, require_ezc3d
+from sogjax.data.export import WRITERS, export_motion, require_ezc3d, write_markers
 from sogjax.data.ground_truth import load_ground_truth
+from sogjax.data.keypoints import named_scheme
 from sogjax.data.motion import Motion, save_motion
+from sogjax.data.projects import CONFIG
+from sogjax.data.recording import Recording
 from sogjax.engine.build import marker_rule
 from sogjax.engine.clock import WRITING, stage
 from sogjax.engine.run import Run
@@ -23,6 +26,9 @@ from sogjax.errors import InputError
 from sogjax.evaluation import evaluate_motions
 from sogjax.model.body import Body
 from sogjax.settings import OutputsConfig
+
+POSE2SIM_SCHEME = "HALPE_26"
+"""Of the points written for Pose2Sim: its default."""
 
 
 @contextmanager
@@ -84,6 +90,32 @@ def export_endings(wanted: OutputsConfig) -> list[str]:
     return [f".{name}" for name in dict.fromkeys(formats)]
 
 
+def pose2sim_file(recording: Recording, frames: tuple[int, int], actor: str = "") -> Path:
+    """Where Pose2Sim's next steps look for the points of a trial; `frames`: first and last."""
+    person = f"_{actor}" if actor else ""
+    return recording.path / "pose-3d" / f"{recording.name}{person}_{frames[0]}-{frames[1]}.trc"
+
+
+def check_pose2sim(recording: Recording, frames: tuple[int, int], bodies: Sequence[Body], replaced: bool) -> None:
+    """Check that points can be written into a Pose2Sim project; `frames`: first and last.
+
+    Raises:
+        InputError: the recording is none, or has them already, or a body lacks one of the points.
+    """
+    if not (recording.path / CONFIG).is_file():
+        raise InputError(f"outputs.pose2sim=true: {recording.path} is no Pose2Sim project (no {CONFIG}); leave it out")
+    for body in bodies:
+        path = pose2sim_file(recording, frames, body.name if len(bodies) > 1 else "")
+        if path.exists() and not replaced:
+            raise InputError(f"{path}: already exists; move it away, or give overwrite=true to replace it")
+        lacking = set(named_scheme(POSE2SIM_SCHEME).landmarks) - {*body.landmarks.names, *body.skeleton.names}
+        if lacking:
+            raise InputError(
+                f"outputs.pose2sim=true: {body.name} has no landmark {min(lacking)}, one of {POSE2SIM_SCHEME}; leave "
+                "it out, or add the landmark to the body file"
+            )
+
+
 def write_results(result: Run, out: Path, wanted: OutputsConfig, config: Any, made_actors: Sequence[Body]) -> None:
     """Write the files that need whole motions; each appears under its name only when complete."""
     with stage(WRITING):
@@ -102,6 +134,11 @@ def _write_results(result: Run, out: Path, wanted: OutputsConfig, config: Any, m
         for ending in export_endings(wanted):
             result.files.append(out / file_name("motion", ending, name, len(names)))
             export_motion(motion, result.files[-1])
+        if wanted.pose2sim:
+            span = int(motion.frame[0]), int(motion.frame[-1])
+            path = pose2sim_file(result.recording, span, name if len(names) > 1 else "")
+            write_markers(path, motion, named_scheme(POSE2SIM_SCHEME), motion.up)
+            say(f"{path}: written for Pose2Sim's next steps")
     with atomic_path(out / "config.yaml") as temporary:
         temporary.write_text(OmegaConf.to_yaml(config))
     result.files.append(out / "config.yaml")

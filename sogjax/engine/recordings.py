@@ -13,6 +13,7 @@ from sogjax.data.actor_file import load_body, named_body
 from sogjax.data.recording import Recording, open_recording
 from sogjax.engine.build import color_space_and_radius, energy_terms
 from sogjax.engine.example_frames import check_actors, with_examples
+from sogjax.engine.keypoint_actor import keypoint_actor, with_rough_poses
 from sogjax.engine.terminal import progress, say
 from sogjax.errors import InputError
 from sogjax.model.body import Body
@@ -97,19 +98,50 @@ def actors_of(
         return bodies, []
     space, _ = color_space_and_radius(color)
     images = images or ImagesConfig()
-    made = _made_actors(str(recording.path), recording.rig.names, body, space, images.background, images.cache, actors)
-    return [actor.body for actor in made], list(made)
+    bodies, made = _made_actors(
+        str(recording.path), recording.rig.names, body, space, images.background, images.cache, actors
+    )
+    return list(bodies), list(made)
 
 
 @cache
 def _made_actors(
     path: str, cameras: tuple[str, ...], body: str, space: str, background: str, cells: str | None, actors: int | None
-) -> tuple[MadeActor, ...]:
+) -> tuple[tuple[Body, ...], tuple[MadeActor, ...]]:
     """The actors of a recording, made once per process: the members of a sweep share them."""
     start = body_named(body)
     recording = open_recording(Path(path))
     recording = replace(recording, rig=recording.rig.select(cameras))
-    recording, learnt, best = with_examples(recording, ImagesConfig(background=background, cache=cells), actors)
+    images = ImagesConfig(background=background, cache=cells)
+    try:
+        made = _of_examples(recording, start, space, images, actors)
+        return tuple(actor.body for actor in made), made
+    except InputError as error:
+        return (keypoint_actor_or(error, recording, start, space, actors),), ()
+
+
+def keypoint_actor_or(
+    error: InputError, recording: Recording, start: Body, space: str, actors: int | None, symmetric: bool = True
+) -> Body:
+    """The actor of keypoints, where none can be made of pictures for a reason.
+
+    Raises:
+        InputError: the reason, where there are example poses, several actors, or no keypoints that tell.
+    """
+    if recording.example_poses or actors not in (None, 1):
+        raise error
+    actor = keypoint_actor(recording, start, space, symmetric)
+    if actor is None:
+        raise error
+    say(f"the actor is made of the keypoints and of colours at the posed body, as its outlines cannot be had ({error})")
+    return actor
+
+
+def _of_examples(
+    recording: Recording, start: Body, space: str, images: ImagesConfig, actors: int | None
+) -> tuple[MadeActor, ...]:
+    recording, learnt, best = with_examples(recording, images, actors)
+    recording = with_rough_poses(recording, start)
     terms = energy_terms(EnergyConfig())
     made = []
     for subject in subjects_of(recording):

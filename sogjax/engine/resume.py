@@ -49,8 +49,8 @@ def _again(
     """The frames of a prefix, without tracking them."""
     state, capacities = TrackState.from_pose(start), prefix.capacities
     for index, frame in enumerate(frames):
-        cells, present = on_device(frame)
-        images = image_blobs(tracker, state, cells, capacities, present) if with_images else _no_blobs(len(cells))
+        cells, beside = on_device(frame)
+        images = image_blobs(tracker, state, cells, capacities, beside) if with_images else _no_blobs(len(cells))
         result = prefix.result(index, images)
         yield TrackedFrame(index, result, capacities, tracker.reader.color_space, 0.0)
         state = state.advanced(result.pose)

@@ -1,6 +1,6 @@
 """A run told both ways: what was kept of it is revised where a backward pass explains the body better."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,10 +45,11 @@ class Reviser:
         say(f"taken from the backward pass in {counted(len(found.frames), 'frame')}: {parts}")
         return Prefix(_revised(rows, found.frames))
 
-    def _backwards(self, begin: int, stop: int) -> Iterator[FrameCells]:
+    def _backwards(self, begin: int, stop: int) -> Iterable[FrameCells]:
         """The cells of some rows, the last one first."""
-        first = self.job.frames[0]
-        return frames_backwards(self.job.recording, self.job.grids, self.images, first + begin, first + stop)
+        begin, stop = self.job.frames[0] + begin, self.job.frames[0] + stop
+        frames = frames_backwards(self.job.recording, self.job.grids, self.images, begin, stop)
+        return self.job.with_keypoints(frames, range(stop - 1, begin - 1, -1))
 
 
 def _revised(rows: dict[str, np.ndarray], frames: dict[int, Revised]) -> dict[str, np.ndarray]:

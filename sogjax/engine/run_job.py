@@ -17,6 +17,7 @@ from sogjax.engine.cells import picture_reader
 from sogjax.engine.clock import BACKGROUND, BEFORE, BOTH_WAYS, FIRST_FRAME, PREPARING, TRACKING, WRITING, stage
 from sogjax.engine.job import Job
 from sogjax.engine.kept_run import KeptRun
+from sogjax.engine.keypoint_offsets import told_offsets
 from sogjax.engine.pipeline import Follow, FrameDone, FrameTracker, PictureReader, tracked_frames
 from sogjax.engine.prefix import Prefix
 from sogjax.engine.resume import frames_of, resumed
@@ -55,6 +56,8 @@ def tracking(
     read = picture_reader(config.images)
     with stage(BACKGROUND):
         job = replace(job, tracker=learnt_again(job, config.images, read, kept=kept))
+    with stage(PREPARING):
+        job = replace(job, tracker=told_offsets(job, read))
     revise = Reviser(job, config.images) if config.tracking.both_ways else None
     with run_job(job, outputs, out, read, kept=kept, images=config.images, revise=revise, stays=stays) as result:
         yield result
@@ -172,6 +175,7 @@ def _begun(
         say(f"{out}: {num_kept} of {counted(last - first, 'frame')} are done; resuming after them")
     elif job.num_before:
         frames = frames_backwards(job.recording, job.grids, images or ImagesConfig(), first, job.begin + 1)
+        frames = job.with_keypoints(frames, range(job.begin, first - 1, -1))
         with stage(BEFORE):
             prefix = tracked_backwards(job.tracker, job.start, frames, job.num_before + 1, times)
     start = job.start if prefix is None or not job.num_before else prefix.pose(0)
@@ -197,7 +201,8 @@ def _streamed(
     with stage(stages[0]) as turn, streams:
         count = last - first - streams.num_skipped
         pictures = read(job.recording, streams.preparation(job.grids), last - count, last) if count else iter(())
-        frames = tracked_frames(pictures, count, streams.times, follow)
+        known = lambda cells: follow(job.with_keypoints(cells, range(last - count, last)))
+        frames = tracked_frames(pictures, count, streams.times, known)
         with closing(frames), Behind(streams.consume, FRAMES_BEHIND) as behind:
             for done in frames:
                 used.append(float(np.mean(done.tracked.result.num_matching)))

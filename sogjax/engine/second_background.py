@@ -153,13 +153,14 @@ def _first_pass(job: Job, images: ImagesConfig, read: PictureReader) -> dict[int
     sampled, poses = {*sampled_frames(job.recording)}, dict[int, Array]()
     if job.begin > job.frames[0]:
         frames = frames_backwards(job.recording, job.grids, images, job.frames[0], job.begin + 1)
-        prefix = tracked_backwards(job.tracker, job.start, frames, job.begin + 1 - job.frames[0], StageTimes())
+        known = job.with_keypoints(frames, range(job.begin, job.frames[0] - 1, -1))
+        prefix = tracked_backwards(job.tracker, job.start, known, job.begin + 1 - job.frames[0], StageTimes())
         frame_of = range(job.frames[0], job.frames[0] + prefix.num_frames)
         poses = {frame: prefix.pose(k) for k, frame in enumerate(frame_of) if frame in sampled}
     pictures = read(job.recording, Preparation(job.grids), job.begin, job.frames[1])
     cells = (cells_of_frame([picture.cells for picture in frame]) for frame in pictures)
     shown = progress(cells, job.frames[1] - job.begin, "tracking, to learn the background")
-    for done in track(job.tracker, job.start, shown):
+    for done in track(job.tracker, job.start, job.with_keypoints(shown, range(job.begin, job.frames[1]))):
         if job.begin + done.index in sampled:
             poses[job.begin + done.index] = jnp.asarray(done.result.pose)
     return poses

@@ -26,7 +26,7 @@ from sogjax.engine.first_pose import initial_pose_file, known_opening
 from sogjax.engine.job import frame_range
 from sogjax.engine.kept_run import KeptRun
 from sogjax.engine.origin import origin_of
-from sogjax.engine.outputs import actor_name, evaluate, export_endings, write_results
+from sogjax.engine.outputs import actor_name, check_pose2sim, evaluate, export_endings, write_results
 from sogjax.engine.recordings import actors_of, file_list, opened
 from sogjax.engine.run import Run
 from sogjax.engine.run_folder import RunFolder, run_folder
@@ -80,6 +80,9 @@ def _run_in(folder: RunFolder, recording: Recording, config: TrackConfig, comman
             bodies, found = actors()
     if not going_on:
         folder.begin(command, origin, [] if made else file_list(config.actor))
+    if config.outputs.pose2sim:
+        first, last = (frame + recording.first_frame for frame in frame_range(recording, config))
+        check_pose2sim(recording, (first, last - 1), bodies, config.overwrite)
     if anew:
         kept.keep_actors(bodies)
         with stage(ACTORS):

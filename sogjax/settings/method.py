@@ -37,6 +37,9 @@ class EnergyConfig:
     limit_weight: float = option(1.0, "[w_l] weight of the joint limits, 1/rad^2")
     acceleration_weight: float = option(0.01, "[w_a] weight of smooth motion, 1/rad^2")
     foreground_weight: float = option(0.2, "weight of covering what is not background, and nothing that is; 0: off")
+    keypoint_weight: float = option(
+        0.7, "weight of being near keypoints that other programs left beside the recording; 0: off"
+    )
     overlap_exponent: str = option("exact", "exact | printed: Eq. 6 with or without the 1/2 that Eq. 2 implies")
     capped: bool = option(True, "the cap of Eq. 8 against blobs that hide each other")
     pairs: str = option("sparse", "dense: all pairs of blobs | sparse: pairs near each other, equal to 1e-4")

@@ -20,6 +20,9 @@ class OutputsConfig:
     rerun_images: bool = option(True, "put the pictures into motion.rrd")
     bvh: bool = option(True, "motion.bvh")
     formats: list[str] | None = option(None, "further formats of the motion, some of [trc,c3d,glb,csv]; null: none")
+    pose2sim: bool = option(
+        False, "PROJECT/pose-3d/TRIAL_FIRST-LAST.trc of a Pose2Sim project, which its next steps read (HALPE_26)"
+    )
     markers: str = option("scaled", "scaled | closest: how markers are attached for metrics.json, as for evaluate")
     confidence: bool = option(
         True, "how likely each limb is more than 10 cm off: in motion.npz, motion.rrd, the overlay and the summary"

@@ -14,7 +14,7 @@ from sogjax.energy.posed import History
 from sogjax.model.body import Body
 from sogjax.tracking.body_parts import Part, PartArrays
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import FrameCells, TrackedFrame, TrackState, on_device
+from sogjax.tracking.frame import Beside, FrameCells, TrackedFrame, TrackState, on_device
 from sogjax.tracking.room import Needed, with_room
 from sogjax.tracking.tracker import Tracker, track
 
@@ -126,8 +126,8 @@ def part_gains(
     second: Float[Array, "dof"],
 ) -> Float[Array, "part"]:
     """The gains, with larger capacities where either pose sees more image blobs."""
-    cells, present = on_device(frame)
-    return with_room(lambda room: _gains(tracker, cells, room, present, parts, first, second), capacities)
+    cells, beside = on_device(frame)
+    return with_room(lambda room: _gains(tracker, cells, room, beside, parts, first, second), capacities)
 
 
 @eqx.filter_jit
@@ -135,7 +135,7 @@ def _gains(
     tracker: Tracker,
     cells: UInt8[Array, "camera rows columns 3"],
     capacities: Capacities,
-    present: Bool[Array, "camera"] | None,
+    beside: Beside,
     parts: PartArrays,
     first: Float[Array, "dof"],
     second: Float[Array, "dof"],
@@ -147,7 +147,7 @@ def _gains(
     mixed = jnp.concatenate([parts.mixed(tracker.body, first, second), parts.mixed(tracker.body, second, first)])
 
     def seen_near(at: Float[Array, "dof"]) -> tuple[Float[Array, "part"], Needed]:
-        views, near, matching = tracker.views(cells, TrackState.from_pose(at), capacities, present)
+        views, near, matching = tracker.views(cells, TrackState.from_pose(at), capacities, beside)
         energy = FrameEnergy(tracker.body, views, History.unknown(at), tracker.terms)
         values = jax.lax.map(energy, jnp.concatenate([first[None], second[None], mixed]))
         into_first, into_second = values[2:].reshape(2, -1)

@@ -17,7 +17,7 @@ from sogjax.energy.posed import History
 from sogjax.tracking.backward_pass import SURE_FRAMES, FramesBackwards, Pass, compared_backwards
 from sogjax.tracking.body_parts import body_parts, merged_pose
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import FrameCells, TrackState, on_device
+from sogjax.tracking.frame import Beside, FrameCells, TrackState, on_device
 from sogjax.tracking.limb_doubt import Judgement
 from sogjax.tracking.room import Needed, with_room
 from sogjax.tracking.taken_parts import stretches, taken_parts
@@ -118,13 +118,13 @@ def _valued(
     tracker: Tracker,
     history: History,
     cells: UInt8[Array, "camera rows columns 3"],
-    present: Bool[Array, "camera"] | None,
+    beside: Beside,
     capacities: Capacities,
     pose: Float[Array, "dof"],
     usual: Float[Array, "2 blob"],
 ) -> tuple[tuple[Float[Array, ""], dict[str, Float[Array, ""]], Judgement], Needed]:
     """Energy, terms and doubts of a pose that is known; and the room that they need."""
-    views, near, matching = tracker.views(cells, TrackState.from_pose(pose), capacities, present)
+    views, near, matching = tracker.views(cells, TrackState.from_pose(pose), capacities, beside)
     energy = FrameEnergy(tracker.body, views, history, tracker.terms)
-    judged = tracker.judged(pose, usual, views.windows, cells, present)
+    judged = tracker.judged(pose, usual, views.windows, cells, beside.present)
     return (energy(pose), energy.values(pose), judged), (jnp.max(near), jnp.max(matching))

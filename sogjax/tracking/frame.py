@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int, UInt8
 
+from sogjax.energy.keypoint_views import SeenKeypoints
 from sogjax.model.sog import Sog
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.limb_doubt import Judgement
@@ -21,16 +22,35 @@ class PartialCells(NamedTuple):
     present: Bool[np.ndarray | Array, "camera"]
 
 
-FrameCells = UInt8[np.ndarray, "camera rows columns 3"] | PartialCells
+class WithKeypoints(NamedTuple):
+    """The cells of a frame, and what keypoint detectors saw in it."""
+
+    cells: UInt8[np.ndarray | Array, "camera rows columns 3"] | PartialCells
+    keypoints: SeenKeypoints
 
 
-def on_device(
-    frame: FrameCells,
-) -> tuple[UInt8[Array, "camera rows columns 3"], Bool[Array, "camera"] | None]:
-    """The cells of a frame, and which cameras are present; None: all are."""
+FrameCells = UInt8[np.ndarray | Array, "camera rows columns 3"] | PartialCells | WithKeypoints
+
+
+class Beside(NamedTuple):
+    """What is known of a frame beside its cells."""
+
+    present: Bool[Array, "camera"] | None = None
+    """The cameras that have a picture; None: all have."""
+    keypoints: SeenKeypoints | None = None
+
+
+NOTHING = Beside()
+
+
+def on_device(frame: FrameCells) -> tuple[UInt8[Array, "camera rows columns 3"], Beside]:
+    """The cells of a frame, and what else is known of it."""
+    if isinstance(frame, WithKeypoints):
+        cells, beside = on_device(frame.cells)  # pyright: ignore[reportArgumentType]
+        return cells, beside._replace(keypoints=jax.tree.map(jnp.asarray, frame.keypoints))
     if isinstance(frame, PartialCells):
-        return jnp.asarray(frame.cells), jnp.asarray(frame.present)
-    return jnp.asarray(frame), None
+        return jnp.asarray(frame.cells), Beside(jnp.asarray(frame.present))
+    return jnp.asarray(frame), NOTHING
 
 
 class TrackState(eqx.Module):
@@ -41,6 +61,8 @@ class TrackState(eqx.Module):
     num_known: Int[Array, ""]
     usual: Float[Array, "2 blob"] | None = None
     """What was seen in the blobs' places so far (`Judgement.usual`); NaN where nothing is known, None: not judged."""
+    expected: Float[Array, "dof"] | None = None
+    """The pose that the next frame is expected to show; None: as the last two poses say."""
 
     @classmethod
     def from_pose(cls, pose: Float[Array, "dof"]) -> "TrackState":

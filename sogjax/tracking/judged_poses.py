@@ -20,7 +20,8 @@ def judged_poses(
     if usual is None:
         return
     for pose, frame in zip(poses, frames, strict=True):
-        found = _judged(tracker, *on_device(frame), jnp.asarray(pose, jnp.float32), usual)
+        cells, beside = on_device(frame)
+        found = _judged(tracker, cells, beside.present, jnp.asarray(pose, jnp.float32), usual)
         usual = found.usual
         yield found
 

@@ -8,11 +8,11 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, UInt8
+from jaxtyping import Array, Float, UInt8
 
 from sogjax.model.sog import Sog
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import FrameResult, TrackState
+from sogjax.tracking.frame import NOTHING, Beside, FrameResult, TrackState
 from sogjax.tracking.tracker import Tracker, first_capacities, larger_capacities
 
 ClipCells = UInt8[Array, "frame camera rows columns 3"]
@@ -69,7 +69,7 @@ def image_blobs(
     state: TrackState,
     cells: UInt8[Array, "camera rows columns 3"],
     capacities: Capacities,
-    present: Bool[Array, "camera"] | None = None,
+    beside: Beside = NOTHING,
 ) -> Sog:
-    """The image blobs of a frame that was tracked already; `present` as in `Tracker.views`."""
-    return tracker.views(cells, state, capacities, present)[0].images
+    """The image blobs of a frame that was tracked already."""
+    return tracker.views(cells, tracker.led(state, beside), capacities, beside)[0].images

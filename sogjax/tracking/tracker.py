@@ -15,6 +15,8 @@ from jaxtyping import Array, Bool, Float, Int, UInt8
 from sogjax.compiled.once import computed_once
 from sogjax.energy.coloring import Coloring
 from sogjax.energy.frame_energy import FrameEnergy
+from sogjax.energy.keypoint_views import KeypointViews
+from sogjax.energy.keypoints import keypoint_pull_among
 from sogjax.energy.posed import History, Posed
 from sogjax.energy.term import Terms
 from sogjax.energy.views import Views
@@ -33,8 +35,20 @@ from sogjax.tracking.culling import (
     capacity_for,
     union_boxes,
 )
-from sogjax.tracking.frame import FrameCells, FrameResult, PartialCells, TrackedFrame, TrackState, on_device, on_host
+from sogjax.tracking.frame import (
+    NOTHING,
+    Beside,
+    FrameCells,
+    FrameResult,
+    PartialCells,
+    TrackedFrame,
+    TrackState,
+    WithKeypoints,
+    on_device,
+    on_host,
+)
 from sogjax.tracking.frame_fit import frame_fit
+from sogjax.tracking.guide import Guide
 from sogjax.tracking.judged_limbs import JudgedLimbs
 from sogjax.tracking.limb_doubt import Judgement, judgement
 from sogjax.tracking.limb_evidence import blob_evidence
@@ -93,7 +107,9 @@ class Tracker(eqx.Module):
         return replace(state, usual=jnp.full((2, self.body.num_blobs), jnp.nan, self.body.blob_sigmas.dtype))
 
     def predicted(self, state: TrackState) -> Float[Array, "dof"]:
-        """Theta_0 of Section 5.3: linear extrapolation of the last two poses."""
+        """Theta_0 of Section 5.3: linear extrapolation of the last two poses, unless a pose is expected."""
+        if state.expected is not None:
+            return state.expected
         return state.previous + self.extrapolation * (state.previous - state.before_previous)
 
     def boxes(self, state: TrackState) -> Float[Array, "camera actor 2 2"]:
@@ -112,12 +128,13 @@ class Tracker(eqx.Module):
         cells: UInt8[Array, "camera rows columns 3"],
         state: TrackState,
         capacities: Capacities,
-        present: Bool[Array, "camera"] | None = None,
+        beside: Beside = NOTHING,
     ) -> tuple[Views, Int[Array, "camera"], Int[Array, "camera"]]:
         """What the cameras see, culled, and the counts that must be held against the capacities.
 
-        A camera that is not `present` (None: all are) sees nothing, and the similarity is the mean over the others.
+        A camera that is not present sees nothing, and the similarity is the mean over the others.
         """
+        present = beside.present
         rgb = cells.astype(self.cameras.intrinsics.dtype) / 255.0
         odds, boxes = self.reader.odds(rgb), self.boxes(state)
         near_blobs = partial(self.reader.near_blobs, capacity=capacities.near)
@@ -130,7 +147,8 @@ class Tracker(eqx.Module):
             normalizers = normalizers * jnp.mean(present, dtype=normalizers.dtype)
             windows = None if windows is None else windows.of_present(present)
         body_colors = from_rgb(self.body.blob_colors, self.reader.color_space)
-        body = eqx.tree_at(lambda sog: sog.colors, self.body.posed_blobs(state.previous), body_colors)
+        blobs = self.body.posed_blobs(state.previous)
+        body = eqx.tree_at(lambda sog: sog.colors, blobs, body_colors)
         if self.pairs == "sparse":
             images, similarities, num_matching = self.reader.compared_blobs(near, weights, body)
         else:
@@ -138,17 +156,29 @@ class Tracker(eqx.Module):
                 near, weights, body, capacities.matching
             )
         coloring = Coloring(self.reader.color_radius, self.reader.color_space, weights)
-        views = Views(self.cameras, images, similarities, normalizers, coloring=coloring, windows=windows)
+        keypoints = self.keypoint_views(beside, state.previous, normalizers)
+        views = Views(
+            self.cameras, images, similarities, normalizers, coloring=coloring, windows=windows, keypoints=keypoints
+        )
         return views, num_near, num_matching
+
+    def keypoint_views(
+        self, beside: Beside, pose: Float[Array, "dof"], normalizers: Float[Array, "camera"]
+    ) -> KeypointViews | None:
+        """Keypoints as the energy takes them, near a pose; None: there are none, or none of its terms looks at them."""
+        pull = keypoint_pull_among(self.terms)
+        if pull is None or beside.keypoints is None:
+            return None
+        return pull.views(beside.keypoints, self.cameras, Posed.from_pose(self.body, pose), normalizers)
 
     def step(
         self,
         state: TrackState,
-        cells: UInt8[Array, "camera rows columns 3"] | PartialCells,
+        cells: UInt8[Array, "camera rows columns 3"] | PartialCells | WithKeypoints,
         capacities: Capacities | None = None,
-        present: Bool[Array, "camera"] | None = None,
+        beside: Beside = NOTHING,
     ) -> tuple[TrackState, FrameResult]:
-        """Find the pose of one frame from its cells (sRGB bytes); `present` as in `views`.
+        """Find the pose of one frame from its cells (sRGB bytes); `beside`: what else is known of it.
 
         With `capacities`, whether these sufficed is for the caller to see in the counts. Without, the tracker's own
         are used, and a frame that needs more is an error when it is computed.
@@ -156,18 +186,28 @@ class Tracker(eqx.Module):
         Raises:
             ValueError: there are none.
         """
-        if isinstance(cells, PartialCells):
-            cells, present = jnp.asarray(cells.cells), jnp.asarray(cells.present)
+        if isinstance(cells, PartialCells | WithKeypoints):
+            cells, beside = on_device(cells)
         if capacities is not None:
-            seen = self.views(cells, state, capacities, present)
-            return self._judged(*self.found(state, seen, capacities), seen[0], cells, present)
+            state = self.led(state, beside)
+            seen = self.views(cells, state, capacities, beside)
+            return self._judged(*self.found(state, seen, capacities), seen[0], cells, beside.present)
         if self.capacities is None:
             raise ValueError("the tracker has no capacities; give some, or take one of sogjax.make_tracker")
-        state, result = self.step(state, cells, self.capacities, present)
+        state, result = self.step(state, cells, self.capacities, beside)
         room = self.capacities
         cut_off = jnp.any(result.num_near > room.near) | jnp.any(result.num_matching > room.matching)
         cut_off |= result.num_blocks > room.blocks
         return eqx.error_if((state, result), cut_off, NO_ROOM)
+
+    def led(self, state: TrackState, beside: Beside) -> TrackState:
+        """The state, expecting the pose to which keypoints lead; the same where there are none."""
+        pull = keypoint_pull_among(self.terms)
+        views = self.keypoint_views(beside, state.previous, self.normalizers)
+        if pull is None or views is None:
+            return state
+        guide = Guide(self.body, self.cameras, views, pull)
+        return replace(state, expected=guide.followed(self.predicted(state), self.scales))
 
     def found(
         self,
@@ -259,19 +299,19 @@ def track(
     repair = Repair(tracker.body) if tracker.repairs else None
     for index, frame in enumerate(frames):
         begin = time.perf_counter()
-        cells, present = on_device(frame)
+        cells, beside = on_device(frame)
         if capacities is None:
             capacities = first_capacities(tracker, state, cells)
         while True:
-            next_state, result = _step(tracker, state, cells, capacities, present)
+            next_state, result = _step(tracker, state, cells, capacities, beside)
             needed = jax.device_get((result.num_near, result.num_matching, result.num_blocks))
             near, matching, blocks = (int(count.max()) for count in needed)
             if capacities.hold(near, matching, blocks):
                 break
             capacities = larger_capacities(capacities, near, matching, blocks)
         if repair is not None:
-            step = partial(_step_within, tracker, cells, capacities, present)
-            judge = partial(_doubts, tracker, cells, present)
+            step = partial(_step_within, tracker, cells, capacities, beside)
+            judge = partial(_doubts, tracker, cells, beside.present)
             next_state, result = repair.after(state, (next_state, result), step, judge)
         state = next_state
         seconds = time.perf_counter() - begin
@@ -282,11 +322,11 @@ def _step_within(
     tracker: Tracker,
     cells: UInt8[Array, "camera rows columns 3"],
     capacities: Capacities,
-    present: Bool[Array, "camera"] | None,
+    beside: Beside,
     state: TrackState,
 ) -> tuple[TrackState, FrameResult] | None:
     """A step, unless it needs more room."""
-    found, result = _step(tracker, state, cells, capacities, present)
+    found, result = _step(tracker, state, cells, capacities, beside)
     needed = jax.device_get((result.num_near, result.num_matching, result.num_blocks))
     return (found, result) if capacities.hold(*(int(count.max()) for count in needed)) else None
 

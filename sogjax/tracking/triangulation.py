@@ -55,9 +55,14 @@ class Triangulated:
 def rays_of(rig: CameraRig, pixels: Float[np.ndarray, "camera point 2"]) -> Float[np.ndarray, "camera point 2"]:
     """Rays of pixels of the pictures as recorded."""
     matrix = np.asarray(rig.cameras.intrinsics, float)
-    straight = np.asarray(_undistorted(rig.cameras, jnp.asarray(pixels, jnp.float32)), float)
+    straight = undistorted(rig, pixels)
     focal = np.stack([matrix[:, 0, 0], matrix[:, 1, 1]], axis=-1)
     return (straight - matrix[:, None, :2, 2]) / focal[:, None]
+
+
+def undistorted(rig: CameraRig, pixels: Float[np.ndarray, "camera point 2"]) -> Float[np.ndarray, "camera point 2"]:
+    """Undistorted pixels of pixels of the pictures as recorded."""
+    return np.asarray(_undistorted(rig.cameras, jnp.asarray(pixels, jnp.float32)), float)
 
 
 def poses_of(rig: CameraRig) -> Float[np.ndarray, "camera 3 4"]:

@@ -24,6 +24,14 @@ class KeypointFiles:
     of_all: Path | None = None
     """An array whose first axis is the cameras, sorted by the names of their videos."""
 
+    @property
+    def files(self) -> list[Path]:
+        """All of them, sorted."""
+        found = [self.of_all] if self.of_all is not None else []
+        for path in self.by_name.values():
+            found += json_files(path) if path.is_dir() else [path]
+        return sorted(found)
+
 
 def find_keypoints(recording: Path) -> KeypointFiles | None:
     """The keypoint files of a recording; None where there are none."""

@@ -1,0 +1,105 @@
+"""What are keypoints worth with few cameras, and what is the body model worth beside triangulation?
+
+    python experiments/few_cameras.py [sequences=[walk,run]] [cameras=[2,4]] [cases=[without,keypoints]] [frames=60]
+
+Yardstick sequences are tracked without keypoints and with simulated ones (biased by 35 mm, as real detectors are;
+`unbiased` beside it, and the cases of `robustness`, with `robust_cameras`), and the same keypoints are triangulated.
+Actors are made with all cameras. What was done is kept in `out` and not done again: it can be stopped, and done in
+parts. Tables are printed, and written as tables.md and results.csv.
+"""
+
+import csv
+import io
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+
+import numpy as np
+
+from sogjax.data.atomic import atomic_path
+from sogjax.engine.terminal import say
+from sogjax.errors import InputError
+from sogjax.study.experiment import synth_settings, yardsticks
+from sogjax.study.few_cameras import CASES, Result, Trial, Trials
+from sogjax.study.machine import command_line, machine_line
+from sogjax.study.script import run_script, settings_from
+from sogjax.study.source import MOST_FRAMES
+
+ROBUSTNESS = ["twice the noise", "20 % outliers", "10 % exchanges", "a third missing"]
+
+
+@dataclass
+class Settings:
+    """What is tried, as `key=value` on the command line."""
+
+    sequences: list[str] = field(default_factory=list)
+    """Rows of the experiment `sequences`; none: all."""
+    cameras: list[int] = field(default_factory=lambda: [2, 3, 4, 6, 12])
+    cases: list[str] = field(default_factory=lambda: ["without", "keypoints", "unbiased"])
+    robustness: list[str] = field(default_factory=lambda: [*ROBUSTNESS])
+    robust_cameras: list[int] = field(default_factory=lambda: [4])
+    frames: int = 60
+    settings: list[str] = field(default_factory=list)
+    """Of `sogjax track`, as `energy.keypoint_weight=0.3`."""
+    out: str = "outputs/few_cameras"
+
+
+def main() -> None:
+    """Run what is not there yet, and write the tables."""
+    settings = settings_from(Settings)
+    unknown = [case for case in (*settings.cases, *settings.robustness) if case not in CASES]
+    if unknown:
+        raise InputError(f"cases: {unknown[0]}: is none of {', '.join(CASES)}")
+    synth = {
+        name: synth_settings({"frames": MOST_FRAMES, **chosen})
+        for name, chosen in yardsticks(settings.sequences).items()
+    }
+    out = Path(settings.out)
+    trials = Trials(out, synth, settings.frames, tuple(settings.settings))
+    kinds = [(count, case) for count in settings.cameras for case in settings.cases]
+    kinds += [(count, case) for count in settings.robust_cameras for case in settings.robustness]
+    done: dict[Trial, Result] = {}
+    for sequence in synth:
+        for count, case in kinds:
+            trial = Trial(sequence, count, case)
+            done[trial] = trials.result(trial)
+            say(f"{sequence}, {count} cameras, {case}: {done[trial].mean:.1f} mm, {done[trial].lost} lost")
+    text = tables(done, kinds)
+    with atomic_path(out / "tables.md") as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    with atomic_path(out / "results.csv") as temporary:
+        temporary.write_text(rows(done), encoding="utf-8")
+    print(text)
+
+
+def tables(done: dict[Trial, Result], kinds: list[tuple[int, str]]) -> str:
+    """All sequences together, then each, as Markdown."""
+    head = "| cameras | keypoints | joints, mm | 95 %, mm | lost | triangulated alone, mm | lost |"
+    lines = [f"{machine_line()}: `{command_line()}`", "", head, "|---" * 7 + "|"]
+    for count, case in dict.fromkeys(kinds):
+        found = [result for trial, result in done.items() if (trial.cameras, trial.case) == (count, case)]
+        mean = lambda name, found=found: float(np.mean([getattr(result, name) for result in found]))
+        total = lambda name, found=found: sum(getattr(result, name) for result in found)
+        alone = "" if CASES[case] is None else f"{mean('triangulated'):.1f}"
+        alone_lost = "" if CASES[case] is None else total("triangulated_lost")
+        figures = f"{mean('mean'):.1f} | {mean('worst'):.1f} | {total('lost')} | {alone} | {alone_lost}"
+        lines.append(f"| {count} | {case} | {figures} |")
+    columns = [f"{count}, {case}" for count, case in dict.fromkeys(kinds)]
+    lines += ["", "| sequence (mm, lost) | " + " | ".join(columns) + " |", "|---" * (1 + len(columns)) + "|"]
+    for sequence in dict.fromkeys(trial.sequence for trial in done):
+        cells = [done[Trial(sequence, count, case)] for count, case in dict.fromkeys(kinds)]
+        shown = [f"{cell.mean:.1f}" + (f", {cell.lost}" if cell.lost else "") for cell in cells]
+        lines.append(f"| {sequence} | {' | '.join(shown)} |")
+    return "\n".join(lines) + "\n"
+
+
+def rows(done: dict[Trial, Result]) -> str:
+    """Every trial, as CSV."""
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow([entry.name for kind in (Trial, Result) for entry in fields(kind)])
+    writer.writerows([[*asdict(trial).values(), *asdict(result).values()] for trial, result in done.items()])
+    return text.getvalue()
+
+
+if __name__ == "__main__":
+    run_script(main)

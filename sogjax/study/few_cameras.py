@@ -1,0 +1,144 @@
+"""What keypoints are worth with few cameras: tracking with and without them, and the keypoints triangulated alone."""
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from sogjax.data.actor_file import load_body, save_body
+from sogjax.data.atomic import atomic_path
+from sogjax.data.ground_truth import load_ground_truth
+from sogjax.data.keypoints import load_keypoints
+from sogjax.data.recording import Recording
+from sogjax.engine.recordings import actors_of, opened, with_cameras
+from sogjax.engine.track import track_recording
+from sogjax.evaluation import evaluate_motions
+from sogjax.evaluation.metrics import lost_points
+from sogjax.model.body import Body
+from sogjax.settings.compose import track_config
+from sogjax.study.triangulation_trials import triangulation_errors
+from sogjax.synth import SynthSettings
+from sogjax.synth.cache import cached_keypoints, cached_recording
+from sogjax.synth.detector import DetectorSettings
+
+BIASED = {"keypoint_bias": 0.035}
+CASES: dict[str, dict[str, float] | None] = {
+    "without": None,
+    "keypoints": BIASED,
+    "unbiased": {},
+    "twice the noise": BIASED | {"keypoint_noise": 10.0},
+    "20 % outliers": BIASED | {"keypoint_outliers": 0.2},
+    "10 % exchanges": BIASED | {"keypoint_exchanges": 0.1},
+    "a third missing": BIASED | {"keypoint_missing": 1.0 / 3.0},
+}
+"""By name the detector's settings beside the usual ones; None: no keypoints. Real detectors are biased."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One sequence with so many cameras and one kind of keypoints."""
+
+    sequence: str
+    cameras: int
+    case: str
+
+
+@dataclass(frozen=True)
+class Result:
+    """Errors of joint centres in millimetres; NaN where there is nothing to compare."""
+
+    mean: float
+    worst: float
+    """The 95th percentile."""
+    lost: int
+    """Stretches of five frames in which a joint is 20 cm off."""
+    triangulated: float
+    """Mean of the keypoints alone, triangulated, filled and filtered."""
+    triangulated_lost: int
+
+
+def evenly(names: Sequence[str], count: int) -> tuple[str, ...]:
+    """So many of a ring of cameras; two of them a third of the ring apart, as opposite ones see the same outline."""
+    if count == 2:
+        return names[0], names[len(names) // 3]
+    return tuple(names[k * len(names) // count] for k in range(count))
+
+
+@dataclass(frozen=True)
+class Trials:
+    """Runs trials, and keeps what came of each."""
+
+    folder: Path
+    synth: dict[str, SynthSettings]
+    """By sequence."""
+    frames: int
+    """Of each sequence, from its first."""
+    words: tuple[str, ...] = ()
+    """Settings of `sogjax track`."""
+
+    def result(self, trial: Trial) -> Result:
+        """Of a trial: what was kept of it, else now.
+
+        Raises:
+            InputError: it cannot be tracked.
+        """
+        content = json.dumps([asdict(trial), asdict(self.synth[trial.sequence]), self.frames, self.words, CASES])
+        path = self.folder / "results" / f"{hashlib.sha256(content.encode()).hexdigest()[:16]}.json"
+        if path.is_file():
+            return Result(**json.loads(path.read_text(encoding="utf-8"))["result"])
+        found = self._run(trial)
+        with atomic_path(path) as temporary:
+            temporary.write_text(json.dumps({"trial": asdict(trial), "result": asdict(found)}), encoding="utf-8")
+        return found
+
+    def _run(self, trial: Trial) -> Result:
+        recording = self._recording(trial)
+        bodies = self._actors(trial.sequence)
+        recording = with_cameras(recording, evenly(recording.rig.names, trial.cameras))
+        recording = replace(recording, num_frames=min(self.frames, recording.num_frames))
+        config = track_config([f"images.cache={self.folder / 'cells'}", *self.words], recording=recording.path)
+        run = track_recording(recording, bodies, config)
+        assert recording.ground_truth is not None
+        truth = load_ground_truth(recording.ground_truth)
+        evaluated = evaluate_motions(run.motions, truth).evaluations.values()
+        joints = [each.joints for each in evaluated if each.joints is not None]
+        errors = np.concatenate([each.errors for each in joints], axis=1)
+        lost = sum(len(lost_points(each.errors, each.names, np.arange(len(each.errors)))) for each in joints)
+        alone = self._triangulated(recording)
+        return Result(1e3 * float(np.nanmean(errors)), 1e3 * float(np.nanpercentile(errors, 95)), lost, *alone)
+
+    def _triangulated(self, recording: Recording) -> tuple[float, int]:
+        keypoints = load_keypoints(recording)
+        if keypoints is None or recording.ground_truth is None:
+            return float("nan"), 0
+        found = triangulation_errors(recording, keypoints, load_ground_truth(recording.ground_truth), keypoints.cameras)
+        return 1e3 * found.filtered, found.lost
+
+    def _recording(self, trial: Trial) -> Recording:
+        """The rendered recording beside the keypoints of the case, in a folder of links."""
+        wanted, values = self.synth[trial.sequence], CASES[trial.case]
+        source = cached_recording(wanted)
+        place = self.folder / "recordings" / f"{source.name}-{trial.case.replace(' ', '_').replace('%', 'percent')}"
+        place.mkdir(parents=True, exist_ok=True)
+        parts = {part.name: part for part in source.iterdir()}
+        if values is not None:
+            parts["pose"] = cached_keypoints(wanted, replace(DetectorSettings(keypoints="pose2sim"), **values))
+        for name, part in parts.items():
+            if not (place / name).exists():
+                (place / name).symlink_to(part.resolve())
+        return opened(str(place))
+
+    def _actors(self, sequence: str) -> list[Body]:
+        """Made from the example poses with all cameras, once."""
+        source = cached_recording(self.synth[sequence])
+        folder = self.folder / "actors" / source.name
+        files = sorted(folder.glob("*.yaml"))
+        if not files:
+            recording, config = opened(str(source)), track_config(recording=source)
+            for number, actor in enumerate(actors_of(recording, None, config.body, config.color)[0]):
+                save_body(folder / f"{number}_{actor.name}.yaml", actor)
+            files = sorted(folder.glob("*.yaml"))
+        return [load_body(path) for path in files]

@@ -1,0 +1,168 @@
+"""Keypoints that detectors saw, as a term of the energy: value, derivatives, whose keypoint is whose, and outliers."""
+
+from dataclasses import replace
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from body_cases import random_body
+from rig_cases import ring_rig
+from sog_cases import in_float64
+
+from sogjax.energy.keypoint_views import KeypointViews, SeenKeypoints, body_sizes
+from sogjax.energy.keypoints import KeypointPull
+from sogjax.energy.posed import Posed
+from sogjax.model.camera import project_points
+
+COUNT, PEOPLE = 3, 2
+MIRRORED, GROUPS = (1, 0, 2), (0, 0, -1)
+
+
+@pytest.fixture(autouse=True)
+def double():
+    with jax.enable_x64(True):
+        yield
+
+
+@pytest.fixture
+def cameras(double):
+    return in_float64(jax.tree.map(jnp.asarray, ring_rig(2).cameras))
+
+
+@pytest.fixture
+def body(double):
+    one = random_body(4)
+    whole = replace(one.skeleton, parents=(-1, *(max(parent, 0) for parent in one.skeleton.parents[1:])))
+    return in_float64(replace(one, skeleton=whole))
+
+
+def pull(**values):
+    marks = values.pop("landmarks", ((0, 1, 2),))
+    offsets = values.pop("offsets", jnp.zeros((len(marks), COUNT, 3)))
+    return in_float64(KeypointPull(1.0, landmarks=marks, mirrored=MIRRORED, groups=GROUPS, offsets=offsets, **values))
+
+
+def projected(cameras, body, pose):
+    """Landmarks in every picture: (camera, keypoint, 2)."""
+    points = body.posed_landmarks(pose)
+    return jax.vmap(project_points, in_axes=(0, None))(cameras, points)[0]
+
+
+def views_of(cameras, body, pose, pixels, sure, exchanged=0.0):
+    """Of keypoints (camera, person, keypoint, 2)."""
+    seen = SeenKeypoints(jnp.asarray(pixels, jnp.float64), jnp.asarray(sure, jnp.float64))
+    blobs = body.posed_blobs(pose)
+    scale, areas = body_sizes(cameras, blobs, jnp.full(2, 1e4), (0,) * body.num_blobs)
+    return KeypointViews(seen, jnp.full(seen.confidence.shape, exchanged), scale, areas)
+
+
+def value(term, body, cameras, views, pose):
+    return term.model(Posed.from_pose(body, pose), cameras, views).value
+
+
+def drawn(seed=0, people=PEOPLE):
+    """Landmarks in every picture with something added, for so many people."""
+    return np.random.default_rng(seed).normal(scale=6.0, size=(2, people, COUNT, 2))
+
+
+def near(body):
+    return body.poses["rest"]
+
+
+@pytest.mark.parametrize("tolerance", [0.0, 0.02])
+def test_the_gradient_is_that_of_autodiff(body, cameras, tolerance):
+    pose = near(body)
+    pixels = np.asarray(projected(cameras, body, pose))[:, None] + drawn()
+    sure = np.random.default_rng(1).uniform(0.2, 1.0, (2, PEOPLE, COUNT))
+    views = views_of(cameras, body, pose, pixels, sure, exchanged=0.3)
+    term = pull(tolerance=tolerance, offsets=jnp.full((1, COUNT, 3), 0.01))
+    expected = jax.grad(lambda p: value(term, body, cameras, views, p))(pose + 0.01)
+    model = term.model(Posed.from_pose(body, pose + 0.01), cameras, views)
+    assert float(jnp.linalg.norm(expected)) > 1e-6
+    np.testing.assert_allclose(model.gradient, expected, rtol=1e-9, atol=1e-14)
+    assert float(jnp.linalg.eigvalsh(model.curvature).min()) > -1e-12
+
+
+def test_the_curvature_is_that_of_the_value_where_the_landmarks_lie_on_keypoints(body, cameras):
+    """Gauss-Newton is exact there, but for the constant that takes its share."""
+    pose = near(body)
+    pixels = np.asarray(projected(cameras, body, pose))[:, None]
+    views = views_of(cameras, body, pose, pixels, np.ones((2, 1, COUNT)))
+    term = pull(outlier=0.1)
+    expected = -jax.hessian(lambda p: value(term, body, cameras, views, p))(pose)
+    model = term.model(Posed.from_pose(body, pose), cameras, views)
+    np.testing.assert_allclose(model.curvature, expected, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(model.value, np.log(1.0 + 1.0 / 0.1) * np.mean(views.areas), rtol=1e-6)
+
+
+def test_somebody_else_far_away_does_not_matter(body, cameras):
+    pose = near(body)
+    pixels = np.asarray(projected(cameras, body, pose))[:, None] + drawn(people=1)
+    alone = views_of(cameras, body, pose, pixels, np.ones((2, 1, COUNT)))
+    both = views_of(cameras, body, pose, np.concatenate([pixels + 900.0, pixels], axis=1), np.ones((2, 2, COUNT)))
+    term = pull()
+    for part in ("value", "gradient"):
+        one, two = (getattr(term.model(Posed.from_pose(body, pose), cameras, v), part) for v in (alone, both))
+        np.testing.assert_allclose(two, one, rtol=1e-9)
+
+
+def test_padding_is_inert_whatever_it_holds(body, cameras):
+    pose = near(body)
+    at = np.asarray(projected(cameras, body, pose))[:, None]
+    views = views_of(cameras, body, pose, np.concatenate([at, at], axis=1), np.zeros((2, 2, COUNT)))
+    gradient = jax.grad(lambda p: value(pull(), body, cameras, views, p))(pose)
+    assert (np.asarray(gradient) == 0.0).all()
+    assert float(value(pull(), body, cameras, views, pose)) == 0.0
+
+
+def seen_by(cameras, body, pose, which):
+    """The keypoints of a detector that exchanged the sides in some of the cameras, as the term takes them."""
+    cameras = jax.tree.map(lambda leaf: jnp.concatenate([leaf, leaf]), cameras)
+    at = np.asarray(projected(cameras, body, pose))[:, None]
+    at = np.stack([one[:, list(MIRRORED)] if k in which else one for k, one in enumerate(at)])
+    seen = SeenKeypoints(jnp.asarray(at), jnp.full((4, 1, COUNT), 0.8))
+    return pull().views(seen, cameras, Posed.from_pose(body, pose + 0.01), jnp.full(4, 1e4))
+
+
+def test_exchanged_sides_are_noticed_and_counted_as_what_they_are(body, cameras):
+    """Of one camera; where all agree with each other, it is the body whose sides are exchanged."""
+    pose = near(body)
+    right, wrong, all_wrong = (seen_by(cameras, body, pose, which) for which in ((), (2,), (0, 1, 2, 3)))
+    assert float(right.exchanged.max()) < 0.1
+    assert float(wrong.exchanged[2, 0, :2].min()) > 0.9
+    assert float(np.asarray(wrong.exchanged)[[0, 1, 3]].max()) < 0.1
+    assert (np.asarray(wrong.exchanged[:, :, 2]) == 0.0).all()  # it has no other side
+    assert float(all_wrong.exchanged.max()) == 0.0
+
+
+def test_exchanged_keypoints_count_as_those_of_the_other_side(body, cameras):
+    pose = near(body)
+    at = np.asarray(projected(cameras, body, pose))[:, None]
+    right = views_of(cameras, body, pose, at, np.ones((2, 1, COUNT)))
+    wrong = views_of(cameras, body, pose, at[:, :, list(MIRRORED)], np.ones((2, 1, COUNT)), exchanged=1.0)
+    np.testing.assert_allclose(*(value(pull(), body, cameras, views, pose) for views in (right, wrong)), rtol=1e-9)
+
+
+def test_a_keypoint_without_landmark_or_behind_the_camera_says_nothing(body, cameras):
+    pose = near(body)
+    at = np.asarray(projected(cameras, body, pose))[:, None]
+    views = views_of(cameras, body, pose, at, np.ones((2, 1, COUNT)))
+    assert float(value(pull(landmarks=((-1, -1, -1),)), body, cameras, views, pose)) == 0.0
+    flip = jnp.asarray(np.diag([1.0, -1.0, -1.0, 1.0]))
+    behind = eqx.tree_at(lambda c: c.camera_from_world, cameras, flip[None] @ cameras.camera_from_world)
+    assert float(value(pull(), body, behind, views, pose)) == 0.0
+
+
+def test_two_actors_are_each_drawn_to_what_is_near(body, cameras):
+    """Their landmarks are those of one body, by actor."""
+    pose = near(body)
+    at = np.asarray(projected(cameras, body, pose))[:, None]
+    seen = SeenKeypoints(jnp.asarray(at), jnp.ones((2, 1, COUNT)))
+    views, one = (KeypointViews(seen, jnp.zeros((2, 1, COUNT)), jnp.full((2, n), 300.0), jnp.ones(2)) for n in (2, 1))
+    twice = pull(landmarks=((0, 1, 2), (0, 1, 2)), offsets=jnp.zeros((2, COUNT, 3)))
+    posed = Posed.from_pose(body, pose + 0.01)
+    np.testing.assert_allclose(
+        twice.model(posed, cameras, views).gradient, pull().model(posed, cameras, one).gradient, rtol=1e-9
+    )
