@@ -17,7 +17,7 @@ from sogjax.engine.actor_report import report_folder, write_actor_report
 from sogjax.engine.build import color_space_and_radius, energy_terms
 from sogjax.engine.example_frames import with_examples
 from sogjax.engine.outputs import free_path, results_folder
-from sogjax.engine.recordings import body_named, opened
+from sogjax.engine.recordings import body_named, check_scale, opened
 from sogjax.engine.terminal import progress, say
 from sogjax.errors import InputError
 from sogjax.sentences import counted
@@ -37,6 +37,7 @@ def run(config: ActorConfig) -> Path:
     terms = energy_terms(config.energy)
     recording = opened(config.recording, config.cameras)
     body = body_named(config.body)
+    check_scale(recording, [body])
     out = Path(config.out)
     if out.is_dir():
         raise InputError(f"out={out}: is a folder; give the actor file to write, such as out={out / 'actor.yaml'}")

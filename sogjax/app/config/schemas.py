@@ -54,6 +54,7 @@ class CheckConfig:
     largest_offset: int = option(15, "largest time offset between cameras to look for, frames")
     write: bool = option(False, "write the time offsets found into recording.yaml, as frame_offset")
     cameras: list[str] | None = option(None, "cameras to examine; null: all")
+    overwrite: bool = option(False, "accepted as by other commands; an earlier check is replaced in any case")
 
 
 @dataclass
@@ -131,3 +132,4 @@ class DoctorConfig:
     """Check the installation: versions, devices, extras, speed of the disk, and a five-second test."""
 
     folder: str = option(".", "folder whose writing speed is measured")
+    overwrite: bool = option(False, "accepted as by other commands; nothing is written")
