@@ -1,18 +1,19 @@
 """`sogjax export`: a motion or a calibration in another format."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import jax.numpy as jnp
 
 from sogjax.app.config.schemas import ExportConfig
 from sogjax.data.calibration import CameraRig, load_calibration, save_calibration
-from sogjax.data.export import export_motion, write_markers
+from sogjax.data.export import export_motion, write_initial_pose, write_markers
 from sogjax.data.keypoints import named_scheme
 from sogjax.data.motion import DEFAULT_UP, Motion, load_motion
 from sogjax.data.recording import open_recording
 from sogjax.data.skeletool_motion import read_skeletool_motion, write_skeletool_motion
 from sogjax.engine.outputs import free_path
-from sogjax.engine.recordings import body_named
+from sogjax.engine.recordings import body_named, file_list
 from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.model.frames import UP_AXES, world_from_upright
@@ -30,7 +31,7 @@ def run(config: ExportConfig) -> Path:
     if config.calibration is not None:
         save_calibration(out, _rig(Path(config.calibration)))
     else:
-        _export_motion(config, Path(str(config.motion)), out)
+        _export_motion(config, file_list(config.motion), out)
     print(out)
     return out
 
@@ -39,7 +40,19 @@ def _rig(path: Path) -> CameraRig:
     return open_recording(path).rig if path.is_dir() else load_calibration(path)
 
 
-def _export_motion(config: ExportConfig, source: Path, out: Path) -> None:
+def _export_motion(config: ExportConfig, sources: Sequence[Path], out: Path) -> None:
+    is_pose = out.suffix.lower() in (".yaml", ".yml")
+    if config.frame is not None and not is_pose:
+        raise InputError(f"frame={config.frame}: only a .yaml holds one frame; leave it out, or write to=NAME.yaml")
+    if len(sources) != 1 and not is_pose:
+        raise InputError(f"motion={','.join(map(str, sources))}: {out.suffix} holds one motion; give one")
+    if is_pose:
+        write_initial_pose(out, [_read_motion(config, source) for source in sources], config.frame)
+    else:
+        _export_one(config, sources[0], out)
+
+
+def _export_one(config: ExportConfig, source: Path, out: Path) -> None:
     if config.up not in (None, *UP_AXES):
         raise InputError(f"up={config.up}: must be one of {', '.join(UP_AXES)}")
     if config.markers is not None and out.suffix.lower() != ".trc":

@@ -110,13 +110,16 @@ class ViewConfig:
 class ExportConfig:
     """Write a motion, or a calibration, in another format."""
 
-    motion: str | None = option(None, "motion.npz, or a .motion of Skeletool")
+    motion: Any = option(
+        None, "motion.npz, or a .motion of Skeletool; for a .yaml a list of motion_NAME.npz with several actors"
+    )
     calibration: str | None = option(None, "calibration file, or the folder of a recording; instead of a motion")
     to: str = option(
         REQUIRED,
         "file to write; the ending gives the format: .bvh .trc .c3d .glb .csv .motion .npz; "
-        "of a calibration: .toml .calibration",
+        "one frame as an initial_pose.yaml: .yaml; of a calibration: .toml .calibration",
     )
+    frame: int | None = option(None, "frame whose pose a .yaml holds, by the recording's numbers; null: the first")
     up: str | None = option(None, "vertical of the motion's world: x y z -x -y -z; null: what the motion says")
     actor: str | None = option(None, "actor or body file of the motion; only needed to read or write a .motion")
     fps: float | None = option(None, "frames per second; only needed to read a .motion")

@@ -8,6 +8,7 @@ from sogjax.data.export.bvh import write_bvh
 from sogjax.data.export.c3d import require_ezc3d, write_c3d
 from sogjax.data.export.csv import write_csv
 from sogjax.data.export.glb import write_glb
+from sogjax.data.export.initial_pose import write_initial_pose
 from sogjax.data.export.trc import write_markers, write_trc
 from sogjax.data.motion import Motion, save_motion
 from sogjax.errors import InputError
@@ -21,6 +22,7 @@ __all__ = [
     "write_c3d",
     "write_csv",
     "write_glb",
+    "write_initial_pose",
     "write_markers",
     "write_trc",
 ]
