@@ -6,19 +6,19 @@ from sogjax.data.doubtful import doubtful_limbs
 from sogjax.engine.clock import clocked
 from sogjax.engine.run import Run
 from sogjax.engine.terminal import say
-from sogjax.engine.track import track_to_folder
+from sogjax.engine.track import Opening, track_to_folder
 from sogjax.sentences import counted
 from sogjax.settings import TrackConfig
 
 
-def run(config: TrackConfig, command: str = "track") -> Run:
+def run(config: TrackConfig, command: str = "track", opening: Opening | None = None) -> Run:
     """Track into a folder, and print the results; at last how long each stage took.
 
     Raises:
         InputError: as `track_to_folder`.
     """
     with clocked() as clock:
-        result = track_to_folder(config, command)
+        result = track_to_folder(config, command, opening)
         say_results(result)
         print(f"\n{clock.table()}")
     say_verdicts(result)
