@@ -7,8 +7,7 @@ import jax.numpy as jnp
 
 from sogjax.app.config.schemas import ExportConfig
 from sogjax.data.calibration import CameraRig, load_calibration, save_calibration
-from sogjax.data.export import export_motion, write_initial_pose, write_markers
-from sogjax.data.keypoints import named_scheme
+from sogjax.data.export import export_motion, write_angles_csv, write_c3d, write_initial_pose, write_trc
 from sogjax.data.motion import DEFAULT_UP, Motion, load_motion
 from sogjax.data.recording import open_recording
 from sogjax.data.skeletool_motion import read_skeletool_motion, write_skeletool_motion
@@ -55,12 +54,18 @@ def _export_motion(config: ExportConfig, sources: Sequence[Path], out: Path) -> 
 def _export_one(config: ExportConfig, source: Path, out: Path) -> None:
     if config.up not in (None, *UP_AXES):
         raise InputError(f"up={config.up}: must be one of {', '.join(UP_AXES)}")
-    if config.markers is not None and out.suffix.lower() != ".trc":
-        raise InputError(f"markers={config.markers}: only a .trc has markers; leave it out, or write to=NAME.trc")
-    scheme = None if config.markers is None else named_scheme(config.markers)
+    write_points = {".trc": write_trc, ".c3d": write_c3d}.get(out.suffix.lower())
+    if config.markers is not None and write_points is None:
+        raise InputError(
+            f"markers={config.markers}: only .trc and .c3d have markers; leave it out, or write to=NAME.trc"
+        )
+    if config.angles and out.suffix.lower() not in (".csv", ".mot"):
+        raise InputError("angles=true: only .csv and .mot hold angles; leave it out, or write to=NAME.csv")
     motion = _read_motion(config, source)
-    if scheme is not None:
-        write_markers(out, motion, scheme, config.up or motion.up)
+    if write_points is not None:
+        write_points(out, motion, config.up or motion.up, config.markers)
+    elif config.angles and out.suffix.lower() == ".csv":
+        write_angles_csv(out, motion, config.up or motion.up)
     elif out.suffix.lower() == ".motion":
         write_skeletool_motion(out, motion, _actor(config, out))
     else:

@@ -19,7 +19,7 @@ class OutputsConfig:
     rerun: bool = option(True, "motion.rrd, for the Rerun viewer")
     rerun_images: bool = option(True, "put the pictures into motion.rrd")
     bvh: bool = option(True, "motion.bvh")
-    formats: list[str] | None = option(None, "further formats of the motion, some of [trc,c3d,glb,csv]; null: none")
+    formats: list[str] | None = option(None, "further formats of the motion, some of [trc,c3d,glb,csv,mot]; null: none")
     markers: str = option("scaled", "scaled | closest: how markers are attached for metrics.json, as for evaluate")
     confidence: bool = option(
         True, "how likely each limb is more than 10 cm off: in motion.npz, motion.rrd, the overlay and the summary"

@@ -116,7 +116,7 @@ class ExportConfig:
     calibration: str | None = option(None, "calibration file, or the folder of a recording; instead of a motion")
     to: str = option(
         REQUIRED,
-        "file to write; the ending gives the format: .bvh .trc .c3d .glb .csv .motion .npz; "
+        "file to write; the ending gives the format: .bvh .trc .c3d .glb .csv .mot .motion .npz; "
         "one frame as an initial_pose.yaml: .yaml; of a calibration: .toml .calibration",
     )
     frame: int | None = option(None, "frame whose pose a .yaml holds, by the recording's numbers; null: the first")
@@ -125,8 +125,10 @@ class ExportConfig:
     fps: float | None = option(None, "frames per second; only needed to read a .motion")
     markers: str | None = option(
         None,
-        "keypoint scheme whose points a .trc has, by name or file: HALPE_26 for Pose2Sim's next steps; null: the bones",
+        "points of a .trc or .c3d; null: joint centres, toes, heels, hands, head top | all: every bone, too | "
+        "a keypoint scheme by name or file: HALPE_26 for Pose2Sim's next steps",
     )
+    angles: bool = option(False, "a .csv holds joint angles in degrees instead of positions, as a .mot always does")
     overwrite: bool = option(False, OVERWRITE)
 
 
