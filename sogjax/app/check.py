@@ -15,7 +15,7 @@ from sogjax.data.atomic import atomic_path
 from sogjax.data.offsets_file import offsets_line, write_frame_offsets
 from sogjax.data.recording import Recording, open_recording
 from sogjax.engine.outputs import results_folder
-from sogjax.engine.terminal import progress, say
+from sogjax.engine.terminal import alive, progress, say
 from sogjax.errors import InputError
 from sogjax.sentences import counted
 from sogjax.view.plots import write_png
@@ -32,7 +32,7 @@ def run(config: CheckConfig) -> list[Finding]:
     recording = _opened(config)
     start, frames = _stretch(config, recording)
     out = Path(config.out) if config.out else Path("outputs") / recording.name / "check"
-    with results_folder(out):
+    with results_folder(out), alive("examining the recording"):
         found = examined(recording, start, frames, config.largest_offset, progress)
         with atomic_path(out / "check.json") as temporary:
             temporary.write_text(json.dumps(found.numbers, indent=1))

@@ -56,6 +56,7 @@ def track_to_folder(config: TrackConfig, command: str = "track", opening: Openin
     Raises:
         InputError: an invalid recording, actor or setting; a folder that another run uses, or whose results must stay.
     """
+    config = replace(config, outputs=config.outputs.asked())
     build.check(config)
     export_endings(config.outputs)
     recording = opened(config.recording, config.cameras)

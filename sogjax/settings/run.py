@@ -1,6 +1,6 @@
 """The settings of a run: what is tracked, with which method, and what is written; and those of an actor."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from sogjax.settings.method import ColorConfig, EnergyConfig, ImagesConfig, SolverConfig, TrackingConfig
@@ -13,6 +13,7 @@ OVERWRITE = "replace the results of an earlier run"
 class OutputsConfig:
     """Files to write beside the motion."""
 
+    motion_only: bool = option(False, "none of them: no overlay, no Rerun file, no other format, whatever they say")
     overlay: bool = option(True, "overlay.mp4, the skeleton on every camera's pictures")
     worst: bool = option(True, "worst.png, the five frames that fit worst, to look at first")
     overlay_width: int = option(1920, "width of the overlay video, px")
@@ -24,6 +25,12 @@ class OutputsConfig:
     confidence: bool = option(
         True, "how likely each limb is more than 10 cm off: in motion.npz, motion.rrd, the overlay and the summary"
     )
+
+    def asked(self) -> "OutputsConfig":
+        """The outputs, all of them off where only the motion is asked for."""
+        if not self.motion_only:
+            return self
+        return replace(self, overlay=False, rerun=False, bvh=False, formats=None)
 
 
 @dataclass

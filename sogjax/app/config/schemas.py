@@ -97,11 +97,12 @@ class EvaluateConfig:
 
 @dataclass
 class ViewConfig:
-    """Write or open the Rerun recording of a motion."""
+    """Write or open the Rerun recording of a motion, or write a picture of it, which needs no display."""
 
     motion: Any = option(REQUIRED, "motion.npz, or a list of them with several actors")
     recording: str = option(REQUIRED, "folder of the recording")
-    out: str | None = option(None, "motion.rrd to write; null: open the viewer")
+    out: str | None = option(None, "motion.rrd or picture.png to write; null: open the viewer")
+    frame: int | None = option(None, "frame of a picture, by the recording's numbers; null: the middle")
     images: bool = option(True, "with the pictures")
     overwrite: bool = option(False, OVERWRITE)
 
