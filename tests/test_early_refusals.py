@@ -24,7 +24,6 @@ def test_the_endings_are_those_of_the_writers():
         (("export", "motion=m.npz", "to=a.fbx"), ".bvh"),
         (("export", "calibration=c.toml", "to=a.bvh"), CALIBRATIONS[0]),
         (("view", "motion=m", "recording=r", "out=a.mp4"), ".rrd .png"),
-        (("actor", "recording=r", "out=a.json"), ".yaml"),
         (("track", "recording=r", "outputs.formats=[fbx]"), "trc"),
         (("track", "recording=r", "foo=1"), "foo"),
     ],

@@ -23,7 +23,7 @@ UNKNOWN = float("nan")
 
 
 def no_truth():
-    return Numbers(dict.fromkeys(COLUMNS, UNKNOWN) | {"similarity": 0.05, "iterations": 3.0})
+    return Numbers(dict.fromkeys(COLUMNS, UNKNOWN) | {"similarity": 0.05, "iterations": 3.0, "doubtful": 0})
 
 
 class Searches(list):

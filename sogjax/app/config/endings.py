@@ -8,9 +8,6 @@ from sogjax.errors import InputError
 MOTIONS = (".bvh", ".c3d", ".csv", ".glb", ".mot", ".motion", ".npz", ".trc", ".yaml", ".yml")
 CALIBRATIONS = (".toml", ".calibration")
 ENDINGS = {
-    "actor": {"out": (".yaml", ".yml")},
-    "body": {"out": (".yaml", ".yml")},
-    "evaluate": {"out": (".json",)},
     "view": {"out": (".rrd", ".png")},
 }
 """By command and option; an option that is not given is not looked at."""

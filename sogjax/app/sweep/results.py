@@ -143,7 +143,7 @@ def table(rows: Sequence[tuple[str, Mapping[str, float] | str]]) -> str:
         if isinstance(numbers, str):
             lines.append(f"{name:<{width}}   failed: {numbers}")
         else:
-            lines.append(f"{name:<{width}}" + "".join(_cell(column, numbers[column]) for column in columns))
+            lines.append(f"{name:<{width}}" + "".join(_cell(column, float(numbers[column])) for column in columns))
     return "\n".join(lines)
 
 
