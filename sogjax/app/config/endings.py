@@ -7,7 +7,7 @@ from sogjax.errors import InputError
 
 MOTIONS = (".bvh", ".c3d", ".csv", ".glb", ".mot", ".motion", ".npz", ".trc", ".yaml", ".yml")
 CALIBRATIONS = (".toml", ".calibration")
-ENDINGS = {
+ENDINGS: dict[str, dict[str, tuple[str, ...]]] = {
     "view": {"out": (".rrd", ".png")},
 }
 """By command and option; an option that is not given is not looked at."""
