@@ -8,7 +8,7 @@ from sogjax.evaluation import summarize
 
 COLUMNS = (
     *("mean mm", "std mm", "joints mm", "lost", "swaps"),
-    *("similarity", "doubtful", "iterations", "not converged", "frames/s"),
+    *("similarity", "explained %", "findings", "doubtful", "iterations", "not converged", "frames/s"),
 )
 OBJECTIVE = "mean mm"
 """What a searching sweeper minimises."""
@@ -33,6 +33,11 @@ def row_numbers(result: Run) -> Numbers:
         numbers["swaps"] = len(result.evaluation.swaps)
         numbers["lost"] = sum(len(e.lost) for e in result.evaluation.evaluations.values())
     numbers["similarity"] = _mean_similarity(result)
+    explained = [verdict.explained for verdict in result.verdicts.values() if verdict.explained is not None]
+    if explained:
+        numbers["explained %"] = 100.0 * float(np.mean(explained))
+    if result.verdicts:
+        numbers["findings"] = sum(len(verdict.findings) for verdict in result.verdicts.values())
     numbers["doubtful"] = sum(len(doubtful_limbs(motion)) for motion in result.motions.values())
     numbers["iterations"] = float(np.mean(result.iterations))
     numbers["not converged"] = int(np.sum(~result.converged))
