@@ -137,7 +137,7 @@ def test_a_lens_model_without_a_fold_bends_nothing_back():
 
 @pytest.mark.parametrize("command", SCHEMAS)
 def test_every_command_accepts_overwrite(command):
-    required = {"recording": "r", "out": "o", "motion": "m", "truth": "t", "to": "x", "from_": "f"}
+    required = {"recording": "r", "out": "o.rrd", "motion": "m", "truth": "t", "to": "x.bvh", "from_": "f"}
     schema = SCHEMAS[command].__dataclass_fields__
     words = [f"{key.removesuffix('_')}={value}" for key, value in required.items() if key in schema]
     assert composed(command, [*words, "overwrite=true"]).overwrite
