@@ -92,8 +92,8 @@ def test_a_mirrored_world(tmp_path):
 @pytest.mark.slow
 def test_millimetres_taken_for_metres(tmp_path):
     found = looked_at(tmp_path / "walk", faulty.in_millimetres)
-    (finding,) = warnings(found)
-    assert finding.topic == "unit"
+    (finding,) = [f for f in found.findings if f.severity not in ("ok", "note")]
+    assert (finding.severity, finding.topic) == ("error", "unit")
     assert "unit: mm" in finding.remedy
     assert found.numbers["subject"]["height"] == pytest.approx(1700, rel=0.15)
 
@@ -238,7 +238,7 @@ def test_every_file_that_is_wrong_is_named(capsys, tmp_path):
 
     assert main(["check", f"recording={recording}", f"out={tmp_path / 'out'}"]) == 2
     out, err = capsys.readouterr()
-    assert "left.mp4" in err
+    assert "left.mp4" not in err  # once is enough
     assert ["left.mp4" in line or "initial_pose.yaml" in line for line in out.splitlines()] == [True, True]
     assert all(line.startswith("error") for line in out.splitlines())
     assert not (tmp_path / "out").exists()

@@ -126,7 +126,7 @@ def test_help_of_the_whole_names_every_command(capsys):
 
 @pytest.mark.parametrize("command", SCHEMAS)
 def test_defaults_in_the_help_are_the_defaults_of_the_command(command):
-    required = [f"{key}=x" for key, default, _ in help_lines(SCHEMAS[command]) if default == "required"]
+    required = [f"{key}=x.bvh" for key, default, _ in help_lines(SCHEMAS[command]) if default == "required"]
     config = composed(command, required)
     for key, default, _ in help_lines(SCHEMAS[command]):
         value = config

@@ -134,15 +134,16 @@ def test_a_command_replaces_its_own_results_only(tmp_path):
 def test_files_of_the_other_commands(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     save_motion(tmp_path / "motion.npz", walking_motion(4))
-    (tmp_path / "walk.bvh").write_text("mine")
+    for name in ("walk.bvh", "walk.rrd"):
+        (tmp_path / name).write_text("mine")
     for command in (
         ("export", "motion=motion.npz", "to=walk.bvh"),
         ("body", "from=other.bvh", "out=walk.bvh"),
         ("evaluate", "motion=motion.npz", "truth=t.npz", "out=walk.bvh"),
-        ("view", "motion=motion.npz", "recording=walk", "out=walk.bvh"),
+        ("view", "motion=motion.npz", "recording=walk", "out=walk.rrd"),
     ):
         sentence = refused(capsys, *command)
-        assert "walk.bvh: already exists" in sentence
+        assert f"{command[-1].partition('=')[2]}: already exists" in sentence
         assert "overwrite=true" in sentence
     assert (tmp_path / "walk.bvh").read_text() == "mine"
     done(capsys, "export", "motion=motion.npz", "to=walk.bvh", "overwrite=true")

@@ -2,8 +2,10 @@
 
 import sys
 
+import cv2
+import numpy as np
 import pytest
-from command_line import refused
+from command_line import done, refused
 from motion_cases import walking_motion
 from small_recording import make_recording
 
@@ -38,3 +40,31 @@ def test_a_viewer_that_fails_says_nothing_itself(capfd, monkeypatch, words, last
     assert sentence.startswith(f"sogjax: the Rerun viewer could not be opened on {out.strip()}")
     assert (f"({last})" in sentence) == bool(last)
     assert "out=FILE.rrd" in sentence
+
+
+def test_a_picture_where_rerun_cannot_draw(capsys, monkeypatch, tmp_path, words):
+    monkeypatch.setattr(view, "rerun_screenshot", lambda path: None)
+    out = tmp_path / "picture.png"
+    _, said = done(capsys, *words, f"out={out}", "frame=2")
+    assert "overlay" in said
+    picture = cv2.imread(str(out))
+    assert picture.shape[1] > picture.shape[0]
+    _, said = done(capsys, *words, f"out={tmp_path / 'bare.png'}", "images=false")
+    assert cv2.imread(str(tmp_path / "bare.png")) is not None
+
+
+def test_a_picture_is_what_rerun_drew_of_that_frame(capsys, monkeypatch, tmp_path, words):
+    drawn = np.random.default_rng(0).integers(0, 255, (40, 60, 3), np.uint8)
+    seen = []
+    monkeypatch.setattr(view, "rerun_screenshot", lambda path: drawn)
+    monkeypatch.setattr(view, "write_rerun", lambda path, recording, motions, frames: seen.append((motions, frames)))
+    done(capsys, *words, f"out={tmp_path / 'picture.png'}", "frame=2")
+    ((motions, frames),) = seen
+    assert [motion.frame.tolist() for motion in motions] == [[2]]
+    assert len(frames) == 1
+    np.testing.assert_array_equal(cv2.imread(str(tmp_path / "picture.png")), drawn)
+
+
+def test_a_frame_that_is_not_there_and_one_of_a_whole_file_are_refused(capsys, tmp_path, words):
+    assert "frames 0 to 3" in refused(capsys, *words, f"out={tmp_path / 'picture.png'}", "frame=9")
+    assert "only a picture" in refused(capsys, *words, f"out={tmp_path / 'motion.rrd'}", "frame=2")

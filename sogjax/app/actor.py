@@ -18,7 +18,7 @@ from sogjax.engine.build import color_space_and_radius, energy_terms
 from sogjax.engine.example_frames import with_examples
 from sogjax.engine.keypoint_actor import with_rough_poses
 from sogjax.engine.outputs import free_path, results_folder
-from sogjax.engine.recordings import body_named, keypoint_actor_or, opened
+from sogjax.engine.recordings import body_named, check_scale, keypoint_actor_or, opened
 from sogjax.engine.terminal import progress, say
 from sogjax.errors import InputError
 from sogjax.model.body import Body
@@ -38,6 +38,7 @@ def run(config: ActorConfig) -> Path:
     space, _ = color_space_and_radius(config.color)
     recording = opened(config.recording, config.cameras)
     body = body_named(config.body)
+    check_scale(recording, [body])
     out = Path(config.out)
     if out.is_dir():
         raise InputError(f"out={out}: is a folder; give the actor file to write, such as out={out / 'actor.yaml'}")

@@ -1,9 +1,9 @@
 """`sogjax adjust`: the poses of a tracked clip and the shape of its actor, adjusted together."""
 
-from sogjax.app.track import say_verdicts
 from sogjax.engine.adjust import adjust_to_folder
 from sogjax.engine.clock import clocked
 from sogjax.engine.run import Run
+from sogjax.engine.verdict import say_verdicts
 from sogjax.settings import AdjustConfig
 
 

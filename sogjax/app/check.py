@@ -1,8 +1,10 @@
 """`sogjax check`: what is wrong with a recording, and what to do about it."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import NoReturn
 
 from sogjax.app.config.schemas import CheckConfig
 from sogjax.check.examination import Examination, examined
@@ -13,7 +15,7 @@ from sogjax.data.atomic import atomic_path
 from sogjax.data.offsets_file import offsets_line, write_frame_offsets
 from sogjax.data.recording import Recording, open_recording
 from sogjax.engine.outputs import results_folder
-from sogjax.engine.terminal import progress, say
+from sogjax.engine.terminal import alive, progress, say
 from sogjax.errors import InputError
 from sogjax.sentences import counted
 from sogjax.view.plots import write_png
@@ -24,13 +26,13 @@ def run(config: CheckConfig) -> list[Finding]:
     """Examine a recording, print the findings, and write check.json and check.png.
 
     Raises:
-        InputError: a recording that does not open, once all that is wrong with its files was said; an option that is
-            out of range.
+        InputError: a recording that does not open, or that nothing right can be made of, once all that is wrong was
+            said; an option that is out of range.
     """
     recording = _opened(config)
     start, frames = _stretch(config, recording)
     out = Path(config.out) if config.out else Path("outputs") / recording.name / "check"
-    with results_folder(out):
+    with results_folder(out), alive("examining the recording"):
         found = examined(recording, start, frames, config.largest_offset, progress)
         with atomic_path(out / "check.json") as temporary:
             temporary.write_text(json.dumps(found.numbers, indent=1))
@@ -41,6 +43,8 @@ def run(config: CheckConfig) -> list[Finding]:
     counts = [(sum(f.severity == kind for f in found.findings), kind) for kind in reversed(SEVERITIES)]
     shown = [counted(count, kind, "ok" if kind == "ok" else None) for count, kind in counts if count]
     say(", ".join(shown) + f"; see {out / 'check.png'}")
+    if any(finding.severity == "error" for finding in found.findings):
+        raise InputError(f"{recording.path}: nothing right can be made of it before what is called an error is mended")
     return found.findings
 
 
@@ -52,8 +56,8 @@ def _opened(config: CheckConfig) -> Recording:
     except InputError as error:
         if path.is_dir():
             problems = opening_problems(path, error)
-            for finding in problems if len(problems) > 1 or problems[0].cause else []:
-                print(finding.line())
+            if len(problems) > 1 or problems[0].cause:
+                _say_all(path, problems)
         raise
     if not config.cameras:
         return recording
@@ -62,6 +66,12 @@ def _opened(config: CheckConfig) -> Recording:
         known = ", ".join(recording.rig.names)
         raise InputError(f"cameras={','.join(config.cameras)}: there is no camera {', '.join(unknown)}, only {known}")
     return replace(recording, rig=recording.rig.select(tuple(config.cameras)))
+
+
+def _say_all(path: Path, problems: Sequence[Finding]) -> NoReturn:
+    for finding in problems:
+        print(finding.line())
+    raise InputError(f"{path}: cannot be opened; mend what is said above of its files")
 
 
 def _stretch(config: CheckConfig, recording: Recording) -> tuple[int, int]:

@@ -1,18 +1,18 @@
 """`sogjax export`: a motion or a calibration in another format."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import jax.numpy as jnp
 
 from sogjax.app.config.schemas import ExportConfig
 from sogjax.data.calibration import CameraRig, load_calibration, save_calibration
-from sogjax.data.export import export_motion, write_markers
-from sogjax.data.keypoints import named_scheme
+from sogjax.data.export import export_motion, write_angles_csv, write_c3d, write_initial_pose, write_trc
 from sogjax.data.motion import DEFAULT_UP, Motion, load_motion
 from sogjax.data.recording import open_recording
 from sogjax.data.skeletool_motion import read_skeletool_motion, write_skeletool_motion
 from sogjax.engine.outputs import free_path
-from sogjax.engine.recordings import body_named
+from sogjax.engine.recordings import body_named, file_list
 from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.model.frames import UP_AXES, world_from_upright
@@ -30,7 +30,7 @@ def run(config: ExportConfig) -> Path:
     if config.calibration is not None:
         save_calibration(out, _rig(Path(config.calibration)))
     else:
-        _export_motion(config, Path(str(config.motion)), out)
+        _export_motion(config, file_list(config.motion), out)
     print(out)
     return out
 
@@ -39,15 +39,33 @@ def _rig(path: Path) -> CameraRig:
     return open_recording(path).rig if path.is_dir() else load_calibration(path)
 
 
-def _export_motion(config: ExportConfig, source: Path, out: Path) -> None:
+def _export_motion(config: ExportConfig, sources: Sequence[Path], out: Path) -> None:
+    is_pose = out.suffix.lower() in (".yaml", ".yml")
+    if config.frame is not None and not is_pose:
+        raise InputError(f"frame={config.frame}: only a .yaml holds one frame; leave it out, or write to=NAME.yaml")
+    if len(sources) != 1 and not is_pose:
+        raise InputError(f"motion={','.join(map(str, sources))}: {out.suffix} holds one motion; give one")
+    if is_pose:
+        write_initial_pose(out, [_read_motion(config, source) for source in sources], config.frame)
+    else:
+        _export_one(config, sources[0], out)
+
+
+def _export_one(config: ExportConfig, source: Path, out: Path) -> None:
     if config.up not in (None, *UP_AXES):
         raise InputError(f"up={config.up}: must be one of {', '.join(UP_AXES)}")
-    if config.markers is not None and out.suffix.lower() != ".trc":
-        raise InputError(f"markers={config.markers}: only a .trc has markers; leave it out, or write to=NAME.trc")
-    scheme = None if config.markers is None else named_scheme(config.markers)
+    write_points = {".trc": write_trc, ".c3d": write_c3d}.get(out.suffix.lower())
+    if config.markers is not None and write_points is None:
+        raise InputError(
+            f"markers={config.markers}: only .trc and .c3d have markers; leave it out, or write to=NAME.trc"
+        )
+    if config.angles and out.suffix.lower() not in (".csv", ".mot"):
+        raise InputError("angles=true: only .csv and .mot hold angles; leave it out, or write to=NAME.csv")
     motion = _read_motion(config, source)
-    if scheme is not None:
-        write_markers(out, motion, scheme, config.up or motion.up)
+    if write_points is not None:
+        write_points(out, motion, config.up or motion.up, config.markers)
+    elif config.angles and out.suffix.lower() == ".csv":
+        write_angles_csv(out, motion, config.up or motion.up)
     elif out.suffix.lower() == ".motion":
         write_skeletool_motion(out, motion, _actor(config, out))
     else:

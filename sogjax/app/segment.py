@@ -17,7 +17,7 @@ from sogjax.engine.background import background_or_reason
 from sogjax.engine.example_frames import with_examples
 from sogjax.engine.outputs import free_path, results_folder
 from sogjax.engine.recordings import opened
-from sogjax.engine.terminal import progress, say
+from sogjax.engine.terminal import alive, progress, say
 from sogjax.errors import InputError
 from sogjax.images.background import CameraBackground
 from sogjax.images.foreground_picture import foreground_probability
@@ -48,7 +48,7 @@ def run(config: SegmentConfig) -> list[Path]:
         free_path("out", out / f"{example.name}.png", config.overwrite)
     if frames:
         free_path("out", out / BACKGROUND, config.overwrite)
-    with results_folder(out):
+    with results_folder(out), alive("segmenting"):
         learnt = with_examples(recording, ImagesConfig())[1] if examples else None
         shown = progress(examples, len(examples), "example poses")
         sheets = [_masks(recording, example, out, learnt) for example in shown]
@@ -93,7 +93,8 @@ def _background_sheets(recording: Recording, choice: str, frames: list[int], fol
     as_is = lambda camera, image: image
     shown = {frame: next(read_prepared(recording, as_is, frame, frame + 1)) for frame in frames}
     paths = []
-    for camera, name in enumerate(recording.rig.names):
+    names = recording.rig.names
+    for camera, name in enumerate(progress(names, len(names), "backgrounds")):
         background = found[camera]
         pictures = {
             frame: (images[camera], foreground_probability(images[camera], background))

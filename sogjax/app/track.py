@@ -6,19 +6,20 @@ from sogjax.data.doubtful import doubtful_limbs
 from sogjax.engine.clock import clocked
 from sogjax.engine.run import Run
 from sogjax.engine.terminal import say
-from sogjax.engine.track import track_to_folder
+from sogjax.engine.track import Opening, track_to_folder
+from sogjax.engine.verdict import say_verdicts
 from sogjax.sentences import counted
 from sogjax.settings import TrackConfig
 
 
-def run(config: TrackConfig, command: str = "track") -> Run:
+def run(config: TrackConfig, command: str = "track", opening: Opening | None = None) -> Run:
     """Track into a folder, and print the results; at last how long each stage took.
 
     Raises:
         InputError: as `track_to_folder`.
     """
     with clocked() as clock:
-        result = track_to_folder(config, command)
+        result = track_to_folder(config, command, opening)
         say_results(result)
         print(f"\n{clock.table()}")
     say_verdicts(result)
@@ -47,14 +48,3 @@ def say_results(result: Run) -> None:
             f"warning: {not_converged} of {frames} did not converge within "
             "solver.max_iterations; check them in the overlay"
         )
-
-
-def say_verdicts(result: Run) -> None:
-    """Print in a line each whether the actors' motions look right; a warning where they cannot be relied on."""
-    for name, verdict in result.verdicts.items():
-        whose = f"{name}: " if len(result.verdicts) > 1 else ""
-        if verdict.wrong:
-            say(f"WARNING: {whose}{verdict.sentence}; see worst.png")
-        else:
-            see = "" if verdict.looks_right else "; see worst.png"
-            print(f"\nverdict: {whose}{verdict.sentence}{see}")

@@ -4,7 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 SEVERITIES = ("ok", "note", "warning", "error")
-"""From harmless to fatal: `ok` was checked and is right, `error` keeps a recording from being opened."""
+"""From harmless to fatal: `ok` was checked and is right, `error` keeps a recording from being opened,
+or anything right from being made of it."""
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,11 @@
 """Calibrations with a common mistake undone; a check tries which one the pictures fit."""
 
+from dataclasses import replace
+
 import jax.numpy as jnp
 import numpy as np
 
 from sogjax.data.calibration import CameraRig
-from sogjax.model.camera import Camera
 
 _FLIP = np.diag([-1.0, 1.0, 1.0, 1.0])
 
@@ -31,5 +32,5 @@ def exchanged_rig(rig: CameraRig, first: int, second: int) -> CameraRig:
 def _with_poses(rig: CameraRig, poses: np.ndarray) -> CameraRig:
     cameras = rig.cameras
     like = cameras.camera_from_world.dtype
-    changed = Camera(cameras.intrinsics, jnp.asarray(poses, like), cameras.distortion, cameras.image_size)
+    changed = replace(cameras, camera_from_world=jnp.asarray(poses, like))
     return CameraRig(rig.names, changed)

@@ -1,8 +1,10 @@
 """What keeps a recording from being opened: each file is checked on its own, so all problems are reported at once."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TypeVar
+
+import numpy as np
 
 from sogjax.check.findings import Finding
 from sogjax.data.calibration import CameraRig, load_calibration
@@ -34,13 +36,15 @@ def opening_problems(path: Path, first: InputError) -> list[Finding]:
     sources = tried(lambda: find_sources(path)) or {}
     rig = tried(lambda: _rig(path, settings, project))
     rig = named_as_sources(rig, sources, project) if rig is not None else None
-    for camera, source in sources.items():
-        info = tried(lambda source=source: look_at_source(source))
-        if info is not None and rig is not None and camera in rig.names:
-            tried(lambda camera=camera, source=source, info=info: check_size(source, info.size, rig, camera))
+    infos = {camera: tried(lambda source=source: look_at_source(source)) for camera, source in sources.items()}
+    sizes = {camera: info.size for camera, info in infos.items() if info is not None}
     if rig is not None:
-        tried(lambda: find_background(path / "background", rig, rig.names))
-        tried(lambda: find_example_poses(path / "example_poses", rig, rig.names, settings.example_poses, None))
+        calibrated, sized = rig.names, _of_known_size(rig, sizes, settings.cameras)
+        for camera in sized.names:
+            if camera in sizes:
+                tried(lambda camera=camera: check_size(sources[camera], sizes[camera], sized, camera))
+        tried(lambda: find_background(path / "background", sized, calibrated))
+        tried(lambda: find_example_poses(path / "example_poses", sized, calibrated, settings.example_poses, None))
     for name, read in (("initial_pose.yaml", read_initial_poses), ("ground_truth.npz", load_ground_truth)):
         if (path / name).exists():
             tried(lambda name=name, read=read: read(path / name))
@@ -54,6 +58,14 @@ def _rig(path: Path, settings: RecordingSettings, project: Project | None) -> Ca
     given = settings.calibration
     named = [named_calibration(path, given, project)] if given else calibrations_of(path, project)
     return load_calibration(named[0], settings.unit) if len(named) == 1 else None
+
+
+def _of_known_size(rig: CameraRig, sizes: Mapping[str, tuple[int, int]], used: Sequence[str] | None) -> CameraRig:
+    """The cameras that are used and whose pictures have a known size: by the calibration, else by their videos."""
+    rig = rig.with_sizes(sizes)
+    widths = np.asarray(rig.cameras.image_size)[:, 0]
+    known = [name for name, width in zip(rig.names, widths, strict=True) if not np.isnan(width)]
+    return rig.select([name for name in known if used is None or name in used])
 
 
 def _finding(sentence: str) -> Finding:

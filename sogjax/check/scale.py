@@ -20,6 +20,12 @@ SUBJECTS = (0.25, 4.0)
 DISTANCES = (0.4, 40.0)
 """Metres from cameras to what they look at."""
 EXPECTED_HEIGHT, EXPECTED_DISTANCE = 1.7, 4.0
+HOPELESS = 3.0
+"""A unit of length that is off by more than this is an error."""
+NEAREST, FARTHEST = 0.3, 50.0
+"""Metres from the cameras to what they look at; outside, a person is not tracked."""
+LEAST_ANGLE = 5.0
+"""Degrees between two cameras' directions; otherwise they look at no one point."""
 FLOOR = 0.25
 """Metres that the lowest point of the subject may be from 0 along the vertical."""
 OUTLIERS = 0.1
@@ -107,7 +113,28 @@ def _wrong_unit(what: str, factor: float, unit: str | None) -> Finding:
     likely = min(_UNITS, key=lambda name: abs(np.log(_UNITS[name] / (factor * given))))
     words = {"millimetres": "`unit: mm`", "metres": "`unit: m`"}
     remedy = f"write {words[likely]} into recording.yaml" if likely in words else "convert the translations to metres"
-    return Finding("warning", "unit", what, f"a calibration in {likely}", remedy)
+    severity = "error" if abs(np.log(factor)) > np.log(HOPELESS) else "warning"
+    return Finding(severity, "unit", what, f"a calibration in {likely}", remedy)
+
+
+def implausible_distance(geometry: RigGeometry, unit: str | None, subject: float) -> str | None:
+    """Why nothing can be tracked at the scale of a calibration, and the remedy; None: it can.
+
+    `subject` is the extent of the body in metres: small animals are filmed from nearer, large ones from farther away.
+    """
+    if not _look_together(geometry):
+        return None
+    nearest, farthest = NEAREST * min(subject / EXPECTED_HEIGHT, 1.0), FARTHEST * max(subject / EXPECTED_HEIGHT, 1.0)
+    if nearest <= geometry.scale <= farthest:
+        return None
+    factor = EXPECTED_DISTANCE / geometry.scale * subject / EXPECTED_HEIGHT
+    shown = f"the cameras are {_length(geometry.scale)} from what they look at, and the body is {_length(subject)} tall"
+    return _wrong_unit(shown, factor, unit).sentence()
+
+
+def _look_together(geometry: RigGeometry) -> bool:
+    """Whether two cameras look in directions different enough for a point that they look at."""
+    return bool((geometry.forwards @ geometry.forwards.T).min() < np.cos(np.deg2rad(LEAST_ANGLE)))
 
 
 def _length(metres: float) -> str:

@@ -114,7 +114,7 @@ class Motion:
         raise InputError(f"the motion has no joint or landmark {name!r}; {hint}")
 
     def save(self, path: str | Path) -> None:
-        """Write the motion in the format that the ending says: .npz .bvh .trc .c3d .glb .csv.
+        """Write the motion in the format that the ending says: .npz .bvh .trc .c3d .glb .csv .mot.
 
         All numbers are kept by .npz only. The file appears when it is whole, and replaces one that is there.
 
@@ -187,8 +187,12 @@ def motion_from_poses(
 
 
 def save_motion(path: Path, motion: Motion) -> None:
-    """Write `motion.npz`."""
+    """Write `motion.npz`: the fields, and where the landmarks are, by plain names."""
     arrays = arrays_of(motion)
+    if motion.landmark_names is not None and len(motion.landmark_names):
+        names = motion.landmark_names.tolist()
+        arrays["points"] = np.stack([motion.joint(name) for name in names], axis=1).astype(np.float32)
+        arrays["point_names"] = np.array(names, str)
     arrays["format_version"] = np.array(FORMAT_VERSION)
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **arrays)  # pyright: ignore[reportArgumentType]

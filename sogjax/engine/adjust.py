@@ -34,6 +34,7 @@ def adjust_to_folder(config: AdjustConfig) -> Run:
         InputError: a motion of another recording or body, a clip that is too short, a window that does not fit into
             memory, or a folder whose results must stay.
     """
+    config = replace(config, outputs=config.outputs.asked())
     export_endings(config.outputs)
     recording = opened(config.recording)
     path = Path(config.out or f"outputs/{recording.name}_adjusted")

@@ -22,6 +22,13 @@ from sogjax.settings import ImagesConfig
 NUM_TRIED, NUM_EXAMPLES = 8, 5
 """Frames in which the pose is looked for, and those of them that the actor is made of."""
 FEWEST_EXAMPLES = 2
+WAYS = (
+    "Without example poses, the background is learnt from the videos, and frames of them are taken as example poses. "
+    "Other ways, the easiest first: pictures of the empty scene (background/CAMERA.jpg); frames of your choice "
+    "(`example_poses: [0, 150]` in recording.yaml); pictures of clear poses with masks (example_poses/POSE/CAMERA.jpg, "
+    "CAMERA.mask.png); an actor file (actor=FILE)"
+)
+"""What is done by itself where a recording has no example poses, and what else can be done."""
 LEAST_KNOWN, MOSTLY_KNOWN = 0.6, 0.95
 """Part of the silhouettes where the background must be, and had better be, known."""
 FEW_CAMERAS = 4
@@ -116,7 +123,7 @@ def _people_examples(recording: Recording, learnt: Sequence[CameraBackground], a
 
 
 def _no_examples(recording: Recording, problem: str) -> InputError:
-    return InputError(f"{recording.path}: no example poses can be taken from the videos, since {problem}")
+    return InputError(f"{recording.path}: no example poses can be taken from the videos, since {problem}. {WAYS}")
 
 
 def _say_chosen(recording: Recording, frames: Sequence[int], num_seen: int | None) -> None:
@@ -129,8 +136,8 @@ def _background(recording: Recording, images: ImagesConfig) -> tuple[CameraBackg
     found = background_or_reason(recording, images)
     if isinstance(found, str):
         raise InputError(
-            f"{recording.path}: there are no example poses (example_poses/POSE/CAMERA.jpg with CAMERA.mask.png), no "
-            f"actor=FILE, and none can be taken from the videos: {found}"
+            f"{recording.path}: there is no actor=FILE, there are no example poses, and none can be taken from the "
+            f"videos: {found}. {WAYS}"
         )
     return found
 

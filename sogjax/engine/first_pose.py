@@ -13,7 +13,7 @@ from sogjax.energy import Term
 from sogjax.engine.clip_keypoints import ClipKeypoints
 from sogjax.engine.keypoint_start import keypoint_starts
 from sogjax.engine.pose_search import Beginning, PoseSearch, tried_frames
-from sogjax.engine.terminal import say
+from sogjax.engine.terminal import alive, say
 from sogjax.engine.unsure_picture import write_unsure_picture
 from sogjax.errors import InputError
 from sogjax.model.body import Body
@@ -125,7 +125,8 @@ def clear_beginning(search: PoseSearch, first: int, last: int, picture: Path | N
     recording = search.recording
     guesses: list[Beginning] = []
     for frame in tried_frames(first, last, recording.fps):
-        guesses.append(search.beginning(frame))
+        with alive(f"searching for the first pose in frame {frame + recording.first_frame}"):
+            guesses.append(search.beginning(frame))
         for body, pose in zip(search.bodies, guesses[-1].poses, strict=True):
             say(
                 f"pose of {body.name} in frame {frame + recording.first_frame}: "

@@ -10,7 +10,7 @@ from omegaconf import OmegaConf
 
 from sogjax.data.actor_file import save_body
 from sogjax.data.atomic import atomic_path
-from sogjax.data.export import WRITERS, export_motion, require_ezc3d, write_markers
+from sogjax.data.export import WRITERS, export_motion, require_ezc3d, write_trc
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.keypoints import named_scheme
 from sogjax.data.motion import Motion, save_motion
@@ -137,7 +137,7 @@ def _write_results(result: Run, out: Path, wanted: OutputsConfig, config: Any, m
         if wanted.pose2sim:
             span = int(motion.frame[0]), int(motion.frame[-1])
             path = pose2sim_file(result.recording, span, name if len(names) > 1 else "")
-            write_markers(path, motion, named_scheme(POSE2SIM_SCHEME), motion.up)
+            write_trc(path, motion, motion.up, POSE2SIM_SCHEME)
             say(f"{path}: written for Pose2Sim's next steps")
     with atomic_path(out / "config.yaml") as temporary:
         temporary.write_text(OmegaConf.to_yaml(config))

@@ -7,10 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import jax.numpy as jnp
+import numpy as np
 
 from sogjax.actor.make import MadeActor, make_actor, subjects_of
+from sogjax.check.cameras import rig_geometry
+from sogjax.check.scale import implausible_distance
 from sogjax.data.actor_file import load_body, named_body
 from sogjax.data.recording import Recording, open_recording
+from sogjax.data.recording_settings import read_recording_settings
 from sogjax.engine.build import color_space_and_radius, energy_terms
 from sogjax.engine.example_frames import check_actors, with_examples
 from sogjax.engine.keypoint_actor import keypoint_actor, with_rough_poses
@@ -95,7 +99,9 @@ def actors_of(
                 f"actor={files}: two actors are named {max(names, key=names.count)!r}; give each its own `name`"
             )
         check_actors(recording, actors, len(bodies))
+        check_scale(recording, bodies)
         return bodies, []
+    check_scale(recording, [body_named(body)])
     space, _ = color_space_and_radius(color)
     images = images or ImagesConfig()
     bodies, made = _made_actors(
@@ -149,6 +155,29 @@ def _of_examples(
         report = lambda stage, label=label: say(f"{label}: {stage}")
         made.append(make_actor(recording, start, subject, space, terms, report, progress, learnt=learnt, best=best))
     return tuple(made)
+
+
+def check_scale(recording: Recording, bodies: Sequence[Body]) -> None:
+    """Check that the cameras stand as far from what they look at as bodies of this size are filmed from.
+
+    Raises:
+        InputError: they do not; the calibration's unit of length is probably another.
+    """
+    settings = recording.path / "recording.yaml"
+    problem = implausible_distance(
+        rig_geometry(recording.rig, recording.up),
+        read_recording_settings(settings).unit,
+        max(_extent(body) for body in bodies),
+    )
+    if problem is not None:
+        raise InputError(f"{recording.path}: {problem}")
+
+
+def _extent(body: Body) -> float:
+    """The largest side of a body in its rest pose, in metres."""
+    blobs = body.posed_blobs(body.poses["rest"])
+    means, radii = np.asarray(blobs.means), np.asarray(blobs.sigmas)[:, None]
+    return float(((means + radii).max(axis=0) - (means - radii).min(axis=0)).max())
 
 
 def upright(body: Body, recording: Recording) -> Body:

@@ -6,7 +6,10 @@ from sogjax.data.doubtful import doubtful_limbs
 from sogjax.engine.run import Run
 from sogjax.evaluation import summarize
 
-COLUMNS = ("mean mm", "std mm", "joints mm", "lost", "doubtful", "swaps", "iterations", "not converged", "frames/s")
+COLUMNS = (
+    *("mean mm", "std mm", "joints mm", "lost", "swaps"),
+    *("similarity", "explained %", "findings", "doubtful", "iterations", "not converged", "frames/s"),
+)
 OBJECTIVE = "mean mm"
 """What a searching sweeper minimises."""
 
@@ -29,8 +32,21 @@ def row_numbers(result: Run) -> Numbers:
             numbers["joints mm"] = 1000.0 * summarize(np.concatenate(joints, axis=1)).mean
         numbers["swaps"] = len(result.evaluation.swaps)
         numbers["lost"] = sum(len(e.lost) for e in result.evaluation.evaluations.values())
+    numbers["similarity"] = _mean_similarity(result)
+    explained = [verdict.explained for verdict in result.verdicts.values() if verdict.explained is not None]
+    if explained:
+        numbers["explained %"] = 100.0 * float(np.mean(explained))
+    if result.verdicts:
+        numbers["findings"] = sum(len(verdict.findings) for verdict in result.verdicts.values())
     numbers["doubtful"] = sum(len(doubtful_limbs(motion)) for motion in result.motions.values())
     numbers["iterations"] = float(np.mean(result.iterations))
     numbers["not converged"] = int(np.sum(~result.converged))
     numbers["frames/s"] = result.times.frames_per_second("step")
     return numbers
+
+
+def _mean_similarity(result: Run) -> float:
+    """Over the frames and actors where it was computed."""
+    values = np.concatenate([np.asarray(motion.similarity, float) for motion in result.motions.values()])
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else float("nan")

@@ -1,24 +1,41 @@
-"""Progress bar and messages on standard error; the bar only appears on a terminal."""
+"""Signs of life and messages on standard error: a bar on a terminal, elsewhere a line every ten seconds."""
 
 import sys
+import threading
 import time
 from collections.abc import Iterable, Iterator
-from typing import TextIO, TypeVar
+from contextlib import contextmanager
+from dataclasses import dataclass
+from io import TextIOBase
+from typing import TypeVar
 
 Item = TypeVar("Item")
 
 SHOWN_AFTER = 1.0
 """Seconds before a bar appears: shorter work needs none."""
 REDRAWN_AFTER = 0.1
+LINE_AFTER = 10.0
+"""Seconds between lines where there is no terminal, and between signs of life of work without a count."""
 WIDTH = 24
 
 
-def progress(items: Iterable[Item], total: int, label: str, stream: TextIO | None = None) -> Iterator[Item]:
-    """The items, with a bar like `tracking ######---- 12/40 8.1/s` on standard error."""
+@dataclass
+class _Said:
+    """When something was last said, by the monotonic clock."""
+
+    at: float = 0.0
+
+
+_said = _Said()
+
+
+def progress(items: Iterable[Item], total: int, label: str, stream: TextIOBase | None = None) -> Iterator[Item]:
+    """The items, with a bar like `tracking ######---- 12/40 8.1/s, 3 s left` on standard error.
+
+    Where that is no terminal, such a line comes every ten seconds.
+    """
     out = sys.stderr if stream is None else stream
-    if not out.isatty():
-        yield from items
-        return
+    terminal = out.isatty()
     begin = drawn = time.monotonic()
     count = 0
     try:
@@ -26,22 +43,60 @@ def progress(items: Iterable[Item], total: int, label: str, stream: TextIO | Non
             yield item
             count += 1
             now = time.monotonic()
-            if now - begin > SHOWN_AFTER and (now - drawn > REDRAWN_AFTER or count == total):
-                drawn = now
+            if terminal and now - begin > SHOWN_AFTER and (now - drawn > REDRAWN_AFTER or count == total):
+                drawn = _said.at = now
                 out.write("\r" + bar(label, count, total, now - begin))
                 out.flush()
+            elif not terminal and now - drawn > LINE_AFTER:
+                drawn = _said.at = now
+                print(bar(label, count, total, now - begin).rstrip(), file=out, flush=True)
     finally:
-        if drawn > begin:
+        if terminal and drawn > begin:
             out.write("\n")
             out.flush()
 
 
+@contextmanager
+def alive(label: str, stream: TextIOBase | None = None) -> Iterator[None]:
+    """For work without a count: while nothing else was said for ten seconds, a line like `first pose: 20 s so far`."""
+    out = sys.stderr if stream is None else stream
+    begin, ended = time.monotonic(), threading.Event()
+
+    def tell() -> None:
+        told = begin
+        while not ended.wait(max(told + LINE_AFTER - time.monotonic(), 0.0)):
+            told = max(told, _said.at)
+            if time.monotonic() - told >= LINE_AFTER:
+                told = time.monotonic()
+                print(f"{label}: {told - begin:.0f} s so far", file=out, flush=True)
+
+    thread = threading.Thread(target=tell, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+
+
 def bar(label: str, count: int, total: int, seconds: float) -> str:
-    """One line with the progress and speed of a job."""
+    """One line with the progress and speed of a job, and how long the rest takes at this speed."""
     filled = WIDTH * count // max(total, 1)
-    return f"{label:<18} {'#' * filled}{'-' * (WIDTH - filled)} {count}/{total} {count / max(seconds, 1e-9):.1f}/s "
+    left = f", {remaining(seconds * (total - count) / count)} left" if 0 < count < total else ""
+    shown = (
+        f"{label:<18} {'#' * filled}{'-' * (WIDTH - filled)} {count}/{total} {count / max(seconds, 1e-9):.1f}/s{left}"
+    )
+    return f"{shown:<{len(label) + WIDTH + 40}}"
+
+
+def remaining(seconds: float) -> str:
+    """A time that is left, as people say it."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
 
 
 def say(text: str) -> None:
     """Print a message for the user, apart from the results on standard output."""
     print(text, file=sys.stderr, flush=True)
+    _said.at = time.monotonic()

@@ -1,12 +1,13 @@
 """From the videos of a recording to the motion of its actors, with or without files."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from jaxtyping import Array, Float
 from omegaconf import OmegaConf
 
 from sogjax.actor.make import MadeActor
@@ -38,6 +39,8 @@ from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.settings import OutputsConfig, TrackConfig
 
+Opening = Callable[[Recording, Sequence[Body], TrackConfig], tuple[Float[Array, "dof"], int] | None]
+"""Tells the first pose and its frame, counted from the recording's first; None: they are searched for."""
 NOTHING = OutputsConfig(overlay=False, rerun=False, bvh=False)
 UNADJUSTED = "unadjusted.npz"
 UNADJUSTED_ACTOR = "unadjusted_actor.yaml"
@@ -45,12 +48,15 @@ UNADJUSTED_ACTOR = "unadjusted_actor.yaml"
 _ROWS = (*PER_FRAME, *SOMETIMES_PER_FRAME)
 
 
-def track_to_folder(config: TrackConfig, command: str = "track") -> Run:
+def track_to_folder(config: TrackConfig, command: str = "track", opening: Opening | None = None) -> Run:
     """Track, evaluate if there is ground truth, and write the results; or resume a run that was stopped.
+
+    `opening` is asked for the first pose where the making of the actors does not tell it.
 
     Raises:
         InputError: an invalid recording, actor or setting; a folder that another run uses, or whose results must stay.
     """
+    config = replace(config, outputs=config.outputs.asked())
     build.check(config)
     export_endings(config.outputs)
     recording = opened(config.recording, config.cameras)
@@ -59,10 +65,10 @@ def track_to_folder(config: TrackConfig, command: str = "track") -> Run:
     initial_pose_file(recording, config)
     path = Path(config.out or f"outputs/{recording.name}")
     with run_folder(path, config.overwrite, config.resume, command) as folder:
-        return _run_in(folder, recording, config, command)
+        return _run_in(folder, recording, config, command, opening)
 
 
-def _run_in(folder: RunFolder, recording: Recording, config: TrackConfig, command: str) -> Run:
+def _run_in(folder: RunFolder, recording: Recording, config: TrackConfig, command: str, opening: Opening | None) -> Run:
     """Track into this run's own folder, or resume there."""
     actors = partial(actors_of, recording, config.actor, config.body, config.color, config.images, config.actors)
     made = config.actor is None
@@ -87,8 +93,10 @@ def _run_in(folder: RunFolder, recording: Recording, config: TrackConfig, comman
         kept.keep_actors(bodies)
         with stage(ACTORS):
             _report_actors(recording, found, folder.path)
-        if (opening := known_opening(recording, found, config)) is not None:
-            kept.keep_start(*opening)
+        if (known := known_opening(recording, found, config)) is not None:
+            kept.keep_start(*known)
+    if opening is not None and kept.start() is None and (shared := opening(recording, bodies, config)) is not None:
+        kept.keep_start(*shared)
     adjust = config.adjust and _adjustable(recording, bodies, config)
     shown = NOTHING if adjust else config.outputs
     with tracking(recording, bodies, config, shown, folder.path, kept=kept, stays=adjust) as result:

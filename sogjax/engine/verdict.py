@@ -25,6 +25,17 @@ def judge(result: Run) -> None:
     result.verdicts = verdicts(result.motions, expected_of(result.bodies))
 
 
+def say_verdicts(result: Run) -> None:
+    """Print in a line each whether the actors' motions look right; a warning where they cannot be relied on."""
+    for name, verdict in result.verdicts.items():
+        whose = f"{name}: " if len(result.verdicts) > 1 else ""
+        if verdict.wrong:
+            say(f"WARNING: {whose}{verdict.sentence}; see worst.png")
+        else:
+            see = "" if verdict.looks_right else "; see worst.png"
+            print(f"\nverdict: {whose}{verdict.sentence}{see}")
+
+
 def expected_of(bodies: Sequence[Body]) -> dict[str, float]:
     """How much of each actor its example poses explain, where that is known."""
     return {body.name: float(body.explained) for body in bodies if np.isfinite(float(body.explained))}

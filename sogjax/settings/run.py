@@ -1,6 +1,6 @@
 """The settings of a run: what is tracked, with which method, and what is written; and those of an actor."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from sogjax.settings.method import ColorConfig, EnergyConfig, ImagesConfig, SolverConfig, TrackingConfig
@@ -13,13 +13,14 @@ OVERWRITE = "replace the results of an earlier run"
 class OutputsConfig:
     """Files to write beside the motion."""
 
+    motion_only: bool = option(False, "none of them: no overlay, no Rerun file, no other format, whatever they say")
     overlay: bool = option(True, "overlay.mp4, the skeleton on every camera's pictures")
     worst: bool = option(True, "worst.png, the five frames that fit worst, to look at first")
     overlay_width: int = option(1920, "width of the overlay video, px")
     rerun: bool = option(True, "motion.rrd, for the Rerun viewer")
     rerun_images: bool = option(True, "put the pictures into motion.rrd")
     bvh: bool = option(True, "motion.bvh")
-    formats: list[str] | None = option(None, "further formats of the motion, some of [trc,c3d,glb,csv]; null: none")
+    formats: list[str] | None = option(None, "further formats of the motion, some of [trc,c3d,glb,csv,mot]; null: none")
     pose2sim: bool = option(
         False, "PROJECT/pose-3d/TRIAL_FIRST-LAST.trc of a Pose2Sim project, which its next steps read (HALPE_26)"
     )
@@ -27,6 +28,12 @@ class OutputsConfig:
     confidence: bool = option(
         True, "how likely each limb is more than 10 cm off: in motion.npz, motion.rrd, the overlay and the summary"
     )
+
+    def asked(self) -> "OutputsConfig":
+        """The outputs, all of them off where only the motion is asked for."""
+        if not self.motion_only:
+            return self
+        return replace(self, overlay=False, worst=False, rerun=False, bvh=False, formats=None, pose2sim=False)
 
 
 @dataclass

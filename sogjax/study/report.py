@@ -37,6 +37,7 @@ def write_report(config: ReportConfig) -> list[Path]:
     names = config.only or [*experiment_names(), LIMBS]
     experiments = [Experiment.named(name) for name in names if name != LIMBS]
     _check_matplotlib()
+    _check_truth([*config.recordings, *(config.compared or [])])
     with results_folder(Path(config.out)) as out:
         study = Study.from_config(config, out)
         begin = time.perf_counter()
@@ -61,6 +62,17 @@ def experiment_sections(experiments: Sequence[Experiment], study: Study, done: l
     if not compared:
         return own
     return [methods_section(), *compared, *([own_section()] if own else []), *own]
+
+
+def _check_truth(recordings: Sequence[str]) -> None:
+    """Found out before an actor is made of any recording.
+
+    Raises:
+        InputError: a folder without ground truth.
+    """
+    for path in map(Path, recordings):
+        if path.is_dir() and not (path / "ground_truth.npz").is_file():
+            raise InputError(f"{path}: has no ground_truth.npz; give a recording with ground truth")
 
 
 def _check_matplotlib() -> None:

@@ -32,4 +32,7 @@ class ReportConfig:
     )
     pictures: int = option(6, "worst frames to show")
     note: str = option("", "sentence for the report, such as what else the machine was running")
+    overwrite: bool = option(
+        False, "accepted as by other commands; the report is replaced in any case, existing runs are kept"
+    )
     do: bool = option(True, "run what is missing; false: report on existing runs only")

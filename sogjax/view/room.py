@@ -17,7 +17,7 @@ AXES = ((60, 60, 235), (60, 200, 60), (235, 110, 60))
 """BGR of the world's x, y and z axis."""
 CELLS = 8
 """Of the floor grid, along each side; a cell is one metre wide where the set-up is of usual size."""
-PIECES = 24
+PIECES = 48
 """Points along a line: what is outside of a picture, or bent by a lens, is drawn piece by piece."""
 FRUSTUM_DEPTH = 0.12
 """In units of the distance between cameras and what they look at."""

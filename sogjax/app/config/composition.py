@@ -7,15 +7,19 @@ from typing import Any
 from hydra import compose, initialize_config_dir
 from hydra.core.config_store import ConfigStore
 from hydra.core.global_hydra import GlobalHydra
+from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.errors import HydraException
+from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from sogjax.app.config import schemas
+from sogjax.app.config.endings import check_endings
 from sogjax.app.config.overrides import plain_sentence, ready_for_hydra
 from sogjax.errors import InputError
 from sogjax.settings import ActorConfig, AdjustConfig, TrackConfig
 from sogjax.settings.compose import as_object
 from sogjax.settings.files import choices_of, conf_dir, default_choices
+from sogjax.settings.wrong_values import unfit_value
 from sogjax.study.settings import ReportConfig
 
 SCHEMAS: dict[str, type] = {
@@ -56,14 +60,31 @@ def composed(command: str, overrides: Sequence[str]) -> Any:
     """
     words = ready_for_hydra(overrides, sweep=False)
     with _plain_errors(command):
-        return as_object(_tree(command, words), command)
+        config = as_object(_tree(command, words), command)
+    check_endings(command, config)
+    return config
 
 
 def _tree(command: str, words: Sequence[str]) -> Any:
     register_schemas()
     GlobalHydra.instance().clear()
+    plain = [word for word in words if _is_no_group(command, word)]
     with initialize_config_dir(str(conf_dir()), version_base="1.3"):
-        return compose(command, overrides=list(words))
+        tree = compose(command, overrides=[word for word in words if word not in plain])
+    for override in OverridesParser.create().parse_overrides(plain):
+        key, value = override.get_key_element(), override.value()
+        try:
+            OmegaConf.update(tree, key, value)
+        except OmegaConfBaseException as error:
+            raise InputError(unfit_value(key, str(value), str(error), f"see sogjax {command} --help")) from error
+    return tree
+
+
+def _is_no_group(command: str, word: str) -> bool:
+    """Whether a key is an option of a command that has not the config group of that name: Hydra takes it for one."""
+    key = word.partition("=")[0]
+    known = key in SCHEMAS[command].__dataclass_fields__ and key not in config_groups(command)
+    return known and (conf_dir() / key).is_dir()
 
 
 @contextmanager

@@ -54,6 +54,7 @@ class CheckConfig:
     largest_offset: int = option(15, "largest time offset between cameras to look for, frames")
     write: bool = option(False, "write the time offsets found into recording.yaml, as frame_offset")
     cameras: list[str] | None = option(None, "cameras to examine; null: all")
+    overwrite: bool = option(False, "accepted as by other commands; an earlier check is replaced in any case")
 
 
 @dataclass
@@ -96,11 +97,12 @@ class EvaluateConfig:
 
 @dataclass
 class ViewConfig:
-    """Write or open the Rerun recording of a motion."""
+    """Write or open the Rerun recording of a motion, or write a picture of it, which needs no display."""
 
     motion: Any = option(REQUIRED, "motion.npz, or a list of them with several actors")
     recording: str = option(REQUIRED, "folder of the recording")
-    out: str | None = option(None, "motion.rrd to write; null: open the viewer")
+    out: str | None = option(None, "motion.rrd or picture.png to write; null: open the viewer")
+    frame: int | None = option(None, "frame of a picture, by the recording's numbers; null: the middle")
     images: bool = option(True, "with the pictures")
     overwrite: bool = option(False, OVERWRITE)
 
@@ -109,20 +111,25 @@ class ViewConfig:
 class ExportConfig:
     """Write a motion, or a calibration, in another format."""
 
-    motion: str | None = option(None, "motion.npz, or a .motion of Skeletool")
+    motion: Any = option(
+        None, "motion.npz, or a .motion of Skeletool; for a .yaml a list of motion_NAME.npz with several actors"
+    )
     calibration: str | None = option(None, "calibration file, or the folder of a recording; instead of a motion")
     to: str = option(
         REQUIRED,
-        "file to write; the ending gives the format: .bvh .trc .c3d .glb .csv .motion .npz; "
-        "of a calibration: .toml .calibration",
+        "file to write; the ending gives the format: .bvh .trc .c3d .glb .csv .mot .motion .npz; "
+        "one frame as an initial_pose.yaml: .yaml; of a calibration: .toml .calibration",
     )
+    frame: int | None = option(None, "frame whose pose a .yaml holds, by the recording's numbers; null: the first")
     up: str | None = option(None, "vertical of the motion's world: x y z -x -y -z; null: what the motion says")
     actor: str | None = option(None, "actor or body file of the motion; only needed to read or write a .motion")
     fps: float | None = option(None, "frames per second; only needed to read a .motion")
     markers: str | None = option(
         None,
-        "keypoint scheme whose points a .trc has, by name or file: HALPE_26 for Pose2Sim's next steps; null: the bones",
+        "points of a .trc or .c3d; null: joint centres, toes, heels, hands, head top | all: every bone, too | "
+        "a keypoint scheme by name or file: HALPE_26 for Pose2Sim's next steps",
     )
+    angles: bool = option(False, "a .csv holds joint angles in degrees instead of positions, as a .mot always does")
     overwrite: bool = option(False, OVERWRITE)
 
 
@@ -131,3 +138,4 @@ class DoctorConfig:
     """Check the installation: versions, devices, extras, speed of the disk, and a five-second test."""
 
     folder: str = option(".", "folder whose writing speed is measured")
+    overwrite: bool = option(False, "accepted as by other commands; nothing is written")

@@ -8,6 +8,7 @@ from hydra.experimental.callback import Callback
 from hydra.types import RunMode
 
 from sogjax.app.sweep.results import Failure, Member, finish_sweep, forget_results, keep_result, kept_results
+from sogjax.engine.shared_start import forget_shared_openings
 
 failures: list[str] = []
 """Why members of the last sweep of this process failed, whatever process they ran in."""
@@ -19,6 +20,7 @@ class SweepTable(Callback):
     def on_multirun_start(self, config: Any, **kwargs: Any) -> None:
         """Remove the results of an earlier sweep in the same folder."""
         failures.clear()
+        forget_shared_openings()
         forget_results(Path(config.hydra.sweep.dir))
 
     def on_job_end(self, config: Any, job_return: JobReturn, **kwargs: Any) -> None:

@@ -13,11 +13,17 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import UInt8
 
+from sogjax.app.sweep.distances import distances_to_first
 from sogjax.data.atomic import atomic_path
 from sogjax.engine.run_numbers import COLUMNS, OBJECTIVE
+from sogjax.engine.terminal import say
 from sogjax.view.plots import plot_per_point, write_png
 
 RESULT = "result.json"
+APART = "to first mm"
+"""The column of `Member.apart`."""
+ALL = (*COLUMNS[:6], APART, *COLUMNS[6:])
+_TITLES = {OBJECTIVE: "mean marker error", APART: "mean distance of the joints to the first member's"}
 
 
 class Failure(str):
@@ -33,6 +39,9 @@ class Member(NamedTuple):
     overrides: list[str]
     result: Mapping[str, float] | str
     """Its numbers, or why it failed."""
+    apart: float = float("nan")
+    """Millimetres, the mean distance of its joints to those of the first member that worked; NaN where they cannot be
+    compared."""
 
 
 def keep_result(folder: Path, member: Member) -> None:
@@ -42,7 +51,8 @@ def keep_result(folder: Path, member: Member) -> None:
         InputError: the folder cannot be written.
     """
     with atomic_path(folder / RESULT) as temporary:
-        temporary.write_text(json.dumps({"overrides": member.overrides, "result": member.result}), encoding="utf-8")
+        content = {"overrides": member.overrides, "result": member.result}
+        temporary.write_text(json.dumps(content), encoding="utf-8")
 
 
 def forget_results(sweep: Path) -> None:
@@ -54,7 +64,11 @@ def forget_results(sweep: Path) -> None:
 def kept_results(sweep: Path) -> list[Member]:
     """The results of a sweep's members, in the order of their numbers."""
     paths = sorted(sweep.glob(f"*/{RESULT}"), key=lambda path: (len(path.parent.name), path.parent.name))
-    return [Member(**json.loads(path.read_text(encoding="utf-8"))) for path in paths]
+    members = [Member(**json.loads(path.read_text(encoding="utf-8"))) for path in paths]
+    apart = distances_to_first(
+        [None if isinstance(member.result, str) else path.parent for member, path in zip(members, paths, strict=True)]
+    )
+    return [member._replace(apart=distance) for member, distance in zip(members, apart, strict=True)]
 
 
 def finish_sweep(sweep: Path, members: Sequence[Member]) -> None:
@@ -66,23 +80,39 @@ def finish_sweep(sweep: Path, members: Sequence[Member]) -> None:
     if not members:
         return
     names = differing([member.overrides for member in members])
-    print(table([(name, member.result) for name, member in zip(names, members, strict=True)]))
+    print(table([(name, with_distance(member)) for name, member in zip(names, members, strict=True)]))
     with atomic_path(sweep / "sweep.csv") as temporary:
         temporary.write_text(_csv(members), encoding="utf-8")
     print(f"\n{sweep / 'sweep.csv'}")
-    if any(not isinstance(member.result, str) and np.isfinite(member.result[OBJECTIVE]) for member in members):
-        write_png(sweep / "sweep.png", _chart(members))
+    if all(isinstance(member.result, str) for member in members):
+        say("no sweep.png: no member worked")
+    elif (column := _drawn(members)) is None:
+        say("no sweep.png: there is no truth, and the motions have no joints or frames in common")
+    else:
+        write_png(sweep / "sweep.png", _chart(members, column))
         print(sweep / "sweep.png")
 
 
-def _chart(members: Sequence[Member]) -> UInt8[np.ndarray, "h w 3"]:
-    """The mean marker errors of the members, and which failed."""
+def with_distance(member: Member) -> Mapping[str, float] | str:
+    """A member's numbers and its distance to the first, or why it failed."""
+    return member.result if isinstance(member.result, str) else {**member.result, APART: member.apart}
+
+
+def _drawn(members: Sequence[Member]) -> str | None:
+    """What the chart shows: the error where there is truth, else the distance to the first member."""
+    rows = [row for member in members if not isinstance(row := with_distance(member), str)]
+    return next((column for column in (OBJECTIVE, APART) if any(np.isfinite(row[column]) for row in rows)), None)
+
+
+def _chart(members: Sequence[Member], column: str) -> UInt8[np.ndarray, "h w 3"]:
+    """A number of the members in millimetres, and which failed."""
     own = _own_words([member.overrides for member in members])
     keys = dict.fromkeys(_setting(word)[0] for words in own for word in words)
     labels = [" ".join(_setting(word)[1] for word in words) or "as configured" for words in own]
     failed = [number for number, member in enumerate(members) if isinstance(member.result, str)]
-    errors = [np.nan if isinstance(m.result, str) else 1e-3 * m.result[OBJECTIVE] for m in members]
-    title = f"mean marker error over {', '.join(keys) or 'one run'}"
+    rows = [with_distance(member) for member in members]
+    errors = [np.nan if isinstance(row, str) else 1e-3 * row[column] for row in rows]
+    title = f"{_TITLES[column]} over {', '.join(keys) or 'one run'}"
     return plot_per_point(np.asarray(errors, float), labels, title, failed=failed)
 
 
@@ -104,15 +134,23 @@ def _setting(override: str) -> tuple[str, str]:
 
 
 def table(rows: Sequence[tuple[str, Mapping[str, float] | str]]) -> str:
-    """A plain-text table of settings and results."""
+    """A plain-text table of settings and results; what no member knows, such as errors without a truth, is left out."""
     width = max(len("settings"), *(len(name) for name, _ in rows)) if rows else 8
-    lines = [f"{'settings':<{width}}" + "".join(f"{column:>14}" for column in COLUMNS)]
+    done = [numbers for _, numbers in rows if not isinstance(numbers, str)]
+    columns = [c for c in ALL if any(np.isfinite(numbers.get(c, np.nan)) for numbers in done)]
+    lines = [f"{'settings':<{width}}" + "".join(f"{column:>14}" for column in columns)]
     for name, numbers in rows:
         if isinstance(numbers, str):
             lines.append(f"{name:<{width}}   failed: {numbers}")
         else:
-            lines.append(f"{name:<{width}}" + "".join(f"{numbers[column]:>14.2f}" for column in COLUMNS))
+            lines.append(f"{name:<{width}}" + "".join(_cell(column, float(numbers[column])) for column in columns))
     return "\n".join(lines)
+
+
+def _cell(column: str, value: float) -> str:
+    if not np.isfinite(value):
+        return f"{'-':>14}"
+    return f"{value:>14.4f}" if column == "similarity" else f"{value:>14.2f}"
 
 
 def _csv(members: Sequence[Member]) -> str:
@@ -121,9 +159,9 @@ def _csv(members: Sequence[Member]) -> str:
     keys = list(dict.fromkeys(key for setting in settings for key in setting))
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([*keys, *COLUMNS, "failed"])
+    writer.writerow([*keys, *ALL, "failed"])
     for setting, member in zip(settings, members, strict=True):
-        failed = isinstance(member.result, str)
-        numbers = [""] * len(COLUMNS) if isinstance(member.result, str) else [member.result[c] for c in COLUMNS]
-        writer.writerow([*(setting.get(key, "") for key in keys), *numbers, member.result if failed else ""])
+        row = with_distance(member)
+        numbers = [""] * len(ALL) if isinstance(row, str) else [row[column] for column in ALL]
+        writer.writerow([*(setting.get(key, "") for key in keys), *numbers, row if isinstance(row, str) else ""])
     return text.getvalue()

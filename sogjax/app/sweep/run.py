@@ -12,7 +12,10 @@ from sogjax.app.config.overrides import plain_sentence, ready_for_hydra
 from sogjax.app.sweep.results import Failure
 from sogjax.engine.compiled_programs import forget_programs_if_many
 from sogjax.engine.run_numbers import Numbers, row_numbers
+from sogjax.engine.shared_start import of_first_pose, shared_opening
+from sogjax.engine.terminal import say
 from sogjax.errors import InputError
+from sogjax.settings import TrackConfig
 from sogjax.settings.compose import as_object
 from sogjax.settings.files import conf_dir
 
@@ -66,8 +69,19 @@ def _check_members(words: Sequence[str]) -> None:
         if len(own) < len(words):  # another sweeper than Hydra's own may understand it
             return
         raise InputError(plain_sentence("track", SCHEMAS["track"], error)) from error
-    for member in members:
-        composed("track", member)
+    _say_shared([composed("track", member) for member in members])
+
+
+def _say_shared(members: Sequence[TrackConfig]) -> None:
+    """Say whether all members begin with one first pose and one actor, and if not, why."""
+    if len(members) < 2:
+        return
+    each = [of_first_pose(member) for member in members]
+    changed = [key for key in each[0] if any(other[key] != each[0][key] for other in each)]
+    if changed:
+        say(f"{', '.join(changed)}: changes what the first pose is, so members have different ones")
+    else:
+        say(f"one first pose{'' if members[0].actor else ' and one actor'} for all {len(members)} members")
 
 
 def _members(overrides: "Sequence[Override]") -> Iterator[tuple[str, ...]]:
@@ -156,6 +170,7 @@ def track_task(tree: Any) -> Numbers:
     from sogjax.app import track
 
     config = as_object(tree, "track")
-    if not config.out or HydraConfig.get().mode == RunMode.MULTIRUN:
+    several = HydraConfig.get().mode == RunMode.MULTIRUN
+    if not config.out or several:
         config.out = HydraConfig.get().runtime.output_dir
-    return row_numbers(track.run(config))
+    return row_numbers(track.run(config, opening=shared_opening if several else None))

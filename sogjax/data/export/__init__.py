@@ -4,11 +4,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from sogjax.data.export.angles import write_angles_csv, write_mot
 from sogjax.data.export.bvh import write_bvh
 from sogjax.data.export.c3d import require_ezc3d, write_c3d
 from sogjax.data.export.csv import write_csv
 from sogjax.data.export.glb import write_glb
-from sogjax.data.export.trc import write_markers, write_trc
+from sogjax.data.export.initial_pose import write_initial_pose
+from sogjax.data.export.trc import write_trc
 from sogjax.data.motion import Motion, save_motion
 from sogjax.errors import InputError
 
@@ -17,11 +19,13 @@ __all__ = [
     "export_motion",
     "motion_writer",
     "require_ezc3d",
+    "write_angles_csv",
     "write_bvh",
     "write_c3d",
     "write_csv",
     "write_glb",
-    "write_markers",
+    "write_initial_pose",
+    "write_mot",
     "write_trc",
 ]
 
@@ -30,6 +34,7 @@ WRITERS: dict[str, Callable[[Path, Motion, str], None]] = {
     ".c3d": write_c3d,
     ".csv": write_csv,
     ".glb": write_glb,
+    ".mot": write_mot,
     ".npz": lambda path, motion, up: save_motion(path, replace(motion, up=up)),
     ".trc": write_trc,
 }

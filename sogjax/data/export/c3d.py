@@ -1,4 +1,4 @@
-"""C3D, the file format of marker systems: one point per bone, in millimetres, in the motion's own world."""
+"""C3D, the file format of marker systems: joint centres and extremities, in millimetres, in the motion's own world."""
 
 import importlib
 from pathlib import Path
@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from sogjax.data.atomic import atomic_path
-from sogjax.data.export.bones import bone_frames, bones_of, frame_time
+from sogjax.data.export.bones import frame_time
+from sogjax.data.export.points import marker_points
 from sogjax.data.motion import Motion
 from sogjax.errors import InputError
 from sogjax.model.frames import forward_axis
@@ -17,8 +18,8 @@ MAX_FRAMES = 65_535
 """A C3D header counts no further; more frames would be lost silently."""
 
 
-def write_c3d(path: Path, motion: Motion, up: str = "z") -> None:
-    """Write the origins of all bones; POINT:X_SCREEN and Y_SCREEN say which axes point forward and up.
+def write_c3d(path: Path, motion: Motion, up: str = "z", markers: str | None = None) -> None:
+    """Write the points of `marker_points`; POINT:X_SCREEN and Y_SCREEN say which axes point forward and up.
 
     Raises:
         InputError: ezc3d is not installed; no frames, too many or uneven ones; or a path that cannot be written.
@@ -30,14 +31,13 @@ def write_c3d(path: Path, motion: Motion, up: str = "z") -> None:
             f"{path}: C3D holds at most {MAX_FRAMES} frames, but the motion has {motion.num_frames}; "
             "write .trc or .csv, or track it in parts"
         )
-    bones = bones_of(motion)
-    _, positions = bone_frames(motion, bones, up, up)
-    points = np.ones((4, len(bones.names), motion.num_frames))
+    names, positions = marker_points(motion, up, up, markers)
+    points = np.ones((4, len(names), motion.num_frames))
     points[:3] = MILLIMETRES * positions.transpose(2, 1, 0)
     file = ezc3d.c3d()
     parameters = file["parameters"]["POINT"]
     parameters["RATE"]["value"] = [rate]
-    parameters["LABELS"]["value"] = bones.names
+    parameters["LABELS"]["value"] = names
     parameters["UNITS"]["value"] = ["mm"]
     file.add_parameter("POINT", "X_SCREEN", _signed(forward_axis(up)))
     file.add_parameter("POINT", "Y_SCREEN", _signed(up))

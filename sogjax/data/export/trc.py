@@ -1,4 +1,4 @@
-"""TRC, the tab-separated marker file of OpenSim: one point per bone, in metres, Y up."""
+"""TRC, the tab-separated marker file of OpenSim: joint centres and extremities, in metres, Y up."""
 
 from pathlib import Path
 
@@ -6,40 +6,22 @@ import numpy as np
 from jaxtyping import Float
 
 from sogjax.data.atomic import atomic_path
-from sogjax.data.export.bones import bone_frames, bones_of, frame_time, world_turn
-from sogjax.data.keypoints.scheme import KeypointScheme
+from sogjax.data.export.bones import frame_time
+from sogjax.data.export.points import marker_points
 from sogjax.data.motion import Motion
 
-_JOINTS = {"hip": "Hip", "knee": "Knee", "ankle": "Ankle", "shoulder": "Shoulder", "elbow": "Elbow", "wrist": "Wrist"}
-OPENSIM_NAMES = {"root": "Hip", "neck": "Neck"} | {
-    f"{side}_{joint}": side[0].upper() + name for side in ("left", "right") for joint, name in _JOINTS.items()
-}
-"""The names that OpenSim models for video have (Pose2Sim's), by those of the default body's bones."""
 
+def write_trc(path: Path, motion: Motion, up: str = "z", markers: str | None = None) -> None:
+    """Write the points of `marker_points`; those that OpenSim's models know have their names there.
 
-def write_trc(path: Path, motion: Motion, up: str = "z") -> None:
-    """Write the origins of all bones; those that OpenSim's models know get their names there.
+    X, Y, Z are Y, Z, X of a world with z up, as in Pose2Sim's files.
 
     Raises:
-        InputError: no frames, unevenly spaced frames, or a path that cannot be written.
+        InputError: no frames, unevenly spaced frames, or a path that cannot be written; a keypoint scheme that is not
+            known, or a motion that lacks one of its points.
     """
     rate = 1.0 / frame_time(path, motion)
-    bones = bones_of(motion)
-    _, positions = bone_frames(motion, bones, up, "y")
-    _write(path, motion, rate, [OPENSIM_NAMES.get(name, name) for name in bones.names], positions)
-
-
-def write_markers(path: Path, motion: Motion, scheme: KeypointScheme, up: str = "z") -> None:
-    """Write the points of a keypoint scheme under its names, as Pose2Sim's triangulation does.
-
-    Its X, Y, Z are Y, Z, X of a world with z up.
-
-    Raises:
-        InputError: the motion lacks a point (one of an earlier version may), or what `write_trc` refuses.
-    """
-    rate = 1.0 / frame_time(path, motion)
-    points = np.stack([motion.joint(name).astype(float) for name in scheme.landmarks], axis=1)
-    _write(path, motion, rate, list(scheme.keypoints), points @ world_turn(up, "y").T)
+    _write(path, motion, rate, *marker_points(motion, up, "y", markers))
 
 
 def _write(

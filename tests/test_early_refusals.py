@@ -1,0 +1,65 @@
+"""Wrong keys and endings are refused before anything heavy is imported; and what the switches of outputs mean."""
+
+import subprocess
+import sys
+
+import pytest
+
+from sogjax.app.config.composition import composed
+from sogjax.app.config.endings import CALIBRATIONS, FORMATS, MOTIONS, check_endings
+from sogjax.data.export import WRITERS
+from sogjax.errors import InputError
+from sogjax.settings import OutputsConfig
+from sogjax.settings.compose import track_config
+
+
+def test_the_endings_are_those_of_the_writers():
+    assert {*WRITERS} | {".motion", ".yaml", ".yml"} == {*MOTIONS}
+    assert {f".{name}" for name in FORMATS} == {*WRITERS} - {".npz"}
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("export", "motion=m.npz", "to=a.fbx"), ".bvh"),
+        (("export", "calibration=c.toml", "to=a.bvh"), CALIBRATIONS[0]),
+        (("view", "motion=m", "recording=r", "out=a.mp4"), ".rrd .png"),
+        (("track", "recording=r", "outputs.formats=[fbx]"), "trc"),
+        (("track", "recording=r", "foo=1"), "foo"),
+    ],
+)
+def test_a_wrong_word_is_refused_when_the_settings_are_composed(words, said):
+    with pytest.raises(InputError) as refused:
+        composed(words[0], list(words[1:]))
+    assert said in str(refused.value)
+
+
+def test_nothing_heavy_is_imported_before():
+    look = (
+        "import sys\n"
+        "from sogjax.app.cli import main\n"
+        "assert main(['export', 'motion=m.npz', 'to=a.fbx']) == 2\n"
+        "heavy = {'jax', 'cv2', 'rerun', 'scipy'} & set(sys.modules)\n"
+        "sys.exit(f'imported: {heavy}' if heavy else 0)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", look], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(("word", "shown"), [("images=false", False), ("images=true", True)])
+def test_an_option_with_the_name_of_a_config_group(word, shown):
+    config = composed("view", ["motion=m", "recording=r", "out=a.rrd", word])
+    assert (config.images, config.out) == (shown, "a.rrd")
+    assert composed("track", ["recording=r", "images=grid"]).images.box_around
+
+
+def test_a_wrong_value_for_it_is_one_sentence():
+    with pytest.raises(InputError, match="images"):
+        composed("view", ["motion=m", "recording=r", "out=a.rrd", "images=maybe"])
+
+
+def test_one_switch_for_the_motion_only():
+    asked = track_config(["outputs.motion_only=true"], recording="r").outputs.asked()
+    assert (asked.overlay, asked.rerun, asked.bvh, asked.formats) == (False, False, False, None)
+    assert OutputsConfig().asked().overlay
+    check_endings("track", track_config(recording="r"))

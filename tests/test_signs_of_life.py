@@ -1,0 +1,67 @@
+"""Signs of life: bars with the time left, lines where there is no terminal, and silence where little time passes."""
+
+import io
+import time
+
+import pytest
+
+from sogjax.engine import terminal
+from sogjax.engine.terminal import alive, bar, progress, remaining
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """Five seconds pass whenever it is looked at."""
+    now = iter(range(1000, 100_000, 5))
+    monkeypatch.setattr(terminal.time, "monotonic", lambda: float(next(now)))
+
+
+def test_where_there_is_no_terminal_a_line_comes_every_ten_seconds(clock):
+    out = io.StringIO()
+    assert list(progress(range(8), 8, "tracking", out)) == list(range(8))
+    lines = out.getvalue().splitlines()
+    assert len(lines) == 2  # after 15 and 30 of 40 seconds
+    assert "3/8" in lines[0]
+    assert lines[0].endswith("left")
+
+
+def test_short_work_says_nothing():
+    out = io.StringIO()
+    list(progress(range(8), 8, "tracking", out))
+    assert out.getvalue() == ""
+
+
+def test_a_bar_has_the_time_left_and_none_at_the_end(clock):
+    out = Terminal()
+    list(progress(range(4), 4, "tracking", out))
+    first, *_, last = [text for text in out.getvalue().split("\r") if text]
+    assert "15 s left" in first
+    assert "left" not in last
+    assert "4/4" in last
+
+
+@pytest.mark.parametrize(("seconds", "said"), [(12.4, "12 s"), (200.0, "3 min"), (9000.0, "2.5 h")])
+def test_times_as_people_say_them(seconds, said):
+    assert remaining(seconds) == said
+
+
+def test_nothing_is_divided_by_nothing_done():
+    assert "0/5" in bar("tracking", 0, 5, 3.0)
+
+
+def test_work_without_a_count_shows_that_it_goes_on(monkeypatch):
+    monkeypatch.setattr(terminal, "LINE_AFTER", 0.02)
+    out = io.StringIO()
+    with alive("searching", out):
+        deadline = time.monotonic() + 5.0
+        while "searching: 0 s so far" not in out.getvalue() and time.monotonic() < deadline:
+            time.sleep(0.01)
+    said = out.getvalue()
+    assert said.startswith("searching: 0 s so far")
+    time.sleep(0.05)
+    assert out.getvalue() == said
