@@ -98,8 +98,8 @@ def scale_findings(size: SubjectSize | None, geometry: RigGeometry, unit: str | 
 
 
 def _by_distance(geometry: RigGeometry, unit: str | None) -> list[Finding]:
-    """Without a subject, the distance to what the cameras look at is used."""
-    if len(geometry.names) < 2:
+    """Without a subject, the distance to what the cameras look at is used, if they look at one point."""
+    if len(geometry.names) < 2 or not _look_together(geometry):
         return []
     shown = f"the cameras are {_length(geometry.scale)} from what they look at"
     if DISTANCES[0] <= geometry.scale <= DISTANCES[1]:

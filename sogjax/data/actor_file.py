@@ -110,7 +110,7 @@ def save_body(path: Path, body: Body) -> None:
 
 def _explained(document: dict[str, Entry]) -> float:
     if "explained" not in document:
-        return float("nan")
+        return 0.0
     value = document["explained"].number()
     if not 0.0 <= value <= 1.0:
         raise document["explained"].error("a part of 1")
@@ -163,7 +163,7 @@ def _attachments(rows: list[Row], joints: Sequence[str], metres: float) -> Attac
 def _lines(body: Body) -> Iterator[str]:
     skeleton = body.skeleton
     yield from (f"name: {_flow(body.name)}", "unit: m", "color_space: rgb")
-    if np.isfinite(explained := float(body.explained)):
+    if (explained := float(body.explained)) > 0.0:
         yield f"explained: {explained:.3f}  # of it in its example poses; what is tracked with it is held against this"
     yield from ("", "joints:")
     offsets, axes, revolute = map(np.asarray, (skeleton.offsets, skeleton.axes, skeleton.revolute))

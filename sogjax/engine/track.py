@@ -41,7 +41,7 @@ from sogjax.settings import OutputsConfig, TrackConfig
 
 Opening = Callable[[Recording, Sequence[Body], TrackConfig], tuple[Float[Array, "dof"], int] | None]
 """Tells the first pose and its frame, counted from the recording's first; None: they are searched for."""
-NOTHING = OutputsConfig(overlay=False, rerun=False, bvh=False)
+NOTHING = OutputsConfig(motion_only=True).asked()
 UNADJUSTED = "unadjusted.npz"
 UNADJUSTED_ACTOR = "unadjusted_actor.yaml"
 """The motion as it was tracked, and its actor, beside the adjusted ones."""

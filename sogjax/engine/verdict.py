@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import cv2
-import numpy as np
 
 from sogjax.data.atomic import atomic_path
 from sogjax.data.video import read_frames
@@ -38,7 +37,7 @@ def say_verdicts(result: Run) -> None:
 
 def expected_of(bodies: Sequence[Body]) -> dict[str, float]:
     """How much of each actor its example poses explain, where that is known."""
-    return {body.name: float(body.explained) for body in bodies if np.isfinite(float(body.explained))}
+    return {body.name: float(body.explained) for body in bodies if float(body.explained) > 0.0}
 
 
 def write_metrics(path: Path, result: Run) -> None:

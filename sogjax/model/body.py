@@ -56,8 +56,8 @@ class Body(eqx.Module):
     landmarks: Attachments
     poses: dict[str, Float[Array, "dof"]]
     shape_groups: tuple[ShapeGroup, ...] = eqx.field(static=True, default=())
-    explained: Float[Array, ""] = eqx.field(default_factory=lambda: jnp.asarray(jnp.nan, jnp.float32))
-    """Of an actor: how much of it its example poses explain (0 to 1); NaN: not known."""
+    explained: Float[Array, ""] = eqx.field(default_factory=lambda: jnp.zeros((), jnp.float32))
+    """Of an actor: how much of it its example poses explain (0 to 1); 0: not known."""
 
     @property
     def num_blobs(self) -> int:

@@ -22,7 +22,7 @@ def check_endings(command: str, config: Any) -> None:
         InputError: such an ending or format.
     """
     options = dict(ENDINGS.get(command, {}))
-    if command == "export":
+    if command == "export" and (config.calibration is None) != (config.motion is None):
         options["to"] = MOTIONS if config.calibration is None else CALIBRATIONS
     for key, endings in options.items():
         value = getattr(config, key)
