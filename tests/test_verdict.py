@@ -8,6 +8,7 @@ import pytest
 from motion_cases import walking_motion
 from rig_cases import ring_rig
 
+from sogjax.app.actor import actor_verdict
 from sogjax.evaluation.verdict import verdicts, worst_frames
 from sogjax.view.closeups import HEIGHT, closeups
 
@@ -111,3 +112,15 @@ def test_closeups_show_the_body_in_each_frame(walk, tmp_path):
     assert drawn.shape[0] == 2 * HEIGHT
     assert np.ptp(drawn, axis=(0, 1)).max() > 100
     cv2.imwrite(str(tmp_path / "closeups.png"), drawn)
+
+
+@pytest.mark.parametrize(
+    ("iou", "explained", "warnings", "said"),
+    [
+        (0.86, 0.7, 0, "looks right (its example poses explain 70% of it)"),
+        (0.6, 0.7, 0, "silhouettes agree to 60% only"),
+        (0.86, 0.2, 1, "explain 20% of it only (60 to 75 % is usual): look at colors.png; 1 warning in report.md"),
+    ],
+)
+def test_an_actor_is_judged_by_its_example_poses(iou, explained, warnings, said):
+    assert said in actor_verdict(iou, explained, warnings)

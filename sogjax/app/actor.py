@@ -29,6 +29,10 @@ NOTICED = 0.15
 """Logarithm of a camera's gain above which it is reported."""
 
 
+GOOD_IOU, GOOD_COLORS = 0.75, 0.5
+"""Below these an actor must be looked at: agreement with the masks, and what its example poses explain of it."""
+
+
 def run(config: ActorConfig) -> Path:
     """Make the actor and write its file and its report.
 
@@ -62,7 +66,20 @@ def run(config: ActorConfig) -> Path:
         say(f"note: {note}")
     print(out)
     print(folder / "report.md")
+    print(f"\nverdict: {actor_verdict(report.mean_iou, float(made.body.explained), len(report.warnings))}")
     return out
+
+
+def actor_verdict(mean_iou: float, explained: float, num_warnings: int) -> str:
+    """What is thought of an actor, from what its own example poses show: both are parts of 1."""
+    found = []
+    if mean_iou < GOOD_IOU:
+        found.append(f"silhouettes agree to {mean_iou:.0%} only (80 % and more is usual): look at silhouettes_*.png")
+    if explained < GOOD_COLORS:
+        found.append(f"its example poses explain {explained:.0%} of it only (60 to 75 % is usual): look at colors.png")
+    if num_warnings:
+        found.append(f"{counted(num_warnings, 'warning')} in report.md")
+    return "; ".join(found) or f"looks right (its example poses explain {explained:.0%} of it)"
 
 
 def _made(recording: Recording, body: Body, config: ActorConfig) -> tuple[Recording, MadeActor]:
