@@ -14,6 +14,7 @@ from drawn_scene import cells_of, draw, in_colors, make_tracker, moved, standing
 from rig_cases import ring_rig
 
 from sogjax.adjust import adjusted
+from sogjax.adjust.clip_energy import MANY_CAMERAS, Weights
 from sogjax.adjust.clip_shape import ClipShape
 from sogjax.adjust.frame_models import frame_model, shape_rates
 from sogjax.adjust.pictures import Reader, bytes_of_frame
@@ -83,7 +84,8 @@ def test_a_forearm_that_is_too_long_is_found_from_a_clip(scene):
     pictures = lambda rows, near: reader.pictures([cells[row] for row in rows], near)
     unknown = np.full(len(poses), np.nan)
     start = np.stack(poses)
-    found = adjusted(tracker, pictures, start, np.arange(16), unknown, 30.0, "z", 60)
+    as_of_many = Weights(shape=Weights().shape * len(tracker.normalizers) / MANY_CAMERAS)  # drawn, they err in nothing
+    found = adjusted(tracker, pictures, start, np.arange(16), unknown, 30.0, "z", 60, as_of_many)
     assert found.after > found.before
     assert found.params[shape.names.index("forearm_length")] < -0.03
     in_windows = adjusted(tracker, pictures, start, np.arange(16), unknown, 30.0, "z", 13)

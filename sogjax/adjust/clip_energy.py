@@ -31,8 +31,7 @@ from sogjax.tracking.tracker import Tracker
 LARGEST_SHAPE_STEP = 0.05
 """Of an iteration: logarithms of scales, metres."""
 MANY_CAMERAS = 12
-"""For which the weight of the shape's prior is given. The energy is a mean over cameras, of which few say little; what
-is wrong with the body is wrong in all of them, so what they say grows as the root of their number."""
+"""For which the weight of the shape's prior is given: the energy is a mean over cameras, of which few say little."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +103,7 @@ class ClipEnergy:
     def priors(self) -> Float[np.ndarray, "shared"]:
         """Curvature of what holds the shared parameters at 0."""
         shape = np.arange(self.num_shared) < self.shape.num_params
-        of_shape = self.weights.shape * np.sqrt(max(MANY_CAMERAS / len(self.tracker.normalizers), 1.0))
+        of_shape = self.weights.shape * max(MANY_CAMERAS / len(self.tracker.normalizers), 1.0)
         weights = np.where(shape, 2.0 * of_shape, 2.0 * self.weights.cameras)
         return weights * len(self.frames) / self.spread**2
 
