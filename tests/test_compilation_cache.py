@@ -1,4 +1,4 @@
-"""Compiled programs are kept only where a person asks for it, apart for each jaxlib and processor."""
+"""Compiled programs are kept, apart for each jaxlib and processor, where they are taken back; or not, if asked."""
 
 import os
 import subprocess
@@ -7,7 +7,7 @@ from importlib.metadata import version
 
 import pytest
 
-from sogjax.engine.compilation_cache import VARIABLE, use_compilation_cache
+from sogjax.engine.compilation_cache import REFUSED, TRIED, VARIABLE, _sweep, refusal, use_compilation_cache
 from sogjax.errors import InputError
 
 PROGRAM = """
@@ -15,8 +15,8 @@ import jax
 from jax._src import monitoring
 from sogjax.engine.compilation_cache import use_compilation_cache
 hits = []
-monitoring.register_event_listener(lambda event, **_: hits.append(event) if event.endswith("cache_hits") else None)
 use_compilation_cache()
+monitoring.register_event_listener(lambda event, **_: hits.append(event) if event.endswith("cache_hits") else None)
 jax.jit(lambda x: x * 2.0 + 1.0)(1.0).block_until_ready()
 print(len(hits))
 """
@@ -24,22 +24,77 @@ print(len(hits))
 
 def hits(environment):
     """How many programs of a new process were taken from the cache."""
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM], env=os.environ | environment, capture_output=True, text=True, check=True
-    )
+    surroundings = {k: v for k, v in os.environ.items() if not k.startswith("JAX_COMPILATION_CACHE")} | environment
+    done = subprocess.run([sys.executable, "-c", PROGRAM], env=surroundings, capture_output=True, text=True, check=True)
+    assert not done.stderr
     return int(done.stdout)
 
 
 def test_a_second_process_finds_the_programs_of_the_first(tmp_path):
     assert hits({VARIABLE: str(tmp_path / "kept")}) == 0
-    (folder,) = (tmp_path / "kept").iterdir()
+    (folder,) = (path for path in (tmp_path / "kept").iterdir() if path.is_dir())
     assert folder.name.startswith(f"jaxlib-{version('jaxlib')}-")
+    assert (folder / TRIED).exists()
     assert hits({VARIABLE: str(tmp_path / "kept")}) >= 1
 
 
-def test_nothing_is_kept_unasked(tmp_path):
-    assert hits({VARIABLE: ""}) == 0
+def test_they_lie_in_the_cache_folder_by_default(tmp_path):
+    surroundings = {VARIABLE: "", "SOGJAX_CACHE": str(tmp_path)}
+    hits(surroundings)
+    assert hits(surroundings) >= 1
+    assert list((tmp_path / "programs").glob("*/*-cache"))
+
+
+def test_nothing_is_kept_when_switched_off(tmp_path):
+    assert hits({VARIABLE: "off", "SOGJAX_CACHE": str(tmp_path)}) == 0
     assert list(tmp_path.iterdir()) == []
+
+
+def test_work_goes_on_where_kept_programs_are_not_taken(tmp_path):
+    kept = tmp_path / "kept"
+    hits({VARIABLE: str(kept)})
+    (tried,) = kept.glob(f"*/{TRIED}")
+    tried.rename(tried.with_name(REFUSED))
+    assert hits({VARIABLE: str(kept)}) == 0
+
+
+def test_a_damaged_program_is_compiled_again(tmp_path):
+    kept = tmp_path / "kept"
+    hits({VARIABLE: str(kept)})
+    for program in kept.glob("*/*-cache"):
+        program.write_bytes(program.read_bytes()[:50])
+    assert hits({VARIABLE: str(kept)}) == 0  # and nothing is said, which `hits` sees to
+
+
+def test_a_complaint_about_the_machine_is_noticed(monkeypatch):
+    told = "Loading XLA:CPU AOT result. Target machine feature +prefer-no-scatter is not supported on the host machine."
+
+    def complaining(function):
+        os.write(2, f"{told}\n".encode())
+        return lambda x: x
+
+    monkeypatch.setattr("jax.jit", complaining)
+    assert told in refusal()
+
+
+def test_a_default_folder_that_cannot_be_made_is_no_error(tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("in the way")
+    monkeypatch.setenv(VARIABLE, "")
+    monkeypatch.setenv("SOGJAX_CACHE", str(tmp_path / "file"))
+    use_compilation_cache()
+
+
+def test_programs_that_were_not_used_for_longest_go_first(tmp_path):
+    (tmp_path / "here").mkdir()
+    paths = [tmp_path / "here" / f"{k}-cache" for k in range(8)]
+    for k, path in enumerate(paths):
+        path.write_bytes(bytes(100))
+        os.utime(path, (k, k))
+    _sweep(tmp_path, largest=400)
+    assert sorted(path.name for path in tmp_path.glob("*/*-cache")) == ["5-cache", "6-cache", "7-cache"]
+    paths[0].write_bytes(bytes(1000))
+    _sweep(tmp_path, largest=400)  # not twice on one day
+    assert paths[0].exists()
 
 
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path, monkeypatch):

@@ -11,7 +11,7 @@ from pathlib import Path
 import jax
 
 from sogjax.app.config.schemas import DoctorConfig
-from sogjax.engine.compilation_cache import VARIABLE
+from sogjax.engine.compilation_cache import OFF, VARIABLE
 from sogjax.engine.self_test import LAWS
 from sogjax.errors import InputError
 
@@ -92,7 +92,9 @@ def _say_cache() -> None:
     """Where compiled programs are kept."""
     folder = jax.config.values["jax_compilation_cache_dir"]
     if folder is None:
-        _line("compiled programs", f"are not kept; set {VARIABLE}=FOLDER for quicker starts")
+        off = os.environ.get(VARIABLE, "").lower() == OFF
+        why = f"{VARIABLE}={OFF}" if off else f"not possible here; {VARIABLE}=FOLDER may name another folder"
+        _line("compiled programs", f"are not kept ({why})")
         return
     files = [path for path in Path(folder).glob("*") if path.is_file()]
     size = sum(path.stat().st_size for path in files) / 1e6

@@ -2,10 +2,10 @@
 
 import hashlib
 import json
-import os
 from dataclasses import asdict
 from pathlib import Path
 
+from sogjax.data.cache_folder import default_cache_dir
 from sogjax.errors import InputError
 from sogjax.synth.detector import DetectorSettings
 from sogjax.synth.keypoints import write_simulated
@@ -21,15 +21,6 @@ KEYPOINT_VERSION = 1
 
 _CHOICES = ("props", "outfit", "room", "light_drift")
 """Settings that name no recording while they have their defaults."""
-
-
-def default_cache_dir() -> Path:
-    """Where recordings are kept: SOGJAX_CACHE, else the system's folder for caches."""
-    own = os.environ.get("SOGJAX_CACHE")
-    if own:
-        return Path(own)
-    system = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
-    return Path(system) / "sogjax" if system else Path.home() / ".cache" / "sogjax"
 
 
 def cache_name(settings: SynthSettings) -> str:
