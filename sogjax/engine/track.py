@@ -22,6 +22,7 @@ from sogjax.engine.adjust import write_numbers, written
 from sogjax.engine.adjust_checks import check_window, too_short
 from sogjax.engine.adjust_clip import adjusted_clip
 from sogjax.engine.clock import ACTORS, ADJUSTING, stage
+from sogjax.engine.compiled_programs import forget_programs_if_many
 from sogjax.engine.example_frames import check_actors
 from sogjax.engine.first_pose import initial_pose_file, known_opening
 from sogjax.engine.job import frame_range
@@ -162,6 +163,7 @@ def _ended(folder: RunFolder, recording: Recording, wanted: OutputsConfig) -> Ru
 
 def track_recording(recording: Recording, bodies: list[Body], config: TrackConfig, terms: Sequence[Term] = ()) -> Run:
     """Track actors (in their own upright frames) without writing files; `terms` are added to those of the settings."""
+    forget_programs_if_many()
     with (
         TemporaryDirectory() as folder,
         tracking(recording, bodies, config, NOTHING, Path(folder), KeptRun(Path(folder), lasts=False), terms) as result,
