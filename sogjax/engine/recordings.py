@@ -23,6 +23,7 @@ from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.model.frames import world_from_upright
 from sogjax.settings import ColorConfig, EnergyConfig, ImagesConfig
+from sogjax.tracking.mirrored import means_of
 
 
 def opened(path: str, cameras: Sequence[str] | None = None) -> Recording:
@@ -175,8 +176,8 @@ def check_scale(recording: Recording, bodies: Sequence[Body]) -> None:
 
 def _extent(body: Body) -> float:
     """The largest side of a body in its rest pose, in metres."""
-    blobs = body.posed_blobs(body.poses["rest"])
-    means, radii = np.asarray(blobs.means), np.asarray(blobs.sigmas)[:, None]
+    means = means_of(body, np.asarray(body.poses["rest"])[None])[0]
+    radii = np.asarray(body.blob_sigmas)[:, None]
     return float(((means + radii).max(axis=0) - (means - radii).min(axis=0)).max())
 
 

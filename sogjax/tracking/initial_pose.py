@@ -6,7 +6,6 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 from jaxtyping import Array, Float
 
 from sogjax.data.initial_pose import InitialPose
@@ -14,6 +13,7 @@ from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.model.frames import axis_vector
 from sogjax.sentences import counted
+from sogjax.tracking.point_fit import ANYWHERE, Points, fitted_to_points
 
 LANDMARK_NOISE = 0.03
 """Metres: what a landmark is expected to be off."""
@@ -68,24 +68,27 @@ def check_rough_pose(body: Body, description: InitialPose, up: str) -> None:
 
 def placed(body: Body, pose: Float[Array, "dof"], position: Float[np.ndarray, "3"]) -> Float[Array, "dof"]:
     """The pose with the root at a position (metres, world)."""
+    found, axes, offsets = (
+        np.array(pose),
+        np.asarray(body.skeleton.axes, float),
+        np.asarray(body.skeleton.offsets, float),
+    )
     for joint, dof, weight in _root_dofs(body, revolute=False):
-        axis = np.asarray(body.skeleton.axes[joint], float)
-        offset = np.asarray(body.skeleton.offsets[joint], float)
-        pose = pose.at[dof].set(float(axis @ (position - offset)) / weight)
-    return pose
+        found[dof] = float(axes[joint] @ (position - offsets[joint])) / weight
+    return jnp.asarray(found)
 
 
 def centred(body: Body, pose: Float[Array, "dof"], centre: Float[np.ndarray, "3"]) -> Float[Array, "dof"]:
     """The pose moved so that the body's centre lies at a point (metres, world)."""
-    step = jnp.asarray(centre - np.asarray(body_centre(body, pose), float), pose.dtype)
-    return pose + jnp.sum(shifts(body) * step[None, :], axis=1)
+    step = centre - np.asarray(body_centre(body, pose), float)
+    return jnp.asarray(np.asarray(pose) + np.asarray(shifts(body)) @ step, pose.dtype)
 
 
 def shifts(body: Body) -> Float[Array, "dof 3"]:
     """What has to be added to a pose for each metre by which the whole body moves (world)."""
-    table = np.zeros((body.skeleton.num_dofs, 3))
+    table, axes = np.zeros((body.skeleton.num_dofs, 3)), np.asarray(body.skeleton.axes, float)
     for joint, dof, weight in _root_dofs(body, revolute=False):
-        table[dof] = np.asarray(body.skeleton.axes[joint], float) / weight
+        table[dof] = axes[joint] / weight
     return jnp.asarray(table, body.skeleton.offsets.dtype)
 
 
@@ -112,6 +115,15 @@ def root_rotation(body: Body, pose: Float[Array, "dof"]) -> Float[np.ndarray, "3
 
 
 @jax.jit
+def _landmarks_in(body: Body, pose: Float[Array, "dof"]) -> Float[Array, "landmark 3"]:
+    return body.posed_landmarks(pose)
+
+
+def _posed_landmarks(body: Body, pose: Float[Array, "dof"]) -> Float[np.ndarray, "landmark 3"]:
+    return np.asarray(_landmarks_in(body, pose), float)
+
+
+@jax.jit
 def _joint_frames(body: Body, pose: Float[Array, "dof"]) -> Float[Array, "joint 4 4"]:
     return body.skeleton.world_from_joint(pose)
 
@@ -119,14 +131,19 @@ def _joint_frames(body: Body, pose: Float[Array, "dof"]) -> Float[Array, "joint 
 def turned(body: Body, pose: Float[Array, "dof"], heading: float, up: str) -> Float[Array, "dof"]:
     """The pose turned to a heading (radians about the vertical; 0 is the rest pose's)."""
     turn = heading_dof(body, up)
-    return pose if turn is None else pose.at[turn[0]].set(heading / turn[1])
+    if turn is None:
+        return pose
+    found = np.array(pose)
+    found[turn[0]] = heading / turn[1]
+    return jnp.asarray(found)
 
 
 def heading_dof(body: Body, up: str) -> tuple[int, float] | None:
     """The degree of freedom that turns the whole body about the vertical, and radians for each unit of it."""
     vertical = axis_vector(up)
+    axes = np.asarray(body.skeleton.axes, float)
     for joint, dof, weight in _root_dofs(body, revolute=True):
-        along = float(np.asarray(body.skeleton.axes[joint], float) @ vertical)
+        along = float(axes[joint] @ vertical)
         if abs(along) > VERTICAL:
             return dof, weight * float(np.sign(along))
     return None
@@ -144,20 +161,18 @@ def fit_landmarks(
     Raises:
         InputError: unknown landmark names, or fewer than four.
     """
-    indices, targets = landmark_targets(body, landmarks)
-    centre = jnp.mean(targets, axis=0)
-    middle = jnp.mean(jax.jit(Body.posed_landmarks)(body, start)[indices], axis=0)
-    start = placed(body, start, root_position(body, start) + np.asarray(centre - middle, float))
+    points = landmark_targets(body, landmarks)
+    middle = np.mean(_posed_landmarks(body, start)[np.asarray(points.landmarks)], axis=0)
+    start = placed(body, start, root_position(body, start) + np.mean(np.asarray(points.places, float), axis=0) - middle)
     headings = [None] if keep_heading else np.arange(NUM_HEADINGS) * 2.0 * np.pi / NUM_HEADINGS - np.pi
-    starts = jnp.stack([start if h is None else turned(body, start, float(h), up) for h in headings])
-    fitted, costs = _fit_all(body, starts, indices, targets, dof_spread(body))
-    return fitted[jnp.argmin(jnp.where(jnp.isfinite(costs), costs, jnp.inf))]
+    starts = np.stack([start if h is None else turned(body, start, float(h), up) for h in headings])
+    far = jnp.asarray(ANYWHERE, starts.dtype)
+    fitted, costs = fitted_to_points(body, jnp.asarray(starts), points, far, dof_spread(body))
+    return jnp.asarray(np.asarray(fitted)[np.argmin(costs)])
 
 
-def landmark_targets(
-    body: Body, landmarks: Mapping[str, tuple[float, float, float]]
-) -> tuple[Array, Float[Array, "landmark 3"]]:
-    """Indices of the named landmarks in the body and the points they should lie on.
+def landmark_targets(body: Body, landmarks: Mapping[str, tuple[float, float, float]]) -> Points:
+    """The named landmarks of the body and the points they should lie on.
 
     Raises:
         InputError: unknown landmark names, or fewer than four.
@@ -174,41 +189,20 @@ def landmark_targets(
             f"{counted(len(landmarks), 'landmark')} cannot fit the body {body.name!r}; "
             f"give at least {MIN_LANDMARKS}, well spread"
         )
-    indices = jnp.array([known.index(name) for name in landmarks])
-    return indices, jnp.array(list(landmarks.values()), body.landmarks.offsets.dtype)
+    dtype = body.landmarks.offsets.dtype
+    return Points(
+        jnp.asarray(np.array([known.index(name) for name in landmarks])),
+        jnp.asarray(np.array(list(landmarks.values())), dtype),
+        jnp.asarray(np.full(len(landmarks), LANDMARK_NOISE), dtype),
+        jnp.asarray(np.ones(len(landmarks)), dtype),
+    )
 
 
 def dof_spread(body: Body) -> Float[Array, "dof"]:
     """How far each degree of freedom may lie from the start pose."""
-    spread = jnp.full(body.skeleton.num_dofs, POSE_SPREAD, body.skeleton.offsets.dtype)
-    root = [dof for revolute in (False, True) for _, dof, _ in _root_dofs(body, revolute)]
-    return spread.at[jnp.array(root, int)].set(ROOT_SPREAD)
-
-
-@jax.jit
-def _fit_all(
-    body: Body,
-    starts: Float[Array, "start dof"],
-    indices: Array,
-    targets: Float[Array, "landmark 3"],
-    spread: Float[Array, "dof"],
-) -> tuple[Float[Array, "start dof"], Float[Array, "start"]]:
-    solver = optx.LevenbergMarquardt(rtol=1e-4, atol=1e-4)
-    lower, upper = body.skeleton.joint_limits()
-
-    def fit(start):
-        def residuals(pose, _):
-            distances = (body.posed_landmarks(pose)[indices] - targets) / LANDMARK_NOISE
-            prior = (pose - start) / spread
-            params = body.skeleton.joint_params(pose)
-            limits = jnp.maximum(lower - params, 0.0) + jnp.maximum(params - upper, 0.0)
-            return distances, prior, 30.0 * limits
-
-        result = optx.least_squares(residuals, solver, start, max_steps=100, throw=False)
-        cost = jnp.sum(jnp.concatenate([part.reshape(-1) ** 2 for part in residuals(result.value, None)]))
-        return result.value, cost
-
-    return jax.vmap(fit)(starts)
+    spread = np.full(body.skeleton.num_dofs, POSE_SPREAD)
+    spread[[dof for revolute in (False, True) for _, dof, _ in _root_dofs(body, revolute)]] = ROOT_SPREAD
+    return jnp.asarray(spread, body.skeleton.offsets.dtype)
 
 
 def _named_pose(body: Body, pose: str | Mapping[str, float] | None) -> Float[Array, "dof"]:

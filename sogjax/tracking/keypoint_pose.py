@@ -1,13 +1,12 @@
 """Poses and sizes of a body from triangulated keypoints, some of which may be far off or missing."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 from jaxtyping import Array, Float, Int
 
 from sogjax.data.keypoints import KeypointScheme
@@ -20,6 +19,7 @@ from sogjax.tracking.initial_pose import (
     root_position,
     turned,
 )
+from sogjax.tracking.point_fit import Points, fitted_to_points
 
 NOISE = 0.03
 """Metres: what a triangulated keypoint is expected to be off, beside what its scheme allows."""
@@ -27,7 +27,6 @@ WIDE = 8.0
 """Times the noise from which on a point counts little, while headings are told apart."""
 FAR = 3.0
 """The same at the end."""
-STEPS = 40
 LEFT_OUT = 0.25
 """Metres from which on a point is left out of the last fit."""
 ON = 0.1
@@ -63,20 +62,22 @@ def pose_of_keypoints(
     if known.sum() < MIN_LANDMARKS:
         return None
     dtype = body.landmarks.offsets.dtype
-    targets = jnp.asarray(np.where(known[:, None], points, 0.0), dtype)
-    noise = jnp.asarray(np.hypot(NOISE, np.array(scheme.within)), dtype)
-    places = jnp.asarray(np.maximum(indices, 0))
+    noise = np.hypot(NOISE, np.array(scheme.within))
+    places = np.where(known[:, None], points, 0.0)
+    all_known = Points(
+        jnp.asarray(np.maximum(indices, 0)), *(jnp.asarray(part, dtype) for part in (places, noise, known))
+    )
 
     def fitted(starts, far, kept):
-        what = (places, targets, jnp.asarray(kept, dtype), noise, dof_spread(body))
-        return _fitted(body, starts, jnp.asarray(far, dtype), *what)
+        points = replace(all_known, known=jnp.asarray(kept, dtype))
+        return fitted_to_points(body, starts, points, jnp.asarray(far, dtype), dof_spread(body))
 
     poses, costs = fitted(_starts(body, up, np.median(points[known], axis=0)), WIDE, known)
     # From now on the angles stay near what was found, not near the rest pose's.
-    pose, _ = fitted(poses[jnp.argmin(jnp.where(jnp.isfinite(costs), costs, jnp.inf))][None], FAR, known)
-    near = known & (_distances(body, pose[0], places, targets) < LEFT_OUT)
+    pose, _ = fitted(poses[np.argmin(costs)][None], FAR, known)
+    near = known & (_distances(body, pose[0], all_known) < LEFT_OUT)
     pose, _ = fitted(pose, FAR, near)
-    off = _distances(body, pose[0], places, targets)[known]
+    off = _distances(body, pose[0], all_known)[known]
     on = off < ON
     distance = float(off[on].mean()) if on.any() else float("nan")
     return KeypointPose(np.asarray(pose[0]), float(on.mean()), distance, int(known.sum()))
@@ -133,40 +134,6 @@ def _posed(body: Body, poses: Float[Array, "pose dof"]) -> Float[Array, "pose la
     return jax.vmap(body.posed_landmarks)(poses)
 
 
-def _distances(
-    body: Body, pose: Float[Array, "dof"], indices: Int[Array, "keypoint"], targets: Float[Array, "keypoint 3"]
-) -> Float[np.ndarray, "keypoint"]:
-    points = np.asarray(_posed(body, pose[None])[0], float)
-    return np.linalg.norm(points[np.asarray(indices)] - np.asarray(targets, float), axis=-1)
-
-
-@eqx.filter_jit
-def _fitted(
-    body: Body,
-    starts: Float[Array, "start dof"],
-    far: Float[Array, ""],
-    indices: Int[Array, "keypoint"],
-    targets: Float[Array, "keypoint 3"],
-    known: Float[Array, "keypoint"],
-    noise: Float[Array, "keypoint"],
-    spread: Float[Array, "dof"],
-) -> tuple[Float[Array, "start dof"], Float[Array, "start"]]:
-    """Least squares with Cauchy's loss: a point `far` times its noise away counts half as much, and less beyond."""
-    solver = optx.LevenbergMarquardt(rtol=1e-4, atol=1e-4)
-    lower, upper = body.skeleton.joint_limits()
-
-    def fit(start):
-        def residuals(pose, _):
-            misses = (body.posed_landmarks(pose)[indices] - targets) / noise[:, None]
-            squared = jnp.sum(misses**2, axis=-1) / far**2
-            loss = jnp.where(squared > 1e-6, jnp.log1p(squared) / jnp.maximum(squared, 1e-6), 1.0)
-            of_points = misses * (jnp.sqrt(loss) * known)[:, None]
-            params = body.skeleton.joint_params(pose)
-            limits = jnp.maximum(lower - params, 0.0) + jnp.maximum(params - upper, 0.0)
-            return of_points, (pose - start) / spread, 30.0 * limits
-
-        result = optx.least_squares(residuals, solver, start, max_steps=STEPS, throw=False)
-        cost = jnp.sum(jnp.concatenate([part.reshape(-1) ** 2 for part in residuals(result.value, None)]))
-        return result.value, cost
-
-    return jax.vmap(fit)(starts)
+def _distances(body: Body, pose: Float[Array, "dof"], points: Points) -> Float[np.ndarray, "keypoint"]:
+    found = np.asarray(_posed(body, pose[None])[0], float)
+    return np.linalg.norm(found[np.asarray(points.landmarks)] - np.asarray(points.places, float), axis=-1)

@@ -364,39 +364,30 @@ def larger_capacities(capacities: Capacities, near: int, matching: int, blocks: 
 
 def first_capacities(tracker: Tracker, state: TrackState, cells: UInt8[Array, "camera rows columns 3"]) -> Capacities:
     """Capacities with headroom for what the first frame needs."""
-    near, matching = _counts(tracker, state, cells)
-    capacities = Capacities(
-        near=capacity_for(int(near.max()), HEADROOM), matching=capacity_for(int(matching.max()), HEADROOM)
-    )
+    near, matching, blocks = (int(count.max()) for count in _counts(tracker, state, cells))
+    room = capacity_for(near, HEADROOM)
     if tracker.pairs == "dense":
-        return capacities
-    blocks = int(_num_blocks(tracker, state, cells, capacities))
-    return Capacities(capacities.near, capacities.near, block_capacity(blocks, BLOCK_HEADROOM))
+        return Capacities(room, capacity_for(matching, HEADROOM))
+    return Capacities(room, room, block_capacity(blocks, BLOCK_HEADROOM))
 
 
 def compile_counts(tracker: Tracker, shape: tuple[int, ...]) -> None:
     """Compile beforehand what `first_capacities` counts with, for cells of a shape, while other work goes on."""
-    body = tracker.body.skeleton
-    pose = jnp.zeros(body.num_dofs, body.offsets.dtype)
-    _counts(tracker, TrackState.from_pose(pose), jnp.zeros(shape, jnp.uint8))
-
-
-@eqx.filter_jit
-def _num_blocks(
-    tracker: Tracker, state: TrackState, cells: UInt8[Array, "camera rows columns 3"], capacities: Capacities
-) -> Int[Array, ""]:
-    """How many blocks of near pairs there are where the solver starts."""
-    views, _, _ = tracker.views(cells, state, capacities)
-    objective = FrameEnergy(tracker.body, views, History.unknown(state.previous), tracker.terms)
-    return objective.near(tracker.predicted(state), capacity=1)[1]
+    _counts(tracker, tracker.start(tracker.body.poses["rest"]), jnp.zeros(shape, jnp.uint8))
 
 
 @eqx.filter_jit
 def _counts(
     tracker: Tracker, state: TrackState, cells: UInt8[Array, "camera rows columns 3"]
-) -> tuple[Int[Array, "camera"], Int[Array, "camera"]]:
-    """How many image blobs pass the first test and both tests, with as much room as there can be."""
+) -> tuple[Int[Array, "camera"], Int[Array, "camera"], Int[Array, ""]]:
+    """How many image blobs pass the first test and both tests, and how many blocks of near pairs there are.
+
+    With as much room as there can be, for the pose where the solver starts; no blocks where all pairs are compared.
+    """
     num_candidates = tracker.reader.candidates.sigmas.shape[-1]
     everything = Capacities(near=capacity_for(min(num_candidates, CAPACITIES[-1])), matching=CAPACITIES[0])
-    _, near, matching = tracker.views(cells, state, everything)
-    return near, matching
+    views, near, matching = tracker.views(cells, state, everything)
+    if tracker.pairs == "dense":
+        return near, matching, jnp.asarray(0)
+    objective = FrameEnergy(tracker.body, views, History.unknown(state.previous), tracker.terms)
+    return near, matching, objective.near(tracker.predicted(state), capacity=1)[1]

@@ -74,7 +74,7 @@ class CameraRig:
     def select(self, names: Sequence[str]) -> "CameraRig":
         """The rig of `names`, in their order."""
         indices = np.array([self.names.index(name) for name in names], int)
-        return CameraRig(tuple(names), jax.tree.map(lambda leaf: leaf[indices], self.cameras))
+        return CameraRig(tuple(names), jax.tree.map(lambda leaf: jnp.asarray(np.asarray(leaf)[indices]), self.cameras))
 
 
 @dataclass(frozen=True)
