@@ -13,6 +13,7 @@ from sogjax.model.body import Body
 from sogjax.model.camera import Camera, distort, project, project_points
 from sogjax.model.color import averaging_space, from_rgb, to_rgb
 from sogjax.model.sog import Sog
+from sogjax.tracking.mirrored import means_of
 
 SAMPLE_RADIUS = 0.8
 """Samples are taken within this many sigmas of a blob's centre."""
@@ -111,7 +112,7 @@ def _filled(
     """Colours of blobs that were never seen, from the nearest blob that was; the body's own where none was."""
     if not seen.any():
         return np.asarray(body.blob_colors, float)
-    means = np.asarray(body.posed_blobs(body.poses["rest"]).means, float)
+    means = means_of(body, np.asarray(body.poses["rest"])[None])[0].astype(float)
     distance = np.linalg.norm(means[:, None] - means[None, seen], axis=-1)
     return colors[seen][np.argmin(distance, axis=1)]
 
@@ -123,4 +124,4 @@ def colored(body: Body, colors: Float[np.ndarray, "blob 3"]) -> Body:
 
 def camera_of(rig: Camera, index: int) -> Camera:
     """One camera of a stack."""
-    return jax.tree.map(lambda leaf: leaf[index], rig)
+    return jax.tree.map(lambda leaf: jnp.asarray(np.asarray(leaf)[index]), rig)

@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 from itertools import product
 
+import equinox as eqx
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float
 
 from sogjax.actor.colors import ColoredView, blob_samples
 from sogjax.model.body import Body
@@ -38,14 +39,23 @@ def side_colors(body: Body, views: Sequence[ColoredView], up: str) -> SideColors
 def _sides(body: Body, view: ColoredView, up: str) -> np.ndarray:
     """Which side of each blob a camera sees."""
     pose, rest = view.pose, body.poses["rest"]
-    turns = [np.asarray(body.skeleton.world_from_joint(p), float)[:, :3, :3] for p in (pose, rest)]
+    frames, means = zip(*(map(np.asarray, _frames_and_means(body, p)) for p in (pose, rest)), strict=True)
+    turns = [frame[:, :3, :3].astype(float) for frame in frames]
     of_joint = np.einsum("jab,jcb->jac", turns[1], turns[0])  # from the pose to the rest pose, by joint
     world = np.asarray(view.camera.camera_from_world, float)
     eye = -world[:3, :3].T @ world[:3, 3]
-    towards = eye - np.asarray(body.posed_blobs(pose).means, float)
+    towards = eye - means[0].astype(float)
     at_rest = np.einsum("bac,bc->ba", of_joint[np.asarray(body.blobs.joints)], towards) @ world_from_upright(up)
     azimuth = np.arctan2(at_rest[:, 1], at_rest[:, 0])
     return np.round(azimuth / (2.0 * np.pi / SIDES)).astype(int) % SIDES
+
+
+@eqx.filter_jit
+def _frames_and_means(
+    body: Body, pose: Float[Array, "dof"]
+) -> tuple[Float[Array, "joint 4 4"], Float[Array, "blob 3"]]:
+    frames = body.skeleton.world_from_joint(pose)
+    return frames, body.blobs.points_world(frames)
 
 
 def consistent_ways(fits: Sequence[Sequence[float]], colors: Sequence[Sequence[SideColors]]) -> tuple[int, ...]:

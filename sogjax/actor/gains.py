@@ -48,13 +48,8 @@ def _log_light(body: Body, views: Sequence[ColoredView]) -> Float[np.ndarray, "b
     """Logarithm of the middle light that a camera shows of every blob, over all poses."""
     parts = [blob_samples(body, view) for view in views]
     samples = [np.concatenate(of_blob) for of_blob in zip(*parts, strict=True)]
-    return np.stack([_log_middle(colors) for colors in samples])
-
-
-def _log_middle(rgb: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "3"]:
-    if len(rgb) < FEWEST_SAMPLES:
-        return np.full(3, np.nan)
-    light = np.median(np.asarray(linear_light(jnp.asarray(rgb, jnp.float32)), float), axis=0)
+    middle = np.stack([np.median(rgb, axis=0) if len(rgb) >= FEWEST_SAMPLES else np.full(3, np.nan) for rgb in samples])
+    light = np.asarray(linear_light(jnp.asarray(middle, jnp.float32)), float)
     return np.log(np.where((light >= DARKEST) & (light <= BRIGHTEST), light, np.nan))
 
 

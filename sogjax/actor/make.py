@@ -116,7 +116,7 @@ def make_actor(
         examples, pictures, poses = [examples[k] for k in kept], [pictures[k] for k in kept], [poses[k] for k in kept]
         report(f"uses {', '.join(example.name for example in examples)}")
     report("shape")
-    views = stack_views([silhouette_views(posed, rig, body.num_blobs, FINE_DEPTH) for posed in pictures])
+    views = stack_views(silhouette_views(pictures, rig, body.num_blobs, FINE_DEPTH))
     estimate = estimate_shape(model, jnp.stack(poses), views, silhouettes_of(pictures, rig), terms)
     shaped = model.shaped(estimate.shape_params)
     _check_fit(recording, shaped, estimate, pictures, rig)

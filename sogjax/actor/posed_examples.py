@@ -10,7 +10,7 @@ from sogjax.actor.colors import ColoredView, camera_of
 from sogjax.actor.example_pose import poses_from_silhouettes, starts_at
 from sogjax.actor.facing import consistent_ways, side_colors
 from sogjax.actor.silhouette_iou import silhouette_iou
-from sogjax.actor.silhouettes import COARSE_DEPTH, PosedPictures, same_capacity, silhouette_views, subject_centre
+from sogjax.actor.silhouettes import COARSE_DEPTH, PosedPictures, silhouette_views, subject_centre
 from sogjax.data.recording import ExamplePose, Recording
 from sogjax.energy.term import Terms
 from sogjax.model.body import Body
@@ -36,7 +36,7 @@ def rough_poses(
     progress: Progress,
 ) -> list[Float[Array, "dof"]]:
     """The rough poses of an upright body in the example pictures; front and back are told apart by all together."""
-    coarse = same_capacity([silhouette_views(posed, rig, body.num_blobs, COARSE_DEPTH) for _, posed in shown])
+    coarse = silhouette_views([posed for _, posed in shown], rig, body.num_blobs, COARSE_DEPTH)
     ways, colors = [], []
     triples = [(*pair, views) for pair, views in zip(shown, coarse, strict=True)]
     for example, posed, views in progress(triples, len(triples), "example poses"):

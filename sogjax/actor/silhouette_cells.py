@@ -3,10 +3,11 @@
 from collections.abc import Sequence
 
 import cv2
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Array, Bool, Float
 
 from sogjax.actor.coverage import Silhouettes
 from sogjax.actor.silhouettes import PosedPictures
@@ -24,10 +25,17 @@ def silhouettes_of(pictures: Sequence[PosedPictures], rig: Camera) -> Silhouette
     means, sigmas, coverage, mask = (np.stack(part) for part in zip(*poses, strict=True))
     dtype = rig.intrinsics.dtype
     as_dtype = lambda array: jnp.asarray(array, dtype)
-    undistorted = jax.vmap(jax.vmap(undistort), in_axes=(None, 0))(rig, as_dtype(means))
-    sigmas = jax.vmap(lambda *of_pose: jax.vmap(undistorted_sizes)(rig, *of_pose))(as_dtype(means), as_dtype(sigmas))
-    cameras = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (len(pictures), *leaf.shape)), rig)
-    return Silhouettes(cameras, undistorted, sigmas, as_dtype(coverage), jnp.asarray(mask))
+    undistorted, sigmas = _undistorted(rig, as_dtype(means), as_dtype(sigmas))
+    repeated = lambda leaf: jnp.asarray(np.broadcast_to(np.asarray(leaf), (len(pictures), *leaf.shape)))
+    return Silhouettes(jax.tree.map(repeated, rig), undistorted, sigmas, as_dtype(coverage), jnp.asarray(mask))
+
+
+@eqx.filter_jit
+def _undistorted(
+    rig: Camera, means: Float[Array, "pose camera cell 2"], sigmas: Float[Array, "pose camera cell"]
+) -> tuple[Float[Array, "pose camera cell 2"], Float[Array, "pose camera cell"]]:
+    by_pose = lambda of_camera, *arrays: jax.vmap(lambda *of_pose: jax.vmap(of_camera)(rig, *of_pose))(*arrays)
+    return by_pose(undistort, means), by_pose(undistorted_sizes, means, sigmas)
 
 
 def _pose_cells(pictures: PosedPictures, num_cameras: int) -> tuple[np.ndarray, ...]:

@@ -3,6 +3,7 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from sogjax.actor.coverage import Silhouettes, mismatch, mismatch_equations
@@ -119,11 +120,9 @@ def _fitted(fit: SilhouetteFit, start: Float[Array, "param"], scales: Scales) ->
 
 def scales_with_shape(pose: Scales, num_poses: int, num_shape_params: int) -> Scales:
     """The pose's scales for every example pose, and one more kind for the shape parameters."""
-    num_kinds = pose.first_steps.shape[0]
+    kinds, num_kinds = np.asarray(pose.kinds), pose.first_steps.shape[0]
     return Scales(
-        kinds=jnp.concatenate(
-            [jnp.tile(pose.kinds, num_poses), jnp.full(num_shape_params, num_kinds, pose.kinds.dtype)]
-        ),
+        kinds=jnp.asarray(np.append(np.tile(kinds, num_poses), np.full(num_shape_params, num_kinds, kinds.dtype))),
         first_steps=jnp.append(pose.first_steps, 0.01),
         largest_steps=jnp.append(pose.largest_steps, 0.05),
     )

@@ -9,7 +9,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, UInt8
+from jaxtyping import Array, Bool, Float, Int, UInt8
 
 from sogjax.actor.example_masks import example_masks
 from sogjax.data.recording import ExamplePose, Recording
@@ -88,48 +88,62 @@ def _check_picture(path: Path, image: UInt8[np.ndarray, "_h _w 3"], size: tuple[
         )
 
 
-def silhouette_views(pictures: PosedPictures, rig: Camera, num_blobs: int, depth: int) -> Views:
-    """The masks of one example pose as Sogs: blobs of the subject match the body, others repel it a little.
+def silhouette_views(pictures: Sequence[PosedPictures], rig: Camera, num_blobs: int, depth: int) -> list[Views]:
+    """The masks of each example pose as Sogs: blobs of the subject match the body, others repel it a little.
 
-    A camera without a picture shows nothing.
+    A camera without a picture shows nothing. All have one shape, so that one program serves them.
     """
     sizes = np.asarray(rig.image_size).astype(int)
     grids = tuple(CellGrid.from_depth(int(width), int(height), depth) for width, height in sizes)
+    candidates, normalizers = Candidates.from_grids(grids, rig), whole_image_overlap(rig.image_size)
+    cells = [jnp.asarray(_white_cells(posed, sizes, grids)) for posed in pictures]
+    capacity = capacity_for(max(int(np.max(_num_leaves(of_pose, candidates))) for of_pose in cells))
+    views = []
+    for posed, of_pose in zip(pictures, cells, strict=True):
+        present = jnp.asarray(np.array([k in posed.masks for k in range(len(grids))]))
+        images, similarities = _silhouette_sogs(of_pose, candidates, present, capacity, num_blobs)
+        views.append(Views(rig, images, similarities, normalizers))
+    return views
+
+
+def _white_cells(
+    pictures: PosedPictures, sizes: Int[np.ndarray, "camera 2"], grids: tuple[CellGrid, ...]
+) -> UInt8[np.ndarray, "camera rows columns 3"]:
+    """Cells of pictures that are white where the masks are."""
     white = [
         np.repeat(pictures.masks.get(k, np.zeros((height, width), bool))[..., None], 3, axis=-1).astype(np.uint8) * 255
         for k, (width, height) in enumerate(sizes)
     ]
-    present = jnp.asarray([k in pictures.masks for k in range(len(grids))])
-    cells = jnp.asarray(stack_cells(white, grids))
-    candidates = Candidates.from_grids(grids, rig)
-    capacity = capacity_for(int(_num_leaves(cells, candidates)))
-    images, match = _silhouette_sogs(cells, candidates, present, capacity)
-    similarities = jnp.repeat(match[:, None, :], num_blobs, axis=1)
-    return Views(rig, images, similarities, whole_image_overlap(rig.image_size))
+    return stack_cells(white, grids)
 
 
-@eqx.filter_jit
 def _leaves(cells: UInt8[Array, "camera rows columns 3"], candidates: Candidates) -> tuple[Array, Array]:
     tolerance = jnp.asarray(SILHOUETTE_TOLERANCE, candidates.sigmas.dtype)
     return jax.vmap(quadtree, in_axes=(0, 0, None))(cells.astype(tolerance.dtype) / 255.0, candidates, tolerance)
 
 
-def _num_leaves(cells: UInt8[Array, "camera rows columns 3"], candidates: Candidates) -> int:
-    return int(jnp.max(jnp.sum(_leaves(cells, candidates)[1], axis=1)))
+@eqx.filter_jit
+def _num_leaves(cells: UInt8[Array, "camera rows columns 3"], candidates: Candidates) -> Int[Array, "camera"]:
+    return jnp.sum(_leaves(cells, candidates)[1], axis=1)
 
 
 @eqx.filter_jit
 def _silhouette_sogs(
-    cells: UInt8[Array, "camera rows columns 3"], candidates: Candidates, present: Bool[Array, "camera"], capacity: int
-) -> tuple[Sog, Float[Array, "camera image"]]:
-    """The image blobs and how each matches the colour of the body."""
+    cells: UInt8[Array, "camera rows columns 3"],
+    candidates: Candidates,
+    present: Bool[Array, "camera"],
+    capacity: int,
+    num_blobs: int,
+) -> tuple[Sog, Float[Array, "camera body image"]]:
+    """The image blobs and how each matches the colour of the body's blobs."""
     colors, leaves = _leaves(cells, candidates)
     leaves = leaves & present[:, None]
     select = jax.vmap(keep_blobs, in_axes=(0, 0, 0, 0, None))
     images, _, _ = select(candidates.means, candidates.sigmas, colors, leaves, capacity)
     coverage = images.colors[..., 0]
     match = coverage + (1.0 - coverage) * BACKGROUND_SIMILARITY
-    return images, jnp.where(images.mask, match, 0.0)
+    match = jnp.where(images.mask, match, 0.0)
+    return images, jnp.repeat(match[:, None, :], num_blobs, axis=1)
 
 
 def subject_centre(pictures: PosedPictures, rig: Camera) -> Float[np.ndarray, "3"]:
@@ -148,25 +162,6 @@ def subject_centre(pictures: PosedPictures, rig: Camera) -> Float[np.ndarray, "3
     return np.linalg.solve(normal, target)
 
 
-def same_capacity(views: Sequence[Views]) -> list[Views]:
-    """The same views with as much padding as the largest needs, so that they have one shape and compile once."""
-    capacity = max(view.images.capacity for view in views)
-    return [_padded(view, capacity) for view in views]
-
-
 def stack_views(views: Sequence[Views]) -> Views:
-    """Views of several poses with a leading axis for the poses."""
-    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *same_capacity(views))
-
-
-def _padded(views: Views, capacity: int) -> Views:
-    extra = capacity - views.images.capacity
-    at_end = lambda leaf, fill=0.0: jnp.pad(leaf, ((0, 0), (0, extra)), constant_values=fill)
-    images = Sog(
-        jnp.pad(views.images.means, ((0, 0), (0, extra), (0, 0))),
-        at_end(views.images.sigmas, 1.0),
-        jnp.pad(views.images.colors, ((0, 0), (0, extra), (0, 0))),
-        at_end(views.images.mask, False),
-    )
-    similarities = jnp.pad(views.color_similarities, ((0, 0), (0, 0), (0, extra)))
-    return Views(views.cameras, images, similarities, views.normalizers)
+    """Views of several poses, of one shape, with a leading axis for the poses."""
+    return jax.tree.map(lambda *leaves: jnp.asarray(np.stack([np.asarray(leaf) for leaf in leaves])), *views)

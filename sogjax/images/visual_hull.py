@@ -68,12 +68,12 @@ class VoxelPixels:
 
 def resized(camera: Camera, size: tuple[float | int, float | int]) -> Camera:
     """The camera of the same pictures at another width and height, in whatever these are counted."""
-    scale = jnp.asarray(size, camera.image_size.dtype) / camera.image_size
-    matrix = camera.intrinsics
-    focal = matrix[:2, :2] * scale[:, None]
-    middle = (matrix[:2, 2] + 0.5) * scale - 0.5
-    matrix = matrix.at[:2, :2].set(focal).at[:2, 2].set(middle)
-    return eqx.tree_at(lambda c: (c.intrinsics, c.image_size), camera, (matrix, scale * camera.image_size))
+    before, matrix = np.asarray(camera.image_size), np.array(camera.intrinsics)
+    scale = (np.asarray(size) / before).astype(before.dtype)
+    matrix[:2, :2] *= scale[:, None]
+    matrix[:2, 2] = (matrix[:2, 2] + 0.5) * scale - 0.5
+    changed = (jnp.asarray(matrix), jnp.asarray(scale * before))
+    return eqx.tree_at(lambda c: (c.intrinsics, c.image_size), camera, changed)
 
 
 def cube_around(masks: Sequence[Bool[np.ndarray, "_h _w"]], cameras: Sequence[Camera]) -> Cube:

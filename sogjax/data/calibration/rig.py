@@ -45,7 +45,7 @@ class CameraRig:
     def camera(self, name: str) -> Camera:
         """The one camera called `name`, without a camera axis."""
         index = self.names.index(name)
-        return jax.tree.map(lambda leaf: leaf[index], self.cameras)
+        return jax.tree.map(lambda leaf: jnp.asarray(np.asarray(leaf)[index]), self.cameras)
 
     def image_size(self, name: str) -> tuple[int, int]:
         """Width and height of a camera's images, in pixels.
