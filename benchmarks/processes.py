@@ -1,4 +1,4 @@
-"""What only a process of its own shows: start-up, and the most memory that is resident.
+"""What only a process of its own shows: how long importing takes, and the most memory that is resident.
 
 python benchmarks/processes.py first_frame|memory ACTOR_FILE
 """

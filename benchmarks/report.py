@@ -19,6 +19,7 @@ from energies import energy_quantities, growth_quantities
 from processes import process_quantities
 from quantities import Quantity, is_worse, reference_milliseconds
 from runs import Scene, end_to_end_quantities, solver_quantities, stage_quantities
+from start_up import start_up_quantities
 
 from sogjax.data.actor_file import save_body
 from sogjax.data.atomic import atomic_path
@@ -73,6 +74,7 @@ def parts() -> dict[str, Callable[[Scene], Iterable[Quantity]]]:
         "end_to_end": end_to_end_quantities,
         "growth": lambda _: growth_quantities(),
         "process": of_processes,
+        "start_up": of_starts,
     }
 
 
@@ -82,6 +84,14 @@ def of_processes(scene: Scene) -> Iterator[Quantity]:
         actor = Path(folder) / "actor.yaml"
         save_body(actor, scene.bodies[0])
         yield from process_quantities(actor)
+
+
+def of_starts(scene: Scene) -> Iterator[Quantity]:
+    """From commands to their first results, with the scene's actor in a file."""
+    with TemporaryDirectory() as folder:
+        actor = Path(folder) / "actor.yaml"
+        save_body(actor, scene.bodies[0])
+        yield from start_up_quantities(actor)
 
 
 def row(quantity: Quantity) -> str:

@@ -1,0 +1,109 @@
+"""How long does a person wait for the first motion, with programs compiled now and with those of an earlier run?
+
+    python benchmarks/start_up.py [against=CHECKOUT] [commands=[given,searched,actor,demo]]
+
+Each command is a process of its own, on the demo's recording with its actor: with an empty folder for compiled
+programs, and again with what the first run kept. `against` is another checkout of sogjax, whose commands take turns
+with this one's.
+"""
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from quantities import Quantity
+from track_speed import demo_recording
+
+from sogjax.study.machine import machine_line
+from sogjax.study.script import run_script, settings_from
+
+OURS = Path(__file__).resolve().parents[1]
+FRAMES = "stop=3"
+NAMES = {
+    "given": f"track {FRAMES}, given pose",
+    "searched": f"track {FRAMES}, searched pose",
+    "actor": "actor of four example poses",
+    "demo": "demo, rendering included",
+}
+AIMS = {"given": (15.0, 6.0), "searched": (28.0, 14.0), "actor": (30.0, 15.0), "demo": (75.0, None)}
+"""Seconds with programs compiled now, and kept."""
+
+
+@dataclass
+class Settings:
+    """What is measured, as `key=value` on the command line."""
+
+    against: str | None = None
+    commands: list[str] = field(default_factory=lambda: [*NAMES])
+
+
+def main() -> None:
+    """Print seconds, one row for each command."""
+    settings, recording = settings_from(Settings), demo_recording()
+    checkouts = [OURS] if settings.against is None else [Path(settings.against).resolve(), OURS]
+    print(machine_line())
+    heads = ["cold", "kept"] if len(checkouts) == 1 else ["cold before", "now", "ratio", "kept before", "now", "ratio"]
+    print(f"{'seconds':<34}" + "".join(f"{head:>12}" for head in heads), flush=True)
+    with TemporaryDirectory() as folder:
+        actor = made_actor(recording, Path(folder))
+        for name in settings.commands:
+            taken = [seconds(name, checkout, recording, actor) for checkout in checkouts]
+            columns = []
+            for times in zip(*taken, strict=True):
+                columns += [*times] if len(times) == 1 else [*times, times[1] / times[0]]
+            print(f"{NAMES[name]:<34}" + "".join(f"{value:>12.2f}" for value in columns), flush=True)
+
+
+def start_up_quantities(actor: Path) -> Iterator[Quantity]:
+    """All of them, as rows of the report."""
+    recording = demo_recording()
+    for name, aims in AIMS.items():
+        for kept, value, aim in zip(("cold", "kept"), seconds(name, OURS, recording, actor), aims, strict=True):
+            yield Quantity("start-up", f"{NAMES[name]}, {kept}", value, "s", target=aim)
+
+
+def made_actor(recording: Path, folder: Path) -> Path:
+    """The actor of a recording."""
+    with TemporaryDirectory() as programs:
+        _run(["actor", f"recording={recording}", f"out={folder / 'actor.yaml'}"], OURS, Path(programs), folder)
+    return folder / "actor.yaml"
+
+
+def seconds(name: str, checkout: Path, recording: Path, actor: Path) -> tuple[float, float]:
+    """Of a command of a checkout, by the clock: with an empty folder for compiled programs, and after that."""
+    with TemporaryDirectory() as folder:
+        programs, taken = Path(folder) / "programs", []
+        for turn in ("cold", "kept"):
+            out = Path(folder) / turn
+            out.mkdir()
+            track = ["track", f"recording={recording}", f"actor={actor}", FRAMES, f"out={out / 'run'}"]
+            command = {
+                "given": track,
+                "searched": [*track, "initial_pose=auto"],
+                "actor": ["actor", f"recording={recording}", f"out={out / 'actor.yaml'}"],
+                "demo": ["demo", f"out={out / 'demo'}"],
+            }[name]
+            begin = time.perf_counter()
+            _run(command, checkout, programs, out)
+            taken.append(time.perf_counter() - begin)
+    return taken[0], taken[1]
+
+
+def _run(command: list[str], checkout: Path, programs: Path, cache: Path) -> None:
+    environment = os.environ | {
+        "PYTHONPATH": str(checkout),
+        "SOGJAX_COMPILATION_CACHE": str(programs),
+        "SOGJAX_CACHE": str(cache),
+    }
+    done = subprocess.run([sys.executable, "-m", "sogjax", *command], capture_output=True, text=True, env=environment)
+    if done.returncode:
+        raise RuntimeError(f"{checkout}: sogjax {' '.join(command)} ended with {done.returncode}:\n{done.stderr}")
+
+
+if __name__ == "__main__":
+    run_script(main)
