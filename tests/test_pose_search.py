@@ -79,7 +79,10 @@ def test_two_dogs_of_other_colours_are_both_found(dog):
     first = moved(dog, standing(dog, 1.1, (0.0, 0.45)), {"root_yaw": 0.4})
     second = moved(dog, standing(dog, 1.1, (0.1, -0.45)), {"root_yaw": -2.6})
     make = frames_of(over(draw(dog, first, RIG), draw(other, second, RIG)))
-    found = search_poses([dog, other], [searcher(dog), searcher(other)], make, 1)
+    shares = []
+    found = search_poses([dog, other], [searcher(dog), searcher(other)], make, 1, shares.append)
+    assert shares == sorted(shares)
+    assert 0.0 < shares[0] < shares[-1] <= 1.0
     assert off(dog, found[0].pose, first) < 0.06
     assert off(other, found[1].pose, second) < 0.06
 

@@ -6,7 +6,7 @@ import time
 import pytest
 
 from sogjax.engine import terminal
-from sogjax.engine.terminal import alive, bar, progress, remaining
+from sogjax.engine.terminal import Work, alive, bar, progress, remaining
 
 
 class Terminal(io.StringIO):
@@ -65,3 +65,19 @@ def test_work_without_a_count_shows_that_it_goes_on(monkeypatch):
     assert said.startswith("searching: 0 s so far")
     time.sleep(0.05)
     assert out.getvalue() == said
+
+
+def test_work_whose_share_is_known_says_how_long_the_rest_takes(monkeypatch):
+    monkeypatch.setattr(terminal, "LINE_AFTER", 0.02)
+    out = io.StringIO()
+    with alive("searching", out) as work:
+        work.share = 0.25
+        deadline = time.monotonic() + 5.0
+        while "left" not in out.getvalue() and time.monotonic() < deadline:
+            time.sleep(0.01)
+    assert "so far, about 0 s left" in out.getvalue()
+
+
+def test_time_left_follows_from_the_share_that_is_done():
+    assert Work(0.25).left(20.0) == ", about 60 s left"
+    assert Work(0.0).left(20.0) == Work(1.0).left(20.0) == ""

@@ -1,6 +1,7 @@
 """The poses of the actors in the first frame of a track: from a file, or searched for where they are clear."""
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import jax.numpy as jnp
@@ -125,8 +126,8 @@ def clear_beginning(search: PoseSearch, first: int, last: int, picture: Path | N
     recording = search.recording
     guesses: list[Beginning] = []
     for frame in tried_frames(first, last, recording.fps):
-        with alive(f"searching for the first pose in frame {frame + recording.first_frame}"):
-            guesses.append(search.beginning(frame))
+        with alive(f"searching for the first pose in frame {frame + recording.first_frame}") as work:
+            guesses.append(search.beginning(frame, partial(setattr, work, "share")))
         for body, pose in zip(search.bodies, guesses[-1].poses, strict=True):
             say(
                 f"pose of {body.name} in frame {frame + recording.first_frame}: "

@@ -56,11 +56,26 @@ def progress(items: Iterable[Item], total: int, label: str, stream: TextIOBase |
             out.flush()
 
 
+@dataclass
+class Work:
+    """Work that is under way."""
+
+    share: float = 0.0
+    """How much of it is done, 0 to 1; 0: not known."""
+
+    def left(self, seconds: float) -> str:
+        """How long the rest takes, when so many seconds are over."""
+        return f", about {remaining(seconds * (1.0 / self.share - 1.0))} left" if 0.0 < self.share < 1.0 else ""
+
+
 @contextmanager
-def alive(label: str, stream: TextIOBase | None = None) -> Iterator[None]:
-    """For work without a count: while nothing else was said for ten seconds, a line like `first pose: 20 s so far`."""
+def alive(label: str, stream: TextIOBase | None = None) -> Iterator[Work]:
+    """For work without a count: while nothing else was said for ten seconds, a line like `first pose: 20 s so far`.
+
+    With the time that is left, where whoever works sets the `share` of what was yielded.
+    """
     out = sys.stderr if stream is None else stream
-    begin, ended = time.monotonic(), threading.Event()
+    begin, ended, work = time.monotonic(), threading.Event(), Work()
 
     def tell() -> None:
         told = begin
@@ -68,12 +83,12 @@ def alive(label: str, stream: TextIOBase | None = None) -> Iterator[None]:
             told = max(told, _said.at)
             if time.monotonic() - told >= LINE_AFTER:
                 told = time.monotonic()
-                print(f"{label}: {told - begin:.0f} s so far", file=out, flush=True)
+                print(f"{label}: {told - begin:.0f} s so far{work.left(told - begin)}", file=out, flush=True)
 
     thread = threading.Thread(target=tell, daemon=True)
     thread.start()
     try:
-        yield
+        yield work
     finally:
         ended.set()
         thread.join()

@@ -9,12 +9,16 @@ from jaxtyping import Array, Float
 from sogjax.model.body import Body
 from sogjax.tracking.explained import explained
 from sogjax.tracking.following import followed
-from sogjax.tracking.pose_search import Searcher, search
+from sogjax.tracking.pose_search import Searcher, Told, nothing, search
 from sogjax.tracking.seen_frame import SeenFrame
 from sogjax.tracking.sureness import SURE, Agreement, Evidence, agreed_confidence, confidence
 
 FrameMaker = Callable[[Searcher, int], SeenFrame]
 """A frame as it is compared with one body: that which is searched (0) and those that come next."""
+
+
+SEARCHED = 0.8
+"""Share of the time that the search in the first frame takes; the rest follows what was found."""
 
 
 @dataclass(frozen=True)
@@ -49,9 +53,9 @@ class Path:
     poses: Float[np.ndarray, "frame dof"]
 
 
-def search_pose(searcher: Searcher, frames: Sequence[SeenFrame]) -> Path:
+def search_pose(searcher: Searcher, frames: Sequence[SeenFrame], told: Told = nothing) -> Path:
     """The pose of a body in the first of some frames, which explains the later ones too."""
-    optima = search(searcher, frames[0])
+    optima = search(searcher, frames[0], told=lambda share: told(SEARCHED * share))
     if not optima:
         rest = np.asarray(searcher.body.poses["rest"])
         return Path(FoundPose(rest, 0.0, 0.0, False, 0.0), np.repeat(rest[None], len(frames), axis=0))
@@ -72,17 +76,20 @@ def search_pose(searcher: Searcher, frames: Sequence[SeenFrame]) -> Path:
 
 
 def search_poses(
-    bodies: Sequence[Body], searchers: Sequence[Searcher], make: FrameMaker, num_frames: int
+    bodies: Sequence[Body], searchers: Sequence[Searcher], make: FrameMaker, num_frames: int, told: Told = nothing
 ) -> list[FoundPose]:
     """The poses of several bodies in one frame: the surest is found first, and what it covers is its own."""
     found: dict[int, Path] = {}
+    count, total = 0, len(bodies) * (len(bodies) + 1) // 2
     while len(found) < len(bodies):
         candidates = {}
         for k in (k for k in range(len(bodies)) if k not in found):
             frames = [make(searchers[k], frame) for frame in range(num_frames)]
             for other, path in found.items():
                 frames = [f.with_found(bodies[other], pose) for f, pose in zip(frames, path.poses, strict=True)]
-            candidates[k] = search_pose(searchers[k], frames)
+            before = count / total
+            candidates[k] = search_pose(searchers[k], frames, lambda share, before=before: told(before + share / total))
+            count += 1
         surest = max(candidates, key=lambda k: (candidates[k].found.confidence, candidates[k].found.margin))
         found[surest] = candidates[surest]
     return [found[k].found for k in range(len(bodies))]

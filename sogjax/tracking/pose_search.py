@@ -1,6 +1,6 @@
 """The pose of a body in one frame without a hint: places, turns and named poses tried at once, the best refined."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import equinox as eqx
@@ -48,6 +48,9 @@ POOR = 0.3
 DIFFERENT = 0.1
 """Metres, mean distance of the blobs: poses farther apart are different optima."""
 
+Told = Callable[[float], None]
+"""Called with the share of some work that is done, 0 to 1."""
+
 
 @dataclass(frozen=True)
 class Optimum:
@@ -86,8 +89,15 @@ class Searcher:
         return SearchEnergy.from_terms(self.body, frame.cameras, self.terms, self.kinds)
 
 
-def search(searcher: Searcher, frame: SeenFrame, count: int = NUM_LAST) -> list[Optimum]:
-    """The best different poses of a body in one frame, best first; none, if nothing looks like it."""
+def nothing(share: float) -> None:
+    """Nobody asks how far a search is."""
+
+
+def search(searcher: Searcher, frame: SeenFrame, count: int = NUM_LAST, told: Told = nothing) -> list[Optimum]:
+    """The best different poses of a body in one frame, best first; none, if nothing looks like it.
+
+    `told` is called with the share of the work that is done.
+    """
     found = places(frame, searcher.up, NUM_PLACES)
     if not found:
         return []
@@ -96,9 +106,12 @@ def search(searcher: Searcher, frame: SeenFrame, count: int = NUM_LAST) -> list[
     tried = _starts(searcher, found)
     tried = hunt.climbed(_spread_best(searcher.body, hunt.scored(tried)), FIRST_ITERATIONS)
     tried = _best(searcher.body, tried, NUM_SECOND)
-    for _ in range(2):
+    told(0.3)
+    for share in (0.6, 0.85):
         tried = _best(searcher.body, _with_better_limbs(hunt, tried), NUM_LAST)
+        told(share)
     tried = hunt.climbed(_with_look_alikes(hunt, tried), LAST_ITERATIONS)
+    told(1.0)
     best = _best(searcher.body, tried, count)
     return [Optimum(pose, float(value)) for pose, value in zip(best.poses, best.values, strict=True)]
 
