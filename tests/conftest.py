@@ -7,6 +7,7 @@ os.environ.setdefault("JAX_PLATFORMS", "cpu")
 # Most of the tests' time is compilation, a third of it LLVM's optimisation; `.ci/run` keeps that in the slow tests.
 os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "true")
 os.environ.setdefault("SOGJAX_COMPILATION_CACHE", "off")
+os.environ.setdefault("SOGJAX_BACKGROUND_CACHE", "off")
 
 import jax
 import pytest

@@ -7,7 +7,7 @@ from importlib.metadata import version
 
 import pytest
 
-from sogjax.engine.compilation_cache import REFUSED, TRIED, VARIABLE, _sweep, refusal, use_compilation_cache
+from sogjax.engine.compilation_cache import REFUSED, TRIED, VARIABLE, refusal, use_compilation_cache
 from sogjax.errors import InputError
 
 PROGRAM = """
@@ -82,19 +82,6 @@ def test_a_default_folder_that_cannot_be_made_is_no_error(tmp_path, monkeypatch)
     monkeypatch.setenv(VARIABLE, "")
     monkeypatch.setenv("SOGJAX_CACHE", str(tmp_path / "file"))
     use_compilation_cache()
-
-
-def test_programs_that_were_not_used_for_longest_go_first(tmp_path):
-    (tmp_path / "here").mkdir()
-    paths = [tmp_path / "here" / f"{k}-cache" for k in range(8)]
-    for k, path in enumerate(paths):
-        path.write_bytes(bytes(100))
-        os.utime(path, (k, k))
-    _sweep(tmp_path, largest=400)
-    assert sorted(path.name for path in tmp_path.glob("*/*-cache")) == ["5-cache", "6-cache", "7-cache"]
-    paths[0].write_bytes(bytes(1000))
-    _sweep(tmp_path, largest=400)  # not twice on one day
-    assert paths[0].exists()
 
 
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path, monkeypatch):

@@ -11,7 +11,8 @@ from pathlib import Path
 import jax
 
 from sogjax.app.config.schemas import DoctorConfig
-from sogjax.engine.compilation_cache import OFF, VARIABLE
+from sogjax.data.cache_folder import OFF
+from sogjax.engine.compilation_cache import VARIABLE
 from sogjax.engine.self_test import LAWS
 from sogjax.errors import InputError
 

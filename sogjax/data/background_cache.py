@@ -1,7 +1,9 @@
 """Backgrounds that were learnt from a recording, on disk, so that later runs do not read its videos for them."""
 
+import contextlib
 import hashlib
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from sogjax.data.atomic import atomic_path
+from sogjax.data.cache_folder import OFF, default_cache_dir, sweep
 from sogjax.data.npz_file import read_npz
 from sogjax.data.recording import Recording
 from sogjax.data.source import fingerprint
@@ -17,6 +20,10 @@ from sogjax.errors import InputError
 BACKGROUND_VERSION = 1
 """Raise it with every change that alters what is learnt."""
 NOTE = "made_from"
+VARIABLE = "SOGJAX_BACKGROUND_CACHE"
+"""The environment variable with the folder where `images.cache` names none, or `off`."""
+LARGEST = 1_000_000_000
+"""Bytes that the usual folder may take; a camera takes about one million."""
 
 Arrays = dict[str, np.ndarray]
 
@@ -37,35 +44,59 @@ def background_origin(recording: Recording) -> dict[str, Any]:
     }
 
 
+def background_folder(chosen: str | None) -> Path | None:
+    """Where backgrounds are kept: in the folder of `images.cache`, or where the environment says; None: nowhere."""
+    if chosen is not None:
+        return Path(chosen)
+    name = os.environ.get(VARIABLE, "")
+    if name.lower() == OFF:
+        return None
+    return Path(name).expanduser() if name else default_cache_dir() / "backgrounds"
+
+
 def kept_background(
-    folder: str | None, recording: Recording, make: Callable[[], Arrays], say: Callable[[str], None]
+    chosen: str | None, recording: Recording, make: Callable[[], Arrays], say: Callable[[str], None]
 ) -> Arrays:
     """What `make` returns, from a file in the folder where it is kept there, else made and kept.
 
+    `chosen` is the folder that the settings name. Where they name none, and the usual one cannot be written, nothing
+    is kept.
+
     Raises:
-        InputError: the folder cannot be written, or whatever `make` raises.
+        InputError: the folder that was chosen cannot be written, or whatever `make` raises.
     """
+    folder = background_folder(chosen)
     if folder is None:
         return make()
     made_from = json.dumps(background_origin(recording), sort_keys=True)
-    path = _file(Path(folder), recording)
+    path = _file(folder, recording)
     if path.is_file():
         try:
             arrays = read_npz(path)
             if str(arrays.pop(NOTE, "")) == made_from:
                 return arrays
-            say(f"images.cache: {path} was made from other files or settings; it is made again")
+            say(f"{path} was made from other files or settings; it is made again")
         except InputError:
-            say(f"images.cache: {path} is damaged; it is made again")
+            say(f"{path} is damaged; it is made again")
     arrays = make()
+    kept = {NOTE: np.array(made_from)} | arrays
+    if chosen is None:
+        with contextlib.suppress(InputError):
+            _write(path, kept)
+            sweep(folder, "*-background.npz", LARGEST)
+        return arrays
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         reason = error.strerror or str(error)
-        raise InputError(f"images.cache={folder}: no folder can be made there ({reason}); choose another") from error
-    with atomic_path(path) as temporary, temporary.open("wb") as file:
-        np.savez_compressed(file, **{NOTE: np.array(made_from)}, **arrays)  # pyright: ignore[reportArgumentType]
+        raise InputError(f"images.cache={chosen}: no folder can be made there ({reason}); choose another") from error
+    _write(path, kept)
     return arrays
+
+
+def _write(path: Path, arrays: Arrays) -> None:
+    with atomic_path(path) as temporary, temporary.open("wb") as file:
+        np.savez_compressed(file, **arrays)  # pyright: ignore[reportArgumentType]
 
 
 def _file(folder: Path, recording: Recording) -> Path:

@@ -1,10 +1,16 @@
-"""Where what can be made again is kept between runs: rendered recordings, compiled programs."""
+"""Where what can be made again is kept between runs: rendered recordings, compiled programs, learnt backgrounds."""
 
+import contextlib
 import os
+import time
 from pathlib import Path
 
 VARIABLE = "SOGJAX_CACHE"
 """The environment variable that names another folder."""
+OFF = "off"
+"""Value of a variable that names a folder of its own: nothing is kept."""
+SWEPT, SWEPT_EVERY = "swept", 86400.0
+"""Name of the file that says when a folder was last looked through, and seconds until that is done again."""
 
 
 def default_cache_dir() -> Path:
@@ -14,3 +20,25 @@ def default_cache_dir() -> Path:
         return Path(own)
     system = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
     return Path(system) / "sogjax" if system else Path.home() / ".cache" / "sogjax"
+
+
+def sweep(folder: Path, pattern: str, largest: int) -> None:
+    """Delete the files that were not used for longest, where a folder holds more than so many bytes.
+
+    Looks once a day; does nothing where it may not.
+    """
+    mark = folder / SWEPT
+    with contextlib.suppress(OSError):
+        if mark.exists() and time.time() - mark.stat().st_mtime < SWEPT_EVERY:
+            return
+        mark.touch()
+        files = [(path, path.stat()) for path in folder.glob(pattern)]
+        found = sorted((max(status.st_atime, status.st_mtime), status.st_size, path) for path, status in files)
+        excess = sum(size for _, size, _ in found) - largest
+        if excess > 0:
+            excess += largest // 4
+        for _, size, path in found:
+            if excess <= 0:
+                return
+            path.unlink(missing_ok=True)
+            excess -= size

@@ -6,24 +6,20 @@ import os
 import platform
 import sys
 import tempfile
-import time
 import warnings
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
 
-from sogjax.data.cache_folder import default_cache_dir
+from sogjax.data.cache_folder import OFF, default_cache_dir, sweep
 from sogjax.errors import InputError
 
 VARIABLE = "SOGJAX_COMPILATION_CACHE"
 """The environment variable with the folder, or `off`; without it programs lie beside other things that are kept."""
-OFF = "off"
 LARGEST = 1_000_000_000
 """Bytes that kept programs may take; a recording of its own takes about three million."""
-SWEPT_EVERY = 86400.0
-"""Seconds between looks at how much is kept."""
-TRIED, REFUSED, SWEPT = "tried", "refused", "swept"
-"""Names of files in the folder: kept programs were taken there; were not, and why; were counted, and when."""
+TRIED, REFUSED = "tried", "refused"
+"""Names of files in the folder: kept programs were taken there; were not, and why."""
 _NOT_READ = "Error reading persistent compilation cache entry"
 _NOT_OF_THIS_MACHINE = "AOT result"
 """Part of what is written to standard error about a program that may not run on this processor."""
@@ -52,8 +48,7 @@ def use_compilation_cache() -> None:
         raise InputError(f"{VARIABLE}={name}: no folder can be made there ({reason}); choose another") from error
     if not os.access(own, os.W_OK) or (own / REFUSED).exists():
         return
-    with contextlib.suppress(OSError):
-        _sweep(folder)
+    sweep(folder, "*/*-cache", LARGEST)
     _use(str(own))
     if not (own / TRIED).exists():
         reason = refusal()
@@ -110,25 +105,6 @@ def _standard_error_to(file: int) -> Iterator[None]:
         sys.stderr.flush()
         os.dup2(before, 2)
         os.close(before)
-
-
-def _sweep(folder: Path, largest: int = LARGEST) -> None:
-    """Delete programs that were not used for longest, where too much is kept; looks once a day."""
-    mark = folder / SWEPT
-    if mark.exists() and time.time() - mark.stat().st_mtime < SWEPT_EVERY:
-        return
-    mark.touch()
-    programs = [(path, path.stat()) for path in folder.glob("*/*-cache")]
-    found = sorted((max(status.st_atime, status.st_mtime), status.st_size, path) for path, status in programs)
-    excess = sum(size for _, size, _ in found) - largest
-    if excess <= 0:
-        return
-    excess += largest // 4
-    for _, size, path in found:
-        if excess <= 0:
-            return
-        path.unlink(missing_ok=True)
-        excess -= size
 
 
 def _processor() -> str:
