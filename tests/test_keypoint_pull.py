@@ -11,7 +11,7 @@ from body_cases import random_body
 from rig_cases import ring_rig
 from sog_cases import in_float64
 
-from sogjax.energy.keypoint_views import KeypointViews, SeenKeypoints, body_sizes
+from sogjax.energy.keypoint_views import LEAST, KeypointViews, SeenKeypoints, belonging, body_sizes
 from sogjax.energy.keypoints import KeypointPull
 from sogjax.energy.posed import Posed
 from sogjax.model.camera import project_points
@@ -55,7 +55,8 @@ def views_of(cameras, body, pose, pixels, sure, exchanged=0.0):
     seen = SeenKeypoints(jnp.asarray(pixels, jnp.float64), jnp.asarray(sure, jnp.float64))
     blobs = body.posed_blobs(pose)
     scale, areas = body_sizes(cameras, blobs, jnp.full(2, 1e4), (0,) * body.num_blobs)
-    return KeypointViews(seen, jnp.full(seen.confidence.shape, exchanged), scale, areas)
+    belongs = jnp.ones((*seen.confidence.shape[:2], scale.shape[1]))
+    return KeypointViews(seen, jnp.full(seen.confidence.shape, exchanged), scale, areas, belongs)
 
 
 def value(term, body, cameras, views, pose):
@@ -160,9 +161,47 @@ def test_two_actors_are_each_drawn_to_what_is_near(body, cameras):
     pose = near(body)
     at = np.asarray(projected(cameras, body, pose))[:, None]
     seen = SeenKeypoints(jnp.asarray(at), jnp.ones((2, 1, COUNT)))
-    views, one = (KeypointViews(seen, jnp.zeros((2, 1, COUNT)), jnp.full((2, n), 300.0), jnp.ones(2)) for n in (2, 1))
+    views, one = (
+        KeypointViews(seen, jnp.zeros((2, 1, COUNT)), jnp.full((2, n), 300.0), jnp.ones(2), jnp.ones((2, 1, n)))
+        for n in (2, 1)
+    )
     twice = pull(landmarks=((0, 1, 2), (0, 1, 2)), offsets=jnp.zeros((2, COUNT, 3)))
     posed = Posed.from_pose(body, pose + 0.01)
     np.testing.assert_allclose(
         twice.model(posed, cameras, views).gradient, pull().model(posed, cameras, one).gradient, rtol=1e-9
     )
+
+
+def belongs(people, actors, sure=None):
+    """Of people in one picture of 100 pixels a metre, whose keypoints lie where (metres), and actors there."""
+    spread = np.arange(COUNT)[:, None] * [0.0, 0.5]
+    pixels = 100.0 * (np.asarray(people, float)[None, :, None] + spread)
+    seen = SeenKeypoints(jnp.asarray(pixels), jnp.ones(pixels.shape[:3]) if sure is None else jnp.asarray(sure)[None])
+    at = 100.0 * (np.asarray(actors, float)[None, :, None] + spread)
+    found = belonging(seen, jnp.asarray(at), jnp.ones(at.shape[:3], bool), jnp.full((1, len(actors)), 100.0))
+    return np.asarray(found)[0]
+
+
+def test_each_of_two_people_is_the_actor_who_is_nearer():
+    found = belongs([(0.0, 0.0), (0.4, 0.0)], [(0.45, 0.0), (0.05, 0.0)])
+    np.testing.assert_allclose(found, [[LEAST, 1.0], [1.0, LEAST]], atol=0.01)
+
+
+def test_somebody_else_is_not_the_only_actor():
+    np.testing.assert_allclose(belongs([(0.0, 0.0), (0.6, 0.0)], [(0.1, 0.0)])[:, 0], [1.0, LEAST], atol=0.01)
+
+
+def test_where_nobody_is_near_all_count_alike():
+    np.testing.assert_allclose(belongs([(3.0, 0.0), (5.0, 0.0)], [(0.0, 0.0)]), 1.0)
+
+
+def test_nobody_is_two_actors():
+    found = belongs([(0.0, 0.0), (0.6, 0.0)], [(0.05, 0.0), (0.3, 0.0)])  # the second actor is as near to both
+    assert found[0, 0] == found[1, 1] == 1.0
+    assert found[0, 1] < 0.2
+
+
+def test_a_person_without_keypoints_is_nobody_in_particular():
+    found = belongs([(0.0, 0.0), (9.0, 9.0)], [(0.0, 0.0)], sure=np.array([[1.0] * COUNT, [0.0] * COUNT]))
+    assert found[0, 0] == 1.0
+    assert np.isfinite(found).all()

@@ -17,6 +17,15 @@ RARE = 0.03
 """Share of the groups of keypoints whose sides a detector exchanges."""
 
 
+NEAR_BODY = 0.25
+"""Metres by which a keypoint is off its landmark, where people are told apart."""
+TOLD_APART = 4.0
+"""How many keypoints' worth the evidence is that people found by a detector are one actor or another: those of one body
+are off together."""
+LEAST = 0.05
+"""What counts of a keypoint of somebody who seems to be another one."""
+
+
 class SeenKeypoints(eqx.Module):
     """The keypoints of people in the pictures of one time; people are in no order."""
 
@@ -36,6 +45,8 @@ class KeypointViews(eqx.Module):
     """At the actor's distance."""
     areas: Float[Array, "*camera"]
     """Of the body's blobs, as a share of the picture, in units of Eq. 9: what the similarity could be at most."""
+    belongs: Float[Array, "*camera person actor"]
+    """How far somebody in the picture is thought to be an actor: by all keypoints together, from `LEAST` to 1."""
 
 
 def body_sizes(
@@ -88,3 +99,22 @@ def exchange_odds(
     share = jnp.sum(sure * likely, axis=(0, 1)) / jnp.maximum(jnp.sum(sure, axis=(0, 1)), 1e-6)
     likely = jnp.where(share[None, None] <= 0.5, likely, 0.0)
     return jnp.einsum("cpg,kg->cpk", likely, member, precision="highest")
+
+
+def belonging(
+    seen: SeenKeypoints,
+    pixels: Float[Array, "camera actor keypoint 2"],
+    known: Bool[Array, "camera actor keypoint"],
+    pixels_per_metre: Float[Array, "camera actor"],
+) -> Float[Array, "camera person actor"]:
+    """How far people in the pictures are actors: the more, the nearer all their keypoints lie to an actor's landmarks.
+
+    Nobody is two actors, and where nobody lies nearer than others, all count alike; arguments as of `exchange_odds`.
+    """
+    away = (seen.pixels[:, :, None] - pixels[:, None]) / pixels_per_metre[:, None, :, None, None]
+    cost = jnp.minimum(jnp.sum(away**2, axis=-1) / (2.0 * NEAR_BODY**2), MOST)
+    sure = jnp.where(known[:, None], jnp.asarray(seen.confidence)[:, :, None], 0.0)
+    near = TOLD_APART * jnp.sum(sure * (MOST - cost), axis=-1) / jnp.maximum(jnp.sum(sure, axis=-1), 1.0)
+    logs = near - jax.nn.logsumexp(near, axis=2, keepdims=True)  # of the actors, for somebody
+    logs = logs + near
+    return jnp.maximum(jnp.exp(logs - jnp.max(logs, axis=1, keepdims=True)), LEAST)

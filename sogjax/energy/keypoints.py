@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from sogjax.energy.keypoint_views import KeypointViews, SeenKeypoints, body_sizes, exchange_odds
+from sogjax.energy.keypoint_views import KeypointViews, SeenKeypoints, belonging, body_sizes, exchange_odds
 from sogjax.energy.posed import Frame, Posed
 from sogjax.energy.term import Term, Terms
 from sogjax.model.body import Body
@@ -104,7 +104,8 @@ class KeypointPull(Term):
         shape = (len(pixels), len(self.landmarks), len(self.mirrored))
         known = (depths > NEAR).reshape(shape) & jnp.asarray(np.array(self.landmarks, int) >= 0)[None]
         exchanged = exchange_odds(seen, pixels.reshape(*shape, 2), known, sizes, self.mirrored, self.groups)
-        return KeypointViews(seen, exchanged, sizes, areas)
+        belongs = belonging(seen, pixels.reshape(*shape, 2), known, sizes)
+        return KeypointViews(seen, exchanged, sizes, areas, belongs)
 
     def points(self, posed: Posed) -> Float[Array, "point 3"]:
         """Where the detector would put the keypoints of all actors, in the world; any place for those without one."""
@@ -136,6 +137,7 @@ class KeypointPull(Term):
         sure = jnp.concatenate([(1.0 - views.exchanged) * seen.confidence, mirrored], axis=-2)
         # By camera, candidate and point; a point is a keypoint of an actor.
         pixels, sure = jnp.tile(pixels, (1, 1, actors, 1)), jnp.tile(sure, (1, 1, actors))
+        sure = sure * jnp.repeat(jnp.tile(views.belongs, (1, 2, 1)), count, axis=2)
         scale = jnp.repeat(views.pixels_per_metre, count, axis=1)
         project_all = jax.vmap(project_points, in_axes=(0, None))
         at, depths = project_all(cameras, points)
