@@ -1,5 +1,7 @@
 """Pose2Sim projects and FreeMoCap recordings are recordings as they are."""
 
+import re
+
 import numpy as np
 import pytest
 from command_line import actor_file, done, refused, trackable
@@ -138,3 +140,42 @@ def test_without_a_ground_plane_the_vertical_is_the_first_cameras(tmp_path):
     assert "ground plane" in recording.warnings[0]
     (folder / "recording.yaml").write_text("up: -y\n")
     assert open_recording(folder).warnings == ()
+
+
+def synchronised(folder, shifts):
+    """What Pose2Sim's synchronisation leaves: the files of `pose/` under numbers less by a shift."""
+    for name, shift in shifts.items():
+        (source,) = (folder / "pose").glob(f"*{name}*")
+        target = folder / "pose-sync" / source.name
+        target.mkdir(parents=True)
+        for file in source.iterdir():
+            stem, number, rest = re.fullmatch(r"(.*?)([0-9]+)(\D*)", file.name).groups()
+            if int(number) - shift >= 0:
+                (target / f"{stem}{int(number) - shift:06d}{rest}").write_bytes(file.read_bytes())
+
+
+def test_frames_are_shifted_as_pose2sim_shifted_its_files(tmp_path):
+    folder, written = pose2sim(tmp_path / "trial")
+    synchronised(folder, {"cam01": 0, "cam02": 1})
+    recording = open_recording(folder)
+    assert recording.frame_offset == {"cam01": 0, "cam02": 1}
+    assert recording.num_frames == 3
+    assert any("cam02 by +1" in warning for warning in recording.warnings)
+    found = load_keypoints(recording)
+    np.testing.assert_allclose(found.points[0], written[:3], atol=1e-3)
+    np.testing.assert_allclose(found.points[1], written[1:], atol=1e-3)
+
+
+def test_offsets_in_the_settings_count_more_than_pose2sims(tmp_path):
+    folder, _ = pose2sim(tmp_path / "trial")
+    synchronised(folder, {"cam01": 0, "cam02": 1})
+    (folder / "recording.yaml").write_text("frame_offset: {cam01: 1}\n")
+    assert open_recording(folder).frame_offset == {"cam01": 1, "cam02": 0}
+
+
+def test_other_peoples_files_in_pose_sync_tell_nothing(tmp_path):
+    folder, _ = pose2sim(tmp_path / "trial")
+    synchronised(folder, {"cam01": 0, "cam02": 1})
+    for file in (folder / "pose-sync").glob("*cam02*/*"):
+        file.write_text('{"people": []}')
+    assert set(open_recording(folder).frame_offset.values()) == {0}
