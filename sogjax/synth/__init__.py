@@ -1,7 +1,8 @@
 """Rendered recordings of people with ground truth: for the demo, the tests and the benchmarks."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from sogjax.lazy import lazy_names
 from sogjax.synth.settings import ACTOR_NAMES, MOTIONS, SynthSettings
 
 if TYPE_CHECKING:
@@ -17,13 +18,12 @@ __all__ = [
     "render_recording",
 ]
 
-_LAZY = {"render_recording": "render", "cached_recording": "cache", "default_cache_dir": "cache"}
-"""Loaded on first use: the settings alone are needed by every command line."""
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _LAZY:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module
-
-    return getattr(import_module(f"{__name__}.{_LAZY[name]}"), name)
+# Loaded on first use: the settings alone are needed by every command line.
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "render_recording": f"{__name__}.render",
+        "cached_recording": f"{__name__}.cache",
+        "default_cache_dir": f"{__name__}.cache",
+    },
+)
