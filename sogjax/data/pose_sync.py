@@ -4,8 +4,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from sogjax.data.keypoints.files import files_in, json_files
-from sogjax.data.keypoints.people import number_in
+from sogjax.data.keypoint_files import files_in, json_files, number_in
 from sogjax.data.name_match import matched_names
 
 FOLDER, SHIFTED = "pose", "pose-sync"

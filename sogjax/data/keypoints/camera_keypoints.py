@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sogjax.data.keypoints.files import json_files
+from sogjax.data.keypoint_files import json_files
 from sogjax.data.keypoints.formats import read_pictures
 from sogjax.data.keypoints.people import Person
 from sogjax.errors import InputError

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from sogjax.data.keypoint_files import number_in
 from sogjax.data.keypoints.alphapose import pictures_of_alphapose, recognises_alphapose
 from sogjax.data.keypoints.mmpose import pictures_of_mmpose, recognises_mmpose
 from sogjax.data.keypoints.openpose import pictures_of_openpose, recognises_openpose
-from sogjax.data.keypoints.people import Picture, number_in, read_json
+from sogjax.data.keypoints.people import Picture, read_json
 from sogjax.errors import InputError
 
 MAX_BYTES = 512 * 2**20

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sogjax.data.image_folder import numbered_images
+from sogjax.data.keypoint_files import KeypointFiles, files_in, find_keypoints, number_in
 from sogjax.data.keypoints.arrays import read_keypoint_array
 from sogjax.data.keypoints.camera_keypoints import (
     CameraKeypoints,
@@ -14,9 +15,7 @@ from sogjax.data.keypoints.camera_keypoints import (
     read_camera,
     with_image_numbers,
 )
-from sogjax.data.keypoints.files import KeypointFiles, files_in, find_keypoints
 from sogjax.data.keypoints.keypoints import Keypoints
-from sogjax.data.keypoints.people import number_in
 from sogjax.data.keypoints.scheme import KeypointScheme, named_scheme
 from sogjax.data.keypoints.scheme_choice import check_counts, told_scheme
 from sogjax.data.name_match import matched_names

@@ -3,7 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from sogjax.data.keypoints.people import Picture, number_in, people_found, person_of_triples
+from sogjax.data.keypoint_files import number_in
+from sogjax.data.keypoints.people import Picture, people_found, person_of_triples
 from sogjax.errors import InputError
 
 _KEYS = ("pose_keypoints_2d", "pose_keypoints")

@@ -1,7 +1,6 @@
 """People in pictures as detectors' files give them, before their scheme is known."""
 
 import json
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -89,11 +88,3 @@ def people_found(path: Path, people: Sequence[Person]) -> tuple[Person, ...]:
     if len({len(person) for person in people if len(person)}) > 1:
         raise InputError(f"{path}: its people have different numbers of keypoints; run the detector again")
     return tuple(person for person in people if (person[:, 2] > 0.0).any())
-
-
-def number_in(name: str) -> int | None:
-    """The number at the end of a picture's name: 12 of `cam01_000012_keypoints.json` and of `12.jpg`."""
-    stem = re.sub(r"\.[A-Za-z][A-Za-z0-9]*$", "", name)
-    stem = re.sub(r"[_-]?(keypoints|pose|openpose)$", "", stem, flags=re.I)
-    match = re.search(r"([0-9]{1,15})$", stem)
-    return None if match is None else int(match[1])

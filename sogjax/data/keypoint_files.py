@@ -61,3 +61,11 @@ def files_in(folder: Path) -> KeypointFiles | None:
 def json_files(folder: Path) -> list[Path]:
     """The JSON files of a folder, sorted by name."""
     return [path for path in visible_files(folder) if path.suffix.lower() == ".json" and path.is_file()]
+
+
+def number_in(name: str) -> int | None:
+    """The number at the end of a picture's name: 12 of `cam01_000012_keypoints.json` and of `12.jpg`."""
+    stem = re.sub(r"\.[A-Za-z][A-Za-z0-9]*$", "", name)
+    stem = re.sub(r"[_-]?(keypoints|pose|openpose)$", "", stem, flags=re.I)
+    match = re.search(r"([0-9]{1,15})$", stem)
+    return None if match is None else int(match[1])
