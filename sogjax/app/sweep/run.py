@@ -5,11 +5,14 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from itertools import islice, product
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sogjax.app.config.composition import SCHEMAS, composed, register_schemas
 from sogjax.app.config.overrides import plain_sentence, ready_for_hydra
+from sogjax.app.sweep.folders import with_folders
 from sogjax.app.sweep.results import Failure
+from sogjax.app.sweep.takes import is_of_takes, track_take, track_takes
 from sogjax.engine.compiled_programs import forget_programs_if_many
 from sogjax.engine.run_numbers import Numbers, row_numbers
 from sogjax.engine.shared_start import of_first_pose, shared_opening
@@ -37,7 +40,14 @@ def run_sweep(command: str, overrides: Sequence[str]) -> int:
     if command != "track":
         others = ", ".join(name for name in SCHEMAS if name != "track")
         raise InputError(f"{command} -m: only track can be swept, not {others}; leave -m out")
-    words = ready_for_hydra(overrides, sweep=True)
+    words = ready_for_hydra(with_folders(overrides), sweep=True)
+    if is_of_takes(words):
+        return track_takes(words, _swept)
+    return _swept(words)
+
+
+def _swept(words: Sequence[str]) -> int:
+    """Run Hydra with the words of a sweep, after looking at its members."""
     _check_members(words)
     program = sys.argv
     sys.argv = ["sogjax track", "-m", *words]
@@ -77,6 +87,8 @@ def _say_shared(members: Sequence[TrackConfig]) -> None:
     if len(members) < 2:
         return
     each = [of_first_pose(member) for member in members]
+    if len({member.recording for member in members}) == len(members):
+        return  # nobody expects them to share
     changed = [key for key in each[0] if any(other[key] != each[0][key] for other in each)]
     if changed:
         say(f"{', '.join(changed)}: changes what the first pose is, so members have different ones")
@@ -162,15 +174,19 @@ def run_hydra(task: Callable[[Any], Any]) -> int:
     return 0
 
 
-def track_task(tree: Any) -> Numbers:
-    """Track one member of a sweep into its own folder; the numbers of its row."""
+def track_task(tree: Any) -> Numbers | dict[str, Any]:
+    """Track one member of a sweep, or one of several recordings, into its own folder; the numbers of its row."""
     from hydra.core.hydra_config import HydraConfig
     from hydra.types import RunMode
 
     from sogjax.app import track
 
     config = as_object(tree, "track")
-    several = HydraConfig.get().mode == RunMode.MULTIRUN
+    hydras: Any = HydraConfig.get()
+    several = hydras.mode == RunMode.MULTIRUN
+    if several and (takes := hydras.callbacks.table.get("takes")):
+        take = takes[hydras.job.num]
+        return track_take(config, take.actor, Path(take.out), track.run)
     if not config.out or several:
-        config.out = HydraConfig.get().runtime.output_dir
+        config.out = hydras.runtime.output_dir
     return row_numbers(track.run(config, opening=shared_opening if several else None))
