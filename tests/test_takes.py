@@ -51,6 +51,7 @@ def test_a_pattern_of_folders_is_the_list_of_the_recordings_in_them(lab, capsys)
     assert expanded(f"{lab}/anna/*") == [f"{lab}/anna/run fast", f"{lab}/anna/walk"]
     assert "notes: passed over, as no recording" in capsys.readouterr().err
     assert expanded(f"['{lab}/*/r*','{lab}/b*/*'],exclude={lab}/ben/x*") == [f"{lab}/anna/run fast", f"{lab}/ben/walk"]
+    assert expanded(f"'{lab}/[ab]*/r*'") == [f"{lab}/anna/run fast"]
     assert expanded(f"'{lab}/*/*',exclude='{lab}/anna/*'") == [f"{lab}/ben/walk"]
 
 

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,6 +22,8 @@ NUMBERS = {
     "seconds": 1,
 }
 """The columns of numbers, and their decimals; errors are there where a truth is."""
+LONGEST = 160
+"""Letters of a verdict on the screen; the files have all of it."""
 
 
 class Row(NamedTuple):
@@ -57,7 +60,7 @@ def finish_takes(out: Path, rows: Sequence[Row]) -> None:
     print()
     for line in cells:
         numbers = "".join(f"{cell:>{width + 2}}" for cell, width in zip(line[1:-1], widths[1:-1], strict=True))
-        print(f"{line[0]:<{widths[0]}}{numbers}  {line[-1]}")
+        print(f"{line[0]:<{widths[0]}}{numbers}  {textwrap.shorten(line[-1], LONGEST, placeholder=' ...')}")
     print(f"\nresults of each: {out}/RECORDING")
     for name, text in (("recordings.csv", _csv(rows)), ("recordings.md", _markdown(cells))):
         with atomic_path(out / name) as temporary:
