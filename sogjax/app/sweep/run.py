@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 
+PICTURES = ("outputs.overlay", "outputs.rerun")
+"""Outputs of every frame, for which pictures are decoded."""
 CHECKED_MEMBERS = 100
 """Members of a sweep that are checked before it begins."""
 
@@ -43,7 +45,19 @@ def run_sweep(command: str, overrides: Sequence[str]) -> int:
     words = ready_for_hydra(with_folders(overrides), sweep=True)
     if is_of_takes(words):
         return track_takes(words, _swept)
-    return _swept(words)
+    return _swept(_without_pictures(words))
+
+
+def _without_pictures(words: Sequence[str]) -> list[str]:
+    """The words of a sweep over settings: its members write no pictures of every frame unless these are named.
+
+    These take up to four tenths of a later member's time, and the table needs none.
+    """
+    named = {word.partition("=")[0].lstrip("+~") for word in words}
+    if named & {*PICTURES, "outputs", "outputs.motion_only", "outputs.rerun_images", "outputs.overlay_width"}:
+        return [*words]
+    say(f"members write no overlay and no Rerun file; {' '.join(f'{key}=true' for key in PICTURES)} brings them back")
+    return [*words, *(f"{key}=false" for key in PICTURES)]
 
 
 def _swept(words: Sequence[str]) -> int:
