@@ -83,6 +83,12 @@ def test_recordings_alone_are_takes_and_with_other_values_members_of_a_sweep(wor
     assert is_of_takes(words) is takes
 
 
+def test_a_pattern_that_matches_one_recording_is_no_sweep_over_settings_either():
+    assert not is_of_takes(["recording='a'"])
+    assert is_of_takes(["recording='a'"], by_pattern=True)
+    assert not is_of_takes(["recording='a'", "stop=3,4"], by_pattern=True)
+
+
 def test_the_place_of_a_take_is_its_path_in_the_folder_of_all(tmp_path):
     paths = [tmp_path / name for name in ("anna/walk", "anna/run", "ben/walk")]
     assert places_of(paths) == ["anna/walk", "anna/run", "ben/walk"]

@@ -42,29 +42,31 @@ def run_sweep(command: str, overrides: Sequence[str]) -> int:
     if command != "track":
         others = ", ".join(name for name in SCHEMAS if name != "track")
         raise InputError(f"{command} -m: only track can be swept, not {others}; leave -m out")
-    words = ready_for_hydra(with_folders(overrides), sweep=True)
-    if is_of_takes(words):
+    folders = with_folders(overrides)
+    words = ready_for_hydra(folders, sweep=True)
+    if is_of_takes(words, by_pattern=folders != [*overrides]):
         return track_takes(words, _swept)
-    return _swept(_without_pictures(words))
+    return _swept(words, _no_pictures(words))
 
 
-def _without_pictures(words: Sequence[str]) -> list[str]:
-    """The words of a sweep over settings: its members write no pictures of every frame unless these are named.
+def _no_pictures(words: Sequence[str]) -> list[str]:
+    """What members of a sweep over settings are told besides: no pictures of every frame, unless these are named.
 
     These take up to four tenths of a later member's time, and the table needs none.
     """
     named = {word.partition("=")[0].lstrip("+~") for word in words}
-    if named & {*PICTURES, "outputs", "outputs.motion_only", "outputs.rerun_images", "outputs.overlay_width"}:
-        return [*words]
-    say(f"members write no overlay and no Rerun file; {' '.join(f'{key}=true' for key in PICTURES)} brings them back")
-    return [*words, *(f"{key}=false" for key in PICTURES)]
+    others = {"outputs", "outputs.motion_only", "outputs.rerun_images", "outputs.overlay_width"}
+    return [] if named & {*PICTURES, *others} else [f"{key}=false" for key in PICTURES]
 
 
-def _swept(words: Sequence[str]) -> int:
-    """Run Hydra with the words of a sweep, after looking at its members."""
+def _swept(words: Sequence[str], added: Sequence[str] = ()) -> int:
+    """Run Hydra with the words of a sweep, after looking at its members; words that are `added` are told."""
     _check_members(words)
+    if added:
+        asked = " ".join(f"{key}=true" for key in PICTURES)
+        say(f"members write no overlay and no Rerun file; {asked} brings them back")
     program = sys.argv
-    sys.argv = ["sogjax track", "-m", *words]
+    sys.argv = ["sogjax track", "-m", *words, *added]
     try:
         return run_hydra(track_task)
     finally:

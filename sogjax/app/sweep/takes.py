@@ -35,8 +35,8 @@ class Take:
     """Where its results lie, from the folder of all of them."""
 
 
-def is_of_takes(words: Sequence[str]) -> bool:
-    """Whether the words of a sweep name several recordings and sweep over nothing else."""
+def is_of_takes(words: Sequence[str], by_pattern: bool = False) -> bool:
+    """Whether the words of a sweep name several recordings, or any `by_pattern`, and sweep over nothing else."""
     from hydra.core.override_parser.overrides_parser import OverridesParser
     from hydra.errors import HydraException
 
@@ -45,7 +45,9 @@ def is_of_takes(words: Sequence[str]) -> bool:
     except HydraException:
         return False
     swept = [override.get_key_element() for override in parsed if override.is_sweep_override()]
-    return swept == [KEY] and not any(word.startswith("hydra/sweeper=") for word in words)
+    return (swept == [KEY] or (by_pattern and not swept)) and not any(
+        word.startswith("hydra/sweeper=") for word in words
+    )
 
 
 def track_takes(words: Sequence[str], run: Callable[[list[str]], int]) -> int:
