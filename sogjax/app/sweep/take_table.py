@@ -22,6 +22,7 @@ NUMBERS = {
     "seconds": 1,
 }
 """The columns of numbers, and their decimals; errors are there where a truth is."""
+FAILED = "FAILED: "
 LONGEST = 160
 """Letters of a verdict on the screen; the files have all of it."""
 
@@ -42,7 +43,7 @@ class Row(NamedTuple):
     @property
     def sentence(self) -> str:
         """The verdict, or why there is none."""
-        return f"FAILED: {self.result}" if isinstance(self.result, str) else str(self.result.get("verdict") or "-")
+        return f"{FAILED}{self.result}" if isinstance(self.result, str) else str(self.result.get("verdict") or "-")
 
     def number(self, column: str) -> float:
         """NaN where it is not known."""
@@ -60,12 +61,17 @@ def finish_takes(out: Path, rows: Sequence[Row]) -> None:
     print()
     for line in cells:
         numbers = "".join(f"{cell:>{width + 2}}" for cell, width in zip(line[1:-1], widths[1:-1], strict=True))
-        print(f"{line[0]:<{widths[0]}}{numbers}  {textwrap.shorten(line[-1], LONGEST, placeholder=' ...')}")
+        print(f"{line[0]:<{widths[0]}}{numbers}  {_shown(line[-1])}")
     print(f"\nresults of each: {out}/RECORDING")
     for name, text in (("recordings.csv", _csv(rows)), ("recordings.md", _markdown(cells))):
         with atomic_path(out / name) as temporary:
             temporary.write_text(text, encoding="utf-8")
         print(out / name)
+
+
+def _shown(sentence: str) -> str:
+    """On the screen: why a recording failed as a whole, a verdict without its end where it is long."""
+    return sentence if sentence.startswith(FAILED) else textwrap.shorten(sentence, LONGEST, placeholder=" ...")
 
 
 def _columns(rows: Sequence[Row]) -> list[str]:
