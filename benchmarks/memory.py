@@ -6,12 +6,14 @@ Tracks videos (mp4v) that show the first frames of a recording forwards and back
 (overlay, Rerun file with pictures), each length in a process of its own, and prints its largest resident memory.
 """
 
-import resource
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+
+from quantities import Quantity
 
 from sogjax.data.recording import Recording
 from sogjax.data.source import open_source
@@ -24,6 +26,8 @@ from sogjax.study.script import run_script, settings_from
 
 MIB = 1024
 """Kibibytes, in which the system counts."""
+FLAT = 10.0
+"""Mebibytes that 1000 frames may add: what allocators keep, not what a frame needs. The first thousand adds more."""
 
 
 @dataclass
@@ -42,7 +46,7 @@ def main() -> None:
     settings = settings_from(Settings)
     if len(settings.repeats) == 1:
         track_repeatedly(settings, settings.repeats[0])
-        print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MIB)
+        print(most_resident_mib())
         return
     print(machine_line())
     for repeats in settings.repeats:
@@ -51,6 +55,24 @@ def main() -> None:
         done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
         largest = float(done.stdout.split()[-1])
         print(f"{settings.frames * repeats:6d} frames: at most {largest:6.0f} MiB resident", flush=True)
+
+
+def long_quantities(recording: Path, actor: Path, repeats: tuple[int, int] = (64, 192)) -> Iterator[Quantity]:
+    """What a thousand more frames of four cameras take; nothing, if memory is flat."""
+    settings = Settings(str(recording), str(actor))
+    few, many = (largest(settings, each) for each in repeats)
+    thousands = settings.frames * (repeats[1] - repeats[0]) / 1000.0
+    yield Quantity("memory", f"most resident, {settings.frames * repeats[1]} frames, four cameras", many, "MiB")
+    yield Quantity("memory", "growth in 1000 frames", (many - few) / thousands, "MiB", target=FLAT)
+
+
+def largest(settings: Settings, repeats: int) -> float:
+    """Mebibytes that a process of its own has resident at most, when it tracks the frames so many times."""
+    cameras = ",".join(opened(settings.recording).rig.names[:4])
+    words = [f"recording={settings.recording}", f"actor={settings.actor}", f"frames={settings.frames}"]
+    words += [f"repeats=[{repeats}]", f"overrides=[solver.max_iterations=20,'cameras=[{cameras}]']"]
+    done = subprocess.run([sys.executable, __file__, *words], check=True, stdout=subprocess.PIPE, text=True)
+    return float(done.stdout.split()[-1])
 
 
 def track_repeatedly(settings: Settings, repeats: int) -> None:
@@ -62,6 +84,15 @@ def track_repeatedly(settings: Settings, repeats: int) -> None:
         longer = longer_recording(recording, settings.frames, repeats, Path(folder))
         with tracking(longer, bodies, config, config.outputs, Path(folder)) as result:
             assert len(result.converged) == longer.num_frames
+
+
+def most_resident_mib() -> float:
+    """Of this process so far; Linux only.
+
+    By `VmHWM`, which starts from zero with a program: `ru_maxrss` counts what the process was forked from.
+    """
+    status = Path("/proc/self/status").read_text(encoding="ascii")
+    return float(status.partition("VmHWM:")[2].split()[0]) / MIB
 
 
 def longer_recording(recording: Recording, frames: int, repeats: int, folder: Path) -> Recording:

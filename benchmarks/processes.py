@@ -14,7 +14,6 @@ from tempfile import TemporaryDirectory
 
 from quantities import Quantity
 
-MIB_IN_KIB = 1024.0
 IMPORT = "import time; begin = time.perf_counter(); import sogjax; print(time.perf_counter() - begin)"
 """A program of its own, in which nothing is imported yet."""
 
@@ -48,10 +47,8 @@ def first_frame_seconds(actor: str) -> float:
 
 
 def resident_mib(actor: str) -> float:
-    """After tracking the demo with all outputs; Linux only.
-
-    By `VmHWM`, which starts from zero with a program: `ru_maxrss` counts what the process was forked from.
-    """
+    """After tracking the demo with all outputs; Linux only."""
+    from memory import most_resident_mib
     from track_speed import demo_recording
 
     from sogjax.engine.track import track_to_folder
@@ -59,8 +56,7 @@ def resident_mib(actor: str) -> float:
 
     with TemporaryDirectory() as folder:
         track_to_folder(track_config(recording=demo_recording(), actor=actor, out=f"{folder}/demo"))
-    status = Path("/proc/self/status").read_text(encoding="ascii")
-    return float(status.partition("VmHWM:")[2].split()[0]) / MIB_IN_KIB
+    return most_resident_mib()
 
 
 if __name__ == "__main__":

@@ -16,10 +16,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from energies import energy_quantities, growth_quantities
+from memory import long_quantities
 from processes import process_quantities
 from quantities import Quantity, is_worse, reference_milliseconds
 from runs import Scene, end_to_end_quantities, solver_quantities, stage_quantities
 from start_up import start_up_quantities
+from sweep_speed import sweep_quantities
 
 from sogjax.data.actor_file import save_body
 from sogjax.data.atomic import atomic_path
@@ -75,6 +77,8 @@ def parts() -> dict[str, Callable[[Scene], Iterable[Quantity]]]:
         "growth": lambda _: growth_quantities(),
         "process": of_processes,
         "start_up": of_starts,
+        "sweep": of_sweeps,
+        "long": of_long_clips,
     }
 
 
@@ -92,6 +96,22 @@ def of_starts(scene: Scene) -> Iterator[Quantity]:
         actor = Path(folder) / "actor.yaml"
         save_body(actor, scene.bodies[0])
         yield from start_up_quantities(actor)
+
+
+def of_sweeps(scene: Scene) -> Iterator[Quantity]:
+    """What a sweep costs in single runs, with the scene's actor in a file."""
+    with TemporaryDirectory() as folder:
+        actor = Path(folder) / "actor.yaml"
+        save_body(actor, scene.bodies[0])
+        yield from sweep_quantities(actor, scene.frames)
+
+
+def of_long_clips(scene: Scene) -> Iterator[Quantity]:
+    """How memory grows with the length of a clip, with the scene's actor in a file."""
+    with TemporaryDirectory() as folder:
+        actor = Path(folder) / "actor.yaml"
+        save_body(actor, scene.bodies[0])
+        yield from long_quantities(scene.folder, actor)
 
 
 def row(quantity: Quantity) -> str:

@@ -3,6 +3,7 @@
 import csv
 from dataclasses import replace
 
+import cv2
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -14,9 +15,10 @@ from sogjax.app.sweep.distances import distances_to_first
 from sogjax.app.sweep.results import APART, Failure, Member, finish_sweep, keep_result, kept_results
 from sogjax.data.motion import save_motion
 from sogjax.data.recording import open_recording
-from sogjax.engine import shared_start
+from sogjax.engine import background, build, shared_start
 from sogjax.engine.run_numbers import COLUMNS, Numbers
 from sogjax.engine.shared_start import forget_shared_openings, shared_opening
+from sogjax.settings import ImagesConfig
 from sogjax.settings.compose import track_config
 
 UNKNOWN = float("nan")
@@ -118,3 +120,37 @@ def test_a_report_looks_for_the_truth_before_anything_else(capsys, tmp_path):
         capsys, "report", f"recordings=[{recording}]", f"out={tmp_path / 'report'}", "only=[limit_weight]"
     )
     assert not (tmp_path / "report").exists()
+
+
+@pytest.mark.parametrize(
+    ("word", "added"),
+    [
+        ("start=0,1", ["outputs.overlay=false", "outputs.rerun=false"]),
+        ("outputs.overlay=true", []),
+        ("outputs.motion_only=true", []),
+    ],
+)
+def test_members_write_pictures_of_every_frame_only_where_these_are_named(monkeypatch, capsys, word, added):
+    seen = []
+    monkeypatch.setattr(sweep_run, "run_hydra", lambda task: seen.append(sweep_run.sys.argv) or 0)
+    sweep_run.run_sweep("track", ["recording=r", word])
+    assert seen[0][4:] == added
+    assert ("no overlay" in capsys.readouterr().err) == bool(added)
+
+
+def test_the_background_is_cut_into_cells_once_until_its_files_change(monkeypatch, tmp_path):
+    recording = open_recording(trackable(tmp_path / "two"))
+    plates = {name: tmp_path / f"{name}.png" for name in recording.rig.names}
+    for path in plates.values():
+        cv2.imwrite(str(path), np.zeros((48, 64, 3), np.uint8))
+    recording, images = replace(recording, background=plates), ImagesConfig()
+    grids = build.cell_grids(recording, images.depth)
+    first = background.background_cells(recording, grids, images)
+    assert background.background_cells(recording, grids, images) is first
+    assert background.background_cells(recording, build.cell_grids(recording, 4), images).colors.shape != (
+        first.colors.shape
+    )
+    cv2.imwrite(str(plates["left"]), np.full((48, 64, 3), 200, np.uint8))
+    changed = background.background_cells(recording, grids, images)
+    assert int(changed.colors[0].max()) == 200
+    assert int(changed.colors[1].max()) == 0

@@ -35,6 +35,7 @@ _KEYS = (
     "color_gains",
     "example_poses",
     "keypoint_scheme",
+    "subject",
 )
 
 
@@ -59,6 +60,8 @@ class RecordingSettings:
     """By camera."""
     example_poses: tuple[ExampleSettings, ...] | None = None
     keypoint_scheme: str | None = None
+    subject: tuple[str, ...] = ()
+    """Whom the recording shows, as their actor files are named; empty where nobody is named."""
 
     @property
     def by_camera(self) -> dict[str, dict[str, Any]]:
@@ -90,6 +93,7 @@ def read_recording_settings(path: Path) -> RecordingSettings:
         color_gains=_gains(given["color_gains"]) if "color_gains" in given else {},
         example_poses=read_examples(given["example_poses"]) if "example_poses" in given else None,
         keypoint_scheme=_file_name(given["keypoint_scheme"]) if "keypoint_scheme" in given else None,
+        subject=_subjects(given["subject"]) if "subject" in given else (),
     )
 
 
@@ -119,6 +123,14 @@ def _file_name(entry: Entry) -> str:
     if (wanted := objection(name)) is not None:
         raise entry.error(wanted)
     return name
+
+
+def _subjects(entry: Entry) -> tuple[str, ...]:
+    """One name or several, each once: they become names of files."""
+    names = tuple(map(_file_name, entry.items() if isinstance(entry.value, list) else [entry]))
+    if not names or len(set(names)) < len(names):
+        raise entry.error("the name of whom the recording shows, or a list of names, each once")
+    return names
 
 
 def _camera_names(entry: Entry) -> tuple[str, ...]:

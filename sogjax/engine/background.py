@@ -6,6 +6,7 @@ from threading import Lock
 
 from sogjax.data.background_cache import Arrays, background_origin, kept_background
 from sogjax.data.recording import Recording
+from sogjax.data.source import fingerprint
 from sogjax.data.video import read_still
 from sogjax.engine.clip_learning import PARTS, LeftOut, UnsuitableError, learn
 from sogjax.engine.terminal import say
@@ -19,18 +20,35 @@ CHOICES = ("auto", "pictures", "clip", "none")
 MOST_MADE = 4
 """Backgrounds that a process remembers: those of twelve cameras take 30 MB."""
 _made: dict[str, Arrays | str] = {}
+MOST_CUT = 2
+"""Backgrounds whose cells a process remembers, for the members of a sweep: those of twelve cameras take 3 MB."""
+_cut: dict[str, BackgroundCells] = {}
 _making = Lock()
 _said: set[str] = set()
 
 
 def background_cells(recording: Recording, grids: Sequence[CellGrid], images: ImagesConfig) -> BackgroundCells | None:
-    """The background of all cameras as cells; None: without one.
+    """The background of all cameras as cells; None: without one. Made once for the members of a sweep.
 
     Raises:
         InputError: as `backgrounds`.
     """
+    path = str(recording.path.resolve())
+    key = json.dumps([path, images.background, str(grids), _photographs(recording), background_origin(recording)])
+    if images.cache is None and key in _cut:
+        return _cut[key]
     found = backgrounds(recording, images)
-    return None if found is None else stack_background(found, grids)
+    if found is None:
+        return None
+    _cut[key] = stack_background(found, grids)
+    for oldest in list(_cut)[:-MOST_CUT]:
+        del _cut[oldest]
+    return _cut[key]
+
+
+def _photographs(recording: Recording) -> dict[str, str]:
+    """The pictures of the empty scene as they are on the disk, by camera."""
+    return {name: fingerprint(recording.background[name]) for name in recording.background}
 
 
 def backgrounds(recording: Recording, images: ImagesConfig) -> tuple[CameraBackground, ...] | None:

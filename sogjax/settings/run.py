@@ -41,9 +41,13 @@ class TrackConfig:
     """Track the actors of a recording."""
 
     preset: str = option("default", "default | paper: all settings at once; those given individually take precedence")
-    recording: str = option(REQUIRED, "folder of the recording")
-    out: str = option("", "folder for the results; default: outputs/RECORDING")
-    actor: Any = option(None, "actor file, or a list of them; null: make it from the example poses")
+    recording: str = option(REQUIRED, "folder of the recording; with -m several: A,B,C or 'glob(/data/*)'")
+    out: str = option("", "folder for the results; default: outputs/RECORDING; of several recordings the one around")
+    actor: Any = option(
+        None,
+        "actor file, or a list of them; of several recordings also a folder of SUBJECT.yaml; null: make it from the "
+        "example poses",
+    )
     actors: int | None = option(
         None, "how many people to make actors of, without example poses; null: one, or as many as files or poses name"
     )

@@ -36,6 +36,8 @@ def _checked(word: str, sweep: bool) -> str:
         raise InputError(f"{word}: is not an option; write key=value")
     if for_hydra and not sweep:
         raise InputError(f"{word}: Hydra's own settings only count in a sweep; add -m or leave it out")
+    if not sweep and word.startswith("recording=glob("):
+        raise InputError(f"{word}: names several recordings; add -m")
     if key[0] in "+~" and not for_hydra:
         raise InputError(f"{word}: options cannot be added or removed; write key=value")
     return word

@@ -1,5 +1,6 @@
 """Hydra callback that collects the results of a sweep and prints their table at the end."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +16,21 @@ failures: list[str] = []
 
 
 class SweepTable(Callback):
-    """Each member leaves a file in its folder, whatever process it runs in; the table is made from these."""
+    """Each member leaves a file in its folder, whatever process it runs in; the table is made from these.
+
+    `takes` are the folders and actors of several recordings by the numbers of the members: their table is made by the
+    command itself, since it holds recordings that no member tracks, too.
+    """
+
+    def __init__(self, takes: Sequence[Any] | None = None):
+        self._takes = takes
 
     def on_multirun_start(self, config: Any, **kwargs: Any) -> None:
         """Remove the results of an earlier sweep in the same folder."""
         failures.clear()
         forget_shared_openings()
-        forget_results(Path(config.hydra.sweep.dir))
+        if not self._takes:
+            forget_results(Path(config.hydra.sweep.dir))
 
     def on_job_end(self, config: Any, job_return: JobReturn, **kwargs: Any) -> None:
         """Keep the row of a member that ended."""
@@ -33,6 +42,8 @@ class SweepTable(Callback):
 
     def on_multirun_end(self, config: Any, **kwargs: Any) -> None:
         """Print the table; write the CSV and the plot."""
+        if self._takes:
+            return
         sweep = Path(config.hydra.sweep.dir)
         members = kept_results(sweep)
         failures.extend(member.result for member in members if isinstance(member.result, str))

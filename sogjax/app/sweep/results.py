@@ -55,6 +55,14 @@ def keep_result(folder: Path, member: Member) -> None:
         temporary.write_text(json.dumps(content), encoding="utf-8")
 
 
+def kept_member(folder: Path) -> Member | None:
+    """A member's result in its folder; None where there is none, or none that can be read."""
+    try:
+        return Member(**json.loads((folder / RESULT).read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError):
+        return None
+
+
 def forget_results(sweep: Path) -> None:
     """Remove the results of an earlier sweep from a folder."""
     for path in sweep.glob(f"*/{RESULT}"):

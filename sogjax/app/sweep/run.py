@@ -5,11 +5,14 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from itertools import islice, product
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sogjax.app.config.composition import SCHEMAS, composed, register_schemas
 from sogjax.app.config.overrides import plain_sentence, ready_for_hydra
+from sogjax.app.sweep.folders import with_folders
 from sogjax.app.sweep.results import Failure
+from sogjax.app.sweep.takes import is_of_takes, track_take, track_takes
 from sogjax.engine.compiled_programs import forget_programs_if_many
 from sogjax.engine.run_numbers import Numbers, row_numbers
 from sogjax.engine.shared_start import of_first_pose, shared_opening
@@ -24,6 +27,8 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 
+PICTURES = ("outputs.overlay", "outputs.rerun")
+"""Outputs of every frame, for which pictures are decoded."""
 CHECKED_MEMBERS = 100
 """Members of a sweep that are checked before it begins."""
 
@@ -37,10 +42,31 @@ def run_sweep(command: str, overrides: Sequence[str]) -> int:
     if command != "track":
         others = ", ".join(name for name in SCHEMAS if name != "track")
         raise InputError(f"{command} -m: only track can be swept, not {others}; leave -m out")
-    words = ready_for_hydra(overrides, sweep=True)
+    folders = with_folders(overrides)
+    words = ready_for_hydra(folders, sweep=True)
+    if is_of_takes(words, by_pattern=folders != [*overrides]):
+        return track_takes(words, _swept)
+    return _swept(words, _no_pictures(words))
+
+
+def _no_pictures(words: Sequence[str]) -> list[str]:
+    """What members of a sweep over settings are told besides: no pictures of every frame, unless these are named.
+
+    These take up to four tenths of a later member's time, and the table needs none.
+    """
+    named = {word.partition("=")[0].lstrip("+~") for word in words}
+    others = {"outputs", "outputs.motion_only", "outputs.rerun_images", "outputs.overlay_width"}
+    return [] if named & {*PICTURES, *others} else [f"{key}=false" for key in PICTURES]
+
+
+def _swept(words: Sequence[str], added: Sequence[str] = ()) -> int:
+    """Run Hydra with the words of a sweep, after looking at its members; words that are `added` are told."""
     _check_members(words)
+    if added:
+        asked = " ".join(f"{key}=true" for key in PICTURES)
+        say(f"members write no overlay and no Rerun file; {asked} brings them back")
     program = sys.argv
-    sys.argv = ["sogjax track", "-m", *words]
+    sys.argv = ["sogjax track", "-m", *words, *added]
     try:
         return run_hydra(track_task)
     finally:
@@ -77,6 +103,8 @@ def _say_shared(members: Sequence[TrackConfig]) -> None:
     if len(members) < 2:
         return
     each = [of_first_pose(member) for member in members]
+    if len({member.recording for member in members}) == len(members):
+        return  # nobody expects them to share
     changed = [key for key in each[0] if any(other[key] != each[0][key] for other in each)]
     if changed:
         say(f"{', '.join(changed)}: changes what the first pose is, so members have different ones")
@@ -162,15 +190,19 @@ def run_hydra(task: Callable[[Any], Any]) -> int:
     return 0
 
 
-def track_task(tree: Any) -> Numbers:
-    """Track one member of a sweep into its own folder; the numbers of its row."""
+def track_task(tree: Any) -> Numbers | dict[str, Any]:
+    """Track one member of a sweep, or one of several recordings, into its own folder; the numbers of its row."""
     from hydra.core.hydra_config import HydraConfig
     from hydra.types import RunMode
 
     from sogjax.app import track
 
     config = as_object(tree, "track")
-    several = HydraConfig.get().mode == RunMode.MULTIRUN
+    hydras: Any = HydraConfig.get()
+    several = hydras.mode == RunMode.MULTIRUN
+    if several and (takes := hydras.callbacks.table.get("takes")):
+        take = takes[hydras.job.num]
+        return track_take(config, take.actor, Path(take.out), track.run)
     if not config.out or several:
-        config.out = HydraConfig.get().runtime.output_dir
+        config.out = hydras.runtime.output_dir
     return row_numbers(track.run(config, opening=shared_opening if several else None))

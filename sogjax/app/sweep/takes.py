@@ -1,0 +1,159 @@
+"""Many recordings by one command: each as if tracked alone, one table at the end, and only what is missing is done."""
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sogjax.app.config.composition import composed
+from sogjax.app.config.overrides import quoted_value
+from sogjax.app.sweep.actors import Subjects
+from sogjax.app.sweep.folders import KEY, places_of, recordings_in
+from sogjax.app.sweep.results import RESULT, Failure, Member, keep_result, kept_member
+from sogjax.app.sweep.take_table import NO_RESULT, Row, finish_takes
+from sogjax.engine.clock import TOTAL
+from sogjax.engine.kept_run import FOLDER, NOTE, read_note
+from sogjax.engine.outputs import results_folder
+from sogjax.engine.run import Run
+from sogjax.engine.run_numbers import row_numbers
+from sogjax.engine.terminal import say
+from sogjax.errors import InputError
+from sogjax.sentences import counted
+from sogjax.settings import TrackConfig
+
+ACTORS = "actors"
+"""The folder of the actors that were made."""
+
+
+@dataclass(frozen=True)
+class Take:
+    """A recording among several."""
+
+    recording: Path
+    place: str
+    """Where its results lie, from the folder of all of them."""
+
+
+def is_of_takes(words: Sequence[str], by_pattern: bool = False) -> bool:
+    """Whether the words of a sweep name several recordings, or any `by_pattern`, and sweep over nothing else."""
+    from hydra.core.override_parser.overrides_parser import OverridesParser
+    from hydra.errors import HydraException
+
+    try:
+        parsed = OverridesParser.create().parse_overrides(list(words))
+    except HydraException:
+        return False
+    swept = [override.get_key_element() for override in parsed if override.is_sweep_override()]
+    return (swept == [KEY] or (by_pattern and not swept)) and not any(
+        word.startswith("hydra/sweeper=") for word in words
+    )
+
+
+def track_takes(words: Sequence[str], run: Callable[[list[str]], int]) -> int:
+    """Track several recordings into a folder for each, and print and write their table; `run` runs Hydra's words.
+
+    Raises:
+        InputError: a setting is invalid, or some recordings failed.
+    """
+    paths = [Path(path).absolute() for path in recordings_in(words)]
+    takes = [Take(path, place) for path, place in zip(paths, places_of(paths), strict=True)]
+    others = [word for word in words if word.partition("=")[0] != KEY]
+    own = [word for word in others if not word.lstrip("+~").startswith("hydra")]
+    config: TrackConfig = composed("track", [*own, f"{KEY}={quoted_value(str(takes[0].recording))}"])
+    out = Path(config.out or "outputs").absolute()
+    with results_folder(out):
+        for take in takes:
+            _forget_failure(out / take.place)
+        ready = _ready(takes, config, out)
+        problem = _run(ready, others, out, run) if ready else None
+        rows = [_row(take, out) for take in takes]
+        finish_takes(out, rows)
+    failed = [row for row in rows if row.failed]
+    if failed and not (problem and len(failed) == len(takes) and failed[0].failed == NO_RESULT):
+        raise InputError(
+            f"{len(failed)} of {counted(len(takes), 'recording')} failed; the first: {failed[0].failed} "
+            "(the same command again does these only)"
+        )
+    if problem:
+        raise problem
+    return 0
+
+
+def track_take(config: TrackConfig, actor: Any, out: Path, track: Callable[[TrackConfig], Run]) -> dict[str, Any]:
+    """Track a recording among several into its folder, going on where an earlier command stopped; its numbers."""
+    config.out, config.actor = str(out), config.actor if actor is None else list(actor)
+    config.resume = not config.overwrite and ((out / NOTE).is_file() or (out / FOLDER).is_dir())
+    before = kept_member(out)
+    ended = config.resume and (out / NOTE).is_file()
+    say(f"\n== {config.recording}")
+    result = track(config)
+    if ended and before is not None and not isinstance(before.result, str):
+        return dict(before.result)
+    verdict = "; ".join(verdict.sentence for verdict in result.verdicts.values())
+    seconds = read_note(out / NOTE).get("seconds") or {}
+    return row_numbers(result) | {
+        "frames": len(result.converged),
+        "seconds": seconds.get(TOTAL, float("nan")),
+        "verdict": verdict,
+    }
+
+
+def _forget_failure(folder: Path) -> None:
+    kept = kept_member(folder)
+    if kept is None or isinstance(kept.result, str):
+        (folder / RESULT).unlink(missing_ok=True)
+
+
+def _ready(takes: Sequence[Take], config: TrackConfig, out: Path) -> list[tuple[Take, list[str] | None]]:
+    """The takes whose actors are there, with these; why the others have none is kept as their result."""
+    given = Path(config.actor) if isinstance(config.actor, str) and Path(config.actor).is_dir() else None
+    if config.actor is not None and given is None:
+        return [(take, None) for take in takes]
+    subjects = Subjects(given or out / ACTORS, [take.recording for take in takes], makes=given is None)
+    failed: dict[str, str] = {}
+    ready = []
+    for take in takes:
+        try:
+            ready.append((take, subjects.actor_of(take.recording, config, failed)))
+        except InputError as error:
+            say(f"{take.place}: {error}")
+            keep_result(out / take.place, Member([], Failure(error)))
+    return ready
+
+
+def _run(
+    ready: Sequence[tuple[Take, list[str] | None]], words: Sequence[str], out: Path, run: Callable[[list[str]], int]
+) -> InputError | None:
+    """Let Hydra's launcher track them; what was wrong, if anything was."""
+    listed = ",".join(quoted_value(str(take.recording)) for take, _ in ready)
+    own = [word for word in words if word.partition("=")[0] not in ("out", "actor", "hydra.sweep.dir")]
+    actor = [word for word in words if word.startswith("actor=") and ready[0][1] is None]
+    places = [out / take.place for take, _ in ready]
+    members = ",".join(
+        f"{{out:{quoted_value(str(place))},actor:{_list(actor)}}}"
+        for place, (_, actor) in zip(places, ready, strict=True)
+    )
+    hydras = [
+        f"hydra.sweep.dir={quoted_value(str(out))}",
+        "hydra.sweep.subdir='${oc.select:hydra.callbacks.table.takes.${hydra.job.num}.out}'",
+        f"+hydra.callbacks.table.takes=[{members}]",
+    ]
+    with suppress(OSError):
+        for place in places:
+            place.mkdir(parents=True, exist_ok=True)
+    try:
+        run([*own, *actor, f"{KEY}={listed}", *hydras])
+    except InputError as error:
+        return error
+    return None
+
+
+def _list(files: Sequence[str] | None) -> str:
+    return "null" if files is None else f"[{','.join(map(quoted_value, files))}]"
+
+
+def _row(take: Take, out: Path) -> Row:
+    kept = kept_member(out / take.place)
+    result = NO_RESULT if kept is None else kept.result
+    return Row(take.place, out / take.place, result)
