@@ -40,6 +40,8 @@ def plane_video(path: Path, start: int, threads: int) -> PlaneVideo | None:
     That is where PyAV is not installed, or where the video is of a rare kind: turned sideways, of odd size, with more
     than eight bits or other differences of colour. `threads` decode it.
     """
+    if pyav_version() is None:  # any folder of this name could be imported
+        return None
     try:
         av: Any = import_module("av")
     except ImportError:
