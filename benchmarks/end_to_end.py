@@ -67,7 +67,7 @@ def main() -> None:
 
 def decoding_rate(recording: Recording, frames: int) -> float:
     """Multi-view frames per second when nothing is done with the pictures, without opening the files."""
-    pictures = ahead(read_prepared(recording, lambda camera, image: None, 0, frames), FRAMES_AHEAD)
+    pictures = ahead(read_prepared(recording, lambda camera, image: None, 0, frames, planes=True), FRAMES_AHEAD)
     next(pictures)
     begin = time.perf_counter()
     count = sum(1 for _ in pictures)

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from decoding import decoding_quantities
 from energies import energy_quantities, growth_quantities
 from memory import long_quantities
 from processes import process_quantities
@@ -73,6 +74,7 @@ def parts() -> dict[str, Callable[[Scene], Iterable[Quantity]]]:
         "energy": lambda _: energy_quantities(),
         "solver": solver_quantities,
         "stage": stage_quantities,
+        "decoding": lambda scene: decoding_quantities(scene.recording, scene.frames),
         "end_to_end": end_to_end_quantities,
         "growth": lambda _: growth_quantities(),
         "process": of_processes,

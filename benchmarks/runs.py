@@ -13,6 +13,8 @@ from track_speed import demo_recording
 
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.recording import Recording
+from sogjax.energy.frame_energy import FrameEnergy
+from sogjax.energy.posed import History
 from sogjax.energy.similarity import similarity_among
 from sogjax.engine.cells import cells_of_clip
 from sogjax.engine.job import Job
@@ -96,9 +98,19 @@ def stage_quantities(scene: Scene) -> Iterator[Quantity]:
         )
     )
     seen = views(job.tracker, state, cells)
+    quadratic = eqx.filter_jit(lambda objective, pose: objective.quadratic(pose))
+    judged = eqx.filter_jit(
+        lambda tracker, state, views: tracker.judged(state.previous, state.usual, views.windows, cells)
+    )
+    objective = FrameEnergy(job.tracker.body, seen, History.unknown(job.start), job.tracker.terms)
+    objective = eqx.filter_jit(lambda energy, pose: energy.near(pose, capacities.blocks)[0])(objective, job.start)
     yield Quantity("stage", "quad-trees of 12 cameras", milliseconds(leaves, job.tracker.reader, cells), "ms")
     yield Quantity("stage", "with choice of blobs and colours", milliseconds(views, job.tracker, state, cells), "ms")
     yield Quantity("stage", "lists of near pairs", milliseconds(near, job.tracker, state, seen), "ms")
+    yield Quantity("stage", "value, gradient and curvature", milliseconds(quadratic, objective, job.start), "ms")
+    if job.tracker.limbs is not None and job.tracker.reader.subject is not None:
+        known = job.tracker.with_memory(state)
+        yield Quantity("stage", "evidence for the limbs", milliseconds(judged, job.tracker, known, seen), "ms")
 
 
 def end_to_end_quantities(scene: Scene) -> Iterator[Quantity]:

@@ -5,8 +5,10 @@ import pytest
 
 from sogjax.images.cells import CellGrid, stack_cells
 
-BYTE = 0.51
-"""Rounding of a mean to a byte, in whichever direction."""
+GREY_LEVEL = 1.0
+"""What rounding at every halving may amount to."""
+FINE = 0.51
+"""One rounding to a byte, in whichever direction."""
 
 
 def random_image(width, height, seed=0):
@@ -47,7 +49,27 @@ def test_a_cell_is_the_mean_of_its_pixels(width, height, depth):
         ]
         for r in range(grid.rows)
     ]
-    np.testing.assert_allclose(averages, expected, atol=BYTE)
+    np.testing.assert_allclose(averages, expected, atol=GREY_LEVEL)
+
+
+@pytest.mark.parametrize(("size", "cell"), [((64, 48), 4), ((1296, 972), 8), ((101, 77), 2)])
+def test_means_of_one_channel_are_exact_but_for_the_first_halving(size, cell):
+    width, height = size
+    plane = random_image(width, height)[..., 0]
+    grid = CellGrid(width, height, cell)
+    rows, columns = height // cell, width // cell
+    whole = plane[: rows * cell, : columns * cell].reshape(rows, cell, columns, cell)
+    found = grid.fine_averages(plane)
+    assert found.dtype == np.float32
+    assert found.shape == (grid.rows, grid.columns)
+    np.testing.assert_allclose(found[:rows, :columns], whole.mean((1, 3)), atol=1e-3 if cell <= 4 else FINE)
+
+
+@pytest.mark.parametrize("cell", [4, 8, 16])
+def test_noise_does_not_become_brighter(cell):
+    """A halving rounds up: three of them alone would add 0.4."""
+    image = random_image(1024, 1024)
+    assert abs(CellGrid(1024, 1024, cell).averages(image).mean() - image.mean()) < 0.15
 
 
 def test_cameras_of_different_sizes_are_stacked_as_rgb():

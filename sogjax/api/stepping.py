@@ -9,14 +9,13 @@ from jaxtyping import Array, UInt8
 from sogjax.api.settings import track_settings
 from sogjax.api.tracking import actor_list
 from sogjax.data.recording import Recording
-from sogjax.data.video import read_prepared
 from sogjax.energy import Term
 from sogjax.energy.keypoints import keypoint_pull_among
 from sogjax.engine.cells import picture_reader
 from sogjax.engine.clip_keypoints import ClipKeypoints, with_keypoints
 from sogjax.engine.job import Job
 from sogjax.engine.keypoint_offsets import told_offsets
-from sogjax.engine.pipeline import Preparation, cells_of_frame
+from sogjax.engine.pipeline import Preparation, cells_of_frame, read_pictures
 from sogjax.engine.recordings import with_cameras
 from sogjax.errors import InputError
 from sogjax.model.body import Body
@@ -102,7 +101,7 @@ def read_cells(
 def _cells(
     recording: Recording, preparation: Preparation, start: int, stop: int
 ) -> Iterator[UInt8[Array, "camera rows columns 3"] | PartialCells]:
-    for pictures in read_prepared(recording, preparation, start, stop):
+    for pictures in read_pictures(recording, preparation, start, stop):
         cells, beside = on_device(cells_of_frame([picture.cells for picture in pictures]))
         yield cells if beside.present is None else PartialCells(cells, beside.present)
 

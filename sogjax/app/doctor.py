@@ -24,6 +24,7 @@ CLASHING = ("opencv-python", "opencv-contrib-python", "opencv-contrib-python-hea
 """Packages that overwrite opencv-python-headless's files."""
 EXTRAS = {
     "export": ("ezc3d",),
+    "video": ("av",),
     "report": ("matplotlib",),
     "notebook": ("matplotlib", "ipykernel", "nbmake"),
     "joblib": ("hydra-joblib-launcher",),

@@ -19,11 +19,12 @@ from jaxtyping import UInt8
 
 from sogjax.data.atomic import atomic_path
 from sogjax.data.npz_file import check_npy
+from sogjax.data.plane_video import pyav_version
 from sogjax.data.recording import Recording
 from sogjax.data.source import fingerprint
 from sogjax.errors import InputError
 
-CELLS_VERSION = 1
+CELLS_VERSION = 2
 """Raise it with every change that alters cells or their files."""
 _CHUNK = 2**22
 
@@ -95,7 +96,11 @@ class CellCache:
         """Everything that the cells depend on."""
         cameras = self.recording.rig.names
         gains = {camera: list(self.recording.color_gains[camera]) for camera in sorted(self.recording.color_gains)}
-        optional = {"color_gains": gains, "picked": {camera: list(n) for camera, n in self.recording.picked.items()}}
+        optional = {
+            "color_gains": gains,
+            "picked": {camera: list(n) for camera, n in self.recording.picked.items()},
+            "PyAV": pyav_version(),  # its cells may differ from those of OpenCV by a grey level
+        }
         return {key: value for key, value in optional.items() if value} | {
             "version": CELLS_VERSION,
             "depth": self.depth,

@@ -4,11 +4,12 @@ Phones and cameras that drop images write such videos: if counted, their images 
 """
 
 from collections.abc import Sequence
+from typing import Generic
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Bool, Float, Int
 
-from sogjax.data.image_stream import ImageStream
+from sogjax.data.image_stream import Image, ImageStream
 
 MOST_FRAMES = 50
 """Per image on average: with more, a time stamp or the rate is wrong."""
@@ -46,17 +47,17 @@ def _frame_times(times: Float[np.ndarray, "image"], fps: float) -> Float[np.ndar
     return times[0] + np.arange(count) / fps
 
 
-class PickedImages:
+class PickedImages(Generic[Image]):
     """Some images of a source, each as often as its number stands in a row of numbers that does not fall.
 
     All images before them are decoded: where the rate varies, no decoder finds an image by its number.
     """
 
-    def __init__(self, images: ImageStream, numbers: Sequence[int]) -> None:
+    def __init__(self, images: ImageStream[Image], numbers: Sequence[int]) -> None:
         self._images, self._numbers, self._next = images, iter(numbers), 0
-        self._image: UInt8[np.ndarray, "height width 3"] | None = None
+        self._image: Image | None = None
 
-    def read(self) -> UInt8[np.ndarray, "height width 3"] | None:
+    def read(self) -> Image | None:
         """The image of the next number, or None after the last."""
         number = next(self._numbers, None)
         if number is None:

@@ -10,9 +10,11 @@ import numpy as np
 from jaxtyping import Float
 
 from sogjax.data.image_folder import ImageFolder, numbered_images, visible_files
-from sogjax.data.image_stream import ImageStream
+from sogjax.data.image_stream import Bgr, ImageStream
 from sogjax.data.picked_images import PickedImages
+from sogjax.data.plane_video import plane_video
 from sogjax.data.video_file import VideoFile, look_at_video
+from sogjax.data.yuv_picture import YuvPicture
 from sogjax.errors import InputError
 
 VIDEO_SUFFIXES = (".mp4", ".avi", ".mkv", ".mov")
@@ -66,7 +68,7 @@ def videos_in(folder: Path) -> list[Path]:
     return [path for path in visible_files(folder) if path.is_file() and path.suffix.lower() in VIDEO_SUFFIXES]
 
 
-def open_source(path: Path, start: int = 0, threads: int = 1, picked: Sequence[int] | None = None) -> ImageStream:
+def open_source(path: Path, start: int = 0, threads: int = 1, picked: Sequence[int] | None = None) -> ImageStream[Bgr]:
     """The images of a video or of an image folder from its frame `start` on; `threads` decode a video.
 
     Where images are `picked`, frame k is the file's image `picked[k]`; the numbers must not fall.
@@ -77,6 +79,20 @@ def open_source(path: Path, start: int = 0, threads: int = 1, picked: Sequence[i
     if picked is not None:
         return PickedImages(open_source(path, 0, threads), picked[start:])
     return ImageFolder(path, start) if path.is_dir() else VideoFile(path, start, threads)
+
+
+def open_with_least_work(
+    path: Path, start: int = 0, threads: int = 1, picked: Sequence[int] | None = None
+) -> ImageStream[Bgr | YuvPicture]:
+    """The same, but the images of a video stay in its own colours where they can be read so.
+
+    Raises:
+        InputError: the video or folder cannot be opened.
+    """
+    video = None if path.is_dir() else plane_video(path, 0 if picked is not None else start, threads)
+    if video is None:
+        return open_source(path, start, threads, picked)
+    return video if picked is None else PickedImages(video, picked[start:])
 
 
 def look_at_source(path: Path) -> SourceInfo:

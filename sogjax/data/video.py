@@ -17,8 +17,9 @@ from sogjax.data.color_gains import evened
 from sogjax.data.image_file import read_image, read_mask
 from sogjax.data.image_stream import ImageStream
 from sogjax.data.recording import Recording
-from sogjax.data.source import open_source
+from sogjax.data.source import open_source, open_with_least_work
 from sogjax.data.video_file import frame_times
+from sogjax.data.yuv_picture import YuvPicture
 from sogjax.errors import InputError
 
 __all__ = ["VideoWriter", "read_frames", "read_image", "read_mask", "read_prepared", "read_still"]
@@ -44,11 +45,13 @@ def read_prepared(
     start: int = 0,
     stop: int | None = None,
     workers: int | None = None,
+    planes: bool = False,
 ) -> Iterator[list[Item]]:
     """The same, but what `prepare` makes of each image (None where a camera is missing) and the number of its camera.
 
     The decoding threads do that, so a large image need not outlive the moment in which it was decoded. There are
-    `workers` of them, by default one for each core.
+    `workers` of them, by default one for each core. With `planes`, an image may come in its video's own colours
+    (`YuvPicture`), which spares the conversion of every pixel, unless the colours of its camera are to be evened out.
 
     Raises:
         InputError: a video ends early or changes its size.
@@ -56,11 +59,11 @@ def read_prepared(
     stop = recording.num_frames if stop is None else min(stop, recording.num_frames)
     if not 0 <= start <= stop:
         raise ValueError(f"frames {start} to {stop} are not in a recording of {recording.num_frames} frames")
-    return _decoded_ahead(recording, prepare, start, stop, workers or os.cpu_count() or 1)
+    return _decoded_ahead(recording, prepare, start, stop, workers or os.cpu_count() or 1, planes)
 
 
 def _decoded_ahead(
-    recording: Recording, prepare: Callable[[int, Any], Item], start: int, stop: int, workers: int
+    recording: Recording, prepare: Callable[[int, Any], Item], start: int, stop: int, workers: int, planes: bool
 ) -> Iterator[list[Item]]:
     if start == stop:
         return
@@ -70,7 +73,7 @@ def _decoded_ahead(
         pool = stack.enter_context(ThreadPoolExecutor(min(len(cameras), workers)))
         opened = [
             pool.submit(
-                open_source,
+                open_with_least_work if planes and camera not in recording.color_gains else open_source,
                 recording.sources[camera],
                 max(recording.first_frame + start + recording.frame_offset[camera], 0),
                 threads,
@@ -101,14 +104,16 @@ def _decoded_ahead(
             yield images
 
 
-def _close_all(opened: list[Future[ImageStream]]) -> None:
+def _close_all(opened: list[Future[ImageStream[Any]]]) -> None:
     wait(opened)
     for future in opened:
         if future.exception() is None:
             future.result().close()
 
 
-def _checked(recording: Recording, camera: str, image: np.ndarray | None, frame: int) -> np.ndarray | None:
+def _checked(
+    recording: Recording, camera: str, image: np.ndarray | YuvPicture | None, frame: int
+) -> np.ndarray | YuvPicture | None:
     source, number = recording.sources[camera], recording.first_frame + frame
     if image is None and recording.fewest_cameras is not None:
         return None
@@ -120,7 +125,7 @@ def _checked(recording: Recording, camera: str, image: np.ndarray | None, frame:
     size = (image.shape[1], image.shape[0])
     if size != recording.rig.image_size(camera):
         raise InputError(f"{source}: its frame {number} is {size[0]}x{size[1]}, unlike the first; convert it again")
-    return evened(image, recording.color_gains.get(camera))
+    return image if isinstance(image, YuvPicture) else evened(image, recording.color_gains.get(camera))
 
 
 def read_still(recording: Recording, camera: str, path: Path) -> UInt8[np.ndarray, "height width 3"]:

@@ -6,8 +6,7 @@ from jaxtyping import Array, Float
 
 from sogjax.data.cell_cache import cell_cache
 from sogjax.data.recording import Recording
-from sogjax.data.video import read_prepared
-from sogjax.engine.pipeline import Preparation, cells_of_frame
+from sogjax.engine.pipeline import Preparation, cells_of_frame, read_pictures
 from sogjax.engine.prefix import Prefix
 from sogjax.engine.terminal import progress, say
 from sogjax.engine.timing import StageTimes
@@ -52,6 +51,6 @@ def frames_backwards(
         yield from kept[::-1]
         return
     for stop in range(last, first, -BLOCK):
-        block = list(read_prepared(recording, Preparation(grids), max(first, stop - BLOCK), stop))
+        block = list(read_pictures(recording, Preparation(grids), max(first, stop - BLOCK), stop))
         for pictures in reversed(block):
             yield cells_of_frame([picture.cells for picture in pictures])

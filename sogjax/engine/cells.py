@@ -6,8 +6,7 @@ import numpy as np
 
 from sogjax.data.cell_cache import Cells, CellsOfClip, cell_cache
 from sogjax.data.recording import Recording
-from sogjax.data.video import read_prepared
-from sogjax.engine.pipeline import Picture, PictureReader, Preparation
+from sogjax.engine.pipeline import Picture, PictureReader, Preparation, read_pictures
 from sogjax.engine.terminal import say
 from sogjax.errors import InputError
 from sogjax.images.cells import CellGrid
@@ -21,17 +20,17 @@ def picture_reader(images: ImagesConfig) -> PictureReader:
     """
     folder = images.cache
     if folder is None:
-        return read_prepared
+        return read_pictures
 
     def read(recording: Recording, preparation: Preparation, first: int, last: int) -> Iterator[list[Picture]]:
         if not recording.complete:
             say("images.cache: not used for this recording, since cameras are missing in some frames")
-            return read_prepared(recording, preparation, first, last)
+            return read_pictures(recording, preparation, first, last)
         cache = cell_cache(folder, recording, images.depth, say)
         kept = cache.find(first, last)
         if kept is not None and preparation.cells_only:
             return pictures_of(kept)
-        decoded = read_prepared(recording, preparation, first, last)
+        decoded = read_pictures(recording, preparation, first, last)
         return decoded if kept is not None else cache.kept(first, last, decoded, cells_of)
 
     return read

@@ -11,11 +11,10 @@ from jaxtyping import Array, Float, UInt8
 
 from sogjax.data.keypoints import Keypoints, load_keypoints
 from sogjax.data.recording import Recording
-from sogjax.data.video import read_prepared
 from sogjax.energy.frame_energy import still_energy
 from sogjax.energy.similarity import similarity_among
 from sogjax.engine import build
-from sogjax.engine.pipeline import Preparation, cells_of_frame
+from sogjax.engine.pipeline import Preparation, cells_of_frame, read_pictures
 from sogjax.engine.terminal import say
 from sogjax.model.body import Body, concatenate
 from sogjax.settings import TrackConfig
@@ -117,7 +116,7 @@ def _who_is_who(
     orders = [*permutations(range(len(bodies)))]
     grids = build.cell_grids(recording, config.images.depth)
     tracker = build.tracker(recording, concatenate(bodies), grids, config)
-    pictures = next(iter(read_prepared(recording, Preparation(grids), frame, frame + 1)))
+    pictures = next(iter(read_pictures(recording, Preparation(grids), frame, frame + 1)))
     cells, beside = on_device(cells_of_frame([picture.cells for picture in pictures]))
     poses = [np.concatenate([_pose(found[k][person]) for k, person in enumerate(order)]) for order in orders]
     states = [TrackState.from_pose(jnp.asarray(pose, tracker.normalizers.dtype)) for pose in poses]

@@ -14,6 +14,7 @@ import numpy as np
 
 import sogjax
 from sogjax.data.keypoints import find_keypoints
+from sogjax.data.plane_video import pyav_version
 from sogjax.data.recording import Recording
 from sogjax.data.source import files_fingerprint, fingerprint
 from sogjax.engine import build
@@ -40,6 +41,7 @@ def origin_of(recording: Recording, config: TrackConfig, given_actors: Sequence[
     return {
         "sogjax": sogjax.__version__,
         **{name: version(name) for name in PACKAGES},
+        "PyAV": pyav_version(),
         "device": jax.default_backend(),
         "precision": str(jnp.asarray(0.0).dtype),
         **_settings(config, ""),

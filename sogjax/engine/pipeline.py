@@ -12,6 +12,8 @@ from jaxtyping import Array, Float, UInt8
 
 from sogjax.data.recording import Recording
 from sogjax.data.stages import ahead
+from sogjax.data.video import read_prepared
+from sogjax.data.yuv_picture import YuvPicture
 from sogjax.engine.terminal import progress
 from sogjax.engine.timing import StageTimes
 from sogjax.errors import InputError
@@ -75,14 +77,26 @@ class Preparation:
         """Whether only the cells are needed."""
         return self.tile is nothing and self.jpeg is nothing
 
-    def __call__(self, camera: int, image: np.ndarray | None) -> Picture:
+    def __call__(self, camera: int, image: np.ndarray | YuvPicture | None) -> Picture:
         """The cells of a picture and what the outputs need of it; empty if there is no picture."""
         if image is None:
             return Picture(None, None, None, 0.0)
         begin = time.perf_counter()
         cells = padded_cells(image, self.grids[camera], stack_shape(self.grids))
         seconds = time.perf_counter() - begin
-        return Picture(cells, self.tile(camera, image), self.jpeg(camera, image), seconds)
+        if self.cells_only:
+            return Picture(cells, None, None, seconds)
+        shown = image.bgr() if isinstance(image, YuvPicture) else image
+        return Picture(cells, self.tile(camera, shown), self.jpeg(camera, shown), seconds)
+
+
+def read_pictures(recording: Recording, preparation: Preparation, first: int, last: int) -> Iterator[list[Picture]]:
+    """What is made of the pictures of each frame, with the least work: no picture is converted that nothing shows.
+
+    Raises:
+        InputError: a video ends early or changes its size.
+    """
+    return read_prepared(recording, preparation, first, last, planes=True)
 
 
 def cells_of_frame(cells: Sequence[UInt8[np.ndarray, "rows columns 3"] | None]) -> FrameCells:

@@ -1,10 +1,17 @@
 """From a decoded frame to the grid of its smallest quad-tree cells, in one pass over the full-size pixels."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Float, UInt8
+
+from sogjax.data.yuv_picture import YuvPicture
+from sogjax.images.yuv_means import rgb_of_means
+
+FINE = 4
+"""Squares of so many pixels are averaged in floating point."""
 
 
 @dataclass(frozen=True)
@@ -37,26 +44,68 @@ class CellGrid:
         return -(-self.height // self.cell_size)
 
     def averages(self, image: UInt8[np.ndarray, "height width 3"]) -> UInt8[np.ndarray, "rows columns 3"]:
-        """Mean colour of every cell, over the part of it that the image covers; channels stay as they are."""
-        size = self.cell_size
-        if size == 1:
-            return image
-        whole_columns, whole_rows = self.width // size, self.height // size
+        """Mean colour of every cell, over the part of it that the image covers; channels stay as they are.
+
+        Within a grey level: it is rounded at every halving.
+        """
         averages = np.empty((self.rows, self.columns, 3), np.uint8)
-        x, y = whole_columns * size, whole_rows * size
-        parts = [
-            (slice(0, y), slice(0, whole_rows), slice(0, x), slice(0, whole_columns)),
-            (slice(0, y), slice(0, whole_rows), slice(x, None), slice(whole_columns, None)),
-            (slice(y, None), slice(whole_rows, None), slice(0, x), slice(0, whole_columns)),
-            (slice(y, None), slice(whole_rows, None), slice(x, None), slice(whole_columns, None)),
-        ]
-        for pixel_rows, cell_rows, pixel_columns, cell_columns in parts:
+        self._fill(averages, image, block_means)
+        return averages
+
+    def fine_averages(self, plane: UInt8[np.ndarray, "height width"]) -> Float[np.ndarray, "rows columns"]:
+        """The same of one channel, without rounding in the end."""
+        averages = np.empty((self.rows, self.columns), np.float32)
+        self._fill(averages, plane, fine_block_means)
+        return averages
+
+    def halved(self) -> "CellGrid":
+        """The same cells of an image of half the width and height, both of which are even."""
+        return CellGrid(self.width // 2, self.height // 2, self.cell_size // 2)
+
+    def _fill(self, averages: np.ndarray, image: np.ndarray, means: Callable[[np.ndarray, int], np.ndarray]) -> None:
+        """The whole cells by `means`, those that the image covers in part one by one."""
+        size = self.cell_size
+        columns, rows = self.width // size, self.height // size
+        x, y = columns * size, rows * size
+        if columns and rows:
+            averages[:rows, :columns] = means(image[:y, :x], size)
+        for pixel_rows, cell_rows, pixel_columns, cell_columns in (
+            (slice(0, y), slice(0, rows), slice(x, None), slice(columns, None)),
+            (slice(y, None), slice(rows, None), slice(0, x), slice(0, columns)),
+            (slice(y, None), slice(rows, None), slice(x, None), slice(columns, None)),
+        ):
             target = averages[cell_rows, cell_columns]
             if target.size:
-                shape = (target.shape[1], target.shape[0])
-                source = image[pixel_rows, pixel_columns]
-                averages[cell_rows, cell_columns] = cv2.resize(source, shape, interpolation=cv2.INTER_AREA)
-        return averages
+                source = image[pixel_rows, pixel_columns].astype(averages.dtype, copy=False)
+                averages[cell_rows, cell_columns] = _reduced(source, (target.shape[1], target.shape[0]))
+
+
+def block_means(image: UInt8[np.ndarray, "_h _w *channel"], size: int) -> UInt8[np.ndarray, "_rows _columns *channel"]:
+    """Means over squares of `size` pixels, a power of two, by halving: OpenCV is quick at nothing else.
+
+    It rounds halves up; every other halving is of the negative, so that a noisy picture does not become brighter.
+    """
+    while size >= 4:
+        image = ~_half(~_half(image))
+        size //= 4
+    return _half(image) if size == 2 else image
+
+
+def fine_block_means(plane: UInt8[np.ndarray, "_h _w"], size: int) -> Float[np.ndarray, "_rows _columns"]:
+    """The same without rounding where few numbers are left."""
+    coarse = max(size // FINE, 1)
+    fine = block_means(plane, coarse).astype(np.float32)
+    for _ in range((size // coarse).bit_length() - 1):
+        fine = _half(fine)
+    return fine
+
+
+def _half(image: np.ndarray) -> np.ndarray:
+    return _reduced(image, (image.shape[1] // 2, image.shape[0] // 2))
+
+
+def _reduced(image: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    return cv2.resize(image, shape, interpolation=cv2.INTER_AREA)
 
 
 def stack_cells(
@@ -77,9 +126,9 @@ def stack_shape(grids: tuple[CellGrid, ...]) -> tuple[int, int]:
 
 
 def padded_cells(
-    image: UInt8[np.ndarray, "_height _width 3"], grid: CellGrid, shape: tuple[int, int]
+    image: UInt8[np.ndarray, "_height _width 3"] | YuvPicture, grid: CellGrid, shape: tuple[int, int]
 ) -> UInt8[np.ndarray, "rows columns 3"]:
-    """RGB cells of one BGR image, padded to `shape`.
+    """RGB cells of one image (BGR, or in a video's own colours), padded to `shape`.
 
     Raises:
         ValueError: an image whose size is not its grid's.
@@ -88,5 +137,17 @@ def padded_cells(
         found = f"{image.shape[1]}x{image.shape[0]}"
         raise ValueError(f"an image is {found} pixels, its grid is for {grid.width}x{grid.height}")
     cells = np.zeros((*shape, 3), np.uint8)
-    cells[: grid.rows, : grid.columns] = grid.averages(image)[..., ::-1]
+    cells[: grid.rows, : grid.columns] = _rgb_cells(image, grid)
     return cells
+
+
+def _rgb_cells(
+    image: UInt8[np.ndarray, "_height _width 3"] | YuvPicture, grid: CellGrid
+) -> UInt8[np.ndarray, "rows columns 3"]:
+    if isinstance(image, YuvPicture) and grid.cell_size == 1:
+        image = image.bgr()
+    if not isinstance(image, YuvPicture):
+        return grid.averages(image)[..., ::-1]
+    half = grid.halved()
+    blue, red = half.fine_averages(image.blue_difference), half.fine_averages(image.red_difference)
+    return rgb_of_means(grid.fine_averages(image.luma), blue, red, image.standard, image.full_range)

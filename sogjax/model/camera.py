@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
+from sogjax.compiled.small_matrices import applied
 from sogjax.model.rotation import transform_points
 from sogjax.model.sog import Sog
 
@@ -50,7 +51,7 @@ def project_points(camera: Camera, points_world: Float[Array, "n 3"]) -> tuple[F
     safe_depth = jnp.where(depth > NEAR, depth, 1.0)
     rays = points_camera[:, :2] / safe_depth[:, None]
     matrix = camera.intrinsics
-    pixels = jnp.einsum("ij,nj->ni", matrix[:2, :2], rays, precision="highest") + matrix[None, :2, 2]
+    pixels = applied(matrix[None, :2, :2], rays) + matrix[None, :2, 2]
     return pixels, depth
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, Bool, Float, Int
 
+from sogjax.compiled.small_matrices import applied, product
 from sogjax.model.rotation import cross_matrix, rigid_transform, rotation_about_axis
 
 Parents = tuple[int, ...]
@@ -41,7 +42,7 @@ def _composed(parents, revolute, offsets, axes, joint_params) -> Frames:
     local = rigid_transform(rotation_about_axis(axes, angles), offsets + slides[:, None] * axes)
     transforms = jnp.concatenate([local, jnp.eye(4, dtype=local.dtype)[None]])
     for ancestors in _doubled_ancestors(parents):
-        transforms = jnp.matmul(transforms[ancestors], transforms, precision="highest")
+        transforms = product(transforms[ancestors], transforms)
     return transforms[:-1]
 
 
@@ -71,15 +72,15 @@ def _frame_rates(parents, revolute, axes, frames, param_rates) -> Frames:
     sums = jnp.matmul(below, jnp.concatenate([turning, sliding], axis=1) * param_rates[:, None], precision="highest")
     across = cross_matrix(sums[:, :3])
     arms = frames[:, :3, 3] - frames[:1, :3, 3]
-    moved = jnp.einsum("jab,jb->ja", across, arms, precision="highest") + sums[:, 3:]
-    turned = jnp.einsum("jab,jbc->jac", across, frames[:, :3, :3], precision="highest")
+    moved = applied(across, arms) + sums[:, 3:]
+    turned = product(across, frames[:, :3, :3])
     upper = jnp.concatenate([turned, moved[:, :, None]], axis=2)
     return jnp.concatenate([upper, jnp.zeros_like(upper[:, :1, :])], axis=1)
 
 
 def _screws(revolute, axes, frames) -> tuple[Float[Array, "joint 3"], Float[Array, "joint 3"]]:
     """Angular velocity that each joint gives, and the velocity it gives to a point at the first joint's origin."""
-    axes_world = jnp.einsum("jab,jb->ja", frames[:, :3, :3], axes, precision="highest")
+    axes_world = applied(frames[:, :3, :3], axes)
     turning = jnp.where(revolute[:, None], axes_world, 0.0)
     arms = frames[:, :3, 3] - frames[:1, :3, 3]
     return turning, jnp.where(revolute[:, None], jnp.cross(arms, turning), axes_world)

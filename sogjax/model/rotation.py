@@ -3,6 +3,8 @@
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from sogjax.compiled.small_matrices import applied, product
+
 
 def cross_matrix(vectors: Float[Array, "*batch 3"]) -> Float[Array, "*batch 3 3"]:
     """The matrix of the cross product with each vector from the left."""
@@ -17,7 +19,7 @@ def rotation_about_axis(axes: Float[Array, "*batch 3"], angles: Float[Array, "*b
     cross = cross_matrix(axes)
     sine, cosine = jnp.sin(angles)[..., None, None], jnp.cos(angles)[..., None, None]
     eye = jnp.broadcast_to(jnp.eye(3, dtype=axes.dtype), cross.shape)
-    return eye + sine * cross + (1.0 - cosine) * (cross @ cross)
+    return eye + sine * cross + (1.0 - cosine) * product(cross, cross)
 
 
 def rigid_transform(
@@ -33,5 +35,5 @@ def transform_points(
     b_from_a: Float[Array, "*batch 4 4"], points: Float[Array, "*batch 3"]
 ) -> Float[Array, "*batch 3"]:
     """Points of frame a, expressed in frame b; one transform per point."""
-    rotated = jnp.einsum("...ij,...j->...i", b_from_a[..., :3, :3], points, precision="highest")
+    rotated = applied(b_from_a[..., :3, :3], points)
     return rotated + b_from_a[..., :3, 3]

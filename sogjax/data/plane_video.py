@@ -1,0 +1,154 @@
+"""A video whose images stay in its own colours, decoded by PyAV, where that is installed (`sogjax[video]`)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import UInt8
+
+from sogjax.data.image_file import MAX_PIXELS
+from sogjax.data.yuv_picture import ColorStandard, YuvPicture
+
+if TYPE_CHECKING:
+    from av.container import InputContainer  # pyright: ignore[reportMissingImports]
+    from av.video.frame import VideoFrame  # pyright: ignore[reportMissingImports]
+
+FORMATS = {"yuv420p": False, "yuvj420p": True}
+"""The pixel formats that are read, and whether black and white are 0 and 255; cameras write hardly any other."""
+STANDARDS: dict[int, ColorStandard] = {1: "709", 2: "601", 5: "601", 6: "601"}
+"""Colours by their number in the file (ITU-T H.273), as FFmpeg converts them; 2 is "not said"."""
+OPTIONS = {"skip_loop_filter": "noref"}
+"""Images that no other one is made of need no smoothing of block edges: the mean of a cell does not see them."""
+
+
+def pyav_version() -> str | None:
+    """The version of PyAV; None: it is not installed."""
+    try:
+        return version("av")
+    except PackageNotFoundError:
+        return None
+
+
+def plane_video(path: Path, start: int, threads: int) -> PlaneVideo | None:
+    """The images of a video from its frame `start` on; None where only OpenCV can read them as they should be.
+
+    That is where PyAV is not installed, or where the video is of a rare kind: turned sideways, of odd size, with more
+    than eight bits or other differences of colour. `threads` decode it.
+    """
+    if pyav_version() is None:  # any folder of this name could be imported
+        return None
+    try:
+        av: Any = import_module("av")
+    except ImportError:
+        return None
+    try:
+        container = av.open(str(path), options={})
+    except (OSError, ValueError):  # OpenCV's reader says what is wrong with it
+        return None
+    video = PlaneVideo(container, threads)
+    if video.readable and (start == 0 or video.seek(start)):
+        return video
+    video.close()
+    return None
+
+
+class PlaneVideo:
+    """The images of an open file, one after the other."""
+
+    def __init__(self, container: InputContainer, threads: int):
+        self._container = container
+        self._images: Iterator[VideoFrame] = iter(())
+        self._first: VideoFrame | None = None
+        if not container.streams.video:
+            return
+        stream = container.streams.video[0]
+        codec = stream.codec_context
+        codec.options = OPTIONS
+        codec.thread_count = threads
+        codec.thread_type = "AUTO" if threads > 1 else "NONE"
+        if 0 < codec.width * codec.height <= MAX_PIXELS:
+            self._images = self._decoded()
+            self._first = next(self._images, None)
+
+    @property
+    def readable(self) -> bool:
+        """Whether the images are of a kind that is read here, by the first one."""
+        first = self._first
+        return first is not None and _known(first)
+
+    def read(self) -> YuvPicture | UInt8[np.ndarray, "height width 3"] | None:
+        """The next image, or None after the last; as a picture (BGR) where its kind changes within the video."""
+        image = self._next()
+        if image is None:
+            return None
+        return yuv_picture(image) if _known(image) else _bgr(image)
+
+    def skip(self) -> None:
+        """Pass over the next image."""
+        self._next()
+
+    def close(self) -> None:
+        """Release the file."""
+        self._first, self._images = None, iter(())
+        self._container.close()
+
+    def seek(self, start: int) -> bool:
+        """Jump to a frame, counted from the first at the video's constant rate; False: it cannot be found."""
+        stream = self._container.streams.video[0]
+        rate, unit = stream.average_rate, stream.time_base
+        begin = stream.start_time or 0
+        if not rate or not unit:
+            return False
+        back = start
+        while True:
+            self._container.seek(begin + int(back / rate / unit), stream=stream, backward=True)
+            self._images = self._decoded()
+            image = self._first = next(self._images, None)
+            if image is None or image.pts is None:
+                return False
+            number = round((image.pts - begin) * unit * rate)
+            if number <= start:
+                break
+            if back == 0:
+                return False
+            back = max(0, 2 * back - number - 1)
+        for _ in range(start - number):
+            self._next()
+        return True
+
+    def _next(self) -> VideoFrame | None:
+        image, self._first = self._first, None
+        return next(self._images, None) if image is None else image
+
+    def _decoded(self) -> Iterator[VideoFrame]:
+        """All images from here on, up to damage: as with OpenCV, no later image is taken for that of another frame."""
+        for packet in self._container.demux(video=0):
+            try:
+                images = packet.decode()
+            except (OSError, ValueError):
+                return
+            yield from images  # pyright: ignore[reportReturnType]
+
+
+def yuv_picture(image: VideoFrame) -> YuvPicture:
+    """The planes of an image; they live in the decoder's memory as long as they are used."""
+    luma, blue, red = (
+        np.frombuffer(plane, np.uint8).reshape(plane.height, plane.line_size)[:, : plane.width]  # pyright: ignore
+        for plane in image.planes
+    )
+    full_range = FORMATS[image.format.name]
+    return YuvPicture(luma, blue, red, STANDARDS[int(image.colorspace)], full_range, lambda: _bgr(image))
+
+
+def _known(image: VideoFrame) -> bool:
+    even = image.width % 2 == 0 and image.height % 2 == 0
+    return even and image.format.name in FORMATS and int(image.colorspace) in STANDARDS and image.rotation == 0
+
+
+def _bgr(image: VideoFrame) -> UInt8[np.ndarray, "height width 3"]:
+    return image.to_ndarray(format="bgr24")

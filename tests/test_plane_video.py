@@ -1,0 +1,171 @@
+"""Videos in their own colours (PyAV): the same cells and the same frames as OpenCV's pictures."""
+
+import sys
+
+import cv2
+import numpy as np
+import pytest
+from small_recording import make_recording, shared_recording, write_video
+
+from sogjax.data import plane_video as module
+from sogjax.data.plane_video import plane_video
+from sogjax.data.recording import open_recording
+from sogjax.data.source import open_with_least_work
+from sogjax.data.video import read_frames, read_prepared
+from sogjax.data.video_file import VideoFile
+from sogjax.data.yuv_picture import YuvPicture
+from sogjax.engine.build import cell_grids
+from sogjax.engine.pipeline import Preparation, read_pictures
+from sogjax.images.cells import CellGrid, padded_cells
+
+av = pytest.importorskip("av")
+
+MEAN = 0.6
+"""Grey levels between the cells of one picture, on average: both are rounded to bytes."""
+WORST = 3
+"""Levels in any cell without saturated pixels: what FFmpeg's converter drops is taken off on average only."""
+
+
+def painted(frame, size):
+    """A smooth picture with noise, whose colours are far from saturated and change with the frame."""
+    width, height = size
+    rng = np.random.default_rng(frame)
+    patches = rng.integers(70, 180, (9, 12, 3), np.uint8)
+    noise = rng.normal(0.0, 3.0, (height, width, 3))
+    return np.clip(cv2.resize(patches, size, interpolation=cv2.INTER_CUBIC) + noise, 0, 255).astype(np.uint8)
+
+
+def painted_video(path, size=(208, 116), frames=6, kind="yuv420p", colors=None):
+    """MPEG-4 as OpenCV writes it; with a kind of pixels or colours, H.264."""
+    with av.open(str(path), "w") as container:
+        plain = kind == "yuv420p" and colors is None
+        stream = container.add_stream("mpeg4" if plain else "libx264", rate=25, bit_rate=20_000_000)
+        stream.width, stream.height = size
+        stream.pix_fmt = kind
+        if colors is not None:
+            stream.codec_context.colorspace = colors
+        for frame in range(frames):
+            image = av.VideoFrame.from_ndarray(painted(frame, size), format="bgr24").reformat(format=kind)
+            if colors is not None:
+                image.colorspace = colors
+            container.mux(stream.encode(image))
+        container.mux(stream.encode())
+    return path
+
+
+def cells_of(image, depth):
+    grid = CellGrid.from_depth(image.shape[1], image.shape[0], depth)
+    return padded_cells(image, grid, (grid.rows, grid.columns)).astype(int)
+
+
+def images_of(stream):
+    found = []
+    while (image := stream.read()) is not None:
+        found.append(image)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("kind", "colors", "depth"),
+    [("yuv420p", None, 8), ("yuv420p", None, 7), ("yuv420p", None, 5), ("yuvj420p", None, 6), ("yuv420p", 1, 6)],
+)
+def test_cells_are_those_of_pictures(tmp_path, kind, colors, depth):
+    path = painted_video(tmp_path / "video.mp4", kind=kind, colors=colors)
+    found, expected = images_of(plane_video(path, 0, 1)), images_of(VideoFile(path, 0, 1))
+    assert len(found) == len(expected) == 6
+    for planes, picture in zip(found, expected, strict=True):
+        assert isinstance(planes, YuvPicture)
+        difference = np.abs(cells_of(planes, depth) - cells_of(picture, depth))
+        assert difference.mean() < MEAN
+        assert difference.max() <= WORST
+
+
+def test_cells_of_a_real_recording():
+    folder = shared_recording("rendered_walk")
+    if folder is None:
+        pytest.skip("there is no recording rendered_walk beside the project")
+    source = open_recording(folder).sources["cam03"]
+    differences = [
+        cells_of(planes, 8) - cells_of(picture, 8)
+        for planes, picture in zip(
+            images_of(plane_video(source, 30, 1)), images_of(VideoFile(source, 30, 1)), strict=True
+        )
+    ]
+    assert abs(np.mean(differences)) < 0.3
+    assert np.percentile(np.abs(differences), 99) <= 1
+
+
+@pytest.mark.parametrize("start", [1, 4, 12, 25, 29])
+def test_seeking_is_exact(tmp_path, start):
+    path = painted_video(tmp_path / "video.mp4", size=(64, 48), frames=30)
+    everything = images_of(plane_video(path, 0, 1))
+    rest = images_of(plane_video(path, start, 2))
+    assert len(rest) == 30 - start
+    for found, expected in zip(rest, everything[start:], strict=True):
+        np.testing.assert_array_equal(found.luma, expected.luma)
+
+
+def test_skipping(tmp_path):
+    path = painted_video(tmp_path / "video.mp4", size=(64, 48))
+    stream, everything = plane_video(path, 0, 1), images_of(plane_video(path, 0, 1))
+    stream.skip()
+    np.testing.assert_array_equal(stream.read().luma, everything[1].luma)
+    stream.close()
+    assert stream.read() is None
+
+
+def test_rare_kinds_are_left_to_opencv(tmp_path):
+    path = painted_video(tmp_path / "video.mp4", kind="yuv422p")
+    assert plane_video(path, 0, 1) is None
+    assert isinstance(open_with_least_work(path), VideoFile)
+
+
+@pytest.mark.parametrize("content", [b"", b"no video at all" * 100])
+def test_what_is_no_video_is_left_to_opencv(tmp_path, content):
+    path = tmp_path / "video.mp4"
+    path.write_bytes(content)
+    assert plane_video(path, 0, 1) is None
+
+
+def test_without_pyav_opencv_reads(tmp_path, monkeypatch):
+    folder = make_recording(tmp_path / "r")
+    monkeypatch.setitem(sys.modules, "av", None)
+    recording = open_recording(folder)
+    images = next(iter(read_prepared(recording, lambda camera, image: image, planes=True)))
+    assert all(isinstance(image, np.ndarray) for image in images)
+
+
+def test_pictures_are_made_for_what_shows_them(tmp_path):
+    """And the cells are the same then."""
+    recording = open_recording(make_recording(tmp_path / "r"))
+    grids = cell_grids(recording, 4)
+    plain = list(read_pictures(recording, Preparation(grids), 0, 4))
+    shown = list(read_pictures(recording, Preparation(grids, tile=lambda camera, image: image), 0, 4))
+    for few, more, images in zip(plain, shown, read_frames(recording), strict=True):
+        for camera, image in enumerate(images):
+            assert few[camera].tile is None
+            np.testing.assert_array_equal(few[camera].cells, more[camera].cells)
+            np.testing.assert_allclose(more[camera].tile.astype(int), image.astype(int), atol=2)
+
+
+def test_evened_colours_are_those_of_pictures(tmp_path):
+    settings = "up: z\ncolor_gains:\n  left: [1.2, 1.0, 0.9]\n"
+    recording = open_recording(make_recording(tmp_path / "r", settings=settings))
+    left, right = next(iter(read_prepared(recording, lambda camera, image: image, planes=True)))
+    assert isinstance(left, np.ndarray)
+    assert isinstance(right, YuvPicture)
+    np.testing.assert_array_equal(left, next(iter(read_frames(recording)))[0])
+
+
+def test_a_damaged_video_ends_where_it_does_with_opencv(tmp_path):
+    path = tmp_path / "video.mp4"
+    write_video(path, frames=8)
+    content = bytearray(path.read_bytes())
+    middle = content.index(b"mdat") + 4 + (content.index(b"moov") - content.index(b"mdat")) // 2
+    content[middle : middle + 40] = bytes(40)
+    path.write_bytes(content)
+    assert len(images_of(plane_video(path, 0, 1))) == len(images_of(VideoFile(path, 0, 1)))
+
+
+def test_the_version_is_told():
+    assert module.pyav_version() == av.__version__
