@@ -57,7 +57,7 @@ def test_wrong_actors_are_what_they_are_called():
     body, other = make_body(), replace(make_body(), name="other")
     (exchanged,) = CASES["red and blue exchanged"]([body], [])
     np.testing.assert_array_equal(exchanged.blob_colors[:, 0], body.blob_colors[:, 2])
-    assert [one.name for one in CASES["another actor"]([body], [other])] == [body.name]
+    assert [one.name for one in CASES["another person"]([body], [other])] == [body.name]
     assert [one.name for one in CASES["doubled actor"]([body], [])] == [body.name, "double"]
 
 

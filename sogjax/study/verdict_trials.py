@@ -92,7 +92,7 @@ def smaller(bodies: list[Body], others: list[Body]) -> list[Body]:
 
 
 def somebody_else(bodies: list[Body], others: list[Body]) -> list[Body]:
-    """As many actors of another sequence, under the names of these."""
+    """Actors of another sequence, under the names of these."""
     return [replace(other, name=body.name) for body, other in zip(bodies, others, strict=False)]
 
 
@@ -106,7 +106,8 @@ CASES: dict[str, Callable[[list[Body], list[Body]], list[Body]]] = {
     "red and blue exchanged": exchanged_colors,
     "a fifth larger": larger,
     "a fifth smaller": smaller,
-    "another actor": somebody_else,
+    "other clothes": somebody_else,
+    "another person": somebody_else,
     "doubled actor": doubled,
 }
 
@@ -175,12 +176,15 @@ class VerdictTrials:
         return [load_body(path) for path in sorted(folder.glob("*.yaml"))]
 
     def _others(self, trial: VerdictTrial) -> list[Body]:
-        """Of the sequence before in the list that has as many actors; made only for the case that needs them."""
-        if CASES[trial.case] is not somebody_else:
-            return []
+        """Of the sequence before in the list that has as many actors, or of the first that has more, the last one."""
         count = self.synth[trial.sequence].actors
-        alike = [name for name, settings in self.synth.items() if settings.actors == count]
-        return self._actors(alike[alike.index(trial.sequence) - 1])
+        if trial.case == "other clothes":
+            alike = [name for name, settings in self.synth.items() if settings.actors == count]
+            return self._actors(alike[alike.index(trial.sequence) - 1])
+        if trial.case == "another person":
+            groups = [name for name, settings in self.synth.items() if settings.actors > 1]
+            return self._actors(groups[0])[::-1]
+        return []
 
     def _truth(self, sequence: str) -> GroundTruth:
         return load_ground_truth(cached_recording(self.synth[sequence]) / "ground_truth.npz")
