@@ -3,8 +3,8 @@
     python experiments/verdicts.py [sequences=[walk,run]] [cameras=[4,12]] [backgrounds=[pictures,clip]] [do=false]
 
 Yardstick sequences are tracked by their own actors and by wrong ones (`cases`, with `wrong_cameras`): red and blue
-exchanged, other clothes (another sequence's), another person, a fifth larger or smaller, one too many. The verdict of
-each run stands beside the truth: a limb is lost where its joints are more than 10 cm off on average, for three frames
+exchanged, other clothes (another sequence's), another person, a fifth larger or smaller. The verdict of each run
+stands beside the truth: a limb is lost where its joints are more than 10 cm off on average, for three frames
 or more. Motions are kept in `out` and not tracked again, verdicts follow from them by the rule as it stands. Tables are
 printed, and written as tables.md.
 """

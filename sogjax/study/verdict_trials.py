@@ -96,11 +96,6 @@ def somebody_else(bodies: list[Body], others: list[Body]) -> list[Body]:
     return [replace(other, name=body.name) for body, other in zip(bodies, others, strict=False)]
 
 
-def doubled(bodies: list[Body], others: list[Body]) -> list[Body]:
-    """One more actor than there are people, like the first."""
-    return [*bodies, replace(bodies[0], name="double")]
-
-
 CASES: dict[str, Callable[[list[Body], list[Body]], list[Body]]] = {
     "own actor": own,
     "red and blue exchanged": exchanged_colors,
@@ -108,7 +103,6 @@ CASES: dict[str, Callable[[list[Body], list[Body]], list[Body]]] = {
     "a fifth smaller": smaller,
     "other clothes": somebody_else,
     "another person": somebody_else,
-    "doubled actor": doubled,
 }
 
 
