@@ -17,6 +17,7 @@ from sogjax.data.atomic import atomic_path
 from sogjax.data.cell_cache import CellsOfClip
 from sogjax.energy.posed import Posed
 from sogjax.engine.terminal import say
+from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.settings.compose import track_config
 from sogjax.study.displaced import displaced
@@ -114,6 +115,8 @@ class LimbTrials:
             return np.stack([np.asarray(frame.result.pose) for frame in found])
 
         first = np.concatenate([_true_start(body, source) for body in source.bodies])
+        if not np.isfinite(first).all():
+            first = np.asarray(source.start)
         frames = np.arange(len(cells))
         plain = follow(jnp.asarray(first), frames)
         yield Tracked(PLAIN, frames, plain, np.concatenate([first[None], plain[:-1]]), 0)
@@ -121,7 +124,7 @@ class LimbTrials:
         poses = follow(jnp.asarray(first), skipping)
         yield Tracked(SKIPPING, skipping, poses, np.concatenate([first[None], poses[:-1]]), 0)
         body, random = tracker.body, np.random.default_rng(len(trial.sequence) * 100 + (trial.cameras or 0))
-        for at in DISPLACED_IN:
+        for at in (at for at in DISPLACED_IN if at + FOLLOWED < len(cells)):
             for name, limb, blobs in zip(limb_names(body), limbs(body.skeleton), limb_blobs(body), strict=True):
                 wrong = displaced(body, plain[at], limb, blobs, random)
                 if wrong is None:
@@ -133,7 +136,11 @@ class LimbTrials:
                 yield Tracked(f"{name} displaced", after, poses, np.concatenate([wrong[None], poses[:-1]]), at)
 
     def keep(self, trial: LimbTrial, runs: Sequence[Tracked]) -> None:
-        """Measure the limbs in the frames of all runs, the plain one first, and keep that."""
+        """Measure the limbs in the frames of all runs, the plain one first, and keep that where the truth is known.
+
+        Raises:
+            InputError: it is known nowhere.
+        """
         source, tracker, cells = self._tracker(trial)
         usual: Float[np.ndarray, "frame 2 blob"] = np.zeros((0, 2, tracker.body.num_blobs))
         columns: dict[str, list[Any]] = {key: [] for key in ("kind", "name", "worse", "contradicted", "error")}
@@ -141,14 +148,20 @@ class LimbTrials:
             start = usual[run.follows] if run.follows else np.full((2, tracker.body.num_blobs), np.nan, np.float32)
             measures, before = measured(tracker, cells, run, start)
             usual = before if run.kind == PLAIN else usual
+            if run.frames[0] >= source.truth.num_frames:
+                continue
             errors = limb_errors(source.bodies, source.truth, run.frames, run.poses)
             for k, name in enumerate(limb_names(tracker.body)):
-                if name in errors.names:
+                error = errors.limbs[:, errors.names.index(name)] if name in errors.names else np.full(1, np.nan)
+                known = np.isfinite(error)
+                if known.any():
                     columns["kind"].append(run.kind)
                     columns["name"].append(name)
-                    columns["worse"].append(np.asarray(measures.worse[:, k]))
-                    columns["contradicted"].append(np.asarray(measures.contradicted[:, k]))
-                    columns["error"].append(errors.limbs[:, errors.names.index(name)])
+                    columns["worse"].append(np.asarray(measures.worse[:, k])[known])
+                    columns["contradicted"].append(np.asarray(measures.contradicted[:, k])[known])
+                    columns["error"].append(error[known])
+        if not columns["error"]:
+            raise InputError(f"{source.path}: its truth knows no limb in the frames that were tracked")
         stop = np.cumsum([len(error) for error in columns["error"]])
         ends = {"first": np.concatenate([[0], stop[:-1]]), "stop": stop}
         words = {key: np.array(columns.pop(key), str) for key in ("kind", "name")}

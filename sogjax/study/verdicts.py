@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Int
 from sogjax.data.ground_truth import GroundTruth
 from sogjax.data.motion import motion_from_poses
 from sogjax.evaluation import joint_errors
+from sogjax.evaluation.markers import common_frames
 from sogjax.evaluation.metrics import mean_per_frame
 from sogjax.model.body import Body, dof_slices
 from sogjax.study.climbs import Pair
@@ -44,7 +45,11 @@ def limb_errors(
     frames: Int[np.ndarray, "frame"],
     poses: Float[np.ndarray, "frame dof"],
 ) -> LimbErrors:
-    """The errors of poses of several bodies, upright in the world, beside each other; `frames` are the truth's."""
+    """The errors of poses of several bodies, upright in the world, beside each other; `frames` are the recording's.
+
+    Raises:
+        InputError: the truth knows none of these frames.
+    """
     names: list[str] = []
     columns: list[np.ndarray] = []
     known = np.asarray(np.isfinite(poses).all(axis=1))
@@ -55,7 +60,10 @@ def limb_errors(
         if found is not None:
             subject = f"{body.name}/" if len(bodies) > 1 else ""
             names += [subject + name for name in found.names]
-            columns.append(np.where(known[:, None], found.errors, np.nan))
+            rows, _ = common_frames(motion, of_body)
+            column = np.full((len(frames), len(found.names)), np.nan)
+            column[rows] = np.where(known[rows, None], found.errors, np.nan)
+            columns.append(column)
     errors = np.concatenate([*columns, np.zeros((len(frames), 0))], axis=1)
     of_joint = [limb_of(name) for name in names]
     limbs = tuple(dict.fromkeys(of_joint))

@@ -1,0 +1,128 @@
+"""Is a run right that says "looks right", and wrong where it doubts itself?
+
+    python experiments/verdicts.py [sequences=[walk,run]] [cameras=[4,12]] [backgrounds=[pictures,clip]] [do=false]
+
+Yardstick sequences are tracked by their own actors and by wrong ones (`cases`, with `wrong_cameras`): red and blue
+exchanged, other clothes (another sequence's), another person, a fifth larger or smaller. The verdict of each run
+stands beside the truth: a limb is lost where its joints are more than 10 cm off on average, for three frames
+or more. Motions are kept in `out` and not tracked again, verdicts follow from them by the rule as it stands. Tables are
+printed, and written as tables.md.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from sogjax.data.atomic import atomic_path
+from sogjax.engine.compiled_programs import forget_programs_if_many
+from sogjax.engine.terminal import say
+from sogjax.errors import InputError
+from sogjax.study.experiment import synth_settings, yardsticks
+from sogjax.study.machine import command_line, machine_line
+from sogjax.study.script import run_script, settings_from
+from sogjax.study.source import MOST_FRAMES
+from sogjax.study.verdict_trials import CASES, JudgedRun, VerdictTrial, VerdictTrials, share
+
+OWN = next(iter(CASES))
+COLUMNS = (
+    "sequence",
+    "case",
+    "background, cameras",
+    "joints, mm",
+    "lost limbs, frames",
+    "explained",
+    "of expected",
+    "overlap",
+    "verdict",
+)
+
+
+@dataclass
+class Settings:
+    """What is tracked, as `key=value` on the command line."""
+
+    sequences: list[str] = field(default_factory=list)
+    """Rows of the experiment `sequences`; none: all."""
+    cameras: list[int] = field(default_factory=lambda: [4, 12])
+    backgrounds: list[str] = field(default_factory=lambda: ["pictures"])
+    cases: list[str] = field(default_factory=lambda: [*CASES])
+    wrong_cameras: list[int] = field(default_factory=lambda: [4])
+    """With which wrong actors are tried."""
+    frames: int = 60
+    do: bool = True
+    """Whether trials that are missing are run."""
+    settings: list[str] = field(default_factory=list)
+    """Of `sogjax track`."""
+    out: str = "outputs/verdicts"
+
+
+def main() -> None:
+    """Run what is not there yet, and write the tables."""
+    settings = settings_from(Settings)
+    unknown = [case for case in settings.cases if case not in CASES]
+    if unknown:
+        raise InputError(f"cases: {unknown[0]}: is none of {', '.join(CASES)}")
+    synth = {name: synth_settings({"frames": MOST_FRAMES, **chosen}) for name, chosen in yardsticks([]).items()}
+    trials, found = VerdictTrials(Path(settings.out), synth, settings.frames, tuple(settings.settings)), []
+    for background in settings.backgrounds:
+        for case in settings.cases:
+            for cameras in settings.cameras if case == OWN else settings.wrong_cameras:
+                for sequence in yardsticks(settings.sequences):
+                    forget_programs_if_many()
+                    runs = trials.judged(VerdictTrial(sequence, cameras, background, case), settings.do)
+                    found += runs
+                    for run in runs:
+                        say(f"{sequence}, {cameras} cameras, {background}, {case}: {said(run)}")
+    if not found:
+        raise InputError("no trial was run; do=true runs them")
+    text = tables(found)
+    with atomic_path(Path(settings.out) / "tables.md") as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    print(text)
+
+
+def said(run: JudgedRun) -> str:
+    """The verdict in a line, and what is lost."""
+    if run.verdict is None:
+        return f"refused: {run.refused}"
+    lost = ", ".join(f"{limb} {count}" for limb, count in (run.lost or {}).items())
+    return f"{run.verdict.sentence} ({1e3 * run.mean:.0f} mm, lost: {lost or 'nothing'})"
+
+
+def tables(found: list[JudgedRun]) -> str:
+    """How often verdicts hold, by case and setting, then every run, as Markdown."""
+    lines = [
+        f"{machine_line()}: `{command_line()}`",
+        "",
+        "| case | background, cameras | actors | right, and doubted | a limb lost, and looks right "
+        "| wrong subject, or refused |",
+        "|---" * 6 + "|",
+    ]
+    kind = lambda run: (run.trial.case, f"{run.trial.background}, {run.trial.cameras}")
+    for group in dict.fromkeys(map(kind, found)):
+        runs = [run for run in found if kind(run) == group]
+        tracked = [run for run in runs if run.verdict is not None]
+        right, lost = [run for run in tracked if run.right], [run for run in tracked if not run.right]
+        doubted = share(right, lambda run: not run.looks_right)
+        missed = share(lost, lambda run: run.looks_right)
+        caught = share(runs, lambda run: run.verdict is None or run.verdict.wrong)
+        lines.append(f"| {group[0]} | {group[1]} | {len(runs)} | {doubted} | {missed} | {caught} |")
+    lines += ["", "| " + " | ".join(COLUMNS) + " |", "|---" * len(COLUMNS) + "|", *map(_row, found)]
+    return "\n".join(lines) + "\n"
+
+
+def _row(run: JudgedRun) -> str:
+    trial, verdict = run.trial, run.verdict
+    name = trial.sequence + (f", {run.actor}" if run.actor not in ("", "anna") else "")
+    first = f"| {name} | {trial.case} | {trial.background}, {trial.cameras}"
+    if verdict is None:
+        return f"{first} | | | | | | refused: {run.refused} |"
+    lost = ", ".join(f"{limb} {count}" for limb, count in (run.lost or {}).items())
+    explained, expected = verdict.explained or 0.0, verdict.expected
+    overlaps = sorted(verdict.overlap.values())
+    overlap = f"{overlaps[len(overlaps) // 2]:.2f}" if overlaps else ""
+    ratio = f"{explained / expected:.2f}" if expected else ""
+    return f"{first} | {1e3 * run.mean:.0f} | {lost} | {explained:.2f} | {ratio} | {overlap} | {verdict.sentence} |"
+
+
+if __name__ == "__main__":
+    run_script(main)

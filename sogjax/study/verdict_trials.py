@@ -1,0 +1,205 @@
+"""What runs think of themselves beside the truth: sequences tracked as they should be, and with something wrong."""
+
+import hashlib
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from sogjax.data.actor_file import load_body, save_body
+from sogjax.data.atomic import atomic_path
+from sogjax.data.ground_truth import GroundTruth, load_ground_truth
+from sogjax.data.motion import Motion, load_motion, save_motion
+from sogjax.engine.recordings import actors_of, opened, with_cameras
+from sogjax.engine.track import track_recording
+from sogjax.engine.verdict import expected_of
+from sogjax.errors import InputError
+from sogjax.evaluation import joint_errors
+from sogjax.evaluation.metrics import mean_per_frame, stretches
+from sogjax.evaluation.verdict import Verdict, verdicts
+from sogjax.model.body import Body
+from sogjax.settings.compose import track_config
+from sogjax.study.few_cameras import evenly
+from sogjax.study.verdicts import limb_of
+from sogjax.synth import SynthSettings
+from sogjax.synth.cache import cached_recording
+
+FAR = 0.1
+"""Metres from the truth, beyond which a limb is lost."""
+FOR = 3
+"""Frames: a limb that is far off for fewer is not lost."""
+
+
+@dataclass(frozen=True)
+class VerdictTrial:
+    """A sequence tracked with some of its cameras by an actor, right or wrong."""
+
+    sequence: str
+    cameras: int
+    background: str
+    """As `images.background`."""
+    case: str
+    """Of `CASES`."""
+
+
+@dataclass(frozen=True)
+class JudgedRun:
+    """What a run thought of one actor, and how far that was off; where nothing was tracked, only why."""
+
+    trial: VerdictTrial
+    actor: str
+    refused: str = ""
+    verdict: Verdict | None = None
+    mean: float = float("nan")
+    """Of all joints (metres)."""
+    lost: dict[str, int] | None = None
+    """Frames in which a limb is far off, by limb, of the stretches that last."""
+
+    @property
+    def right(self) -> bool:
+        """No limb is lost."""
+        return self.lost is not None and not self.lost
+
+    @property
+    def looks_right(self) -> bool:
+        """What the run said."""
+        return self.verdict is not None and self.verdict.looks_right
+
+
+def own(bodies: list[Body], others: list[Body]) -> list[Body]:
+    """The actors that were made for it."""
+    return bodies
+
+
+def exchanged_colors(bodies: list[Body], others: list[Body]) -> list[Body]:
+    """As of pictures whose red and blue are exchanged."""
+    return [eqx.tree_at(lambda body: body.blob_colors, body, body.blob_colors[:, ::-1]) for body in bodies]
+
+
+def larger(bodies: list[Body], others: list[Body]) -> list[Body]:
+    """By a fifth."""
+    return [scaled(body, 1.2) for body in bodies]
+
+
+def smaller(bodies: list[Body], others: list[Body]) -> list[Body]:
+    """By a fifth."""
+    return [scaled(body, 0.8) for body in bodies]
+
+
+def somebody_else(bodies: list[Body], others: list[Body]) -> list[Body]:
+    """Actors of another sequence, under the names of these."""
+    return [replace(other, name=body.name) for body, other in zip(bodies, others, strict=False)]
+
+
+CASES: dict[str, Callable[[list[Body], list[Body]], list[Body]]] = {
+    "own actor": own,
+    "red and blue exchanged": exchanged_colors,
+    "a fifth larger": larger,
+    "a fifth smaller": smaller,
+    "other clothes": somebody_else,
+    "another person": somebody_else,
+}
+
+
+def scaled(body: Body, factor: float) -> Body:
+    """A body all of whose lengths are so many times as long."""
+    lengths = lambda b: (b.skeleton.offsets, b.blobs.offsets, b.blob_sigmas, b.landmarks.offsets)
+    return eqx.tree_at(lengths, body, tuple(factor * jnp.asarray(part) for part in lengths(body)))
+
+
+@dataclass(frozen=True)
+class VerdictTrials:
+    """Runs trials and keeps their motions: verdicts follow from them anew, by the rule as it stands."""
+
+    folder: Path
+    synth: dict[str, SynthSettings]
+    """By sequence."""
+    frames: int
+    """Of each sequence, from its first."""
+    words: tuple[str, ...] = ()
+    """Settings of `sogjax track`."""
+
+    def judged(self, trial: VerdictTrial, do: bool = True) -> list[JudgedRun]:
+        """Each actor of a trial that was kept, or is run now; none where it would have to be run and must not."""
+        content = json.dumps([asdict(trial), asdict(self.synth[trial.sequence]), self.frames, self.words])
+        place = self.folder / "motions" / hashlib.sha256(content.encode()).hexdigest()[:16]
+        if not (place / "trial.json").is_file():
+            if not do:
+                return []
+            self._run(trial, place)
+        kept = json.loads((place / "trial.json").read_text(encoding="utf-8"))
+        if kept["refused"]:
+            return [JudgedRun(trial, "", kept["refused"])]
+        motions = {name: load_motion(place / f"{name}.npz") for name in kept["expected"]}
+        found = verdicts(motions, {name: value for name, value in kept["expected"].items() if value})
+        truth = self._truth(trial.sequence)
+        return [judged_run(trial, name, motion, truth, found[name]) for name, motion in motions.items()]
+
+    def _run(self, trial: VerdictTrial, place: Path) -> None:
+        recording = opened(str(cached_recording(self.synth[trial.sequence])))
+        recording = with_cameras(recording, evenly(recording.rig.names, trial.cameras))
+        recording = replace(recording, num_frames=min(self.frames, recording.num_frames))
+        bodies = CASES[trial.case](self._actors(trial.sequence), self._others(trial))
+        words = [f"images.cache={self.folder / 'cells'}", f"images.background={trial.background}", *self.words]
+        kept: dict[str, Any] = {"trial": asdict(trial), "refused": "", "expected": {}}
+        try:
+            run = track_recording(recording, bodies, track_config(words, recording=recording.path))
+        except InputError as error:
+            kept["refused"] = str(error)
+        else:
+            expected = expected_of(bodies)
+            kept["expected"] = {name: expected.get(name) for name in run.motions}
+            for name, motion in run.motions.items():
+                save_motion(place / f"{name}.npz", motion)
+        with atomic_path(place / "trial.json") as temporary:
+            temporary.write_text(json.dumps(kept, indent=1), encoding="utf-8")
+
+    def _actors(self, sequence: str) -> list[Body]:
+        """Made from the example poses with all cameras, once."""
+        source = cached_recording(self.synth[sequence])
+        folder = self.folder / "actors" / source.name
+        if not folder.is_dir():
+            recording, config = opened(str(source)), track_config(recording=source)
+            for number, actor in enumerate(actors_of(recording, None, config.body, config.color)[0]):
+                save_body(folder / f"{number}_{actor.name}.yaml", actor)
+        return [load_body(path) for path in sorted(folder.glob("*.yaml"))]
+
+    def _others(self, trial: VerdictTrial) -> list[Body]:
+        """Of the sequence before in the list that has as many actors, or of the first that has more, the last one."""
+        count = self.synth[trial.sequence].actors
+        if trial.case == "other clothes":
+            alike = [name for name, settings in self.synth.items() if settings.actors == count]
+            return self._actors(alike[alike.index(trial.sequence) - 1])
+        if trial.case == "another person":
+            groups = [name for name, settings in self.synth.items() if settings.actors > 1]
+            return self._actors(groups[0])[::-1]
+        return []
+
+    def _truth(self, sequence: str) -> GroundTruth:
+        return load_ground_truth(cached_recording(self.synth[sequence]) / "ground_truth.npz")
+
+
+def judged_run(trial: VerdictTrial, name: str, motion: Motion, truth: GroundTruth, verdict: Verdict) -> JudgedRun:
+    """Beside the truth: of the subject of this name, or of the only one."""
+    subject = name if name in truth.subjects else next(iter(truth.subjects), None)
+    found = joint_errors(motion, truth.subject(subject) if subject else truth)
+    if found is None:
+        raise InputError(f"{trial.sequence}: its truth has no joints of the actor")
+    lost = {limb: count for limb in dict.fromkeys(map(limb_of, found.names)) if (count := _lost(found, limb))}
+    return JudgedRun(trial, name, "", verdict, float(np.nanmean(found.errors)), lost)
+
+
+def _lost(found: Any, limb: str) -> int:
+    columns = [k for k, name in enumerate(found.names) if limb_of(name) == limb]
+    far = np.nan_to_num(mean_per_frame(found.errors[:, columns])) > FAR
+    return sum(stop - first for first, stop in stretches(far, FOR))
+
+
+def share(runs: Sequence[JudgedRun], holds: Callable[[JudgedRun], bool]) -> str:
+    """`3 of 11` runs for which something holds."""
+    return f"{sum(map(holds, runs))} of {len(runs)}"
