@@ -178,7 +178,7 @@ def test_a_run_is_done_once_and_resumed_after_that(source_folder, monkeypatch, c
     assert [run.frame for run in first.values()] == [[0, 1, 2, 3], [0, 2]]
     assert len(first["b"].plan["cameras"]) == 2
     assert all(np.isfinite(run.errors[1:]).all() for run in first.values())
-    assert all(run.errors[0] < 1e-3 for run in first.values())  # mm; where markers are attached: it counts, as everywhere
+    assert all(run.errors[0] < 1e-3 for run in first.values())  # mm: where markers are attached; it counts, too
     assert all(len(run.closest_mm) == len(run.error_mm) for run in first.values())
     monkeypatch.setattr(Source, "cells", None)
     again = {row: run for row, _, run in Study(source_folder, study.recordings, 4).records(experiment(**rows))}
