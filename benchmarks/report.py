@@ -26,6 +26,7 @@ from sweep_speed import sweep_quantities
 
 from sogjax.data.actor_file import save_body
 from sogjax.data.atomic import atomic_path
+from sogjax.engine.compiler_options import use_compiler_options
 from sogjax.study.machine import machine_line
 
 REFERENCE = "reference ms"
@@ -34,6 +35,7 @@ FORMAT = 1
 
 def main() -> int:
     """Measure, print, write and compare; the exit status."""
+    use_compiler_options()
     arguments = parsed()
     sections = arguments.only.split(",") if arguments.only else list(parts())
     if unknown := [section for section in sections if section not in parts()]:

@@ -50,7 +50,7 @@ def main() -> None:
     heads = ["cold", "kept"] if len(checkouts) == 1 else ["cold before", "now", "ratio", "kept before", "now", "ratio"]
     print(f"{'seconds':<34}" + "".join(f"{head:>12}" for head in heads), flush=True)
     with TemporaryDirectory() as folder:
-        actor = made_actor(recording, Path(folder))
+        actor = made_actor(recording, Path(folder), checkouts[0])  # the older one does not read all that is new
         for name in settings.commands:
             taken = [seconds(name, checkout, recording, actor) for checkout in checkouts]
             columns = []
@@ -67,10 +67,10 @@ def start_up_quantities(actor: Path) -> Iterator[Quantity]:
             yield Quantity("start-up", f"{NAMES[name]}, {kept}", value, "s", target=aim)
 
 
-def made_actor(recording: Path, folder: Path) -> Path:
-    """The actor of a recording."""
+def made_actor(recording: Path, folder: Path, checkout: Path) -> Path:
+    """The actor that a checkout makes of a recording."""
     with TemporaryDirectory() as programs:
-        _run(["actor", f"recording={recording}", f"out={folder / 'actor.yaml'}"], OURS, Path(programs), folder)
+        _run(["actor", f"recording={recording}", f"out={folder / 'actor.yaml'}"], checkout, Path(programs), folder)
     return folder / "actor.yaml"
 
 
@@ -100,7 +100,8 @@ def _run(command: list[str], checkout: Path, programs: Path, cache: Path) -> Non
         "SOGJAX_COMPILATION_CACHE": str(programs),
         "SOGJAX_CACHE": str(cache),
     }
-    done = subprocess.run([sys.executable, "-m", "sogjax", *command], capture_output=True, text=True, env=environment)
+    line = [sys.executable, "-m", "sogjax", *command]  # not in a checkout's folder, whose modules would go first
+    done = subprocess.run(line, capture_output=True, text=True, env=environment, cwd=cache)
     if done.returncode:
         raise RuntimeError(f"{checkout}: sogjax {' '.join(command)} ended with {done.returncode}:\n{done.stderr}")
 

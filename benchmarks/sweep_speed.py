@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 from quantities import Quantity
-from start_up import made_actor
+from start_up import OURS, made_actor
 from track_speed import demo_recording
 
 from sogjax.engine.clock import TOTAL, TRACKING
@@ -55,7 +55,7 @@ def main() -> None:
     settings, recording = settings_from(Settings), demo_recording()
     print(machine_line())
     with TemporaryDirectory() as folder:
-        actor = made_actor(recording, Path(folder))
+        actor = made_actor(recording, Path(folder), OURS)
         for name, taken in measured(recording, actor, settings):
             print(
                 f"programs {name}: run {taken.run:.1f} s, sweep of {settings.settings} {taken.sweep:.1f} s, "

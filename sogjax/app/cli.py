@@ -18,6 +18,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from sogjax.app.config.composition import SCHEMAS, composed
     from sogjax.engine.clock import STARTING, age_of_process, clocked, stage
     from sogjax.engine.compilation_cache import use_compilation_cache
+    from sogjax.engine.compiler_options import use_compiler_options
     from sogjax.engine.termination import TerminatedError, terminated_as_interrupted
     from sogjax.errors import InputError
 
@@ -36,6 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(command_help(command))
         return 0
     try:
+        use_compiler_options()
         use_compilation_cache()
         if any(word in ("-m", "--multirun") for word in overrides):
             from sogjax.app.sweep.run import run_sweep

@@ -8,6 +8,7 @@ from omegaconf import MISSING, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from sogjax.engine.compilation_cache import use_compilation_cache
+from sogjax.engine.compiler_options import use_compiler_options
 from sogjax.errors import InputError
 
 Settings = TypeVar("Settings")
@@ -37,6 +38,7 @@ def settings_from(schema: type[Settings], words: Sequence[str] | None = None) ->
 def run_script(main: Callable[[], None]) -> None:
     """Run a script; wrong input is one sentence and exit status 2."""
     try:
+        use_compiler_options()
         use_compilation_cache()
         main()
     except InputError as error:
