@@ -6,6 +6,7 @@ import os
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
 # Most of the tests' time is compilation, a third of it LLVM's optimisation; `.ci/run` keeps that in the slow tests.
 os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "true")
+os.environ.setdefault("XLA_FLAGS", "--xla_backend_optimization_level=1")  # in the slow tests, as the commands
 os.environ.setdefault("SOGJAX_COMPILATION_CACHE", "off")
 os.environ.setdefault("SOGJAX_BACKGROUND_CACHE", "off")
 

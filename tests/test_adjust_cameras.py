@@ -40,6 +40,7 @@ def scene():
     return make_tracker(body, rig, DEPTH), pose, rig
 
 
+@pytest.mark.slow
 def test_a_frame_has_the_gradient_of_its_energy_by_the_moves_of_the_cameras(scene):
     tracker, pose, rig = scene
     cells = cells_of(rig, draw(tracker.body, pose, rig), DEPTH)

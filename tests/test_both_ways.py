@@ -46,6 +46,7 @@ def with_lost_limb(walking_dog, doubt=0.9):
     return replace(passed, poses=poses, doubts=doubts), limb
 
 
+@pytest.mark.slow
 def test_a_lost_limb_comes_back_from_the_other_side(walking_dog):
     tracker, cells, right = walking_dog
     passed, limb = with_lost_limb(walking_dog)

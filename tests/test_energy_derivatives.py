@@ -103,6 +103,7 @@ def test_where_similarities_are_no_function_of_colours_differentiating_by_them_i
         jax.grad(lambda colors: eqx.tree_at(lambda e: e.body.blob_colors, other, colors)(pose))(other.body.blob_colors)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sparse", fast_and_slow(True, False))
 def test_the_value_of_the_quadratic_model_has_the_same_derivative_by_colours(sparse):
     with jax.enable_x64(True):

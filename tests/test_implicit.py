@@ -78,6 +78,7 @@ def remade(energy):
     return eqx.tree_at(lambda e: e.views, energy, anew)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", fast_and_slow(*PLACES))
 def test_the_derivative_of_the_pose_is_that_of_solving_again(optimum, name):
     """In both directions of differentiation."""

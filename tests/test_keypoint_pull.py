@@ -72,6 +72,7 @@ def near(body):
     return body.poses["rest"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tolerance", [0.0, 0.02])
 def test_the_gradient_is_that_of_autodiff(body, cameras, tolerance):
     pose = near(body)
@@ -86,6 +87,7 @@ def test_the_gradient_is_that_of_autodiff(body, cameras, tolerance):
     assert float(jnp.linalg.eigvalsh(model.curvature).min()) > -1e-12
 
 
+@pytest.mark.slow
 def test_the_curvature_is_that_of_the_value_where_the_landmarks_lie_on_keypoints(body, cameras):
     """Gauss-Newton is exact there, but for the constant that takes its share."""
     pose = near(body)
@@ -127,6 +129,7 @@ def seen_by(cameras, body, pose, which):
     return pull().views(seen, cameras, Posed.from_pose(body, pose + 0.01), jnp.full(4, 1e4))
 
 
+@pytest.mark.slow
 def test_exchanged_sides_are_noticed_and_counted_as_what_they_are(body, cameras):
     """Of one camera; where all agree with each other, it is the body whose sides are exchanged."""
     pose = near(body)

@@ -72,6 +72,7 @@ def test_a_limb_that_was_lost_is_led_back(scene):
     assert arm_error(tracker, pose, true) < 0.04
 
 
+@pytest.mark.slow
 def test_a_wrong_camera_and_a_stranger_do_little(scene):
     """One camera's keypoints are of another pose, and a second person is in every picture."""
     tracker, rig, true, lost = scene
@@ -83,6 +84,7 @@ def test_a_wrong_camera_and_a_stranger_do_little(scene):
     assert arm_error(tracker, pose, true) < 0.04
 
 
+@pytest.mark.slow
 def test_without_keypoints_the_term_does_nothing(scene):
     tracker, rig, true, _ = scene
     alone = replace(tracker, terms=tracker.terms[:-1])
@@ -90,6 +92,7 @@ def test_without_keypoints_the_term_does_nothing(scene):
     np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.slow
 def test_a_run_is_resumed_only_with_the_keypoints_that_began_it(capsys, tmp_path, monkeypatch):
     folder = trackable(tmp_path / "walk", frames=20)
     write_keypoints(folder / "keypoints", frames=20)

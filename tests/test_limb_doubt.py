@@ -102,6 +102,7 @@ def test_cameras_without_a_picture_say_nothing(dog):
     np.testing.assert_allclose(other.own, whole.own, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_the_step_judges_and_a_clip_in_one_call_says_the_same(dog):
     tracker, pose, cells = dog
     frames = [cells] * 3

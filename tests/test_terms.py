@@ -90,6 +90,7 @@ climb_near = eqx.filter_jit(solve_near)
 model_of = eqx.filter_jit(lambda term, posed, frame: (term.quadratic(posed, frame), Term.quadratic(term, posed, frame)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pairs", fast_and_slow("sparse", "dense"))
 @pytest.mark.parametrize("name", fast_and_slow(*SOLVERS))
 def test_every_solver_climbs_an_energy_with_a_floor(name, pairs):
