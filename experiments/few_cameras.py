@@ -13,8 +13,6 @@ import io
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 
-import numpy as np
-
 from sogjax.data.atomic import atomic_path
 from sogjax.engine.terminal import say
 from sogjax.errors import InputError
@@ -22,6 +20,7 @@ from sogjax.study.experiment import synth_settings, yardsticks
 from sogjax.study.few_cameras import CASES, Result, Trial, Trials
 from sogjax.study.machine import command_line, machine_line
 from sogjax.study.script import run_script, settings_from
+from sogjax.study.sections.few_cameras import each_table, together_table
 from sogjax.study.source import MOST_FRAMES
 
 ROBUSTNESS = ["twice the noise", "20 % outliers", "10 % exchanges", "a third missing"]
@@ -63,33 +62,13 @@ def main() -> None:
             trial = Trial(sequence, count, case)
             done[trial] = trials.result(trial)
             say(f"{sequence}, {count} cameras, {case}: {done[trial].mean:.1f} mm, {done[trial].lost} lost")
-    text = tables(done, kinds)
+    made_by = f"{machine_line()}: `{command_line()}`"
+    text = "\n\n".join([made_by, together_table(done, kinds), each_table(done, kinds)]) + "\n"
     with atomic_path(out / "tables.md") as temporary:
         temporary.write_text(text, encoding="utf-8")
     with atomic_path(out / "results.csv") as temporary:
         temporary.write_text(rows(done), encoding="utf-8")
     print(text)
-
-
-def tables(done: dict[Trial, Result], kinds: list[tuple[int, str]]) -> str:
-    """All sequences together, then each, as Markdown."""
-    head = "| cameras | keypoints | joints, mm | 95 %, mm | lost | triangulated alone, mm | lost |"
-    lines = [f"{machine_line()}: `{command_line()}`", "", head, "|---" * 7 + "|"]
-    for count, case in dict.fromkeys(kinds):
-        found = [result for trial, result in done.items() if (trial.cameras, trial.case) == (count, case)]
-        mean = lambda name, found=found: float(np.mean([getattr(result, name) for result in found]))
-        total = lambda name, found=found: sum(getattr(result, name) for result in found)
-        alone = "" if CASES[case] is None else f"{mean('triangulated'):.1f}"
-        alone_lost = "" if CASES[case] is None else total("triangulated_lost")
-        figures = f"{mean('mean'):.1f} | {mean('worst'):.1f} | {total('lost')} | {alone} | {alone_lost}"
-        lines.append(f"| {count} | {case} | {figures} |")
-    columns = [f"{count}, {case}" for count, case in dict.fromkeys(kinds)]
-    lines += ["", "| sequence (mm, lost) | " + " | ".join(columns) + " |", "|---" * (1 + len(columns)) + "|"]
-    for sequence in dict.fromkeys(trial.sequence for trial in done):
-        cells = [done[Trial(sequence, count, case)] for count, case in dict.fromkeys(kinds)]
-        shown = [f"{cell.mean:.1f}" + (f", {cell.lost}" if cell.lost else "") for cell in cells]
-        lines.append(f"| {sequence} | {' | '.join(shown)} |")
-    return "\n".join(lines) + "\n"
 
 
 def rows(done: dict[Trial, Result]) -> str:

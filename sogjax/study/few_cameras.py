@@ -85,14 +85,21 @@ class Trials:
         Raises:
             InputError: it cannot be tracked.
         """
-        content = json.dumps([asdict(trial), asdict(self.synth[trial.sequence]), self.frames, self.words, CASES])
-        path = self.folder / "results" / f"{hashlib.sha256(content.encode()).hexdigest()[:16]}.json"
-        if path.is_file():
-            return Result(**json.loads(path.read_text(encoding="utf-8"))["result"])
+        if (kept := self.kept(trial)) is not None:
+            return kept
         found = self._run(trial)
-        with atomic_path(path) as temporary:
+        with atomic_path(self._path(trial)) as temporary:
             temporary.write_text(json.dumps({"trial": asdict(trial), "result": asdict(found)}), encoding="utf-8")
         return found
+
+    def kept(self, trial: Trial) -> Result | None:
+        """Of a trial that was done before; None: it was not."""
+        path = self._path(trial)
+        return Result(**json.loads(path.read_text(encoding="utf-8"))["result"]) if path.is_file() else None
+
+    def _path(self, trial: Trial) -> Path:
+        content = json.dumps([asdict(trial), asdict(self.synth[trial.sequence]), self.frames, self.words, CASES])
+        return self.folder / "results" / f"{hashlib.sha256(content.encode()).hexdigest()[:16]}.json"
 
     def _run(self, trial: Trial) -> Result:
         recording = self._recording(trial)

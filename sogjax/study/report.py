@@ -1,7 +1,7 @@
 """The report: the paper's method and ours in the experiments of its Section 6, then experiments with ours."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from sogjax.engine.outputs import results_folder
@@ -18,14 +18,15 @@ from sogjax.study.sections.about import (
     versions_section,
 )
 from sogjax.study.sections.experiment import experiment_section
+from sogjax.study.sections.few_cameras import few_cameras_section
 from sogjax.study.sections.limbs import limbs_section
 from sogjax.study.sections.worst import worst_section
 from sogjax.study.settings import ReportConfig
 from sogjax.study.study import Study
 
 TITLE = "Section 6 again"
-LIMBS = "limbs"
-"""Beside the experiments of `conf/experiment/`: doubts about limbs against true errors."""
+BESIDE: dict[str, Callable[[Study], Section]] = {"limbs": limbs_section, "few_cameras": few_cameras_section}
+"""Beside the experiments of `conf/experiment/`: doubts about limbs against true errors, and keypoints."""
 
 
 def write_report(config: ReportConfig) -> list[Path]:
@@ -34,8 +35,8 @@ def write_report(config: ReportConfig) -> list[Path]:
     Raises:
         InputError: an experiment or recording that is not there, or a folder that cannot be written.
     """
-    names = config.only or [*experiment_names(), LIMBS]
-    experiments = [Experiment.named(name) for name in names if name != LIMBS]
+    names = config.only or [*experiment_names(), *BESIDE]
+    experiments = [Experiment.named(name) for name in names if name not in BESIDE]
     _check_matplotlib()
     _check_truth([*config.recordings, *(config.compared or [])])
     with results_folder(Path(config.out)) as out:
@@ -46,7 +47,7 @@ def write_report(config: ReportConfig) -> list[Path]:
         if not any(not one.record.failed for one in done) and experiments:
             reason = done[0].record.failed if done else "do=false, and none was done before"
             raise InputError(f"{out}: no run worked: {reason}")
-        sections += [limbs_section(study)] if LIMBS in names else []
+        sections += [section(study) for name, section in BESIDE.items() if name in names]
         say(f"runs done or read in {time.perf_counter() - begin:.0f} s")
         sections += [worst_section(done, config.pictures)] if config.pictures else []
         sections += [about_section(config, done), versions_section(config)]
