@@ -26,7 +26,7 @@ from sogjax.model.body import Body
 from sogjax.settings import TrackConfig
 from sogjax.settings.compose import track_config
 from sogjax.tracking.frame import TrackState
-from sogjax.tracking.tracker import first_capacities
+from sogjax.tracking.room import first_capacities
 
 SOLVERS = ("gauss_newton", "lbfgs", "conditioned_ascent")
 

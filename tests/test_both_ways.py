@@ -18,11 +18,11 @@ from sogjax.tracking.body_parts import PartArrays, body_parts, merged_pose
 from sogjax.tracking.both_ways import told_both_ways
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import PartialCells
+from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.limbs import limb_names, limbs
 from sogjax.tracking.mirrored import means_of
 from sogjax.tracking.room import with_room
 from sogjax.tracking.taken_parts import APART, BIAS, CHANGE, best_choice, stretches, taken_parts
-from sogjax.tracking.tracker import track
 
 LOST = slice(4, 7)
 

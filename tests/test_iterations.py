@@ -9,8 +9,9 @@ from rig_cases import ring_rig
 
 from sogjax.solve import ConditionedAscent, GaussNewton, OptimistixSolver
 from sogjax.tracking.frame import TrackState
+from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.iterations import best_after
-from sogjax.tracking.tracker import first_capacities, track
+from sogjax.tracking.room import first_capacities
 
 SOLVERS = {
     "ascent": ConditionedAscent(),

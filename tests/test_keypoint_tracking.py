@@ -21,7 +21,7 @@ from sogjax.engine.clip_keypoints import keypoint_pull
 from sogjax.model.camera import project_points
 from sogjax.solve import GaussNewton
 from sogjax.tracking.frame import WithKeypoints
-from sogjax.tracking.tracker import track
+from sogjax.tracking.frame_by_frame import track
 
 SCHEME = named_scheme("HALPE_26")
 LIGHT = ("outputs.overlay=false", "outputs.rerun=false", "outputs.bvh=false", "images.depth=4")

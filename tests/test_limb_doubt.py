@@ -17,12 +17,12 @@ from sogjax.images.background_cells import BackgroundCells
 from sogjax.images.foreground import EmptyScene, own_density, subject_colors, subject_density
 from sogjax.model.body import concatenate
 from sogjax.tracking.frame import PartialCells
+from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.judged_limbs import JudgedLimbs
 from sogjax.tracking.limb_doubt import WITH_BACKGROUND, WITHOUT, LimbMeasures, judgement, limb_doubt
 from sogjax.tracking.limb_evidence import BlobEvidence, blob_evidence
 from sogjax.tracking.limbs import joint_limbs, limb_names, limb_slices
 from sogjax.tracking.scan import track_clip
-from sogjax.tracking.tracker import track
 
 DEPTH = 6
 LIMB = "left front leg"

@@ -24,7 +24,7 @@ from sogjax.engine import pipeline
 from sogjax.errors import InputError
 from sogjax.solve import GaussNewton
 from sogjax.tracking.frame import PartialCells
-from sogjax.tracking.tracker import track
+from sogjax.tracking.frame_by_frame import track
 
 LIGHT = ("outputs.overlay=false", "outputs.rerun=false", "outputs.bvh=false")
 

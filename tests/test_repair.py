@@ -13,11 +13,11 @@ from sogjax.engine import build
 from sogjax.errors import InputError
 from sogjax.settings.compose import track_config
 from sogjax.tracking.frame import TrackState
+from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.limb_doubt import Judgement
 from sogjax.tracking.limbs import limb_blobs, limb_names, limbs
 from sogjax.tracking.mirrored import means_of
 from sogjax.tracking.repair import LASTING, NUM_CLIMBED, NUM_TRIED, Repair
-from sogjax.tracking.tracker import track
 
 LIMB = 4
 

@@ -22,7 +22,7 @@ from sogjax.data.motion import Motion, load_motion
 from sogjax.engine import job, kept_run, run_job, streams
 from sogjax.engine import track as track_command
 from sogjax.settings import ColorConfig
-from sogjax.tracking import tracker
+from sogjax.tracking import frame_by_frame
 
 FRAMES, KILLS = 20, 3
 LIGHT = ("outputs.overlay=false", "outputs.rerun=false", "outputs.bvh=false")
@@ -99,12 +99,12 @@ def test_two_actors(capsys, tmp_path, monkeypatch, recording):
 def test_the_tracker_goes_on_with_the_capacities_that_it_stopped_with(capsys, tmp_path, monkeypatch, command):
     """Room for image blobs that had to grow is not counted anew: sums of other lengths are rounded otherwise."""
     grown = tracker.Capacities(near=512, matching=512, blocks=2048)
-    monkeypatch.setattr(tracker, "first_capacities", lambda *_: grown)
+    monkeypatch.setattr(frame_by_frame, "first_capacities", lambda *_: grown)
     done(capsys, *command, "out=whole")
     with monkeypatch.context() as context:
         stop_after(context, 10)
         main([*command, "out=run"])
-    monkeypatch.setattr(tracker, "first_capacities", lambda *_: pytest.fail("counted anew"))
+    monkeypatch.setattr(frame_by_frame, "first_capacities", lambda *_: pytest.fail("counted anew"))
     done(capsys, *command, "out=run", "resume=true")
     assert_same(tmp_path / "run", tmp_path / "whole")
 

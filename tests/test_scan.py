@@ -13,8 +13,8 @@ from rig_cases import ring_rig
 from sogjax.solve import ConditionedAscent, GaussNewton
 from sogjax.tracking import scan as scan_module
 from sogjax.tracking.culling import Capacities
+from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.scan import track_clip
-from sogjax.tracking.tracker import track
 
 DEPTH = 6
 STEP = {"root_x": 0.01, "root_yaw": 0.03, "left_front_swing": 0.05, "tail_side": 0.05}

@@ -13,7 +13,7 @@ from sogjax.data.motion import load_motion
 from sogjax.data.recording import open_recording
 from sogjax.engine import adjust_clip, revision, track
 from sogjax.settings.compose import track_config
-from sogjax.tracking import tracker
+from sogjax.tracking import frame_by_frame
 
 FRAMES, HIGHER = 12, 0.125
 SHOWN = ("outputs.bvh=false", "outputs.rerun=false")
@@ -49,7 +49,7 @@ def higher(monkeypatch):
 
 
 def tracks_nothing(context):
-    context.setattr(tracker, "_step", lambda *_: pytest.fail("a frame was tracked again"))
+    context.setattr(frame_by_frame, "_step", lambda *_: pytest.fail("a frame was tracked again"))
     context.setattr(revision, "told_both_ways", lambda *_: pytest.fail("told both ways again"))
 
 

@@ -14,10 +14,10 @@ from rig_cases import ring_rig
 from sogjax.energy.frame_energy import standard_terms
 from sogjax.model.body import concatenate, dof_slices
 from sogjax.solve import GaussNewton, Solution
-from sogjax.tracking import tracker as tracker_module
+from sogjax.tracking import frame_by_frame
 from sogjax.tracking.culling import CAPACITIES, Capacities
 from sogjax.tracking.frame import TrackState
-from sogjax.tracking.tracker import track
+from sogjax.tracking.frame_by_frame import track
 
 DEPTH, FINE_DEPTH = 6, 7
 """Cells of 4 and 2 pixels: an arm at 3 m is 5 pixels wide."""
@@ -130,7 +130,7 @@ def test_a_frame_that_needs_more_room_is_done_again(dog, monkeypatch):
     enough = roomy[0].capacities
     matching = int(max(r.result.num_matching.max() for r in roomy))
     assert matching > 8
-    monkeypatch.setattr(tracker_module, "first_capacities", lambda *_: Capacities(enough.near, 8))
+    monkeypatch.setattr(frame_by_frame, "first_capacities", lambda *_: Capacities(enough.near, 8))
     grown = list(track(tracker, start, frames[:2]))
     for a, b in zip(grown, roomy, strict=True):
         assert a.capacities.hold(int(a.result.num_near.max()), int(a.result.num_matching.max()))
@@ -145,9 +145,9 @@ def test_near_pairs_are_tracked_by_gauss_newton_and_too_little_room_is_noticed(d
     tracker, poses, frames = dog
     tracker = replace(tracker, pairs="sparse", solver=GaussNewton())
     start = jnp.asarray(poses[0])
-    room = tracker_module.first_capacities
+    room = frame_by_frame.first_capacities
     too_small = lambda *arguments: replace(room(*arguments), blocks=4)
-    monkeypatch.setattr(tracker_module, "first_capacities", too_small)
+    monkeypatch.setattr(frame_by_frame, "first_capacities", too_small)
     results = list(track(tracker, start, frames))
     errors = [landmark_error(tracker.body, r.result.pose, pose) for r, pose in zip(results, poses, strict=True)]
     assert max(errors) < 0.02

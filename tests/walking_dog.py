@@ -11,8 +11,8 @@ from rig_cases import ring_rig
 from sogjax.images.foreground import subject_colors
 from sogjax.solve import GaussNewton
 from sogjax.tracking.backward_pass import Pass
+from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.judged_limbs import JudgedLimbs
-from sogjax.tracking.tracker import track
 
 DEPTH = 6
 FRAMES = 12

@@ -19,9 +19,10 @@ from sogjax.model.body import Body
 from sogjax.model.camera import Camera, project
 from sogjax.tracking.culling import BLOCK_STEP, Capacities, actor_of_blobs, block_capacity, body_boxes
 from sogjax.tracking.frame import Beside, FrameCells, TrackState, on_device
+from sogjax.tracking.room import first_capacities, larger_capacities
 from sogjax.tracking.search_energy import blob_kinds
 from sogjax.tracking.seen_frame import cells_at
-from sogjax.tracking.tracker import Tracker, first_capacities, larger_capacities
+from sogjax.tracking.tracker import Tracker
 
 COLUMNS, ROWS = 40, 64
 """Cells of a window; those of a standing person are 3 cm wide."""

@@ -21,7 +21,8 @@ from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.tracking.culling import Capacities, capacity_for
 from sogjax.tracking.frame import PartialCells, WithKeypoints, on_device
-from sogjax.tracking.tracker import Tracker, first_capacities
+from sogjax.tracking.room import first_capacities
+from sogjax.tracking.tracker import Tracker
 
 ROOM = 2
 """Times the room that suits the first frame: nobody makes more while a pure step runs."""

@@ -13,7 +13,8 @@ from sogjax.engine.timing import StageTimes
 from sogjax.images.cells import CellGrid
 from sogjax.settings import ImagesConfig
 from sogjax.tracking.frame import FrameCells, TrackedFrame
-from sogjax.tracking.tracker import Tracker, track
+from sogjax.tracking.frame_by_frame import track
+from sogjax.tracking.tracker import Tracker
 
 BLOCK = 48
 """Frames that are decoded at once, since videos are read forwards only."""

@@ -20,7 +20,8 @@ from sogjax.images.cells import CellGrid, stack_shape
 from sogjax.model.body import Body, concatenate
 from sogjax.settings import TrackConfig
 from sogjax.tracking.frame import FrameCells
-from sogjax.tracking.tracker import Tracker, compile_counts
+from sogjax.tracking.room import compile_counts
+from sogjax.tracking.tracker import Tracker
 
 
 @dataclass(frozen=True)

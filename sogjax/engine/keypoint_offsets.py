@@ -12,8 +12,9 @@ from sogjax.engine.clip_keypoints import ClipKeypoints
 from sogjax.engine.job import Job
 from sogjax.engine.pipeline import PictureReader, Preparation, cells_of_frame
 from sogjax.engine.terminal import progress, say
+from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.keypoint_offsets import estimated_offsets
-from sogjax.tracking.tracker import Tracker, track
+from sogjax.tracking.tracker import Tracker
 
 FRAMES, FEWEST = 48, 10
 """Of a clip that tell the offsets, at most and at least."""

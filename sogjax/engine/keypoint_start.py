@@ -22,7 +22,8 @@ from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import Beside, TrackState, on_device
 from sogjax.tracking.keypoint_people import triangulated_people
 from sogjax.tracking.keypoint_pose import KeypointPose, pose_of_keypoints
-from sogjax.tracking.tracker import Tracker, first_capacities
+from sogjax.tracking.room import first_capacities
+from sogjax.tracking.tracker import Tracker
 
 LEAST_ON = 0.7
 """Share of the points that the body's landmarks must be on."""

@@ -53,7 +53,7 @@ PictureReader = Callable[[Recording, "Preparation", int, int], Iterator[list[Pic
 
 
 FrameTracker = Callable[[Tracker, Float[Array, "dof"], Iterable[FrameCells]], Iterator[TrackedFrame]]
-"""Finds the poses of frames from their cells in turn, as `sogjax.tracking.tracker.track` does."""
+"""Finds the poses of frames from their cells in turn, as `sogjax.tracking.frame_by_frame.track` does."""
 
 
 Follow = Callable[[Iterable[FrameCells]], Iterator[TrackedFrame]]

@@ -11,8 +11,9 @@ from sogjax.engine.pipeline import FrameTracker
 from sogjax.engine.prefix import Prefix
 from sogjax.model.sog import Sog
 from sogjax.tracking.frame import FrameCells, TrackedFrame, TrackState, on_device
+from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.scan import image_blobs
-from sogjax.tracking.tracker import Tracker, track
+from sogjax.tracking.tracker import Tracker
 
 Frames = Iterable[FrameCells]
 

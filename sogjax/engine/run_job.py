@@ -30,7 +30,7 @@ from sogjax.engine.timing import StageTimes
 from sogjax.model.body import Body
 from sogjax.sentences import counted
 from sogjax.settings import ImagesConfig, OutputsConfig, TrackConfig
-from sogjax.tracking.tracker import track
+from sogjax.tracking.frame_by_frame import track
 
 FRAMES_BEHIND = 8
 """Tracked frames waiting to be written, at most."""

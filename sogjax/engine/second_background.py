@@ -28,8 +28,9 @@ from sogjax.images.foreground import EmptyScene
 from sogjax.images.plate_difference import working_size
 from sogjax.model.body import Body
 from sogjax.settings import ImagesConfig
+from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.search_energy import DISC
-from sogjax.tracking.tracker import Tracker, track
+from sogjax.tracking.tracker import Tracker
 from sogjax.view.projection import picture_points
 
 MUCH_UNKNOWN = 0.015

@@ -18,8 +18,9 @@ from sogjax.model.body import Body
 from sogjax.settings import TrackConfig
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import TrackState
+from sogjax.tracking.room import first_capacities, larger_capacities
 from sogjax.tracking.rounds import solve_near
-from sogjax.tracking.tracker import Tracker, first_capacities, larger_capacities
+from sogjax.tracking.tracker import Tracker
 
 Poses = Float[np.ndarray, "frame dof"]
 Values = Float[np.ndarray, "frame"]

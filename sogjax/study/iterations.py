@@ -9,8 +9,8 @@ from sogjax.settings import TrackConfig
 from sogjax.settings.compose import track_config
 from sogjax.study.source import Source
 from sogjax.tracking.frame import TrackState
+from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.iterations import best_after
-from sogjax.tracking.tracker import track
 
 
 def check_showable(source: Source, frame: int) -> None:

@@ -28,10 +28,11 @@ from sogjax.study.true_poses import true_poses
 from sogjax.study.verdicts import limb_errors
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import TrackState
+from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.limb_doubt import LimbMeasures, judgement, limb_measures
 from sogjax.tracking.limb_evidence import blob_evidence
 from sogjax.tracking.limbs import limb_blobs, limb_names, limbs
-from sogjax.tracking.tracker import Tracker, track
+from sogjax.tracking.tracker import Tracker
 
 PLAIN, SKIPPING = "as recorded", "every third frame"
 SKIPPED = 3

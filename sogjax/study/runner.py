@@ -29,8 +29,9 @@ from sogjax.study.source import Source
 from sogjax.tracking.backward_pass import Pass
 from sogjax.tracking.both_ways import told_both_ways
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import FrameResult
-from sogjax.tracking.tracker import TrackedFrame, Tracker, track
+from sogjax.tracking.frame import FrameResult, TrackedFrame
+from sogjax.tracking.frame_by_frame import track
+from sogjax.tracking.tracker import Tracker
 
 STAGES = ("decode", "step", "whole")
 ALL = "all"

@@ -15,8 +15,9 @@ from sogjax.model.body import Body
 from sogjax.tracking.body_parts import Part, PartArrays
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import Beside, FrameCells, TrackedFrame, TrackState, on_device
+from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.room import Needed, with_room
-from sogjax.tracking.tracker import Tracker, track
+from sogjax.tracking.tracker import Tracker
 
 COMPARED, TOGETHER = 0.03, 0.04
 """Metres, mean over the blobs of a part: above the one it is asked which pass is better, below the other they agree.

@@ -1,13 +1,23 @@
-"""Room for image blobs outside a tracking step: what needs more is computed again."""
+"""Room for image blobs and blocks of pairs: how much the first frame needs, and more where a frame needs more."""
 
 from collections.abc import Callable
 from typing import TypeVar
 
+import equinox as eqx
 import jax
-from jaxtyping import Array, Int
+import jax.numpy as jnp
+from jaxtyping import Array, Int, UInt8
 
-from sogjax.tracking.culling import Capacities
-from sogjax.tracking.tracker import larger_capacities
+from sogjax.energy.frame_energy import FrameEnergy
+from sogjax.energy.posed import History
+from sogjax.tracking.culling import CAPACITIES, Capacities, block_capacity, capacity_for
+from sogjax.tracking.frame import TrackState
+from sogjax.tracking.tracker import Tracker
+
+HEADROOM = 1.4
+"""Slots for image blobs, as a multiple of what the first frame needs."""
+BLOCK_HEADROOM = 1.25
+"""The same for blocks of pairs, whose number for all cameras together changes less."""
 
 Found = TypeVar("Found")
 
@@ -27,3 +37,47 @@ def with_room(compute: Callable[[Capacities], tuple[Found, Needed]], capacities:
         if capacities.hold(near, matching):
             return found
         capacities = larger_capacities(capacities, near, matching, 0)
+
+
+def larger_capacities(capacities: Capacities, near: int, matching: int, blocks: int) -> Capacities:
+    """Capacities with headroom for so many image blobs and blocks of pairs, nowhere smaller than those given.
+
+    Raises:
+        InputError: more image blobs than the largest capacity.
+    """
+    return Capacities(
+        max(capacities.near, capacity_for(near, HEADROOM)),
+        max(capacities.matching, capacity_for(matching, HEADROOM)),
+        max(capacities.blocks, block_capacity(blocks, BLOCK_HEADROOM)) if blocks else capacities.blocks,
+    )
+
+
+def first_capacities(tracker: Tracker, state: TrackState, cells: UInt8[Array, "camera rows columns 3"]) -> Capacities:
+    """Capacities with headroom for what the first frame needs."""
+    near, matching, blocks = (int(count.max()) for count in _counts(tracker, state, cells))
+    room = capacity_for(near, HEADROOM)
+    if tracker.pairs == "dense":
+        return Capacities(room, capacity_for(matching, HEADROOM))
+    return Capacities(room, room, block_capacity(blocks, BLOCK_HEADROOM))
+
+
+def compile_counts(tracker: Tracker, shape: tuple[int, ...]) -> None:
+    """Compile beforehand what `first_capacities` counts with, for cells of a shape, while other work goes on."""
+    _counts(tracker, tracker.start(tracker.body.poses["rest"]), jnp.zeros(shape, jnp.uint8))
+
+
+@eqx.filter_jit
+def _counts(
+    tracker: Tracker, state: TrackState, cells: UInt8[Array, "camera rows columns 3"]
+) -> tuple[Int[Array, "camera"], Int[Array, "camera"], Int[Array, ""]]:
+    """How many image blobs pass the first test and both tests, and how many blocks of near pairs there are.
+
+    With as much room as there can be, for the pose where the solver starts; no blocks where all pairs are compared.
+    """
+    num_candidates = tracker.reader.candidates.sigmas.shape[-1]
+    everything = Capacities(near=capacity_for(min(num_candidates, CAPACITIES[-1])), matching=CAPACITIES[0])
+    views, near, matching = tracker.views(cells, state, everything)
+    if tracker.pairs == "dense":
+        return near, matching, jnp.asarray(0)
+    objective = FrameEnergy(tracker.body, views, History.unknown(state.previous), tracker.terms)
+    return near, matching, objective.near(tracker.predicted(state), capacity=1)[1]

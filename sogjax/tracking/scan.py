@@ -1,7 +1,7 @@
 """A whole clip as one compiled call: the tracker's step in a `lax.scan` over the cells of all frames.
 
-The frame-by-frame tracker (`sogjax.tracking.tracker.track`) gives the same numbers; this one does no work between
-frames.
+The tracker frame by frame (`sogjax.tracking.frame_by_frame.track`) gives the same numbers; this one does no work
+between frames.
 """
 
 import equinox as eqx
@@ -13,7 +13,8 @@ from jaxtyping import Array, Float, UInt8
 from sogjax.model.sog import Sog
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import NOTHING, Beside, FrameResult, TrackState
-from sogjax.tracking.tracker import Tracker, first_capacities, larger_capacities
+from sogjax.tracking.room import first_capacities, larger_capacities
+from sogjax.tracking.tracker import Tracker
 
 ClipCells = UInt8[Array, "frame camera rows columns 3"]
 

@@ -1,7 +1,5 @@
 """Tracking (Section 5.3): predict, cull, solve, advance; one compiled step for every frame of a recording."""
 
-import time
-from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Literal
@@ -26,39 +24,27 @@ from sogjax.model.camera import Camera
 from sogjax.model.color import from_rgb
 from sogjax.solve import Scales, Solution, Solver
 from sogjax.tracking.culling import (
-    CAPACITIES,
     Capacities,
     ImageReader,
     actor_of_blobs,
-    block_capacity,
     body_boxes,
-    capacity_for,
     union_boxes,
 )
 from sogjax.tracking.frame import (
     NOTHING,
     Beside,
-    FrameCells,
     FrameResult,
     PartialCells,
-    TrackedFrame,
     TrackState,
     WithKeypoints,
     on_device,
-    on_host,
 )
 from sogjax.tracking.frame_fit import frame_fit
 from sogjax.tracking.guide import Guide
 from sogjax.tracking.judged_limbs import JudgedLimbs
 from sogjax.tracking.limb_doubt import Judgement, judgement
 from sogjax.tracking.limb_evidence import blob_evidence
-from sogjax.tracking.repair import Repair
 from sogjax.tracking.rounds import solve_near
-
-HEADROOM = 1.4
-"""Slots for image blobs, as a multiple of what the first frame needs."""
-BLOCK_HEADROOM = 1.25
-"""The same for blocks of pairs, whose number for all cameras together changes less."""
 
 NO_ROOM = "a frame has more image blobs than the tracker has room for; make a new one, beginning with this frame"
 
@@ -274,120 +260,3 @@ class Tracker(eqx.Module):
         if self.pairs == "sparse":
             return solve_near(self.solver, objective, start, self.scales, capacities.blocks)
         return self.solver.maximize(objective, start, self.scales), jnp.asarray(0)
-
-
-_step = eqx.filter_jit(Tracker.step)
-
-
-def track(
-    tracker: Tracker,
-    start: Float[Array, "dof"] | TrackState,
-    frames: Iterable[FrameCells],
-    capacities: Capacities | None = None,
-) -> Iterator[TrackedFrame]:
-    """Track the frames one after the other from a rough pose of the first one, or from where another run stopped.
-
-    The step is compiled once, with room for `HEADROOM` times the image blobs of the first frame, or with the given
-    capacities (of a run whose program can so serve this one); a frame that needs more is done again with the next
-    capacity (and compiles again), so no blob is ever cut off unseen. To continue a run, pass the capacities that
-    it stopped with: sums of other lengths round differently.
-
-    Raises:
-        InputError: more image blobs than the largest capacity.
-    """
-    state = tracker.with_memory(start if isinstance(start, TrackState) else TrackState.from_pose(start))
-    repair = Repair(tracker.body) if tracker.repairs else None
-    for index, frame in enumerate(frames):
-        begin = time.perf_counter()
-        cells, beside = on_device(frame)
-        if capacities is None:
-            capacities = first_capacities(tracker, state, cells)
-        while True:
-            next_state, result = _step(tracker, state, cells, capacities, beside)
-            needed = jax.device_get((result.num_near, result.num_matching, result.num_blocks))
-            near, matching, blocks = (int(count.max()) for count in needed)
-            if capacities.hold(near, matching, blocks):
-                break
-            capacities = larger_capacities(capacities, near, matching, blocks)
-        if repair is not None:
-            step = partial(_step_within, tracker, cells, capacities, beside)
-            judge = partial(_doubts, tracker, cells, beside.present)
-            next_state, result = repair.after(state, (next_state, result), step, judge)
-        state = next_state
-        seconds = time.perf_counter() - begin
-        yield TrackedFrame(index, on_host(result), capacities, tracker.reader.color_space, seconds)
-
-
-def _step_within(
-    tracker: Tracker,
-    cells: UInt8[Array, "camera rows columns 3"],
-    capacities: Capacities,
-    beside: Beside,
-    state: TrackState,
-) -> tuple[TrackState, FrameResult] | None:
-    """A step, unless it needs more room."""
-    found, result = _step(tracker, state, cells, capacities, beside)
-    needed = jax.device_get((result.num_near, result.num_matching, result.num_blocks))
-    return (found, result) if capacities.hold(*(int(count.max()) for count in needed)) else None
-
-
-@eqx.filter_jit
-def _doubts(
-    tracker: Tracker,
-    cells: UInt8[Array, "camera rows columns 3"],
-    present: Bool[Array, "camera"] | None,
-    state: TrackState,
-    poses: Float[Array, "try dof"],
-) -> Float[Array, "try limb"]:
-    """The doubt about the limbs of many poses, seen from a state."""
-    odds = tracker.reader.odds(cells.astype(poses.dtype) / 255.0)
-    windows = None if odds is None else tracker.reader.windows(odds, tracker.cameras, tracker.boxes(state))
-    if windows is not None and present is not None:
-        windows = windows.of_present(present)
-    usual = tracker.with_memory(state).usual
-    assert usual is not None
-    return jax.lax.map(lambda pose: tracker.judged(pose, usual, windows, cells, present).doubt, poses)
-
-
-def larger_capacities(capacities: Capacities, near: int, matching: int, blocks: int) -> Capacities:
-    """Capacities with headroom for so many image blobs and blocks of pairs, nowhere smaller than those given.
-
-    Raises:
-        InputError: more image blobs than the largest capacity.
-    """
-    return Capacities(
-        max(capacities.near, capacity_for(near, HEADROOM)),
-        max(capacities.matching, capacity_for(matching, HEADROOM)),
-        max(capacities.blocks, block_capacity(blocks, BLOCK_HEADROOM)) if blocks else capacities.blocks,
-    )
-
-
-def first_capacities(tracker: Tracker, state: TrackState, cells: UInt8[Array, "camera rows columns 3"]) -> Capacities:
-    """Capacities with headroom for what the first frame needs."""
-    near, matching, blocks = (int(count.max()) for count in _counts(tracker, state, cells))
-    room = capacity_for(near, HEADROOM)
-    if tracker.pairs == "dense":
-        return Capacities(room, capacity_for(matching, HEADROOM))
-    return Capacities(room, room, block_capacity(blocks, BLOCK_HEADROOM))
-
-
-def compile_counts(tracker: Tracker, shape: tuple[int, ...]) -> None:
-    """Compile beforehand what `first_capacities` counts with, for cells of a shape, while other work goes on."""
-    _counts(tracker, tracker.start(tracker.body.poses["rest"]), jnp.zeros(shape, jnp.uint8))
-
-
-@eqx.filter_jit
-def _counts(
-    tracker: Tracker, state: TrackState, cells: UInt8[Array, "camera rows columns 3"]
-) -> tuple[Int[Array, "camera"], Int[Array, "camera"], Int[Array, ""]]:
-    """How many image blobs pass the first test and both tests, and how many blocks of near pairs there are.
-
-    With as much room as there can be, for the pose where the solver starts; no blocks where all pairs are compared.
-    """
-    num_candidates = tracker.reader.candidates.sigmas.shape[-1]
-    everything = Capacities(near=capacity_for(min(num_candidates, CAPACITIES[-1])), matching=CAPACITIES[0])
-    views, near, matching = tracker.views(cells, state, everything)
-    if tracker.pairs == "dense":
-        return near, matching, jnp.asarray(0)
-    objective = FrameEnergy(tracker.body, views, History.unknown(state.previous), tracker.terms)
-    return near, matching, objective.near(tracker.predicted(state), capacity=1)[1]
