@@ -208,3 +208,32 @@ def test_a_person_without_keypoints_is_nobody_in_particular():
     found = belongs([(0.0, 0.0), (9.0, 9.0)], [(0.0, 0.0)], sure=np.array([[1.0] * COUNT, [0.0] * COUNT]))
     assert found[0, 0] == 1.0
     assert np.isfinite(found).all()
+
+
+def test_one_person_is_the_nearer_of_two_actors():
+    np.testing.assert_allclose(belongs([(0.0, 0.0)], [(0.05, 0.0), (0.4, 0.0)]), [[1.0, LEAST]], atol=0.02)
+
+
+@pytest.mark.parametrize("actors", [[(0.05, 0.0), (0.7, 0.0)], [(2.0, 0.0), (3.0, 0.0)]], ids=["near", "far"])
+def test_room_for_people_whom_nobody_fills_changes_nothing(actors):
+    padded = belongs([(0.0, 0.0), (9.0, 9.0)], actors, sure=np.array([[1.0] * COUNT, [0.0] * COUNT]))
+    np.testing.assert_array_equal(padded[:1], belongs([(0.0, 0.0)], actors))
+
+
+def test_an_actor_is_drawn_to_the_people_who_belong_to_it(body, cameras):
+    """Two actors and two people: what each says is what it says alone, to whom it belongs."""
+    pose = near(body)
+    at = np.asarray(projected(cameras, body, pose))[:, None] + drawn(people=2)
+    zeros, ones = jnp.zeros((2, 2, COUNT)), jnp.ones((2, 2, COUNT))
+    views = lambda belongs: KeypointViews(
+        SeenKeypoints(jnp.asarray(at), ones), zeros, jnp.full((2, 2), 300.0), jnp.ones(2), jnp.asarray([belongs] * 2)
+    )
+    twice = pull(landmarks=((0, 1, 2), (0, 1, 2)), offsets=jnp.zeros((2, COUNT, 3)))
+    points = twice.points(Posed.from_pose(body, pose))
+    found = twice.pulls(points, cameras, views([[1.0, 0.0], [0.0, 1.0]])).by_point
+    for actor, part in enumerate((slice(0, COUNT), slice(COUNT, 2 * COUNT))):
+        only = np.zeros((2, 2))
+        only[actor] = 1.0  # the other one is nobody's
+        alone = twice.pulls(points, cameras, views(only)).by_point
+        np.testing.assert_allclose(found[part], alone[part], rtol=1e-9)
+    assert not np.allclose(found[:COUNT], found[COUNT:])

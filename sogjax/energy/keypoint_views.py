@@ -109,12 +109,15 @@ def belonging(
 ) -> Float[Array, "camera person actor"]:
     """How far people in the pictures are actors: the more, the nearer all their keypoints lie to an actor's landmarks.
 
-    Nobody is two actors, and where nobody lies nearer than others, all count alike; arguments as of `exchange_odds`.
+    Held against the actor who is nearest to somebody, since nobody is two actors, and against whoever is nearest to the
+    actor. Where nobody lies nearer than others, all count alike; arguments as of `exchange_odds`.
     """
+    confidence = jnp.asarray(seen.confidence)
     away = (seen.pixels[:, :, None] - pixels[:, None]) / pixels_per_metre[:, None, :, None, None]
     cost = jnp.minimum(jnp.sum(away**2, axis=-1) / (2.0 * NEAR_BODY**2), MOST)
-    sure = jnp.where(known[:, None], jnp.asarray(seen.confidence)[:, :, None], 0.0)
+    sure = jnp.where(known[:, None], confidence[:, :, None], 0.0)
     near = TOLD_APART * jnp.sum(sure * (MOST - cost), axis=-1) / jnp.maximum(jnp.sum(sure, axis=-1), 1.0)
-    logs = near - jax.nn.logsumexp(near, axis=2, keepdims=True)  # of the actors, for somebody
-    logs = logs + near
-    return jnp.maximum(jnp.exp(logs - jnp.max(logs, axis=1, keepdims=True)), LEAST)
+    there = jnp.any(confidence > 0.0, axis=2)[..., None]  # room for people whom nobody fills is nearer than nobody
+    nearest = jnp.max(jnp.where(there, near, 0.0), axis=1, keepdims=True)
+    logs = (near - nearest) + (near - jnp.max(near, axis=2, keepdims=True))
+    return jnp.maximum(jnp.exp(jnp.minimum(logs, 0.0)), LEAST)

@@ -34,9 +34,9 @@ class PointPulls(NamedTuple):
 class KeypointPull(Term):
     """The mean over cameras and keypoints of `log(1 + r / outlier)`, times the body's share of the picture.
 
-    `r` is the sum over the people of `confidence exp(-d^2 / 2 S^2)`, d being the distance of the keypoint from the
-    projected landmark (at the actor's distance, in metres) beyond `tolerance`; as far as the sides seem exchanged, of
-    the keypoint of the other side. 0 where no keypoints are known.
+    `r` is the sum over the people of `belongs confidence exp(-d^2 / 2 S^2)`, d being the distance of the keypoint from
+    the projected landmark (at the actor's distance, in metres) beyond `tolerance`; as far as the sides seem exchanged,
+    of the keypoint of the other side; `belongs` says how far somebody is the actor. 0 where no keypoints are known.
     """
 
     landmarks: tuple[tuple[int, ...], ...] = eqx.field(static=True, kw_only=True)
