@@ -168,14 +168,20 @@ def test_frames_are_shifted_as_pose2sim_shifted_its_files(tmp_path):
 
 def test_offsets_in_the_settings_count_more_than_pose2sims(tmp_path):
     folder, _ = pose2sim(tmp_path / "trial")
-    synchronised(folder, {"cam01": 0, "cam02": 1})
-    (folder / "recording.yaml").write_text("frame_offset: {cam01: 1}\n")
-    assert open_recording(folder).frame_offset == {"cam01": 1, "cam02": 0}
+    synchronised(folder, {"cam01": 1, "cam02": 1})
+    (folder / "recording.yaml").write_text("frame_offset: {cam01: 0}\n")
+    recording = open_recording(folder)
+    assert recording.frame_offset == {"cam01": 0, "cam02": 1}
+    assert any("(cam02 by +1)" in warning for warning in recording.warnings)
 
 
-def test_other_peoples_files_in_pose_sync_tell_nothing(tmp_path):
+def test_a_camera_whose_shift_cannot_be_told_is_named(tmp_path):
     folder, _ = pose2sim(tmp_path / "trial")
-    synchronised(folder, {"cam01": 0, "cam02": 1})
+    synchronised(folder, {"cam01": 1, "cam02": 1})
     for file in (folder / "pose-sync").glob("*cam02*/*"):
         file.write_text('{"people": []}')
-    assert set(open_recording(folder).frame_offset.values()) == {0}
+    recording = open_recording(folder)
+    assert recording.frame_offset == {"cam01": 1, "cam02": 0}
+    assert any("of cam02 are shifted" in warning and "`frame_offset`" in warning for warning in recording.warnings)
+    (folder / "recording.yaml").write_text("frame_offset: {cam01: 0, cam02: 0}\n")
+    assert not any("pose-sync" in warning for warning in open_recording(folder).warnings)

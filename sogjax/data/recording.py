@@ -12,7 +12,7 @@ from sogjax.data.camera_choice import chosen_cameras, folder_around
 from sogjax.data.color_gains import ColorGains
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.initial_pose import read_initial_poses
-from sogjax.data.pose_sync import said, shifted_offsets
+from sogjax.data.pose_sync import Shifts, pose2sims_shifts
 from sogjax.data.projects import Project, calibrations_of, named_as_sources, named_calibration, project_in
 from sogjax.data.recording_frames import TimedImages, frame_rate, frames_in_common, images_by_time, uneven
 from sogjax.data.recording_settings import RecordingSettings, read_recording_settings
@@ -116,8 +116,8 @@ def open_recording(path: Path) -> Recording:
                 f"{path / 'recording.yaml'}: {key}: there is no camera {strange!r} in the calibration; "
                 f"its cameras are: {', '.join(calibrated.names)}"
             )
-    shifted = shifted_offsets(path, cameras) if project is not None and not settings.frame_offset else {}
-    exact = {camera: settings.frame_offset.get(camera, shifted.get(camera, 0)) for camera in cameras}
+    shifts = (pose2sims_shifts(path, cameras) if project else Shifts({}, ())).without(settings.frame_offset)
+    exact = {camera: settings.frame_offset.get(camera, shifts.offsets.get(camera, 0)) for camera in cameras}
     offsets = {camera: round(offset) for camera, offset in exact.items()}
     with ThreadPoolExecutor() as pool:
         infos = dict(zip(cameras, pool.map(look_at_source, sources.values()), strict=True))
@@ -149,7 +149,7 @@ def open_recording(path: Path) -> Recording:
         ground_truth=_ground_truth(path / "ground_truth.npz"),
         warnings=(
             *warnings,
-            *([f"{path}: {said(shifted)}"] if shifted else []),
+            *(f"{path}: {warning}" for warning in shifts.warnings),
             *_doubts(path, given, rig, project),
             *uneven(sources, infos, timed, settings.fewest_cameras),
         ),
