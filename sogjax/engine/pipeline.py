@@ -60,7 +60,7 @@ Follow = Callable[[Iterable[FrameCells]], Iterator[TrackedFrame]]
 """The same with a tracker that knows where it begins."""
 
 
-def nothing(camera: int, image: np.ndarray) -> None:
+def no_picture(camera: int, image: np.ndarray) -> None:
     """Made of a picture that no output needs."""
 
 
@@ -69,13 +69,13 @@ class Preparation:
     """What the decoding threads make of each picture before they drop it."""
 
     grids: tuple[CellGrid, ...]
-    tile: PictureMaker = nothing
-    jpeg: PictureMaker = nothing
+    tile: PictureMaker = no_picture
+    jpeg: PictureMaker = no_picture
 
     @property
     def cells_only(self) -> bool:
         """Whether only the cells are needed."""
-        return self.tile is nothing and self.jpeg is nothing
+        return self.tile is no_picture and self.jpeg is no_picture
 
     def __call__(self, camera: int, image: np.ndarray | YuvPicture | None) -> Picture:
         """The cells of a picture and what the outputs need of it; empty if there is no picture."""

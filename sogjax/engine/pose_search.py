@@ -18,7 +18,7 @@ from sogjax.settings import TrackConfig
 from sogjax.tracking.following import followed
 from sogjax.tracking.found_pose import FoundPose, search_poses
 from sogjax.tracking.mirrored import means_of, sides_apart
-from sogjax.tracking.pose_search import Optimum, Searcher, Told, nothing
+from sogjax.tracking.pose_search import Optimum, Report, Searcher, unreported
 from sogjax.tracking.seen_frame import SeenFrame
 from sogjax.tracking.sureness import Agreement
 
@@ -84,19 +84,21 @@ class PoseSearch:
         """What was found, by frame."""
         return {}
 
-    def beginning(self, frame: int, told: Told = nothing) -> Beginning:
+    def beginning(self, frame: int, report: Report = unreported) -> Beginning:
         """The best poses in a frame, and how sure they are: by themselves, or since a search in another one agrees.
 
-        `told` is called with the share of the work that is done, as if the second search were needed.
+        `report` is called with the share of the work that is done, as if the second search were needed.
 
         Raises:
             InputError: no camera has the frame.
         """
-        found = Beginning(frame, self.poses(frame, lambda share: told(0.5 * share)))
+        found = Beginning(frame, self.poses(frame, lambda share: report(0.5 * share)))
         other = self._agreeing_frame(frame)
         if found.sure or other is None or not all(pose.energy > 0.0 for pose in found.poses):
             return found
-        agreements = self._agreements(found, Beginning(other, self.poses(other, lambda share: told(0.5 + 0.5 * share))))
+        agreements = self._agreements(
+            found, Beginning(other, self.poses(other, lambda share: report(0.5 + 0.5 * share)))
+        )
         judged = [pose.with_agreement(each) for pose, each in zip(found.poses, agreements, strict=True)]
         return Beginning(frame, judged)
 
@@ -125,24 +127,24 @@ class PoseSearch:
             )
         return agreements
 
-    def poses(self, frame: int, told: Told = nothing) -> list[FoundPose]:
+    def poses(self, frame: int, report: Report = unreported) -> list[FoundPose]:
         """The best poses of all actors in a frame, counted from the recording's first, by what is seen there.
 
         Raises:
             InputError: no camera has the frame.
         """
         if frame not in self._searched:
-            self._searched[frame] = self._search(frame, told)
+            self._searched[frame] = self._search(frame, report)
         return self._searched[frame]
 
-    def _search(self, frame: int, told: Told) -> list[FoundPose]:
+    def _search(self, frame: int, report: Report) -> list[FoundPose]:
         frames = self._followed_frames(frame)
         cells = dict(self._cells(sorted(frames)))
         if not cells[frame][1].any():
             shown = frame + self.recording.first_frame
             raise InputError(f"{self.recording.path}: no camera has frame {shown}; begin later (start=)")
         make = lambda searcher, k: self._seen(searcher, *cells[frames[k]])
-        return search_poses(self.bodies, self._searchers, make, len(frames), told)
+        return search_poses(self.bodies, self._searchers, make, len(frames), report)
 
     def carried(self, beginning: Beginning, frame: int) -> list[Float[np.ndarray, "dof"]]:
         """The poses of a beginning, followed to another frame."""

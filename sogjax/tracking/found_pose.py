@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 from sogjax.model.body import Body
 from sogjax.tracking.explained import explained
 from sogjax.tracking.following import followed
-from sogjax.tracking.pose_search import Searcher, Told, nothing, search
+from sogjax.tracking.pose_search import Report, Searcher, search, unreported
 from sogjax.tracking.seen_frame import SeenFrame
 from sogjax.tracking.sureness import SURE, Agreement, Evidence, agreed_confidence, confidence
 
@@ -53,9 +53,9 @@ class Path:
     poses: Float[np.ndarray, "frame dof"]
 
 
-def search_pose(searcher: Searcher, frames: Sequence[SeenFrame], told: Told = nothing) -> Path:
+def search_pose(searcher: Searcher, frames: Sequence[SeenFrame], report: Report = unreported) -> Path:
     """The pose of a body in the first of some frames, which explains the later ones too."""
-    optima = search(searcher, frames[0], told=lambda share: told(SEARCHED * share))
+    optima = search(searcher, frames[0], report=lambda share: report(SEARCHED * share))
     if not optima:
         rest = np.asarray(searcher.body.poses["rest"])
         return Path(FoundPose(rest, 0.0, 0.0, False, 0.0), np.repeat(rest[None], len(frames), axis=0))
@@ -76,7 +76,11 @@ def search_pose(searcher: Searcher, frames: Sequence[SeenFrame], told: Told = no
 
 
 def search_poses(
-    bodies: Sequence[Body], searchers: Sequence[Searcher], make: FrameMaker, num_frames: int, told: Told = nothing
+    bodies: Sequence[Body],
+    searchers: Sequence[Searcher],
+    make: FrameMaker,
+    num_frames: int,
+    report: Report = unreported,
 ) -> list[FoundPose]:
     """The poses of several bodies in one frame: the surest is found first, and what it covers is its own."""
     found: dict[int, Path] = {}
@@ -88,7 +92,9 @@ def search_poses(
             for other, path in found.items():
                 frames = [f.with_found(bodies[other], pose) for f, pose in zip(frames, path.poses, strict=True)]
             before = count / total
-            candidates[k] = search_pose(searchers[k], frames, lambda share, before=before: told(before + share / total))
+            candidates[k] = search_pose(
+                searchers[k], frames, lambda share, before=before: report(before + share / total)
+            )
             count += 1
         surest = max(candidates, key=lambda k: (candidates[k].found.confidence, candidates[k].found.margin))
         found[surest] = candidates[surest]

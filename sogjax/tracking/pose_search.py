@@ -48,7 +48,7 @@ POOR = 0.3
 DIFFERENT = 0.1
 """Metres, mean distance of the blobs: poses farther apart are different optima."""
 
-Told = Callable[[float], None]
+Report = Callable[[float], None]
 """Called with the share of some work that is done, 0 to 1."""
 
 
@@ -89,14 +89,14 @@ class Searcher:
         return SearchEnergy.from_terms(self.body, frame.cameras, self.terms, self.kinds)
 
 
-def nothing(share: float) -> None:
+def unreported(share: float) -> None:
     """Nobody asks how far a search is."""
 
 
-def search(searcher: Searcher, frame: SeenFrame, count: int = NUM_LAST, told: Told = nothing) -> list[Optimum]:
+def search(searcher: Searcher, frame: SeenFrame, count: int = NUM_LAST, report: Report = unreported) -> list[Optimum]:
     """The best different poses of a body in one frame, best first; none, if nothing looks like it.
 
-    `told` is called with the share of the work that is done.
+    `report` is called with the share of the work that is done.
     """
     found = places(frame, searcher.up, NUM_PLACES)
     if not found:
@@ -106,12 +106,12 @@ def search(searcher: Searcher, frame: SeenFrame, count: int = NUM_LAST, told: To
     tried = _starts(searcher, found)
     tried = hunt.climbed(_spread_best(searcher.body, hunt.scored(tried)), FIRST_ITERATIONS)
     tried = _best(searcher.body, tried, NUM_SECOND)
-    told(0.3)
+    report(0.3)
     for share in (0.6, 0.85):
         tried = _best(searcher.body, _with_better_limbs(hunt, tried), NUM_LAST)
-        told(share)
+        report(share)
     tried = hunt.climbed(_with_look_alikes(hunt, tried), LAST_ITERATIONS)
-    told(1.0)
+    report(1.0)
     best = _best(searcher.body, tried, count)
     return [Optimum(pose, float(value)) for pose, value in zip(best.poses, best.values, strict=True)]
 
