@@ -1,6 +1,7 @@
 """Videos in their own colours (PyAV): the same cells and the same frames as OpenCV's pictures."""
 
 import sys
+from fractions import Fraction
 
 import cv2
 import numpy as np
@@ -103,6 +104,72 @@ def test_seeking_is_exact(tmp_path, start):
     assert len(rest) == 30 - start
     for found, expected in zip(rest, everything[start:], strict=True):
         np.testing.assert_array_equal(found.luma, expected.luma)
+
+
+BARS = 6
+"""Bits of a frame's number, shown as black and white bars."""
+
+
+def numbered_video(path, codec, options, when, rate=30):
+    """Images that show their numbers; `when` says at which frame time each is to be shown."""
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream(codec, rate=rate, options=options)
+        stream.width, stream.height, stream.pix_fmt = 16 * BARS, 32, "yuv420p"
+        stream.codec_context.time_base = Fraction(1, 10 * rate)
+        for number, time in enumerate(when):
+            bits = [255 * (number >> bit & 1) for bit in range(BARS)]
+            picture = np.broadcast_to(np.repeat(np.uint8(bits), 16)[None, :, None], (32, 16 * BARS, 3))
+            image = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="bgr24")
+            image.pts, image.time_base = round(10 * time), Fraction(1, 10 * rate)
+            container.mux(stream.encode(image))
+        container.mux(stream.encode())
+    return path
+
+
+def number_shown(image):
+    shown = image.luma if isinstance(image, YuvPicture) else image[..., 0]
+    return sum((int(bar.mean()) > 127) << bit for bit, bar in enumerate(np.split(shown.astype(int), BARS, axis=1)))
+
+
+EVENLY = range(60)
+VIDEOS = {
+    "AVI of H.264": ("video.avi", "libx264", {"bf": "0"}, EVENLY),
+    "AVI of H.264 with B-frames": ("video.avi", "libx264", {"bf": "2"}, EVENLY),
+    "AVI of MPEG-4 with B-frames": ("video.avi", "mpeg4", {"bf": "2", "g": "12"}, EVENLY),
+    "mp4 with B-frames": ("video.mp4", "libx264", {"bf": "2", "g": "12"}, EVENLY),
+    "mkv": ("video.mkv", "libx264", {"g": "12"}, EVENLY),
+    "three images missing": ("video.mp4", "libx264", {"g": "12"}, [k + 3 * (k > 10) for k in EVENLY]),
+    "one image missing": ("video.mp4", "libx264", {"g": "12"}, [k + (k > 10) for k in EVENLY]),
+    "times that are not even": ("video.mp4", "libx264", {"g": "12"}, [k + 0.3 * (k % 3 == 1) for k in EVENLY]),
+}
+
+
+@pytest.mark.parametrize("name", VIDEOS)
+def test_all_readers_begin_with_the_image_of_that_number(tmp_path, name):
+    file, *how = VIDEOS[name]
+    path = numbered_video(tmp_path / file, *how)
+    for start in (1, 7, 12, 20, 31, 45, 58):
+        for stream in (open_with_least_work(path, start), VideoFile(path, start, 1)):
+            assert [number_shown(image) for image in images_of(stream)] == [*range(start, 60)], (start, stream)
+
+
+def test_planes_are_read_where_images_are_missing(tmp_path):
+    file, *how = VIDEOS["three images missing"]
+    assert plane_video(numbered_video(tmp_path / file, *how), 20, 1) is not None
+
+
+def test_full_range_without_a_format_of_its_own_is_left_to_opencv(tmp_path):
+    path = tmp_path / "video.mp4"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libvpx-vp9", rate=25, bit_rate=20_000_000)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        stream.codec_context.color_range = 2
+        container.mux(stream.encode(av.VideoFrame.from_ndarray(painted(0, (64, 48)), format="bgr24")))
+        container.mux(stream.encode())
+    video = plane_video(path, 0, 1)
+    (expected,) = images_of(VideoFile(path, 0, 1))
+    found = expected if video is None else video.read()
+    assert np.abs(cells_of(found, 4) - cells_of(expected, 4)).mean() < MEAN
 
 
 def test_skipping(tmp_path):

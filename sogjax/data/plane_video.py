@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -22,15 +23,23 @@ FORMATS = {"yuv420p": False, "yuvj420p": True}
 """The pixel formats that are read, and whether black and white are 0 and 255; cameras write hardly any other."""
 STANDARDS: dict[int, ColorStandard] = {1: "709", 2: "601", 5: "601", 6: "601"}
 """Colours by their number in the file (ITU-T H.273), as FFmpeg converts them; 2 is "not said"."""
+FULL_RANGE = 2
+"""The number of the range in which black and white are 0 and 255."""
 OPTIONS = {"skip_loop_filter": "noref"}
-"""Images that no other one is made of need no smoothing of block edges: the mean of a cell does not see them."""
+"""Images that no other one is made of need no smoothing of block edges: the mean of a cell does not see them. Pictures
+made beside the cells, as for the overlay, show them."""
 
 
 def pyav_version() -> str | None:
-    """The version of PyAV; None: it is not installed."""
+    """The version of PyAV; None: it is not installed, or cannot be imported."""
+    return None if _pyav() is None else version("av")
+
+
+def _pyav() -> Any:
     try:
-        return version("av")
-    except PackageNotFoundError:
+        version("av")  # any folder of this name could be imported
+        return import_module("av")
+    except (PackageNotFoundError, ImportError):
         return None
 
 
@@ -38,23 +47,40 @@ def plane_video(path: Path, start: int, threads: int) -> PlaneVideo | None:
     """The images of a video from its frame `start` on; None where only OpenCV can read them as they should be.
 
     That is where PyAV is not installed, or where the video is of a rare kind: turned sideways, of odd size, with more
-    than eight bits or other differences of colour. `threads` decode it.
+    than eight bits or other differences of colour; with `start`, also where its file does not say when each image is
+    to be shown. `threads` decode it.
     """
-    if pyav_version() is None:  # any folder of this name could be imported
+    av = _pyav()
+    if av is None:
         return None
-    try:
-        av: Any = import_module("av")
-    except ImportError:
-        return None
+    errors = (OSError, ValueError, AttributeError, av.FFmpegError)  # of the file, which OpenCV names; of an old PyAV
     try:
         container = av.open(str(path), options={})
-    except (OSError, ValueError):  # OpenCV's reader says what is wrong with it
+    except errors:
         return None
-    video = PlaneVideo(container, threads)
-    if video.readable and (start == 0 or video.seek(start)):
-        return video
-    video.close()
+    try:
+        video = PlaneVideo(container, threads)
+        if video.readable and (start == 0 or video.seek(_times(path), start)):
+            return video
+    except errors:
+        pass
+    container.close()
     return None
+
+
+def _times(path: Path) -> tuple[int, ...]:
+    """When the images are to be shown, in their order and in units of the file; none where it does not say so."""
+    state = path.stat()
+    return _times_of(str(path), state.st_size, state.st_mtime_ns)
+
+
+@lru_cache(maxsize=256)
+def _times_of(path: str, size: int, changed: int) -> tuple[int, ...]:
+    """The whole file is read, but not decoded."""
+    with _pyav().open(path) as container:
+        packets = [packet for packet in container.demux(video=0) if packet.size and not packet.is_discard]
+        times = [packet.pts for packet in packets]
+    return () if None in times or len({*times}) < len(times) else tuple(sorted(times))
 
 
 class PlaneVideo:
@@ -97,29 +123,30 @@ class PlaneVideo:
         self._first, self._images = None, iter(())
         self._container.close()
 
-    def seek(self, start: int) -> bool:
-        """Jump to a frame, counted from the first at the video's constant rate; False: it cannot be found."""
-        stream = self._container.streams.video[0]
-        rate, unit = stream.average_rate, stream.time_base
-        begin = stream.start_time or 0
-        if not rate or not unit:
+    def seek(self, times: Sequence[int], start: int) -> bool:
+        """Jump to an image by its number, given when each is to be shown; False: it cannot be found for sure."""
+        first = self._first
+        if start >= len(times) or first is None or first.pts != times[0]:
             return False
-        back = start
+        stream, numbers, back = self._container.streams.video[0], {time: k for k, time in enumerate(times)}, start
         while True:
-            self._container.seek(begin + int(back / rate / unit), stream=stream, backward=True)
+            self._container.seek(times[back], stream=stream, backward=True)
             self._images = self._decoded()
-            image = self._first = next(self._images, None)
-            if image is None or image.pts is None:
-                return False
-            number = round((image.pts - begin) * unit * rate)
-            if number <= start:
-                break
-            if back == 0:
+            image, number = self._reached(numbers, start)
+            if image is not None and number == start:
+                self._first = image
+                return True
+            if number is None or back == 0:
                 return False
             back = max(0, 2 * back - number - 1)
-        for _ in range(start - number):
-            self._next()
-        return True
+
+    def _reached(self, numbers: Mapping[int, int], start: int) -> tuple[VideoFrame | None, int | None]:
+        """The first image from here on that does not come before the wanted one, and its number."""
+        for image in self._images:
+            number = None if image.pts is None else numbers.get(image.pts)
+            if number is None or number >= start:
+                return image, number
+        return None, None
 
     def _next(self) -> VideoFrame | None:
         image, self._first = self._first, None
@@ -147,7 +174,9 @@ def yuv_picture(image: VideoFrame) -> YuvPicture:
 
 def _known(image: VideoFrame) -> bool:
     even = image.width % 2 == 0 and image.height % 2 == 0
-    return even and image.format.name in FORMATS and int(image.colorspace) in STANDARDS and image.rotation == 0
+    kind = image.format.name
+    as_named = kind in FORMATS and (FORMATS[kind] or int(image.color_range) != FULL_RANGE)  # OpenCV knows some of these
+    return even and as_named and int(image.colorspace) in STANDARDS and image.rotation == 0
 
 
 def _bgr(image: VideoFrame) -> UInt8[np.ndarray, "height width 3"]:

@@ -4,6 +4,7 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import cv2
@@ -17,6 +18,8 @@ from sogjax.errors import InputError
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 
+UNSTEADY = 0.25
+"""Part of a frame by which an image comes too early or too late to be found by its time."""
 _COUNT_PACKETS_BELOW = 256 * 2**20
 """Bytes. The packets of larger videos are not counted, which would mean reading the whole file."""
 
@@ -44,10 +47,11 @@ class VideoFile:
         self._capture.release()
 
     def _seek(self, start: int, threads: int) -> None:
-        """Jump to a frame; where the container cannot, decode up to it."""
-        self._capture.set(cv2.CAP_PROP_POS_FRAMES, start)
-        if round(self._capture.get(cv2.CAP_PROP_POS_FRAMES)) == start:
-            return
+        """Jump to a frame by its number; where the container cannot, or images are missing, decode up to it."""
+        if _steady(self._path, self._capture.get(cv2.CAP_PROP_FPS)):
+            self._capture.set(cv2.CAP_PROP_POS_FRAMES, start)
+            if round(self._capture.get(cv2.CAP_PROP_POS_FRAMES)) == start:
+                return
         self._capture.release()
         self._capture = _capture(self._path, [cv2.CAP_PROP_N_THREADS, threads])
         for _ in range(start):
@@ -87,6 +91,21 @@ def frame_times(path: Path) -> Float[np.ndarray, "frame"]:
         while capture.grab():
             times.append(1e-3 * capture.get(cv2.CAP_PROP_POS_MSEC))
     return np.sort(np.array(times, float))
+
+
+def _steady(path: Path, fps: float) -> bool:
+    """Whether images come at a constant rate, by which a jump finds them; believed of files too large to read."""
+    state = path.stat()
+    if state.st_size >= _COUNT_PACKETS_BELOW:
+        return True
+    return _is_steady(path, fps, (state.st_size, state.st_mtime_ns))
+
+
+@lru_cache(maxsize=256)
+def _is_steady(path: Path, fps: float, state: tuple[int, int]) -> bool:
+    times = frame_times(path)
+    expected = np.arange(len(times)) / max(fps, 1e-6)
+    return len(times) > 0 and bool(np.all(np.abs(times - times[0] - expected) * fps < UNSTEADY))
 
 
 def _capture(path: Path, parameters: Sequence[int] = ()) -> cv2.VideoCapture:
