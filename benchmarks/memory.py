@@ -111,6 +111,9 @@ def longer_recording(recording: Recording, frames: int, repeats: int, folder: Pa
         frame_offset=dict.fromkeys(recording.rig.names, 0),
         first_frame=0,
         num_frames=frames * repeats,
+        num_images=dict.fromkeys(recording.rig.names, frames * repeats),
+        picked={},
+        missing={},
     )
 
 

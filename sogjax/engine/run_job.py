@@ -15,6 +15,7 @@ from sogjax.energy import Term
 from sogjax.engine.backwards import frames_backwards, tracked_backwards
 from sogjax.engine.cells import picture_reader
 from sogjax.engine.clock import BACKGROUND, BEFORE, BOTH_WAYS, FIRST_FRAME, PREPARING, TRACKING, WRITING, stage
+from sogjax.engine.freed_memory import return_freed_memory
 from sogjax.engine.job import Job
 from sogjax.engine.kept_run import KeptRun
 from sogjax.engine.keypoint_offsets import told_offsets
@@ -100,6 +101,7 @@ def run_job(
     streams, goes_on = _begun(job, outputs, out, follow, kept, images)
     first = job.frames[0]
     missing = Counter(job.recording.num_missing(range(first, first + streams.num_skipped)))
+    return_freed_memory()
     try:
         used = _streamed(job, streams, read, goes_on, missing)
         image_blobs = float(np.mean(used)) if used else float("nan")
@@ -213,6 +215,9 @@ def _streamed(
                         if picture.cells is None
                     )
                 behind.put(done)
-                turn(stages[1])
+                if len(used) == 1:
+                    turn(stages[1])
+                    return_freed_memory()
             turn(WRITING)
+    return_freed_memory()
     return used
