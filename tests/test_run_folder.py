@@ -30,6 +30,10 @@ def contents(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
+def contents_of_all(folder):
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
 def test_results_stay_unless_they_are_to_be_overwritten(capsys, tmp_path, command):
     done(capsys, *command)
     before = contents(tmp_path / "run")
@@ -39,6 +43,13 @@ def test_results_stay_unless_they_are_to_be_overwritten(capsys, tmp_path, comman
     assert contents(tmp_path / "run") == before
     done(capsys, *command, "stop=2", "overwrite=true")
     assert load_motion(tmp_path / "run" / "motion.npz").num_frames == 2
+
+
+def test_a_recording_is_no_place_for_results(capsys, tmp_path, command):
+    before = contents_of_all(tmp_path / "walk")
+    sentence = refused(capsys, *command[:-1], f"out={tmp_path / 'walk'}", "overwrite=true")
+    assert f"out={tmp_path / 'walk' / 'results'}" in sentence
+    assert contents_of_all(tmp_path / "walk") == before
 
 
 def test_nothing_of_an_older_run_is_left_but_what_is_not_its_own(capsys, tmp_path, command):
@@ -169,17 +180,17 @@ def test_a_rendered_recording_is_replaced_as_a_whole(capsys, tmp_path):
     assert (tmp_path / "r" / "actor.yaml").read_text() == "mine"
 
 
-@pytest.mark.parametrize("name", ["..", ".", "../precious.txt", "videos", "/etc/hostname"])
+@pytest.mark.parametrize("name", ["..", ".", "../precious.txt", "clips", "/etc/hostname"])
 def test_a_note_that_names_what_is_no_result_removes_nothing(tmp_path, name):
     out = tmp_path / "work" / "out"
-    (out / "videos").mkdir(parents=True)
-    (out / "videos" / "left.mp4").write_text("a video")
+    (out / "clips").mkdir(parents=True)
+    (out / "clips" / "left.mp4").write_text("a video")
     (tmp_path / "work" / "precious.txt").write_text("keep")
     (out / NOTE).write_text(json.dumps({"command": "track", "files": [name]}))
     with run_folder(out, overwrite=True) as folder:
         folder.begin("track", {})
     assert (tmp_path / "work" / "precious.txt").read_text() == "keep"
-    assert (out / "videos" / "left.mp4").is_file()
+    assert (out / "clips" / "left.mp4").is_file()
 
 
 def test_folders_of_the_user_inside_of_an_unfinished_run_stay(tmp_path):
@@ -188,3 +199,12 @@ def test_folders_of_the_user_inside_of_an_unfinished_run_stay(tmp_path):
     with run_folder(tmp_path, overwrite=True) as folder:
         folder.begin("track", {})
     assert (tmp_path / "motion.partial" / "mine" / "notes.txt").is_file()
+
+
+def test_one_person_under_two_names_is_refused(capsys, tmp_path, command):
+    text = (tmp_path / "a.yaml").read_text()
+    assert "name: puppet\n" in text
+    (tmp_path / "b.yaml").write_text(text.replace("name: puppet\n", "name: ben\n"))
+    words = [word for word in command if not word.startswith("actor=")]
+    assert "same actor" in refused(capsys, *words, f"actor=[{tmp_path / 'a.yaml'},{tmp_path / 'b.yaml'}]")
+    assert not (tmp_path / "run").exists()

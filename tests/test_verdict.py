@@ -3,12 +3,17 @@
 from dataclasses import replace
 
 import cv2
+import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 import pytest
+from body_cases import shipped
 from motion_cases import walking_motion
 from rig_cases import ring_rig
 
 from sogjax.app.actor import actor_verdict
+from sogjax.engine.verdict import say_if_other_subject
+from sogjax.evaluation.strained import Limits
 from sogjax.evaluation.verdict import verdicts, worst_frames
 from sogjax.view.closeups import HEIGHT, closeups
 
@@ -24,6 +29,10 @@ def judged(motion, explained=0.7, overlap=0.7):
         overlap=np.full((count, len(CAMERAS)), overlap),
         camera_names=np.array(CAMERAS),
     )
+
+
+def replace_explained(body, value):
+    return eqx.tree_at(lambda b: b.explained, body, jnp.asarray(value, jnp.float32))
 
 
 def of_one(motion, expected=0.75):
@@ -73,6 +82,37 @@ def test_frames_that_fit_badly_are_named(walk):
     assert not found.wrong
     assert found.sentence == f"look at frames {walk.frame[8]}-{walk.frame[12]}: the body fits badly"
     assert set(found.worst) & set(walk.frame[8:13].tolist())
+
+
+def test_joints_at_their_limits_are_named(walk):
+    """Unless the limit is where the body rests, or they are there for a while only."""
+    motion = judged(walk)
+    names = motion.dof_names.tolist()
+    pose, half = np.array(motion.pose), motion.num_frames // 2
+    for name in ("left_shoulder_twist", "left_elbow", "right_elbow"):
+        pose[:, names.index(name)] = 0.0
+    pose[: half + 2, names.index("left_shoulder_twist")] = 0.59
+    pose[: half - 1, names.index("right_elbow")] = 2.5
+    limits = {
+        "left_shoulder_twist": Limits(-0.6, 0.6, 0.0),
+        "left_elbow": Limits(0.0, 2.4, 0.0),
+        "right_elbow": Limits(0.0, 2.5, 0.0),
+        "root_tx": Limits(-np.inf, np.inf, 0.0),
+    }
+    found = verdicts({"anna": replace(motion, pose=pose)}, {"anna": 0.75}, {"anna": limits})["anna"]
+    assert found.findings == (
+        f"look at left_shoulder_twist, at its limit in {(half + 2) / (2 * half):.0%} of the frames",
+    )
+
+
+def test_another_subject_is_told_at_the_first_frame(capsys):
+    body = replace_explained(shipped("human"), 0.7)
+    say_if_other_subject([body], np.array([0.5]))
+    assert capsys.readouterr().err == ""
+    say_if_other_subject([body], np.array([0.01]))
+    assert "WARNING: this seems not to be human: 1.0% explained" in capsys.readouterr().err
+    say_if_other_subject([replace_explained(body, 0.0)], np.array([0.01]))  # nothing is known of its example poses
+    assert capsys.readouterr().err == ""
 
 
 def test_limbs_in_doubt_are_named(walk):

@@ -41,7 +41,10 @@ def calibration_findings(
                 findings.append(finding)
     if not compared:
         what = "the calibration cannot be checked against silhouettes: at least three cameras need one"
-        remedy = "add masks, or pictures of the empty scene as background/CAMERA.jpg, for more cameras"
+        remedy = (
+            "for this check add masks, or pictures of the empty scene as background/CAMERA.jpg, of more cameras; "
+            "tracking does without them"
+        )
         return [Finding("note", "calibration", what, "", remedy)], {}
     if not findings:
         lowest = min(fits.values(), key=lambda fit: fit.coverage).coverage

@@ -205,11 +205,12 @@ def arrays_of(motion: Motion) -> dict[str, np.ndarray]:
 
 
 def load_motion(path: Path) -> Motion:
-    """Read `motion.npz`, or the folder of a motion that is being written (`MotionLog`).
+    """Read `motion.npz`, the folder of a run that wrote one, or that of a motion being written (`MotionLog`).
 
     Raises:
         InputError: no such file, no npz, another version, or an array missing, misshapen or not finite.
     """
+    path = path / "motion.npz" if (path / "motion.npz").is_file() else path
     return checked_motion(path, read_log(path) if path.is_dir() else read_npz(path))
 
 

@@ -162,6 +162,9 @@ def open_recording(path: Path) -> Recording:
     )
 
 
+ADD_CALIBRATION = "add calibration.toml, or a calibration of another program (README, Formats)"
+
+
 def _calibration(path: Path, settings: RecordingSettings, project: Project | None) -> Path:
     if settings.calibration is not None:
         named = named_calibration(path, settings.calibration, project)
@@ -170,7 +173,7 @@ def _calibration(path: Path, settings: RecordingSettings, project: Project | Non
         return named
     found = calibrations_of(path, project)
     if not found:
-        raise InputError(f"{path}: holds no calibration file; {folder_around(path) or 'add calibration.toml'}")
+        raise InputError(f"{path}: holds no calibration file; {folder_around(path) or ADD_CALIBRATION}")
     if len(found) > 1:
         names = ", ".join(file.name for file in found)
         raise InputError(f"{path}: holds several calibrations ({names}); name one as `calibration:` in recording.yaml")

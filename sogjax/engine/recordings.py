@@ -76,6 +76,26 @@ def file_list(value: Any) -> list[Path]:
     return [Path(str(item)) for item in values]
 
 
+def _check_different(files: Any, bodies: Sequence[Body]) -> None:
+    """Two of one size, shape and colours are one person twice, whatever they are called.
+
+    Raises:
+        InputError: there are such.
+    """
+    for k, body in enumerate(bodies):
+        for other in bodies[:k]:
+            alike = body.blob_colors.shape == other.blob_colors.shape and all(
+                np.array_equal(one, two)
+                for one, two in (
+                    (body.blob_colors, other.blob_colors),
+                    (body.blob_sigmas, other.blob_sigmas),
+                    (body.skeleton.offsets, other.skeleton.offsets),
+                )
+            )
+            if alike:
+                raise InputError(f"actor={files}: two of these are the same actor; give one file for each person")
+
+
 def actors_of(
     recording: Recording,
     files: Any,
@@ -95,6 +115,7 @@ def actors_of(
     if files is not None:
         bodies = [load_body(path) for path in file_list(files)]
         names = [body.name for body in bodies]
+        _check_different(files, bodies)
         if len(set(names)) < len(names):
             raise InputError(
                 f"actor={files}: two actors are named {max(names, key=names.count)!r}; give each its own `name`"

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from sogjax.data.export import WRITERS
 from sogjax.data.file_names import objection
+from sogjax.data.source import find_sources
 from sogjax.engine.clock import seconds_so_far
 from sogjax.engine.kept_run import FOLDER, NOTE, KeptRun, read_note, write_note
 from sogjax.engine.origin import Origin, difference
@@ -153,8 +154,10 @@ def run_folder(
         command: that runs.
 
     Raises:
-        InputError: it cannot be written, another run uses it, or it holds results that must not be overwritten.
+        InputError: it cannot be written, another run uses it, it holds results that must not be overwritten, or it
+            is a recording.
     """
+    _check_no_recording(path)
     with results_folder(path), _locked(path):
         folder = RunFolder(path, overwrite, resume, command)
         try:
@@ -163,6 +166,19 @@ def run_folder(
             if folder.began and not any(path.glob("motion*.partial")):
                 folder.kept.remove()  # it did not come to its first frame
             raise
+
+
+def _check_no_recording(path: Path) -> None:
+    """Results beside videos would be taken for a recording's own files.
+
+    Raises:
+        InputError: the folder has images of cameras.
+    """
+    try:
+        find_sources(path)
+    except InputError:
+        return
+    raise InputError(f"out={path}: is the folder of a recording; give results one of their own, as out={path}/results")
 
 
 def earlier_results(folder: Path, note: dict) -> list[Path]:

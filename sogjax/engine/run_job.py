@@ -28,6 +28,7 @@ from sogjax.engine.second_background import learnt_again
 from sogjax.engine.streams import Streams, readable_frames
 from sogjax.engine.terminal import say
 from sogjax.engine.timing import StageTimes
+from sogjax.engine.verdict import say_if_other_subject
 from sogjax.model.body import Body
 from sogjax.sentences import counted
 from sogjax.settings import ImagesConfig, OutputsConfig, TrackConfig
@@ -218,6 +219,9 @@ def _streamed(
                 if len(used) == 1:
                     turn(stages[1])
                     return_freed_memory()
+                    limbs = done.tracked.result.limbs
+                    if stages[0] == FIRST_FRAME and limbs is not None and limbs.explained is not None:
+                        say_if_other_subject(job.bodies, np.asarray(limbs.explained))
             turn(WRITING)
     return_freed_memory()
     return used

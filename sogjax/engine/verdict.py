@@ -5,6 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+import numpy as np
+from jaxtyping import Float
 
 from sogjax.data.atomic import atomic_path
 from sogjax.data.video import read_frames
@@ -12,7 +14,8 @@ from sogjax.engine.run import Run
 from sogjax.engine.terminal import say
 from sogjax.errors import InputError
 from sogjax.evaluation.numbers import write_json
-from sogjax.evaluation.verdict import NUM_WORST, verdicts
+from sogjax.evaluation.strained import limits_of
+from sogjax.evaluation.verdict import NUM_WORST, OTHER_SUBJECT, verdicts
 from sogjax.model.body import Body
 from sogjax.view.closeups import closeups
 
@@ -21,18 +24,30 @@ WORST = "worst.png"
 
 def judge(result: Run) -> None:
     """Note what is thought of each actor's motion."""
-    result.verdicts = verdicts(result.motions, expected_of(result.bodies))
+    limits = {body.name: limits_of(body) for body in result.bodies}
+    result.verdicts = verdicts(result.motions, expected_of(result.bodies), limits)
 
 
 def say_verdicts(result: Run) -> None:
     """Print in a line each whether the actors' motions look right; a warning where they cannot be relied on."""
+    drawn = f"; see {WORST}" if any(path.name == WORST for path in result.files) else ""
     for name, verdict in result.verdicts.items():
         whose = f"{name}: " if len(result.verdicts) > 1 else ""
         if verdict.wrong:
-            say(f"WARNING: {whose}{verdict.sentence}; see worst.png")
+            say(f"WARNING: {whose}{verdict.sentence}{drawn}")
         else:
-            see = "" if verdict.looks_right else "; see worst.png"
-            print(f"\nverdict: {whose}{verdict.sentence}{see}")
+            print(f"\nverdict: {whose}{verdict.sentence}{'' if verdict.looks_right else drawn}")
+
+
+def say_if_other_subject(bodies: Sequence[Body], explained: Float[np.ndarray, "actor"]) -> None:
+    """Warn at the first frame, so that nobody waits for a whole clip of somebody else."""
+    expected = expected_of(bodies)
+    for body, share in zip(bodies, explained.tolist(), strict=True):
+        if share < OTHER_SUBJECT * expected.get(body.name, 0.0):
+            say(
+                f"WARNING: this seems not to be {body.name}: {share:.1%} explained in the first frame, against "
+                f"{expected[body.name]:.1%} in the example poses; Ctrl-C stops, and what is wrong is told at the end"
+            )
 
 
 def expected_of(bodies: Sequence[Body]) -> dict[str, float]:

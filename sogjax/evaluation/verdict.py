@@ -10,6 +10,7 @@ from jaxtyping import Float, Int
 from sogjax.data.doubtful import DoubtfulLimb, doubtful_limbs
 from sogjax.data.motion import Motion
 from sogjax.evaluation.metrics import stretches
+from sogjax.evaluation.strained import Limits, strained_joints
 
 OTHER_SUBJECT = 0.6
 """Of what an actor explains in its example poses: less, and it is another subject, or none."""
@@ -63,19 +64,34 @@ class Verdict:
         return asdict(self) | {"looks_right": self.looks_right, "sentence": self.sentence}
 
 
-def verdicts(motions: Mapping[str, Motion], expected: Mapping[str, float]) -> dict[str, Verdict]:
-    """Of the actors of a run; `expected`: what they explain in their example poses, where that is known."""
+def verdicts(
+    motions: Mapping[str, Motion],
+    expected: Mapping[str, float],
+    limits: Mapping[str, Mapping[str, Limits]] | None = None,
+) -> dict[str, Verdict]:
+    """Of the actors of a run.
+
+    Args:
+        motions: by actor.
+        expected: what actors explain in their example poses, where that is known.
+        limits: by actor and degree of freedom.
+    """
+    limits = limits or {}
     return {
-        name: _verdict(name, motion, expected.get(name), _inside(name, motions)) for name, motion in motions.items()
+        name: _verdict(name, motion, expected.get(name), _inside(name, motions), limits.get(name, {}))
+        for name, motion in motions.items()
     }
 
 
-def _verdict(name: str, motion: Motion, expected: float | None, inside: Sequence[str]) -> Verdict:
+def _verdict(
+    name: str, motion: Motion, expected: float | None, inside: Sequence[str], limits: Mapping[str, Limits]
+) -> Verdict:
     explained = None if motion.explained is None else float(np.median(motion.explained))
     overlap = _overlaps(motion)
     wrong = [*_wrong(explained, expected, overlap), *inside]
     doubtful = doubtful_limbs(motion)
-    look = [] if wrong else [*_bad_overlaps(overlap), *_bad_stretches(motion), *_limbs(doubtful)]
+    parts = [*_limbs(doubtful), *_bent(motion, limits)]
+    look = [] if wrong else [*_bad_overlaps(overlap), *_bad_stretches(motion), *parts]
     return Verdict(
         actor=name,
         wrong=bool(wrong),
@@ -150,6 +166,11 @@ def _bad_stretches(motion: Motion) -> list[str]:
 
 def _limbs(doubtful: Sequence[DoubtfulLimb]) -> list[str]:
     return _shortened([f"look at {_frames(limb.first_frame, limb.last_frame)}, {limb.name}" for limb in doubtful])
+
+
+def _bent(motion: Motion, limits: Mapping[str, Limits]) -> list[str]:
+    strained = strained_joints(motion, limits).items()
+    return _shortened([f"look at {name}, at its limit in {share:.0%} of the frames" for name, share in strained])
 
 
 def _frames(first: int, last: int) -> str:

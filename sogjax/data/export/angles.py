@@ -69,7 +69,9 @@ _PAIRS = (
 
 
 def joint_angles(motion: Motion, up: str = "z") -> dict[str, Float[np.ndarray, "frame"]]:
-    """Angles (degrees, without jumps of a turn) and the pelvis' place (metres, Y up as in TRC) by OpenSim's names.
+    """Angles (degrees) and the pelvis' place (metres, Y up as in TRC) by OpenSim's names.
+
+    Angles lie within half a turn; those of the pelvis go on from frame to frame.
 
     Raises:
         InputError: the body has none of the joints that they are angles of.
@@ -87,7 +89,10 @@ def joint_angles(motion: Motion, up: str = "z") -> dict[str, Float[np.ndarray, "
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # at 90 degrees about the middle axis one of many is chosen
             angles = Rotation.from_matrix(turned).as_euler(pair.order, degrees=True)
-        angles = np.unwrap(angles, axis=0, period=360.0)
+        if (
+            pair.above is None
+        ):  # a person who turns round and round; other angles would stay a turn off after 90 degrees
+            angles = np.unwrap(angles, axis=0, period=360.0)
         columns |= {name: sign * angles[:, pair.order.index(axis)] for name, axis, sign in pair.names}
         if pair.above is None:
             columns |= dict(zip(_PLACE, world_turn(up, "y") @ frames[:, :3, 3].T, strict=True))
