@@ -40,6 +40,8 @@ from sogjax.tracking.judged_poses import judged_poses
 
 CLEARLY = 1.01
 """By which factor new colours must explain more to be taken: those of example poses were measured within masks."""
+MORE_DOUBT = 0.02
+"""About a limb, on average over the frames, that new colours may cause."""
 
 
 @dataclass(frozen=True)
@@ -106,10 +108,10 @@ def adjusted_clip(
     if in_question:
         numbers["cameras"] = camera_numbers(recording, found)
     body, numbers["similarity_of_new_colors"] = _recolored(job, source, found, after, config)
-    job = replace(job, bodies=[body], tracker=replace(job.tracker, body=body))
-    prefix, after = _judged(job, source, prefix, after)
+    say("adjusting: what the cameras say of it")
+    job, (prefix, after) = _judged_with_colors(job, source, prefix, after, body)
     turn = jnp.asarray(world_from_upright(recording.up).T, actor.blob_sigmas.dtype)
-    return AdjustedClip(job, prefix, body.rotated(turn), after, numbers, found.moves)
+    return AdjustedClip(job, prefix, job.bodies[0].rotated(turn), after, numbers, found.moves)
 
 
 def _job(recording: Recording, actor: Body, motion: Motion, config: TrackConfig, read: PictureReader) -> Job:
@@ -183,6 +185,12 @@ def _recolored(job: Job, source: _Source, found: Adjusted, motion: Motion, confi
     return (body if after > CLEARLY * before else found.body), after / before
 
 
+def more_doubtful(motion: Motion, than: Motion) -> bool:
+    """Whether a limb is in doubt more than the most doubtful one of another motion, on average over the frames."""
+    doubt = lambda one: 0.0 if one.limb_doubt is None else float(np.max(np.mean(one.limb_doubt, axis=0), initial=0.0))
+    return doubt(motion) > doubt(than) + MORE_DOUBT
+
+
 def _energies(found: Adjusted, job: Job) -> Float[np.ndarray, "frame"]:
     """Of Eq. 10 without a history."""
     parts = [float(term.signed_weight) * found.values[term.name] for term in job.tracker.terms]
@@ -203,9 +211,20 @@ def _motion(found: Adjusted, job: Job, before: Motion) -> Motion:
     )
 
 
+def _judged_with_colors(
+    job: Job, source: "_Source", prefix: Prefix, motion: Motion, body: Body
+) -> tuple[Job, tuple[Prefix, Motion]]:
+    """The job with a body of new colours, unless these make a limb more doubtful; and what is said of the poses."""
+    judged = _judged(job, source, prefix, motion)
+    if body is job.bodies[0]:
+        return job, judged
+    recolored = replace(job, bodies=[body], tracker=replace(job.tracker, body=body))
+    anew = _judged(recolored, source, prefix, motion)
+    return (job, judged) if more_doubtful(anew[1], judged[1]) else (recolored, anew)
+
+
 def _judged(job: Job, source: _Source, prefix: Prefix, motion: Motion) -> tuple[Prefix, Motion]:
     """The frames and the motion with what the cameras say of the adjusted poses."""
-    say("adjusting: what the cameras say of it")
     cells = source.coming(np.arange(motion.num_frames))
     found = list(judged_poses(job.tracker, np.asarray(motion.pose), cells))
     if not found:
