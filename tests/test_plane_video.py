@@ -2,6 +2,7 @@
 
 import sys
 from fractions import Fraction
+from itertools import islice
 
 import cv2
 import numpy as np
@@ -9,7 +10,8 @@ import pytest
 from small_recording import make_recording, shared_recording, write_video
 
 from sogjax.data import plane_video as module
-from sogjax.data.plane_video import plane_video
+from sogjax.data import video_file
+from sogjax.data.plane_video import PlaneVideo, plane_video
 from sogjax.data.recording import open_recording
 from sogjax.data.source import open_with_least_work
 from sogjax.data.video import read_frames, read_prepared
@@ -136,6 +138,7 @@ VIDEOS = {
     "AVI of H.264": ("video.avi", "libx264", {"bf": "0"}, EVENLY),
     "AVI of H.264 with B-frames": ("video.avi", "libx264", {"bf": "2"}, EVENLY),
     "AVI of MPEG-4 with B-frames": ("video.avi", "mpeg4", {"bf": "2", "g": "12"}, EVENLY),
+    "AVI whose second packet is a key frame": ("video.avi", "mpeg4", {"bf": "2", "g": "3"}, EVENLY),
     "mp4 with B-frames": ("video.mp4", "libx264", {"bf": "2", "g": "12"}, EVENLY),
     "mkv": ("video.mkv", "libx264", {"g": "12"}, EVENLY),
     "three images missing": ("video.mp4", "libx264", {"g": "12"}, [k + 3 * (k > 10) for k in EVENLY]),
@@ -153,9 +156,36 @@ def test_all_readers_begin_with_the_image_of_that_number(tmp_path, name):
             assert [number_shown(image) for image in images_of(stream)] == [*range(start, 60)], (start, stream)
 
 
-def test_planes_are_read_where_images_are_missing(tmp_path):
+@pytest.mark.parametrize("name", VIDEOS)
+def test_the_reader_does_not_depend_on_the_start(tmp_path, name):
+    """Else a resumed run would not get the cells of an undisturbed one."""
+    file, *how = VIDEOS[name]
+    path = numbered_video(tmp_path / file, *how)
+    everything = images_of(plane_video(path, 0, 1))
+    for start in (1, 2, 3, 20, 59):
+        rest = images_of(plane_video(path, start, 1))
+        assert len(rest) == 60 - start
+        for found, expected in zip(rest, everything[start:], strict=True):
+            np.testing.assert_array_equal(found.luma, expected.luma)
+
+
+def test_images_are_counted_where_jumping_fails(tmp_path, monkeypatch):
+    def fail(path):
+        raise av.error.ExternalError(1, "nothing of Python's")
+
+    monkeypatch.setattr(module, "_times", fail)
+    file, *how = VIDEOS["mp4 with B-frames"]
+    stream = plane_video(numbered_video(tmp_path / file, *how), 20, 1)
+    assert isinstance(stream, PlaneVideo)
+    assert number_shown(stream.read()) == 20
+
+
+def test_missing_images_of_large_videos_are_seen_too(tmp_path, monkeypatch):
+    monkeypatch.setattr(video_file, "_COUNT_PACKETS_BELOW", 0)
     file, *how = VIDEOS["three images missing"]
-    assert plane_video(numbered_video(tmp_path / file, *how), 20, 1) is not None
+    path = numbered_video(tmp_path / file, *how)
+    for start in (12, 31, 45):
+        assert number_shown(VideoFile(path, start, 1).read()) == start
 
 
 def test_full_range_without_a_format_of_its_own_is_left_to_opencv(tmp_path):
@@ -194,9 +224,44 @@ def test_what_is_no_video_is_left_to_opencv(tmp_path, content):
     assert plane_video(path, 0, 1) is None
 
 
+@pytest.mark.parametrize("start", [0, 2])
+def test_a_pyav_too_old_is_not_used(tmp_path, monkeypatch, start):
+    """One without `VideoFrame.rotation`; the file that it opened is closed."""
+    path, opened = painted_video(tmp_path / "video.mp4", size=(64, 48)), []
+
+    def without_rotation(image):
+        raise AttributeError("rotation")
+
+    class Watched(PlaneVideo):
+        def __init__(self, container, threads):
+            opened.append(container)
+            super().__init__(container, threads)
+
+    monkeypatch.setattr(module, "_known", without_rotation)
+    monkeypatch.setattr(module, "PlaneVideo", Watched)
+    assert isinstance(open_with_least_work(path, start), VideoFile)
+    (container,) = opened
+    with pytest.raises(AssertionError, match="not open"):
+        next(container.demux(video=0))
+
+
+def test_an_error_of_ffmpeg_alone_ends_a_video(tmp_path):
+    class Damaged:
+        def __init__(self, container):
+            self.streams, self._container = container.streams, container
+
+        def demux(self, video):
+            yield from islice(self._container.demux(video=video), 3)
+            raise av.error.ExternalError(1, "nothing of Python's")
+
+    with av.open(str(painted_video(tmp_path / "video.mp4", size=(64, 48)))) as container:
+        assert 0 < len(images_of(PlaneVideo(Damaged(container), 1))) <= 3
+
+
 def test_without_pyav_opencv_reads(tmp_path, monkeypatch):
     folder = make_recording(tmp_path / "r")
     monkeypatch.setitem(sys.modules, "av", None)
+    assert module.pyav_version() is None
     recording = open_recording(folder)
     images = next(iter(read_prepared(recording, lambda camera, image: image, planes=True)))
     assert all(isinstance(image, np.ndarray) for image in images)

@@ -24,7 +24,7 @@ from sogjax.data.recording import Recording
 from sogjax.data.source import fingerprint
 from sogjax.errors import InputError
 
-CELLS_VERSION = 3
+CELLS_VERSION = 4
 """Raise it with every change that alters cells or their files."""
 _CHUNK = 2**22
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from functools import lru_cache
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
@@ -46,26 +47,46 @@ def _pyav() -> Any:
 def plane_video(path: Path, start: int, threads: int) -> PlaneVideo | None:
     """The images of a video from its frame `start` on; None where only OpenCV can read them as they should be.
 
-    That is where PyAV is not installed, or where the video is of a rare kind: turned sideways, of odd size, with more
-    than eight bits or other differences of colour; with `start`, also where its file does not say when each image is
-    to be shown. `threads` decode it.
+    That is where PyAV is not installed, or is too old, or where the video is of a rare kind: turned sideways, of odd
+    size, with more than eight bits or other differences of colour. It does not depend on `start`, so the same frame
+    gives the same cells wherever reading began. `threads` decode it.
     """
-    av = _pyav()
-    if av is None:
-        return None
-    errors = (OSError, ValueError, AttributeError, av.FFmpegError)  # of the file, which OpenCV names; of an old PyAV
-    try:
-        container = av.open(str(path), options={})
-    except errors:
+    if _pyav() is None:
         return None
     try:
-        video = PlaneVideo(container, threads)
-        if video.readable and (start == 0 or video.seek(_times(path), start)):
+        video = _opened(path, threads)
+        if video is None or start == 0 or _jumped(video, path, start):
             return video
-    except errors:
-        pass
-    container.close()
-    return None
+        video.close()
+        if (video := _opened(path, threads)) is not None:
+            for _ in range(start):
+                video.skip()
+        return video
+    except (*_failures(), AttributeError):  # of the file, which OpenCV names; of an old PyAV
+        return None
+
+
+def _failures() -> tuple[type[Exception], ...]:
+    """What PyAV raises over files; some errors of FFmpeg are of no kind of Python's."""
+    return OSError, ValueError, _pyav().FFmpegError
+
+
+def _opened(path: Path, threads: int) -> PlaneVideo | None:
+    with ExitStack() as stack:
+        container = _pyav().open(str(path), options={})
+        stack.callback(container.close)
+        video = PlaneVideo(container, threads)
+        if not video.readable:
+            return None
+        stack.pop_all()
+        return video
+
+
+def _jumped(video: PlaneVideo, path: Path, start: int) -> bool:
+    try:
+        return video.seek(_times(path), start)
+    except _failures():
+        return False
 
 
 def _times(path: Path) -> tuple[int, ...]:
@@ -154,12 +175,12 @@ class PlaneVideo:
 
     def _decoded(self) -> Iterator[VideoFrame]:
         """All images from here on, up to damage: as with OpenCV, no later image is taken for that of another frame."""
-        for packet in self._container.demux(video=0):
-            try:
-                images = packet.decode()
-            except (OSError, ValueError):
-                return
-            yield from images  # pyright: ignore[reportReturnType]
+        failures = _failures()
+        try:
+            for packet in self._container.demux(video=0):
+                yield from packet.decode()  # pyright: ignore[reportReturnType]
+        except failures:
+            return
 
 
 def yuv_picture(image: VideoFrame) -> YuvPicture:

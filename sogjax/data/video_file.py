@@ -94,10 +94,11 @@ def frame_times(path: Path) -> Float[np.ndarray, "frame"]:
 
 
 def _steady(path: Path, fps: float) -> bool:
-    """Whether images come at a constant rate, by which a jump finds them; believed of files too large to read."""
+    """Whether images come at a constant rate, by which a jump finds them; the whole file is read once, however large.
+
+    PyAV's reader does so too: both find the same image by its number.
+    """
     state = path.stat()
-    if state.st_size >= _COUNT_PACKETS_BELOW:
-        return True
     return _is_steady(path, fps, (state.st_size, state.st_mtime_ns))
 
 
