@@ -70,3 +70,13 @@ def test_a_failed_member_is_marked_and_one_without_truth_is_not(tmp_path, capsys
     assert shares[1:] == [0.0, 0.0]
     assert rows_of(tmp_path)[0]["failed"] == "the disk is full"
     assert "stop=0" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("truth", [True, False])
+def test_what_columns_mean_is_said(tmp_path, capsys, labels, truth):
+    error = 10.0 if truth else float("nan")
+    finish_sweep(tmp_path, [Member([f"stop={k}"], Numbers(numbers(error) | {"findings": 2}), 3.0) for k in (3, 4)])
+    out = capsys.readouterr().out
+    assert "to first mm: mean distance of the joints" in out
+    assert ("no truth: these numbers compare" in out) == (not truth)
+    assert " 2 " in out.splitlines()[1] + " "

@@ -6,7 +6,7 @@ Launchers may run members in other processes or on other machines, so their resu
 import csv
 import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,6 +23,13 @@ RESULT = "result.json"
 APART = "to first mm"
 """The column of `Member.apart`."""
 ALL = (*COLUMNS[:6], APART, *COLUMNS[6:])
+_COUNTS = ("lost", "swaps", "findings", "doubtful", "not converged")
+_MEANINGS = {
+    APART: "mean distance of the joints to those of the first member",
+    "explained %": "of the visible area, how much shows the actor's own colours",
+    "findings": "of the verdict; 0: it looks right",
+    "doubtful": "stretches in which a limb is in doubt",
+}
 _TITLES = {OBJECTIVE: "mean marker error", APART: "mean distance of the joints to the first member's"}
 
 
@@ -88,7 +95,10 @@ def finish_sweep(sweep: Path, members: Sequence[Member]) -> None:
     if not members:
         return
     names = differing([member.overrides for member in members])
-    print(table([(name, with_distance(member)) for name, member in zip(names, members, strict=True)]))
+    rows = [with_distance(member) for member in members]
+    print(table(list(zip(names, rows, strict=True))))
+    if done := [row for row in rows if not isinstance(row, str)]:
+        print(f"\n{legend(_known(done))}")
     with atomic_path(sweep / "sweep.csv") as temporary:
         temporary.write_text(_csv(members), encoding="utf-8")
     print(f"\n{sweep / 'sweep.csv'}")
@@ -145,7 +155,7 @@ def table(rows: Sequence[tuple[str, Mapping[str, float] | str]]) -> str:
     """A plain-text table of settings and results; what no member knows, such as errors without a truth, is left out."""
     width = max(len("settings"), *(len(name) for name, _ in rows)) if rows else 8
     done = [numbers for _, numbers in rows if not isinstance(numbers, str)]
-    columns = [c for c in ALL if any(np.isfinite(numbers.get(c, np.nan)) for numbers in done)]
+    columns = _known(done)
     lines = [f"{'settings':<{width}}" + "".join(f"{column:>14}" for column in columns)]
     for name, numbers in rows:
         if isinstance(numbers, str):
@@ -155,10 +165,23 @@ def table(rows: Sequence[tuple[str, Mapping[str, float] | str]]) -> str:
     return "\n".join(lines)
 
 
+def _known(done: Sequence[Mapping[str, float]]) -> list[str]:
+    return [column for column in ALL if any(np.isfinite(numbers.get(column, np.nan)) for numbers in done)]
+
+
 def _cell(column: str, value: float) -> str:
     if not np.isfinite(value):
         return f"{'-':>14}"
-    return f"{value:>14.4f}" if column == "similarity" else f"{value:>14.2f}"
+    digits = 4 if column == "similarity" else 0 if column in _COUNTS else 2
+    return f"{value:>14.{digits}f}"
+
+
+def legend(columns: Collection[str]) -> str:
+    """What columns of the table are that nobody can guess."""
+    lines = [f"{column}: {meaning}" for column, meaning in _MEANINGS.items() if column in columns]
+    if OBJECTIVE not in columns:
+        lines.append("there is no truth: these numbers compare the members, and do not rank them")
+    return "\n".join(lines)
 
 
 def _csv(members: Sequence[Member]) -> str:
