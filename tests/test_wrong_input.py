@@ -323,7 +323,9 @@ def test_an_option_with_something_wrong(capsys, recording, tmp_path, argument, w
 
 def test_two_actors_of_one_name(capsys, recording, tmp_path):
     path = actor_file(tmp_path / "actor.yaml")
-    refused_track(capsys, recording, f"actor=[{path},{path}]", words=("puppet", "name"))
+    (tmp_path / "other.yaml").write_text(path.read_text().replace("- 0.6\n", "- 0.5\n"))  # in other colours
+    refused_track(capsys, recording, f"actor=[{path},{tmp_path / 'other.yaml'}]", words=("puppet", "name"))
+    refused_track(capsys, recording, f"actor=[{path},{path}]", words=("the same actor", "each person"))
 
 
 def test_a_folder_that_cannot_be_written(capsys, recording, tmp_path):
