@@ -23,6 +23,7 @@ from sogjax.engine import job, kept_run, run_job, streams
 from sogjax.engine import track as track_command
 from sogjax.settings import ColorConfig
 from sogjax.tracking import frame_by_frame
+from sogjax.tracking.culling import Capacities
 
 FRAMES, KILLS = 20, 3
 LIGHT = ("outputs.overlay=false", "outputs.rerun=false", "outputs.bvh=false")
@@ -79,12 +80,20 @@ def test_the_end_is_that_of_a_run_that_was_not_stopped(capsys, tmp_path, monkeyp
     assert "already ended" in err
 
 
+def person_file(folder, name, red):
+    def change(content):
+        content["name"] = name
+        content["blobs"][1]["color"][0] = red
+
+    return actor_file(folder / f"{name}.yaml", change)
+
+
 @pytest.mark.slow
 def test_two_actors(capsys, tmp_path, monkeypatch, recording):
     (recording / "initial_pose.yaml").write_text(
         "one: {pose: rest, position: [0, 0, 1], heading: 0}\ntwo: {pose: rest, position: [0.5, 0, 1], heading: 0}\n"
     )
-    files = [actor_file(tmp_path / f"{name}.yaml", lambda c, n=name: c.update(name=n)) for name in ("one", "two")]
+    files = [person_file(tmp_path, name, red) for name, red in (("one", 0.6), ("two", 0.5))]
     words = ["track", f"recording={recording}", f"actor=[{files[0]},{files[1]}]", *SMALL, *LIGHT]
     done(capsys, *words, "out=whole")
     with monkeypatch.context() as context:
@@ -98,7 +107,7 @@ def test_two_actors(capsys, tmp_path, monkeypatch, recording):
 @pytest.mark.slow
 def test_the_tracker_goes_on_with_the_capacities_that_it_stopped_with(capsys, tmp_path, monkeypatch, command):
     """Room for image blobs that had to grow is not counted anew: sums of other lengths are rounded otherwise."""
-    grown = tracker.Capacities(near=512, matching=512, blocks=2048)
+    grown = Capacities(near=512, matching=512, blocks=2048)
     monkeypatch.setattr(frame_by_frame, "first_capacities", lambda *_: grown)
     done(capsys, *command, "out=whole")
     with monkeypatch.context() as context:

@@ -217,7 +217,7 @@ OPTIONS = (
 COMMANDS: list[tuple[str, tuple[str, ...]]] = [
     ("an unknown command", ("trakc", "recording=walk")),
     ("no recording named", ("track", "actor=actor.yaml")),
-    ("two actors of one name", ("track", "recording=walk", "actor=[actor.yaml,body.yaml]", "out=new/results")),
+    ("one actor for two people", ("track", "recording=walk", "actor=[actor.yaml,body.yaml]", "out=new/results")),
     ("a sweep over an unknown key", (*TRACK, "-m", "energy.weight=0,1")),
     ("a motion that synth does not know", ("synth", "out=new", "motion=fly")),
     ("pictures of odd width", ("synth", "out=new", "width=65")),
