@@ -39,8 +39,8 @@ def test_short_work_says_nothing():
 def test_a_bar_has_the_time_left_and_none_at_the_end(clock):
     out = Terminal()
     list(progress(range(4), 4, "tracking", out))
-    first, *_, last = [text for text in out.getvalue().split("\r") if text]
-    assert "15 s left" in first
+    _, first, *_, last = [text for text in out.getvalue().split("\r") if text]
+    assert "10 s left" in first
     assert "left" not in last
     assert "4/4" in last
 
@@ -48,6 +48,15 @@ def test_a_bar_has_the_time_left_and_none_at_the_end(clock):
 @pytest.mark.parametrize(("seconds", "said"), [(12.4, "12 s"), (200.0, "3 min"), (9000.0, "2.5 h")])
 def test_times_as_people_say_them(seconds, said):
     assert remaining(seconds) == said
+
+
+def test_the_first_item_which_waits_for_programs_says_nothing_of_the_others(monkeypatch):
+    now = iter((0.0, 60.0, 61.0, 62.0, 63.0))
+    monkeypatch.setattr(terminal.time, "monotonic", lambda: next(now))
+    out = Terminal()
+    list(progress(range(4), 4, "tracking", out))
+    assert "1/4  " in out.getvalue()
+    assert "2/4 1.0/s, 2 s left" in out.getvalue()
 
 
 def test_nothing_is_divided_by_nothing_done():

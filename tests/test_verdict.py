@@ -52,6 +52,11 @@ def test_what_is_explained_as_in_the_example_poses_looks_right(walk):
     assert found.overlap == dict.fromkeys(CAMERAS, 0.7)
 
 
+def test_a_good_verdict_that_rests_on_little_says_so(walk):
+    assert "without a background or example poses" in of_one(walk, expected=None).sentence
+    assert of_one(walk).sentence == of_one(judged(walk), expected=None).sentence == "looks right"
+
+
 def test_another_subject_is_told_by_how_little_is_explained(walk):
     found = of_one(judged(walk, explained=0.1))
     assert found.wrong

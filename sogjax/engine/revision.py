@@ -8,7 +8,7 @@ import numpy as np
 from sogjax.engine.backwards import frames_backwards
 from sogjax.engine.job import Job
 from sogjax.engine.prefix import JUDGEMENT, TERM, Prefix
-from sogjax.engine.terminal import say
+from sogjax.engine.terminal import alive, say
 from sogjax.errors import InputError
 from sogjax.sentences import counted
 from sogjax.settings import ImagesConfig
@@ -35,7 +35,8 @@ class Reviser:
         if doubtful:
             say(f"limbs in doubt in {counted(doubtful, 'frame')}: tracked backwards around them, too")
         try:
-            found = told_both_ways(job.tracker, passed, self._backwards)
+            with alive("tracking backwards"):
+                found = told_both_ways(job.tracker, passed, self._backwards)
         except InputError as error:
             say(f"warning: not told both ways, the first pass stays as it is: {error}")
             return None

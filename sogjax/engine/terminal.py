@@ -32,24 +32,26 @@ _said = _Said()
 def progress(items: Iterable[Item], total: int, label: str, stream: TextIOBase | None = None) -> Iterator[Item]:
     """The items, with a bar like `tracking ######---- 12/40 8.1/s, 3 s left` on standard error.
 
-    Where that is no terminal, such a line comes every ten seconds.
+    Where that is no terminal, such a line comes every ten seconds. The speed is that of the items after the first,
+    which waits for programs to be compiled.
     """
     out = sys.stderr if stream is None else stream
     terminal = out.isatty()
-    begin = drawn = time.monotonic()
+    begin = drawn = first = time.monotonic()
     count = 0
     try:
         for item in items:
             yield item
             count += 1
             now = time.monotonic()
+            first = now if count == 1 else first
             if terminal and now - begin > SHOWN_AFTER and (now - drawn > REDRAWN_AFTER or count == total):
                 drawn = _said.at = now
-                out.write("\r" + bar(label, count, total, now - begin))
+                out.write("\r" + bar(label, count, total, now - first))
                 out.flush()
             elif not terminal and now - drawn > LINE_AFTER:
                 drawn = _said.at = now
-                print(bar(label, count, total, now - begin).rstrip(), file=out, flush=True)
+                print(bar(label, count, total, now - first).rstrip(), file=out, flush=True)
     finally:
         if terminal and drawn > begin:
             out.write("\n")
@@ -95,12 +97,12 @@ def alive(label: str, stream: TextIOBase | None = None) -> Iterator[Work]:
 
 
 def bar(label: str, count: int, total: int, seconds: float) -> str:
-    """One line with the progress and speed of a job, and how long the rest takes at this speed."""
-    filled = WIDTH * count // max(total, 1)
-    left = f", {remaining(seconds * (total - count) / count)} left" if 0 < count < total else ""
-    shown = (
-        f"{label:<18} {'#' * filled}{'-' * (WIDTH - filled)} {count}/{total} {count / max(seconds, 1e-9):.1f}/s{left}"
-    )
+    """One line with the progress of a job, its speed since the first item was done, and how long the rest takes so."""
+    filled, speed = WIDTH * count // max(total, 1), ""
+    if count > 1:
+        each = max(seconds, 1e-9) / (count - 1)
+        speed = f" {1.0 / each:.1f}/s" + (f", {remaining(each * (total - count))} left" if count < total else "")
+    shown = f"{label:<18} {'#' * filled}{'-' * (WIDTH - filled)} {count}/{total}{speed}"
     return f"{shown:<{len(label) + WIDTH + 40}}"
 
 

@@ -56,8 +56,11 @@ class Verdict:
 
     @property
     def sentence(self) -> str:
-        """In a line."""
-        return "looks right" if self.looks_right else "; ".join(self.findings)
+        """In a line; what it rests on, where that is little."""
+        if self.findings:
+            return "; ".join(self.findings)
+        known = self.expected is not None or self.overlap
+        return "looks right" if known else "looks right, as far as that is told without a background or example poses"
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""

@@ -30,14 +30,19 @@ def write_initial_pose(path: Path, motions: Sequence[Motion], frame: int | None 
     if len(motions) > 1 and (not all(names) or len(set(names)) < len(names)):
         raise InputError(f"{path}: motions of several actors must each say whose they are, but they say {names}")
     content = poses[0] if len(poses) == 1 else dict(zip(names, poses, strict=True))
+    text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None)
     with atomic_path(path) as temporary:
-        temporary.write_text(yaml.safe_dump(content, sort_keys=False, default_flow_style=None), encoding="utf-8")
+        temporary.write_text(f"# Frame {_number(motions[0], frame)} of a motion.\n{text}", encoding="utf-8")
+
+
+def _number(motion: Motion, frame: int | None) -> int:
+    return int(motion.frame[0]) if frame is None else frame
 
 
 def _pose(path: Path, motion: Motion, frame: int | None) -> dict[str, Any]:
     if motion.num_frames == 0:
         raise InputError(f"{path}: the motion has no frames")
-    wanted = int(motion.frame[0]) if frame is None else frame
+    wanted = _number(motion, frame)
     rows = np.flatnonzero(motion.frame == wanted)
     if len(rows) == 0:
         raise InputError(f"frame={frame}: the motion has the frames {motion.frame[0]} to {motion.frame[-1]}")
