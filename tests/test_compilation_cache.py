@@ -3,13 +3,19 @@
 import os
 import subprocess
 import sys
+import warnings
 from importlib.metadata import version
 
 import pytest
+from full_disk import files_of_at_most
 
-from sogjax.engine.compilation_cache import REFUSED, TRIED, VARIABLE, refusal, use_compilation_cache
+from sogjax.engine.compilation_cache import REFUSED, TRIED, VARIABLE, complaints, use_compilation_cache
+from sogjax.engine.unread_programs import forget_unread
 from sogjax.errors import InputError
 
+NOT_OF_THIS_MACHINE = (
+    "Loading XLA:CPU AOT result. Target machine feature +prefer-no-scatter is not supported on the host machine."
+)
 PROGRAM = """
 import jax
 from jax._src import monitoring
@@ -54,27 +60,60 @@ def test_work_goes_on_where_kept_programs_are_not_taken(tmp_path):
     kept = tmp_path / "kept"
     hits({VARIABLE: str(kept)})
     (tried,) = kept.glob(f"*/{TRIED}")
-    tried.rename(tried.with_name(REFUSED))
+    tried.rename(tried.with_name(REFUSED)).write_text(NOT_OF_THIS_MACHINE)
     assert hits({VARIABLE: str(kept)}) == 0
 
 
-def test_a_damaged_program_is_compiled_again(tmp_path):
+@pytest.mark.parametrize("room", [0, 64])
+def test_one_start_on_a_full_disk_does_not_switch_it_off_for_good(tmp_path, room):
+    kept = tmp_path / "kept"
+    with files_of_at_most(room):
+        assert hits({VARIABLE: str(kept)}) == 0
+    assert list(kept.glob("*/*")) == []
+    hits({VARIABLE: str(kept)})
+    assert hits({VARIABLE: str(kept)}) >= 1
+
+
+def test_a_refusal_that_does_not_speak_of_the_machine_counts_for_nothing(tmp_path):
+    kept = tmp_path / "kept"
+    hits({VARIABLE: str(kept)})
+    (tried,) = kept.glob(f"*/{TRIED}")
+    tried.rename(tried.with_name(REFUSED))
+    hits({VARIABLE: str(kept)})
+    assert hits({VARIABLE: str(kept)}) >= 1
+
+
+@pytest.mark.parametrize("size", [0, 50])
+def test_a_damaged_program_is_compiled_again_and_kept_again(tmp_path, size):
     kept = tmp_path / "kept"
     hits({VARIABLE: str(kept)})
     for program in kept.glob("*/*-cache"):
-        program.write_bytes(program.read_bytes()[:50])
+        program.write_bytes(program.read_bytes()[:size])
     assert hits({VARIABLE: str(kept)}) == 0  # and nothing is said, which `hits` sees to
+    assert hits({VARIABLE: str(kept)}) >= 1
+
+
+def test_only_programs_of_the_name_that_cannot_be_read_are_deleted(tmp_path):
+    names = ("jit_step-0a-cache", "jit_step-1b-cache", "jit_steps-0a-cache", "jit_step-0a-atime", TRIED)
+    for name in names:
+        (tmp_path / name).touch()
+    with warnings.catch_warnings(record=True) as others:
+        warnings.simplefilter("always")
+        for _ in range(2):
+            forget_unread(tmp_path)
+        warnings.warn("Error reading persistent compilation cache entry for 'jit_step': OSError: no", stacklevel=1)
+        warnings.warn("something else", stacklevel=1)
+    assert [str(each.message) for each in others] == ["something else"]
+    assert {path.name for path in tmp_path.iterdir()} == {*names[2:]}
 
 
 def test_a_complaint_about_the_machine_is_noticed(monkeypatch):
-    told = "Loading XLA:CPU AOT result. Target machine feature +prefer-no-scatter is not supported on the host machine."
-
     def complaining(function):
-        os.write(2, f"{told}\n".encode())
+        os.write(2, f"{NOT_OF_THIS_MACHINE}\n".encode())
         return lambda x: x
 
     monkeypatch.setattr("jax.jit", complaining)
-    assert told in refusal()
+    assert NOT_OF_THIS_MACHINE in complaints()
 
 
 def test_a_default_folder_that_cannot_be_made_is_no_error(tmp_path, monkeypatch):

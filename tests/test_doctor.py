@@ -1,10 +1,12 @@
 """`sogjax doctor`: everything is said, the laws of its self-test can fail, and trouble is an exit status."""
 
+import jax
 import pytest
 from command_line import done, refused
 
 from sogjax.app import doctor
 from sogjax.engine import self_test
+from sogjax.engine.compilation_cache import REFUSED, VARIABLE, programs_folder
 
 
 def test_a_sound_installation(capsys, tmp_path):
@@ -21,6 +23,19 @@ def test_a_folder_that_cannot_be_written_is_trouble(capsys, tmp_path, monkeypatc
     missing = tmp_path / "missing"
     with pytest.raises(doctor.InputError, match="cannot be written"):
         doctor.run(doctor.DoctorConfig(folder=str(missing)))
+
+
+def test_why_programs_are_not_kept_is_told_with_the_file_that_says_so(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr(doctor, "LAWS", {})
+    monkeypatch.setenv(VARIABLE, str(tmp_path))
+    monkeypatch.setitem(jax.config.values, "jax_compilation_cache_dir", None)
+    folder = programs_folder()
+    folder.mkdir()
+    (folder / REFUSED).write_text("Loading XLA:CPU AOT result. A feature is missing.\nand so on")
+    doctor.run(doctor.DoctorConfig(folder=str(tmp_path)))
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("compiled programs"))
+    assert str(folder / REFUSED) in line
+    assert "A feature is missing. and so on" in line
 
 
 def test_a_law_that_is_broken_is_trouble(capsys, monkeypatch):

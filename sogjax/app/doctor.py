@@ -11,8 +11,7 @@ from pathlib import Path
 import jax
 
 from sogjax.app.config.schemas import DoctorConfig
-from sogjax.data.cache_folder import OFF
-from sogjax.engine.compilation_cache import VARIABLE
+from sogjax.engine.compilation_cache import why_not_kept
 from sogjax.engine.self_test import LAWS
 from sogjax.errors import InputError
 
@@ -91,14 +90,12 @@ def _say_machine() -> None:
 
 
 def _say_cache() -> None:
-    """Where compiled programs are kept."""
+    """Where compiled programs are kept, or why they are not."""
     folder = jax.config.values["jax_compilation_cache_dir"]
     if folder is None:
-        off = os.environ.get(VARIABLE, "").lower() == OFF
-        why = f"{VARIABLE}={OFF}" if off else f"not possible here; {VARIABLE}=FOLDER may name another folder"
-        _line("compiled programs", f"are not kept ({why})")
+        _line("compiled programs", f"are not kept ({why_not_kept()})")
         return
-    files = [path for path in Path(folder).glob("*") if path.is_file()]
+    files = [path for path in Path(folder).glob("*-cache") if path.is_file()]
     size = sum(path.stat().st_size for path in files) / 1e6
     _line("compiled programs", f"{len(files)} in {folder} ({size:.1f} MB)")
 

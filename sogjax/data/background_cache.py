@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from sogjax.data.atomic import atomic_path
-from sogjax.data.cache_folder import OFF, default_cache_dir, sweep
+from sogjax.data.cache_folder import OFF, default_cache_dir, named_folder, sweep
 from sogjax.data.npz_file import read_npz
 from sogjax.data.recording import Recording
 from sogjax.data.source import fingerprint
@@ -45,13 +45,21 @@ def background_origin(recording: Recording) -> dict[str, Any]:
 
 
 def background_folder(chosen: str | None) -> Path | None:
-    """Where backgrounds are kept: in the folder of `images.cache`, or where the environment says; None: nowhere."""
+    """Where backgrounds are kept: in the folder of `images.cache`, or where the environment says; None: nowhere.
+
+    Raises:
+        InputError: the folder that the environment names cannot be known.
+    """
     if chosen is not None:
         return Path(chosen)
-    name = os.environ.get(VARIABLE, "")
-    if name.lower() == OFF:
+    if os.environ.get(VARIABLE, "").lower() == OFF:
         return None
-    return Path(name).expanduser() if name else default_cache_dir() / "backgrounds"
+    if (named := named_folder(VARIABLE)) is not None:
+        return named
+    try:
+        return default_cache_dir() / "backgrounds"
+    except InputError:
+        return None
 
 
 def kept_background(

@@ -7,20 +7,21 @@ import platform
 import sys
 import tempfile
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from importlib.metadata import version
 from pathlib import Path
 
-from sogjax.data.cache_folder import OFF, default_cache_dir, sweep
+from sogjax.data.atomic import atomic_path
+from sogjax.data.cache_folder import OFF, default_cache_dir, named_folder, sweep
+from sogjax.engine.unread_programs import NOT_READ, NOT_WRITTEN, delete_programs, forget_unread
 from sogjax.errors import InputError
 
 VARIABLE = "SOGJAX_COMPILATION_CACHE"
 """The environment variable with the folder, or `off`; without it programs lie beside other things that are kept."""
 LARGEST = 1_000_000_000
-"""Bytes that kept programs may take; a recording of its own takes about three million."""
+"""Bytes to which kept programs are cut back once a day; a recording of its own takes about three million."""
 TRIED, REFUSED = "tried", "refused"
 """Names of files in the folder: kept programs were taken there; were not, and why."""
-_NOT_READ = "Error reading persistent compilation cache entry"
 _NOT_OF_THIS_MACHINE = "AOT result"
 """Part of what is written to standard error about a program that may not run on this processor."""
 
@@ -28,8 +29,7 @@ _NOT_OF_THIS_MACHINE = "AOT result"
 def use_compilation_cache() -> None:
     """Keep compiled programs, and use those that are kept, unless the environment variable says `off`.
 
-    Each version of jaxlib and each kind of processor has its own subfolder: a program compiled for one may fail on
-    another. Where the folder cannot be written, or kept programs are not taken, everything is compiled anew.
+    Where the folder cannot be written, or kept programs are not taken, everything is compiled anew.
 
     Raises:
         InputError: the folder that the variable names cannot be made.
@@ -37,8 +37,9 @@ def use_compilation_cache() -> None:
     name = os.environ.get(VARIABLE, "")
     if name.lower() == OFF or (not name and os.environ.get("JAX_COMPILATION_CACHE_DIR")):
         return
-    folder = Path(name).expanduser() if name else default_cache_dir() / "programs"
-    own = folder / f"jaxlib-{version('jaxlib')}-{_processor()}"
+    own = programs_folder()
+    if own is None:
+        return
     try:
         own.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -46,22 +47,54 @@ def use_compilation_cache() -> None:
             return
         reason = error.strerror or str(error)
         raise InputError(f"{VARIABLE}={name}: no folder can be made there ({reason}); choose another") from error
-    if not os.access(own, os.W_OK) or (own / REFUSED).exists():
+    if not os.access(own, os.W_OK) or refusal(own):
         return
-    sweep(folder, "*/*-cache", LARGEST)
+    sweep(own.parent, "*/*-cache", LARGEST)
     _use(str(own))
-    if not (own / TRIED).exists():
-        reason = refusal()
-        with contextlib.suppress(OSError):
-            (own / (REFUSED if reason else TRIED)).write_text(reason, encoding="utf-8")
-        if reason:
-            _use(None)
+    forget_unread(own)
+    if not (own / TRIED).exists() and not _taken_back(own):
+        _use(None)
+
+
+def programs_folder() -> Path | None:
+    """Where programs of this jaxlib and processor are kept, as one compiled for another may fail; None: nowhere.
+
+    Raises:
+        InputError: the folder that the variable names cannot be known.
+    """
+    chosen = named_folder(VARIABLE)
+    if chosen is None:
+        try:
+            chosen = default_cache_dir() / "programs"
+        except InputError:
+            return None
+    return chosen / f"jaxlib-{version('jaxlib')}-{_processor()}"
+
+
+def refusal(folder: Path) -> str:
+    """What was said of programs of this folder that are not of this machine; empty: nothing."""
+    try:
+        text = (folder / REFUSED).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return ""
+    return text if _NOT_OF_THIS_MACHINE in text else ""
+
+
+def why_not_kept() -> str:
+    """Why a command keeps no programs, and what can be done."""
+    if os.environ.get(VARIABLE, "").lower() == OFF:
+        return f"{VARIABLE}={OFF}"
+    folder = programs_folder()
+    remedy = f"{VARIABLE}=FOLDER may name another folder"
+    if folder is None:
+        return f"no home folder is known; {remedy}"
+    if said := refusal(folder):
+        return f"{folder / REFUSED} says: {' '.join(said.split())}; delete that file to have it tried again"
+    return f"not possible in {folder}; {remedy}"
 
 
 def _use(folder: str | None) -> None:
     """Tell jax, now or when it is imported; processes that are started from this one know it, too."""
-    # A program that cannot be read is compiled: nothing that a person has to know.
-    warnings.filterwarnings("ignore", message=_NOT_READ)
     options = {
         "jax_compilation_cache_dir": folder,
         "jax_persistent_cache_min_compile_time_secs": 0.0,
@@ -74,23 +107,48 @@ def _use(folder: str | None) -> None:
             os.environ[key.upper()] = str(value)
         if "jax" in sys.modules:
             sys.modules["jax"].config.update(key, value)
+    if "jax" in sys.modules:
+        from jax.experimental.compilation_cache.compilation_cache import reset_cache
+
+        reset_cache()  # jax looks up the folder once only
 
 
-def refusal() -> str:
-    """Why a program that was just kept is not taken back without a complaint; empty: it is."""
+def _taken_back(folder: Path) -> bool:
+    """Whether a program that was just kept is taken back, which is noted; not where the disk was in the way."""
+    said = complaints()
+    refused = [line for line in said if _NOT_OF_THIS_MACHINE in line]
+    for line in said:
+        if (damaged := NOT_READ.match(line) or NOT_WRITTEN.match(line)) is not None:
+            delete_programs(folder, damaged[1])
+    if refused or not said:
+        with contextlib.suppress(InputError, OSError), atomic_path(folder / (REFUSED if refused else TRIED)) as file:
+            file.write_text("\n".join(refused), encoding="utf-8")
+    return not said
+
+
+def complaints() -> list[str]:
+    """What is said, line by line, where a program is kept and taken back."""
     import jax
     import jax.numpy as jnp
 
-    one = jnp.ones(3)
-    with tempfile.TemporaryFile() as said, warnings.catch_warnings(record=True) as complaints:
+    with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always")
-        with _standard_error_to(said.fileno()):
-            for _ in range(2):  # the second function is the same program, but jax does not know that
-                jax.jit(lambda x: jnp.sin(x) * 2.0 + 1.0)(one).block_until_ready()
-        said.seek(0)
-        lines = said.read().decode(errors="replace").splitlines()
-    reasons = [str(each.message) for each in complaints if _NOT_READ in str(each.message)]
-    return "\n".join(reasons + [line for line in lines if _NOT_OF_THIS_MACHINE in line])
+        one = jnp.ones(3)
+        try:
+            with tempfile.TemporaryFile() as said:
+                with _standard_error_to(said.fileno()):
+                    for _ in range(2):  # the second function is the same program, but jax does not know that
+                        jax.jit(lambda x: jnp.sin(x) * 2.0 + 1.0)(one).block_until_ready()
+                said.seek(0)
+                lines = said.read().decode(errors="replace").splitlines()
+        except OSError as error:  # no room for temporary files
+            return [*_of_the_disk(found), str(error)]
+    return [*_of_the_disk(found), *(line for line in lines if _NOT_OF_THIS_MACHINE in line)]
+
+
+def _of_the_disk(found: Sequence[warnings.WarningMessage]) -> list[str]:
+    told = [str(each.message) for each in found]
+    return [text for text in told if NOT_READ.match(text) or NOT_WRITTEN.match(text)]
 
 
 @contextlib.contextmanager
