@@ -23,7 +23,7 @@ NOTE = "made_from"
 VARIABLE = "SOGJAX_BACKGROUND_CACHE"
 """The environment variable with the folder where `images.cache` names none, or `off`."""
 LARGEST = 1_000_000_000
-"""Bytes that the usual folder may take; a camera takes about one million."""
+"""Bytes to which the usual folder is cut back once a day; a camera takes about one million."""
 
 Arrays = dict[str, np.ndarray]
 
