@@ -138,12 +138,17 @@ def test_members_write_pictures_of_every_frame_only_where_these_are_named(monkey
     assert ("no overlay" in capsys.readouterr().err) == bool(added)
 
 
-def test_the_background_is_cut_into_cells_once_until_its_files_change(monkeypatch, tmp_path):
-    recording = open_recording(trackable(tmp_path / "two"))
-    plates = {name: tmp_path / f"{name}.png" for name in recording.rig.names}
+def black_scene(folder):
+    """A recording with photographs of the empty scene, all black."""
+    recording = open_recording(trackable(folder / "two"))
+    plates = {name: folder / f"{name}.png" for name in recording.rig.names}
     for path in plates.values():
         cv2.imwrite(str(path), np.zeros((48, 64, 3), np.uint8))
-    recording, images = replace(recording, background=plates), ImagesConfig()
+    return replace(recording, background=plates), plates
+
+
+def test_the_background_is_cut_into_cells_once_until_its_files_change(tmp_path):
+    (recording, plates), images = black_scene(tmp_path), ImagesConfig()
     grids = build.cell_grids(recording, images.depth)
     first = background.background_cells(recording, grids, images)
     assert background.background_cells(recording, grids, images) is first
@@ -154,3 +159,20 @@ def test_the_background_is_cut_into_cells_once_until_its_files_change(monkeypatc
     changed = background.background_cells(recording, grids, images)
     assert int(changed.colors[0].max()) == 200
     assert int(changed.colors[1].max()) == 0
+
+
+class Shared(dict):
+    """What other threads throw out as soon as it is there: they are named still, and gone already."""
+
+    def __setitem__(self, key, value):
+        pass
+
+    def __iter__(self):
+        return iter(["first", "second", "third"])
+
+
+def test_members_that_share_a_background_do_not_throw_out_what_another_uses(monkeypatch, tmp_path):
+    monkeypatch.setattr(background, "_cut", Shared())
+    (recording, _), images = black_scene(tmp_path), ImagesConfig()
+    found = background.background_cells(recording, build.cell_grids(recording, images.depth), images)
+    assert int(found.colors.max()) == 0

@@ -23,7 +23,7 @@ _made: dict[str, Arrays | str] = {}
 MOST_CUT = 2
 """Backgrounds whose cells a process remembers, for the members of a sweep: those of twelve cameras take 3 MB."""
 _cut: dict[str, BackgroundCells] = {}
-_making = Lock()
+_making, _cutting = Lock(), Lock()
 _said: set[str] = set()
 
 
@@ -35,15 +35,18 @@ def background_cells(recording: Recording, grids: Sequence[CellGrid], images: Im
     """
     path = str(recording.path.resolve())
     key = json.dumps([path, images.background, str(grids), _photographs(recording), background_origin(recording)])
-    if images.cache is None and key in _cut:
-        return _cut[key]
+    known = _cut.get(key) if images.cache is None else None
+    if known is not None:
+        return known
     found = backgrounds(recording, images)
     if found is None:
         return None
-    _cut[key] = stack_background(found, grids)
-    for oldest in list(_cut)[:-MOST_CUT]:
-        del _cut[oldest]
-    return _cut[key]
+    cells = stack_background(found, grids)
+    with _cutting:
+        _cut[key] = cells
+        for oldest in list(_cut)[:-MOST_CUT]:
+            _cut.pop(oldest, None)
+    return cells
 
 
 def _photographs(recording: Recording) -> dict[str, str]:
