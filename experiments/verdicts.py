@@ -5,8 +5,8 @@
 Yardstick sequences are tracked by their own actors and by wrong ones (`cases`, with `wrong_cameras`): red and blue
 exchanged, other clothes (another sequence's), another person, a fifth larger or smaller. The verdict of each run
 stands beside the truth: a limb is lost where its joints are more than 10 cm off on average, for three frames
-or more. Motions are kept in `out` and not tracked again, verdicts follow from them by the rule as it stands. Tables are
-printed, and written as tables.md.
+or more. Motions are kept in `out` and not tracked again, verdicts follow from them by the rule as it stands; what was
+refused is tried again. Tables are printed, and written as tables.md.
 """
 
 from dataclasses import dataclass, field

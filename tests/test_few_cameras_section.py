@@ -5,6 +5,7 @@ import json
 import pytest
 
 from sogjax.errors import InputError
+from sogjax.study import few_cameras
 from sogjax.study.few_cameras import Result, Trial, Trials
 from sogjax.study.sections.few_cameras import few_cameras_section
 from sogjax.study.study import Study
@@ -42,6 +43,15 @@ def test_a_result_is_read_from_where_it_was_written(study, monkeypatch):
     assert trials.result(trial) == result
     assert trials.kept(trial) == result
     assert json.loads(next(study.folder.glob("results/*.json")).read_text())["trial"]["cameras"] == 2
+
+
+def test_results_of_another_program_are_none_of_this_one(study, monkeypatch):
+    trials = Trials(study.folder, {"walk": SynthSettings()}, 60)
+    trial, result = Trial("walk", 2, "without"), Result(30.0, 80.0, 1, 2.0, 0)
+    monkeypatch.setattr(Trials, "_run", lambda self, trial: result)
+    trials.result(trial)
+    monkeypatch.setattr(few_cameras, "program_digest", lambda *_: "another", raising=False)
+    assert trials.kept(trial) is None
 
 
 def test_a_trial_that_cannot_be_tracked_is_a_sentence(tmp_path, monkeypatch):

@@ -1,18 +1,25 @@
 """Verdicts beside the truth: wrong actors are made as they are called, and limbs are lost where they are far off."""
 
+import json
 from dataclasses import replace
+from types import SimpleNamespace
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from motion_cases import walking_motion
+from small_recording import make_recording
 from tiny_body import make_body
 
 from sogjax.data.ground_truth import GroundTruth
 from sogjax.data.motion import motion_from_poses
+from sogjax.errors import InputError
 from sogjax.evaluation.verdict import verdicts
-from sogjax.study.verdict_trials import CASES, VerdictTrial, judged_run, scaled
+from sogjax.study import verdict_trials
+from sogjax.study.verdict_trials import CASES, VerdictTrial, VerdictTrials, judged_run, scaled
 from sogjax.study.verdicts import limb_errors
+from sogjax.synth import SynthSettings
 
 NAMES = ("left_elbow", "right_elbow", "root_tx")
 TRIAL = VerdictTrial("walk", 4, "pictures", "own actor")
@@ -68,3 +75,73 @@ def test_limbs_are_judged_where_the_truth_ends_before_the_motion():
     shorter = replace(truth, joints=truth.joints[:3] + 0.01)
     errors = limb_errors([body], shorter, np.array([1, 2, 3]), poses[1:])
     assert np.isfinite(errors.limbs).all(axis=1).tolist() == [True, True, False]
+
+
+class Tracking:
+    """In place of tracking: the same motion each time, or an error; counts how often it was asked."""
+
+    def __init__(self, motion):
+        self.motion, self.error, self.count = motion, None, 0
+
+    def __call__(self, *_):
+        self.count += 1
+        if self.error is not None:
+            raise self.error
+        return SimpleNamespace(motions={"tiny": self.motion})
+
+
+@pytest.fixture
+def tracking(tmp_path, monkeypatch):
+    """Of a body whose elbow is at its limit in every frame."""
+    body = make_body()
+    limits = jnp.ones(body.skeleton.num_dofs)
+    body = eqx.tree_at(lambda one: (one.skeleton.dof_lower, one.skeleton.dof_upper), body, (-limits, limits))
+    poses = np.zeros((4, body.skeleton.num_dofs))
+    poses[:, body.skeleton.dof_names.index("left_elbow")] = 1.0
+    found = Tracking(motion_from_poses(body, poses, 25.0))
+    clip = make_recording(tmp_path / "clip", ("left", "middle", "right"))
+    monkeypatch.setattr(verdict_trials, "cached_recording", lambda _: clip)
+    monkeypatch.setattr(verdict_trials, "track_recording", found)
+    monkeypatch.setattr(VerdictTrials, "_actors", lambda *_: [body])
+    monkeypatch.setattr(VerdictTrials, "_truth", lambda *_: truth_of(found.motion, ("left_elbow",)))
+    return found
+
+
+@pytest.fixture
+def trials(tmp_path):
+    return VerdictTrials(tmp_path / "out", {"walk": SynthSettings()}, 60)
+
+
+def test_joints_at_their_limits_are_named_of_kept_trials_as_well(tracking, trials):
+    trial = replace(TRIAL, cameras=2)
+    at_limit = ("look at left_elbow, at its limit in 100% of the frames",)
+    (run,) = trials.judged(trial)
+    assert run.verdict.findings == at_limit
+    (kept,) = trials.folder.glob("motions/*/trial.json")
+    content = json.loads(kept.read_text())
+    content.pop("limits", None)  # as earlier versions wrote it
+    for text in (kept.read_text(), json.dumps(content)):
+        kept.write_text(text)
+        (again,) = trials.judged(trial, do=False)
+        assert again.verdict.findings == at_limit
+    assert tracking.count == 1
+
+
+def test_what_was_refused_is_tried_again(tracking, trials):
+    trial, tracking.error = replace(TRIAL, cameras=2), InputError("no first pose")
+    for do in (True, False):
+        (run,) = trials.judged(trial, do=do)
+        assert run.refused == "no first pose"
+    assert tracking.count == 1
+    tracking.error = None
+    (run,) = trials.judged(trial)
+    assert not run.refused
+    assert run.verdict is not None
+
+
+def test_trouble_with_the_disk_is_no_verdict(tracking, trials):
+    tracking.error = InputError("the disk is full")
+    tracking.error.__cause__ = OSError("no space left")
+    with pytest.raises(InputError, match="the disk is full"):
+        trials.judged(replace(TRIAL, cameras=2))
+    assert trials.judged(replace(TRIAL, cameras=2), do=False) == []

@@ -8,17 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
-from sogjax.data.actor_file import load_body, save_body
 from sogjax.data.atomic import atomic_path
 from sogjax.data.ground_truth import load_ground_truth
 from sogjax.data.keypoints import load_keypoints
 from sogjax.data.recording import Recording
-from sogjax.engine.recordings import actors_of, opened, with_cameras
+from sogjax.engine.recordings import opened, with_cameras
 from sogjax.engine.track import track_recording
 from sogjax.evaluation import evaluate_motions
 from sogjax.evaluation.metrics import lost_points
 from sogjax.model.body import Body
 from sogjax.settings.compose import track_config
+from sogjax.study.kept_actors import kept_actors
+from sogjax.study.record import program_digest
 from sogjax.study.triangulation_trials import triangulation_errors
 from sogjax.synth import SynthSettings
 from sogjax.synth.cache import cached_keypoints, cached_recording
@@ -69,7 +70,7 @@ def evenly(names: Sequence[str], count: int) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Trials:
-    """Runs trials, and keeps what came of each."""
+    """Runs trials, and keeps what came of each; not done again by the same program."""
 
     folder: Path
     synth: dict[str, SynthSettings]
@@ -98,8 +99,10 @@ class Trials:
         return Result(**json.loads(path.read_text(encoding="utf-8"))["result"]) if path.is_file() else None
 
     def _path(self, trial: Trial) -> Path:
-        content = json.dumps([asdict(trial), asdict(self.synth[trial.sequence]), self.frames, self.words, CASES])
-        return self.folder / "results" / f"{hashlib.sha256(content.encode()).hexdigest()[:16]}.json"
+        program = [program_digest(f"study/{name}.py") for name in ("few_cameras", "triangulation_trials")]
+        content = [program, asdict(trial), asdict(self.synth[trial.sequence]), self.frames, self.words, CASES]
+        key = hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
+        return self.folder / "results" / f"{key}.json"
 
     def _run(self, trial: Trial) -> Result:
         recording = self._recording(trial)
@@ -139,13 +142,5 @@ class Trials:
         return opened(str(place))
 
     def _actors(self, sequence: str) -> list[Body]:
-        """Made from the example poses with all cameras, once."""
         source = cached_recording(self.synth[sequence])
-        folder = self.folder / "actors" / source.name
-        files = sorted(folder.glob("*.yaml"))
-        if not files:
-            recording, config = opened(str(source)), track_config(recording=source)
-            for number, actor in enumerate(actors_of(recording, None, config.body, config.color)[0]):
-                save_body(folder / f"{number}_{actor.name}.yaml", actor)
-            files = sorted(folder.glob("*.yaml"))
-        return [load_body(path) for path in files]
+        return kept_actors(self.folder / "actors" / f"{source.name}-{program_digest()}", source)

@@ -11,20 +11,21 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from sogjax.data.actor_file import load_body, save_body
 from sogjax.data.atomic import atomic_path
 from sogjax.data.ground_truth import GroundTruth, load_ground_truth
 from sogjax.data.motion import Motion, load_motion, save_motion
-from sogjax.engine.recordings import actors_of, opened, with_cameras
+from sogjax.engine.recordings import opened, with_cameras
 from sogjax.engine.track import track_recording
 from sogjax.engine.verdict import expected_of
 from sogjax.errors import InputError
 from sogjax.evaluation import joint_errors
 from sogjax.evaluation.metrics import mean_per_frame, stretches
+from sogjax.evaluation.strained import Limits, limits_of
 from sogjax.evaluation.verdict import Verdict, verdicts
 from sogjax.model.body import Body
 from sogjax.settings.compose import track_config
 from sogjax.study.few_cameras import evenly
+from sogjax.study.kept_actors import kept_actors
 from sogjax.study.verdicts import limb_of
 from sogjax.synth import SynthSettings
 from sogjax.synth.cache import cached_recording
@@ -33,6 +34,8 @@ FAR = 0.1
 """Metres from the truth, beyond which a limb is lost."""
 FOR = 3
 """Frames: a limb that is far off for fewer is not lost."""
+TRIAL = "trial.json"
+"""Name of the file that says what came of a trial, beside its motions."""
 
 
 @dataclass(frozen=True)
@@ -125,49 +128,61 @@ class VerdictTrials:
     """Settings of `sogjax track`."""
 
     def judged(self, trial: VerdictTrial, do: bool = True) -> list[JudgedRun]:
-        """Each actor of a trial that was kept, or is run now; none where it would have to be run and must not."""
+        """Each actor of a trial that was kept, or is run now; none where it would have to be run and must not.
+
+        What was refused is tried again, if `do`.
+        """
         content = json.dumps([asdict(trial), asdict(self.synth[trial.sequence]), self.frames, self.words])
         place = self.folder / "motions" / hashlib.sha256(content.encode()).hexdigest()[:16]
-        if not (place / "trial.json").is_file():
-            if not do:
-                return []
+        kept = _read(place)
+        if do and (kept is None or kept["refused"]):
             self._run(trial, place)
-        kept = json.loads((place / "trial.json").read_text(encoding="utf-8"))
+            kept = _read(place)
+        if kept is None:
+            return []
         if kept["refused"]:
             return [JudgedRun(trial, "", kept["refused"])]
         motions = {name: load_motion(place / f"{name}.npz") for name in kept["expected"]}
-        found = verdicts(motions, {name: value for name, value in kept["expected"].items() if value})
+        expected = {name: value for name, value in kept["expected"].items() if value}
+        found = verdicts(motions, expected, self._limits(trial, kept))
         truth = self._truth(trial.sequence)
         return [judged_run(trial, name, motion, truth, found[name]) for name, motion in motions.items()]
+
+    def _limits(self, trial: VerdictTrial, kept: dict[str, Any]) -> dict[str, dict[str, Limits]]:
+        """By actor and degree of freedom; earlier versions did not keep them beside the motions."""
+        if "limits" not in kept:
+            return {body.name: limits_of(body) for body in self._bodies(trial)}
+        return {name: {dof: Limits(*row) for dof, row in rows.items()} for name, rows in kept["limits"].items()}
 
     def _run(self, trial: VerdictTrial, place: Path) -> None:
         recording = opened(str(cached_recording(self.synth[trial.sequence])))
         recording = with_cameras(recording, evenly(recording.rig.names, trial.cameras))
         recording = replace(recording, num_frames=min(self.frames, recording.num_frames))
-        bodies = CASES[trial.case](self._actors(trial.sequence), self._others(trial))
+        bodies = self._bodies(trial)
         words = [f"images.cache={self.folder / 'cells'}", f"images.background={trial.background}", *self.words]
         kept: dict[str, Any] = {"trial": asdict(trial), "refused": "", "expected": {}}
         try:
             run = track_recording(recording, bodies, track_config(words, recording=recording.path))
         except InputError as error:
+            if isinstance(error.__cause__, OSError):  # a full disk says nothing of the subject
+                raise
             kept["refused"] = str(error)
         else:
             expected = expected_of(bodies)
             kept["expected"] = {name: expected.get(name) for name in run.motions}
+            kept["limits"] = {body.name: limits_of(body) for body in bodies}
             for name, motion in run.motions.items():
                 save_motion(place / f"{name}.npz", motion)
-        with atomic_path(place / "trial.json") as temporary:
+        with atomic_path(place / TRIAL) as temporary:
             temporary.write_text(json.dumps(kept, indent=1), encoding="utf-8")
 
+    def _bodies(self, trial: VerdictTrial) -> list[Body]:
+        """The right or wrong actors of a trial."""
+        return CASES[trial.case](self._actors(trial.sequence), self._others(trial))
+
     def _actors(self, sequence: str) -> list[Body]:
-        """Made from the example poses with all cameras, once."""
         source = cached_recording(self.synth[sequence])
-        folder = self.folder / "actors" / source.name
-        if not folder.is_dir():
-            recording, config = opened(str(source)), track_config(recording=source)
-            for number, actor in enumerate(actors_of(recording, None, config.body, config.color)[0]):
-                save_body(folder / f"{number}_{actor.name}.yaml", actor)
-        return [load_body(path) for path in sorted(folder.glob("*.yaml"))]
+        return kept_actors(self.folder / "actors" / source.name, source)
 
     def _others(self, trial: VerdictTrial) -> list[Body]:
         """Of the sequence before in the list that has as many actors, or of the first that has more, the last one."""
@@ -182,6 +197,12 @@ class VerdictTrials:
 
     def _truth(self, sequence: str) -> GroundTruth:
         return load_ground_truth(cached_recording(self.synth[sequence]) / "ground_truth.npz")
+
+
+def _read(place: Path) -> dict[str, Any] | None:
+    """What was kept of a trial; None: nothing."""
+    path = place / TRIAL
+    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
 
 
 def judged_run(trial: VerdictTrial, name: str, motion: Motion, truth: GroundTruth, verdict: Verdict) -> JudgedRun:
