@@ -11,7 +11,6 @@ import pytest
 from body_cases import shipped
 from command_line import actor_file, refused, trackable
 from drawn_scene import cells_of, draw, in_colors, make_tracker, moved, standing
-from motion_cases import walking_motion
 from rig_cases import ring_rig
 
 from sogjax.adjust import adjusted
@@ -25,7 +24,7 @@ from sogjax.data.actor_file import load_body
 from sogjax.data.motion import load_motion, motion_from_poses, save_motion
 from sogjax.energy.frame_energy import FrameEnergy, standard_terms
 from sogjax.energy.posed import History
-from sogjax.engine import adjust_checks, adjust_clip
+from sogjax.engine import adjust_checks
 from sogjax.engine.memory import available_memory
 from sogjax.errors import InputError
 from sogjax.synth import SynthSettings, render_recording
@@ -105,6 +104,7 @@ def test_a_track_is_adjusted_and_its_actor_learnt(tmp_path):
     out = tmp_path / "run"
     assert main(["track", f"recording={recording}", f"out={out}", "adjust=true", "outputs.rerun=false"]) == 0
     numbers = json.loads((out / "adjustment.json").read_text())
+    assert isinstance(numbers["new_colors"], bool)
     assert numbers["energy_after"] > numbers["energy_before"]
     assert numbers["joints_after_mm"] < 1.05 * numbers["joints_before_mm"]
     written = set(json.loads((out / "run.json").read_text())["files"])
@@ -221,11 +221,3 @@ def test_tracking_does_not_begin_where_adjusting_would_not_fit(capsys, tracked, 
 @pytest.mark.parametrize("window", [0, -3])
 def test_a_window_without_frames_is_refused(capsys, tracked, window):
     assert f"window={window}" in sentence(capsys, tracked, f"window={window}")
-
-
-@pytest.mark.parametrize(("doubt", "more"), [(0.1, False), (0.11, False), (0.6, True)])
-def test_new_colours_that_make_a_limb_doubtful_are_told(doubt, more):
-    motion = walking_motion(num_frames=2)
-    of_limbs = lambda *values: replace(motion, limb_doubt=np.tile(np.float32(values), (2, 1)))
-    assert adjust_clip.more_doubtful(of_limbs(0.0, doubt), of_limbs(0.1, 0.0)) == more
-    assert not adjust_clip.more_doubtful(replace(motion, limb_doubt=None), of_limbs(0.1, 0.0))

@@ -20,13 +20,13 @@ from sogjax.engine import build
 from sogjax.engine.adjust_cameras import camera_numbers, moved_rig, moves_of
 from sogjax.engine.adjust_checks import WINDOW, check_length
 from sogjax.engine.adjust_colors import color_rows, mean_similarity, measured_colors
+from sogjax.engine.adjust_judged import judged_with_colors
 from sogjax.engine.cells import picture_reader
 from sogjax.engine.clip_keypoints import clip_keypoints, keypoint_terms
 from sogjax.engine.job import Job
-from sogjax.engine.judged_frames import Judged
 from sogjax.engine.keypoint_offsets import FRAMES, knowing_offsets
 from sogjax.engine.pipeline import PictureReader, Preparation, cells_of_frame
-from sogjax.engine.prefix import JUDGEMENT, Prefix
+from sogjax.engine.prefix import Prefix
 from sogjax.engine.recordings import upright
 from sogjax.engine.second_background import learnt_again
 from sogjax.engine.terminal import progress, say
@@ -36,12 +36,9 @@ from sogjax.model.body import Body
 from sogjax.model.frames import axis_vector, world_from_upright
 from sogjax.settings import TrackConfig
 from sogjax.tracking.frame import FrameCells
-from sogjax.tracking.judged_poses import judged_poses
 
 CLEARLY = 1.01
 """By which factor new colours must explain more to be taken: those of example poses were measured within masks."""
-MORE_DOUBT = 0.02
-"""About a limb, on average over the frames, that new colours may cause."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +106,9 @@ def adjusted_clip(
         numbers["cameras"] = camera_numbers(recording, found)
     body, numbers["similarity_of_new_colors"] = _recolored(job, source, found, after, config)
     say("adjusting: what the cameras say of it")
-    job, (prefix, after) = _judged_with_colors(job, source, prefix, after, body)
+    cells = source.coming(np.arange(after.num_frames))
+    job, prefix, after = judged_with_colors(job, body, cells, prefix, after)
+    numbers["new_colors"] = job.bodies[0] is not found.body
     turn = jnp.asarray(world_from_upright(recording.up).T, actor.blob_sigmas.dtype)
     return AdjustedClip(job, prefix, job.bodies[0].rotated(turn), after, numbers, found.moves)
 
@@ -185,12 +184,6 @@ def _recolored(job: Job, source: _Source, found: Adjusted, motion: Motion, confi
     return (body if after > CLEARLY * before else found.body), after / before
 
 
-def more_doubtful(motion: Motion, than: Motion) -> bool:
-    """Whether a limb is in doubt more than the most doubtful one of another motion, on average over the frames."""
-    doubt = lambda one: 0.0 if one.limb_doubt is None else float(np.max(np.mean(one.limb_doubt, axis=0), initial=0.0))
-    return doubt(motion) > doubt(than) + MORE_DOUBT
-
-
 def _energies(found: Adjusted, job: Job) -> Float[np.ndarray, "frame"]:
     """Of Eq. 10 without a history."""
     parts = [float(term.signed_weight) * found.values[term.name] for term in job.tracker.terms]
@@ -209,29 +202,6 @@ def _motion(found: Adjusted, job: Job, before: Motion) -> Motion:
         converged=before.converged,
         up=before.up,
     )
-
-
-def _judged_with_colors(
-    job: Job, source: "_Source", prefix: Prefix, motion: Motion, body: Body
-) -> tuple[Job, tuple[Prefix, Motion]]:
-    """The job with a body of new colours, unless these make a limb more doubtful; and what is said of the poses."""
-    judged = _judged(job, source, prefix, motion)
-    if body is job.bodies[0]:
-        return job, judged
-    recolored = replace(job, bodies=[body], tracker=replace(job.tracker, body=body))
-    anew = _judged(recolored, source, prefix, motion)
-    return (job, judged) if more_doubtful(anew[1], judged[1]) else (recolored, anew)
-
-
-def _judged(job: Job, source: _Source, prefix: Prefix, motion: Motion) -> tuple[Prefix, Motion]:
-    """The frames and the motion with what the cameras say of the adjusted poses."""
-    cells = source.coming(np.arange(motion.num_frames))
-    found = list(judged_poses(job.tracker, np.asarray(motion.pose), cells))
-    if not found:
-        return prefix, motion
-    rows = {key: np.stack([np.asarray(getattr(each, name)) for each in found]) for key, name in JUDGEMENT.items()}
-    said = Judged.of(found, job.recording.rig.names).of_actor(0, job.bodies[0], slice(None))
-    return Prefix(prefix.rows | rows), replace(motion, **{key: np.asarray(value) for key, value in said.items()})
 
 
 def _prefix(found: Adjusted, job: Job, before: Motion) -> Prefix:
@@ -287,7 +257,7 @@ def _feet(before: Motion, after: Motion) -> dict[str, float | None]:
 
 
 def sentence(numbers: dict[str, Any]) -> str:
-    """The numbers in a line or two."""
+    """The numbers in up to three lines."""
     changes = numbers["bone_lengths_changed"]
     most = max(changes, key=lambda name: abs(changes[name]))
     mean = float(np.mean(np.abs(list(changes.values()))))
@@ -297,4 +267,13 @@ def sentence(numbers: dict[str, Any]) -> str:
     )
     if numbers.get("joints_before_mm") is not None:
         lines += f"\njoints {numbers['joints_before_mm']:.1f} mm to {numbers['joints_after_mm']:.1f} mm from the truth"
-    return lines
+    return lines + _of_colors(numbers["similarity_of_new_colors"], numbers["new_colors"])
+
+
+def _of_colors(similarity: float, taken: bool) -> str:
+    """A line on colours that are clearly more similar, by which factor, and were taken or not; else nothing."""
+    if taken:
+        return f"\ncolours measured anew: {similarity - 1.0:.1%} more similar"
+    if similarity > CLEARLY:
+        return f"\ncolours stay: new ones would be {similarity - 1.0:.1%} more similar, but put a limb in doubt"
+    return ""
