@@ -69,6 +69,12 @@ def test_a_pattern_without_m_is_refused_with_the_remedy(capsys, tmp_path):
     assert "add -m" in refused(capsys, "track", f"recording=glob({tmp_path}/*)")
 
 
+@pytest.mark.parametrize("word", ["recording=glob(/data/*)", "recording=a,b", "hydra.verbose=true"])
+def test_a_command_that_cannot_be_swept_does_not_ask_for_m(capsys, word):
+    assert "-m" not in refused(capsys, "check", word)
+    assert "add -m" in refused(capsys, "track", word)
+
+
 @pytest.mark.parametrize(
     ("words", "takes"),
     [

@@ -43,7 +43,7 @@ def run_sweep(command: str, overrides: Sequence[str]) -> int:
         others = ", ".join(name for name in SCHEMAS if name != "track")
         raise InputError(f"{command} -m: only track can be swept, not {others}; leave -m out")
     folders = with_folders(overrides)
-    words = ready_for_hydra(folders, sweep=True)
+    words = ready_for_hydra(folders, command, sweep=True)
     if is_of_takes(words, by_pattern=folders != [*overrides]):
         return track_takes(words, _swept)
     return _swept(words, _no_pictures(words))
