@@ -2,6 +2,8 @@
 
 import csv
 import json
+import shutil
+from pathlib import Path
 
 import pytest
 import yaml
@@ -11,7 +13,7 @@ from small_recording import make_recording
 
 from sogjax.app.cli import main
 from sogjax.app.sweep import actors
-from sogjax.app.sweep.folders import places_of, recordings_in, with_folders
+from sogjax.app.sweep.folders import places_of, recordings_in, root_of, with_folders
 from sogjax.app.sweep.takes import is_of_takes
 from sogjax.data.actor_file import load_body
 from sogjax.data.subject_names import posed_subjects
@@ -103,6 +105,55 @@ def test_the_place_of_a_take_is_its_path_in_the_folder_of_all(tmp_path):
         places_of([paths[0], paths[0]])
     with pytest.raises(InputError, match="lies in this folder"):
         places_of([tmp_path / "anna", paths[0]])
+
+
+def test_a_recording_spelled_with_dots_keeps_its_results_in_the_folder_of_all(lab, monkeypatch):
+    monkeypatch.chdir(lab / "anna")
+    assert places_of([Path("../ben/walk"), Path("walk")]) == ["ben/walk", "anna/walk"]
+    with pytest.raises(InputError, match="twice"):
+        places_of([Path("../anna/walk"), Path("walk")])
+    assert expanded("['walk','../anna/walk',../ben/*]") == ["../anna/walk", "../ben/walk"]
+
+
+def test_a_recording_that_is_added_moves_no_results_of_a_pattern(lab, tmp_path):
+    def places(pattern):
+        return places_of(list(map(Path, expanded(pattern))), root_of([f"recording=glob({pattern})"]))
+
+    shutil.rmtree(lab / "ben")
+    before = places(f"{lab}/*/*")
+    assert before == ["anna/run fast", "anna/walk"]
+    a_recording(lab / "ben" / "walk")
+    assert places(f"{lab}/*/*") == [*before, "ben/walk"]
+    assert places(f"{lab}/anna/*") == ["run fast", "walk"]
+    assert places(f"'{lab}/*/[r]*'") == ["anna/run fast"]
+    assert places(f"['{lab}/anna/walk','{lab}/ben/*']") == ["anna/walk", "ben/walk"]
+    assert root_of([f"recording={lab}/anna/walk,{lab}/anna/run"]) is None
+
+
+@pytest.mark.parametrize("pattern", [".", "..", "/", "''", "'**/x'", "[]"])
+def test_patterns_without_a_name_are_refused_in_a_sentence(capsys, tmp_path, monkeypatch, pattern):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    sentence = refused(capsys, "track", "-m", f"recording=glob({pattern})")
+    assert "matches no folder" in sentence or "matches 1 folder, none of them a recording" in sentence
+
+
+def test_a_pattern_may_be_the_folder_itself_or_begin_at_home(lab, monkeypatch, capsys):
+    monkeypatch.chdir(lab / "anna" / "walk")
+    assert places_of(list(map(Path, expanded("."))), root_of(["recording=glob(.)"])) == ["walk"]
+    monkeypatch.setenv("HOME", str(lab))
+    assert expanded("'~/ben/*'") == [f"{lab}/ben/walk"]
+    monkeypatch.chdir(lab / "anna")
+    assert expanded("'**'") == ["run fast", "walk"]
+    told = capsys.readouterr().err
+    assert "notes" in told
+    assert ": , " not in told
+
+
+def test_no_recording_lies_among_the_actors(tmp_path):
+    with pytest.raises(InputError, match="which is for the actors of all; rename"):
+        places_of([tmp_path / "actors", tmp_path / "walk"])
+    assert places_of([tmp_path / "actors" / "a", tmp_path / "actors" / "b"]) == ["a", "b"]
 
 
 @pytest.fixture

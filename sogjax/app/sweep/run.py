@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from sogjax.app.config.composition import SCHEMAS, composed, register_schemas
 from sogjax.app.config.overrides import plain_sentence, ready_for_hydra
-from sogjax.app.sweep.folders import with_folders
+from sogjax.app.sweep.folders import root_of, with_folders
 from sogjax.app.sweep.results import Failure
 from sogjax.app.sweep.takes import is_of_takes, track_take, track_takes
 from sogjax.engine.compiled_programs import forget_programs_if_many
@@ -45,7 +45,7 @@ def run_sweep(command: str, overrides: Sequence[str]) -> int:
     folders = with_folders(overrides)
     words = ready_for_hydra(folders, command, sweep=True)
     if is_of_takes(words, by_pattern=folders != [*overrides]):
-        return track_takes(words, _swept)
+        return track_takes(words, _swept, root_of(overrides))
     return _swept(words, _no_pictures(words))
 
 

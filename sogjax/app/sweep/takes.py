@@ -9,7 +9,7 @@ from typing import Any
 from sogjax.app.config.composition import composed
 from sogjax.app.config.overrides import quoted_value
 from sogjax.app.sweep.actors import Subjects
-from sogjax.app.sweep.folders import KEY, places_of, recordings_in
+from sogjax.app.sweep.folders import ACTORS, KEY, places_of, recordings_in, whole_path
 from sogjax.app.sweep.results import RESULT, Failure, Member, keep_result, kept_member
 from sogjax.app.sweep.take_table import NO_RESULT, Row, finish_takes
 from sogjax.engine.clock import TOTAL
@@ -21,9 +21,6 @@ from sogjax.engine.terminal import say
 from sogjax.errors import InputError
 from sogjax.sentences import counted
 from sogjax.settings import TrackConfig
-
-ACTORS = "actors"
-"""The folder of the actors that were made."""
 
 
 @dataclass(frozen=True)
@@ -50,14 +47,19 @@ def is_of_takes(words: Sequence[str], by_pattern: bool = False) -> bool:
     )
 
 
-def track_takes(words: Sequence[str], run: Callable[[list[str]], int]) -> int:
-    """Track several recordings into a folder for each, and print and write their table; `run` runs Hydra's words.
+def track_takes(words: Sequence[str], run: Callable[[list[str]], int], root: Path | None = None) -> int:
+    """Track several recordings into a folder for each, and print and write their table.
+
+    Args:
+        words: of the sweep.
+        run: runs words by Hydra.
+        root: the folder from which the recordings' names are counted; None: what they have in common.
 
     Raises:
         InputError: a setting is invalid, or some recordings failed.
     """
-    paths = [Path(path).absolute() for path in recordings_in(words)]
-    takes = [Take(path, place) for path, place in zip(paths, places_of(paths), strict=True)]
+    paths = [whole_path(path) for path in recordings_in(words)]
+    takes = [Take(path, place) for path, place in zip(paths, places_of(paths, root), strict=True)]
     others = [word for word in words if word.partition("=")[0] != KEY]
     own = [word for word in others if not word.lstrip("+~").startswith("hydra")]
     config: TrackConfig = composed("track", [*own, f"{KEY}={quoted_value(str(takes[0].recording))}"])
