@@ -36,6 +36,7 @@ from sogjax.engine.run_job import tracking
 from sogjax.engine.streams import file_name
 from sogjax.engine.terminal import say
 from sogjax.engine.timing import StageTimes
+from sogjax.engine.verdict import METRICS, kept_verdicts
 from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.settings import OutputsConfig, TrackConfig
@@ -157,6 +158,7 @@ def _ended(folder: RunFolder, recording: Recording, wanted: OutputsConfig) -> Ru
     frames = next(iter(motions.values())).frame - recording.first_frame
     missing = recording.num_missing(frames.tolist())
     result = Run(recording, [], motions, StageTimes(), float("nan"), files=files, missing=missing)
+    result.verdicts = kept_verdicts(folder.path / METRICS)
     evaluate(result, wanted)
     return result
 
