@@ -12,7 +12,8 @@ from sogjax.app.config.composition import SCHEMAS, composed, register_schemas
 from sogjax.app.config.overrides import plain_sentence, ready_for_hydra
 from sogjax.app.sweep.folders import root_of, with_folders
 from sogjax.app.sweep.results import Failure
-from sogjax.app.sweep.takes import is_of_takes, track_take, track_takes
+from sogjax.app.sweep.take_rows import track_take
+from sogjax.app.sweep.takes import is_of_takes, track_takes
 from sogjax.engine.compiled_programs import forget_programs_if_many
 from sogjax.engine.run_numbers import Numbers, row_numbers
 from sogjax.engine.shared_start import of_first_pose, shared_opening
