@@ -133,25 +133,14 @@ def _members(overrides: "Sequence[Override]") -> Iterator[tuple[str, ...]]:
     return product(*choices.values())
 
 
-def sweep_main(task: Callable[[Any], Any]) -> int:
-    """Run the task as `sys.argv` says; the exit status, for a script."""
-    try:
-        return run_hydra(task)
-    except InputError as error:
-        print(f"sogjax: {error}", file=sys.stderr)
-        return 2
-
-
 def run_hydra(task: Callable[[Any], Any]) -> int:
-    """Run a task of the track settings once, or with `-m` as a sweep, which continues when a member fails.
+    """Run a task of the track settings as the sweep that `sys.argv` says, which continues when a member fails.
 
     Raises:
-        InputError: an invalid override, or the only run has wrong input.
+        InputError: an invalid override, or a member failed.
     """
     import hydra
-    from hydra.core.hydra_config import HydraConfig
     from hydra.errors import HydraException
-    from hydra.types import RunMode
     from omegaconf.errors import OmegaConfBaseException
 
     from sogjax.app.sweep.callback import failures
@@ -168,8 +157,6 @@ def run_hydra(task: Callable[[Any], Any]) -> int:
             wrong.append(str(error))
             return Failure(error)
         except Exception as error:
-            if HydraConfig.get().mode != RunMode.MULTIRUN:
-                raise
             LOG.exception("a member of the sweep failed")
             wrong.append(f"{type(error).__name__}: {error}")
             return Failure(wrong[-1])
@@ -194,16 +181,13 @@ def run_hydra(task: Callable[[Any], Any]) -> int:
 def track_task(tree: Any) -> Numbers | dict[str, Any]:
     """Track one member of a sweep, or one of several recordings, into its own folder; the numbers of its row."""
     from hydra.core.hydra_config import HydraConfig
-    from hydra.types import RunMode
 
     from sogjax.app import track
 
     config = as_object(tree, "track")
     hydras: Any = HydraConfig.get()
-    several = hydras.mode == RunMode.MULTIRUN
-    if several and (takes := hydras.callbacks.table.get("takes")):
+    if takes := hydras.callbacks.table.get("takes"):
         take = takes[hydras.job.num]
         return track_take(config, take.actor, Path(take.out), track.run)
-    if not config.out or several:
-        config.out = hydras.runtime.output_dir
-    return row_numbers(track.run(config, opening=shared_opening if several else None))
+    config.out = hydras.runtime.output_dir
+    return row_numbers(track.run(config, opening=shared_opening))
