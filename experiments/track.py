@@ -2,18 +2,18 @@
 
 python experiments/track.py -m energy.limit_weight=0,1,2
 
-tracks the rendered walk of the demo; `recording=FOLDER` tracks another recording.
+tracks the rendered walk of the demo; `recording=FOLDER` tracks another recording. It is `sogjax track` otherwise.
 """
 
 import sys
 
+from sogjax.app.cli import main
 from sogjax.app.config.overrides import quoted_value
-from sogjax.app.sweep.run import sweep_main, track_task
 from sogjax.engine.terminal import progress
 from sogjax.synth import SynthSettings, cached_recording
 
 if __name__ == "__main__":
-    if not any(word.startswith("recording=") or word in ("-h", "--help") for word in sys.argv[1:]):
-        demo = cached_recording(SynthSettings(), progress=progress)
-        sys.argv.append(f"recording={quoted_value(str(demo))}")
-    sys.exit(sweep_main(track_task))
+    words = sys.argv[1:]
+    if not any(word.startswith("recording=") or word in ("-h", "--help") for word in words):
+        words.append(f"recording={quoted_value(str(cached_recording(SynthSettings(), progress=progress)))}")
+    sys.exit(main(["track", *words]))

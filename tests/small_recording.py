@@ -76,6 +76,14 @@ def make_recording(folder, cameras=("left", "right"), settings="up: z\n", frames
     return folder
 
 
+def named_recording(folder, subject=None, poses=False):
+    """A recording that is only looked at: whom it shows, and whether it has example poses."""
+    make_recording(folder, settings=f"up: z\nsubject: {subject}\n" if subject else "up: z\n")
+    if poses:
+        (folder / "example_poses" / "tpose").mkdir(parents=True)
+    return folder
+
+
 def shared_recording(name):
     """A recording beside the project, or None where it is absent."""
     folder = Path(__file__).parents[2] / "shared" / "recordings" / name

@@ -1,7 +1,10 @@
 """Members of a sweep: what they share, how far they are apart, and what is said where there is no truth."""
 
 import csv
+import runpy
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import jax.numpy as jnp
@@ -136,6 +139,17 @@ def test_members_write_pictures_of_every_frame_only_where_these_are_named(monkey
     sweep_run.run_sweep("track", ["recording=r", word])
     assert seen[0][4:] == added
     assert ("no overlay" in capsys.readouterr().err) == bool(added)
+
+
+def test_the_script_of_a_sweep_leaves_them_out_too(monkeypatch, capsys):
+    script, seen = Path(__file__).parents[1] / "experiments" / "track.py", []
+    monkeypatch.setattr(sweep_run, "run_hydra", lambda task: seen.append(sweep_run.sys.argv) or 0)
+    monkeypatch.setattr(sys, "argv", [str(script), "-m", "recording=r", "start=0,1"])
+    with pytest.raises(SystemExit) as end:
+        runpy.run_path(str(script), run_name="__main__")
+    assert end.value.code == 0
+    assert "no overlay" in capsys.readouterr().err
+    assert seen[0][4:] == ["outputs.overlay=false", "outputs.rerun=false"]
 
 
 def black_scene(folder):

@@ -1,181 +1,102 @@
-"""Many recordings by one command: which they are, whose actor each has, and what is done again."""
+"""Many recordings by one command: what is done, what fails, and what is done again."""
 
 import csv
 import json
+import os
 
 import pytest
-import yaml
 from command_line import actor_file, refused, trackable
 from rendered_person import rendered_person
-from small_recording import make_recording
 
 from sogjax.app.cli import main
-from sogjax.app.sweep import actors
-from sogjax.app.sweep.folders import places_of, recordings_in, with_folders
-from sogjax.app.sweep.takes import is_of_takes
-from sogjax.data.actor_file import load_body
-from sogjax.data.subject_names import posed_subjects
-from sogjax.errors import InputError
-from sogjax.settings import TrackConfig
+from sogjax.app.sweep import takes
+from sogjax.app.sweep.results import Member
+from sogjax.app.sweep.take_rows import keep_row, row_of
+from sogjax.app.sweep.take_table import NO_RESULT
+from sogjax.engine.kept_run import write_note
 
 FAST = (
     *("solver.max_iterations=20", "images.depth=6", "outputs.motion_only=true"),
     *("tracking.both_ways=false", "stop=2"),
 )
-
-
-def a_recording(folder, subject=None, poses=False):
-    """A recording that is only looked at."""
-    make_recording(folder, settings=f"up: z\nsubject: {subject}\n" if subject else "up: z\n")
-    if poses:
-        (folder / "example_poses" / "tpose").mkdir(parents=True)
-    return folder
-
-
-@pytest.fixture
-def lab(tmp_path):
-    """Two subjects with two takes each, one of them with a space in its name, and a folder of notes."""
-    for name in ("anna/walk", "anna/run fast", "ben/walk"):
-        a_recording(tmp_path / "data" / name, name.partition("/")[0])
-    (tmp_path / "data" / "anna" / "notes").mkdir()
-    (tmp_path / "data" / "anna" / ".hidden").mkdir()
-    (tmp_path / "data" / "list.txt").write_text("")
-    return tmp_path / "data"
-
-
-def expanded(pattern):
-    return recordings_in(with_folders([f"recording=glob({pattern})"]))
-
-
-def test_a_pattern_of_folders_is_the_list_of_the_recordings_in_them(lab, capsys):
-    assert expanded(f"{lab}/anna/*") == [f"{lab}/anna/run fast", f"{lab}/anna/walk"]
-    assert "notes: passed over, as no recording" in capsys.readouterr().err
-    assert expanded(f"['{lab}/*/r*','{lab}/b*/*'],exclude={lab}/ben/x*") == [f"{lab}/anna/run fast", f"{lab}/ben/walk"]
-    assert expanded(f"'{lab}/[ab]*/r*'") == [f"{lab}/anna/run fast"]
-    assert expanded(f"'{lab}/*/*',exclude='{lab}/anna/*'") == [f"{lab}/ben/walk"]
-
-
-def test_a_pattern_relative_to_the_folder_where_the_command_runs(lab, monkeypatch):
-    monkeypatch.chdir(lab)
-    assert expanded("*/walk") == ["anna/walk", "ben/walk"]
-
-
-@pytest.mark.parametrize("words", [("recording=glob({lab}/x*)",), ("recording=glob({lab}/anna/n*)",)])
-def test_a_pattern_without_recordings_is_refused(lab, capsys, words):
-    assert "a recording has videos/" in refused(capsys, "track", "-m", *(word.format(lab=lab) for word in words))
-
-
-def test_a_pattern_without_m_is_refused_with_the_remedy(capsys, tmp_path):
-    assert "add -m" in refused(capsys, "track", f"recording=glob({tmp_path}/*)")
-
-
-@pytest.mark.parametrize(
-    ("words", "takes"),
-    [
-        (["recording=a,b", "stop=3"], True),
-        (["recording='a','b c'"], True),
-        (["recording=a,b", "stop=3,4"], False),
-        (["recording=a", "stop=3,4"], False),
-        (["recording=a,b", "hydra/sweeper=optuna"], False),
-    ],
+FEWEST = (
+    *("solver.max_iterations=3", "solver.min_iterations=1", "images.depth=4", "images.background=none"),
+    *("outputs.motion_only=true", "tracking.both_ways=false"),
 )
-def test_recordings_alone_are_takes_and_with_other_values_members_of_a_sweep(words, takes):
-    assert is_of_takes(words) is takes
-
-
-def test_a_pattern_that_matches_one_recording_is_no_sweep_over_settings_either():
-    assert not is_of_takes(["recording='a'"])
-    assert is_of_takes(["recording='a'"], by_pattern=True)
-    assert not is_of_takes(["recording='a'", "stop=3,4"], by_pattern=True)
-
-
-def test_the_place_of_a_take_is_its_path_in_the_folder_of_all(tmp_path):
-    paths = [tmp_path / name for name in ("anna/walk", "anna/run", "ben/walk")]
-    assert places_of(paths) == ["anna/walk", "anna/run", "ben/walk"]
-    assert places_of(paths[:2]) == ["walk", "run"]
-    with pytest.raises(InputError, match="twice"):
-        places_of([paths[0], paths[0]])
-    with pytest.raises(InputError, match="lies in this folder"):
-        places_of([tmp_path / "anna", paths[0]])
-
-
-@pytest.fixture
-def made(monkeypatch):
-    """The recordings and names that actors are made of."""
-    seen = []
-
-    def run(config):
-        seen.append((config.recording.rpartition("/")[2], config.subject))
-        if "bad" in config.recording:
-            raise InputError("no pose was found")
-        actor_file(actors.Path(config.out))
-
-    monkeypatch.setattr(actors.actor_command, "run", run)
-    return seen
-
-
-def test_a_subject_has_one_actor_made_of_the_take_with_example_poses(tmp_path, made):
-    takes = [a_recording(tmp_path / name, "anna", poses=name == "poses") for name in ("first", "poses", "last")]
-    (tmp_path / "actors").mkdir()
-    subjects, config, failed = actors.Subjects(tmp_path / "actors", takes, True), TrackConfig(recording="r"), {}
-    files = [subjects.actor_of(take, config, failed) for take in takes]
-    assert files == [[str(tmp_path / "actors" / "anna.yaml")]] * 3
-    assert made == [("poses", None)]
-    assert load_body(tmp_path / "actors" / "anna.yaml").name == "anna"
-
-
-def test_an_actor_beside_the_videos_goes_first_and_nobody_named_has_none(tmp_path, made):
-    own, unnamed = a_recording(tmp_path / "own", "anna"), a_recording(tmp_path / "unnamed")
-    actor_file(own / "actor.yaml")
-    subjects = actors.Subjects(tmp_path / "actors", [own, unnamed], True)
-    assert subjects.actor_of(own, TrackConfig(recording="r"), {}) == [str(own / "actor.yaml")]
-    assert subjects.actor_of(unnamed, TrackConfig(recording="r"), {}) is None
-    assert made == []
-
-
-def test_the_next_take_is_tried_where_one_fails_and_the_failure_counts_for_all(tmp_path, made):
-    takes = [a_recording(tmp_path / name, "anna", poses=True) for name in ("bad", "good")]
-    (tmp_path / "actors").mkdir()
-    assert actors.Subjects(tmp_path / "actors", takes, True).actor_of(takes[0], TrackConfig(recording="r"), {})
-    assert [name for name, _ in made] == ["bad", "good"]
-    alone, failed = a_recording(tmp_path / "bad_ben", "ben"), {}
-    subjects = actors.Subjects(tmp_path / "actors", [alone], True)
-    for _ in range(2):
-        with pytest.raises(InputError, match="no actor of ben: no pose was found"):
-            subjects.actor_of(alone, TrackConfig(recording="r"), failed)
-    assert [name for name, _ in made] == ["bad", "good", "bad_ben"]
-
-
-def test_a_folder_of_actors_must_have_everybody(tmp_path, made):
-    pair = a_recording(tmp_path / "pair", "[anna, ben]")
-    (tmp_path / "mine").mkdir()
-    actor_file(tmp_path / "mine" / "anna.yaml")
-    subjects = actors.Subjects(tmp_path / "mine", [pair], False)
-    with pytest.raises(InputError, match=r"has no ben.yaml.*sogjax actor recording="):
-        subjects.actor_of(pair, TrackConfig(recording="r"), {})
-    actor_file(tmp_path / "mine" / "ben.yaml")
-    files = [str(tmp_path / "mine" / f"{name}.yaml") for name in ("anna", "ben")]
-    assert subjects.actor_of(pair, TrackConfig(recording="r"), {}) == files
-    assert made == []
-
-
-def test_example_poses_tell_whom_they_show(tmp_path):
-    assert posed_subjects(a_recording(tmp_path / "a")) == ()
-    assert posed_subjects(a_recording(tmp_path / "b", poses=True)) == (None,)
-    named = a_recording(tmp_path / "c")
-    (named / "recording.yaml").write_text(yaml.safe_dump({"example_poses": [{"name": "t", "actor": "ben"}]}))
-    assert posed_subjects(named) == ("ben",)
-
-
-@pytest.mark.parametrize("value", ["[]", "[a, a]", "../a", "3"])
-def test_subjects_are_names(tmp_path, value):
-    with pytest.raises(InputError, match="subject"):
-        actors.named_subjects(a_recording(tmp_path / "r", value))
 
 
 def rows_of(out):
     with (out / "recordings.csv").open(encoding="utf-8") as file:
         return {row["recording"]: row for row in csv.DictReader(file)}
+
+
+@pytest.fixture
+def pair(tmp_path, monkeypatch, plain_logging):
+    """The words that track two recordings in which nobody is to be seen."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("a", "b"):
+        trackable(tmp_path / name, frames=2)
+    return ("track", "-m", "recording=a,b", f"actor={actor_file(tmp_path / 'actor.yaml')}", *FEWEST)
+
+
+def test_a_refused_command_keeps_the_rows_of_what_has_ended(capsys, tmp_path, pair):
+    assert main(pair) == 0
+    rows, results = rows_of(tmp_path / "outputs"), tmp_path / "outputs" / "a" / "result.json"
+    assert rows["a"]["verdict"] not in ("", "-")
+    kept = results.read_text()
+    capsys.readouterr()
+
+    assert main([*pair, "energy.limit_weight=0.5"]) == 2
+    refusal = capsys.readouterr().err.splitlines()[-1]
+    for word in ("2 of 2", "energy.limit_weight was", "now it is 0.5", "out=", "overwrite=true"):
+        assert word in refusal
+    assert "resume=true" not in refusal
+    assert "cannot be resumed" in rows_of(tmp_path / "outputs")["b"]["failed"]
+    assert results.read_text() == kept
+
+    results.unlink()  # as if the command had been killed before it was kept
+    assert main(pair) == 0
+    assert rows_of(tmp_path / "outputs") == rows
+
+
+def test_what_kept_a_recording_from_any_result_is_told(capsys, pair):
+    assert main([*pair[:2], "recording=glob(a)", *pair[3:]]) == 0
+    capsys.readouterr()
+    assert main([*pair, "hydra.launcher.n_jbos=2"]) == 2
+    assert "n_jbos" in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_any_error_before_tracking_is_a_row(capsys, tmp_path, pair, monkeypatch):
+    whole = takes.Subjects.actor_of
+
+    def actor_of(self, take, *arguments):
+        if take.name == "a":
+            raise ArithmeticError("no such inverse")
+        return whole(self, take, *arguments)
+
+    (tmp_path / "actors").mkdir()
+    actor_file(tmp_path / "actors" / "ben.yaml")
+    (tmp_path / "b" / "recording.yaml").write_text("up: z\nsubject: ben\n")
+    monkeypatch.setattr(takes.Subjects, "actor_of", actor_of)
+    assert main([*pair[:3], "actor=actors", *FEWEST]) == 2
+    rows = rows_of(tmp_path / "outputs")
+    assert "ArithmeticError: no such inverse" in rows["a"]["failed"]
+    assert (rows["b"]["failed"], rows["b"]["frames"]) == ("", "2.0")
+
+
+@pytest.mark.parametrize("word", ["hydra.sweep.dir=elsewhere", "hydra.sweep.subdir=x"])
+def test_a_folder_of_hydras_is_refused_with_the_remedy(capsys, pair, word):
+    assert "use out=DIR instead" in refused(capsys, *pair, word)
+
+
+def test_a_row_that_is_older_than_the_run_is_not_of_it(tmp_path):
+    keep_row(tmp_path, Member([], {"frames": 3.0, "verdict": "looks right"}))
+    assert row_of("a", tmp_path).failed == NO_RESULT
+    write_note(tmp_path / "run.json", {"command": "track"})
+    os.utime(tmp_path / "run.json", ns=(0, 0))
+    assert row_of("a", tmp_path).sentence == "looks right"
+    os.utime(tmp_path / "result.json", ns=(-1, -1))
+    assert row_of("a", tmp_path).failed == NO_RESULT
 
 
 @pytest.mark.slow

@@ -12,7 +12,8 @@ from motion_cases import walking_motion
 from rig_cases import ring_rig
 
 from sogjax.app.actor import actor_verdict
-from sogjax.engine.verdict import say_if_other_subject
+from sogjax.engine.verdict import kept_verdicts, say_if_other_subject
+from sogjax.evaluation.numbers import write_json
 from sogjax.evaluation.strained import Limits
 from sogjax.evaluation.verdict import verdicts, worst_frames
 from sogjax.view.closeups import HEIGHT, closeups
@@ -147,6 +148,25 @@ def test_the_worst_frames_do_not_lie_side_by_side(walk):
 def test_a_motion_that_was_not_judged_has_a_verdict_too(walk):
     found = of_one(replace(walk, explained=None, overlap=None, camera_names=None, limb_doubt=None))
     assert (found.explained, found.overlap, found.looks_right) == (None, {}, True)
+
+
+@pytest.mark.parametrize("doubtful", [False, True])
+def test_verdicts_are_read_as_they_were_written(walk, tmp_path, doubtful):
+    motion = judged(walk, overlap=0.5)
+    if doubtful:
+        doubt = np.full((motion.num_frames, 1), 0.9)
+        motion = replace(motion, limb_names=np.array(["left arm"]), limb_doubt=doubt)
+    found = {"anna": of_one(motion), "ben": of_one(walk, None)}
+    write_json(tmp_path / "metrics.json", {"verdicts": {name: verdict.as_dict() for name, verdict in found.items()}})
+    assert kept_verdicts(tmp_path / "metrics.json") == found
+    assert bool(found["anna"].doubtful) is doubtful
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{}", '{"verdicts": null}', '{"verdicts": {"anna": {"actor": "anna"}}}'])
+def test_verdicts_that_cannot_be_read_are_none(tmp_path, content):
+    assert kept_verdicts(tmp_path / "metrics.json") == {}
+    (tmp_path / "metrics.json").write_text(content)
+    assert kept_verdicts(tmp_path / "metrics.json") == {}
 
 
 def test_closeups_show_the_body_in_each_frame(walk, tmp_path):

@@ -1,5 +1,6 @@
 """`sogjax actor`: an actor file from the example poses of a recording, with a report beside it."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import jax
@@ -33,8 +34,12 @@ GOOD_IOU, GOOD_COLORS = 0.75, 0.5
 """Below these an actor must be looked at: agreement with the masks, and what its example poses explain of it."""
 
 
-def run(config: ActorConfig) -> Path:
-    """Make the actor and write its file and its report.
+def run(config: ActorConfig, name: str | None = None) -> Path:
+    """Make the actor and write its report and its file, which comes last: where it is, it is whole.
+
+    Args:
+        config: what it is made of, and where to.
+        name: of the actor; None: its subject's, or else its body's.
 
     Raises:
         InputError: an invalid recording, example pose or body, or an actor file that already exists.
@@ -52,13 +57,15 @@ def run(config: ActorConfig) -> Path:
             recording, made = _made(recording, body, config)
         except InputError as error:
             actor = keypoint_actor_or(error, recording, body, space, config.actors, config.symmetric)
-            save_body(out, actor)
+            save_body(out, replace(actor, name=name or actor.name))
             print(out)
             return out
-        save_body(out, made.body)
+        if name is not None:
+            made = replace(made, body=replace(made.body, name=name), upright_body=replace(made.upright_body, name=name))
         folder = report_folder(out)
         report = write_actor_report(folder, made, recording.rig)
-    say_gains(recording, made, folder)
+        say_gains(recording, made, folder)
+        save_body(out, made.body)
     print(f"silhouettes and masks agree to {report.mean_iou:.3f} (mean IoU)")
     if report.warnings:
         say(f"{counted(len(report.warnings), 'warning')}: see {folder / 'report.md'}")

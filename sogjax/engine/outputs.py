@@ -21,7 +21,7 @@ from sogjax.engine.clock import WRITING, stage
 from sogjax.engine.run import Run
 from sogjax.engine.streams import file_name
 from sogjax.engine.terminal import say
-from sogjax.engine.verdict import WORST, judge, write_metrics, write_worst
+from sogjax.engine.verdict import METRICS, WORST, judge, write_metrics, write_worst
 from sogjax.errors import InputError
 from sogjax.evaluation import evaluate_motions
 from sogjax.model.body import Body
@@ -144,8 +144,8 @@ def _write_results(result: Run, out: Path, wanted: OutputsConfig, config: Any, m
     result.files.append(out / "config.yaml")
     evaluate(result, wanted)
     judge(result)
-    write_metrics(out / "metrics.json", result)
-    result.files.append(out / "metrics.json")
+    write_metrics(out / METRICS, result)
+    result.files.append(out / METRICS)
     if wanted.worst and write_worst(out / WORST, result):
         result.files.append(out / WORST)
     result.files += streamed

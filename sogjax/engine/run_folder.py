@@ -115,8 +115,8 @@ class RunFolder:
         what = difference(before, now)
         if what is not None:
             raise InputError(
-                f"{self.path}: resume=true cannot resume the run that was begun there, because {what}; give the "
-                "same settings and files, or start over with overwrite=true"
+                f"{self.path}: the run that was begun there cannot be resumed, because {what}; give the same settings "
+                "and files, choose another folder with out=DIR, or start over with overwrite=true"
             )
 
     def _clear(self, needed: Sequence[Path]) -> None:

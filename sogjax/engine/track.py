@@ -36,6 +36,7 @@ from sogjax.engine.run_job import tracking
 from sogjax.engine.streams import file_name
 from sogjax.engine.terminal import say
 from sogjax.engine.timing import StageTimes
+from sogjax.engine.verdict import METRICS, kept_verdicts
 from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.settings import OutputsConfig, TrackConfig
@@ -152,11 +153,12 @@ def _ended(folder: RunFolder, recording: Recording, wanted: OutputsConfig) -> Ru
     """A run that ended before."""
     say(f"{folder.path}: the run has already ended; nothing to do")
     files = [folder.path / name for name in folder.note["files"]]
-    loaded = {path: load_motion(path) for path in files if path.suffix == ".npz"}
+    loaded = {path: load_motion(path) for path in files if path.suffix == ".npz" and path.name != UNADJUSTED}
     motions = {actor_name(path, motion): motion for path, motion in loaded.items()}
     frames = next(iter(motions.values())).frame - recording.first_frame
     missing = recording.num_missing(frames.tolist())
     result = Run(recording, [], motions, StageTimes(), float("nan"), files=files, missing=missing)
+    result.verdicts = kept_verdicts(folder.path / METRICS)
     evaluate(result, wanted)
     return result
 

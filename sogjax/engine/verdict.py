@@ -1,5 +1,6 @@
 """What a run thinks of itself: its verdict in numbers and in a line, and a picture of its worst frames."""
 
+import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,11 +16,11 @@ from sogjax.engine.terminal import say
 from sogjax.errors import InputError
 from sogjax.evaluation.numbers import write_json
 from sogjax.evaluation.strained import limits_of
-from sogjax.evaluation.verdict import NUM_WORST, OTHER_SUBJECT, verdicts
+from sogjax.evaluation.verdict import NUM_WORST, OTHER_SUBJECT, Verdict, verdicts
 from sogjax.model.body import Body
 from sogjax.view.closeups import closeups
 
-WORST = "worst.png"
+METRICS, WORST = "metrics.json", "worst.png"
 
 
 def judge(result: Run) -> None:
@@ -59,6 +60,15 @@ def write_metrics(path: Path, result: Run) -> None:
     """Write the comparison with the truth, if there is one, and the verdicts."""
     compared: dict[str, Any] = {} if result.evaluation is None else result.evaluation.as_dict()
     write_json(path, compared | {"verdicts": {name: found.as_dict() for name, found in result.verdicts.items()}})
+
+
+def kept_verdicts(path: Path) -> dict[str, Verdict]:
+    """What `write_metrics` wrote of the actors; nothing where that cannot be read."""
+    try:
+        kept = json.loads(path.read_text(encoding="utf-8"))["verdicts"]
+        return {name: Verdict.from_dict(found) for name, found in kept.items()}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return {}
 
 
 def write_worst(path: Path, result: Run) -> bool:

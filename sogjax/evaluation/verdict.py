@@ -1,7 +1,7 @@
 """Whether a motion is to be trusted, in absolute terms: what the run itself saw, without a truth."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -65,6 +65,18 @@ class Verdict:
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         return asdict(self) | {"looks_right": self.looks_right, "sentence": self.sentence}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> "Verdict":
+        """What `as_dict` gave, read from JSON.
+
+        Raises:
+            KeyError, TypeError: it is something else.
+        """
+        own: dict[str, Any] = {entry.name: content[entry.name] for entry in fields(cls)}
+        own |= {key: tuple(own[key]) for key in ("findings", "worst")}
+        own["doubtful"] = tuple(DoubtfulLimb(**limb) for limb in own["doubtful"])
+        return cls(**own)
 
 
 def verdicts(

@@ -58,7 +58,7 @@ def composed(command: str, overrides: Sequence[str]) -> Any:
     Raises:
         InputError: an unknown key, a value of the wrong type, a required key that is missing.
     """
-    words = ready_for_hydra(overrides, sweep=False)
+    words = ready_for_hydra(overrides, command, sweep=False)
     with _plain_errors(command):
         config = as_object(_tree(command, words), command)
     check_endings(command, config)

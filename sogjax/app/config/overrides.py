@@ -7,6 +7,8 @@ from keyword import iskeyword
 from sogjax.errors import InputError
 from sogjax.settings.wrong_values import no_such_choice, unfit_value, unknown_key
 
+SWEPT = "track"
+"""The command that `-m` runs for several values."""
 PATH_KEYS = (
     *("recording", "out", "actor", "body", "motion", "truth", "to", "calibration", "from", "dof", "images.cache"),
     "hydra.sweep.dir",
@@ -17,16 +19,16 @@ _PLAIN = re.compile(r"[\w./\\:%+@?|-]*", re.ASCII)
 _OWN_SYNTAX = ("'", '"', "[", "{", "$")
 
 
-def ready_for_hydra(words: Sequence[str], sweep: bool) -> list[str]:
-    """The overrides, paths quoted where they need it.
+def ready_for_hydra(words: Sequence[str], command: str, sweep: bool) -> list[str]:
+    """The overrides of a command, paths quoted where they need it.
 
     Raises:
         InputError: a word that is no `key=value`.
     """
-    return [_for_schema(_quoted(_checked(word, sweep))) for word in words]
+    return [_for_schema(_quoted(_checked(word, command, sweep))) for word in words]
 
 
-def _checked(word: str, sweep: bool) -> str:
+def _checked(word: str, command: str, sweep: bool) -> str:
     key, equals, value = word.partition("=")
     for_hydra = key.lstrip("+~").startswith("hydra")
     if key.startswith("-"):
@@ -35,9 +37,11 @@ def _checked(word: str, sweep: bool) -> str:
     if not equals or not key:
         raise InputError(f"{word}: is not an option; write key=value")
     if for_hydra and not sweep:
-        raise InputError(f"{word}: Hydra's own settings only count in a sweep; add -m or leave it out")
+        remedy = "add -m or leave it out" if command == SWEPT else "leave it out"
+        raise InputError(f"{word}: Hydra's own settings only count in a sweep; {remedy}")
     if not sweep and word.startswith("recording=glob("):
-        raise InputError(f"{word}: names several recordings; add -m")
+        remedy = "add -m" if command == SWEPT else f"{command} takes one, as recording=FOLDER"
+        raise InputError(f"{word}: names several recordings; {remedy}")
     if key[0] in "+~" and not for_hydra:
         raise InputError(f"{word}: options cannot be added or removed; write key=value")
     return word
@@ -73,7 +77,8 @@ def plain_sentence(command: str, schema: type, error: BaseException) -> str:
         return no_such_choice(found[1], found[2], re.findall(r"^\t(\w+)$", text, re.MULTILINE))
     if found := re.search(r"Ambiguous value for argument '([^']*)'", text):
         key, _, value = found[1].partition("=")
-        return f"{found[1]}: write several values as {key}=[{value}], or add -m to sweep over them"
+        sweep = ", or add -m to sweep over them" if command == SWEPT else ""
+        return f"{found[1]}: write several values as {key}=[{value}]{sweep}"
     if found := re.search(r"Error merging override (.*)", text):
         key, _, value = found[1].partition("=")
         return unfit_value(key, value, text, see)

@@ -1,15 +1,17 @@
 """The actors of several recordings: one for each subject, made once and used for all takes of it."""
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sogjax.app import actor as actor_command
-from sogjax.data.actor_file import load_body, save_body
 from sogjax.data.subject_names import OWN_ACTOR, actor_files, named_subjects, posed_subjects
 from sogjax.engine.terminal import say
 from sogjax.errors import InputError
 from sogjax.settings import ActorConfig, TrackConfig
+
+LOG = logging.getLogger(__name__)
 
 TRIED = 3
 """Takes of a subject that an actor is tried to be made of."""
@@ -17,7 +19,10 @@ TRIED = 3
 
 @dataclass(frozen=True)
 class Subjects:
-    """The folder of the actor files `SUBJECT.yaml`, and which takes may serve to make those that are missing."""
+    """The folder of the actor files `SUBJECT.yaml`, and which takes may serve to make those that are missing.
+
+    With `overwrite` in the settings those that are there are made anew.
+    """
 
     folder: Path
     takes: Sequence[Path]
@@ -27,7 +32,7 @@ class Subjects:
     def actor_of(self, take: Path, config: TrackConfig, failed: dict[str, str]) -> list[str] | None:
         """The actor files of a take; None: nobody is named, so its own is made of its example poses or its videos.
 
-        `failed` tells by subject why no actor could be made, and is added to.
+        `failed` tells by subject why no actor could be made, an empty text where it was made, and is added to.
 
         Raises:
             InputError: the take's settings cannot be read, or there is no actor of one of its subjects.
@@ -42,7 +47,7 @@ class Subjects:
             )
         files = actor_files(self.folder, subjects)
         for subject, file in zip(subjects, files, strict=True):
-            if file.is_file():
+            if file.is_file() and not (self.makes and config.overwrite):
                 continue
             if not self.makes:
                 remedy = f"make it with sogjax actor recording={take} out={file}"
@@ -59,16 +64,16 @@ class Subjects:
         for take, chosen in self._sources(subject)[:TRIED]:
             say(f"\n== actor {subject}, of {take}, for all recordings of this subject")
             settings = ActorConfig(recording=str(take), out=str(file), subject=chosen, body=config.body)
+            settings = replace(settings, cameras=config.cameras, color=config.color, overwrite=config.overwrite)
             try:
-                actor_command.run(replace(settings, cameras=config.cameras, color=config.color))
+                actor_command.run(settings, subject)
+                return ""
             except InputError as error:
-                say(f"no actor of {take}: {error}")
                 reasons.append(str(error))
-                continue
-            body = load_body(file)
-            if body.name != subject:
-                save_body(file, replace(body, name=subject))
-            return ""
+            except Exception as error:  # another take may do, and the takes of others
+                LOG.exception("an actor was not made")
+                reasons.append(f"{type(error).__name__}: {error}")
+            say(f"no actor of {take}: {reasons[-1]}")
         return reasons[0] if reasons else f"no recording shows {subject} alone or in example poses of its own"
 
     def _sources(self, subject: str) -> list[tuple[Path, str | None]]:

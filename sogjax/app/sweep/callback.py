@@ -9,6 +9,7 @@ from hydra.experimental.callback import Callback
 from hydra.types import RunMode
 
 from sogjax.app.sweep.results import Failure, Member, finish_sweep, forget_results, keep_result, kept_results
+from sogjax.app.sweep.take_rows import keep_row
 from sogjax.engine.shared_start import forget_shared_openings
 
 failures: list[str] = []
@@ -38,7 +39,11 @@ class SweepTable(Callback):
             return
         completed = job_return.status == JobStatus.COMPLETED
         result = job_return.return_value if completed else Failure(job_return._return_value)
-        keep_result(Path(config.hydra.runtime.output_dir), Member(list(job_return.overrides or []), result))
+        member, folder = Member(list(job_return.overrides or []), result), Path(config.hydra.runtime.output_dir)
+        if self._takes:
+            keep_row(folder, member)
+        else:
+            keep_result(folder, member)
 
     def on_multirun_end(self, config: Any, **kwargs: Any) -> None:
         """Print the table; write the CSV and the plot."""

@@ -51,21 +51,21 @@ class Member(NamedTuple):
     compared."""
 
 
-def keep_result(folder: Path, member: Member) -> None:
-    """Write a member's result into its own folder.
+def keep_result(folder: Path, member: Member, name: str = RESULT) -> None:
+    """Write a member's result into its own folder, as a file of that name.
 
     Raises:
         InputError: the folder cannot be written.
     """
-    with atomic_path(folder / RESULT) as temporary:
+    with atomic_path(folder / name) as temporary:
         content = {"overrides": member.overrides, "result": member.result}
         temporary.write_text(json.dumps(content), encoding="utf-8")
 
 
-def kept_member(folder: Path) -> Member | None:
+def kept_member(folder: Path, name: str = RESULT) -> Member | None:
     """A member's result in its folder; None where there is none, or none that can be read."""
     try:
-        return Member(**json.loads((folder / RESULT).read_text(encoding="utf-8")))
+        return Member(**json.loads((folder / name).read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError):
         return None
 

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from sogjax.app.config.composition import SCHEMAS, composed, register_schemas
 from sogjax.app.config.overrides import plain_sentence, ready_for_hydra
-from sogjax.app.sweep.folders import with_folders
+from sogjax.app.sweep.folders import root_of, with_folders
 from sogjax.app.sweep.results import Failure
-from sogjax.app.sweep.takes import is_of_takes, track_take, track_takes
+from sogjax.app.sweep.take_rows import track_take
+from sogjax.app.sweep.takes import is_of_takes, track_takes
 from sogjax.engine.compiled_programs import forget_programs_if_many
 from sogjax.engine.run_numbers import Numbers, row_numbers
 from sogjax.engine.shared_start import of_first_pose, shared_opening
@@ -43,9 +44,9 @@ def run_sweep(command: str, overrides: Sequence[str]) -> int:
         others = ", ".join(name for name in SCHEMAS if name != "track")
         raise InputError(f"{command} -m: only track can be swept, not {others}; leave -m out")
     folders = with_folders(overrides)
-    words = ready_for_hydra(folders, sweep=True)
+    words = ready_for_hydra(folders, command, sweep=True)
     if is_of_takes(words, by_pattern=folders != [*overrides]):
-        return track_takes(words, _swept)
+        return track_takes(words, _swept, root_of(overrides))
     return _swept(words, _no_pictures(words))
 
 
@@ -132,25 +133,14 @@ def _members(overrides: "Sequence[Override]") -> Iterator[tuple[str, ...]]:
     return product(*choices.values())
 
 
-def sweep_main(task: Callable[[Any], Any]) -> int:
-    """Run the task as `sys.argv` says; the exit status, for a script."""
-    try:
-        return run_hydra(task)
-    except InputError as error:
-        print(f"sogjax: {error}", file=sys.stderr)
-        return 2
-
-
 def run_hydra(task: Callable[[Any], Any]) -> int:
-    """Run a task of the track settings once, or with `-m` as a sweep, which continues when a member fails.
+    """Run a task of the track settings as the sweep that `sys.argv` says, which continues when a member fails.
 
     Raises:
-        InputError: an invalid override, or the only run has wrong input.
+        InputError: an invalid override, or a member failed.
     """
     import hydra
-    from hydra.core.hydra_config import HydraConfig
     from hydra.errors import HydraException
-    from hydra.types import RunMode
     from omegaconf.errors import OmegaConfBaseException
 
     from sogjax.app.sweep.callback import failures
@@ -167,8 +157,6 @@ def run_hydra(task: Callable[[Any], Any]) -> int:
             wrong.append(str(error))
             return Failure(error)
         except Exception as error:
-            if HydraConfig.get().mode != RunMode.MULTIRUN:
-                raise
             LOG.exception("a member of the sweep failed")
             wrong.append(f"{type(error).__name__}: {error}")
             return Failure(wrong[-1])
@@ -193,16 +181,13 @@ def run_hydra(task: Callable[[Any], Any]) -> int:
 def track_task(tree: Any) -> Numbers | dict[str, Any]:
     """Track one member of a sweep, or one of several recordings, into its own folder; the numbers of its row."""
     from hydra.core.hydra_config import HydraConfig
-    from hydra.types import RunMode
 
     from sogjax.app import track
 
     config = as_object(tree, "track")
     hydras: Any = HydraConfig.get()
-    several = hydras.mode == RunMode.MULTIRUN
-    if several and (takes := hydras.callbacks.table.get("takes")):
+    if takes := hydras.callbacks.table.get("takes"):
         take = takes[hydras.job.num]
         return track_take(config, take.actor, Path(take.out), track.run)
-    if not config.out or several:
-        config.out = hydras.runtime.output_dir
-    return row_numbers(track.run(config, opening=shared_opening if several else None))
+    config.out = hydras.runtime.output_dir
+    return row_numbers(track.run(config, opening=shared_opening))

@@ -1,29 +1,28 @@
 """Many recordings by one command: each as if tracked alone, one table at the end, and only what is missing is done."""
 
+import logging
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from sogjax.app.config.composition import composed
 from sogjax.app.config.overrides import quoted_value
 from sogjax.app.sweep.actors import Subjects
-from sogjax.app.sweep.folders import KEY, places_of, recordings_in
-from sogjax.app.sweep.results import RESULT, Failure, Member, keep_result, kept_member
+from sogjax.app.sweep.folders import ACTORS, KEY, places_of, recordings_in, whole_path
+from sogjax.app.sweep.results import Member
+from sogjax.app.sweep.take_rows import forget_failure, keep_row, row_of
 from sogjax.app.sweep.take_table import NO_RESULT, Row, finish_takes
-from sogjax.engine.clock import TOTAL
-from sogjax.engine.kept_run import FOLDER, NOTE, read_note
 from sogjax.engine.outputs import results_folder
-from sogjax.engine.run import Run
-from sogjax.engine.run_numbers import row_numbers
 from sogjax.engine.terminal import say
 from sogjax.errors import InputError
 from sogjax.sentences import counted
 from sogjax.settings import TrackConfig
 
-ACTORS = "actors"
-"""The folder of the actors that were made."""
+LOG = logging.getLogger(__name__)
+
+SWEEP_FOLDERS = ("hydra.sweep.dir", "hydra.sweep.subdir")
+"""Where the members of a sweep over settings lie."""
 
 
 @dataclass(frozen=True)
@@ -50,59 +49,55 @@ def is_of_takes(words: Sequence[str], by_pattern: bool = False) -> bool:
     )
 
 
-def track_takes(words: Sequence[str], run: Callable[[list[str]], int]) -> int:
-    """Track several recordings into a folder for each, and print and write their table; `run` runs Hydra's words.
+def track_takes(words: Sequence[str], run: Callable[[list[str]], int], root: Path | None = None) -> int:
+    """Track several recordings into a folder for each, and print and write their table.
+
+    Args:
+        words: of the sweep.
+        run: runs words by Hydra.
+        root: the folder from which the recordings' names are counted; None: what they have in common.
 
     Raises:
         InputError: a setting is invalid, or some recordings failed.
     """
-    paths = [Path(path).absolute() for path in recordings_in(words)]
-    takes = [Take(path, place) for path, place in zip(paths, places_of(paths), strict=True)]
+    _check_folders(words)
+    paths = [whole_path(path) for path in recordings_in(words)]
+    takes = [Take(path, place) for path, place in zip(paths, places_of(paths, root), strict=True)]
     others = [word for word in words if word.partition("=")[0] != KEY]
     own = [word for word in others if not word.lstrip("+~").startswith("hydra")]
     config: TrackConfig = composed("track", [*own, f"{KEY}={quoted_value(str(takes[0].recording))}"])
     out = Path(config.out or "outputs").absolute()
     with results_folder(out):
         for take in takes:
-            _forget_failure(out / take.place)
+            forget_failure(out / take.place)
         ready = _ready(takes, config, out)
         problem = _run(ready, others, out, run) if ready else None
-        rows = [_row(take, out) for take in takes]
+        rows = [row_of(take.place, out / take.place) for take in takes]
         finish_takes(out, rows)
-    failed = [row for row in rows if row.failed]
-    if failed and not (problem and len(failed) == len(takes) and failed[0].failed == NO_RESULT):
-        raise InputError(
-            f"{len(failed)} of {counted(len(takes), 'recording')} failed; the first: {failed[0].failed} "
-            "(the same command again does these only)"
-        )
-    if problem:
-        raise problem
+    _check_rows(rows, problem)
     return 0
 
 
-def track_take(config: TrackConfig, actor: Any, out: Path, track: Callable[[TrackConfig], Run]) -> dict[str, Any]:
-    """Track a recording among several into its folder, going on where an earlier command stopped; its numbers."""
-    config.out, config.actor = str(out), config.actor if actor is None else list(actor)
-    config.resume = not config.overwrite and ((out / NOTE).is_file() or (out / FOLDER).is_dir())
-    before = kept_member(out)
-    ended = config.resume and (out / NOTE).is_file()
-    say(f"\n== {config.recording}")
-    result = track(config)
-    if ended and before is not None and not isinstance(before.result, str):
-        return dict(before.result)
-    verdict = "; ".join(verdict.sentence for verdict in result.verdicts.values())
-    seconds = read_note(out / NOTE).get("seconds") or {}
-    return row_numbers(result) | {
-        "frames": len(result.converged),
-        "seconds": seconds.get(TOTAL, float("nan")),
-        "verdict": verdict,
-    }
+def _check_folders(words: Sequence[str]) -> None:
+    for word in words:
+        if word.partition("=")[0].lstrip("+~") in SWEEP_FOLDERS:
+            raise InputError(f"{word}: results of several recordings lie by their names in out; use out=DIR instead")
 
 
-def _forget_failure(folder: Path) -> None:
-    kept = kept_member(folder)
-    if kept is None or isinstance(kept.result, str):
-        (folder / RESULT).unlink(missing_ok=True)
+def _check_rows(rows: Sequence[Row], problem: InputError | None) -> None:
+    """A problem that kept a recording from having any result is told rather than how many failed.
+
+    Raises:
+        InputError: there was a problem, or some recordings failed.
+    """
+    failed = [row.failed for row in rows if row.failed]
+    if problem and (not failed or NO_RESULT in failed):
+        raise problem
+    if failed:
+        raise InputError(
+            f"{len(failed)} of {counted(len(rows), 'recording')} failed; the first: {failed[0]} "
+            "(the same command again does these only)"
+        )
 
 
 def _ready(takes: Sequence[Take], config: TrackConfig, out: Path) -> list[tuple[Take, list[str] | None]]:
@@ -117,8 +112,14 @@ def _ready(takes: Sequence[Take], config: TrackConfig, out: Path) -> list[tuple[
         try:
             ready.append((take, subjects.actor_of(take.recording, config, failed)))
         except InputError as error:
-            say(f"{take.place}: {error}")
-            keep_result(out / take.place, Member([], Failure(error)))
+            reason = str(error)
+        except Exception as error:  # the other takes are tracked
+            LOG.exception("a recording has no actor")
+            reason = f"{type(error).__name__}: {error}"
+        else:
+            continue
+        say(f"{take.place}: {reason}")
+        keep_row(out / take.place, Member([], reason))
     return ready
 
 
@@ -127,7 +128,7 @@ def _run(
 ) -> InputError | None:
     """Let Hydra's launcher track them; what was wrong, if anything was."""
     listed = ",".join(quoted_value(str(take.recording)) for take, _ in ready)
-    own = [word for word in words if word.partition("=")[0] not in ("out", "actor", "hydra.sweep.dir")]
+    own = [word for word in words if word.partition("=")[0] not in ("out", "actor")]
     actor = [word for word in words if word.startswith("actor=") and ready[0][1] is None]
     places = [out / take.place for take, _ in ready]
     members = ",".join(
@@ -151,9 +152,3 @@ def _run(
 
 def _list(files: Sequence[str] | None) -> str:
     return "null" if files is None else f"[{','.join(map(quoted_value, files))}]"
-
-
-def _row(take: Take, out: Path) -> Row:
-    kept = kept_member(out / take.place)
-    result = NO_RESULT if kept is None else kept.result
-    return Row(take.place, out / take.place, result)
