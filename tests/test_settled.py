@@ -107,6 +107,10 @@ def test_a_run_stopped_while_it_is_adjusted(capsys, tmp_path, monkeypatch, comma
         done(capsys, *words, "out=run", "resume=true")
     before, after = (load_motion(tmp_path / "run" / name) for name in ("unadjusted.npz", "motion.npz"))
     np.testing.assert_allclose(after.pose[:, 2] - before.pose[:, 2], HIGHER, atol=1e-5)
+    told = []
+    monkeypatch.setattr(track, "evaluate", lambda run, _: told.extend(run.motions.values()))
+    done(capsys, *words, "out=run", "resume=true")  # has ended: what is told is the adjusted motion
+    assert [motion.pose[0, 2] for motion in told] == [after.pose[0, 2]]
 
 
 def test_a_run_without_a_folder_that_is_stopped_does_not_advise_to_resume(capsys, tmp_path, monkeypatch, command):
