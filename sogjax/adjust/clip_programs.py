@@ -16,6 +16,7 @@ from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.neighbours import displaced, margins
 from sogjax.energy.pairs import SparsePairs
 from sogjax.energy.posed import History
+from sogjax.energy.rest import RestPenalty
 from sogjax.energy.term import Terms
 from sogjax.energy.views import Views
 from sogjax.model.body import Body
