@@ -18,12 +18,12 @@ from sogjax.adjust.clip_energy import MANY_CAMERAS, Weights
 from sogjax.adjust.clip_shape import ClipShape
 from sogjax.adjust.frame_models import frame_model, shape_rates
 from sogjax.adjust.pictures import Reader, bytes_of_frame
-from sogjax.adjust.rest import RestPenalty
 from sogjax.app.cli import main
 from sogjax.data.actor_file import load_body
 from sogjax.data.motion import load_motion, motion_from_poses, save_motion
 from sogjax.energy.frame_energy import FrameEnergy, standard_terms
 from sogjax.energy.posed import History
+from sogjax.energy.rest import RestPenalty
 from sogjax.engine import adjust_checks
 from sogjax.engine.memory import available_memory
 from sogjax.errors import InputError

@@ -10,6 +10,7 @@ from small_recording import frame_image, write_image
 
 from sogjax.app.config.composition import composed
 from sogjax.data.actor_file import load_body
+from sogjax.energy.rest import RestPenalty
 from sogjax.engine import build
 from sogjax.engine.recordings import opened, upright
 from sogjax.images.cells import CellGrid
@@ -40,6 +41,13 @@ def numbers(**named):
 
 def fields(module, *names):
     return {name: float(getattr(module, name)) for name in names}
+
+
+def test_only_the_default_keeps_joints_near_rest(recording, tmp_path):
+    rest = [term for term in tracker_of(recording, tmp_path).terms if isinstance(term, RestPenalty)]
+    assert [float(term.weight) for term in rest] == [pytest.approx(2e-5, rel=1e-6)]
+    for words in ("preset=paper", "energy.rest_weight=0"):
+        assert not any(isinstance(term, RestPenalty) for term in tracker_of(recording, tmp_path, words).terms)
 
 
 def test_every_number_of_the_paper_reaches_the_tracker(recording, tmp_path):

@@ -9,15 +9,12 @@ from jaxtyping import Array, Float
 from sogjax.actor.coverage import Silhouettes, mismatch, mismatch_equations
 from sogjax.actor.shape import ShapeModel
 from sogjax.energy.limits import limit_penalty
-from sogjax.model.skeleton import Skeleton
+from sogjax.energy.rest import pose_spread
 from sogjax.solve import GaussNewton, QuadraticModel, Scales, Solution
 
 NOISE = 1e-3
 """Weight of the priors: the mismatch (as a part of the mask's area) that tells as little as half a squared standard
 deviation of a prior. It is what blobs, being round, cannot fit, and by far the largest part of the noise."""
-REST_SPREAD = 0.15
-"""A joint of a range of one radian is expected to lie so far (radians) from its place in `rest`; it grows with the
-square of the range: a collar bone hardly moves, an elbow may be anywhere."""
 MAX_ITERATIONS = 60
 EPSILON = 0.02
 """Length of the step of some two hundred parameters (radians, metres, logarithms) below which the fit ends."""
@@ -126,11 +123,6 @@ def scales_with_shape(pose: Scales, num_poses: int, num_shape_params: int) -> Sc
         first_steps=jnp.append(pose.first_steps, 0.01),
         largest_steps=jnp.append(pose.largest_steps, 0.05),
     )
-
-
-def pose_spread(skeleton: Skeleton) -> Float[Array, "dof"]:
-    """How far each degree of freedom is expected to lie from `rest` in an example pose; infinite without limits."""
-    return REST_SPREAD * (skeleton.dof_upper - skeleton.dof_lower) ** 2
 
 
 def _blobs(model: ShapeModel, pose: Float[Array, "dof"], shape: Float[Array, "shape"]) -> Float[Array, "blob 4"]:

@@ -10,13 +10,13 @@ from sogjax.adjust.camera_moves import Sights, moved_cameras
 from sogjax.adjust.clip_shape import ClipShape
 from sogjax.adjust.frame_models import FrameModels, blobs_by_shape, frame_model, shape_rates
 from sogjax.adjust.pictures import ClipPictures
-from sogjax.adjust.rest import RestPenalty
 from sogjax.energy.appearance import Appearance, ColorWindows
 from sogjax.energy.foreground import Foreground
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.neighbours import displaced, margins
 from sogjax.energy.pairs import SparsePairs
 from sogjax.energy.posed import History
+from sogjax.energy.rest import RestPenalty
 from sogjax.energy.term import Terms
 from sogjax.energy.views import Views
 from sogjax.model.body import Body
@@ -68,8 +68,8 @@ def frame_models(
         views, windows, near, pose, velocities = frame
         sight = None if sights is None or velocities is None else Sights(sights.moves, velocities)
         added = (Appearance(appearance, windows, pictures.kinds), RestPenalty(rest))
-        # The foreground's part is in the appearance already.
-        kept = [term for term in terms if not isinstance(term, Foreground)]
+        # The foreground's part is in the appearance already, rest has a weight of its own.
+        kept = [term for term in terms if not isinstance(term, Foreground | RestPenalty)]
         return frame_model(body, rates, pose, replace(views, pairs=near), (*kept, *added), sight)
 
     velocities = None if sights is None else sights.velocities

@@ -12,6 +12,7 @@ from sogjax.energy.added import added_terms
 from sogjax.energy.frame_energy import standard_terms
 from sogjax.energy.keypoints import KeypointPull
 from sogjax.energy.overlap import EXACT_EXPONENT, PRINTED_EXPONENT
+from sogjax.energy.rest import RestPenalty
 from sogjax.energy.term import Term, Terms
 from sogjax.energy.views import whole_image_overlap
 from sogjax.engine.background import CHOICES, background_cells
@@ -91,6 +92,7 @@ def check(config: TrackConfig) -> None:
         raise InputError(f"images.color_tolerance={config.images.color_tolerance}: must be a number")
     at_least("images.box_enlargement", config.images.box_enlargement, 0.0)
     at_least("energy.keypoint_weight", config.energy.keypoint_weight, 0.0)
+    at_least("energy.rest_weight", config.energy.rest_weight, 0.0)
     box_around(config.images)
     one_of("images.background", config.images.background, CHOICES)
     marker_rule(config.outputs.markers, "outputs.markers")
@@ -223,7 +225,7 @@ def tracker(
         cameras=cameras,
         normalizers=whole_image_overlap(cameras.image_size),
         reader=image_reader(recording, grids, config, [body]),
-        terms=energy_terms(config.energy, terms),
+        terms=_tracking_terms(config.energy, terms),
         solver=solver(config.solver),
         scales=solver_scales(config.solver, body),
         extrapolation=config.tracking.extrapolation,
@@ -245,7 +247,7 @@ def varied(tracker: Tracker, config: TrackConfig) -> Tracker:
     return replace(
         tracker,
         reader=reader,
-        terms=energy_terms(config.energy, [term for term in tracker.terms if isinstance(term, KeypointPull)]),
+        terms=_tracking_terms(config.energy, [term for term in tracker.terms if isinstance(term, KeypointPull)]),
         solver=solver(config.solver),
         scales=solver_scales(config.solver, tracker.body),
         extrapolation=config.tracking.extrapolation,
@@ -253,6 +255,12 @@ def varied(tracker: Tracker, config: TrackConfig) -> Tracker:
         limbs=JudgedLimbs.from_body(tracker.body) if config.outputs.confidence else None,
         repairs=config.tracking.repair,
     )
+
+
+def _tracking_terms(config: EnergyConfig, further: Sequence[Term]) -> Terms:
+    """The energy's terms, and being near rest: first poses, from which one is chosen, may be any."""
+    rest = [RestPenalty(config.rest_weight)] if config.rest_weight else []
+    return energy_terms(config, [*rest, *further])
 
 
 def _subject(bodies: Sequence[Body]) -> SubjectColors:
