@@ -45,7 +45,7 @@ def fields(module, *names):
 
 def test_only_the_default_keeps_joints_near_rest(recording, tmp_path):
     rest = [term for term in tracker_of(recording, tmp_path).terms if isinstance(term, RestPenalty)]
-    assert [float(term.weight) for term in rest] == [pytest.approx(2e-5, rel=1e-6)]
+    assert [float(term.weight) for term in rest] == [pytest.approx(1e-5, rel=1e-6)]
     for words in ("preset=paper", "energy.rest_weight=0"):
         assert not any(isinstance(term, RestPenalty) for term in tracker_of(recording, tmp_path, words).terms)
 
