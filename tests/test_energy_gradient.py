@@ -9,13 +9,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from analytic_gradient import energy_gradient
 from body_cases import posed, random_body, shipped
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rig_cases import ring_rig
 from sog_cases import floats, in_float64, random_views
 
-from sogjax.energy.analytic import energy_gradient
 from sogjax.energy.frame_energy import FrameEnergy, standard_terms
 from sogjax.energy.overlap import EXACT_EXPONENT, PRINTED_EXPONENT
 from sogjax.energy.posed import History

@@ -7,7 +7,7 @@ from body_cases import shipped
 
 from sogjax.data.keypoints import named_scheme
 from sogjax.model.frames import world_from_upright
-from sogjax.tracking.keypoint_pose import bone_pairs, measured_lengths, overall_scale, pose_of_keypoints
+from sogjax.tracking.keypoint_pose import bone_pairs, measured_lengths, pose_of_keypoints
 
 HUMAN = shipped("human")
 SCHEME = named_scheme("HALPE_26")
@@ -85,8 +85,7 @@ def test_the_size_is_that_of_the_bones():
     points = np.stack([1.08 * points_of(HUMAN, pose(seed))[INDICES] for seed in range(5)])
     points[0, :8] += 0.5
     points[1, 10:] = np.nan
-    assert overall_scale(HUMAN, SCHEME, points) == pytest.approx(1.08, abs=2e-3)
-    assert overall_scale(HUMAN, SCHEME, np.full((2, 26, 3), np.nan)) is None
+    assert measured_lengths(HUMAN, SCHEME, np.full((2, 26, 3), np.nan)) == []
     lengths = {
         SCHEME.keypoints[b]: measured for (a, b, _), measured in measured_lengths(HUMAN, SCHEME, points) if a == 11
     }

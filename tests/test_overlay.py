@@ -3,17 +3,16 @@
 from dataclasses import replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 from motion_cases import walking_motion
-from rig_cases import black, opencv_pixels, recording_of, ring_rig
+from rig_cases import black, opencv_pixels, ring_rig
 
 from sogjax.data.recording import open_recording
 from sogjax.data.video import read_frames
 from sogjax.errors import InputError
 from sogjax.view.bones import _PALETTE, LEFT, MIDDLE, RIGHT, bones_from_motion, sides_of
-from sogjax.view.overlay import Overlay, overlay_frame, write_overlay
+from sogjax.view.overlay import Overlay, overlay_frame
 from sogjax.view.projection import picture_points
 from sogjax.view.tiles import grid_for, shrink
 
@@ -165,25 +164,6 @@ def test_a_smaller_picture_keeps_its_mean_and_its_places():
     assert small.shape == (255, 340, 3)
     assert small.mean() == pytest.approx(ramp.mean(), abs=0.5)
     np.testing.assert_allclose(small[100, :, 0], np.linspace(0, 255, 340), atol=2.0)
-
-
-def test_the_video_has_the_motions_frames(tmp_path):
-    rig, motion = ring_rig(2), walking_motion(5, first_frame=7)
-    titles = []
-    path = tmp_path / "overlay.mp4"
-    frames = [black(rig)] * 5
-
-    def progress(items, count, title):
-        titles.append((count, title))
-        return items
-
-    write_overlay(path, recording_of(rig, 20), [motion], frames=frames, width=400, progress=progress)
-    video = cv2.VideoCapture(str(path))
-    assert int(video.get(cv2.CAP_PROP_FRAME_COUNT)) == 5
-    assert int(video.get(cv2.CAP_PROP_FRAME_WIDTH)) == 400
-    assert titles == [(5, "overlay")]
-    with pytest.raises(InputError, match="frames 7 to 11, the recording 0 to 9"):
-        write_overlay(path, recording_of(rig, 10), [motion], frames=frames)
 
 
 @pytest.mark.skipif(not (RECORDINGS / "real_tpose").is_dir(), reason="the example recordings are not here")

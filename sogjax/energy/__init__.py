@@ -1,6 +1,5 @@
 """How well a posed body explains the pictures (Section 4.4, 4.5, 5.1): a sum of terms."""
 
-from sogjax.energy.analytic import energy_gradient
 from sogjax.energy.frame_energy import FrameEnergy, standard_terms, still_energy
 from sogjax.energy.limits import LimitPenalty
 from sogjax.energy.posed import Frame, History, Posed
@@ -21,7 +20,6 @@ __all__ = [
     "Term",
     "Terms",
     "Views",
-    "energy_gradient",
     "standard_terms",
     "still_energy",
     "whole_image_overlap",

@@ -83,11 +83,6 @@ def check(config: TrackConfig) -> None:
         at_least(f"solver.{key}", getattr(config.solver, key), 1e-6)
     between("images.depth", config.images.depth, 1, MAX_DEPTH)
     between("tracking.extrapolation", config.tracking.extrapolation, 0.0, 2.0)
-    if config.tracking.repair and not config.outputs.confidence:
-        raise InputError(
-            "tracking.repair=true outputs.confidence=false: limbs that are not judged cannot be repaired; leave one of "
-            "the two out"
-        )
     if not np.isfinite(config.images.color_tolerance):
         raise InputError(f"images.color_tolerance={config.images.color_tolerance}: must be a number")
     at_least("images.box_enlargement", config.images.box_enlargement, 0.0)
@@ -231,7 +226,6 @@ def tracker(
         extrapolation=config.tracking.extrapolation,
         pairs=pair_choice(config.energy),
         limbs=JudgedLimbs.from_body(body) if config.outputs.confidence else None,
-        repairs=config.tracking.repair,
     )
 
 
@@ -253,7 +247,6 @@ def varied(tracker: Tracker, config: TrackConfig) -> Tracker:
         extrapolation=config.tracking.extrapolation,
         pairs=pair_choice(config.energy),
         limbs=JudgedLimbs.from_body(tracker.body) if config.outputs.confidence else None,
-        repairs=config.tracking.repair,
     )
 
 

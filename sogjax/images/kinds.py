@@ -51,12 +51,6 @@ def kinds_of(colors: Float[np.ndarray, "blob 3"], areas: Float[np.ndarray, "blob
     return _padded(members, tables, subject_colors(colors, areas), len(colors))
 
 
-def any_color(num_blobs: int) -> Kinds:
-    """Kinds of blobs that may all have any colour."""
-    members, table = _by_color(np.zeros((num_blobs, 3))), np.zeros((COLOR_BINS,) * 3)
-    return _padded(members, [table] * len(members), table, num_blobs)
-
-
 def _by_color(colors: Float[np.ndarray, "blob 3"]) -> list[list[int]]:
     """Blobs of about the same colour, at most `SLOTS` together."""
     most, kinds = _num_kinds(len(colors)), []

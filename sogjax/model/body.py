@@ -135,19 +135,9 @@ def concatenate(bodies: Sequence[Body]) -> Body:
     )
 
 
-def blob_slices(bodies: Sequence[Body]) -> list[slice]:
-    """Where each body's blobs lie in the concatenated model."""
-    return _slices([body.num_blobs for body in bodies])
-
-
 def dof_slices(bodies: Sequence[Body]) -> list[slice]:
     """Where each body's degrees of freedom lie in the concatenated pose."""
     return _slices([body.skeleton.num_dofs for body in bodies])
-
-
-def joint_slices(bodies: Sequence[Body]) -> list[slice]:
-    """Where each body's joints lie in the concatenated model."""
-    return _slices([body.skeleton.num_joints for body in bodies])
 
 
 def _slices(counts: Sequence[int]) -> list[slice]:

@@ -76,4 +76,3 @@ class TrackingConfig:
         "where limbs are in doubt, track backwards, too, and take each limb from the better pass; needs "
         "outputs.confidence=true",
     )
-    repair: bool = option(False, "try limbs in doubt in other places, and keep them there if that lasts")

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 
 import numpy as np
-from jaxtyping import Float
 
 from sogjax.synth.anatomy import INDEX, JOINTS, SIDES, Anatomy, Pose
 from sogjax.synth.rotations import Matrix, Vector, about, frame, mirrored, turned, unit
@@ -109,11 +108,6 @@ def _bend(root: Vector, target: Vector, upper: float, lower: float, pole: Vector
 def _parent(joint: str) -> int:
     side, _, base = joint.rpartition("_")
     return INDEX["pelvis"] if base == "hip" else INDEX[f"{side}_clavicle"]
-
-
-def joint_positions(frames: Float[np.ndarray, "22 4 4"], joint: str) -> Vector:
-    """Where a joint is in the world."""
-    return frames[INDEX[joint], :3, 3]
 
 
 def heading_matrix(heading: float) -> Matrix:

@@ -99,15 +99,6 @@ def bone_pairs(body: Body, indices: Int[np.ndarray, "keypoint"]) -> list[tuple[i
     return found
 
 
-def overall_scale(body: Body, scheme: KeypointScheme, points: Float[np.ndarray, "frame keypoint 3"]) -> float | None:
-    """How many times larger than the body the person is: the median over bones of their median over frames.
-
-    None where no bone is seen.
-    """
-    ratios = [length / own for (_, _, own), length in measured_lengths(body, scheme, points)]
-    return float(np.median(ratios)) if ratios else None
-
-
 def measured_lengths(
     body: Body, scheme: KeypointScheme, points: Float[np.ndarray, "frame keypoint 3"]
 ) -> list[tuple[tuple[int, int, float], float]]:

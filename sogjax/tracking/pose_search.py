@@ -11,7 +11,7 @@ from jaxtyping import Array, Float, Int
 
 from sogjax.energy.appearance import ColorWindows
 from sogjax.energy.term import Term
-from sogjax.images.kinds import Kinds, any_color, kinds_of
+from sogjax.images.kinds import Kinds, kinds_of
 from sogjax.model.body import Body
 from sogjax.model.frames import axis_vector
 from sogjax.solve import Scales
@@ -73,11 +73,6 @@ class Searcher:
     def of_body(cls, body: Body, terms: Sequence[Term], up: str) -> "Searcher":
         """For a body in its colours."""
         return cls(body, kinds_of(np.asarray(body.blob_colors), np.asarray(body.blob_sigmas) ** 2), terms, up)
-
-    @classmethod
-    def of_silhouette(cls, body: Body, terms: Sequence[Term], up: str) -> "Searcher":
-        """For a body of unknown colours, in frames whose background is known."""
-        return cls(body, any_color(body.num_blobs), terms, up)
 
     @property
     def scales(self) -> Scales:

@@ -68,8 +68,6 @@ class Tracker(eqx.Module):
     """Whether all pairs of blobs are compared, or those near each other."""
     limbs: JudgedLimbs | None = None
     """Which are judged in every frame; None: none."""
-    repairs: bool = eqx.field(static=True, default=False)
-    """Whether `track` tries limbs in doubt in other places; a step alone does not."""
     capacities: Capacities | None = None
     """Room for image blobs of a step that is given none."""
     first_pose: Float[Array, "dof"] | None = None

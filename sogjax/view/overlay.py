@@ -1,8 +1,7 @@
 """The tracked skeleton drawn over the pictures of all cameras: one grid per frame, or a whole video."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -10,11 +9,8 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from sogjax.data.calibration import CameraRig
 from sogjax.data.motion import Motion
-from sogjax.data.recording import Recording
-from sogjax.data.video import VideoWriter, read_frames
 from sogjax.errors import InputError
 from sogjax.view.bones import Bones, actor_palette, blob_palette, bones_from_motion, doubtful_edges
-from sogjax.view.frames import frame_range
 from sogjax.view.projection import picture_points
 from sogjax.view.tiles import Fit, grid_for, shrink
 
@@ -128,44 +124,6 @@ def overlay_frame(
     """One grid (BGR); see `Overlay`, which is faster for several frames."""
     overlay = Overlay(rig, motions, cameras=cameras, width=width, columns=columns, blobs=blobs)
     return overlay.draw(images, frame)
-
-
-def write_overlay(
-    path: Path,
-    recording: Recording,
-    motions: Sequence[Motion],
-    *,
-    frames: Iterable[Sequence[np.ndarray | None]] | None = None,
-    cameras: Sequence[str] | None = None,
-    width: int = WIDTH,
-    columns: int | None = None,
-    blobs: bool = False,
-    progress: Callable[[Iterable[int], int, str], Iterable[int]] = lambda items, count, title: items,
-) -> None:
-    """Write a video (mp4) of the motions over the recording's pictures, from their first frame to their last.
-
-    Args:
-        path: the video.
-        recording: what was tracked.
-        motions: one for each actor.
-        frames: all cameras' pictures of these frames, if they are at hand; default: read from the recording.
-        cameras: as for `Overlay`, as are `width`, `columns` and `blobs`.
-        width: largest width in pixels.
-        columns: tiles in a row.
-        blobs: draw the blobs too.
-        progress: wraps the frames' numbers to show progress: (numbers, count, title).
-
-    Raises:
-        InputError: a motion that is not of this recording, or an unknown camera.
-    """
-    first, stop = frame_range(recording, motions)
-    overlay = Overlay(recording.rig, motions, cameras=cameras, width=width, columns=columns, blobs=blobs)
-    if frames is None:
-        frames = read_frames(recording, first - recording.first_frame, stop - recording.first_frame)
-    numbers = progress(range(first, stop), stop - first, "overlay")
-    with VideoWriter(Path(path), recording.fps) as video:
-        for frame, images in zip(numbers, frames, strict=True):
-            video.write(overlay.draw(images, frame))
 
 
 def _drawing(rig: CameraRig, fits: list[Fit], motion: Motion, bones: Bones, actor: int, blobs: bool) -> _Drawing:

@@ -1,6 +1,6 @@
 """Small plots of an evaluation, drawn with OpenCV."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import cv2
@@ -15,26 +15,6 @@ _INK, _GRID = (60, 60, 60), (225, 225, 225)
 _COLORS = ((200, 110, 30), (40, 90, 230), (70, 160, 60), (170, 70, 160))
 """BGR of one curve after the other."""
 _FAILED = (30, 30, 200)
-
-
-def plot_per_frame(
-    curves: Mapping[str, Float[np.ndarray, "frame"]], frames: Sequence[int] | np.ndarray, title: str
-) -> UInt8[np.ndarray, "h w 3"]:
-    """Curves in metres over the frames, drawn in millimetres (BGR); gaps where a value is NaN."""
-    values = {name: 1000.0 * np.asarray(curve, float) for name, curve in curves.items()}
-    top = _round_up(max((float(np.nanmax(v)) for v in values.values() if np.isfinite(v).any()), default=1.0))
-    canvas = _axes(title, top)
-    xs = _LEFT + _plot_width() * np.arange(len(frames)) / max(len(frames) - 1, 1)
-    for k in np.unique(np.linspace(0, len(frames) - 1, 9).astype(int)):
-        _text(canvas, str(int(frames[k])), (int(xs[k]) - 8, SIZE[1] - _BOTTOM + 18))
-    for k, (name, curve) in enumerate(values.items()):
-        color = _COLORS[k % len(_COLORS)]
-        present = np.isfinite(curve)
-        points = np.stack([xs, _height(np.where(present, curve, 0.0), top)], axis=1)
-        for a in np.flatnonzero(present[:-1] & present[1:]):
-            cv2.line(canvas, _pixel(points[a]), _pixel(points[a + 1]), color, 2, cv2.LINE_AA)
-        _text(canvas, name, (_LEFT + 8 + 170 * k, _TOP + 14), color)
-    return canvas
 
 
 def plot_per_point(
