@@ -11,11 +11,11 @@ from typing import Any
 
 from quantities import Quantity
 
-from sogjax.data.plane_video import pyav_version
-from sogjax.data.recording import Recording, open_recording
-from sogjax.data.video import read_prepared
-from sogjax.engine.build import cell_grids
-from sogjax.engine.pipeline import Preparation
+from sogjax.io.plane_video import pyav_version
+from sogjax.io.recording import Recording, open_recording
+from sogjax.io.video import read_prepared
+from sogjax.run.build import cell_grids
+from sogjax.run.pipeline import Preparation
 
 DEPTH = 8
 """Of the quad-tree: that of the default settings."""

@@ -13,12 +13,12 @@ from pathlib import Path
 
 from track_speed import demo_recording
 
-from sogjax.app.config.overrides import quoted_value
-from sogjax.data.recording import Recording, open_recording
-from sogjax.data.stages import ahead
-from sogjax.data.video import read_prepared
-from sogjax.engine.pipeline import FRAMES_AHEAD
-from sogjax.engine.run_numbers import row_numbers
+from sogjax.cli.config.overrides import quoted_value
+from sogjax.io.recording import Recording, open_recording
+from sogjax.io.threads import ahead
+from sogjax.io.video import read_prepared
+from sogjax.run.pipeline import FRAMES_AHEAD
+from sogjax.run.run_numbers import row_numbers
 from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from
 from sogjax.study.tracked import track_folder

@@ -11,10 +11,10 @@ import numpy as np
 from gradient import Settings, scattered_views
 from quantities import Quantity, exponent, milliseconds
 
-from sogjax.data.actor_file import load_body, named_body
 from sogjax.energy.frame_energy import FrameEnergy, standard_terms
 from sogjax.energy.posed import History
 from sogjax.energy.views import Views
+from sogjax.io.actor_file import load_body, named_body
 from sogjax.model.body import Body, concatenate
 from sogjax.model.skeleton import Skeleton
 

@@ -15,12 +15,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from sogjax.data.actor_file import load_body, named_body
 from sogjax.energy.frame_energy import FrameEnergy, standard_terms
 from sogjax.energy.overlap import GradientMode
 from sogjax.energy.posed import History
 from sogjax.energy.similarity import Similarity
 from sogjax.energy.views import Views, whole_image_overlap
+from sogjax.io.actor_file import load_body, named_body
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, project
 from sogjax.model.sog import Sog

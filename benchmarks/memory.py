@@ -15,11 +15,11 @@ from tempfile import TemporaryDirectory
 
 from quantities import Quantity
 
-from sogjax.data.recording import Recording
-from sogjax.data.source import open_source
-from sogjax.data.video import VideoWriter
-from sogjax.engine.recordings import actors_of, opened
-from sogjax.engine.run_job import tracking
+from sogjax.io.recording import Recording
+from sogjax.io.source import open_source
+from sogjax.io.video import VideoWriter
+from sogjax.run.recordings import actors_of, opened
+from sogjax.run.run_job import tracking
 from sogjax.settings.compose import track_config
 from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from

@@ -51,7 +51,7 @@ def resident_mib(actor: str) -> float:
     from memory import most_resident_mib
     from track_speed import demo_recording
 
-    from sogjax.engine.track import track_to_folder
+    from sogjax.run.track import track_to_folder
     from sogjax.settings.compose import track_config
 
     with TemporaryDirectory() as folder:

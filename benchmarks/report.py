@@ -24,9 +24,9 @@ from runs import Scene, end_to_end_quantities, solver_quantities, stage_quantiti
 from start_up import start_up_quantities
 from sweep_speed import sweep_quantities
 
-from sogjax.data.actor_file import save_body
-from sogjax.data.atomic import atomic_path
-from sogjax.engine.compiler_options import use_compiler_options
+from sogjax.io.actor_file import save_body
+from sogjax.io.files import atomic_path
+from sogjax.run.compilation_cache import use_compiler_options
 from sogjax.study.machine import machine_line
 
 REFERENCE = "reference ms"

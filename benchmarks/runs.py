@@ -11,22 +11,22 @@ from end_to_end import decoding_rate
 from quantities import Quantity, milliseconds
 from track_speed import demo_recording
 
-from sogjax.data.ground_truth import load_ground_truth
-from sogjax.data.recording import Recording
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History
 from sogjax.energy.similarity import similarity_among
-from sogjax.engine.cells import cells_of_clip
-from sogjax.engine.job import Job
-from sogjax.engine.recordings import actors_of, opened
-from sogjax.engine.run import Run
-from sogjax.engine.track import track_recording
-from sogjax.evaluation import evaluate_motions
+from sogjax.io.ground_truth import load_ground_truth
+from sogjax.io.recording import Recording
 from sogjax.model.body import Body
-from sogjax.settings import TrackConfig
+from sogjax.quality.evaluation import evaluate_motions
+from sogjax.run.cells import cells_of_clip
+from sogjax.run.job import Job
+from sogjax.run.recordings import actors_of, opened
+from sogjax.run.run import Run
+from sogjax.run.track import track_recording
 from sogjax.settings.compose import track_config
+from sogjax.settings.run import TrackConfig
+from sogjax.tracking.capacity import first_capacities
 from sogjax.tracking.frame import TrackState
-from sogjax.tracking.room import first_capacities
 
 SOLVERS = ("gauss_newton", "lbfgs", "conditioned_ascent")
 

@@ -22,7 +22,7 @@ from quantities import Quantity
 from start_up import OURS, made_actor
 from track_speed import demo_recording
 
-from sogjax.engine.clock import TOTAL, TRACKING
+from sogjax.run.clock import TOTAL, TRACKING
 from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from
 

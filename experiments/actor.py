@@ -15,21 +15,22 @@ import jax.numpy as jnp
 import numpy as np
 
 from sogjax.actor.colors import camera_of
+from sogjax.actor.coverage import silhouette_iou
 from sogjax.actor.make import MadeActor, make_actor, subjects_of
-from sogjax.actor.silhouette_iou import silhouette_iou
-from sogjax.data.ground_truth import load_ground_truth
-from sogjax.data.recording import Recording, open_recording
-from sogjax.engine.build import energy_terms
-from sogjax.engine.recordings import body_named
-from sogjax.engine.terminal import say
-from sogjax.engine.track import track_recording
-from sogjax.evaluation import evaluate_motions
-from sogjax.evaluation.bone_lengths import bone_errors
-from sogjax.settings import EnergyConfig
+from sogjax.io.ground_truth import load_ground_truth
+from sogjax.io.recording import Recording, open_recording
+from sogjax.quality.evaluation import evaluate_motions
+from sogjax.quality.metrics import bone_errors
+from sogjax.run.build import energy_terms
+from sogjax.run.recordings import body_named
+from sogjax.run.terminal import say
+from sogjax.run.track import track_recording
 from sogjax.settings.compose import track_config
+from sogjax.settings.method import EnergyConfig
 from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from
-from sogjax.synth import SynthSettings, cached_recording
+from sogjax.synth.cache import cached_recording
+from sogjax.synth.settings import SynthSettings
 
 
 @dataclass

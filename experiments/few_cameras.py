@@ -13,9 +13,9 @@ import io
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 
-from sogjax.data.atomic import atomic_path
-from sogjax.engine.terminal import say
 from sogjax.errors import InputError
+from sogjax.io.files import atomic_path
+from sogjax.run.terminal import say
 from sogjax.study.experiment import synth_settings, yardsticks
 from sogjax.study.few_cameras import CASES, Result, Trial, Trials
 from sogjax.study.machine import command_line, machine_line

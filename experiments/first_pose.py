@@ -12,9 +12,9 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from sogjax.data.atomic import atomic_path
-from sogjax.engine.terminal import say
 from sogjax.errors import InputError
+from sogjax.io.files import atomic_path
+from sogjax.run.terminal import say
 from sogjax.study.experiment import yardsticks
 from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from

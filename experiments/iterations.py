@@ -11,13 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
-from sogjax.data.video import read_frames
+from sogjax.io.video import read_frames
 from sogjax.study.iterations import check_showable, watched
 from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from
 from sogjax.study.settings import ReportConfig
 from sogjax.study.source import source_named
-from sogjax.view.rerun import write_iterations
+from sogjax.view.rerun.iterations import write_iterations
 
 
 @dataclass

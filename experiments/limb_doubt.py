@@ -4,24 +4,24 @@
 
 The yardstick sequences are tracked as recorded, with two of three frames left out, and with each limb displaced by 20
 to 30 cm on purpose, for 10 frames each. A limb is lost if its joints are more than 10 cm off on average. The weights of
-`sogjax/tracking/limb_doubt.py` come from all sequences; in the tables and the picture every other sequence is judged by
-weights that come from the rest. Trials that were made are kept, and not made again by the same program. Writes
-`limb_doubt.png`.
+`sogjax/quality/limb_confidence.py` come from all sequences; in the tables and the picture every other sequence is
+judged by weights that come from the rest. Trials that were made are kept, and not made again by the same program.
+Writes `limb_doubt.png`.
 """
 
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from sogjax.data.atomic import atomic_path
-from sogjax.engine.compiled_programs import forget_programs_if_many
 from sogjax.errors import InputError
+from sogjax.io.files import atomic_path
+from sogjax.quality.limb_confidence import Weights
+from sogjax.run.memory import forget_programs_if_many
 from sogjax.study.experiment import yardsticks
 from sogjax.study.limb_calibration import area_table, calibration_table, fitted, limb_curve, regained_table
 from sogjax.study.limb_trials import PLAIN, JudgedLimb, LimbTrial, LimbTrials
 from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from
 from sogjax.study.study import Study
-from sogjax.tracking.limb_doubt import Weights
 from sogjax.view.limb_chart import limb_chart
 
 

@@ -16,13 +16,13 @@ from pathlib import Path
 import numpy as np
 from omegaconf import MISSING
 
-from sogjax.data.calibration import write_toml
-from sogjax.data.keypoints.scheme import KeypointScheme
-from sogjax.data.keypoints.write import pictures_to_write, write_pose2sim
-from sogjax.data.motion import Motion, load_motion
-from sogjax.data.recording import Recording
-from sogjax.engine.recordings import opened
 from sogjax.errors import InputError
+from sogjax.io.calibration.toml import write_toml
+from sogjax.io.keypoints.scheme import KeypointScheme
+from sogjax.io.keypoints.write import pictures_to_write, write_pose2sim
+from sogjax.io.motion import Motion, load_motion
+from sogjax.io.recording import Recording
+from sogjax.run.recordings import opened
 from sogjax.study.script import run_script, settings_from
 from sogjax.synth.detector import DetectorSettings, Sight
 from sogjax.synth.keypoints import files_there, found_in, scheme_of

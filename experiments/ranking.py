@@ -19,12 +19,12 @@ from typing import Any
 
 from omegaconf import MISSING
 
-from sogjax.data.actor_file import load_body
-from sogjax.data.atomic import atomic_path
-from sogjax.data.motion import load_motion
-from sogjax.engine.recordings import file_list, opened
-from sogjax.engine.terminal import say
+from sogjax.io.actor_file import load_body
+from sogjax.io.files import atomic_path
+from sogjax.io.motion import load_motion
 from sogjax.model.body import Body
+from sogjax.run.recordings import file_list, opened
+from sogjax.run.terminal import say
 from sogjax.study.machine import machine_line
 from sogjax.study.ranking import RankedTrack, ranking_of
 from sogjax.study.ranking_tables import curves_of, limbs_table, terms_table, verdicts_table, write_csv

@@ -7,10 +7,11 @@ tracks the rendered walk of the demo; `recording=FOLDER` tracks another recordin
 
 import sys
 
-from sogjax.app.cli import main
-from sogjax.app.config.overrides import quoted_value
-from sogjax.engine.terminal import progress
-from sogjax.synth import SynthSettings, cached_recording
+from sogjax.cli.config.overrides import quoted_value
+from sogjax.cli.main import main
+from sogjax.run.terminal import progress
+from sogjax.synth.cache import cached_recording
+from sogjax.synth.settings import SynthSettings
 
 if __name__ == "__main__":
     words = sys.argv[1:]

@@ -9,19 +9,18 @@ folder. The settings that begin with `keypoint` are those of `sogjax synth`. Key
 
 from dataclasses import dataclass, field, fields
 
-from sogjax.data.ground_truth import load_ground_truth
-from sogjax.data.keypoints import Keypoints, load_keypoints
-from sogjax.data.recording import Recording
-from sogjax.engine.recordings import opened
-from sogjax.engine.terminal import progress, say
 from sogjax.errors import InputError
+from sogjax.io.ground_truth import load_ground_truth
+from sogjax.io.keypoints.load import Keypoints, load_keypoints
+from sogjax.io.recording import Recording
+from sogjax.run.recordings import opened
+from sogjax.run.terminal import progress, say
 from sogjax.study.experiment import Experiment, synth_settings
 from sogjax.study.few_cameras import evenly
 from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from
 from sogjax.study.triangulation_trials import JointErrors, together, triangulation_errors
-from sogjax.synth import cached_recording
-from sogjax.synth.cache import cached_keypoints
+from sogjax.synth.cache import cached_keypoints, cached_recording
 from sogjax.synth.detector import DetectorSettings
 
 FRAMES = 60

@@ -8,12 +8,12 @@ Both people are rendered into one recording and are one energy (Eq. 8 caps the s
 import sys
 from dataclasses import dataclass, field
 
-from sogjax.app.sweep.results import table
-from sogjax.engine.run_numbers import row_numbers
+from sogjax.cli.sweep.results import table
+from sogjax.run.run_numbers import row_numbers
 from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from
 from sogjax.study.tracked import track_rendered
-from sogjax.synth import SynthSettings
+from sogjax.synth.settings import SynthSettings
 
 
 @dataclass

@@ -12,10 +12,10 @@ refused is tried again. Tables are printed, and written as tables.md.
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from sogjax.data.atomic import atomic_path
-from sogjax.engine.compiled_programs import forget_programs_if_many
-from sogjax.engine.terminal import say
 from sogjax.errors import InputError
+from sogjax.io.files import atomic_path
+from sogjax.run.memory import forget_programs_if_many
+from sogjax.run.terminal import say
 from sogjax.study.experiment import synth_settings, yardsticks
 from sogjax.study.machine import command_line, machine_line
 from sogjax.study.script import run_script, settings_from

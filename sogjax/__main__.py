@@ -2,7 +2,7 @@
 
 import sys
 
-from sogjax.app.cli import main
+from sogjax.cli.main import main
 
 if __name__ == "__main__":
     sys.exit(main())

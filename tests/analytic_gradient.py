@@ -7,10 +7,9 @@ kinematics is used here: only the numbers held by the models are.
 import numpy as np
 from jaxtyping import Float
 
-from sogjax.energy.limits import LimitPenalty
 from sogjax.energy.posed import History
+from sogjax.energy.priors import AccelerationPenalty, LimitPenalty
 from sogjax.energy.similarity import Similarity
-from sogjax.energy.smoothness import AccelerationPenalty
 from sogjax.energy.views import Views
 from sogjax.model.body import Body
 from sogjax.model.camera import NEAR

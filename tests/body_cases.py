@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sogjax.data.actor_file import load_body, named_body
+from sogjax.io.actor_file import load_body, named_body
 from sogjax.model.body import Attachments, Body, ShapeGroup
 from sogjax.model.skeleton import Skeleton
 

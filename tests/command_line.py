@@ -4,7 +4,7 @@ import yaml
 from puppet import PUPPET
 from small_recording import make_recording
 
-from sogjax.app.cli import main
+from sogjax.cli.main import main
 
 INITIAL_POSE = "pose: rest\nposition: [0.0, 0.0, 1.0]\nheading: 0.0\n"
 

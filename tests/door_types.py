@@ -3,9 +3,9 @@
 from typing import assert_type
 
 import sogjax
-from sogjax.data.ground_truth import GroundTruth
-from sogjax.evaluation import Evaluation, GroupEvaluation
-from sogjax.tracking.found_pose import FoundPose
+from sogjax.io.ground_truth import GroundTruth
+from sogjax.quality.evaluation import Evaluation, GroupEvaluation
+from sogjax.search.found_pose import FoundPose
 
 
 def one_actor(path: str) -> None:

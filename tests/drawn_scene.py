@@ -9,11 +9,11 @@ from rig_cases import opencv_pixels
 from sogjax.actor.colors import colored
 from sogjax.energy.frame_energy import standard_terms
 from sogjax.energy.views import whole_image_overlap
-from sogjax.images.cells import CellGrid, stack_cells
-from sogjax.images.quadtree import Candidates
-from sogjax.solve import ConditionedAscent
+from sogjax.scene.cells import CellGrid, stack_cells
+from sogjax.scene.quadtree import Candidates
+from sogjax.solve.ascent import ConditionedAscent
 from sogjax.tracking.culling import ImageReader
-from sogjax.tracking.scales import pose_scales
+from sogjax.tracking.solving import pose_scales
 from sogjax.tracking.tracker import Tracker
 
 BACKGROUND = (70, 70, 70)

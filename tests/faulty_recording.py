@@ -6,9 +6,12 @@ import cv2
 import numpy as np
 
 from sogjax.check.hypotheses import mirrored_rig, unit_rig
-from sogjax.data.calibration import CameraRig, load_calibration, write_toml
+from sogjax.io.calibration.load import load_calibration
+from sogjax.io.calibration.rig import CameraRig
+from sogjax.io.calibration.toml import write_toml
 from sogjax.model.camera import Camera
-from sogjax.synth import SynthSettings, cached_recording
+from sogjax.synth.cache import cached_recording
+from sogjax.synth.settings import SynthSettings
 
 SETTINGS = SynthSettings(cameras=6, width=320, height=240, frames=40)
 WRONG, OTHER = "cam02", "cam04"

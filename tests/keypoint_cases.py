@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from sogjax.data.keypoints import named_scheme
-from sogjax.data.keypoints.write import WRITERS, pictures_to_write
+from sogjax.io.keypoints.scheme import named_scheme
+from sogjax.io.keypoints.write import WRITERS, pictures_to_write
 
 STANDING = {
     "nose": (0.0, 0.9), "eye": (0.02, 0.92), "ear": (0.05, 0.9), "head_top": (0.0, 1.0), "neck": (0.0, 0.8),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sogjax.data.motion import Motion
+from sogjax.io.motion import Motion
 
 JOINTS = (
     ("root_tx", -1, (0.0, 0.0, 0.0)),

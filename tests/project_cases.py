@@ -4,7 +4,7 @@ import numpy as np
 from keypoint_cases import people, write_keypoints
 from small_recording import toml_camera, write_calibration, write_video
 
-from sogjax.data.keypoints import named_scheme
+from sogjax.io.keypoints.scheme import named_scheme
 
 CAMERAS = ("cam01", "cam02")
 

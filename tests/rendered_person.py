@@ -2,7 +2,8 @@
 
 import yaml
 
-from sogjax.synth import SynthSettings, render_recording
+from sogjax.synth.render import render_recording
+from sogjax.synth.settings import SynthSettings
 
 LANDMARKS = ("pelvis", "chest", "neck", "left_elbow")
 

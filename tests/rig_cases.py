@@ -6,8 +6,8 @@ import cv2
 import jax.numpy as jnp
 import numpy as np
 
-from sogjax.data.calibration import CameraRig
-from sogjax.data.recording import Recording
+from sogjax.io.calibration.rig import CameraRig
+from sogjax.io.recording import Recording
 from sogjax.model.camera import Camera
 
 

@@ -10,13 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from sogjax.app.cli import main
-from sogjax.data.actor_file import load_body
-from sogjax.data.ground_truth import load_ground_truth
-from sogjax.data.motion import load_motion
-from sogjax.evaluation import joint_errors, marker_errors
-from sogjax.evaluation.bone_lengths import bone_errors
-from sogjax.synth import SynthSettings, render_recording
+from sogjax.cli.main import main
+from sogjax.io.actor_file import load_body
+from sogjax.io.ground_truth import load_ground_truth
+from sogjax.io.motion import load_motion
+from sogjax.quality.markers import joint_errors, marker_errors
+from sogjax.quality.metrics import bone_errors
+from sogjax.synth.render import render_recording
+from sogjax.synth.settings import SynthSettings
 
 pytestmark = pytest.mark.slow
 

@@ -14,12 +14,12 @@ from tiny_body import make_body
 
 from sogjax.actor.colors import ColoredView, back_projected_colors, colored
 from sogjax.actor.make import make_actor, subjects_of
-from sogjax.actor.shape import ShapeModel
-from sogjax.data.initial_pose import InitialPose
-from sogjax.data.recording import ExamplePose
 from sogjax.energy.frame_energy import standard_terms
 from sogjax.errors import InputError
+from sogjax.io.example_poses import ExamplePose
+from sogjax.io.initial_pose import InitialPose
 from sogjax.model.body import Attachments
+from sogjax.model.shape import ShapeModel
 
 COLOR = 0.02
 """A byte is 0.004; discs have edges."""

@@ -10,9 +10,9 @@ import pytest
 import yaml
 from body_cases import random_body, shipped
 
-from sogjax.data.actor_file import load_body, named_body, save_body
-from sogjax.data.yaml_entry import MAX_BYTES
 from sogjax.errors import InputError
+from sogjax.io.actor_file import load_body, named_body, save_body
+from sogjax.io.yaml_entry import MAX_BYTES
 from sogjax.model.color import COLOR_RADIUS, from_rgb
 
 SMALL = {

@@ -13,15 +13,15 @@ from drawn_scene import DISC, draw, in_colors, moved, standing
 from rig_cases import opencv_pixels, ring_rig
 from tiny_body import make_body
 
-from sogjax.actor.bones import bone_lengths
+from sogjax.actor.coverage import body_silhouette, overlap_ratio, silhouette_iou
 from sogjax.actor.report import actor_report
-from sogjax.actor.shape import ShapeModel
-from sogjax.actor.silhouette_iou import body_silhouette, overlap_ratio, silhouette_iou
 from sogjax.actor.silhouettes import PosedPictures
-from sogjax.engine.actor_report import report_folder, report_page, write_actor_report
 from sogjax.model.body import Attachments, Body
+from sogjax.model.bones import bone_lengths
+from sogjax.model.shape import ShapeModel
+from sogjax.run.actor_report import report_folder, report_page, write_actor_report
 from sogjax.view.body_picture import BACKGROUND, body_picture
-from sogjax.view.silhouette_sheet import BOTH, ONLY_BODY, ONLY_MASK, SilhouetteView, silhouette_sheet
+from sogjax.view.sheets import BOTH, ONLY_BODY, ONLY_MASK, SilhouetteView, silhouette_sheet
 
 SIGMA = 0.2
 HALF = np.sqrt(2.0 * np.log(2.0))

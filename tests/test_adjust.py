@@ -13,21 +13,22 @@ from command_line import actor_file, refused, trackable
 from drawn_scene import cells_of, draw, in_colors, make_tracker, moved, standing
 from rig_cases import ring_rig
 
-from sogjax.adjust import adjusted
-from sogjax.adjust.clip_energy import MANY_CAMERAS, Weights
-from sogjax.adjust.clip_shape import ClipShape
-from sogjax.adjust.frame_models import frame_model, shape_rates
-from sogjax.adjust.pictures import Reader, bytes_of_frame
-from sogjax.app.cli import main
-from sogjax.data.actor_file import load_body
-from sogjax.data.motion import load_motion, motion_from_poses, save_motion
+from sogjax.cli.main import main
 from sogjax.energy.frame_energy import FrameEnergy, standard_terms
 from sogjax.energy.posed import History
-from sogjax.energy.rest import RestPenalty
-from sogjax.engine import adjust_checks
-from sogjax.engine.memory import available_memory
+from sogjax.energy.priors import RestPenalty
 from sogjax.errors import InputError
-from sogjax.synth import SynthSettings, render_recording
+from sogjax.io.actor_file import load_body
+from sogjax.io.motion import load_motion, motion_from_poses, save_motion
+from sogjax.refine.adjustment import adjusted
+from sogjax.refine.clip_energy import MANY_CAMERAS, Weights
+from sogjax.refine.clip_shape import ClipShape
+from sogjax.refine.frame_models import frame_model, shape_rates
+from sogjax.refine.pictures import Reader, bytes_of_frame
+from sogjax.run import adjust_checks
+from sogjax.run.memory import available_memory
+from sogjax.synth.render import render_recording
+from sogjax.synth.settings import SynthSettings
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import TrackState
 
@@ -188,8 +189,8 @@ def test_several_actors_and_empty_folders_are_refused(capsys, tracked):
 def test_a_window_larger_than_memory_is_refused(capsys, tracked, monkeypatch):
     motion = tracked[1]
     each = bytes_of_frame(2, motion.blob_means.shape[1])
-    monkeypatch.setattr("sogjax.engine.adjust_checks.available_memory", lambda: 30 * each)
-    monkeypatch.setattr("sogjax.engine.adjust_checks.bytes_of_frame", lambda *_: 5 * each)
+    monkeypatch.setattr("sogjax.run.adjust_checks.available_memory", lambda: 30 * each)
+    monkeypatch.setattr("sogjax.run.adjust_checks.bytes_of_frame", lambda *_: 5 * each)
     found = sentence(capsys, tracked, "window=24")
     assert "window=24" in found
     assert "fewer cameras" in found

@@ -14,20 +14,20 @@ from rig_cases import recording_of, ring_rig
 from scipy.spatial.transform import Rotation
 from test_adjust import DEPTH, GRADIENT
 
-from sogjax.adjust import adjusted
-from sogjax.adjust.camera_choice import CamerasModel, Part, free_moves
-from sogjax.adjust.camera_moves import MOVE, TIME, Sights, moved_cameras, velocities_of
-from sogjax.adjust.clip_shape import ClipShape
-from sogjax.adjust.frame_models import frame_model, shape_rates
-from sogjax.adjust.pictures import Reader
-from sogjax.data.actor_file import load_body
-from sogjax.data.calibration import CameraRig
-from sogjax.data.motion import motion_from_poses, save_motion
-from sogjax.data.recording import open_recording
 from sogjax.energy.frame_energy import FrameEnergy, standard_terms
 from sogjax.energy.posed import History
-from sogjax.engine.adjust_cameras import camera_lines, check_cameras, moved_rig, moves_of, write_cameras
 from sogjax.errors import InputError
+from sogjax.io.actor_file import load_body
+from sogjax.io.calibration.rig import CameraRig
+from sogjax.io.motion import motion_from_poses, save_motion
+from sogjax.io.recording import open_recording
+from sogjax.refine.adjustment import adjusted
+from sogjax.refine.camera_choice import CamerasModel, Part, free_moves
+from sogjax.refine.camera_moves import MOVE, TIME, Sights, moved_cameras, velocities_of
+from sogjax.refine.clip_shape import ClipShape
+from sogjax.refine.frame_models import frame_model, shape_rates
+from sogjax.refine.pictures import Reader
+from sogjax.run.adjust_cameras import camera_lines, check_cameras, moved_rig, moves_of, write_cameras
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import TrackState
 

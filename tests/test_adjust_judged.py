@@ -10,13 +10,13 @@ from command_line import trackable
 from drawn_scene import grids_of, in_colors, make_tracker
 from motion_cases import walking_motion
 
-from sogjax.data.motion import motion_from_poses
-from sogjax.data.recording import open_recording
-from sogjax.engine import adjust_clip, adjust_judged
-from sogjax.engine.job import Job
-from sogjax.engine.prefix import Prefix
-from sogjax.tracking.limb_doubt import Judgement
-from sogjax.tracking.limbs import limb_names
+from sogjax.io.motion import motion_from_poses
+from sogjax.io.recording import open_recording
+from sogjax.model.limbs import limb_names
+from sogjax.quality.limb_confidence import Judgement
+from sogjax.run import adjust_clip, adjust_judged
+from sogjax.run.job import Job
+from sogjax.run.prefix import Prefix
 
 FRAMES, DEPTH = 3, 4
 

@@ -5,11 +5,9 @@ import numpy as np
 import pytest
 from body_cases import shipped
 
-from sogjax.adjust.arrow import ArrowSystem
-from sogjax.adjust.clip_shape import ClipShape
-from sogjax.adjust.contact import MovingBlobs, contact_model, floor_height, standing, undersides
-from sogjax.adjust.frame_choice import frames_by_spread
-from sogjax.adjust.smoothness import smooth_model
+from sogjax.refine.arrow import ArrowSystem
+from sogjax.refine.clip_priors import MovingBlobs, contact_model, floor_height, smooth_model, standing, undersides
+from sogjax.refine.clip_shape import ClipShape, frames_by_spread
 
 HUMAN = shipped("human")
 UP = np.array([0.0, 0.0, 1.0])
@@ -165,7 +163,7 @@ def test_a_joint_that_moves_leaves_the_flesh_and_the_other_joints(shape):
 
 
 def test_a_world_with_another_vertical_turns_the_places(shape):
-    from sogjax.model.frames import world_from_upright
+    from sogjax.model.rotation import world_from_upright
 
     turn = world_from_upright("-y")
     turned = ClipShape.from_body(HUMAN.rotated(jnp.asarray(turn, jnp.float32)), "-y")

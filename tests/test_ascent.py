@@ -6,7 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from sogjax.solve import ConditionedAscent, Scales, gradient_ascent
+from sogjax.solve.ascent import ConditionedAscent, gradient_ascent
+from sogjax.solve.solution import Scales
 
 FLOAT32 = 1e-5
 CURVATURES = np.array([1.0, 30.0, 4.0, 0.5])

@@ -5,8 +5,8 @@ import os
 
 import pytest
 
-from sogjax.data.atomic import atomic_path
 from sogjax.errors import InputError
+from sogjax.io.files import atomic_path
 
 
 def names_in(folder):

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from small_recording import make_recording
 
-from sogjax.data import background_cache
-from sogjax.data.background_cache import VARIABLE, kept_background
-from sogjax.data.recording import open_recording
 from sogjax.errors import InputError
+from sogjax.io import background_cache
+from sogjax.io.background_cache import VARIABLE, kept_background
+from sogjax.io.recording import open_recording
 
 
 @pytest.fixture

@@ -6,14 +6,14 @@ import pytest
 from command_line import actor_file, done, trackable
 from test_resume import LIGHT, SMALL, assert_same, stop_after
 
-from sogjax.app.cli import main
-from sogjax.data.motion import load_motion
-from sogjax.data.recording import open_recording
-from sogjax.engine import track as track_command
-from sogjax.engine.backwards import frames_backwards
-from sogjax.engine.build import cell_grids
-from sogjax.engine.cells import cells_of_clip
-from sogjax.settings import ColorConfig, ImagesConfig
+from sogjax.cli.main import main
+from sogjax.io.motion import load_motion
+from sogjax.io.recording import open_recording
+from sogjax.run import track as track_command
+from sogjax.run.backwards import frames_backwards
+from sogjax.run.build import cell_grids
+from sogjax.run.cells import cells_of_clip
+from sogjax.settings.method import ColorConfig, ImagesConfig
 
 FRAMES, BEGIN = 20, 11
 
@@ -26,7 +26,7 @@ def recording(tmp_path, monkeypatch):
 
 def test_frames_come_backwards(recording, tmp_path, monkeypatch):
     """Block by block from the videos, or from kept cells; the same as forwards, turned round."""
-    monkeypatch.setattr("sogjax.engine.backwards.BLOCK", 3)
+    monkeypatch.setattr("sogjax.run.backwards.BLOCK", 3)
     opened, images = open_recording(recording), ImagesConfig(depth=4, cache=str(tmp_path / "cells"))
     grids = cell_grids(opened, images.depth)
     decoded = list(frames_backwards(opened, grids, images, 2, 10))

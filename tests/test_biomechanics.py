@@ -7,11 +7,11 @@ from body_cases import shipped
 from command_line import done, refused
 from motion_cases import walking_motion
 
-from sogjax.data.export.angles import joint_angles
-from sogjax.data.export.points import marker_points
-from sogjax.data.motion import motion_from_poses, save_motion
 from sogjax.errors import InputError
-from sogjax.model.frames import world_from_upright
+from sogjax.io.export.angles import joint_angles
+from sogjax.io.export.points import marker_points
+from sogjax.io.motion import motion_from_poses, save_motion
+from sogjax.model.rotation import world_from_upright
 
 DEGREES = 0.01
 

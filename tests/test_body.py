@@ -8,7 +8,7 @@ from body_cases import posed, random_body, reference_points
 from scipy.spatial.transform import Rotation
 
 from sogjax.model.body import concatenate, dof_slices
-from sogjax.model.frames import UP_AXES, axis_vector, world_from_upright
+from sogjax.model.rotation import UP_AXES, axis_vector, world_from_upright
 
 METRES = 5e-6
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from body_cases import shipped
 
-from sogjax.data.ground_truth import GroundTruth
-from sogjax.evaluation.bone_lengths import BONES, bone_errors
+from sogjax.io.ground_truth import GroundTruth
+from sogjax.quality.metrics import BONES, bone_errors
 
 SHORT = {"left_": "l_", "right_": "r_"}
 

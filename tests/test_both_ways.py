@@ -12,17 +12,17 @@ from rig_cases import ring_rig
 from walking_dog import DEPTH, FRAMES, HEIGHT, judging_tracker
 
 from sogjax.model.body import concatenate
-from sogjax.tracking import both_ways
-from sogjax.tracking.backward_pass import Compared, Pass, part_gains
-from sogjax.tracking.body_parts import PartArrays, body_parts, merged_pose
-from sogjax.tracking.both_ways import told_both_ways
+from sogjax.model.limbs import limb_names, limbs
+from sogjax.search import merge_passes as both_ways
+from sogjax.search.backward_pass import Compared, Pass, part_gains
+from sogjax.search.body_parts import PartArrays, body_parts, merged_pose
+from sogjax.search.merge_passes import told_both_ways
+from sogjax.search.mirrored import means_of
+from sogjax.search.select_parts import APART, BIAS, CHANGE, best_choice, stretches, taken_parts
+from sogjax.tracking.capacity import with_room
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import PartialCells
 from sogjax.tracking.frame_by_frame import track
-from sogjax.tracking.limbs import limb_names, limbs
-from sogjax.tracking.mirrored import means_of
-from sogjax.tracking.room import with_room
-from sogjax.tracking.taken_parts import APART, BIAS, CHANGE, best_choice, stretches, taken_parts
 
 LOST = slice(4, 7)
 

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from tiny_body import make_body, random_poses
 
-from sogjax.data.export import export_motion, write_bvh
-from sogjax.data.motion import load_motion, motion_from_poses
 from sogjax.errors import InputError
+from sogjax.io.export.bvh import write_bvh
+from sogjax.io.export.write import export_motion
+from sogjax.io.motion import load_motion, motion_from_poses
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore", PendingDeprecationWarning)  # of PyGLM, which bvhio imports by its old name

@@ -5,10 +5,10 @@ import pwd
 
 import pytest
 
-from sogjax.data.background_cache import background_folder
-from sogjax.data.cache_folder import default_cache_dir, named_folder, sweep
-from sogjax.engine.compilation_cache import use_compilation_cache
 from sogjax.errors import InputError
+from sogjax.io.background_cache import background_folder
+from sogjax.io.cache_folder import default_cache_dir, named_folder, sweep
+from sogjax.run.compilation_cache import use_compilation_cache
 
 
 def test_what_was_not_used_for_longest_goes_first(tmp_path):

@@ -9,14 +9,14 @@ import pytest
 from command_line import actor_file, done, refused, trackable
 from small_recording import make_recording, write_images, write_video
 
-from sogjax.data import cell_cache
-from sogjax.data.motion import load_motion
-from sogjax.data.recording import open_recording
-from sogjax.engine.backwards import frames_backwards
-from sogjax.engine.build import cell_grids
-from sogjax.engine.cells import cells_of, cells_of_clip, picture_reader
-from sogjax.engine.pipeline import Preparation
-from sogjax.settings import ImagesConfig
+from sogjax.io import cell_cache
+from sogjax.io.motion import load_motion
+from sogjax.io.recording import open_recording
+from sogjax.run.backwards import frames_backwards
+from sogjax.run.build import cell_grids
+from sogjax.run.cells import cells_of, cells_of_clip, picture_reader
+from sogjax.run.pipeline import Preparation
+from sogjax.settings.method import ImagesConfig
 
 DEPTH = 4
 

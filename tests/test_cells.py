@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sogjax.images.cells import CellGrid, stack_cells
+from sogjax.scene.cells import CellGrid, stack_cells
 
 GREY_LEVEL = 1.0
 """What rounding at every halving may amount to."""

@@ -14,17 +14,16 @@ from rig_cases import ring_rig
 from small_recording import make_recording, shared_recording, toml_camera, write_calibration
 
 from sogjax.check.agreement import smallest_shift
-from sogjax.check.barcodes import barcodes, correlation, lag_curve
 from sogjax.check.cameras import camera_findings, nearest_point, rig_geometry
 from sogjax.check.examination import examined
 from sogjax.check.exposure import exposure, exposure_findings
-from sogjax.check.motion import CameraMotion
+from sogjax.check.motion import CameraMotion, barcodes, correlation, lag_curve
 from sogjax.check.silhouettes import Moment
 from sogjax.check.synchronisation import synchrony
-from sogjax.data.offsets_file import write_frame_offsets
-from sogjax.data.recording import open_recording
-from sogjax.data.recording_settings import read_recording_settings
 from sogjax.errors import InputError
+from sogjax.io.offsets_file import write_frame_offsets
+from sogjax.io.recording import open_recording
+from sogjax.io.recording_settings import read_recording_settings
 
 
 def looked_at(folder, change=None):
@@ -234,7 +233,7 @@ def test_every_file_that_is_wrong_is_named(capsys, tmp_path):
     recording = make_recording(tmp_path / "two")
     (recording / "videos" / "left.mp4").write_bytes(b"no video" * 100)
     (recording / "initial_pose.yaml").write_text("pose: [1]\n")
-    from sogjax.app.cli import main
+    from sogjax.cli.main import main
 
     assert main(["check", f"recording={recording}", f"out={tmp_path / 'out'}"]) == 2
     out, err = capsys.readouterr()
@@ -306,7 +305,7 @@ def test_inverse_poses_are_recognised(tmp_path):
         world_from_camera = np.stack([right, np.cross(forward, right), forward], axis=1)
         vector = cv2.Rodrigues(world_from_camera)[0].ravel().tolist()
         tables.append(toml_camera(f"c{k}", rotation=str(vector), translation=str(centre.tolist())))
-    from sogjax.data.calibration import load_calibration
+    from sogjax.io.calibration.load import load_calibration
 
     rig = load_calibration(write_calibration(tmp_path, *tables))
     found = camera_findings(rig, rig_geometry(rig, "z"), "z")

@@ -10,15 +10,15 @@ from command_line import actor_file, refused, trackable
 from rig_cases import opencv_pixels, ring_rig
 from small_recording import make_recording, toml_camera, write_calibration
 
-from sogjax.app.cli import main
-from sogjax.app.config.composition import SCHEMAS, composed
 from sogjax.check.cameras import rig_geometry
 from sogjax.check.hypotheses import unit_rig
 from sogjax.check.opening import opening_problems
 from sogjax.check.scale import implausible_distance, scale_findings
-from sogjax.data.calibration import CameraRig
-from sogjax.data.recording import open_recording
+from sogjax.cli.config.composition import SCHEMAS, composed
+from sogjax.cli.main import main
 from sogjax.errors import InputError
+from sogjax.io.calibration.rig import CameraRig
+from sogjax.io.recording import open_recording
 from sogjax.view.projection import picture_points, unfolded_radii
 
 LEFT = "[1.2, -0.5, 0.3]"

@@ -7,7 +7,8 @@ from project_cases import pose2sim
 from rig_cases import opencv_pixels, recording_of, ring_rig
 
 from sogjax.check.keypoints import agreement, suspects
-from sogjax.data.keypoints import Keypoints, named_scheme
+from sogjax.io.keypoints.load import Keypoints
+from sogjax.io.keypoints.scheme import named_scheme
 
 FRAMES = 6
 

@@ -13,9 +13,9 @@ from command_line import actor_file, done, refused, trackable
 from rendered_person import rendered_person
 from small_recording import write_video
 
-from sogjax.app.cli import main
-from sogjax.app.config.composition import SCHEMAS, composed
-from sogjax.data.motion import load_motion
+from sogjax.cli.config.composition import SCHEMAS, composed
+from sogjax.cli.main import main
+from sogjax.io.motion import load_motion
 from sogjax.settings.option import help_lines
 
 FAST = ("solver.max_iterations=20", "images.depth=6")

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from rig_cases import recording_of, ring_rig
 
-from sogjax.engine.background import backgrounds
 from sogjax.errors import InputError
-from sogjax.images.background import CameraBackground, background_cells_of, stack_background
-from sogjax.images.cells import CellGrid
-from sogjax.images.clip_background import SampledCamera, learnt_background
-from sogjax.images.clip_light import even_samples
-from sogjax.images.foreground_picture import foreground_probability
-from sogjax.images.moving_zone import filled
-from sogjax.settings import ImagesConfig
+from sogjax.run.background import backgrounds
+from sogjax.scene.background import CameraBackground, background_cells_of, stack_background
+from sogjax.scene.cells import CellGrid
+from sogjax.scene.clip_background import SampledCamera, learnt_background
+from sogjax.scene.clip_light import even_samples
+from sogjax.scene.foreground import foreground_probability
+from sogjax.scene.moving_zone import filled
+from sogjax.settings.method import ImagesConfig
 
 SIZE = (128, 96)
 RNG = np.random.default_rng(0)

@@ -9,8 +9,8 @@ import pytest
 from command_line import actor_file, done, trackable
 from test_resume import LIGHT, SMALL
 
-from sogjax.engine import clock
-from sogjax.engine.clock import ADJUSTING, FIRST_FRAME, OTHER, STAGES, STARTING, TOTAL, TRACKING, Clock, clocked, stage
+from sogjax.run import clock
+from sogjax.run.clock import ADJUSTING, FIRST_FRAME, OTHER, STAGES, STARTING, TOTAL, TRACKING, Clock, clocked, stage
 
 
 @pytest.fixture

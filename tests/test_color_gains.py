@@ -11,12 +11,11 @@ from rig_cases import ring_rig
 from small_recording import make_recording, write_image
 from tiny_body import make_body
 
-from sogjax.actor.colors import ColoredView, colored
-from sogjax.actor.gains import estimated_gains
-from sogjax.data.color_gains import evened
-from sogjax.data.recording import open_recording
-from sogjax.data.video import read_frames, read_still
+from sogjax.actor.colors import ColoredView, colored, estimated_gains
 from sogjax.errors import InputError
+from sogjax.io.image_file import evened
+from sogjax.io.recording import open_recording
+from sogjax.io.video import read_frames, read_still
 from sogjax.model.color import from_linear_light, linear_light
 
 GAINS = (0.5, 1.0, 1.6)

@@ -9,9 +9,8 @@ from importlib.metadata import version
 import pytest
 from full_disk import files_of_at_most
 
-from sogjax.engine.compilation_cache import REFUSED, TRIED, VARIABLE, complaints, use_compilation_cache
-from sogjax.engine.unread_programs import forget_unread
 from sogjax.errors import InputError
+from sogjax.run.compilation_cache import REFUSED, TRIED, VARIABLE, complaints, forget_unread, use_compilation_cache
 
 NOT_OF_THIS_MACHINE = (
     "Loading XLA:CPU AOT result. Target machine feature +prefer-no-scatter is not supported on the host machine."
@@ -19,7 +18,7 @@ NOT_OF_THIS_MACHINE = (
 PROGRAM = """
 import jax
 from jax._src import monitoring
-from sogjax.engine.compilation_cache import use_compilation_cache
+from sogjax.run.compilation_cache import use_compilation_cache
 hits = []
 use_compilation_cache()
 monitoring.register_event_listener(lambda event, **_: hits.append(event) if event.endswith("cache_hits") else None)

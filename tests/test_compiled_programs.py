@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import pytest
 
-from sogjax.engine.compiled_programs import forget_programs_if_many
+from sogjax.run.memory import forget_programs_if_many
 
 
 @pytest.fixture

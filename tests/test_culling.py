@@ -12,13 +12,13 @@ from rig_cases import ring_rig
 from sogjax.energy.similarity import similarity_among
 from sogjax.energy.views import Views
 from sogjax.errors import InputError
-from sogjax.images.background_cells import BackgroundCells
-from sogjax.images.foreground import EmptyScene
-from sogjax.images.quadtree import keep_blobs
 from sogjax.model.body import concatenate
 from sogjax.model.camera import project
 from sogjax.model.color import from_rgb
 from sogjax.model.sog import Sog
+from sogjax.scene.background import BackgroundCells
+from sogjax.scene.foreground import EmptyScene
+from sogjax.scene.quadtree import keep_blobs
 from sogjax.tracking.culling import (
     BLOB_RADIUS,
     CAPACITIES,

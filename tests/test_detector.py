@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from command_line import done, refused
 
-from sogjax.data.keypoints import load_keypoints, named_scheme
-from sogjax.data.recording import open_recording
 from sogjax.errors import InputError
+from sogjax.io.keypoints.load import load_keypoints
+from sogjax.io.keypoints.scheme import named_scheme
+from sogjax.io.recording import open_recording
 from sogjax.synth.detector import DetectorSettings, Sight, detected
 from sogjax.synth.keypoint_sight import sights
 from sogjax.synth.keypoints import biases, files_there, scheme_of

@@ -3,10 +3,9 @@
 import re
 from pathlib import Path
 
-from sogjax.app.config.composition import composed
-from sogjax.data.actor_file import load_body
-from sogjax.data.keypoints import shipped_schemes
-from sogjax.data.keypoints.scheme import load_scheme
+from sogjax.cli.config.composition import composed
+from sogjax.io.actor_file import load_body
+from sogjax.io.keypoints.scheme import load_scheme, shipped_schemes
 
 GUIDE = Path(__file__).parents[1] / "docs" / "guide"
 

@@ -4,9 +4,9 @@ import jax
 import pytest
 from command_line import done, refused
 
-from sogjax.app import doctor
-from sogjax.engine import self_test
-from sogjax.engine.compilation_cache import REFUSED, VARIABLE, programs_folder
+from sogjax.cli import doctor
+from sogjax.cli import doctor as self_test
+from sogjax.run.compilation_cache import REFUSED, VARIABLE, programs_folder
 
 
 def test_a_sound_installation(capsys, tmp_path):

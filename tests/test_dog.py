@@ -8,10 +8,10 @@ from command_line import done
 from drawn_scene import draw, in_colors, moved, standing
 from rig_cases import ring_rig
 
-from sogjax.data.actor_file import load_body
-from sogjax.data.calibration import write_toml
-from sogjax.data.ground_truth import GroundTruth, load_ground_truth, save_ground_truth
-from sogjax.data.motion import load_motion
+from sogjax.io.actor_file import load_body
+from sogjax.io.calibration.toml import write_toml
+from sogjax.io.ground_truth import GroundTruth, load_ground_truth, save_ground_truth
+from sogjax.io.motion import load_motion
 
 FRAMES = 12
 HEIGHT = 1.1

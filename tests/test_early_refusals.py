@@ -5,12 +5,11 @@ import sys
 
 import pytest
 
-from sogjax.app.config.composition import composed
-from sogjax.app.config.endings import CALIBRATIONS, FORMATS, MOTIONS, check_endings
-from sogjax.data.export import WRITERS
+from sogjax.cli.config.composition import CALIBRATIONS, FORMATS, MOTIONS, check_endings, composed
 from sogjax.errors import InputError
-from sogjax.settings import OutputsConfig
+from sogjax.io.export.write import WRITERS
 from sogjax.settings.compose import track_config
+from sogjax.settings.run import OutputsConfig
 
 
 def test_the_endings_are_those_of_the_writers():
@@ -37,7 +36,7 @@ def test_a_wrong_word_is_refused_when_the_settings_are_composed(words, said):
 def test_nothing_heavy_is_imported_before():
     look = (
         "import sys\n"
-        "from sogjax.app.cli import main\n"
+        "from sogjax.cli.main import main\n"
         "assert main(['export', 'motion=m.npz', 'to=a.fbx']) == 2\n"
         "heavy = {'jax', 'cv2', 'rerun', 'scipy'} & set(sys.modules)\n"
         "sys.exit(f'imported: {heavy}' if heavy else 0)\n"

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from rig_cases import recording_of, ring_rig
 
-from sogjax.actor.facing import consistent_ways, disagreement
+from sogjax.actor.example_pose import consistent_ways, disagreement
 from sogjax.actor.frame_choice import SHAPE_VOXELS, SeenShape, spread_choice, unlikeness
 from sogjax.actor.make import MadeActor
-from sogjax.data.recording import ExamplePose
-from sogjax.engine.example_frames import check_actors, most_helpful, several_people, unsuitable
-from sogjax.engine.first_pose import known_opening
 from sogjax.errors import InputError
-from sogjax.settings import TrackConfig
+from sogjax.io.example_poses import ExamplePose
+from sogjax.run.example_frames import check_actors, most_helpful, several_people, unsuitable
+from sogjax.run.first_pose import known_opening
+from sogjax.settings.run import TrackConfig
 
 
 def shape(frame, part, **values):

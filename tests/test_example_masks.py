@@ -12,8 +12,8 @@ from test_segmentation import FLESH, iou, photo, scene
 
 from sogjax.actor.example_masks import FROM_FILE, FROM_PLATE, example_masks
 from sogjax.actor.silhouettes import load_images, load_pictures
-from sogjax.data.recording import ExamplePose
 from sogjax.errors import InputError
+from sogjax.io.example_poses import ExamplePose
 
 RIG = ring_rig(4, (160, 120), distance=1.6)
 BODY = in_colors(shipped("dog"))

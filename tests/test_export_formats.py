@@ -14,12 +14,12 @@ from scipy.spatial.transform import Rotation
 from test_bvh import BONES, y_up
 from tiny_body import make_body, random_poses
 
-from sogjax.data.export import export_motion
-from sogjax.data.export.bones import bones_of
-from sogjax.data.export.points import OPENSIM_NAMES
-from sogjax.data.motion import load_motion, motion_from_poses, save_motion
-from sogjax.data.motion_log import PER_FRAME, MotionLog
 from sogjax.errors import InputError
+from sogjax.io.export.bones import bones_of
+from sogjax.io.export.points import OPENSIM_NAMES
+from sogjax.io.export.write import export_motion
+from sogjax.io.motion import load_motion, motion_from_poses, save_motion
+from sogjax.io.motion_log import PER_FRAME, MotionLog
 
 BODY = make_body()
 METRES = 1e-4

@@ -6,9 +6,9 @@ import yaml
 from body_cases import shipped
 from command_line import done, refused
 
-from sogjax.data.initial_pose import load_initial_poses
-from sogjax.data.motion import motion_from_poses, save_motion
-from sogjax.tracking.initial_pose import rough_pose
+from sogjax.io.initial_pose import load_initial_poses
+from sogjax.io.motion import motion_from_poses, save_motion
+from sogjax.search.rough_pose import rough_pose
 
 TOLERANCE = 1e-4
 

@@ -9,7 +9,7 @@ from sogjax.study import few_cameras
 from sogjax.study.few_cameras import Result, Trial, Trials
 from sogjax.study.sections.few_cameras import few_cameras_section
 from sogjax.study.study import Study
-from sogjax.synth import SynthSettings
+from sogjax.synth.settings import SynthSettings
 
 
 @pytest.fixture

@@ -5,12 +5,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from sogjax.data.calibration import CameraEntry, rig_from_entries
-from sogjax.images.cells import CellGrid
-from sogjax.images.quadtree import Candidates
+from sogjax.io.calibration.rig import CameraEntry, rig_from_entries
 from sogjax.model.camera import project_points
-from sogjax.view.picture_camera import picture_camera
-from sogjax.view.projection import picture_points
+from sogjax.scene.cells import CellGrid
+from sogjax.scene.quadtree import Candidates
+from sogjax.view.projection import picture_camera, picture_points
 
 MATRIX = np.array([[260.0, 0.0, 320.0], [0.0, 255.0, 240.0], [0.0, 0.0, 1.0]])
 LENS = np.array([0.05, -0.02, 0.003, -0.001])

@@ -13,10 +13,10 @@ from sog_cases import floats, in_float64, random_views
 
 from sogjax.energy.foreground import Foreground
 from sogjax.energy.posed import Frame, History, Posed
-from sogjax.energy.windows import COLUMNS, ROWS, Windows, windows_around
-from sogjax.images.background_cells import BackgroundCells
-from sogjax.images.foreground import LARGEST, EmptyScene, foreground_weights, log_odds, subject_colors
-from sogjax.images.kinds import kind_odds, odds_where_told
+from sogjax.energy.views import COLUMNS, ROWS, Windows, windows_around
+from sogjax.scene.background import BackgroundCells
+from sogjax.scene.color_clusters import kind_odds, odds_where_told
+from sogjax.scene.foreground import LARGEST, EmptyScene, foreground_weights, log_odds, subject_colors
 
 WALL, SHIRT, SKIN = (0.5, 0.6, 0.7), (0.1, 0.2, 0.6), (0.6, 0.42, 0.33)
 odds_of = jax.jit(lambda cells, background, subject: log_odds(cells, EmptyScene.from_background(background), subject))

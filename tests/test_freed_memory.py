@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from sogjax.engine import freed_memory
-from sogjax.engine.freed_memory import return_freed_memory
+from sogjax.run import memory as freed_memory
+from sogjax.run.memory import return_freed_memory
 
 
 def resident_mib():

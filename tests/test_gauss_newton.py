@@ -15,8 +15,11 @@ from sogjax.energy.posed import History
 from sogjax.energy.views import Views, whole_image_overlap
 from sogjax.model.camera import project, project_points, projection_jacobian
 from sogjax.model.sog import Sog
-from sogjax.solve import ConditionedAscent, CurvedObjective, GaussNewton, OptimistixSolver, QuadraticModel
-from sogjax.tracking.scales import pose_scales
+from sogjax.solve.ascent import ConditionedAscent
+from sogjax.solve.gauss_newton import GaussNewton
+from sogjax.solve.optimistix import OptimistixSolver
+from sogjax.solve.solution import CurvedObjective, QuadraticModel
+from sogjax.tracking.solving import pose_scales
 
 FLOAT32 = 1e-4
 climb = eqx.filter_jit(lambda solver, objective, start, scales: solver.maximize(objective, start, scales))

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from small_recording import shared_recording
 
-from sogjax.data.ground_truth import GroundTruth, load_ground_truth, save_ground_truth
 from sogjax.errors import InputError
+from sogjax.io.ground_truth import GroundTruth, load_ground_truth, save_ground_truth
 
 POINTS = np.arange(24.0).reshape(2, 4, 3)
 NAMES = ("Ann/nose", "Ann/toe", "Bob/nose", "Bob/toe")

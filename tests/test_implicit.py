@@ -12,8 +12,10 @@ from sog_cases import floats, in_float64, random_views
 
 from sogjax.energy.frame_energy import FrameEnergy, standard_terms
 from sogjax.energy.posed import History
-from sogjax.solve import GaussNewton, Optimum, Scales, implicit_optimum
-from sogjax.tracking.scales import pose_scales
+from sogjax.solve.gauss_newton import GaussNewton
+from sogjax.solve.implicit import Optimum, implicit_optimum
+from sogjax.solve.solution import Scales
+from sogjax.tracking.solving import pose_scales
 
 STEP = 1e-5
 TOLERANCE = 1e-5

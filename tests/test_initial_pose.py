@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from body_cases import posed, reference_frames, reference_points, shipped
 
-from sogjax.data.initial_pose import InitialPose
 from sogjax.errors import InputError
-from sogjax.model.frames import UP_AXES, axis_vector, world_from_upright
-from sogjax.tracking.initial_pose import rough_pose
+from sogjax.io.initial_pose import InitialPose
+from sogjax.model.rotation import UP_AXES, axis_vector, world_from_upright
+from sogjax.search.rough_pose import rough_pose
 
 HUMAN, DOG = shipped("human"), shipped("dog")
 FITTED = 0.02

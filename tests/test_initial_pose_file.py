@@ -2,8 +2,8 @@
 
 import pytest
 
-from sogjax.data.initial_pose import InitialPose, load_initial_poses
 from sogjax.errors import InputError
+from sogjax.io.initial_pose import InitialPose, load_initial_poses
 
 
 @pytest.fixture

@@ -7,11 +7,13 @@ from body_cases import shipped
 from drawn_scene import cells_of, draw, in_colors, make_tracker, moved, standing
 from rig_cases import ring_rig
 
-from sogjax.solve import ConditionedAscent, GaussNewton, OptimistixSolver
+from sogjax.solve.ascent import ConditionedAscent
+from sogjax.solve.gauss_newton import GaussNewton
+from sogjax.solve.optimistix import OptimistixSolver
+from sogjax.tracking.capacity import first_capacities
 from sogjax.tracking.frame import TrackState
 from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.iterations import best_after
-from sogjax.tracking.room import first_capacities
 
 SOLVERS = {
     "ascent": ConditionedAscent(),

@@ -5,11 +5,11 @@ from dataclasses import replace
 import pytest
 from command_line import actor_file, trackable
 
-from sogjax.data.actor_file import load_body, save_body
+from sogjax.io.actor_file import load_body, save_body
 from sogjax.study import kept_actors
 from sogjax.study.few_cameras import Trials
 from sogjax.study.verdict_trials import VerdictTrials
-from sogjax.synth import SynthSettings
+from sogjax.synth.settings import SynthSettings
 
 NAMES = ["ben", "anna"]
 

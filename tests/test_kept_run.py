@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from command_line import actor_file
 
-from sogjax.data.actor_file import load_body
-from sogjax.data.array_log import ArrayLog
-from sogjax.engine.kept_run import FOLDER, KeptRun
 from sogjax.errors import InputError
+from sogjax.io.actor_file import load_body
+from sogjax.io.array_log import ArrayLog
+from sogjax.run.kept_run import FOLDER, KeptRun
 
 
 @pytest.fixture

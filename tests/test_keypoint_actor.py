@@ -7,16 +7,18 @@ import numpy as np
 import pytest
 from body_cases import shipped
 
-from sogjax.data.ground_truth import load_ground_truth
-from sogjax.data.recording import ExamplePose, open_recording
-from sogjax.engine.adjust_colors import measured_colors
-from sogjax.engine.keypoint_actor import keypoint_actor, with_rough_poses
-from sogjax.engine.keypoint_start import keypoint_starts
-from sogjax.engine.recordings import keypoint_actor_or, upright
 from sogjax.errors import InputError
+from sogjax.io.example_poses import ExamplePose
+from sogjax.io.ground_truth import load_ground_truth
+from sogjax.io.recording import open_recording
+from sogjax.run.adjust_colors import measured_colors
+from sogjax.run.keypoint_actor import keypoint_actor, with_rough_poses
+from sogjax.run.keypoint_start import keypoint_starts
+from sogjax.run.recordings import keypoint_actor_or, upright
 from sogjax.settings.compose import track_config
-from sogjax.synth import SynthSettings, render_recording
 from sogjax.synth.detector import DetectorSettings
+from sogjax.synth.render import render_recording
+from sogjax.synth.settings import SynthSettings
 
 HUMAN = shipped("human")
 SPACE = "hsv_cylinder"
@@ -84,7 +86,7 @@ def test_who_is_who_is_told_by_colours(tmp_path, monkeypatch):
     truth = load_ground_truth(recording.ground_truth)
     config = track_config(recording=recording.path, images={"background": "none"})
     body = upright(HUMAN, recording)
-    monkeypatch.setattr("sogjax.engine.keypoint_start.CLEARLY", 0.0)  # nobody has colours yet
+    monkeypatch.setattr("sogjax.run.keypoint_start.CLEARLY", 0.0)  # nobody has colours yet
     poses = keypoint_starts(recording, [body, replace(body, name="other")], config, 0)
     people = [measured_colors(recording, body, [0], np.asarray(pose)[None], SPACE) for pose in poses]
     monkeypatch.undo()

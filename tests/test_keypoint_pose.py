@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from body_cases import shipped
 
-from sogjax.data.keypoints import named_scheme
-from sogjax.model.frames import world_from_upright
-from sogjax.tracking.keypoint_pose import bone_pairs, measured_lengths, pose_of_keypoints
+from sogjax.io.keypoints.scheme import named_scheme
+from sogjax.model.rotation import world_from_upright
+from sogjax.search.keypoint_pose import bone_pairs, measured_lengths, pose_of_keypoints
 
 HUMAN = shipped("human")
 SCHEME = named_scheme("HALPE_26")

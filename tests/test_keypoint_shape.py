@@ -6,7 +6,7 @@ from body_cases import shipped
 from test_keypoint_pose import INDICES, SCHEME, pose
 
 from sogjax.actor.keypoint_shape import shape_of_keypoints
-from sogjax.actor.shape import ShapeModel
+from sogjax.model.shape import ShapeModel
 
 HUMAN = shipped("human")
 MODEL = ShapeModel.from_body(HUMAN)

@@ -7,15 +7,16 @@ import pytest
 from body_cases import shipped
 from keypoint_cases import write_keypoints
 
-from sogjax.data.ground_truth import load_ground_truth
-from sogjax.data.keypoints import load_keypoints
-from sogjax.data.recording import open_recording
-from sogjax.engine import first_pose
-from sogjax.engine.keypoint_start import keypoint_start
-from sogjax.engine.recordings import upright
+from sogjax.io.ground_truth import load_ground_truth
+from sogjax.io.keypoints.load import load_keypoints
+from sogjax.io.recording import open_recording
+from sogjax.run import first_pose
+from sogjax.run.keypoint_start import keypoint_start
+from sogjax.run.recordings import upright
 from sogjax.settings.compose import track_config
-from sogjax.synth import SynthSettings, render_recording
 from sogjax.synth.detector import DetectorSettings
+from sogjax.synth.render import render_recording
+from sogjax.synth.settings import SynthSettings
 
 FRAMES = 3
 HUMAN = shipped("human")

@@ -13,13 +13,13 @@ from drawn_scene import cells_of, draw, in_colors, make_tracker, standing
 from keypoint_cases import write_keypoints
 from rig_cases import ring_rig
 
-from sogjax.app.cli import main
-from sogjax.data.keypoints import named_scheme
+from sogjax.cli.main import main
 from sogjax.energy.keypoint_views import SeenKeypoints
-from sogjax.engine import run_job
-from sogjax.engine.clip_keypoints import keypoint_pull
+from sogjax.io.keypoints.scheme import named_scheme
 from sogjax.model.camera import project_points
-from sogjax.solve import GaussNewton
+from sogjax.run import run_job
+from sogjax.run.clip_keypoints import keypoint_pull
+from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.tracking.frame import WithKeypoints
 from sogjax.tracking.frame_by_frame import track
 

@@ -9,12 +9,13 @@ from hypothesis import given
 from keypoint_cases import people, person, write_keypoints
 from small_recording import make_recording, write_images
 
-from sogjax.data.keypoints import find_keypoints, load_keypoints, named_scheme, shipped_schemes
-from sogjax.data.keypoints.formats import read_pictures
-from sogjax.data.keypoints.scheme import load_scheme, other_side
-from sogjax.data.name_match import matched_names
-from sogjax.data.recording import open_recording
 from sogjax.errors import InputError
+from sogjax.io.camera_names import matched_names
+from sogjax.io.keypoint_files import find_keypoints
+from sogjax.io.keypoints.formats import read_pictures
+from sogjax.io.keypoints.load import load_keypoints
+from sogjax.io.keypoints.scheme import load_scheme, named_scheme, other_side, shipped_schemes
+from sogjax.io.recording import open_recording
 
 PROGRAMS = ("openpose", "pose2sim", "mmpose", "alphapose", "mediapipe")
 JSON_PROGRAMS = PROGRAMS[:-1]

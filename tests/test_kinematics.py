@@ -8,7 +8,7 @@ import pytest
 from body_cases import random_body, random_skeleton
 from sog_cases import in_float64
 
-from sogjax.compiled.selection import chosen_indices
+from sogjax.model.compiled import chosen_indices
 from sogjax.model.kinematics import _composed
 
 FLOAT64 = 1e-10

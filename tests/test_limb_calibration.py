@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import expit
 
+from sogjax.quality.limb_confidence import WITH_BACKGROUND, WITHOUT
 from sogjax.study.limb_calibration import (
     area_table,
     area_under_roc,
@@ -14,7 +15,6 @@ from sogjax.study.limb_calibration import (
     said_of,
 )
 from sogjax.study.limb_trials import PLAIN, JudgedLimb, LimbTrial
-from sogjax.tracking.limb_doubt import WITH_BACKGROUND, WITHOUT
 
 TRIAL = LimbTrial("walk", "walk:0", 4, "pictures")
 

@@ -11,17 +11,16 @@ from drawn_scene import BACKGROUND, cells_of, draw, in_colors, make_tracker, mov
 from motion_cases import walking_motion
 from rig_cases import ring_rig
 
-from sogjax.data.doubtful import doubtful_limbs
 from sogjax.energy.posed import Posed
-from sogjax.images.background_cells import BackgroundCells
-from sogjax.images.foreground import EmptyScene, own_density, subject_colors, subject_density
 from sogjax.model.body import concatenate
+from sogjax.model.limbs import joint_limbs, limb_names, limb_slices
+from sogjax.quality.limb_confidence import WITH_BACKGROUND, WITHOUT, LimbMeasures, judgement, limb_doubt
+from sogjax.quality.limb_evidence import BlobEvidence, JudgedLimbs, blob_evidence
+from sogjax.quality.limb_warnings import doubtful_limbs
+from sogjax.scene.background import BackgroundCells
+from sogjax.scene.foreground import EmptyScene, own_density, subject_colors, subject_density
 from sogjax.tracking.frame import PartialCells
 from sogjax.tracking.frame_by_frame import track
-from sogjax.tracking.judged_limbs import JudgedLimbs
-from sogjax.tracking.limb_doubt import WITH_BACKGROUND, WITHOUT, LimbMeasures, judgement, limb_doubt
-from sogjax.tracking.limb_evidence import BlobEvidence, blob_evidence
-from sogjax.tracking.limbs import joint_limbs, limb_names, limb_slices
 
 DEPTH = 6
 LIMB = "left front leg"

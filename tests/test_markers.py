@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from motion_cases import JOINTS, points_on, walking_motion
 
-from sogjax.data.ground_truth import GroundTruth
 from sogjax.errors import InputError
-from sogjax.evaluation.markers import attach_markers, joint_errors, marker_errors
-from sogjax.evaluation.report import evaluate_motion, evaluate_motions
-from sogjax.evaluation.swaps import identity_swaps
+from sogjax.io.ground_truth import GroundTruth
+from sogjax.quality.evaluation import evaluate_motion, evaluate_motions
+from sogjax.quality.markers import attach_markers, joint_errors, marker_errors
+from sogjax.quality.swaps import identity_swaps
 
 ON = (3, 6, 8)
 OFFSETS = ((0.1, 0.0, 0.05), (0.03, 0.2, 0.0), (0.0, -0.25, 0.04))

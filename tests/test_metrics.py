@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from motion_cases import points_on, walking_motion
 
-from sogjax.data.ground_truth import GroundTruth
 from sogjax.errors import InputError
-from sogjax.evaluation.metrics import lost_points, mean_per_frame, mean_per_point, std_per_point, summarize
-from sogjax.evaluation.report import evaluate_motion, evaluate_motions
+from sogjax.io.ground_truth import GroundTruth
+from sogjax.quality.evaluation import evaluate_motion, evaluate_motions
+from sogjax.quality.metrics import lost_points, mean_per_frame, mean_per_point, std_per_point, summarize
 from sogjax.view.plots import plot_per_point, write_png
 
 

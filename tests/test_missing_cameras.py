@@ -13,16 +13,16 @@ from rendered_person import rendered_person
 from rig_cases import ring_rig
 from small_recording import SIZE, frame_of, make_recording, toml_camera, write_calibration, write_video
 
-from sogjax.app.cli import main
 from sogjax.check.clip import read_clip
-from sogjax.data import video
-from sogjax.data.motion import load_motion
-from sogjax.data.recording import open_recording
-from sogjax.data.source import look_at_source
-from sogjax.data.video import read_frames
-from sogjax.engine import pipeline
+from sogjax.cli.main import main
 from sogjax.errors import InputError
-from sogjax.solve import GaussNewton
+from sogjax.io import video
+from sogjax.io.motion import load_motion
+from sogjax.io.recording import open_recording
+from sogjax.io.source import look_at_source
+from sogjax.io.video import read_frames
+from sogjax.run import pipeline
+from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.tracking.frame import PartialCells
 from sogjax.tracking.frame_by_frame import track
 

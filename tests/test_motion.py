@@ -8,8 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 from tiny_body import make_body, random_poses
 
-from sogjax.data.motion import Motion, load_motion, motion_from_poses, save_motion
 from sogjax.errors import InputError
+from sogjax.io.motion import Motion, load_motion, motion_from_poses, save_motion
 
 BODY = make_body()
 METRES = 1e-5

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from motion_cases import walking_motion
 
-from sogjax.data.array_log import ROWS
-from sogjax.data.motion import Motion, load_motion, save_motion
-from sogjax.data.motion_log import PER_FRAME, SOMETIMES_PER_FRAME, MotionLog
-from sogjax.data.npz_file import npy_header
 from sogjax.errors import InputError
+from sogjax.io.array_log import ROWS
+from sogjax.io.motion import Motion, load_motion, save_motion
+from sogjax.io.motion_log import PER_FRAME, SOMETIMES_PER_FRAME, MotionLog
+from sogjax.io.npz_file import npy_header
 
 
 def part(motion, frames):

@@ -19,9 +19,8 @@ from sogjax.energy.pairs import TILE
 from sogjax.energy.posed import History
 from sogjax.energy.similarity import similarity_among
 from sogjax.model.camera import project
-from sogjax.solve import ConditionedAscent
-from sogjax.tracking.rounds import solve_near
-from sogjax.tracking.scales import pose_scales
+from sogjax.solve.ascent import ConditionedAscent
+from sogjax.tracking.solving import pose_scales, solve_near
 
 AGREEMENT = 1e-4
 HUMAN = shipped("human")

@@ -10,8 +10,9 @@ from rig_cases import ring_rig
 from sog_cases import random_views
 
 from sogjax.energy.frame_energy import standard_terms, still_energy
-from sogjax.solve import OptimistixSolver, Scales
-from sogjax.tracking.scales import pose_scales
+from sogjax.solve.optimistix import OptimistixSolver
+from sogjax.solve.solution import Scales
+from sogjax.tracking.solving import pose_scales
 
 METHODS = ["bfgs", "lbfgs", "nonlinear_cg"]
 SCALES = Scales(jnp.array([0, 1]), jnp.array([0.02, 0.01]), jnp.array([0.15, 0.05]))

@@ -8,9 +8,9 @@ import pytest
 from motion_cases import walking_motion
 from rig_cases import black, opencv_pixels, ring_rig
 
-from sogjax.data.recording import open_recording
-from sogjax.data.video import read_frames
 from sogjax.errors import InputError
+from sogjax.io.recording import open_recording
+from sogjax.io.video import read_frames
 from sogjax.view.bones import _PALETTE, LEFT, MIDDLE, RIGHT, bones_from_motion, sides_of
 from sogjax.view.overlay import Overlay, overlay_frame
 from sogjax.view.projection import picture_points

@@ -8,12 +8,11 @@ import pytest
 from rig_cases import opencv_pixels, recording_of, ring_rig
 
 from sogjax.actor.frame_choice import subject_cubes
-from sogjax.actor.people_apart import PersonSeen, people_apart
-from sogjax.actor.who_is_who import matched, runs_by_place, told_apart, unlike
-from sogjax.engine import example_people
-from sogjax.engine.example_people import people_examples
-from sogjax.engine.sampled_masks import SampledMasks
-from sogjax.images.cells import CellGrid
+from sogjax.actor.people import PersonSeen, matched, people_apart, runs_by_place, told_apart, unlike
+from sogjax.run import example_people
+from sogjax.run.example_people import people_examples
+from sogjax.run.sampled_masks import SampledMasks
+from sogjax.scene.cells import CellGrid
 
 SIZE = (320, 240)
 RIG = ring_rig(6, SIZE, distance=4.0)

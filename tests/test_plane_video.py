@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from small_recording import make_recording, shared_recording, write_video
 
-from sogjax.data import plane_video as module
-from sogjax.data import video_file
-from sogjax.data.plane_video import PlaneVideo, plane_video
-from sogjax.data.recording import open_recording
-from sogjax.data.source import open_with_least_work
-from sogjax.data.video import read_frames, read_prepared
-from sogjax.data.video_file import VideoFile
-from sogjax.data.yuv_picture import YuvPicture
-from sogjax.engine.build import cell_grids
-from sogjax.engine.pipeline import Preparation, read_pictures
-from sogjax.images.cells import CellGrid, padded_cells
+from sogjax.io import plane_video as module
+from sogjax.io import video_file
+from sogjax.io.plane_video import PlaneVideo, plane_video
+from sogjax.io.recording import open_recording
+from sogjax.io.source import open_with_least_work
+from sogjax.io.video import read_frames, read_prepared
+from sogjax.io.video_file import VideoFile
+from sogjax.model.yuv_picture import YuvPicture
+from sogjax.run.build import cell_grids
+from sogjax.run.pipeline import Preparation, read_pictures
+from sogjax.scene.cells import CellGrid, padded_cells
 
 av = pytest.importorskip("av")
 

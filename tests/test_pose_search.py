@@ -11,17 +11,16 @@ from drawn_scene import draw, in_colors, moved, standing
 from rig_cases import ring_rig
 
 from sogjax.energy.frame_energy import standard_terms
-from sogjax.images.cells import CellGrid, stack_cells
-from sogjax.images.quadtree import Candidates
+from sogjax.model.limbs import limbs, with_other_limb
+from sogjax.scene.cells import CellGrid, stack_cells
+from sogjax.scene.quadtree import Candidates
+from sogjax.search.found_pose import FoundPose, search_pose, search_poses
+from sogjax.search.mirrored import look_alikes, other_side, sides_apart, turns_with_vertical
+from sogjax.search.places import nearest_point
+from sogjax.search.pose_confidence import SURE, Agreement, Evidence, agreed_confidence, confidence
+from sogjax.search.pose_search import Searcher
+from sogjax.search.seen_frame import SeenFrame
 from sogjax.tracking.culling import ImageReader
-from sogjax.tracking.found_pose import FoundPose, search_pose, search_poses
-from sogjax.tracking.hull import nearest_point
-from sogjax.tracking.limbs import limbs, with_other_limb
-from sogjax.tracking.mirrored import look_alikes, other_side, sides_apart
-from sogjax.tracking.pose_search import Searcher
-from sogjax.tracking.rotations import turns_with_vertical
-from sogjax.tracking.seen_frame import SeenFrame
-from sogjax.tracking.sureness import SURE, Agreement, Evidence, agreed_confidence, confidence
 
 RIG = ring_rig(4, (320, 240), distance=2.5)
 TERMS = standard_terms()

@@ -8,16 +8,16 @@ import pytest
 from command_line import actor_file, trackable
 from small_recording import frame_image, write_image
 
-from sogjax.app.config.composition import composed
-from sogjax.data.actor_file import load_body
-from sogjax.energy.rest import RestPenalty
-from sogjax.engine import build
-from sogjax.engine.recordings import opened, upright
-from sogjax.images.cells import CellGrid
-from sogjax.settings import TrackConfig
+from sogjax.cli.config.composition import composed
+from sogjax.energy.priors import RestPenalty
+from sogjax.io.actor_file import load_body
+from sogjax.run import build
+from sogjax.run.recordings import opened, upright
+from sogjax.scene.cells import CellGrid
 from sogjax.settings.compose import track_config
 from sogjax.settings.files import choices_of
-from sogjax.solve import ConditionedAscent
+from sogjax.settings.run import TrackConfig
+from sogjax.solve.ascent import ConditionedAscent
 from sogjax.tracking.frame import TrackState
 
 GROUPS = ("solver", "color", "images", "energy")

@@ -12,15 +12,14 @@ from sog_cases import random_views
 from tiny_body import make_body
 
 from sogjax.energy.frame_energy import FrameEnergy, standard_terms
-from sogjax.energy.limits import limit_penalty
 from sogjax.energy.overlap import self_overlaps
 from sogjax.energy.posed import History
-from sogjax.energy.smoothness import acceleration_penalty
+from sogjax.energy.priors import acceleration_penalty, limit_penalty
 from sogjax.energy.views import Views, whole_image_overlap
-from sogjax.images.cells import CellGrid
-from sogjax.images.quadtree import Candidates, keep_blobs, quadtree
 from sogjax.model.body import concatenate
 from sogjax.model.camera import Camera
+from sogjax.scene.cells import CellGrid
+from sogjax.scene.quadtree import Candidates, keep_blobs, quadtree
 
 FLOAT32 = 1e-5
 energy_and_values = eqx.filter_jit(lambda energy, pose: (energy(pose), energy.values(pose)))

@@ -9,10 +9,10 @@ from project_cases import CAMERAS, freemocap, pose2sim
 from small_recording import FPS
 
 from sogjax.check.opening import opening_problems
-from sogjax.data.actor_file import load_body, named_body, save_body
-from sogjax.data.keypoints import load_keypoints
-from sogjax.data.recording import open_recording
 from sogjax.errors import InputError
+from sogjax.io.actor_file import load_body, named_body, save_body
+from sogjax.io.keypoints.load import load_keypoints
+from sogjax.io.recording import open_recording
 
 
 def test_a_pose2sim_project_is_a_recording(tmp_path):

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from rig_cases import ring_rig
 
-from sogjax.images.cells import CellGrid
-from sogjax.images.quadtree import Candidates, keep_blobs, quadtree
+from sogjax.scene.cells import CellGrid
+from sogjax.scene.quadtree import Candidates, keep_blobs, quadtree
 
 STRAIGHT = (0.0,) * 5
 SIZES = [(64, 48, 3), (100, 76, 4), (48, 64, 3), (101, 77, 4)]

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from tiny_body import make_body
 
-from sogjax.data.ground_truth import GroundTruth
-from sogjax.data.motion import motion_from_poses
+from sogjax.io.ground_truth import GroundTruth
+from sogjax.io.motion import motion_from_poses
 from sogjax.model.body import Attachments
 from sogjax.study.climbs import Climbed, Pair
 from sogjax.study.ranking_tables import limbs_table, verdicts_table, write_csv

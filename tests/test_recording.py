@@ -16,8 +16,8 @@ from small_recording import (
 )
 
 from sogjax.actor.silhouettes import load_images
-from sogjax.data.recording import open_recording
 from sogjax.errors import InputError
+from sogjax.io.recording import open_recording
 
 
 @pytest.fixture

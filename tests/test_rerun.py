@@ -11,11 +11,13 @@ from motion_cases import points_on, walking_motion
 from rerun.chunk import RrdReader
 from rig_cases import black, opencv_pixels, recording_of, ring_rig
 
-from sogjax.data.ground_truth import GroundTruth
 from sogjax.errors import InputError
+from sogjax.io.ground_truth import GroundTruth
 from sogjax.view.bones import bones_from_motion
-from sogjax.view.rerun import ImageBlobs, view_command, write_comparison, write_iterations, write_rerun
+from sogjax.view.rerun.comparison import write_comparison
 from sogjax.view.rerun.curves import plots_with
+from sogjax.view.rerun.file import ImageBlobs, view_command, write_rerun
+from sogjax.view.rerun.iterations import write_iterations
 
 
 def read_back(path):

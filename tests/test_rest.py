@@ -12,9 +12,9 @@ from sog_cases import random_views
 
 from sogjax.actor.colors import colored
 from sogjax.energy.posed import Frame, History, Posed
-from sogjax.energy.rest import REST_SPREAD, RestPenalty, pose_spread
+from sogjax.energy.priors import REST_SPREAD, RestPenalty, pose_spread
 from sogjax.energy.term import Term
-from sogjax.solve import GaussNewton
+from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.tracking.culling import Capacities
 
 HEAD_BENT = {"neck_bend": 0.6, "head_bend": 0.5}

@@ -16,12 +16,12 @@ from command_line import actor_file, done, refused, trackable
 from slow_values import fast_and_slow
 from small_recording import write_video
 
-from sogjax.app.cli import main
-from sogjax.data import array_log
-from sogjax.data.motion import Motion, load_motion
-from sogjax.engine import job, kept_run, run_job, streams
-from sogjax.engine import track as track_command
-from sogjax.settings import ColorConfig
+from sogjax.cli.main import main
+from sogjax.io import array_log
+from sogjax.io.motion import Motion, load_motion
+from sogjax.run import job, kept_run, run_job, streams
+from sogjax.run import track as track_command
+from sogjax.settings.method import ColorConfig
 from sogjax.tracking import frame_by_frame
 from sogjax.tracking.culling import Capacities
 

@@ -5,16 +5,17 @@ import numpy as np
 import pytest
 from command_line import actor_file, done, trackable
 
-from sogjax.data.motion import load_motion
-from sogjax.data.recording import open_recording
-from sogjax.engine import revision, track
-from sogjax.engine.build import cell_grids
-from sogjax.engine.cells import cells_of_clip
-from sogjax.engine.job import Job
 from sogjax.errors import InputError
-from sogjax.settings import ColorConfig, ImagesConfig, TrackConfig
-from sogjax.tracking.both_ways import Revised, Revision
-from sogjax.tracking.limb_doubt import Judgement
+from sogjax.io.motion import load_motion
+from sogjax.io.recording import open_recording
+from sogjax.quality.limb_confidence import Judgement
+from sogjax.run import revision, track
+from sogjax.run.build import cell_grids
+from sogjax.run.cells import cells_of_clip
+from sogjax.run.job import Job
+from sogjax.search.merge_passes import Revised, Revision
+from sogjax.settings.method import ColorConfig, ImagesConfig
+from sogjax.settings.run import TrackConfig
 
 FRAMES, ROW, FARTHER = 12, 5, 0.25
 SMALL = ("images.depth=4", "solver.max_iterations=3", "solver.min_iterations=1", "outputs.bvh=false")

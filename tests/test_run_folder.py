@@ -8,10 +8,10 @@ import pytest
 from command_line import actor_file, done, refused, trackable
 from motion_cases import walking_motion
 
-from sogjax.data.motion import load_motion, save_motion
-from sogjax.engine.kept_run import NOTE
-from sogjax.engine.run_folder import LOCK, run_folder
 from sogjax.errors import InputError
+from sogjax.io.motion import load_motion, save_motion
+from sogjax.run.kept_run import NOTE
+from sogjax.run.run_folder import LOCK, run_folder
 
 SMALL = (
     *("images.depth=4", "solver.max_iterations=2", "solver.min_iterations=1"),
@@ -104,7 +104,7 @@ def test_the_lock_of_a_killed_process_blocks_nobody(capsys, tmp_path, command):
     hold = f"""
 import time
 from pathlib import Path
-from sogjax.engine.run_folder import run_folder
+from sogjax.run.run_folder import run_folder
 with run_folder(Path({str(tmp_path / "run")!r})):
     print("held", flush=True)
     time.sleep(600)

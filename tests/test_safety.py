@@ -13,15 +13,15 @@ import yaml
 from command_line import actor_file, refused, trackable
 from small_recording import make_recording, toml_camera, write_calibration, write_image
 
-from sogjax.data.actor_file import load_body
-from sogjax.data.array_log import CONSTANT, ROWS, read_log
-from sogjax.data.calibration import load_calibration
-from sogjax.data.file_names import objection
-from sogjax.data.image_file import claimed_size, read_image
-from sogjax.data.npz_file import read_npz
-from sogjax.data.recording import open_recording
-from sogjax.data.yaml_entry import read_yaml
 from sogjax.errors import InputError
+from sogjax.io.actor_file import load_body
+from sogjax.io.array_log import CONSTANT, ROWS, read_log
+from sogjax.io.calibration.load import load_calibration
+from sogjax.io.files import objection
+from sogjax.io.image_file import claimed_size, read_image
+from sogjax.io.npz_file import read_npz
+from sogjax.io.recording import open_recording
+from sogjax.io.yaml_entry import read_yaml
 
 LEADING_OUT = ("../../x", "..", "a/b", "/etc/passwd", "..\\x", "a\0b", "x" * 300, ".hidden", "a\nb", "é" * 80)
 PLAIN = ("cam01", "left camera", "Kamera (1)", "カメラ1", "a.b-c_d")
@@ -190,7 +190,7 @@ def test_an_actor_with_too_many_joints_is_refused(tmp_path):
 
 
 def test_a_video_that_claims_too_many_pixels_is_refused(tmp_path, monkeypatch):
-    from sogjax.data import video_file
+    from sogjax.io import video_file
 
     recording = make_recording(tmp_path / "walk")
     monkeypatch.setattr(video_file, "MAX_PIXELS", 64 * 48 - 1)

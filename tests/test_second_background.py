@@ -4,10 +4,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from sogjax.engine import second_background
-from sogjax.engine.job import Job
-from sogjax.engine.kept_run import KeptRun
-from sogjax.settings import ImagesConfig
+from sogjax.run import second_background
+from sogjax.run.job import Job
+from sogjax.run.kept_run import KeptRun
+from sogjax.settings.method import ImagesConfig
 from sogjax.tracking.tracker import Tracker
 
 

@@ -5,9 +5,10 @@ import numpy as np
 from command_line import done, refused
 from rig_cases import ring_rig
 
-from sogjax.data.image_file import read_mask
-from sogjax.synth import SynthSettings, render_recording
-from sogjax.view.contact_sheet import GREEN, TITLE_HEIGHT, Tile, contact_sheet
+from sogjax.io.image_file import read_mask
+from sogjax.synth.render import render_recording
+from sogjax.synth.settings import SynthSettings
+from sogjax.view.sheets import GREEN, TITLE_HEIGHT, Tile, contact_sheet
 
 
 def iou(a, b):

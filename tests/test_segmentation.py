@@ -8,11 +8,19 @@ from body_cases import posed, shipped
 from drawn_scene import draw, in_colors, standing
 from rig_cases import opencv_pixels, ring_rig
 
-from sogjax.images.agreement import disagreeing_cameras, hull_coverage
-from sogjax.images.plate_difference import plate_difference
-from sogjax.images.segmentation import masks_from_plates
-from sogjax.images.visual_hull import VOXELS, Cube, cube_around, resized, voxel_pixels, without_floor
 from sogjax.model.camera import distort, project_points
+from sogjax.scene.plate_difference import plate_difference
+from sogjax.scene.segmentation import masks_from_plates
+from sogjax.scene.visual_hull import (
+    VOXELS,
+    Cube,
+    cube_around,
+    disagreeing_cameras,
+    hull_coverage,
+    resized,
+    voxel_pixels,
+    without_floor,
+)
 
 UP = np.array([0.0, 0.0, 1.0])
 FLESH = 1.5

@@ -2,7 +2,7 @@
 
 import pytest
 
-from sogjax.sentences import counted
+from sogjax.errors import counted
 
 
 @pytest.mark.parametrize(("count", "words"), [(0, "0 frames"), (1, "1 frame"), (2, "2 frames")])

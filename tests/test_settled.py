@@ -6,12 +6,12 @@ from command_line import actor_file, done, trackable
 from test_resume import SMALL, assert_same, stop_after
 from test_revision import ROW, moved_farther
 
-from sogjax.adjust.adjustment import Adjusted
-from sogjax.app.cli import main
-from sogjax.data.actor_file import load_body
-from sogjax.data.motion import load_motion
-from sogjax.data.recording import open_recording
-from sogjax.engine import adjust_clip, revision, track
+from sogjax.cli.main import main
+from sogjax.io.actor_file import load_body
+from sogjax.io.motion import load_motion
+from sogjax.io.recording import open_recording
+from sogjax.refine.adjustment import Adjusted
+from sogjax.run import adjust_clip, revision, track
 from sogjax.settings.compose import track_config
 from sogjax.tracking import frame_by_frame
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from body_cases import random_body, reference_points, shipped
 
-from sogjax.actor.shape import ShapeModel
+from sogjax.model.shape import ShapeModel
 
 BODIES = {"human": shipped("human"), "dog": shipped("dog"), "random": random_body(0)}
 

@@ -5,8 +5,8 @@ import time
 
 import pytest
 
-from sogjax.engine import terminal
-from sogjax.engine.terminal import Work, alive, bar, progress, remaining
+from sogjax.run import terminal
+from sogjax.run.terminal import Work, alive, bar, progress, remaining
 
 
 class Terminal(io.StringIO):

@@ -9,11 +9,10 @@ from body_cases import shipped
 from rig_cases import ring_rig
 
 from sogjax.actor.coverage import Silhouettes, _covered, _seen, _times_cap, mismatch
-from sogjax.actor.shape import LENGTH_SPREAD, ShapeModel
-from sogjax.actor.silhouette_cells import MAX_CELLS, cells_of
-from sogjax.actor.silhouette_fit import SilhouetteFit, fitted
+from sogjax.actor.silhouette_fit import MAX_CELLS, SilhouetteFit, cells_of, fitted
 from sogjax.model.camera import project
-from sogjax.tracking.scales import pose_scales
+from sogjax.model.shape import LENGTH_SPREAD, ShapeModel
+from sogjax.tracking.solving import pose_scales
 
 GRADIENT = 2e-3
 """Relative, float32."""

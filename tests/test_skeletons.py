@@ -14,13 +14,13 @@ from hypothesis import given
 from scipy.spatial.transform import Rotation
 from skeleton_cases import BVH, DOF_TEXT, DOFS, JOINTS, MARKERS, MOTION, skeleton_text
 
-from sogjax.actor.shape import ShapeModel
-from sogjax.data.actor_file import load_body, save_body
-from sogjax.data.motion import load_motion
-from sogjax.data.skeletons import read_skeleton
-from sogjax.data.skeletool_motion import read_skeletool_motion
 from sogjax.errors import InputError
-from sogjax.model.frames import world_from_upright
+from sogjax.io.actor_file import load_body, save_body
+from sogjax.io.motion import load_motion
+from sogjax.io.skeletons.load import read_skeleton
+from sogjax.io.skeletons.skeletool_motion import read_skeletool_motion
+from sogjax.model.rotation import world_from_upright
+from sogjax.model.shape import ShapeModel
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore", PendingDeprecationWarning)  # of PyGLM, which bvhio imports by its old name

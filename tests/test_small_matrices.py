@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from sogjax.compiled.small_matrices import applied, product
+from sogjax.model.compiled import applied, product
 
 
 @pytest.mark.parametrize("shapes", [((7, 4, 4), (7, 4, 4)), ((1, 2, 3), (5, 3, 6)), ((5, 3, 3), (5, 3, 3))])

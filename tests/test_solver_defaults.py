@@ -5,10 +5,12 @@ import jax
 import numpy as np
 import pytest
 
-from sogjax.app.config.composition import composed
-from sogjax.energy import standard_terms
-from sogjax.engine import build
-from sogjax.solve import ConditionedAscent, GaussNewton, OptimistixSolver, gradient_ascent
+from sogjax.cli.config.composition import composed
+from sogjax.energy.frame_energy import standard_terms
+from sogjax.run import build
+from sogjax.solve.ascent import ConditionedAscent, gradient_ascent
+from sogjax.solve.gauss_newton import GaussNewton
+from sogjax.solve.optimistix import OptimistixSolver
 
 SOLVERS = {
     "gauss_newton": GaussNewton,

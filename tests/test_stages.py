@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from sogjax.data.stages import Behind, ahead
+from sogjax.io.threads import Behind, ahead
 
 
 @pytest.fixture(autouse=True)

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from command_line import actor_file, trackable
 
-from sogjax.app.cli import main
-from sogjax.data.motion import Motion, load_motion
-from sogjax.data.source import look_at_source
-from sogjax.engine import pipeline, run_job
+from sogjax.cli.main import main
 from sogjax.errors import InputError
+from sogjax.io.motion import Motion, load_motion
+from sogjax.io.source import look_at_source
+from sogjax.run import pipeline, run_job
 from sogjax.view.overlay_video import OverlayVideo
 
 FRAMES, LAST_GOOD = 14, 10

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from command_line import actor_file
 
-from sogjax.app.config.composition import composed
-from sogjax.engine.build import check
+from sogjax.cli.config.composition import composed
 from sogjax.errors import InputError
-from sogjax.settings import TrackConfig
+from sogjax.run.build import check
+from sogjax.settings.run import TrackConfig
 from sogjax.study import record as records
 from sogjax.study.document import Picture, Section, write_html, write_markdown
 from sogjax.study.experiment import Experiment, ExperimentConfig, RowConfig, experiment_names
@@ -23,7 +23,8 @@ from sogjax.study.source import Source, source_named
 from sogjax.study.study import Study
 from sogjax.study.summary import pooled_std, summarized
 from sogjax.study.table import difference_words, findings, markdown_table, significance
-from sogjax.synth import SynthSettings, render_recording
+from sogjax.synth.render import render_recording
+from sogjax.synth.settings import SynthSettings
 
 STUDY = Path(__file__).resolve().parents[1] / "experiments" / "study.py"
 SMALL = ("images.depth=5", "solver.max_iterations=12")

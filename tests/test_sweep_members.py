@@ -4,7 +4,7 @@ import pytest
 from command_line import refused
 from hydra.core.override_parser.overrides_parser import OverridesParser
 
-from sogjax.app.sweep.run import _members
+from sogjax.cli.sweep.run import _members
 
 
 def members(*words):

@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from sogjax.app.sweep import results as sweep_results
-from sogjax.app.sweep.results import Failure, Member, finish_sweep
-from sogjax.engine.run_numbers import COLUMNS, Numbers
+from sogjax.cli.sweep import results as sweep_results
+from sogjax.cli.sweep.results import Failure, Member, finish_sweep
+from sogjax.run.run_numbers import COLUMNS, Numbers
 from sogjax.view.plots import SIZE, plot_per_point
 
 

@@ -13,16 +13,15 @@ import pytest
 from command_line import refused, trackable
 from motion_cases import walking_motion
 
-from sogjax.app.sweep import run as sweep_run
-from sogjax.app.sweep.distances import distances_to_first
-from sogjax.app.sweep.results import APART, Failure, Member, finish_sweep, keep_result, kept_results
-from sogjax.data.motion import save_motion
-from sogjax.data.recording import open_recording
-from sogjax.engine import background, build, shared_start
-from sogjax.engine.run_numbers import COLUMNS, Numbers
-from sogjax.engine.shared_start import forget_shared_openings, shared_opening
-from sogjax.settings import ImagesConfig
+from sogjax.cli.sweep import run as sweep_run
+from sogjax.cli.sweep.results import APART, Failure, Member, distances_to_first, finish_sweep, keep_result, kept_results
+from sogjax.io.motion import save_motion
+from sogjax.io.recording import open_recording
+from sogjax.run import background, build, shared_start
+from sogjax.run.run_numbers import COLUMNS, Numbers
+from sogjax.run.shared_start import forget_shared_openings, shared_opening
 from sogjax.settings.compose import track_config
+from sogjax.settings.method import ImagesConfig
 
 UNKNOWN = float("nan")
 

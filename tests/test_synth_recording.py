@@ -8,20 +8,23 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from sogjax.data.calibration.rig import CameraEntry, rig_from_entries
-from sogjax.data.ground_truth import load_ground_truth
-from sogjax.data.initial_pose import load_initial_poses
-from sogjax.data.recording import open_recording
-from sogjax.data.video import read_frames, read_image, read_mask
 from sogjax.errors import InputError
+from sogjax.io.cache_folder import default_cache_dir
+from sogjax.io.calibration.rig import CameraEntry, rig_from_entries
+from sogjax.io.ground_truth import load_ground_truth
+from sogjax.io.image_file import read_image, read_mask
+from sogjax.io.initial_pose import load_initial_poses
+from sogjax.io.recording import open_recording
+from sogjax.io.video import read_frames
 from sogjax.model.camera import distort, project_points
-from sogjax.synth import SynthSettings, cached_recording, default_cache_dir, render_recording
 from sogjax.synth import render as render_module
-from sogjax.synth.cache import cache_name
+from sogjax.synth.cache import cache_name, cached_recording
 from sogjax.synth.figure import Mesh
 from sogjax.synth.light import ShadowMap
 from sogjax.synth.plate import plate_of
+from sogjax.synth.render import render_recording
 from sogjax.synth.scene import Scene
+from sogjax.synth.settings import SynthSettings
 from sogjax.synth.stage import stage_of
 from sogjax.synth.textures import Texture
 from sogjax.synth.views import ring_of_views

@@ -9,16 +9,18 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from sogjax.data.recording import open_recording
-from sogjax.data.video import read_frames, read_image
 from sogjax.errors import InputError
-from sogjax.synth import SynthSettings, render_recording
+from sogjax.io.image_file import read_image
+from sogjax.io.recording import open_recording
+from sogjax.io.video import read_frames
 from sogjax.synth.cache import cache_name
 from sogjax.synth.clothes import outfits_from_seed
 from sogjax.synth.filming import film
 from sogjax.synth.flesh import PARTS
 from sogjax.synth.picture import Shadows, mask_of, shot_of
 from sogjax.synth.plate import plate_of
+from sogjax.synth.render import render_recording
+from sogjax.synth.settings import SynthSettings
 from sogjax.synth.stage import stage_of
 
 SMALL = SynthSettings(cameras=4, width=120, height=90, frames=3, seed=2, noise=0.0, camera_variation=0.0)

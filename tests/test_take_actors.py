@@ -9,13 +9,13 @@ import yaml
 from command_line import actor_file
 from small_recording import named_recording
 
-from sogjax.app import actor as actor_command
-from sogjax.app.sweep import actors
-from sogjax.data.actor_file import load_body
-from sogjax.data.subject_names import posed_subjects
+from sogjax.cli import actor as actor_command
+from sogjax.cli.sweep import actors
 from sogjax.errors import InputError
+from sogjax.io.actor_file import load_body
+from sogjax.io.recording_settings import posed_subjects
 from sogjax.model.body import Body
-from sogjax.settings import ActorConfig, TrackConfig
+from sogjax.settings.run import ActorConfig, TrackConfig
 
 
 @pytest.fixture

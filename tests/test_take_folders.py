@@ -7,8 +7,8 @@ import pytest
 from command_line import refused
 from small_recording import named_recording
 
-from sogjax.app.sweep.folders import places_of, recordings_in, root_of, with_folders
-from sogjax.app.sweep.takes import is_of_takes
+from sogjax.cli.sweep.folders import places_of, recordings_in, root_of, with_folders
+from sogjax.cli.sweep.takes import is_of_takes
 from sogjax.errors import InputError
 
 

@@ -8,12 +8,11 @@ import pytest
 from command_line import actor_file, refused, trackable
 from rendered_person import rendered_person
 
-from sogjax.app.cli import main
-from sogjax.app.sweep import takes
-from sogjax.app.sweep.results import Member
-from sogjax.app.sweep.take_rows import keep_row, row_of
-from sogjax.app.sweep.take_table import NO_RESULT
-from sogjax.engine.kept_run import write_note
+from sogjax.cli.main import main
+from sogjax.cli.sweep import takes
+from sogjax.cli.sweep.results import Member
+from sogjax.cli.sweep.take_table import NO_RESULT, keep_row, row_of
+from sogjax.run.kept_run import write_note
 
 FAST = (
     *("solver.max_iterations=20", "images.depth=6", "outputs.motion_only=true"),

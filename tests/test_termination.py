@@ -6,9 +6,8 @@ import time
 
 import pytest
 
-from sogjax.app import track
-from sogjax.app.cli import main
-from sogjax.engine.termination import TerminatedError, terminated_as_interrupted
+from sogjax.cli import track
+from sogjax.cli.main import TerminatedError, main, terminated_as_interrupted
 
 
 def terminate(*_):

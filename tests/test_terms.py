@@ -14,14 +14,14 @@ from rig_cases import ring_rig
 from slow_values import fast_and_slow
 from sog_cases import floats, in_float64, random_views
 
-from sogjax.energy.added import added_terms
 from sogjax.energy.frame_energy import FrameEnergy, standard_terms
 from sogjax.energy.posed import History, Posed
-from sogjax.energy.term import Penalty, Term
+from sogjax.energy.term import Penalty, Term, added_terms
 from sogjax.errors import InputError
-from sogjax.solve import ConditionedAscent, GaussNewton, OptimistixSolver, gradient_ascent
-from sogjax.tracking.rounds import solve_near
-from sogjax.tracking.scales import pose_scales
+from sogjax.solve.ascent import ConditionedAscent, gradient_ascent
+from sogjax.solve.gauss_newton import GaussNewton
+from sogjax.solve.optimistix import OptimistixSolver
+from sogjax.tracking.solving import pose_scales, solve_near
 
 HEIGHT = 0.9
 

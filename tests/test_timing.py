@@ -2,7 +2,7 @@
 
 import pytest
 
-from sogjax.engine.timing import StageTimes
+from sogjax.run.clock import StageTimes
 
 
 def times(**seconds):

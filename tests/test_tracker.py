@@ -13,7 +13,8 @@ from rig_cases import ring_rig
 
 from sogjax.energy.frame_energy import standard_terms
 from sogjax.model.body import concatenate, dof_slices
-from sogjax.solve import GaussNewton, Solution
+from sogjax.solve.gauss_newton import GaussNewton
+from sogjax.solve.solution import Solution
 from sogjax.tracking import frame_by_frame
 from sogjax.tracking.culling import CAPACITIES, Capacities
 from sogjax.tracking.frame import TrackState

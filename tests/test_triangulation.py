@@ -5,9 +5,10 @@ import pytest
 from keypoint_cases import STANDING
 from rig_cases import opencv_pixels, ring_rig
 
-from sogjax.data.keypoints import Keypoints, named_scheme
-from sogjax.tracking.keypoint_people import triangulated_people
-from sogjax.tracking.triangulation import Rays, interpolated, poses_of, rays_of, triangulated
+from sogjax.io.keypoints.load import Keypoints
+from sogjax.io.keypoints.scheme import named_scheme
+from sogjax.search.keypoint_people import triangulated_people
+from sogjax.search.triangulation import Rays, interpolated, poses_of, rays_of, triangulated
 
 EXACT = 1e-3
 """Metres; pixels pass through float32 when they are undistorted."""

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from rig_cases import opencv_pixels, recording_of, ring_rig
 
-from sogjax.data.ground_truth import GroundTruth
-from sogjax.data.keypoints import Keypoints, named_scheme
+from sogjax.io.ground_truth import GroundTruth
+from sogjax.io.keypoints.load import Keypoints
+from sogjax.io.keypoints.scheme import named_scheme
 from sogjax.study.triangulation_trials import filled, filtered, together, triangulation_errors
 
 FRAMES = 30

@@ -11,11 +11,11 @@ from body_cases import shipped
 from motion_cases import walking_motion
 from rig_cases import ring_rig
 
-from sogjax.app.actor import actor_verdict
-from sogjax.engine.verdict import kept_verdicts, say_if_other_subject
-from sogjax.evaluation.numbers import write_json
-from sogjax.evaluation.strained import Limits
-from sogjax.evaluation.verdict import verdicts, worst_frames
+from sogjax.cli.actor import actor_verdict
+from sogjax.quality.limb_warnings import Limits
+from sogjax.quality.numbers import write_json
+from sogjax.quality.verdict import verdicts, worst_frames
+from sogjax.run.verdict import kept_verdicts, say_if_other_subject
 from sogjax.view.closeups import HEIGHT, closeups
 
 CAMERAS = ("left", "right")

@@ -12,14 +12,14 @@ from motion_cases import walking_motion
 from small_recording import make_recording
 from tiny_body import make_body
 
-from sogjax.data.ground_truth import GroundTruth
-from sogjax.data.motion import motion_from_poses
 from sogjax.errors import InputError
-from sogjax.evaluation.verdict import verdicts
+from sogjax.io.ground_truth import GroundTruth
+from sogjax.io.motion import motion_from_poses
+from sogjax.quality.verdict import verdicts
 from sogjax.study import verdict_trials
 from sogjax.study.verdict_trials import CASES, VerdictTrial, VerdictTrials, judged_run, scaled
 from sogjax.study.verdicts import limb_errors
-from sogjax.synth import SynthSettings
+from sogjax.synth.settings import SynthSettings
 
 NAMES = ("left_elbow", "right_elbow", "root_tx")
 TRIAL = VerdictTrial("walk", 4, "pictures", "own actor")

@@ -23,11 +23,12 @@ from small_recording import (
     write_video,
 )
 
-from sogjax.data import image_folder
-from sogjax.data.recording import open_recording
-from sogjax.data.video import VideoWriter, read_frames, read_image, read_mask
-from sogjax.data.video_file import frame_times
 from sogjax.errors import InputError
+from sogjax.io import image_folder
+from sogjax.io.image_file import read_image, read_mask
+from sogjax.io.recording import open_recording
+from sogjax.io.video import VideoWriter, read_frames
+from sogjax.io.video_file import frame_times
 
 
 def frames_read(recording, *span):

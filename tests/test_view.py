@@ -9,9 +9,9 @@ from command_line import done, refused
 from motion_cases import walking_motion
 from small_recording import make_recording
 
-from sogjax.app import view
-from sogjax.app.cli import main
-from sogjax.data.motion import save_motion
+from sogjax.cli import view
+from sogjax.cli.main import main
+from sogjax.io.motion import save_motion
 
 
 @pytest.fixture

@@ -220,7 +220,7 @@ def test_an_example_pose_with_something_wrong(capsys, recording, command, change
 
 def refused_track_lines(capsys, recording, *arguments):
     """As `refused_track`, where the work has begun to report what it does."""
-    from sogjax.app.cli import main
+    from sogjax.cli.main import main
 
     assert main(["track", f"recording={recording}", f"out={recording.parent / 'new'}", *arguments]) == 2
     assert not (recording.parent / "new").exists()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sogjax.images.yuv_means import DROPPED, WEIGHTS, rgb_of_means
+from sogjax.scene.cells import DROPPED, WEIGHTS, rgb_of_means
 
 
 def channels(rgb, standard, full_range):

@@ -8,11 +8,11 @@ from body_cases import shipped
 from drawn_scene import cells_of, draw, in_colors, make_tracker, standing
 from rig_cases import ring_rig
 
-from sogjax.images.foreground import subject_colors
-from sogjax.solve import GaussNewton
-from sogjax.tracking.backward_pass import Pass
+from sogjax.quality.limb_evidence import JudgedLimbs
+from sogjax.scene.foreground import subject_colors
+from sogjax.search.backward_pass import Pass
+from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.tracking.frame_by_frame import track
-from sogjax.tracking.judged_limbs import JudgedLimbs
 
 DEPTH = 6
 FRAMES = 12

@@ -3,6 +3,8 @@
 In the terms of Eq. 8: a cell of the picture is an image blob, and the body covers it where the sum of the overlaps
 reaches the cap. Eq. 9 counts that sum up to the cap, so it hardly tells where the edge of the body is; here the sum
 goes through a step at the cap, so that the edge of the body is compared with the edge of the mask.
+
+The silhouette that a body casts, and how well it covers a mask.
 """
 
 from typing import NamedTuple
@@ -10,11 +12,15 @@ from typing import NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from sogjax.energy.overlap import EXACT_EXPONENT, overlaps, self_overlaps
-from sogjax.model.camera import Camera, project_points
+from sogjax.model.body import Body
+from sogjax.model.camera import Camera, distort, project, project_points
 from sogjax.model.sog import Sog
+from sogjax.scene.plate_difference import reduced_mask
+from sogjax.scene.visual_hull import resized
 
 SHARPNESS = 4.0
 """Power of the step: covered = t^4 / (1 + t^4) where the overlaps are t times the cap. At t = 1 the body's Gaussians
@@ -127,3 +133,41 @@ def _camera_equations(blobs, jacobian, camera, means, sigmas, coverage, mask) ->
     gradient = product(chain.T, product(by_seen, weights * difference))
     matrix = product(chain.T, product(product(by_seen * weights[None, :], by_seen.T), chain))
     return NormalEquations(jnp.sum(weights * difference**2), gradient, matrix)
+
+
+BODY_LEVEL = 0.5
+"""Where the sum of the projected Gaussians is above this, the picture shows body: the sizes in body files mean that."""
+
+
+def silhouette_iou(
+    body: Body, pose: Float[Array, "dof"], camera: Camera, mask: Bool[np.ndarray, "height width"]
+) -> float:
+    """Intersection over union of the body's silhouette and a mask of the camera's picture, as recorded."""
+    small = reduced_mask(mask)
+    return overlap_ratio(body_silhouette(body, pose, camera, small.shape), small)
+
+
+def overlap_ratio(first: Bool[np.ndarray, "rows columns"], second: Bool[np.ndarray, "rows columns"]) -> float:
+    """Intersection over union; 0 where both are empty."""
+    return float((first & second).sum() / max((first | second).sum(), 1))
+
+
+def body_silhouette(
+    body: Body, pose: Float[Array, "dof"], camera: Camera, shape: tuple[int, int]
+) -> Bool[np.ndarray, "rows columns"]:
+    """Where the body is visible in the camera's picture as recorded, resized to (rows, columns)."""
+    return np.asarray(_coverage(body, pose, resized(camera, (shape[1], shape[0])), shape)) > BODY_LEVEL
+
+
+@eqx.filter_jit
+def _coverage(
+    body: Body, pose: Float[Array, "dof"], camera: Camera, shape: tuple[int, int]
+) -> Float[Array, "rows columns"]:
+    """The sum of the projected Gaussians; each is a product of one along the rows and one along the columns."""
+    seen = project(camera, body.posed_blobs(pose))
+    means = distort(camera, seen.means)
+    along = lambda axis, count: jnp.exp(
+        -0.5 * ((jnp.arange(count, dtype=means.dtype)[None, :] - means[:, axis, None]) / seen.sigmas[:, None]) ** 2
+    )
+    rows, columns = along(1, shape[0]), along(0, shape[1])
+    return jnp.matmul(jnp.where(seen.mask[:, None], rows, 0.0).T, columns, precision="highest")

@@ -8,15 +8,15 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, UInt8
 
-from sogjax.data.image_file import read_mask
-from sogjax.data.recording import ExamplePose, Recording
-from sogjax.data.video import read_still
-from sogjax.errors import InputError
-from sogjax.images.agreement import AGREEING, disagreeing_cameras, hull_coverage
-from sogjax.images.background import CameraBackground
-from sogjax.images.segmentation import largest_parts, masks_from_plates
-from sogjax.model.frames import axis_vector
-from sogjax.sentences import counted
+from sogjax.errors import InputError, counted
+from sogjax.io.example_poses import ExamplePose
+from sogjax.io.image_file import read_mask
+from sogjax.io.recording import Recording
+from sogjax.io.video import read_still
+from sogjax.model.rotation import axis_vector
+from sogjax.scene.background import CameraBackground
+from sogjax.scene.segmentation import largest_parts, masks_from_plates
+from sogjax.scene.visual_hull import AGREEING, disagreeing_cameras, hull_coverage
 
 FROM_FILE, FROM_PLATE, FROM_CLIP = "file", "plate", "background from the clip"
 

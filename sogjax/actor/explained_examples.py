@@ -10,12 +10,11 @@ from jaxtyping import Array, Bool, Float, UInt8
 
 from sogjax.actor.silhouettes import PosedPictures
 from sogjax.energy.posed import Posed
-from sogjax.images.foreground import subject_colors
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
-from sogjax.tracking.frame_fit import frame_fit
-from sogjax.tracking.judged_limbs import JudgedLimbs
-from sogjax.tracking.limb_evidence import blob_evidence
+from sogjax.quality.limb_confidence import frame_fit
+from sogjax.quality.limb_evidence import JudgedLimbs, blob_evidence
+from sogjax.scene.foreground import subject_colors
 
 ROWS = 160
 """Cells of a picture's height, about: colours are compared as tracking compares them."""

@@ -9,9 +9,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.ndimage import center_of_mass, label
 
-from sogjax.images.segmentation import MANY, is_subject, largest_parts
-from sogjax.images.visual_hull import VOXELS, Cube, cube_around, voxel_pixels
 from sogjax.model.camera import Camera
+from sogjax.scene.segmentation import MANY, is_subject, largest_parts
+from sogjax.scene.visual_hull import VOXELS, Cube, cube_around, voxel_pixels
 
 SMALLEST_BODY = 0.1
 """Volume of a separate part of a hull, as a share of the largest, from which on it may be somebody else."""

@@ -6,9 +6,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from sogjax.actor.shape import ShapeModel
-from sogjax.data.keypoints import KeypointScheme
-from sogjax.tracking.keypoint_pose import measured_lengths
+from sogjax.io.keypoints.scheme import KeypointScheme
+from sogjax.model.shape import ShapeModel
+from sogjax.search.keypoint_pose import measured_lengths
 
 LENGTH_NOISE = 0.04
 """Expected deviation of a measured length, as a share of it: detectors' joints are not quite the body's."""

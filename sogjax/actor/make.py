@@ -9,25 +9,19 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from sogjax.actor.colors import back_projected_colors, colored
-from sogjax.actor.estimate import Estimate, estimate_shape
 from sogjax.actor.explained_examples import explained_examples
 from sogjax.actor.posed_examples import Progress, Report, agreement, colored_views, found_best, rough_poses
-from sogjax.actor.shape import ShapeModel
-from sogjax.actor.silhouette_cells import silhouettes_of
-from sogjax.actor.silhouettes import (
-    FINE_DEPTH,
-    PosedPictures,
-    load_pictures,
-    silhouette_views,
-    stack_views,
-)
-from sogjax.data.recording import ExamplePose, Recording
+from sogjax.actor.silhouette_fit import Estimate, estimate_shape, silhouettes_of
+from sogjax.actor.silhouettes import FINE_DEPTH, PosedPictures, load_pictures, silhouette_views, stack_views
 from sogjax.energy.term import Terms
 from sogjax.errors import InputError
-from sogjax.images.background import CameraBackground
+from sogjax.io.example_poses import ExamplePose
+from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
-from sogjax.model.frames import world_from_upright
+from sogjax.model.rotation import world_from_upright
+from sogjax.model.shape import ShapeModel
+from sogjax.scene.background import CameraBackground
 
 POSE_FOUND = 0.5
 """Least IoU of masks and silhouettes, the mean over the cameras. Good fits have 0.8 to 0.9."""

@@ -7,15 +7,15 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from sogjax.actor.colors import ColoredView, camera_of
-from sogjax.actor.example_pose import poses_from_silhouettes, starts_at
-from sogjax.actor.facing import consistent_ways, side_colors
-from sogjax.actor.silhouette_iou import silhouette_iou
+from sogjax.actor.coverage import silhouette_iou
+from sogjax.actor.example_pose import consistent_ways, poses_from_silhouettes, side_colors, starts_at
 from sogjax.actor.silhouettes import COARSE_DEPTH, PosedPictures, silhouette_views, subject_centre
-from sogjax.data.recording import ExamplePose, Recording
 from sogjax.energy.term import Terms
+from sogjax.io.example_poses import ExamplePose
+from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
-from sogjax.tracking.initial_pose import rough_pose
+from sogjax.search.rough_pose import rough_pose
 
 Report = Callable[[str], None]
 Progress = Callable[[Iterable[Any], int, str], Iterable[Any]]

@@ -7,11 +7,11 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Array, Float
 
-from sogjax.actor.bones import bone_lengths
-from sogjax.actor.silhouette_iou import silhouette_iou
+from sogjax.actor.coverage import silhouette_iou
 from sogjax.actor.silhouettes import PosedPictures
-from sogjax.data.calibration import CameraRig
+from sogjax.io.calibration.rig import CameraRig
 from sogjax.model.body import Body
+from sogjax.model.bones import bone_lengths
 
 UNDETERMINED = 0.95
 """A shape parameter whose deviation is above this share of what was expected without pictures."""

@@ -1,16 +1,98 @@
-"""All example poses and one shape, fitted to the edges of the masks by Gauss-Newton steps."""
+"""Masks cut into cells of equal size around the subject.
 
+All example poses and one shape, fitted to the edges of the masks by Gauss-Newton steps.
+
+An actor from example poses (Section 5.2): all poses and one set of shape parameters, climbed together.
+
+First Eq. 9 on the binary colours of the silhouettes, which forgives a start that is far off; then the edges of the
+silhouettes themselves, which say exactly where limbs end.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import cv2
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.actor.coverage import Silhouettes, mismatch, mismatch_equations
-from sogjax.actor.shape import ShapeModel
-from sogjax.energy.limits import limit_penalty
-from sogjax.energy.rest import pose_spread
-from sogjax.solve import GaussNewton, QuadraticModel, Scales, Solution
+from sogjax.actor.silhouettes import PosedPictures
+from sogjax.energy.frame_energy import still_energy
+from sogjax.energy.priors import limit_penalty, pose_spread
+from sogjax.energy.term import Terms
+from sogjax.energy.views import Views
+from sogjax.model.camera import Camera, undistort, undistorted_sizes
+from sogjax.model.shape import ShapeModel
+from sogjax.solve.ascent import ConditionedAscent
+from sogjax.solve.gauss_newton import GaussNewton
+from sogjax.solve.solution import QuadraticModel, Scales, Solution
+from sogjax.tracking.solving import pose_scales
+
+MAX_CELLS = 2048
+"""For each camera."""
+BORDER = 0.12
+"""Border around the subject's box, as a part of its longer side."""
+
+
+def silhouettes_of(pictures: Sequence[PosedPictures], rig: Camera) -> Silhouettes:
+    """The masks of all poses, with a leading axis for the poses."""
+    poses = [_pose_cells(posed, int(rig.image_size.shape[0])) for posed in pictures]
+    means, sigmas, coverage, mask = (np.stack(part) for part in zip(*poses, strict=True))
+    dtype = rig.intrinsics.dtype
+    as_dtype = lambda array: jnp.asarray(array, dtype)
+    undistorted, sigmas = _undistorted(rig, as_dtype(means), as_dtype(sigmas))
+    repeated = lambda leaf: jnp.asarray(np.broadcast_to(np.asarray(leaf), (len(pictures), *leaf.shape)))
+    return Silhouettes(jax.tree.map(repeated, rig), undistorted, sigmas, as_dtype(coverage), jnp.asarray(mask))
+
+
+@eqx.filter_jit
+def _undistorted(
+    rig: Camera, means: Float[Array, "pose camera cell 2"], sigmas: Float[Array, "pose camera cell"]
+) -> tuple[Float[Array, "pose camera cell 2"], Float[Array, "pose camera cell"]]:
+    by_pose = lambda of_camera, *arrays: jax.vmap(lambda *of_pose: jax.vmap(of_camera)(rig, *of_pose))(*arrays)
+    return by_pose(undistort, means), by_pose(undistorted_sizes, means, sigmas)
+
+
+def _pose_cells(pictures: PosedPictures, num_cameras: int) -> tuple[np.ndarray, ...]:
+    means = np.zeros((num_cameras, MAX_CELLS, 2))
+    sigmas, coverage = np.ones((num_cameras, MAX_CELLS)), np.zeros((num_cameras, MAX_CELLS))
+    mask = np.zeros((num_cameras, MAX_CELLS), bool)
+    for camera, picture in pictures.masks.items():
+        centres, sigma, covered = cells_of(picture)
+        count = len(covered)
+        means[camera, :count], sigmas[camera, :count], coverage[camera, :count] = centres, sigma, covered
+        mask[camera, :count] = True
+    return means, sigmas, coverage, mask
+
+
+def cells_of(
+    mask: Bool[np.ndarray, "_h _w"],
+) -> tuple[Float[np.ndarray, "cell 2"], float, Float[np.ndarray, "cell"]]:
+    """Centres (pixels as recorded), half a side (pixels), and what part of each cell the mask covers."""
+    top, bottom, left, right = _box(mask)
+    crop = mask[top:bottom, left:right].astype(np.float32)
+    height, width = crop.shape
+    side = max(1.0, np.sqrt(height * width / MAX_CELLS))
+    columns = max(1, int(width / side))
+    rows = max(1, min(int(height / side), MAX_CELLS // columns))
+    covered = cv2.resize(crop, (columns, rows), interpolation=cv2.INTER_AREA)
+    wide, high = width / columns, height / rows
+    x = left + (np.arange(columns) + 0.5) * wide - 0.5
+    y = top + (np.arange(rows) + 0.5) * high - 0.5
+    centres = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    return centres, float(np.sqrt(wide * high) / 2.0), covered.reshape(-1).astype(float)
+
+
+def _box(mask: Bool[np.ndarray, "_h _w"]) -> tuple[int, int, int, int]:
+    """Top, bottom, left and right of the subject with a border, inside the picture."""
+    rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
+    border = int(BORDER * max(rows[-1] - rows[0], columns[-1] - columns[0])) + 1
+    inside = lambda low, high, size: (max(int(low) - border, 0), min(int(high) + border + 1, size))
+    return (*inside(rows[0], rows[-1], mask.shape[0]), *inside(columns[0], columns[-1], mask.shape[1]))
+
 
 NOISE = 1e-3
 """Weight of the priors: the mismatch (as a part of the mask's area) that tells as little as half a squared standard
@@ -129,3 +211,84 @@ def _blobs(model: ShapeModel, pose: Float[Array, "dof"], shape: Float[Array, "sh
     """Means and sigmas (metres, world)."""
     blobs = model.shaped(shape).posed_blobs(pose)
     return jnp.concatenate([blobs.means, blobs.sigmas[:, None]], axis=1)
+
+
+SHAPE_WEIGHT = 3e-5
+"""Weight of the shape's prior in units of the similarity of Eq. 9."""
+CLIMB_ITERATIONS = 150
+
+
+class Estimate(eqx.Module):
+    """The poses of the example pictures, the shape parameters they share, and how certain both are."""
+
+    poses: Float[Array, "pose dof"]
+    shape_params: Float[Array, "shape"]
+    pose_deviations: Float[Array, "pose dof"]
+    """Standard deviations, radians and metres."""
+    shape_deviations: Float[Array, "shape"]
+    """Standard deviations of the logarithms of scale factors."""
+    mismatch: Float[Array, ""]
+    """What was minimised: the area where body and masks differ as a part of the masks' area, with the priors."""
+    iterations: Int[Array, ""]
+    converged: Bool[Array, ""]
+
+
+def estimate_shape(
+    model: ShapeModel,
+    poses: Float[Array, "pose dof"],
+    views: Views,
+    silhouettes: Silhouettes,
+    terms: Terms,
+) -> Estimate:
+    """The poses and the one shape that fit all masks best, from rough poses.
+
+    `views` and `silhouettes` have a leading axis for the poses.
+    """
+    scales = pose_scales(model.body.skeleton)
+    no_shape = jnp.zeros(model.num_shape_params, poses.dtype)
+    start = climbed_together(model, poses, no_shape, views, terms)
+    fit = SilhouetteFit(model, silhouettes)
+    solution = fitted(fit, start, scales)
+    poses_deviation, shape_deviation = fit.split(_deviations(fit, solution.params))
+    best_poses, shape = fit.split(solution.params)
+    return Estimate(
+        best_poses, shape, poses_deviation, shape_deviation, -solution.value, solution.iterations, solution.converged
+    )
+
+
+_deviations = eqx.filter_jit(SilhouetteFit.deviations)
+
+
+def climbed_together(
+    model: ShapeModel,
+    poses: Float[Array, "pose dof"],
+    shape_params: Float[Array, "shape"],
+    views: Views,
+    terms: Terms,
+    max_iterations: int = CLIMB_ITERATIONS,
+) -> Float[Array, "param"]:
+    """The mean of Eq. 9 over the example poses, climbed; the poses one after the other, then the shape."""
+    scales = scales_with_shape(pose_scales(model.body.skeleton), poses.shape[0], shape_params.shape[0])
+    start = jnp.concatenate([poses.reshape(-1), shape_params])
+    return _climb(model, start, poses.shape[0], views, terms, scales, max_iterations)
+
+
+@eqx.filter_jit
+def _climb(
+    model: ShapeModel,
+    start: Float[Array, "param"],
+    num_poses: int,
+    views: Views,
+    terms: Terms,
+    scales: Scales,
+    max_iterations: Any,
+) -> Float[Array, "param"]:
+    num_pose_params = num_poses * model.body.skeleton.num_dofs
+
+    def objective(params: Float[Array, "param"]) -> Float[Array, ""]:
+        shape = params[num_pose_params:]
+        poses = params[:num_pose_params].reshape(num_poses, -1)
+        scores = jax.vmap(still_energy, in_axes=(None, 0, 0, None))(model.shaped(shape), poses, views, terms)
+        return jnp.mean(scores) - SHAPE_WEIGHT * jnp.sum((shape / model.spread) ** 2)
+
+    return ConditionedAscent(max_iterations=max_iterations).maximize(objective, start, scales).params

@@ -12,15 +12,16 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int, UInt8
 
 from sogjax.actor.example_masks import example_masks
-from sogjax.data.recording import ExamplePose, Recording
-from sogjax.data.video import read_frames, read_still
 from sogjax.energy.views import Views, whole_image_overlap
 from sogjax.errors import InputError
-from sogjax.images.background import CameraBackground
-from sogjax.images.cells import CellGrid, stack_cells
-from sogjax.images.quadtree import Candidates, keep_blobs, quadtree
+from sogjax.io.example_poses import ExamplePose
+from sogjax.io.recording import Recording
+from sogjax.io.video import read_frames, read_still
 from sogjax.model.camera import Camera
 from sogjax.model.sog import Sog
+from sogjax.scene.background import CameraBackground
+from sogjax.scene.cells import CellGrid, stack_cells
+from sogjax.scene.quadtree import Candidates, keep_blobs, quadtree
 from sogjax.tracking.culling import capacity_for
 
 BACKGROUND_SIMILARITY = -0.15

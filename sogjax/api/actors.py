@@ -4,17 +4,21 @@ from pathlib import Path
 from typing import Any
 
 from sogjax.actor import make
-from sogjax.data.actor_file import save_body
-from sogjax.data.recording import Recording
-from sogjax.engine.build import color_space_and_radius, energy_terms
-from sogjax.engine.example_frames import with_examples
-from sogjax.engine.keypoint_actor import with_rough_poses
-from sogjax.engine.recordings import body_named, keypoint_actor_or, with_cameras
-from sogjax.engine.terminal import progress, say
 from sogjax.errors import InputError
+from sogjax.io.actor_file import save_body
+from sogjax.io.recording import Recording
 from sogjax.model.body import Body
-from sogjax.settings import ActorConfig, ImagesConfig
+from sogjax.run.build import color_space_and_radius, energy_terms
+from sogjax.run.example_frames import with_examples
+from sogjax.run.keypoint_actor import with_rough_poses
+from sogjax.run.recordings import body_named, keypoint_actor_or, with_cameras
+from sogjax.run.terminal import progress, say
 from sogjax.settings.compose import composed_without_hydra
+from sogjax.settings.method import ImagesConfig
+from sogjax.settings.run import ActorConfig
+
+Actor = Body
+"""A body that was fitted to a subject, in its own upright frame."""
 
 
 def load_actor(name: str | Path) -> Body:

@@ -1,16 +1,29 @@
-"""Recordings to work on: one's own, or a rendered one whose truth is known."""
+"""Recordings to work on: one's own, or a rendered one whose truth is known.
+
+Motions from files, and to look at.
+
+Motions held against the truth.
+"""
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
-from sogjax.data.ground_truth import GroundTruth, load_ground_truth
-from sogjax.data.recording import Recording
-from sogjax.engine.recordings import opened
-from sogjax.engine.terminal import progress
 from sogjax.errors import InputError
+from sogjax.io import motion as motions
+from sogjax.io.ground_truth import GroundTruth, load_ground_truth
+from sogjax.io.motion import Motion
+from sogjax.io.recording import Recording
+from sogjax.io.video import read_frames
+from sogjax.quality.evaluation import Evaluation, GroupEvaluation, evaluate_motions
+from sogjax.quality.markers import MarkerRule
+from sogjax.run.build import marker_rule
+from sogjax.run.recordings import opened
+from sogjax.run.terminal import progress
 from sogjax.settings.compose import composed_without_hydra
-from sogjax.synth import SynthSettings, cached_recording
+from sogjax.synth.cache import cached_recording
+from sogjax.synth.settings import SynthSettings
+from sogjax.view.projection import frame_range
 
 TRUTH = "ground_truth.npz"
 
@@ -66,3 +79,77 @@ def load_truth(source: Recording | str | Path) -> GroundTruth:
         where = source.path if isinstance(source, Recording) else path
         raise InputError(f"{where}: there is no ground truth; give a recording with a {TRUTH}, or such a file")
     return load_ground_truth(path)
+
+
+def load_motion(path: str | Path) -> Motion:
+    """The motion of a file `motion.npz`, or of the folder in which a run that was stopped keeps its frames so far.
+
+    Raises:
+        InputError: no such file, another version, or an array that is missing, misshapen or not finite.
+    """
+    return motions.load_motion(Path(path))
+
+
+def write_rerun(path: str | Path, recording: Recording, motion: Motion | Sequence[Motion], images: bool = True) -> None:
+    """Write a Rerun file (`rerun FILE` opens it): cameras, pictures, skeletons, blobs, curves and true markers.
+
+    Args:
+        path: the `.rrd` file; it is replaced as a whole.
+        recording: in which was tracked.
+        motion: one, or a list of them.
+        images: whether the pictures are read and put into the file.
+
+    Raises:
+        InputError: the file cannot be written, a picture cannot be read, or frames that the recording does not have.
+    """
+    from sogjax.view.rerun import file as rerun
+
+    shown = [motion] if isinstance(motion, Motion) else list(motion)
+    first, stop = (number - recording.first_frame for number in frame_range(recording, shown))
+    rerun.write_rerun(
+        Path(path),
+        recording,
+        shown,
+        names=[each.actor for each in shown] if all(each.actor for each in shown) else None,
+        frames=read_frames(recording, first, stop) if images else None,
+        truth=None if recording.ground_truth is None else load_ground_truth(recording.ground_truth),
+        progress=progress,
+    )
+
+
+Truth = Recording | GroundTruth | str | Path
+
+
+@overload
+def evaluate(motion: Motion, truth: Truth, markers: MarkerRule = ...) -> Evaluation: ...
+
+
+@overload
+def evaluate(motion: Sequence[Motion], truth: Truth, markers: MarkerRule = ...) -> GroupEvaluation: ...
+
+
+def evaluate(
+    motion: Motion | Sequence[Motion], truth: Truth, markers: MarkerRule = "scaled"
+) -> Evaluation | GroupEvaluation:
+    """How far a motion is from the truth, by virtual markers and joints (Section 6), with swaps of several actors.
+
+    `print` shows the numbers in millimetres; `summary` has them in metres, `markers.errors` (frame, marker) and
+    `joints.errors` (frame, joint) every single distance, in metres, NaN where the truth has no value.
+
+    Args:
+        motion: one, or a list of those of several actors, whose names are the truth's subjects.
+        truth: as `load_truth` takes or gives it: a recording, its folder, a file, or the truth itself.
+        markers: how markers are attached, `scaled` (to the blob that is nearest in its own sigmas) or `closest`
+            (Section 6 to the letter: nearest by distance).
+
+    Raises:
+        InputError: there is no truth, it does not know an actor, or nothing can be compared.
+    """
+    rule = marker_rule(markers, "markers")
+    known = truth if isinstance(truth, GroundTruth) else load_truth(truth)
+    if isinstance(motion, Motion):
+        name = next(iter(known.subjects)) if len(known.subjects) == 1 else motion.actor or "actor"
+        return evaluate_motions({name: motion}, known, rule=rule).evaluations[name]
+    if not all(each.actor for each in motion):
+        raise InputError("motion: one of several does not say whose it is; set its `actor`")
+    return evaluate_motions({each.actor: each for each in motion}, known, rule=rule)

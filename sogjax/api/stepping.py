@@ -6,22 +6,21 @@ from typing import Any
 
 from jaxtyping import Array, UInt8
 
-from sogjax.api.settings import track_settings
-from sogjax.api.tracking import actor_list
-from sogjax.data.recording import Recording
-from sogjax.energy import Term
+from sogjax.api.tracking import actor_list, track_settings
 from sogjax.energy.keypoints import keypoint_pull_among
-from sogjax.engine.cells import picture_reader
-from sogjax.engine.clip_keypoints import ClipKeypoints, with_keypoints
-from sogjax.engine.job import Job
-from sogjax.engine.keypoint_offsets import told_offsets
-from sogjax.engine.pipeline import Preparation, cells_of_frame, read_pictures
-from sogjax.engine.recordings import with_cameras
+from sogjax.energy.term import Term
 from sogjax.errors import InputError
+from sogjax.io.recording import Recording
 from sogjax.model.body import Body
+from sogjax.run.cells import picture_reader
+from sogjax.run.clip_keypoints import ClipKeypoints, with_keypoints
+from sogjax.run.job import Job
+from sogjax.run.keypoint_offsets import told_offsets
+from sogjax.run.pipeline import Preparation, cells_of_frame, read_pictures
+from sogjax.run.recordings import with_cameras
+from sogjax.tracking.capacity import first_capacities
 from sogjax.tracking.culling import Capacities, capacity_for
 from sogjax.tracking.frame import PartialCells, WithKeypoints, on_device
-from sogjax.tracking.room import first_capacities
 from sogjax.tracking.tracker import Tracker
 
 ROOM = 2

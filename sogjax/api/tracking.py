@@ -1,19 +1,63 @@
-"""From a recording and its actors to their motion."""
+"""The settings of a track, as keywords.
 
-from collections.abc import Sequence
+From a recording and its actors to their motion.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from typing import Any, overload
 
-from sogjax.api.settings import track_settings
-from sogjax.data.motion import Motion
-from sogjax.data.recording import Recording
-from sogjax.energy import Term
-from sogjax.engine.first_pose import searched_poses
-from sogjax.engine.job import frame_range
-from sogjax.engine.recordings import upright, with_cameras
-from sogjax.engine.track import track_recording
+from sogjax.energy.term import Term
 from sogjax.errors import InputError
+from sogjax.io.motion import Motion
+from sogjax.io.recording import Recording
 from sogjax.model.body import Body
-from sogjax.tracking.found_pose import FoundPose
+from sogjax.run import build
+from sogjax.run.first_pose import searched_poses
+from sogjax.run.job import frame_range
+from sogjax.run.recordings import upright, with_cameras
+from sogjax.run.track import track_recording
+from sogjax.search.found_pose import FoundPose
+from sogjax.settings.compose import track_config
+from sogjax.settings.run import OutputsConfig, TrackConfig
+
+_NOT_HERE = {
+    "recording": "is a separate argument, not a setting",
+    "actor": "is a separate argument, not a setting",
+    "actors": "is a setting of make_actor; give track a list of actors",
+    "body": "is a setting of make_actor",
+    "out": "no file is written; use motion.save(path)",
+    "resume": "no file is written, so nothing can be resumed; use the command `sogjax track`",
+    "overwrite": "no file is written, so nothing is overwritten",
+}
+"""Options of the command that have no meaning without its files, and why."""
+_KEPT_OUTPUTS = ("confidence",)
+"""Outputs that are a part of the motion, and no files."""
+
+
+def track_settings(**settings: Any) -> TrackConfig:
+    """The settings that `track` and `make_tracker` use, every value filled in and checked.
+
+    Names, defaults and errors are those of `sogjax track`, whose `--help` says the meaning and unit of each.
+
+    Args:
+        settings: values as keywords, groups as mappings or as the name of a set of options:
+            `track_settings(preset="paper", stop=40, solver="lbfgs", energy={"limit_weight": 2.0})`.
+
+    Raises:
+        InputError: an unknown setting (with the nearest known one), a wrong value, or an option that only concerns
+            the files of the command.
+    """
+    for key, reason in _NOT_HERE.items():
+        if key in settings:
+            raise InputError(f"{key}: {reason}")
+    config = track_config(recording="", **settings)
+    build.check(config)
+    outputs = settings.get("outputs")
+    for entry in fields(OutputsConfig):
+        if isinstance(outputs, Mapping) and entry.name in outputs and entry.name not in _KEPT_OUTPUTS:
+            raise InputError(f"outputs.{entry.name}: no file is written; use motion.save(path) or sogjax.write_rerun")
+    return config
 
 
 @overload

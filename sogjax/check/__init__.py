@@ -1,1 +1,1 @@
-"""What is wrong with a recording: each check ends in findings with likely cause and remedy."""
+"""What is wrong with a recording: each check ends in findings with the likely cause and the remedy."""

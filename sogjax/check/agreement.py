@@ -9,9 +9,17 @@ import numpy as np
 from jaxtyping import Bool
 
 from sogjax.check.silhouettes import Moment
-from sogjax.data.calibration import CameraRig
-from sogjax.images.agreement import AGREEING, OWN_COVERAGE, widened_by_half_a_voxel
-from sogjax.images.visual_hull import Cube, VoxelPixels, cube_around, resized, voxel_pixels
+from sogjax.io.calibration.rig import CameraRig
+from sogjax.scene.visual_hull import (
+    AGREEING,
+    OWN_COVERAGE,
+    Cube,
+    VoxelPixels,
+    cube_around,
+    resized,
+    voxel_pixels,
+    widened_by_half_a_voxel,
+)
 
 FEWEST_VIEWS = 3
 """With two silhouettes that disagree, nothing tells which is wrong."""

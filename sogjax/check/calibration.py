@@ -9,7 +9,7 @@ from sogjax.check.agreement import Misfit, MomentHull, camera_misfits, hulls_of,
 from sogjax.check.findings import Finding, listed
 from sogjax.check.hypotheses import exchanged_rig, mirrored_rig
 from sogjax.check.silhouettes import Moment
-from sogjax.data.calibration import CameraRig
+from sogjax.io.calibration.rig import CameraRig
 
 POOR = 0.6
 """Mean coverage below which the calibration as a whole is doubted."""

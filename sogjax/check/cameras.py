@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Array, Float, Shaped
 
 from sogjax.check.findings import Finding, listed
-from sogjax.data.calibration import CameraRig
-from sogjax.model.frames import UP_AXES, axis_vector
-from sogjax.sentences import counted
+from sogjax.errors import counted
+from sogjax.io.calibration.rig import CameraRig
+from sogjax.model.rotation import UP_AXES, axis_vector
 
 NARROW, WIDE = 8.0, 150.0
 """Degrees: fields of view outside this range are taken for mistakes."""

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, UInt8
 
-from sogjax.data.recording import Recording
-from sogjax.data.video import read_prepared
-from sogjax.images.plate_difference import working_size
+from sogjax.io.recording import Recording
+from sogjax.io.video import read_prepared
+from sogjax.scene.plate_difference import working_size
 
 SMALL = 320
 """Pixels of the longer side of the grey pictures."""

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from sogjax.check.agreement import hulls_of
-from sogjax.check.barcodes import pair_barcodes
 from sogjax.check.calibration import calibration_findings
 from sogjax.check.cameras import RigGeometry, camera_findings, rig_geometry
 from sogjax.check.clip import Clip, Progress, black_picture, read_clip
@@ -22,16 +21,30 @@ from sogjax.check.frames import (
     source_frames,
 )
 from sogjax.check.hypotheses import unit_rig
-from sogjax.check.jumps import Jump, find_jumps
 from sogjax.check.keypoints import keypoint_findings
-from sogjax.check.motion import motion_of, with_rig
-from sogjax.check.places import place_findings, references_of
+from sogjax.check.motion import motion_of, pair_barcodes, with_rig
 from sogjax.check.scale import scale_findings, subject_size
-from sogjax.check.silhouettes import Moment, example_moments, plates_of, video_moments, without_masks_of
-from sogjax.check.synchronisation import FEWEST_STEPS, Synchrony, synchrony, synchrony_findings, too_short
-from sogjax.data.calibration import CameraRig
-from sogjax.data.recording import Recording
-from sogjax.data.recording_settings import read_recording_settings
+from sogjax.check.silhouettes import (
+    Moment,
+    example_moments,
+    place_findings,
+    plates_of,
+    references_of,
+    video_moments,
+    without_masks_of,
+)
+from sogjax.check.synchronisation import (
+    FEWEST_STEPS,
+    Jump,
+    Synchrony,
+    find_jumps,
+    synchrony,
+    synchrony_findings,
+    too_short,
+)
+from sogjax.io.calibration.rig import CameraRig
+from sogjax.io.recording import Recording
+from sogjax.io.recording_settings import read_recording_settings
 
 STILL = 1e-3
 """Mean motion of a camera's pictures (roots of grey values) below which it sees no one move."""

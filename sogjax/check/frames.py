@@ -10,10 +10,10 @@ from jaxtyping import Bool, Float
 
 from sogjax.check.clip import Clip
 from sogjax.check.findings import Finding, listed
-from sogjax.check.jumps import Jump
-from sogjax.data.recording import Recording
-from sogjax.data.source import SourceInfo, look_at_source
-from sogjax.sentences import counted
+from sogjax.check.synchronisation import Jump
+from sogjax.errors import counted
+from sogjax.io.recording import Recording
+from sogjax.io.source import SourceInfo, look_at_source
 
 GAP = 1.5
 """A pause between two frames of a file, in units of the usual one, above which a frame is missing."""

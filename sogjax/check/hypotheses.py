@@ -5,7 +5,7 @@ from dataclasses import replace
 import jax.numpy as jnp
 import numpy as np
 
-from sogjax.data.calibration import CameraRig
+from sogjax.io.calibration.rig import CameraRig
 
 _FLIP = np.diag([-1.0, 1.0, 1.0, 1.0])
 

@@ -6,11 +6,11 @@ import numpy as np
 from jaxtyping import Float
 
 from sogjax.check.findings import Finding, listed
-from sogjax.data.keypoints import Keypoints, load_keypoints
-from sogjax.data.recording import Recording
 from sogjax.errors import InputError
-from sogjax.tracking.keypoint_people import SAME_PERSON, triangulated_people
-from sogjax.tracking.triangulation import Rays, distances, poses_of, rays_of
+from sogjax.io.keypoints.load import Keypoints, load_keypoints
+from sogjax.io.recording import Recording
+from sogjax.search.keypoint_people import SAME_PERSON, triangulated_people
+from sogjax.search.triangulation import Rays, distances, poses_of, rays_of
 
 SURE = 0.3
 """Confidence of the keypoints that are compared."""

@@ -7,14 +7,15 @@ from typing import TypeVar
 import numpy as np
 
 from sogjax.check.findings import Finding
-from sogjax.data.calibration import CameraRig, load_calibration
-from sogjax.data.ground_truth import load_ground_truth
-from sogjax.data.initial_pose import read_initial_poses
-from sogjax.data.projects import Project, calibrations_of, named_as_sources, named_calibration, project_in
-from sogjax.data.recording_settings import RecordingSettings, read_recording_settings
-from sogjax.data.source import find_sources, look_at_source
-from sogjax.data.stills import check_size, find_background, find_example_poses
 from sogjax.errors import InputError
+from sogjax.io.calibration.load import load_calibration
+from sogjax.io.calibration.rig import CameraRig
+from sogjax.io.example_poses import check_size, find_background, find_example_poses
+from sogjax.io.ground_truth import load_ground_truth
+from sogjax.io.initial_pose import read_initial_poses
+from sogjax.io.projects import Project, calibrations_of, named_as_sources, named_calibration, project_in
+from sogjax.io.recording_settings import RecordingSettings, read_recording_settings
+from sogjax.io.source import find_sources, look_at_source
 
 Value = TypeVar("Value")
 

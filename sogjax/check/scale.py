@@ -11,7 +11,7 @@ from sogjax.check.agreement import MomentHull
 from sogjax.check.cameras import RigGeometry
 from sogjax.check.findings import Finding
 from sogjax.model.camera import NEAR, distort, project_points
-from sogjax.model.frames import axis_vector
+from sogjax.model.rotation import axis_vector
 
 PERSON = (1.2, 2.6)
 """Metres: heights of people, raised arms included."""

@@ -1,4 +1,7 @@
-"""Time offsets between cameras, from what moves; and frames that one camera lost or repeated on the way."""
+"""Time offsets between cameras, from what moves; and frames that one camera lost or repeated on the way.
+
+Frames that one camera lost or repeated: its offset at the end of a clip differs from that at its beginning.
+"""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -6,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from sogjax.check.barcodes import PairCodes, lag_curve
 from sogjax.check.findings import Finding, listed
-from sogjax.sentences import counted
+from sogjax.check.motion import PairCodes, lag_curve
+from sogjax.errors import counted
 
 ALIKE = 0.4
 """Correlation of two cameras' motion above which its lag counts."""
@@ -176,3 +179,35 @@ def synchrony_findings(
         what = f"in step: {int(found.sure.sum()) - len(jumped)} of {counted(len(found.names), 'camera')}"
         findings.append(Finding("ok", "synchronisation", what))
     return findings
+
+
+LARGEST = 3
+"""Frames lost or repeated within a clip, at most, beyond the offset of the whole."""
+FEWEST_STEPS_OF_JUMPS = 16
+"""In either half."""
+SHARP, LEAST_SHARP = 0.06, 0.01
+"""How far the likeness with the others must fall beside the offset, in the better half and in the other."""
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A camera whose time jumps against the others' within a clip."""
+
+    frames: int
+    """Positive: so many frames are lost; negative: repeated or added."""
+
+
+def find_jumps(codes: PairCodes, steps: int, whole: Synchrony) -> dict[int, Jump]:
+    """By camera the difference of its offsets in the two halves of a clip, where both are certain."""
+    half = steps // 2
+    if half < FEWEST_STEPS_OF_JUMPS:
+        return {}
+    largest = LARGEST + int(abs(whole.offsets).max())
+    early, late = (
+        synchrony(whole.names, {pair: (a[part], b[part]) for pair, (a, b) in codes.items()}, half, largest)
+        for part in (slice(0, half), slice(half, steps))
+    )
+    sharp = np.sort([early.sharpness, late.sharpness], axis=0)
+    sure = whole.sure & early.sure & late.sure & (sharp[0] > LEAST_SHARP) & (sharp[1] > SHARP)
+    sure &= early.offsets != late.offsets
+    return {int(k): Jump(int(early.offsets[k] - late.offsets[k])) for k in sure.nonzero()[0]}

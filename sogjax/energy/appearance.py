@@ -12,8 +12,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from sogjax.energy.image_term import ImageTerm
+from sogjax.energy.overlap import ImagePulls
 from sogjax.energy.posed import Frame, Posed
-from sogjax.energy.pulls import ImagePulls
 from sogjax.model.camera import project
 from sogjax.model.sog import Sog
 

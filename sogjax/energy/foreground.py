@@ -8,9 +8,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from sogjax.energy.image_term import ImageTerm
+from sogjax.energy.overlap import ImagePulls
 from sogjax.energy.posed import Frame, Posed
-from sogjax.energy.pulls import ImagePulls
-from sogjax.energy.windows import Windows
+from sogjax.energy.views import Windows
 from sogjax.model.camera import project
 from sogjax.model.sog import Sog
 

@@ -10,15 +10,14 @@ from jaxtyping import Array, Float, Int
 
 from sogjax.energy.foreground import Foreground
 from sogjax.energy.image_term import ImageTerm, images_model
-from sogjax.energy.limits import LimitPenalty
 from sogjax.energy.overlap import EXACT_EXPONENT, GradientMode
 from sogjax.energy.posed import Frame, History, Posed
+from sogjax.energy.priors import AccelerationPenalty, LimitPenalty
 from sogjax.energy.similarity import Similarity, similarity_among
-from sogjax.energy.smoothness import AccelerationPenalty
 from sogjax.energy.term import Terms
 from sogjax.energy.views import Views
 from sogjax.model.body import Body
-from sogjax.solve.quadratic import QuadraticModel
+from sogjax.solve.solution import QuadraticModel
 
 Summand = TypeVar("Summand", Array, QuadraticModel)
 

@@ -19,7 +19,7 @@ from sogjax.energy.term import Term, Terms
 from sogjax.model.body import Body
 from sogjax.model.camera import NEAR, Camera, project_points, projection_jacobian
 from sogjax.model.rotation import transform_points
-from sogjax.solve.quadratic import QuadraticModel
+from sogjax.solve.solution import QuadraticModel
 
 
 class PointPulls(NamedTuple):

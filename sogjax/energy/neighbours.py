@@ -10,10 +10,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from sogjax.compiled.once import computed_once
-from sogjax.compiled.selection import chosen_indices
 from sogjax.energy.pairs import MEMBERS, TILE, SparsePairs, image_quantities
 from sogjax.model.camera import Camera, project
+from sogjax.model.compiled import chosen_indices, computed_once
 from sogjax.model.sog import Sog
 
 NEGLIGIBLE = 1e-4

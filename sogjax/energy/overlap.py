@@ -1,4 +1,6 @@
-"""Overlap of a projected body with images, both Sums of Gaussians (Eq. 5, 6, 8), over any layout of their pairs.
+"""What pictures say about where projected blobs should be.
+
+Overlap of a projected body with images, both Sums of Gaussians (Eq. 5, 6, 8), over any layout of their pairs.
 
 The derivative of `capped_overlap` is computed together with its value from the closed form, which costs little more
 than the value: its exponentials are the expensive part and are shared. Forward mode, reverse mode and second
@@ -6,7 +8,7 @@ derivatives follow from it. `gradient="autodiff"` differentiates the plain formu
 """
 
 from functools import partial
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -14,9 +16,19 @@ from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, Float
 
 from sogjax.energy.pairs import DensePairs, Disks, Pairs, separations
-from sogjax.energy.pulls import ImagePulls
 from sogjax.model.color import color_similarity
 from sogjax.model.sog import Sog
+
+
+class ImagePulls(NamedTuple):
+    """A value of each camera and how it changes with the projected body blobs."""
+
+    value: Float[Array, "*camera"]
+    by_mean: Float[Array, "*camera body 2"]
+    by_sigma: Float[Array, "*camera body"]
+    stiffness: Float[Array, "*camera body"]
+    """The curvature of the value by a mean with its sign turned; the same in both directions, never below 0."""
+
 
 GradientMode = Literal["forward", "autodiff"]
 

@@ -11,7 +11,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from sogjax.compiled.once import computed_once
+from sogjax.model.compiled import computed_once
 from sogjax.model.sog import Sog
 
 TILE = 8

@@ -14,6 +14,7 @@ from sogjax.energy.image_term import ImageTerm
 from sogjax.energy.overlap import (
     EXACT_EXPONENT,
     GradientMode,
+    ImagePulls,
     capped_overlap,
     overlap_of_pairs,
     overlap_pulls,
@@ -21,7 +22,6 @@ from sogjax.energy.overlap import (
 )
 from sogjax.energy.pairs import DensePairs
 from sogjax.energy.posed import Frame, Posed
-from sogjax.energy.pulls import ImagePulls
 from sogjax.energy.term import Terms
 from sogjax.energy.views import Views
 from sogjax.model.camera import project

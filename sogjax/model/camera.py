@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from sogjax.compiled.small_matrices import applied
+from sogjax.model.compiled import applied
 from sogjax.model.rotation import transform_points
 from sogjax.model.sog import Sog
 

@@ -13,7 +13,7 @@ import numpy as np
 from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, Bool, Float, Int
 
-from sogjax.compiled.small_matrices import applied, product
+from sogjax.model.compiled import applied, product
 from sogjax.model.rotation import cross_matrix, rigid_transform, rotation_about_axis
 
 Parents = tuple[int, ...]

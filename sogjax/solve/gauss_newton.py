@@ -5,8 +5,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from sogjax.solve.quadratic import QuadraticModel
-from sogjax.solve.solution import CurvedObjective, Objective, Params, Scales, Solution
+from sogjax.solve.solution import CurvedObjective, Objective, Params, QuadraticModel, Scales, Solution
 
 
 class GaussNewtonState(eqx.Module):

@@ -1,1 +1,1 @@
-"""Studies: experiments that are described in `conf/experiment/`, run over several recordings, and reported."""
+"""Experiments: `conf/experiment/` describes them; they are run over several recordings, and reported."""

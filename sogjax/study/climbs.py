@@ -9,17 +9,17 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int, UInt8
 
-from sogjax.data.recording import Recording
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History
-from sogjax.engine.cells import cells_of_clip
-from sogjax.engine.job import Job
+from sogjax.io.recording import Recording
 from sogjax.model.body import Body
-from sogjax.settings import TrackConfig
+from sogjax.run.cells import cells_of_clip
+from sogjax.run.job import Job
+from sogjax.settings.run import TrackConfig
+from sogjax.tracking.capacity import first_capacities, larger_capacities
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import TrackState
-from sogjax.tracking.room import first_capacities, larger_capacities
-from sogjax.tracking.rounds import solve_near
+from sogjax.tracking.solving import solve_near
 from sogjax.tracking.tracker import Tracker
 
 Poses = Float[np.ndarray, "frame dof"]

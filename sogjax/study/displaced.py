@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from sogjax.model.body import Body
-from sogjax.tracking.mirrored import means_of
+from sogjax.search.mirrored import means_of
 
 NEAREST, FARTHEST = 0.2, 0.3
 """Metres, mean over the limb's blobs."""

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from sogjax.data.atomic import atomic_path
+from sogjax.io.files import atomic_path
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from sogjax.data.atomic import atomic_path
+from sogjax.io.files import atomic_path
 from sogjax.study.experiment import Experiment
 from sogjax.study.record import RunRecord
 from sogjax.study.source import Source

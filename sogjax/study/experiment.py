@@ -12,7 +12,7 @@ from omegaconf.errors import OmegaConfBaseException
 from sogjax.errors import InputError
 from sogjax.settings.compose import composed_without_hydra
 from sogjax.settings.files import conf_dir
-from sogjax.synth import SynthSettings
+from sogjax.synth.settings import SynthSettings
 
 MEASURES = ("accuracy", "speed")
 OVERVIEW = "methods"

@@ -8,22 +8,22 @@ from pathlib import Path
 
 import numpy as np
 
-from sogjax.data.atomic import atomic_path
-from sogjax.data.ground_truth import load_ground_truth
-from sogjax.data.keypoints import load_keypoints
-from sogjax.data.recording import Recording
-from sogjax.engine.recordings import opened, with_cameras
-from sogjax.engine.track import track_recording
-from sogjax.evaluation import evaluate_motions
-from sogjax.evaluation.metrics import lost_points
+from sogjax.io.files import atomic_path
+from sogjax.io.ground_truth import load_ground_truth
+from sogjax.io.keypoints.load import load_keypoints
+from sogjax.io.recording import Recording
 from sogjax.model.body import Body
+from sogjax.quality.evaluation import evaluate_motions
+from sogjax.quality.metrics import lost_points
+from sogjax.run.recordings import opened, with_cameras
+from sogjax.run.track import track_recording
 from sogjax.settings.compose import track_config
 from sogjax.study.kept_actors import kept_actors
 from sogjax.study.record import program_digest
 from sogjax.study.triangulation_trials import triangulation_errors
-from sogjax.synth import SynthSettings
 from sogjax.synth.cache import cached_keypoints, cached_recording
 from sogjax.synth.detector import DetectorSettings
+from sogjax.synth.settings import SynthSettings
 
 BIASED = {"keypoint_bias": 0.035}
 CASES: dict[str, dict[str, float] | None] = {

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from sogjax.data.ground_truth import GroundTruth
+from sogjax.io.ground_truth import GroundTruth
 from sogjax.model.body import Body
 from sogjax.study.verdicts import LimbErrors, limb_errors
 

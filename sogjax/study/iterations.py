@@ -3,10 +3,10 @@
 import jax.numpy as jnp
 import numpy as np
 
-from sogjax.data.motion import Motion, motion_from_poses
 from sogjax.errors import InputError
-from sogjax.settings import TrackConfig
+from sogjax.io.motion import Motion, motion_from_poses
 from sogjax.settings.compose import track_config
+from sogjax.settings.run import TrackConfig
 from sogjax.study.source import Source
 from sogjax.tracking.frame import TrackState
 from sogjax.tracking.frame_by_frame import track

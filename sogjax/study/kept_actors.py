@@ -3,9 +3,9 @@
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from sogjax.data.actor_file import load_body, save_body
-from sogjax.engine.recordings import actors_of, opened
+from sogjax.io.actor_file import load_body, save_body
 from sogjax.model.body import Body
+from sogjax.run.recordings import actors_of, opened
 from sogjax.settings.compose import track_config
 
 

@@ -13,12 +13,15 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from sogjax.data.atomic import atomic_path
-from sogjax.data.cell_cache import CellsOfClip
 from sogjax.energy.posed import Posed
-from sogjax.engine.terminal import say
 from sogjax.errors import InputError
+from sogjax.io.cell_cache import CellsOfClip
+from sogjax.io.files import atomic_path
 from sogjax.model.body import Body
+from sogjax.model.limbs import limb_blobs, limb_names, limbs
+from sogjax.quality.limb_confidence import LimbMeasures, judgement, limb_measures
+from sogjax.quality.limb_evidence import blob_evidence
+from sogjax.run.terminal import say
 from sogjax.settings.compose import track_config
 from sogjax.study.displaced import displaced
 from sogjax.study.record import program_digest
@@ -29,9 +32,6 @@ from sogjax.study.verdicts import limb_errors
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import TrackState
 from sogjax.tracking.frame_by_frame import track
-from sogjax.tracking.limb_doubt import LimbMeasures, judgement, limb_measures
-from sogjax.tracking.limb_evidence import blob_evidence
-from sogjax.tracking.limbs import limb_blobs, limb_names, limbs
 from sogjax.tracking.tracker import Tracker
 
 PLAIN, SKIPPING = "as recorded", "every third frame"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import jax
 
-from sogjax.sentences import counted
+from sogjax.errors import counted
 
 
 def machine_line() -> str:

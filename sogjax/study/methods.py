@@ -4,9 +4,9 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from sogjax.engine.build import color_space_and_radius
-from sogjax.settings import TrackConfig
+from sogjax.run.build import color_space_and_radius
 from sogjax.settings.compose import track_config
+from sogjax.settings.run import TrackConfig
 from sogjax.study.experiment import Experiment
 from sogjax.study.summary import RowSummary
 from sogjax.study.table import ruled_table, significance

@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 from jaxtyping import Float
 
-from sogjax.data.calibration import CameraRig
-from sogjax.data.motion import Motion
-from sogjax.data.video import read_frames
+from sogjax.io.calibration.rig import CameraRig
+from sogjax.io.motion import Motion
+from sogjax.io.video import read_frames
 from sogjax.study.document import Picture
 from sogjax.study.experiment import Experiment
 from sogjax.study.record import RunRecord

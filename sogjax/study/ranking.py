@@ -6,17 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from sogjax.data.ground_truth import GroundTruth, load_ground_truth
-from sogjax.data.motion import Motion
-from sogjax.data.recording import Recording
-from sogjax.engine.recordings import upright
 from sogjax.errors import InputError
+from sogjax.io.cache_folder import default_cache_dir
+from sogjax.io.ground_truth import GroundTruth, load_ground_truth
+from sogjax.io.motion import Motion
+from sogjax.io.recording import Recording
 from sogjax.model.body import Body
+from sogjax.run.recordings import upright
 from sogjax.settings.compose import track_config
 from sogjax.study.climbs import ranked
 from sogjax.study.true_poses import true_poses
 from sogjax.study.verdicts import Ranking, limb_errors
-from sogjax.synth.cache import default_cache_dir
 
 DEFAULT = "default"
 """The set without any word."""

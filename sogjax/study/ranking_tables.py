@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sogjax.data.atomic import atomic_path
+from sogjax.io.files import atomic_path
 from sogjax.study.table import ruled_table
 from sogjax.study.verdicts import EQUAL, UNKNOWN, VERDICTS, Ranking
 from sogjax.view.ranking_chart import RankedCurves

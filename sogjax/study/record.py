@@ -4,6 +4,7 @@ import hashlib
 import json
 from dataclasses import asdict, dataclass, field, fields
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +12,12 @@ import numpy as np
 from jaxtyping import Float, Int
 
 import sogjax
-from sogjax import __version__
-from sogjax.data.atomic import atomic_path
-from sogjax.settings import TrackConfig
+from sogjax.io.files import atomic_path
+from sogjax.settings.run import TrackConfig
 
 RECORD_VERSION = 3
 """To be raised with every change that makes earlier runs incomparable."""
-_DECIDE = ("compiled", "model", "energy", "solve", "images", "tracking", "data", "actor", "evaluation")
+_DECIDE = ("model", "solve", "energy", "scene", "tracking", "search", "quality", "actor", "refine", "io", "run")
 """Packages whose code decides the result of a run."""
 _OF_THE_RESULT = ("body", "color", "images", "energy", "solver", "tracking")
 
@@ -47,7 +47,7 @@ class RunPlan:
     @property
     def key(self) -> str:
         """Sixteen letters that differ where anything differs, the program's own files included."""
-        content = [RECORD_VERSION, __version__, program_digest(), asdict(self)]
+        content = [RECORD_VERSION, version("sogjax"), program_digest(), asdict(self)]
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 
 

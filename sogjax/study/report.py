@@ -4,19 +4,13 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from sogjax.engine.outputs import results_folder
-from sogjax.engine.terminal import say
 from sogjax.errors import InputError
+from sogjax.run.outputs import results_folder
+from sogjax.run.terminal import say
 from sogjax.study.document import Section, write_html, write_markdown
 from sogjax.study.done import Done, write_runs
 from sogjax.study.experiment import Experiment, experiment_names
-from sogjax.study.sections.about import (
-    about_section,
-    installed_version,
-    methods_section,
-    own_section,
-    versions_section,
-)
+from sogjax.study.sections.about import about_section, installed_version, methods_section, own_section, versions_section
 from sogjax.study.sections.experiment import experiment_section
 from sogjax.study.sections.few_cameras import few_cameras_section
 from sogjax.study.sections.limbs import limbs_section

@@ -7,27 +7,28 @@ from dataclasses import asdict, replace
 import numpy as np
 from jaxtyping import Float
 
-from sogjax.data.cell_cache import CellsOfClip
-from sogjax.data.motion import Motion, motion_from_poses
-from sogjax.engine import build
-from sogjax.engine.compiled_programs import forget_programs_if_many
-from sogjax.engine.run import Run
-from sogjax.engine.second_background import MUCH_UNKNOWN, knowing_the_body, unknown_share
-from sogjax.engine.terminal import say
-from sogjax.engine.timing import StageTimes
-from sogjax.engine.track import track_recording
 from sogjax.errors import InputError
-from sogjax.evaluation import Evaluation, GroupEvaluation, PointErrors, evaluate_motions
-from sogjax.evaluation.metrics import mean_per_frame
+from sogjax.io.cell_cache import CellsOfClip
+from sogjax.io.motion import Motion, motion_from_poses
 from sogjax.model.body import Body, dof_slices
-from sogjax.settings import TrackConfig
+from sogjax.quality.evaluation import Evaluation, GroupEvaluation, evaluate_motions
+from sogjax.quality.markers import PointErrors
+from sogjax.quality.metrics import mean_per_frame
+from sogjax.run import build
+from sogjax.run.clock import StageTimes
+from sogjax.run.memory import forget_programs_if_many
+from sogjax.run.run import Run
+from sogjax.run.second_background import MUCH_UNKNOWN, knowing_the_body, unknown_share
+from sogjax.run.terminal import say
+from sogjax.run.track import track_recording
+from sogjax.search.backward_pass import Pass
+from sogjax.search.merge_passes import told_both_ways
 from sogjax.settings.compose import track_config
+from sogjax.settings.run import TrackConfig
 from sogjax.study.experiment import Experiment
 from sogjax.study.machine import machine_facts
 from sogjax.study.record import RunFolder, RunPlan, RunRecord
 from sogjax.study.source import Source
-from sogjax.tracking.backward_pass import Pass
-from sogjax.tracking.both_ways import told_both_ways
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import FrameResult, TrackedFrame
 from sogjax.tracking.frame_by_frame import track

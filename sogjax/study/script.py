@@ -7,9 +7,8 @@ from typing import TypeVar
 from omegaconf import MISSING, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from sogjax.engine.compilation_cache import use_compilation_cache
-from sogjax.engine.compiler_options import use_compiler_options
 from sogjax.errors import InputError
+from sogjax.run.compilation_cache import use_compilation_cache, use_compiler_options
 
 Settings = TypeVar("Settings")
 HELP = ("--help", "-h")

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import beta
 
-from sogjax.data.atomic import atomic_path
+from sogjax.io.files import atomic_path
 from sogjax.study.found_pose import RIGHT
 from sogjax.study.searches import Search
 from sogjax.study.table import ruled_table

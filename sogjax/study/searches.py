@@ -11,12 +11,12 @@ from typing import Any
 import jax
 import numpy as np
 
-from sogjax.data.atomic import atomic_path
-from sogjax.data.recording import Recording
-from sogjax.engine.compiled_programs import forget_programs_if_many
-from sogjax.engine.first_pose import searched_poses
-from sogjax.engine.terminal import say
 from sogjax.errors import InputError
+from sogjax.io.files import atomic_path
+from sogjax.io.recording import Recording
+from sogjax.run.first_pose import searched_poses
+from sogjax.run.memory import forget_programs_if_many
+from sogjax.run.terminal import say
 from sogjax.settings.compose import track_config
 from sogjax.study.found_pose import FoundError, found_error
 from sogjax.study.record import program_digest

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from sogjax.data.motion import Motion
 from sogjax.errors import InputError
+from sogjax.io.motion import Motion
 from sogjax.study.experiment import Experiment
 from sogjax.study.runner import motions_of, run_row
 from sogjax.study.source import Source

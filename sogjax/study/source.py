@@ -11,22 +11,22 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from sogjax.data.actor_file import load_body, save_body
-from sogjax.data.cell_cache import CellsOfClip
-from sogjax.data.ground_truth import GroundTruth, load_ground_truth
-from sogjax.data.recording import Recording
-from sogjax.engine import build
-from sogjax.engine.cells import cells_of_clip
-from sogjax.engine.first_pose import first_poses
-from sogjax.engine.recordings import actors_of, opened, upright
-from sogjax.engine.terminal import progress
 from sogjax.errors import InputError
+from sogjax.io.actor_file import load_body, save_body
+from sogjax.io.cell_cache import CellsOfClip
+from sogjax.io.ground_truth import GroundTruth, load_ground_truth
+from sogjax.io.recording import Recording
 from sogjax.model.body import Body, concatenate
-from sogjax.settings import TrackConfig
+from sogjax.run import build
+from sogjax.run.cells import cells_of_clip
+from sogjax.run.first_pose import first_poses
+from sogjax.run.recordings import actors_of, opened, upright
+from sogjax.run.terminal import progress
 from sogjax.settings.compose import track_config
+from sogjax.settings.run import TrackConfig
 from sogjax.study.experiment import synth_settings
-from sogjax.synth import SynthSettings, cached_recording
-from sogjax.synth.settings import MOTIONS
+from sogjax.synth.cache import cached_recording
+from sogjax.synth.settings import MOTIONS, SynthSettings
 from sogjax.tracking.tracker import Tracker
 
 PARTS = ("videos", "images", "background", "example_poses")

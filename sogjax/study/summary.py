@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from sogjax.evaluation.bootstrap import Interval, bootstrap_interval
+from sogjax.quality.bootstrap import Interval, bootstrap_interval
 from sogjax.study.record import RunRecord
 
 Records = Mapping[str, RunRecord]

@@ -4,15 +4,16 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from sogjax.data.ground_truth import load_ground_truth
-from sogjax.engine.recordings import actors_of, opened
-from sogjax.engine.run import Run
-from sogjax.engine.terminal import progress
-from sogjax.engine.track import track_recording
-from sogjax.evaluation import evaluate_motions
+from sogjax.io.cache_folder import default_cache_dir
+from sogjax.io.ground_truth import load_ground_truth
+from sogjax.quality.evaluation import evaluate_motions
+from sogjax.run.recordings import actors_of, opened
+from sogjax.run.run import Run
+from sogjax.run.terminal import progress
+from sogjax.run.track import track_recording
 from sogjax.settings.compose import track_config
-from sogjax.synth import SynthSettings, cached_recording
-from sogjax.synth.cache import default_cache_dir
+from sogjax.synth.cache import cached_recording
+from sogjax.synth.settings import SynthSettings
 
 
 def track_rendered(settings: SynthSettings, overrides: Sequence[str] = ()) -> Run:

@@ -7,13 +7,12 @@ import numpy as np
 from jaxtyping import Float
 from scipy.signal import butter, sosfiltfilt
 
-from sogjax.data.ground_truth import GroundTruth
-from sogjax.data.keypoints import Keypoints
-from sogjax.data.recording import Recording
-from sogjax.evaluation.bone_lengths import landmark_named
-from sogjax.evaluation.metrics import lost_points
-from sogjax.tracking.keypoint_people import triangulated_people
-from sogjax.tracking.triangulation import interpolated
+from sogjax.io.ground_truth import GroundTruth
+from sogjax.io.keypoints.load import Keypoints
+from sogjax.io.recording import Recording
+from sogjax.quality.metrics import landmark_named, lost_points
+from sogjax.search.keypoint_people import triangulated_people
+from sogjax.search.triangulation import interpolated
 
 LONGEST_GAP = 20
 """Frames that are filled on a line; longer gaps keep the nearest place (Pose2Sim's defaults)."""

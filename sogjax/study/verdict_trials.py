@@ -11,24 +11,24 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from sogjax.data.atomic import atomic_path
-from sogjax.data.ground_truth import GroundTruth, load_ground_truth
-from sogjax.data.motion import Motion, load_motion, save_motion
-from sogjax.engine.recordings import opened, with_cameras
-from sogjax.engine.track import track_recording
-from sogjax.engine.verdict import expected_of
 from sogjax.errors import InputError
-from sogjax.evaluation import joint_errors
-from sogjax.evaluation.metrics import mean_per_frame, stretches
-from sogjax.evaluation.strained import Limits, limits_of
-from sogjax.evaluation.verdict import Verdict, verdicts
+from sogjax.io.files import atomic_path
+from sogjax.io.ground_truth import GroundTruth, load_ground_truth
+from sogjax.io.motion import Motion, load_motion, save_motion
 from sogjax.model.body import Body
+from sogjax.quality.limb_warnings import Limits, limits_of
+from sogjax.quality.markers import joint_errors
+from sogjax.quality.metrics import mean_per_frame, stretches
+from sogjax.quality.verdict import Verdict, verdicts
+from sogjax.run.recordings import opened, with_cameras
+from sogjax.run.track import track_recording
+from sogjax.run.verdict import expected_of
 from sogjax.settings.compose import track_config
 from sogjax.study.few_cameras import evenly
 from sogjax.study.kept_actors import kept_actors
 from sogjax.study.verdicts import limb_of
-from sogjax.synth import SynthSettings
 from sogjax.synth.cache import cached_recording
+from sogjax.synth.settings import SynthSettings
 
 FAR = 0.1
 """Metres from the truth, beyond which a limb is lost."""

@@ -7,12 +7,11 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from sogjax.data.ground_truth import GroundTruth
-from sogjax.data.motion import motion_from_poses
-from sogjax.evaluation import joint_errors
-from sogjax.evaluation.markers import common_frames
-from sogjax.evaluation.metrics import mean_per_frame
+from sogjax.io.ground_truth import GroundTruth
+from sogjax.io.motion import motion_from_poses
 from sogjax.model.body import Body, dof_slices
+from sogjax.quality.markers import common_frames, joint_errors
+from sogjax.quality.metrics import mean_per_frame
 from sogjax.study.climbs import Pair
 
 KEPT, REGAINED, SEARCH, OBJECTIVE, LEFT, UNKNOWN = "kept", "regained", "search", "objective", "left", "unknown"

@@ -5,8 +5,8 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-from sogjax.data.cache_folder import default_cache_dir
 from sogjax.errors import InputError
+from sogjax.io.cache_folder import default_cache_dir
 from sogjax.synth.detector import DetectorSettings
 from sogjax.synth.keypoints import write_simulated
 from sogjax.synth.render import Progress, render_recording, silent

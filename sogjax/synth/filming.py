@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from sogjax.data.atomic import atomic_path
-from sogjax.data.video import VideoWriter
+from sogjax.io.files import atomic_path
+from sogjax.io.video import VideoWriter
 from sogjax.synth.anatomy import Pose
 from sogjax.synth.exercises import EXAMPLE_POSES
 from sogjax.synth.light import drifted

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float
 
-from sogjax.data.keypoints.scheme import KeypointScheme, named_scheme
-from sogjax.data.keypoints.write import WRITERS, pictures_to_write
 from sogjax.errors import InputError
+from sogjax.io.keypoints.scheme import KeypointScheme, named_scheme
+from sogjax.io.keypoints.write import WRITERS, pictures_to_write
 from sogjax.synth.detector import DetectorSettings, Sight, detected
 from sogjax.synth.keypoint_sight import sights
 from sogjax.synth.landmarks import KEYPOINTS

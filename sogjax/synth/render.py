@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from sogjax.data.calibration.rig import CameraEntry, rig_from_entries
-from sogjax.data.calibration.toml import write_toml
-from sogjax.data.ground_truth import GroundTruth, save_ground_truth
 from sogjax.errors import InputError
+from sogjax.io.calibration.rig import CameraEntry, rig_from_entries
+from sogjax.io.calibration.toml import write_toml
+from sogjax.io.ground_truth import GroundTruth, save_ground_truth
 from sogjax.synth.anatomy import Anatomy, Pose
 from sogjax.synth.crew import film_all, num_workers
 from sogjax.synth.detector import DetectorSettings

@@ -10,16 +10,16 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from sogjax.compiled.once import computed_once
 from sogjax.energy.overlap import pair_color_similarities
-from sogjax.energy.windows import Windows, windows_around
+from sogjax.energy.views import Windows, windows_around
 from sogjax.errors import InputError
-from sogjax.images.foreground import EmptyScene, SubjectColors, foreground_weights, log_odds
-from sogjax.images.quadtree import Candidates, keep_blobs, keep_blobs_of_planes, quadtree_of_planes
 from sogjax.model.camera import Camera, project
 from sogjax.model.color import averaging_space, convert, from_rgb
+from sogjax.model.compiled import computed_once
 from sogjax.model.skeleton import Skeleton
 from sogjax.model.sog import Sog
+from sogjax.scene.foreground import EmptyScene, SubjectColors, foreground_weights, log_odds
+from sogjax.scene.quadtree import Candidates, keep_blobs, keep_blobs_of_planes, quadtree_of_planes
 
 CAPACITIES = (256, 512, 768, 1024, 1536, 2048, 3072, 4096, 6144, 8192, 16384, 32768, 65536)
 """The sizes of padded image Sogs. Few, so that few programs are compiled."""

@@ -11,8 +11,8 @@ from jaxtyping import Array, Bool, Float, Int, UInt8
 
 from sogjax.energy.keypoint_views import SeenKeypoints
 from sogjax.model.sog import Sog
+from sogjax.quality.limb_confidence import Judgement
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.limb_doubt import Judgement
 
 
 class PartialCells(NamedTuple):

@@ -7,9 +7,9 @@ import equinox as eqx
 import jax
 from jaxtyping import Array, Float
 
+from sogjax.tracking.capacity import first_capacities, larger_capacities
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import FrameCells, TrackedFrame, TrackState, on_device, on_host
-from sogjax.tracking.room import first_capacities, larger_capacities
 from sogjax.tracking.tracker import Tracker
 
 _step = eqx.filter_jit(Tracker.step)

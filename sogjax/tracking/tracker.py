@@ -10,41 +10,24 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int, UInt8
 
-from sogjax.compiled.once import computed_once
 from sogjax.energy.coloring import Coloring
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.keypoint_views import KeypointViews
 from sogjax.energy.keypoints import keypoint_pull_among
 from sogjax.energy.posed import History, Posed
 from sogjax.energy.term import Terms
-from sogjax.energy.views import Views
-from sogjax.energy.windows import Windows
+from sogjax.energy.views import Views, Windows
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.color import from_rgb
-from sogjax.solve import Scales, Solution, Solver
-from sogjax.tracking.culling import (
-    Capacities,
-    ImageReader,
-    actor_of_blobs,
-    body_boxes,
-    union_boxes,
-)
-from sogjax.tracking.frame import (
-    NOTHING,
-    Beside,
-    FrameResult,
-    PartialCells,
-    TrackState,
-    WithKeypoints,
-    on_device,
-)
-from sogjax.tracking.frame_fit import frame_fit
-from sogjax.tracking.guide import Guide
-from sogjax.tracking.judged_limbs import JudgedLimbs
-from sogjax.tracking.limb_doubt import Judgement, judgement
-from sogjax.tracking.limb_evidence import blob_evidence
-from sogjax.tracking.rounds import solve_near
+from sogjax.model.compiled import computed_once
+from sogjax.quality.limb_confidence import Judgement, frame_fit, judgement
+from sogjax.quality.limb_evidence import JudgedLimbs, blob_evidence
+from sogjax.solve.solution import Scales, Solution, Solver
+from sogjax.tracking.culling import Capacities, ImageReader, actor_of_blobs, body_boxes, union_boxes
+from sogjax.tracking.frame import NOTHING, Beside, FrameResult, PartialCells, TrackState, WithKeypoints, on_device
+from sogjax.tracking.keypoint_prefit import Guide
+from sogjax.tracking.solving import solve_near
 
 NO_ROOM = "a frame has more image blobs than the tracker has room for; make a new one, beginning with this frame"
 

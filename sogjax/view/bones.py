@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from sogjax.data.doubtful import in_doubt
-from sogjax.data.motion import Motion
+from sogjax.io.motion import Motion
+from sogjax.quality.limb_warnings import in_doubt
 
 SAME_ORIGIN = 1e-4
 """Metres. One-axis joints nearer than this to their parent in every frame are drawn as one."""

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from sogjax.data.calibration import CameraRig
-from sogjax.data.motion import Motion
+from sogjax.io.calibration.rig import CameraRig
+from sogjax.io.motion import Motion
 from sogjax.view.overlay import Overlay, write_label
 from sogjax.view.projection import picture_points
 

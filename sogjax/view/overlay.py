@@ -7,9 +7,9 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from sogjax.data.calibration import CameraRig
-from sogjax.data.motion import Motion
 from sogjax.errors import InputError
+from sogjax.io.calibration.rig import CameraRig
+from sogjax.io.motion import Motion
 from sogjax.view.bones import Bones, actor_palette, blob_palette, bones_from_motion, doubtful_edges
 from sogjax.view.projection import picture_points
 from sogjax.view.tiles import Fit, grid_for, shrink

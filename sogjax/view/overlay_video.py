@@ -6,9 +6,9 @@ from types import TracebackType
 
 import numpy as np
 
-from sogjax.data.motion import Motion
-from sogjax.data.recording import Recording
-from sogjax.data.video import VideoWriter
+from sogjax.io.motion import Motion
+from sogjax.io.recording import Recording
+from sogjax.io.video import VideoWriter
 from sogjax.view.bones import Bones, bones_from_motion
 from sogjax.view.overlay import WIDTH, Overlay
 

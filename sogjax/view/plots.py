@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from sogjax.data.atomic import atomic_path
+from sogjax.io.files import atomic_path
 
 SIZE = (900, 360)
 _LEFT, _RIGHT, _TOP, _BOTTOM = 64, 16, 34, 40

@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from sogjax.data.calibration import CameraRig
-from sogjax.model.frames import world_from_upright
-from sogjax.view.contact_sheet import TITLE_HEIGHT, WIDTH, write
+from sogjax.io.calibration.rig import CameraRig
+from sogjax.model.rotation import world_from_upright
 from sogjax.view.projection import picture_points
+from sogjax.view.sheets import TITLE_HEIGHT, WIDTH, write
 from sogjax.view.tiles import grid_for
 
 GRID, FRUSTUM, FIGURE = (235, 235, 120), (80, 170, 255), (80, 220, 60)

@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 
-from sogjax.data.motion import Motion
-from sogjax.data.motion_log import PER_FRAME, SOMETIMES_PER_FRAME
-from sogjax.view.rerun import view_command
+from sogjax.io.motion import Motion
+from sogjax.io.motion_log import PER_FRAME, SOMETIMES_PER_FRAME
+from sogjax.view.rerun.file import view_command
 
 SIZE = "1600x1000"
 ATTEMPTS, LONGEST = 3, 120

@@ -18,7 +18,7 @@ from fuzzing import fuzz_readers
 from outcomes import outcomes_of
 from page import page
 
-from sogjax.data.atomic import atomic_path
+from sogjax.io.files import atomic_path
 from sogjax.study.script import run_script, settings_from
 
 

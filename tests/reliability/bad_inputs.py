@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 from puppet import PUPPET
 
-from sogjax.data.actor_file import load_body
-from sogjax.data.ground_truth import GroundTruth, save_ground_truth
-from sogjax.data.motion import motion_from_poses, save_motion
+from sogjax.io.actor_file import load_body
+from sogjax.io.ground_truth import GroundTruth, save_ground_truth
+from sogjax.io.motion import motion_from_poses, save_motion
 
 Damage = Callable[[Path], object]
 """Done to a workplace."""

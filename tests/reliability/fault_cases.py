@@ -15,10 +15,10 @@ import yaml
 from faults import SAME, Survived, Ward, said_by
 from kill_and_resume import PARTIAL, frames_left, killed_and_resumed, started
 
-from sogjax.data.array_log import ROWS
-from sogjax.data.npz_file import npy_header
-from sogjax.engine.kept_run import FOLDER
 from sogjax.errors import InputError
+from sogjax.io.array_log import ROWS
+from sogjax.io.npz_file import npy_header
+from sogjax.run.kept_run import FOLDER
 
 FIRST_FRAMES = 8
 LATER_FRAMES = 24

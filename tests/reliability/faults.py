@@ -18,8 +18,8 @@ from tempfile import TemporaryDirectory
 from kill_and_resume import Settings, Undisturbed, check_same, frames_left, started
 from kill_and_resume import undisturbed as left_alone
 
-from sogjax.engine.compilation_cache import VARIABLE
 from sogjax.errors import InputError
+from sogjax.run.compilation_cache import VARIABLE
 from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from
 

@@ -10,26 +10,25 @@ import skeleton_cases
 from bad_inputs import make_workplace
 from keypoint_cases import write_keypoints
 
-from sogjax.data.actor_file import load_body
-from sogjax.data.array_log import ArrayLog
-from sogjax.data.calibration import load_calibration
-from sogjax.data.cell_cache import cell_cache
-from sogjax.data.ground_truth import load_ground_truth
-from sogjax.data.image_file import read_image, read_mask
-from sogjax.data.initial_pose import load_initial_poses
-from sogjax.data.keypoints.arrays import read_keypoint_array
-from sogjax.data.keypoints.camera_keypoints import read_camera
-from sogjax.data.keypoints.scheme import load_scheme
-from sogjax.data.motion import load_motion
-from sogjax.data.motion_log import MotionLog
-from sogjax.data.recording import open_recording
-from sogjax.data.recording_settings import read_recording_settings
-from sogjax.data.skeletons import read_skeleton
-from sogjax.data.skeletool_motion import read_skeletool_motion
-from sogjax.data.source import look_at_source, open_source
-from sogjax.engine.kept_run import FOLDER, NOTE, KeptRun
-from sogjax.engine.prefix import CAPACITIES, CAPACITY, COLUMNS, TERM, Prefix
 from sogjax.errors import InputError
+from sogjax.io.actor_file import load_body
+from sogjax.io.array_log import ArrayLog
+from sogjax.io.calibration.load import load_calibration
+from sogjax.io.cell_cache import cell_cache
+from sogjax.io.ground_truth import load_ground_truth
+from sogjax.io.image_file import read_image, read_mask
+from sogjax.io.initial_pose import load_initial_poses
+from sogjax.io.keypoints.camera_keypoints import read_camera, read_keypoint_array
+from sogjax.io.keypoints.scheme import load_scheme
+from sogjax.io.motion import load_motion
+from sogjax.io.motion_log import MotionLog
+from sogjax.io.recording import open_recording
+from sogjax.io.recording_settings import read_recording_settings
+from sogjax.io.skeletons.load import read_skeleton
+from sogjax.io.skeletons.skeletool_motion import read_skeletool_motion
+from sogjax.io.source import look_at_source, open_source
+from sogjax.run.kept_run import FOLDER, NOTE, KeptRun
+from sogjax.run.prefix import CAPACITIES, CAPACITY, COLUMNS, TERM, Prefix
 
 Read = Callable[[Path], object]
 

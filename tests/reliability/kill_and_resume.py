@@ -18,13 +18,14 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from sogjax.data.actor_file import named_body
-from sogjax.data.motion import Motion, load_motion
-from sogjax.data.source import look_at_source
 from sogjax.errors import InputError
+from sogjax.io.actor_file import named_body
+from sogjax.io.motion import Motion, load_motion
+from sogjax.io.source import look_at_source
 from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from
-from sogjax.synth import SynthSettings, cached_recording
+from sogjax.synth.cache import cached_recording
+from sogjax.synth.settings import SynthSettings
 
 PARTIAL = "motion.partial"
 LATE = 0.2

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from bad_inputs import BadInput, make_workplace
 
-from sogjax.app.cli import main as sogjax
+from sogjax.cli.main import main as sogjax
 
 
 @dataclass(frozen=True)

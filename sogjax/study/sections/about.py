@@ -6,7 +6,6 @@ from importlib.metadata import PackageNotFoundError, version
 
 from omegaconf import OmegaConf
 
-from sogjax import __version__
 from sogjax.settings.compose import track_config
 from sogjax.study.document import Section
 from sogjax.study.done import Done, different
@@ -86,7 +85,7 @@ def installed_version(package: str) -> str:
     try:
         return version(package)
     except PackageNotFoundError:
-        return __version__ if package == "sogjax" else "not installed"
+        return version("sogjax") if package == "sogjax" else "not installed"
 
 
 def _recordings(done: Sequence[Done]) -> str:

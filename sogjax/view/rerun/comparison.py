@@ -7,17 +7,15 @@ import numpy as np
 import rerun as rr
 from jaxtyping import Float
 
-from sogjax.data.ground_truth import GroundTruth
-from sogjax.data.motion import Motion
-from sogjax.data.recording import Recording
+from sogjax.io.ground_truth import GroundTruth
+from sogjax.io.motion import Motion
+from sogjax.io.recording import Recording
 from sogjax.view.bones import blob_palette, bones_from_motion
-from sogjax.view.frames import frame_range
-from sogjax.view.picture_camera import PictureCamera, picture_camera
+from sogjax.view.projection import PictureCamera, frame_range, picture_camera
 from sogjax.view.rerun.curves import log_body_curve_looks, log_curves, own_curves, plots_with
 from sogjax.view.rerun.layout import comparison_layout, eye
-from sogjax.view.rerun.names import FRAME, TIME, camera_entity, run_entity
 from sogjax.view.rerun.scene import log_actor, log_cameras, log_look, log_markers
-from sogjax.view.rerun.stream import rerun_stream
+from sogjax.view.rerun.stream import FRAME, TIME, camera_entity, rerun_stream, run_entity
 
 PICTURE_WIDTH = 480
 

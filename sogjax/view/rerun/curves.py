@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from sogjax.data.motion import Motion
+from sogjax.io.motion import Motion
 from sogjax.view.bones import LEFT, MIDDLE, RIGHT, actor_palette
-from sogjax.view.rerun.names import FRAME, ITERATION, entity_part, time_columns
+from sogjax.view.rerun.stream import FRAME, ITERATION, entity_part, time_columns
 
 _CURVE_COLORS = ((90, 170, 255), (255, 170, 60), (120, 220, 120), (255, 110, 120), (190, 140, 255), (240, 220, 90))
 _PLOT_OF = {

@@ -12,17 +12,15 @@ import numpy as np
 import rerun as rr
 from jaxtyping import Float
 
-from sogjax.data.ground_truth import GroundTruth
-from sogjax.data.motion import Motion
-from sogjax.data.recording import Recording
+from sogjax.io.ground_truth import GroundTruth
+from sogjax.io.motion import Motion
+from sogjax.io.recording import Recording
 from sogjax.view.bones import Bones, blob_palette, bones_from_motion
-from sogjax.view.frames import frame_range
-from sogjax.view.picture_camera import picture_camera
+from sogjax.view.projection import frame_range, picture_camera
 from sogjax.view.rerun.curves import log_curve_looks, log_curves, log_traces, own_curves, plots_with
 from sogjax.view.rerun.layout import eye, tracking_layout
-from sogjax.view.rerun.names import FRAME, TIME, actor_entity, camera_entity, color_bytes
 from sogjax.view.rerun.scene import log_actor, log_cameras, log_doubts, log_look, log_markers, log_path
-from sogjax.view.rerun.stream import rerun_stream
+from sogjax.view.rerun.stream import FRAME, TIME, actor_entity, camera_entity, color_bytes, rerun_stream
 
 QUALITY = 80
 """Of the JPEG pictures, 0 to 100."""

@@ -6,14 +6,13 @@ import numpy as np
 import rerun as rr
 from jaxtyping import Float
 
-from sogjax.data.motion import Motion
-from sogjax.data.recording import Recording
+from sogjax.io.motion import Motion
+from sogjax.io.recording import Recording
 from sogjax.view.bones import blob_palette, bones_from_motion
-from sogjax.view.picture_camera import picture_camera
+from sogjax.view.projection import picture_camera
 from sogjax.view.rerun.layout import eye, iterations_layout
-from sogjax.view.rerun.names import ITERATION, camera_entity
 from sogjax.view.rerun.scene import log_cameras, log_look, log_skeletons
-from sogjax.view.rerun.stream import rerun_stream
+from sogjax.view.rerun.stream import ITERATION, camera_entity, rerun_stream
 
 
 def write_iterations(

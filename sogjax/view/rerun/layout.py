@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 import rerun.blueprint as rrb
 
-from sogjax.data.recording import Recording
-from sogjax.model.frames import world_from_upright
-from sogjax.view.rerun.names import FRAME, ITERATION, actor_entity, camera_entity, run_entity
+from sogjax.io.recording import Recording
+from sogjax.model.rotation import world_from_upright
+from sogjax.view.rerun.stream import FRAME, ITERATION, actor_entity, camera_entity, run_entity
 
 CAMERAS_SHOWN = 4
 

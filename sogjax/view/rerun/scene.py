@@ -3,13 +3,13 @@
 import numpy as np
 import rerun as rr
 
-from sogjax.data.doubtful import in_doubt
-from sogjax.data.ground_truth import GroundTruth
-from sogjax.data.motion import Motion
-from sogjax.data.recording import Recording
+from sogjax.io.ground_truth import GroundTruth
+from sogjax.io.motion import Motion
+from sogjax.io.recording import Recording
+from sogjax.quality.limb_warnings import in_doubt
 from sogjax.view.bones import Bones, actor_palette
-from sogjax.view.picture_camera import PictureCamera
-from sogjax.view.rerun.names import FRAME, TIME, camera_entity, time_columns
+from sogjax.view.projection import PictureCamera
+from sogjax.view.rerun.stream import FRAME, TIME, camera_entity, time_columns
 
 LARGEST_DOUBT = 0.06
 """Metres: the radius of the balls around the joints of a limb that is certainly lost."""

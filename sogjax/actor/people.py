@@ -1,0 +1,197 @@
+"""Several people in one frame: parts of the visual hull that stand apart, and where each camera shows which.
+
+Who is who, among people that are seen apart in several frames: by their places, and by their colours.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt8
+from scipy.ndimage import binary_dilation, gaussian_filter, label
+from scipy.optimize import linear_sum_assignment
+
+from sogjax.actor.frame_choice import SMALLEST_BODY, Mask, widened
+from sogjax.model.camera import Camera
+from sogjax.scene.segmentation import MANY
+from sogjax.scene.visual_hull import VOXELS, Cube, VoxelPixels, voxel_pixels, without_floor
+
+GAP = 0.25
+"""Vertical gap between the parts of one body that is closed, metres: a belt in the background's colours."""
+LEAST_HEIGHT = 0.4
+"""Height of a part of the hull, as a share of the tallest one's, from which on it may be somebody else."""
+HIDDEN = 0.1
+"""Share of a silhouette that another one covers, above which a camera's mask is not used."""
+COLOR_BINS = 6
+"""Of each channel, in the histogram of somebody's colours."""
+
+
+@dataclass(frozen=True)
+class PersonSeen:
+    """One of several people in one frame; everything by camera is in cells."""
+
+    frame: int
+    place: Float[np.ndarray, "3"]
+    """Centre of the part of the hull, metres, world."""
+    regions: dict[int, Mask]
+    """Where each camera shows nobody else: the silhouette, a little widened. A camera in which another one hides the
+    person, or is hidden by him, is absent."""
+    masks: dict[int, Mask]
+    """What is not the background there."""
+    colors: Float[np.ndarray, "bin"]
+    """Share of each colour, all cameras together."""
+
+
+def people_apart(
+    frame: int,
+    masks: Mapping[int, Mask],
+    unknown: Mapping[int, Mask],
+    pictures: Mapping[int, UInt8[np.ndarray, "rows columns 3"]],
+    cameras: Mapping[int, Camera],
+    cube: Cube,
+    up: Float[np.ndarray, "3"],
+) -> list[PersonSeen]:
+    """The people who stand apart from each other in one frame, in no particular order.
+
+    Args:
+        frame: its number.
+        masks: what is not the background, shadows or not, by camera.
+        unknown: where nothing is known of the background.
+        pictures: the cells' colours.
+        cameras: for pictures of the masks' size.
+        cube: in which all of them are.
+        up: the world's vertical.
+    """
+    pixels = {k: voxel_pixels(cube, cameras[k], mask.shape) for k, mask in masks.items()}
+    misses = np.sum([~pixels[k].hits(widened(masks[k] | unknown[k])) for k in masks], axis=0)
+    hull = without_floor(misses <= (1 if len(masks) >= MANY else 0), up)
+    bodies = _bodies(hull.reshape(3 * (VOXELS,)), cube.spacing, int(np.argmax(np.abs(up))))
+    regions = {k: _regions([pixels[k].silhouette_of(body) for body in bodies], pixels[k]) for k in masks}
+    people = []
+    for number, body in enumerate(bodies):
+        own = {k: region for k in masks if (region := regions[k][number]) is not None}
+        limited = {k: masks[k] & region for k, region in own.items()}
+        place = cube.points[body].mean(axis=0)
+        people.append(PersonSeen(frame, place, own, limited, color_histogram(pictures, limited)))
+    return people
+
+
+def color_histogram(
+    pictures: Mapping[int, UInt8[np.ndarray, "_rows _columns 3"]],
+    masks: Mapping[int, Bool[np.ndarray, "_rows _columns"]],
+) -> Float[np.ndarray, "bin"]:
+    """The share of each colour in the masks of all cameras, a little blurred; zeros where they are empty."""
+    total = np.zeros(3 * (COLOR_BINS,))
+    for k, mask in masks.items():
+        bins = (pictures[k][mask].astype(int) * COLOR_BINS) >> 8
+        np.add.at(total, tuple(bins.T), 1.0)
+    return (gaussian_filter(total, 0.6) / max(total.sum(), 1.0)).ravel()
+
+
+def _bodies(hull: Bool[np.ndarray, "x y z"], spacing: float, axis: int) -> list[Bool[np.ndarray, "voxel"]]:
+    """The separate parts of a hull that are as tall and as large as somebody."""
+    structure = np.ones([2 * round(0.5 * GAP / spacing) + 1 if k == axis else 1 for k in range(3)], bool)
+    connected: Any = label(binary_dilation(hull, structure))
+    labels: Int[np.ndarray, "x y z"] = np.where(hull, connected[0], 0)
+    parts = [labels == number for number in range(1, connected[1] + 1)]
+    volumes = [int(part.sum()) for part in parts]
+    heights = [int(np.ptp(np.nonzero(part)[axis])) if part.any() else 0 for part in parts]
+    large = [
+        part.ravel()
+        for part, volume, height in zip(parts, volumes, heights, strict=True)
+        if volume > SMALLEST_BODY * max(volumes) and height > LEAST_HEIGHT * max(heights)
+    ]
+    return large
+
+
+def _regions(silhouettes: Sequence[Mask], pixels: VoxelPixels) -> list[Mask | None]:
+    """Around each silhouette of one camera, what is nearer to it than to the others; None: others cover too much."""
+    width = 2 * pixels.footprint + 2
+    distances = [cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 3) for mask in silhouettes]
+    regions: list[Mask | None] = []
+    for number, (mask, distance) in enumerate(zip(silhouettes, distances, strict=True)):
+        others = [other for k, other in enumerate(distances) if k != number]
+        nearest = np.min(others, axis=0) if others else np.full(mask.shape, np.inf)
+        covered = float((mask & (nearest <= 1.0)).sum() / max(mask.sum(), 1))
+        shown = mask.any() and covered <= HIDDEN
+        regions.append((distance <= width) & (distance <= nearest) if shown else None)
+    return regions
+
+
+FASTEST = 4.0
+"""Metres per second: people who stand farther apart than this brings one until the next frame cannot change places."""
+MOVED = 0.5
+"""Largest way from frame to frame, as a share of the distance between two people, for places to tell them."""
+SURE = 0.2
+"""Least difference that exchanging two people makes to how far their colours are off (from 0 to 2), to tell them."""
+
+Moment = Sequence[PersonSeen]
+"""The people in one frame, as many in each."""
+
+
+def told_apart(moments: Sequence[Moment], fps: float) -> list[list[PersonSeen]]:
+    """The moments (in the order of the clip) in which it is sure who is who, people in the same order in all of them.
+
+    Within a run of moments, places tell; runs are brought together by the colours, the longest first.
+    """
+    runs = runs_by_place(moments, fps)
+    if not runs:
+        return []
+    told: list[list[PersonSeen]] = []
+    for run in sorted(runs, key=len, reverse=True):
+        colors = [_mean_colors(run, k) for k in range(len(run[0]))]
+        order = list(range(len(colors)))
+        if told:
+            known = [_mean_colors(told, k) for k in order]
+            order, margin = matched(np.array([[unlike(a, b) for b in colors] for a in known]))
+            if margin < SURE:
+                continue
+        told += [[moment[k] for k in order] for moment in run]
+    return sorted(told, key=lambda moment: moment[0].frame)
+
+
+def runs_by_place(moments: Sequence[Moment], fps: float) -> list[list[list[PersonSeen]]]:
+    """Moments that follow each other so fast that nobody can have changed places, people in one order in each run."""
+    runs: list[list[list[PersonSeen]]] = []
+    for moment in moments:
+        last = runs[-1][-1] if runs else None
+        ways = None if last is None else _distances(last, moment)
+        if last is not None and ways is not None:
+            order, _ = matched(ways)
+            apart = min(_nearest(last), _nearest(moment))
+            moved = max(float(ways[k, other]) for k, other in enumerate(order))
+            seconds = (moment[0].frame - last[0].frame) / fps
+            if moved < MOVED * apart and FASTEST * seconds < apart:
+                runs[-1].append([moment[k] for k in order])
+                continue
+        runs.append([list(moment)])
+    return runs
+
+
+def matched(costs: Float[np.ndarray, "known found"]) -> tuple[list[int], float]:
+    """Which one found is each one known, at the least cost, and what exchanging two of them would cost more."""
+    order = linear_sum_assignment(costs)[1].tolist()
+    pairs = [(i, j) for i in range(len(order)) for j in range(i)]
+    exchanged = [costs[i, order[j]] + costs[j, order[i]] - costs[i, order[i]] - costs[j, order[j]] for i, j in pairs]
+    return order, float(min(exchanged, default=np.inf))
+
+
+def unlike(one: Float[np.ndarray, "bin"], other: Float[np.ndarray, "bin"]) -> float:
+    """From 0 to 1: how little two histograms of colours have in common."""
+    return 1.0 - float(np.minimum(one, other).sum())
+
+
+def _mean_colors(moments: Sequence[Moment], person: int) -> Float[np.ndarray, "bin"]:
+    return np.mean([moment[person].colors for moment in moments], axis=0)
+
+
+def _distances(one: Moment, other: Moment) -> Float[np.ndarray, "one other"]:
+    return np.array([[np.linalg.norm(a.place - b.place) for b in other] for a in one])
+
+
+def _nearest(moment: Moment) -> float:
+    """The distance of the two that are nearest to each other, metres."""
+    distances = _distances(moment, moment)
+    return float(np.min(distances[~np.eye(len(moment), dtype=bool)], initial=np.inf))

@@ -1,1 +1,0 @@
-"""Configuration of the commands by Hydra: schemas, composition, the words of a command line."""

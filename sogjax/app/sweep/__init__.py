@@ -1,1 +1,0 @@
-"""Sweeps: a command for every combination of settings."""

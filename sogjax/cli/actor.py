@@ -1,0 +1,122 @@
+"""`sogjax actor`: an actor file from the example poses of a recording, with a report beside it."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import yaml
+
+from sogjax.actor.colors import ColoredView, camera_of, estimated_gains
+from sogjax.actor.make import MadeActor, make_actor
+from sogjax.errors import InputError, counted
+from sogjax.io.actor_file import save_body
+from sogjax.io.files import atomic_path
+from sogjax.io.recording import Recording
+from sogjax.model.body import Body
+from sogjax.run.actor_report import report_folder, write_actor_report
+from sogjax.run.build import color_space_and_radius, energy_terms
+from sogjax.run.example_frames import with_examples
+from sogjax.run.keypoint_actor import with_rough_poses
+from sogjax.run.outputs import free_path, results_folder
+from sogjax.run.recordings import body_named, check_scale, keypoint_actor_or, opened
+from sogjax.run.terminal import progress, say
+from sogjax.settings.method import ImagesConfig
+from sogjax.settings.run import ActorConfig
+
+NOTICED = 0.15
+"""Logarithm of a camera's gain above which it is reported."""
+
+
+GOOD_IOU, GOOD_COLORS = 0.75, 0.5
+"""Below these an actor must be looked at: agreement with the masks, and what its example poses explain of it."""
+
+
+def run(config: ActorConfig, name: str | None = None) -> Path:
+    """Make the actor and write its report and its file, which comes last: where it is, it is whole.
+
+    Args:
+        config: what it is made of, and where to.
+        name: of the actor; None: its subject's, or else its body's.
+
+    Raises:
+        InputError: an invalid recording, example pose or body, or an actor file that already exists.
+    """
+    space, _ = color_space_and_radius(config.color)
+    recording = opened(config.recording, config.cameras)
+    body = body_named(config.body)
+    check_scale(recording, [body])
+    out = Path(config.out)
+    if out.is_dir():
+        raise InputError(f"out={out}: is a folder; give the actor file to write, such as out={out / 'actor.yaml'}")
+    free_path("out", out, config.overwrite)
+    with results_folder(out.parent):
+        try:
+            recording, made = _made(recording, body, config)
+        except InputError as error:
+            actor = keypoint_actor_or(error, recording, body, space, config.actors, config.symmetric)
+            save_body(out, replace(actor, name=name or actor.name))
+            print(out)
+            return out
+        if name is not None:
+            made = replace(made, body=replace(made.body, name=name), upright_body=replace(made.upright_body, name=name))
+        folder = report_folder(out)
+        report = write_actor_report(folder, made, recording.rig)
+        say_gains(recording, made, folder)
+        save_body(out, made.body)
+    print(f"silhouettes and masks agree to {report.mean_iou:.3f} (mean IoU)")
+    if report.warnings:
+        say(f"{counted(len(report.warnings), 'warning')}: see {folder / 'report.md'}")
+    for note in report.notes:
+        say(f"note: {note}")
+    print(out)
+    print(folder / "report.md")
+    print(f"\nverdict: {actor_verdict(report.mean_iou, float(made.body.explained), len(report.warnings))}")
+    return out
+
+
+def actor_verdict(mean_iou: float, explained: float, num_warnings: int) -> str:
+    """What is thought of an actor, from what its own example poses show: both are parts of 1."""
+    found = []
+    if mean_iou < GOOD_IOU:
+        found.append(f"silhouettes agree to {mean_iou:.0%} only (80 % and more is usual): look at silhouettes_*.png")
+    if explained < GOOD_COLORS:
+        found.append(f"its example poses explain {explained:.0%} of it only (60 to 75 % is usual): look at colors.png")
+    if num_warnings:
+        found.append(f"{counted(num_warnings, 'warning')} in report.md")
+    return "; ".join(found) or f"looks right (its example poses explain {explained:.0%} of it)"
+
+
+def _made(recording: Recording, body: Body, config: ActorConfig) -> tuple[Recording, MadeActor]:
+    """The actor of the example poses, the recording's own or frames of its videos, and the recording with these."""
+    space, _ = color_space_and_radius(config.color)
+    terms = energy_terms(config.energy)
+    recording, learnt, best = with_examples(recording, ImagesConfig(), config.actors)
+    recording = with_rough_poses(recording, body)
+    made = make_actor(recording, body, config.subject, space, terms, say, progress, config.symmetric, learnt, best)
+    return recording, made
+
+
+def say_gains(recording: Recording, made: MadeActor, folder: Path) -> None:
+    """Write color_gains.yaml, and report cameras that show the actor's colours differently."""
+    names, rig = recording.rig.names, jax.tree.map(jnp.asarray, recording.rig.cameras)
+    views: dict[int, list[ColoredView]] = {}
+    for posed, pose in zip(made.pictures, made.example_poses.values(), strict=True):
+        for camera, image in posed.images.items():
+            views.setdefault(camera, []).append(ColoredView(camera_of(rig, camera), image, posed.masks[camera], pose))
+    found = estimated_gains(made.upright_body, views)
+    total = {names[camera]: gains * recording.color_gains.get(names[camera], 1.0) for camera, gains in found.items()}
+    rounded = {name: [round(float(gain), 3) for gain in gains] for name, gains in total.items()}
+    with atomic_path(folder / "color_gains.yaml") as temporary:
+        temporary.write_text(yaml.safe_dump({"color_gains": rounded}, default_flow_style=None, sort_keys=False))
+    unlike = {names[camera]: gains for camera, gains in found.items() if np.abs(np.log(gains)).max() > NOTICED}
+    if unlike:
+        worst = max(unlike, key=lambda name: float(np.abs(np.log(unlike[name])).max()))
+        factors = " ".join(f"{gain:.2f}" for gain in unlike[worst])
+        say(
+            f"in {len(unlike)} of {counted(len(found), 'camera')} the subject's colours differ from "
+            f"the other cameras' (most in {worst}: red, green, blue must be multiplied by {factors}); this may "
+            "be shading; if the cameras differ in exposure or white balance, copy color_gains of "
+            f"{folder / 'color_gains.yaml'} into recording.yaml and make the actor again"
+        )

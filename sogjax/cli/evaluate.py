@@ -1,0 +1,66 @@
+"""`sogjax evaluate`: compare motions with ground truth."""
+
+from pathlib import Path
+
+from sogjax.cli.config.schemas import EvaluateConfig
+from sogjax.errors import InputError
+from sogjax.io.ground_truth import GroundTruth, load_ground_truth
+from sogjax.io.motion import Motion, load_motion
+from sogjax.quality.evaluation import GroupEvaluation, evaluate_motions
+from sogjax.run.build import marker_rule
+from sogjax.run.outputs import actor_name, free_path
+from sogjax.run.recordings import file_list
+
+
+def run(config: EvaluateConfig) -> GroupEvaluation:
+    """Print the table; write the JSON file on request.
+
+    Raises:
+        InputError: files that cannot be opened or do not match, or an existing file for the metrics.
+    """
+    out = None if config.out is None else free_path("out", config.out, config.overwrite)
+    rule = marker_rule(config.markers, "markers")
+    truth = load_ground_truth(truth_file(Path(config.truth)))
+    evaluation = evaluate_motions(named_motions(file_list(config.motion), truth), truth, rule=rule)
+    print(evaluation.table())
+    if out is not None:
+        evaluation.to_json(out)
+        print(out)
+    return evaluation
+
+
+def truth_file(path: Path) -> Path:
+    """The file of a truth, which may be given as its recording's folder.
+
+    Raises:
+        InputError: the folder has none.
+    """
+    if not path.is_dir():
+        return path
+    if not (path / "ground_truth.npz").is_file():
+        raise InputError(
+            f"truth={path}: this folder holds no ground_truth.npz; give that file, or a recording that has one"
+        )
+    return path / "ground_truth.npz"
+
+
+def named_motions(paths: list[Path], truth: GroundTruth) -> dict[str, Motion]:
+    """The motions by actor: `motion_NAME.npz` is NAME's if the truth has several subjects.
+
+    Raises:
+        InputError: a motion whose file name is that of no subject of the truth.
+    """
+    if len(paths) == 1 and len(truth.subjects) < 2:
+        motion = load_motion(paths[0])
+        return {next(iter(truth.subjects), actor_name(paths[0], motion)): motion}
+    if not truth.subjects:
+        raise InputError(f"motion={','.join(map(str, paths))}: the truth is that of one subject; give one motion")
+    motions = {}
+    for path in paths:
+        name = path.stem.removeprefix("motion_")
+        if name not in truth.subjects:
+            raise InputError(
+                f"{path}: the truth's subjects are {', '.join(truth.subjects)}; name the file motion_NAME.npz after one"
+            )
+        motions[name] = load_motion(path)
+    return motions

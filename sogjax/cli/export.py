@@ -1,0 +1,93 @@
+"""`sogjax export`: a motion or a calibration in another format."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import jax.numpy as jnp
+
+from sogjax.cli.config.schemas import ExportConfig
+from sogjax.errors import InputError
+from sogjax.io.calibration.load import load_calibration, save_calibration
+from sogjax.io.calibration.rig import CameraRig
+from sogjax.io.export.angles import write_angles_csv
+from sogjax.io.export.initial_pose import write_initial_pose
+from sogjax.io.export.points import write_c3d, write_trc
+from sogjax.io.export.write import export_motion
+from sogjax.io.motion import DEFAULT_UP, Motion, load_motion
+from sogjax.io.recording import open_recording
+from sogjax.io.skeletons.skeletool_motion import read_skeletool_motion, write_skeletool_motion
+from sogjax.model.body import Body
+from sogjax.model.rotation import UP_AXES, world_from_upright
+from sogjax.run.outputs import free_path
+from sogjax.run.recordings import body_named, file_list
+
+
+def run(config: ExportConfig) -> Path:
+    """Write the file.
+
+    Raises:
+        InputError: a motion or calibration that cannot be opened, an unknown ending, or a file that already exists.
+    """
+    out = free_path("to", config.to, config.overwrite)
+    if (config.motion is None) == (config.calibration is None):
+        raise InputError("export needs motion=... or calibration=..., one of them (see sogjax export --help)")
+    if config.calibration is not None:
+        save_calibration(out, _rig(Path(config.calibration)))
+    else:
+        _export_motion(config, file_list(config.motion), out)
+    print(out)
+    return out
+
+
+def _rig(path: Path) -> CameraRig:
+    return open_recording(path).rig if path.is_dir() else load_calibration(path)
+
+
+def _export_motion(config: ExportConfig, sources: Sequence[Path], out: Path) -> None:
+    is_pose = out.suffix.lower() in (".yaml", ".yml")
+    if config.frame is not None and not is_pose:
+        raise InputError(f"frame={config.frame}: only a .yaml holds one frame; leave it out, or write to=NAME.yaml")
+    if len(sources) != 1 and not is_pose:
+        raise InputError(f"motion={','.join(map(str, sources))}: {out.suffix} holds one motion; give one")
+    if is_pose:
+        write_initial_pose(out, [_read_motion(config, source) for source in sources], config.frame)
+    else:
+        _export_one(config, sources[0], out)
+
+
+def _export_one(config: ExportConfig, source: Path, out: Path) -> None:
+    if config.up not in (None, *UP_AXES):
+        raise InputError(f"up={config.up}: must be one of {', '.join(UP_AXES)}")
+    write_points = {".trc": write_trc, ".c3d": write_c3d}.get(out.suffix.lower())
+    if config.markers is not None and write_points is None:
+        raise InputError(
+            f"markers={config.markers}: only .trc and .c3d have markers; leave it out, or write to=NAME.trc"
+        )
+    if config.angles and out.suffix.lower() not in (".csv", ".mot"):
+        raise InputError("angles=true: only .csv and .mot hold angles; leave it out, or write to=NAME.csv")
+    motion = _read_motion(config, source)
+    if write_points is not None:
+        write_points(out, motion, config.up or motion.up, config.markers)
+    elif config.angles and out.suffix.lower() == ".csv":
+        write_angles_csv(out, motion, config.up or motion.up)
+    elif out.suffix.lower() == ".motion":
+        write_skeletool_motion(out, motion, _actor(config, out))
+    else:
+        export_motion(motion, out, config.up)
+
+
+def _read_motion(config: ExportConfig, path: Path) -> Motion:
+    if path.suffix.lower() != ".motion":
+        return load_motion(path)
+    if config.fps is None or config.fps <= 0:
+        raise InputError(f"{path}: does not say its frame rate; add fps=..., a number over 0")
+    up = config.up or DEFAULT_UP
+    body = _actor(config, path)
+    turned = body.rotated(jnp.asarray(world_from_upright(up), body.blob_sigmas.dtype))
+    return read_skeletool_motion(path, turned, config.fps, up)
+
+
+def _actor(config: ExportConfig, path: Path) -> Body:
+    if config.actor is None:
+        raise InputError(f"{path}: does not say which joints it moves; add actor=..., its actor or body file")
+    return body_named(config.actor)

@@ -1,0 +1,124 @@
+"""SIGTERM, as sent by batch systems and `kill`, ends a run as tidily as Ctrl-C.
+
+The console script `sogjax`: one subcommand per task, with Hydra overrides as arguments.
+"""
+
+import importlib
+import os
+import signal
+import sys
+import textwrap
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from importlib.metadata import version
+from types import FrameType
+
+_DEAF = ("_xla_gc_callback", "__del__")
+"""Functions that the interpreter calls between two lines of others, and whose errors it ignores."""
+_LATER = 0.05
+"""Seconds after which a signal that came there is sent again."""
+
+
+class TerminatedError(KeyboardInterrupt):
+    """Somebody asked the program to end."""
+
+
+@contextmanager
+def terminated_as_interrupted() -> Iterator[None]:
+    """Within the block SIGTERM raises a `TerminatedError`, so that results are written and the rest is removed.
+
+    Does nothing outside the main thread, which alone receives signals.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, _terminate)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _terminate(number: int, frame: FrameType | None) -> None:
+    if frame is not None and frame.f_code.co_name in _DEAF:
+        threading.Timer(_LATER, os.kill, (os.getpid(), number)).start()
+        return
+    raise TerminatedError
+
+
+INTERRUPTED, TERMINATED = 130, 143
+"""Exit status after Ctrl-C and SIGTERM, as in shells."""
+USAGE = "usage: sogjax COMMAND [key=value ...] [-m for a sweep], sogjax COMMAND --help"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command; 0: done, 2: the input was wrong (one sentence on standard error)."""
+    begin, is_process = time.perf_counter(), arguments is None
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    from sogjax.cli.config.composition import SCHEMAS, composed
+    from sogjax.errors import InputError
+    from sogjax.run.clock import STARTING, age_of_process, clocked, stage
+    from sogjax.run.compilation_cache import use_compilation_cache, use_compiler_options
+
+    if not arguments or arguments[0] in ("-h", "--help", "help"):
+        print(_overview())
+        return 0 if arguments else 2
+    if arguments[0] == "--version":
+        print(version("sogjax"))
+        return 0
+    command, overrides = arguments[0], arguments[1:]
+    if command not in SCHEMAS:
+        return _wrong_input(f"no command {command!r}; use one of {', '.join(SCHEMAS)} ({USAGE})")
+    if any(word in ("-h", "--help") for word in overrides):
+        print(command_help(command))
+        return 0
+    try:
+        use_compiler_options()
+        use_compilation_cache()
+        if any(word in ("-m", "--multirun") for word in overrides):
+            from sogjax.cli.sweep.run import run_sweep
+
+            return run_sweep(command, [word for word in overrides if word not in ("-m", "--multirun")])
+        config = composed(command, overrides)
+        begun = max(time.perf_counter() - begin, age_of_process() if is_process else 0.0)
+        with terminated_as_interrupted(), clocked(begun):
+            with stage(STARTING):
+                module = importlib.import_module(f"sogjax.cli.{command}")
+            module.run(config)
+    except InputError as error:
+        return _wrong_input(str(error))
+    except KeyboardInterrupt as stop:
+        print("\nstopped", file=sys.stderr)
+        return TERMINATED if isinstance(stop, TerminatedError) else INTERRUPTED
+    return 0
+
+
+def command_help(command: str) -> str:
+    """Every option of a command with its default, unit and the paper's symbol."""
+    from sogjax.cli.config.composition import SCHEMAS, config_groups
+    from sogjax.settings.option import help_lines
+
+    schema = SCHEMAS[command]
+    lines = [f"sogjax {command} [key=value ...]", "", (schema.__doc__ or "").strip(), ""]
+    for key, default, text in help_lines(schema):
+        lines += textwrap.wrap(f"{key}={default}", 118, initial_indent="  ")
+        lines += textwrap.wrap(text, 110, initial_indent="        ", subsequent_indent="        ")
+    groups = config_groups(command)
+    if groups:
+        lines += ["", "sets of options by name, such as " + f"{next(iter(groups))}={next(iter(groups.values()))[0]}:"]
+        lines += [f"  {group}={' | '.join(names)}" for group, names in groups.items()]
+    return "\n".join(lines)
+
+
+def _overview() -> str:
+    from sogjax.cli.config.composition import SCHEMAS
+
+    rows = [f"  {name:<10} {(schema.__doc__ or '').strip()}" for name, schema in SCHEMAS.items()]
+    return "\n".join(["Markerless motion capture by Sums of Gaussians.", "", USAGE, "", *rows])
+
+
+def _wrong_input(sentence: str) -> int:
+    print(f"sogjax: {sentence}", file=sys.stderr)
+    return 2

@@ -1,0 +1,1 @@
+"""One command for many settings, or for many recordings."""

@@ -1,0 +1,152 @@
+"""Many recordings by one command: each as if tracked alone, one table at the end, and only what is missing is done."""
+
+import logging
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from sogjax.cli.config.composition import composed
+from sogjax.cli.config.overrides import quoted_value
+from sogjax.cli.sweep.actors import Subjects
+from sogjax.cli.sweep.folders import ACTORS, KEY, places_of, recordings_in, whole_path
+from sogjax.cli.sweep.results import Member
+from sogjax.cli.sweep.take_table import NO_RESULT, Row, finish_takes, forget_failure, keep_row, row_of
+from sogjax.errors import InputError, counted
+from sogjax.run.outputs import results_folder
+from sogjax.run.terminal import say
+from sogjax.settings.run import TrackConfig
+
+LOG = logging.getLogger(__name__)
+
+SWEEP_FOLDERS = ("hydra.sweep.dir", "hydra.sweep.subdir")
+"""Where the members of a sweep over settings lie."""
+
+
+@dataclass(frozen=True)
+class Take:
+    """A recording among several."""
+
+    recording: Path
+    place: str
+    """Where its results lie, from the folder of all of them."""
+
+
+def is_of_takes(words: Sequence[str], by_pattern: bool = False) -> bool:
+    """Whether the words of a sweep name several recordings, or any `by_pattern`, and sweep over nothing else."""
+    from hydra.core.override_parser.overrides_parser import OverridesParser
+    from hydra.errors import HydraException
+
+    try:
+        parsed = OverridesParser.create().parse_overrides(list(words))
+    except HydraException:
+        return False
+    swept = [override.get_key_element() for override in parsed if override.is_sweep_override()]
+    return (swept == [KEY] or (by_pattern and not swept)) and not any(
+        word.startswith("hydra/sweeper=") for word in words
+    )
+
+
+def track_takes(words: Sequence[str], run: Callable[[list[str]], int], root: Path | None = None) -> int:
+    """Track several recordings into a folder for each, and print and write their table.
+
+    Args:
+        words: of the sweep.
+        run: runs words by Hydra.
+        root: the folder from which the recordings' names are counted; None: what they have in common.
+
+    Raises:
+        InputError: a setting is invalid, or some recordings failed.
+    """
+    _check_folders(words)
+    paths = [whole_path(path) for path in recordings_in(words)]
+    takes = [Take(path, place) for path, place in zip(paths, places_of(paths, root), strict=True)]
+    others = [word for word in words if word.partition("=")[0] != KEY]
+    own = [word for word in others if not word.lstrip("+~").startswith("hydra")]
+    config: TrackConfig = composed("track", [*own, f"{KEY}={quoted_value(str(takes[0].recording))}"])
+    out = Path(config.out or "outputs").absolute()
+    with results_folder(out):
+        for take in takes:
+            forget_failure(out / take.place)
+        ready = _ready(takes, config, out)
+        problem = _run(ready, others, out, run) if ready else None
+        rows = [row_of(take.place, out / take.place) for take in takes]
+        finish_takes(out, rows)
+    _check_rows(rows, problem)
+    return 0
+
+
+def _check_folders(words: Sequence[str]) -> None:
+    for word in words:
+        if word.partition("=")[0].lstrip("+~") in SWEEP_FOLDERS:
+            raise InputError(f"{word}: results of several recordings lie by their names in out; use out=DIR instead")
+
+
+def _check_rows(rows: Sequence[Row], problem: InputError | None) -> None:
+    """A problem that kept a recording from having any result is told rather than how many failed.
+
+    Raises:
+        InputError: there was a problem, or some recordings failed.
+    """
+    failed = [row.failed for row in rows if row.failed]
+    if problem and (not failed or NO_RESULT in failed):
+        raise problem
+    if failed:
+        raise InputError(
+            f"{len(failed)} of {counted(len(rows), 'recording')} failed; the first: {failed[0]} "
+            "(the same command again does these only)"
+        )
+
+
+def _ready(takes: Sequence[Take], config: TrackConfig, out: Path) -> list[tuple[Take, list[str] | None]]:
+    """The takes whose actors are there, with these; why the others have none is kept as their result."""
+    given = Path(config.actor) if isinstance(config.actor, str) and Path(config.actor).is_dir() else None
+    if config.actor is not None and given is None:
+        return [(take, None) for take in takes]
+    subjects = Subjects(given or out / ACTORS, [take.recording for take in takes], makes=given is None)
+    failed: dict[str, str] = {}
+    ready = []
+    for take in takes:
+        try:
+            ready.append((take, subjects.actor_of(take.recording, config, failed)))
+        except InputError as error:
+            reason = str(error)
+        except Exception as error:  # the other takes are tracked
+            LOG.exception("a recording has no actor")
+            reason = f"{type(error).__name__}: {error}"
+        else:
+            continue
+        say(f"{take.place}: {reason}")
+        keep_row(out / take.place, Member([], reason))
+    return ready
+
+
+def _run(
+    ready: Sequence[tuple[Take, list[str] | None]], words: Sequence[str], out: Path, run: Callable[[list[str]], int]
+) -> InputError | None:
+    """Let Hydra's launcher track them; what was wrong, if anything was."""
+    listed = ",".join(quoted_value(str(take.recording)) for take, _ in ready)
+    own = [word for word in words if word.partition("=")[0] not in ("out", "actor")]
+    actor = [word for word in words if word.startswith("actor=") and ready[0][1] is None]
+    places = [out / take.place for take, _ in ready]
+    members = ",".join(
+        f"{{out:{quoted_value(str(place))},actor:{_list(actor)}}}"
+        for place, (_, actor) in zip(places, ready, strict=True)
+    )
+    hydras = [
+        f"hydra.sweep.dir={quoted_value(str(out))}",
+        "hydra.sweep.subdir='${oc.select:hydra.callbacks.table.takes.${hydra.job.num}.out}'",
+        f"+hydra.callbacks.table.takes=[{members}]",
+    ]
+    with suppress(OSError):
+        for place in places:
+            place.mkdir(parents=True, exist_ok=True)
+    try:
+        run([*own, *actor, f"{KEY}={listed}", *hydras])
+    except InputError as error:
+        return error
+    return None
+
+
+def _list(files: Sequence[str] | None) -> str:
+    return "null" if files is None else f"[{','.join(map(quoted_value, files))}]"

@@ -1,1 +1,0 @@
-"""Small steps that XLA on a CPU compiles badly as they are usually written."""

@@ -1,0 +1,114 @@
+"""Joint limits: how far a pose is beyond them (E_lim of Eq. 10).
+
+Smooth motion: how suddenly a pose departs from the two before (E_acc of Eq. 10).
+
+Poses near rest: joints that hardly move in anybody, such as collar bones, stay about where they are at rest.
+"""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from sogjax.energy.posed import Frame, Posed
+from sogjax.energy.term import Penalty
+from sogjax.model.body import Body
+from sogjax.model.skeleton import Skeleton
+from sogjax.solve.solution import QuadraticModel
+
+
+class LimitPenalty(Penalty):
+    """E_lim, in squared radians and metres; its weight is w_l."""
+
+    def value(self, posed: Posed, frame: Frame) -> Float[Array, ""]:
+        """`limit_penalty` of the joint parameters."""
+        return limit_penalty(posed.joint_params, *posed.body.skeleton.joint_limits())
+
+    def quadratic(self, posed: Posed, frame: Frame) -> QuadraticModel:
+        """Exact: the penalty is quadratic beyond a limit, and 0 within."""
+        return self.model(posed)
+
+    def model(self, posed: Posed) -> QuadraticModel:
+        """The same, whatever the frame."""
+        lower, upper = posed.body.skeleton.joint_limits()
+        beyond = posed.joint_params - jnp.clip(posed.joint_params, lower, upper)
+        transform = posed.body.skeleton.parameter_transform
+        bends = jnp.where(beyond != 0.0, 2.0, 0.0)[:, None] * transform
+        return QuadraticModel(
+            value=self.signed_weight * limit_penalty(posed.joint_params, lower, upper),
+            gradient=-self.weight * jnp.matmul(transform.T, 2.0 * beyond, precision="highest"),
+            curvature=self.weight * jnp.matmul(transform.T, bends, precision="highest"),
+        )
+
+
+def limit_penalty(
+    joint_params: Float[Array, "joint"], lower: Float[Array, "joint"], upper: Float[Array, "joint"]
+) -> Float[Array, ""]:
+    """E_lim: squared distances of the joint parameters Lambda from their limits; 0 within."""
+    below = jnp.maximum(lower - joint_params, 0.0)
+    above = jnp.maximum(joint_params - upper, 0.0)
+    return jnp.sum(below**2) + jnp.sum(above**2)
+
+
+class AccelerationPenalty(Penalty):
+    """E_acc, in squared radians and metres, 0 where there is no history; its weight is w_a."""
+
+    def value(self, posed: Posed, frame: Frame) -> Float[Array, ""]:
+        """`acceleration_penalty` of the pose and the two before."""
+        history = frame.history
+        bend = acceleration_penalty(posed.pose, history.previous, history.before_previous)
+        return jnp.where(history.known, bend, 0.0)
+
+    def quadratic(self, posed: Posed, frame: Frame) -> QuadraticModel:
+        """Exact: the penalty is quadratic."""
+        history = frame.history
+        weight = jnp.where(history.known, self.weight, 0.0)
+        middle = 0.5 * (history.before_previous + posed.pose)
+        return QuadraticModel(
+            value=self.part(posed, frame),
+            gradient=-weight * (middle - history.previous),
+            curvature=weight * 0.5 * jnp.eye(posed.pose.shape[0], dtype=posed.pose.dtype),
+        )
+
+
+def acceleration_penalty(
+    pose: Float[Array, "dof"], previous: Float[Array, "dof"], before_previous: Float[Array, "dof"]
+) -> Float[Array, ""]:
+    """E_acc: squared distance of the previous pose from the middle of its neighbours in time."""
+    return jnp.sum((0.5 * (before_previous + pose) - previous) ** 2)
+
+
+REST_SPREAD = 0.15
+"""A joint of a range of one radian is expected to lie so far (radians) from its place in `rest`; it grows with the
+square of the range: a collar bone hardly moves, an elbow may be anywhere."""
+LEAST_SPREAD = 0.01
+"""Radians or metres: also of a joint that its limits hold in one place."""
+
+
+class RestPenalty(Penalty):
+    """Squared distance from the rest pose, in units of how far each joint is expected from it (`pose_spread`).
+
+    Without it joints that no camera tells much of take up whatever is wrong with the body: raised shoulders, for a
+    shoulder joint that lies too high, or a head bent to its limit, for dark hair before a dark wall.
+    """
+
+    def value(self, posed: Posed, frame: Frame) -> Float[Array, ""]:
+        """The sum over the degrees of freedom that have limits."""
+        return jnp.sum(_inverse(posed.body) * _away(posed) ** 2)
+
+    def quadratic(self, posed: Posed, frame: Frame) -> QuadraticModel:
+        """Exact."""
+        slope = 2.0 * self.weight * _inverse(posed.body)
+        return QuadraticModel(self.part(posed, frame), -slope * _away(posed), jnp.diag(slope))
+
+
+def pose_spread(skeleton: Skeleton) -> Float[Array, "dof"]:
+    """How far each degree of freedom is expected to lie from `rest`; infinite without limits."""
+    return jnp.maximum(REST_SPREAD * (skeleton.dof_upper - skeleton.dof_lower) ** 2, LEAST_SPREAD)
+
+
+def _away(posed: Posed) -> Float[Array, "dof"]:
+    return posed.pose - posed.body.poses["rest"]
+
+
+def _inverse(body: Body) -> Float[Array, "dof"]:
+    """One over the squared expected distances; 0 where there are no limits."""
+    return 1.0 / pose_spread(body.skeleton) ** 2

@@ -1,0 +1,1 @@
+"""Files: recordings, calibrations, videos, keypoints, actors and motions are read and written here."""

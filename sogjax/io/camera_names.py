@@ -1,0 +1,111 @@
+"""Which of two lists of names mean the same cameras, where another program named them in its own way.
+
+Which cameras of a recording are used, and messages where calibration and videos do not fit together.
+"""
+
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from sogjax.errors import InputError
+from sogjax.io.recording_settings import RecordingSettings
+
+
+def matched_names(wanted: Iterable[str], found: Iterable[str]) -> dict[str, str]:
+    """By name of `wanted` the one of `found` that is the same, or holds it or is held by it as whole words.
+
+    Words are runs of letters and numbers without leading zeros: `cam_01` is `Cam1` and a part of `int_cam01_img`, but
+    no part of `cam_010`. A name that could mean two others means none.
+    """
+    wanted, found = [*dict.fromkeys(wanted)], [*dict.fromkeys(found)]
+    same = {name: name for name in wanted if name in found}
+    words = {name: _words(name) for name in (*wanted, *found)}
+    for alike in (lambda a, b: a == b, lambda a, b: _holds(a, b) or _holds(b, a)):
+        left = [name for name in wanted if name not in same]
+        free = [name for name in found if name not in same.values()]
+        pairs = [(a, b) for a in left for b in free if words[a] and words[b] and alike(words[a], words[b])]
+        for a, b in pairs:
+            if sum(a == first for first, _ in pairs) == 1 and sum(b == second for _, second in pairs) == 1:
+                same[a] = b
+    return same
+
+
+def _words(name: str) -> list[str]:
+    found = re.findall(r"[^\W\d_]+|[0-9]+", name.lower())
+    return [word.lstrip("0") or "0" if word.isdigit() else word for word in found]
+
+
+def _holds(words: list[str], part: list[str]) -> bool:
+    return any(words[k : k + len(part)] == part for k in range(len(words) - len(part) + 1))
+
+
+def chosen_cameras(
+    path: Path,
+    calibration: Path,
+    settings: RecordingSettings,
+    calibrated: tuple[str, ...],
+    sources: Mapping[str, Path],
+) -> tuple[str, ...]:
+    """The cameras to use: those that recording.yaml names, else all, which then must all be whole.
+
+    Args:
+        path: the recording.
+        calibration: its file.
+        settings: of recording.yaml.
+        calibrated: the cameras of the calibration.
+        sources: by camera its video or folder of images.
+
+    Raises:
+        InputError: a camera without calibration or without video.
+    """
+    wanted = settings.cameras or tuple(dict.fromkeys((*calibrated, *sources)))
+    otherwise = "" if settings.cameras else ", or list the cameras to use as `cameras:` in recording.yaml"
+    wrong = next((camera for camera in wanted if camera not in calibrated or camera not in sources), None)
+    if wrong is None:
+        return wanted
+    _refuse_other_name(calibration, wanted, calibrated, sources, otherwise)
+    if wrong not in calibrated:
+        raise InputError(
+            f"{calibration}: has no camera {wrong!r}, only: {', '.join(calibrated)}; calibrate it{otherwise}"
+        )
+    raise InputError(
+        f"{path}: has no video of the camera {wrong!r}, only of: {', '.join(sorted(sources))}; "
+        f"add videos/{wrong}.mp4{otherwise}"
+    )
+
+
+def _refuse_other_name(
+    calibration: Path,
+    wanted: tuple[str, ...],
+    calibrated: tuple[str, ...],
+    sources: Mapping[str, Path],
+    otherwise: str,
+) -> None:
+    """One video and one camera left over are probably the same under two names."""
+    videos = [source for camera, source in sources.items() if camera not in calibrated]
+    cameras = [camera for camera in calibrated if camera in wanted and camera not in sources]
+    if len(videos) != 1 or len(cameras) != 1:
+        return
+    video, camera = videos[0], cameras[0]
+    new_name = camera if video.is_dir() else f"{camera}{video.suffix}"
+    raise InputError(
+        f"{video}: {calibration.name} has no camera of this name, and its camera {camera!r} has no video; rename "
+        f"the video to {new_name} if it is that camera's{otherwise}"
+    )
+
+
+def folder_around(path: Path) -> str:
+    """The remedy if something inside a recording was given instead of it; else empty."""
+    inside = path.is_file() or path.name in (
+        "videos",
+        "images",
+        "background",
+        "example_poses",
+        "keypoints",
+        "pose",
+        "synchronized_videos",
+    )
+    for folder in path.resolve().parents[:2] if inside else ():
+        if any((folder / name).is_dir() for name in ("videos", "images", "synchronized_videos")):
+            return f"give the folder of the recording, {folder}"
+    return ""

@@ -1,0 +1,233 @@
+"""The entries of `example_poses` in `recording.yaml`: folders of pictures, or frames of the videos.
+
+The single images of a recording: empty scenes and example poses, matched to the cameras by name.
+"""
+
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool
+
+from sogjax.errors import InputError
+from sogjax.io.calibration.rig import CameraRig
+from sogjax.io.files import objection
+from sogjax.io.image_file import IMAGE_SUFFIXES, read_image, read_mask
+from sogjax.io.initial_pose import InitialPose, parse_initial_pose
+from sogjax.io.yaml_entry import Entry
+
+_OPTIONAL = ("actor", "initial_pose")
+
+
+@dataclass(frozen=True)
+class ExampleSettings:
+    """An entry of `example_poses`."""
+
+    name: str
+    actor: str | None = None
+    initial_pose: InitialPose | None = None
+    frame: int | None = None
+    """Of the videos, in the recording's own numbering; None: the pictures lie in the folder `name`."""
+
+
+def read_examples(entry: Entry) -> tuple[ExampleSettings, ...]:
+    """The list `example_poses`: frame numbers, and mappings with the `name` of a folder or a `frame`.
+
+    Raises:
+        InputError: an entry of another kind, or a folder or a frame that is listed twice.
+    """
+    examples: list[ExampleSettings] = []
+    for item in entry.items():
+        example = _example(item)
+        if example.name in [other.name for other in examples]:
+            key = "name" if example.frame is None else "frame"
+            repeated = item.mapping()[key] if isinstance(item.value, dict) else item
+            raise repeated.error("each folder and each frame once")
+        examples.append(example)
+    return tuple(examples)
+
+
+def frame_name(frame: int) -> str:
+    """How the example pose that a frame of the videos shows is called."""
+    return f"frame_{frame}"
+
+
+def _example(entry: Entry) -> ExampleSettings:
+    if not isinstance(entry.value, dict):
+        frame = _frame(entry)
+        return ExampleSettings(frame_name(frame), frame=frame)
+    from_video = "frame" in entry.value
+    fields = entry.fields(("frame",) if from_video else ("name",), _OPTIONAL)
+    given = {key: value for key, value in fields.items() if value.value is not None}
+    frame = _frame(fields["frame"]) if from_video else None
+    return ExampleSettings(
+        name=_folder(fields["name"]) if frame is None else frame_name(frame),
+        actor=_actor(given["actor"]) if "actor" in given else None,
+        initial_pose=parse_initial_pose(given["initial_pose"]) if "initial_pose" in given else None,
+        frame=frame,
+    )
+
+
+def _frame(entry: Entry) -> int:
+    if isinstance(entry.value, bool) or not isinstance(entry.value, int):
+        raise entry.error("the number of a frame of the videos, or {name: FOLDER} or {frame: NUMBER} with its keys")
+    return entry.value
+
+
+def _folder(entry: Entry) -> str:
+    name = entry.text()
+    if objection(name) is not None:
+        raise entry.error("the name of a folder in example_poses/")
+    return name
+
+
+def _actor(entry: Entry) -> str:
+    name = entry.text()
+    if (wanted := objection(name)) is not None:
+        raise entry.error(wanted)
+    return name
+
+
+_MASK_SUFFIX = ".mask.png"
+
+
+@dataclass(frozen=True)
+class ExamplePose:
+    """Images of a subject in a pose that shows its size and colours (Section 5.2)."""
+
+    name: str
+    actor: str | None
+    images: dict[str, Path]
+    """By camera."""
+    masks: dict[str, Path]
+    """By camera; white = subject. A camera may have none."""
+    initial_pose: InitialPose | None
+    frame: int | None = None
+    """Of the videos, counted from the recording's first, where the images are of one; None: they are files."""
+    within: dict[str, Bool[np.ndarray, "_rows _columns"]] | None = None
+    """By camera, at any size: where the subject is, if others are seen too; a camera without an entry is not used.
+    None: nobody else is seen."""
+
+
+def find_background(folder: Path, rig: CameraRig, calibrated: Iterable[str]) -> dict[str, Path]:
+    """By camera of `rig` the image of the empty scene in `folder`, where there is one.
+
+    Raises:
+        InputError: an image of no calibrated camera, of another size, or one that does not open.
+    """
+    images = _by_camera(folder, _files(folder, mask=False), set(calibrated))
+    images = {camera: images[camera] for camera in rig.names if camera in images}
+    _check_sizes(rig, images, {})
+    return images
+
+
+def find_example_poses(
+    folder: Path,
+    rig: CameraRig,
+    calibrated: Iterable[str],
+    settings: tuple[ExampleSettings, ...] | None,
+    frames: range | None,
+) -> tuple[ExamplePose, ...]:
+    """The example poses: those that `settings` list, else one for every folder in `folder`.
+
+    Args:
+        folder: where their images are.
+        rig: the cameras.
+        calibrated: names of all cameras of the calibration.
+        settings: what recording.yaml lists.
+        frames: the numbers of the frames of the videos; None: not known.
+
+    Raises:
+        InputError: a listed one is missing or empty, an image or mask does not fit its camera, or there is no such
+            frame.
+    """
+    if settings is None:
+        folders = sorted(path.name for path in folder.iterdir() if path.is_dir()) if folder.is_dir() else []
+        settings = tuple(ExampleSettings(name) for name in folders if not name.startswith("."))
+    known = set(calibrated)
+    return tuple(
+        _example_pose(folder / entry.name, rig, known, entry)
+        if entry.frame is None
+        else _of_frame(folder, entry, entry.frame, frames or range(entry.frame, entry.frame + 1))
+        for entry in settings
+    )
+
+
+def _of_frame(folder: Path, entry: ExampleSettings, frame: int, frames: range) -> ExamplePose:
+    if frame not in frames:
+        raise InputError(
+            f"{folder.parent / 'recording.yaml'}: example_poses: there is no frame {frame}; "
+            f"the frames are {frames[0]} to {frames[-1]}"
+        )
+    return ExamplePose(entry.name, entry.actor, {}, {}, entry.initial_pose, frame - frames[0])
+
+
+def _example_pose(folder: Path, rig: CameraRig, calibrated: set[str], entry: ExampleSettings) -> ExamplePose:
+    if not folder.is_dir():
+        raise InputError(f"{folder}: there is no such example pose; make the folder or correct recording.yaml")
+    images = _by_camera(folder, _files(folder, mask=False), calibrated)
+    masks = _by_camera(folder, _files(folder, mask=True), calibrated)
+    for camera, mask in masks.items():
+        if camera not in images:
+            raise InputError(f"{mask}: is a mask without its image; add {camera}.jpg or {camera}.png")
+    images = {camera: images[camera] for camera in rig.names if camera in images}
+    masks = {camera: masks[camera] for camera in rig.names if camera in masks}
+    if not images:
+        raise InputError(f"{folder}: holds no image of any camera; put CAMERA.jpg files there or remove it")
+    _check_sizes(rig, images, masks)
+    return ExamplePose(entry.name, entry.actor, images, masks, entry.initial_pose)
+
+
+def _files(folder: Path, mask: bool) -> list[Path]:
+    if not folder.is_dir():
+        return []
+    files = sorted(path for path in folder.iterdir() if not path.name.startswith("."))
+    is_mask = lambda path: path.name.endswith(_MASK_SUFFIX)
+    return [path for path in files if path.suffix.lower() in IMAGE_SUFFIXES and is_mask(path) == mask]
+
+
+def _by_camera(folder: Path, files: list[Path], calibrated: set[str]) -> dict[str, Path]:
+    found: dict[str, Path] = {}
+    for path in files:
+        camera = path.name.removesuffix(_MASK_SUFFIX).removesuffix(path.suffix)
+        if camera not in calibrated:
+            raise InputError(
+                f"{path}: there is no camera {camera!r} in the calibration, which has: "
+                f"{', '.join(sorted(calibrated))}; rename or remove the image"
+            )
+        if camera in found:
+            raise InputError(f"{folder}: holds both {found[camera].name} and {path.name}; remove one")
+        found[camera] = path
+    return found
+
+
+def _check_sizes(rig: CameraRig, images: dict[str, Path], masks: dict[str, Path]) -> None:
+    with ThreadPoolExecutor() as pool:
+        image_shapes = list(pool.map(lambda path: read_image(path).shape, images.values()))
+        mask_shapes = list(pool.map(lambda path: read_mask(path).shape, masks.values()))
+    for (camera, path), (height, width, _) in zip(images.items(), image_shapes, strict=True):
+        check_size(path, (width, height), rig, camera)
+    for (camera, path), (height, width) in zip(masks.items(), mask_shapes, strict=True):
+        if (width, height) != rig.image_size(camera):
+            wanted = "{}x{}".format(*rig.image_size(camera))
+            raise InputError(f"{path}: the mask is {width}x{height}, its image {wanted}; make them the same size")
+
+
+def check_size(path: Path, size: tuple[int, int], rig: CameraRig, camera: str) -> None:
+    """Check the (width, height) of images against the calibration.
+
+    Raises:
+        InputError: they differ.
+    """
+    width, height = calibrated = rig.image_size(camera)
+    if size == calibrated:
+        return
+    remedy = "calibrate the size that was recorded, or convert the images to the calibrated size"
+    if size == (height, width):
+        remedy = "turn the images by 90 degrees, or calibrate them as they stand"
+    raise InputError(
+        f"{path}: its images are {size[0]}x{size[1]}, but the calibration of {camera!r} is for "
+        f"{width}x{height}; {remedy}"
+    )

@@ -1,0 +1,160 @@
+"""GLB, glTF in one binary file: one node per bone with tracks of its motion, and the blobs as a skinned mesh.
+
+As glTF prescribes: metres, Y up, a figure in its rest pose looks along +Z.
+"""
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial.transform import Rotation
+
+from sogjax.errors import InputError
+from sogjax.io.export.bones import Bones, bone_frames, bones_of, world_turn
+from sogjax.io.files import atomic_path
+from sogjax.io.motion import Motion
+
+FLOAT, UINT16, UINT32 = 5126, 5123, 5125
+_COMPONENTS = {FLOAT: np.dtype("<f4"), UINT16: np.dtype("<u2"), UINT32: np.dtype("<u4")}
+_STILL = 1e-6
+"""Metres within which a bone's offset counts as constant and needs no track."""
+
+BLOB_RADII = 1.35
+"""Half the height of the octahedron that shows a blob, in sigmas: a disc of this radius fits its picture best."""
+
+_CORNERS = np.concatenate([np.eye(3), -np.eye(3)])
+_FACES = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]])
+
+
+class _Content:
+    """The JSON of a glTF file and the binary data that it points to."""
+
+    def __init__(self) -> None:
+        self.tree: dict[str, Any] = {"accessors": [], "bufferViews": []}
+        self.binary = bytearray()
+
+    def accessor(self, values: np.ndarray, kind: str, component: int = FLOAT, bounds: bool = False) -> int:
+        """Append an array, its first axis counting the elements; the number of its accessor."""
+        data = np.ascontiguousarray(values, _COMPONENTS[component])
+        entry: dict[str, Any] = {
+            "bufferView": len(self.tree["bufferViews"]),
+            "componentType": component,
+            "count": len(data),
+            "type": kind,
+        }
+        if bounds:
+            flat = data.reshape(len(data), -1)
+            entry |= {"min": flat.min(axis=0).tolist(), "max": flat.max(axis=0).tolist()}
+        raw = data.tobytes()
+        view = {"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(raw)}
+        self.tree["bufferViews"].append(view)
+        self.tree["accessors"].append(entry)
+        self.binary += raw + bytes(-len(raw) % 4)
+        return len(self.tree["accessors"]) - 1
+
+    def written(self) -> bytes:
+        """The whole file."""
+        self.tree["buffers"] = [{"byteLength": len(self.binary)}]
+        text = json.dumps(self.tree, separators=(",", ":")).encode()
+        text += b" " * (-len(text) % 4)
+        chunks = struct.pack("<I4s", len(text), b"JSON") + text
+        chunks += struct.pack("<I4s", len(self.binary), b"BIN\0") + bytes(self.binary)
+        return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def write_glb(path: Path, motion: Motion, up: str = "z") -> None:
+    """Write a motion whose world has the vertical `up`.
+
+    Raises:
+        InputError: no frames, or a path that cannot be written.
+    """
+    if motion.num_frames == 0:
+        raise InputError(f"{path}: the motion has no frames; export one that has")
+    bones = bones_of(motion)
+    rotations, positions = bone_frames(motion, bones, up, "y")
+    turns, offsets = _local(bones, rotations, positions)
+    content = _Content()
+    children = [[k for k, above in enumerate(bones.parents) if above == bone] for bone in range(len(bones.names))]
+    nodes = [
+        {"name": name, "translation": offsets[0, k].tolist(), "rotation": turns[0, k].tolist()}
+        | ({"children": children[k]} if children[k] else {})
+        for k, name in enumerate(bones.names)
+    ]
+    roots = [k for k, above in enumerate(bones.parents) if above < 0]
+    content.tree |= {
+        "asset": {"version": "2.0", "generator": "sogjax", "extras": {"unit": "m", "up": "y", "fps": motion.fps}},
+        "nodes": nodes,
+        "animations": [_animation(content, motion, turns, offsets)],
+    }
+    if len(motion.blob_sigma):
+        _add_skin(content, motion, bones, rotations[0], positions[0], motion.blob_means[0] @ world_turn(up, "y").T)
+        nodes.append({"name": "blobs", "mesh": 0, "skin": 0})
+        roots.append(len(nodes) - 1)
+    content.tree |= {"scene": 0, "scenes": [{"nodes": roots}]}
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(content.written())
+
+
+def _local(
+    bones: Bones, rotations: Float[np.ndarray, "frame bone 3 3"], positions: Float[np.ndarray, "frame bone 3"]
+) -> tuple[Float[np.ndarray, "frame bone 4"], Float[np.ndarray, "frame bone 3"]]:
+    """Quaternions (x y z w, without jumps of sign) and offsets of the bones in the frames of their parents."""
+    offsets, turns = positions.copy(), rotations.copy()
+    for bone, above in enumerate(bones.parents):
+        if above >= 0:
+            to_parent = np.swapaxes(rotations[:, above], -1, -2)
+            offsets[:, bone] = np.einsum("tij,tj->ti", to_parent, positions[:, bone] - positions[:, above])
+            turns[:, bone] = to_parent @ rotations[:, bone]
+    quaternions = Rotation.from_matrix(turns.reshape(-1, 3, 3)).as_quat().reshape(*turns.shape[:2], 4)
+    jumps = np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0
+    signs = np.cumprod(np.where(jumps, -1.0, 1.0), axis=0)
+    quaternions[1:] *= signs[..., None]
+    return quaternions, offsets
+
+
+def _animation(content: _Content, motion: Motion, turns: np.ndarray, offsets: np.ndarray) -> dict[str, Any]:
+    """A track of rotation for every bone, and of translation for those that move in their parent's frame."""
+    seconds = (motion.frame - motion.frame[0]) / motion.fps
+    times = content.accessor(seconds, "SCALAR", bounds=True)
+    samplers, channels = [], []
+    for bone in range(turns.shape[1]):
+        tracks = {"rotation": content.accessor(turns[:, bone], "VEC4")}
+        if np.ptp(offsets[:, bone], axis=0).max() > _STILL:
+            tracks["translation"] = content.accessor(offsets[:, bone], "VEC3")
+        for path, output in tracks.items():
+            channels.append({"sampler": len(samplers), "target": {"node": bone, "path": path}})
+            samplers.append({"input": times, "output": output, "interpolation": "LINEAR"})
+    return {"name": "motion", "samplers": samplers, "channels": channels}
+
+
+def _add_skin(
+    content: _Content,
+    motion: Motion,
+    bones: Bones,
+    rotations: Float[np.ndarray, "bone 3 3"],
+    positions: Float[np.ndarray, "bone 3"],
+    centres: Float[np.ndarray, "blob 3"],
+) -> None:
+    """An octahedron for each blob, which moves with its bone; given is the first frame, in glTF's axes."""
+    bone_of = {joint: bone for bone, chain in enumerate(bones.chains) for joint in chain}
+    owner = np.array([bone_of[int(joint)] for joint in motion.blob_joint])
+    corners = centres[:, None] + BLOB_RADII * motion.blob_sigma[:, None, None] * _CORNERS
+    faces = _FACES + len(_CORNERS) * np.arange(len(centres))[:, None, None]
+    joints, weights = (np.zeros((len(centres), len(_CORNERS), 4)) for _ in range(2))
+    joints[..., 0], weights[..., 0] = owner[:, None], 1.0
+    bind = np.zeros((len(bones.names), 4, 4))
+    bind[:, :3, :3] = np.swapaxes(rotations, -1, -2)
+    bind[:, :3, 3] = -np.einsum("bji,bj->bi", rotations, positions)
+    bind[:, 3, 3] = 1.0
+    attributes = {
+        "POSITION": content.accessor(corners.reshape(-1, 3), "VEC3", bounds=True),
+        "JOINTS_0": content.accessor(joints.reshape(-1, 4), "VEC4", UINT16),
+        "WEIGHTS_0": content.accessor(weights.reshape(-1, 4), "VEC4"),
+    }
+    indices = content.accessor(faces.reshape(-1), "SCALAR", UINT32)
+    matrices = content.accessor(np.swapaxes(bind, -1, -2).reshape(-1, 16), "MAT4")  # column by column
+    content.tree["meshes"] = [{"name": "blobs", "primitives": [{"attributes": attributes, "indices": indices}]}]
+    content.tree["skins"] = [{"joints": list(range(len(bones.names))), "inverseBindMatrices": matrices}]

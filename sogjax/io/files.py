@@ -1,0 +1,102 @@
+"""Files that are either complete or absent: write under a temporary name, then rename.
+
+Names in files that become file names: none of them may lead out of its folder.
+
+Files that are read whole, and refused if they are larger than their kind can be.
+"""
+
+import errno
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from sogjax.errors import InputError
+
+_DISK_TROUBLE = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS}
+
+
+@contextmanager
+def atomic_path(path: Path) -> Iterator[Path]:
+    """A temporary path in the same folder and with the same suffix as `path`, renamed to it on success.
+
+    The folder is made where it is missing. When the body raises, nothing is left behind and an older file at
+    `path` stays as it was.
+
+    Raises:
+        InputError: the folder cannot be made or written, `path` is a folder, or the disk is full.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder, so no file can be written there; give the path of a file")
+    temporary = path.with_name(f".{path.stem[:80]}.{uuid.uuid4().hex[:8]}.tmp{path.suffix}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary.touch(exist_ok=False)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputError(f"{path}: the folder {path.parent} cannot be written ({reason}); choose another") from error
+    try:
+        with disk_trouble_told(path):
+            yield temporary
+            _rename(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _rename(temporary: Path, path: Path) -> None:
+    try:
+        temporary.replace(path)
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: was removed, or its folder was, while being written; write it again") from error
+
+
+@contextmanager
+def disk_trouble_told(path: Path) -> Iterator[None]:
+    """Turn a full or broken disk into one sentence about `path`.
+
+    Raises:
+        InputError: instead of the system's error.
+    """
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in _DISK_TROUBLE:
+            raise
+        raise InputError(f"{path}: could not be written ({error.strerror}); choose another disk") from error
+
+
+MAX_BYTES = 100
+"""Of a name; file systems allow 255, and prefixes and extensions are added."""
+
+
+def objection(name: str) -> str | None:
+    """Why a name cannot be the name of a file in any folder; None where it can.
+
+    Names that Windows alone keeps for itself (CON, or with a colon) pass: writing fails there, and harms nothing.
+    """
+    if "/" in name or "\\" in name:
+        return "a name without slashes"
+    if not name.isprintable():
+        return "a name of printable characters"
+    if name.startswith(".") or name != name.strip():
+        return "a name that does not begin with a dot and has no space at either end"
+    if len(name.encode(errors="replace")) > MAX_BYTES:
+        return f"a name of at most {MAX_BYTES} bytes"
+    return None
+
+
+def read_bounded(path: Path, max_bytes: int) -> bytes:
+    """The content of a file.
+
+    Raises:
+        InputError: it cannot be read, or has more than `max_bytes`.
+    """
+    try:
+        with path.open("rb") as file:
+            content = file.read(max_bytes + 1)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from error
+    if len(content) > max_bytes:
+        raise InputError(f"{path}: is larger than {max_bytes} bytes; give a file of the right kind")
+    return content

@@ -1,0 +1,121 @@
+"""Keypoint schemes: which place in another program's files is which point of the body."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from sogjax.errors import InputError
+from sogjax.io.actor_rows import Row, filled_table, names
+from sogjax.io.yaml_entry import Entry, read_yaml
+
+LARGEST_COUNT = 1000
+"""Keypoints of one person; no detector gives more."""
+
+FARTHEST = 1.0
+"""Metres that a keypoint may lie from its landmark."""
+
+_SCHEMES = Path(__file__).parent / "schemes"
+
+
+@dataclass(frozen=True)
+class KeypointScheme:
+    """The keypoints that are used, of those that a detector's model has."""
+
+    name: str
+    count: int
+    """How many keypoints a person has in the files, used or not."""
+    keypoints: tuple[str, ...]
+    indices: tuple[int, ...]
+    """Their places in the files."""
+    landmarks: tuple[str, ...]
+    """The landmarks of the body that they mean."""
+    within: tuple[float, ...]
+    """Metres that a keypoint and its landmark may be apart."""
+
+    def on(self, landmarks: Sequence[str]) -> Int[np.ndarray, "keypoint"]:
+        """Of each keypoint the index of its landmark among those of a body; -1 where the body has none such."""
+        return np.array([landmarks.index(name) if name in landmarks else -1 for name in self.landmarks], int)
+
+    @property
+    def mirrored(self) -> Int[np.ndarray, "keypoint"]:
+        """Of each keypoint the index of the other side's; its own at the midline."""
+        places = {name: k for k, name in enumerate(self.keypoints)}
+        return np.array([places.get(other_side(name), k) for k, name in enumerate(self.keypoints)], int)
+
+    def chosen(self, people: Float[np.ndarray, "person all_keypoints 3"]) -> Float[np.ndarray, "person keypoint 3"]:
+        """The keypoints that are used."""
+        return people[:, list(self.indices)]
+
+
+def other_side(name: str) -> str:
+    """A name with left and right exchanged: LKnee, left_knee; others stay."""
+    for left, right in (("left", "right"), ("Left", "Right")):
+        if left in name:
+            return name.replace(left, right)
+        if right in name:
+            return name.replace(right, left)
+    if len(name) > 1 and name[0] in "LR" and name[1].isupper():
+        return ("R" if name[0] == "L" else "L") + name[1:]
+    return name
+
+
+def shipped_schemes() -> dict[str, KeypointScheme]:
+    """The schemes that come with the package, by name."""
+    found = [load_scheme(path) for path in sorted(_SCHEMES.glob("*.yaml"))]
+    return {scheme.name: scheme for scheme in found}
+
+
+def named_scheme(name: str) -> KeypointScheme:
+    """A scheme by its name, or by the path of its file.
+
+    Raises:
+        InputError: neither, or a file that is no scheme.
+    """
+    if name.endswith((".yaml", ".yml")):
+        return load_scheme(Path(name))
+    shipped = shipped_schemes()
+    for known, scheme in shipped.items():
+        if known.lower() == name.lower():
+            return scheme
+    raise InputError(f"no keypoint scheme {name!r} is known; choose one of {', '.join(shipped)}, or give a .yaml file")
+
+
+def load_scheme(path: Path) -> KeypointScheme:
+    """The scheme of a file: `name`, `count`, and `keypoints` with name, index, landmark and within (metres).
+
+    Raises:
+        InputError: the file is no such scheme; the message names the key, its value and what was expected.
+    """
+    content = read_yaml(path).fields(("name", "count", "keypoints"))
+    count = _whole(content["count"], 1, LARGEST_COUNT)
+    rows = filled_table(content["keypoints"], ("name", "index", "landmark", "within"))
+    indices = tuple(_whole(row["index"], 0, count - 1) for row in rows)
+    for row, index in zip(rows, indices, strict=True):
+        if indices.count(index) > 1:
+            raise row["index"].error("an index that no other keypoint has")
+    return KeypointScheme(
+        name=content["name"].text(),
+        count=count,
+        keypoints=names(rows),
+        indices=indices,
+        landmarks=tuple(row["landmark"].text() for row in rows),
+        within=tuple(_distance(row) for row in rows),
+    )
+
+
+def _whole(entry: Entry, lowest: int, highest: int) -> int:
+    value = entry.value
+    if isinstance(value, bool) or not isinstance(value, int) or not lowest <= value <= highest:
+        raise entry.error(f"a whole number from {lowest} to {highest}")
+    return value
+
+
+def _distance(row: Row) -> float:
+    expected = f"a distance in metres from 0 to {FARTHEST:g}"
+    value = row["within"].number(expected)
+    if not 0.0 <= value <= FARTHEST:
+        raise row["within"].error(expected)
+    return value

@@ -1,0 +1,213 @@
+"""Folders of other programs that are recordings as they are: projects of Pose2Sim, recordings of FreeMoCap.
+
+Time offsets that Pose2Sim found: its `pose-sync/` holds the files of `pose/` under shifted numbers.
+"""
+
+import tomllib
+from collections import Counter
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from sogjax.errors import InputError
+from sogjax.io.calibration.load import find_calibrations
+from sogjax.io.calibration.rig import CameraRig
+from sogjax.io.camera_names import matched_names
+from sogjax.io.keypoint_files import files_in, json_files, number_in
+from sogjax.io.recording_settings import FASTEST, RecordingSettings
+from sogjax.io.source import SYNCHRONIZED
+from sogjax.io.text_lines import read_text
+
+CONFIG = "Config.toml"
+"""Of Pose2Sim; a trial's stands in its folder, those of participant and session in the folders around it."""
+
+MAX_BYTES = 2**20
+
+
+@dataclass(frozen=True)
+class Project:
+    """What another program's folder says by its form, where recording.yaml does not."""
+
+    program: str
+    calibrations: tuple[Path, ...]
+    unit: str
+    """Of the calibration's lengths."""
+    up: str
+    fps: float | None = None
+    doubt: str = ""
+    """A sentence on what may be wrong."""
+    frame_range: tuple[int, int] | None = None
+    """First frame to use and the one after the last; None: all."""
+
+    def filled_in(self, settings: RecordingSettings) -> RecordingSettings:
+        """The settings of recording.yaml with the project's where a key is absent."""
+        return replace(
+            settings,
+            unit=settings.unit or self.unit,
+            up=settings.up or self.up,
+            fps=settings.fps or self.fps,
+        )
+
+    def within(self, settings: RecordingSettings, num_frames: int) -> RecordingSettings:
+        """The same with the project's frames, as far as there are so many, where recording.yaml names none."""
+        if self.frame_range is None or settings.first_frame is not None or settings.last_frame is not None:
+            return settings
+        first, stop = self.frame_range[0], min(self.frame_range[1], num_frames)
+        return replace(settings, first_frame=first, last_frame=stop - 1) if first < stop else settings
+
+
+def project_in(path: Path) -> Project | None:
+    """The project of another program in a folder; None where it is none.
+
+    Raises:
+        InputError: its configuration cannot be read.
+    """
+    if (path / CONFIG).is_file():
+        return _pose2sim(path)
+    if (path / SYNCHRONIZED).is_dir():
+        return _freemocap(path)
+    return None
+
+
+def calibrations_of(path: Path, project: Project | None) -> list[Path]:
+    """The calibrations of a recording: in its folder, else where the project has them."""
+    return find_calibrations(path) or [*(project.calibrations if project else ())]
+
+
+def named_calibration(path: Path, name: str, project: Project | None) -> Path:
+    """The calibration that recording.yaml names: in the recording's folder, or where the project has it."""
+    others = project.calibrations if project else ()
+    return next((file for file in others if file.name == name and not (path / name).is_file()), path / name)
+
+
+def named_as_sources(rig: CameraRig, sources: dict[str, Path], project: Project | None) -> CameraRig:
+    """The rig of a project with cameras named as their videos are: `cam01` where the calibration has int_cam01_img."""
+    if project is None:
+        return rig
+    names = {calibrated: video for video, calibrated in matched_names(sources, rig.names).items()}
+    return CameraRig(tuple(names.get(name, name) for name in rig.names), rig.cameras)
+
+
+def _pose2sim(path: Path) -> Project:
+    settings = _toml(path / CONFIG).get("project", {})
+    rate = settings.get("frame_rate") if isinstance(settings, dict) else None
+    rate = float(rate) if isinstance(rate, int | float) else None  # else `auto`
+    if rate is not None and not 0.0 < rate <= FASTEST:
+        raise InputError(f"{path / CONFIG}: frame_rate = {rate} is no frame rate; write 'auto' or frames per second")
+    frames = _frame_range(path / CONFIG, settings.get("frame_range") if isinstance(settings, dict) else None)
+    return Project("Pose2Sim", _pose2sim_calibrations(path), "m", "z", rate, frame_range=frames)
+
+
+def _frame_range(path: Path, value: Any) -> tuple[int, int] | None:
+    """`[10, 300]`, the second not included; 'all', 'auto' and an empty list are all frames."""
+    if not isinstance(value, list) or not value:
+        return None
+    whole = all(isinstance(number, int) and not isinstance(number, bool) for number in value)
+    if len(value) != 2 or not whole or not 0 <= value[0] < value[1]:
+        raise InputError(f"{path}: frame_range = {value} is none; write [FIRST, STOP] with 0 <= FIRST < STOP, or 'all'")
+    return value[0], value[1]
+
+
+def _pose2sim_calibrations(path: Path) -> tuple[Path, ...]:
+    """In a folder with `calib` in its name, of the project or of the session around it."""
+    here = path.resolve()
+    around = [folder for folder in here.parents[:2] if (folder / CONFIG).is_file()]
+    for folder in (path, *around):
+        inside = sorted(part for part in folder.iterdir() if part.is_dir() and "calib" in part.name.lower())
+        files = [file for part in inside for file in find_calibrations(part) if file.suffix.lower() == ".toml"]
+        if files:
+            return tuple(files)
+    return ()
+
+
+def _freemocap(path: Path) -> Project:
+    """Millimetres; the world is the board's on the floor, or the first camera's."""
+    tables = [_toml(file).get("metadata") for file in find_calibrations(path) if file.suffix.lower() == ".toml"]
+    if any(isinstance(table, dict) and table.get("groundplane_calibration") is True for table in tables):
+        return Project("FreeMoCap", (), "mm", "z")
+    doubt = (
+        f"{path}: was calibrated without a ground plane, so its first camera is taken to be level; write the vertical "
+        "as `up:` into recording.yaml if it is not -y"
+    )
+    return Project("FreeMoCap", (), "mm", "-y", doubt=doubt)
+
+
+def _toml(path: Path) -> dict[str, Any]:
+    text = read_text(path, MAX_BYTES)
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        reason = " ".join(str(error).split())
+        raise InputError(f"{path}: is not readable as TOML ({reason}); correct it") from error
+
+
+FOLDER, SHIFTED = "pose", "pose-sync"
+COMPARED = 5
+"""Shifted files of a camera that are looked for among those that were not."""
+MAX_SYNC_BYTES = 2**20
+
+
+class Shifts(NamedTuple):
+    """What Pose2Sim's files tell of the cameras' offsets."""
+
+    offsets: dict[str, int]
+    """By camera its `frame_offset`: by how much more its pictures are numbered in `pose/`."""
+    untold: tuple[str, ...]
+    """Cameras of which that cannot be told."""
+
+    def without(self, cameras: Collection[str]) -> "Shifts":
+        """Of the other cameras."""
+        offsets = {camera: offset for camera, offset in self.offsets.items() if camera not in cameras}
+        return Shifts(offsets, tuple(camera for camera in self.untold if camera not in cameras))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences on what is shifted, and on what is not known."""
+        found = []
+        shown = ", ".join(f"{camera} by {offset:+d}" for camera, offset in self.offsets.items() if offset)
+        if shown:
+            remedy = "write `frame_offset` into recording.yaml if that is wrong"
+            found.append(f"frames are shifted as in {SHIFTED}/ ({shown}); {remedy}")
+        if self.untold:
+            found.append(
+                f"{SHIFTED}/ does not tell by how much frames of {', '.join(self.untold)} are shifted, since its files "
+                f"there are not those of {FOLDER}/ under other numbers: none are; synchronise again, or write "
+                "`frame_offset` into recording.yaml"
+            )
+        return tuple(found)
+
+
+def pose2sims_shifts(path: Path, cameras: Iterable[str]) -> Shifts:
+    """What the files of a project say of these cameras; nothing where Pose2Sim has not synchronised it."""
+    before, after = (files_in(path / name) for name in (FOLDER, SHIFTED))
+    if before is None or after is None:
+        return Shifts({}, ())
+    cameras = [*cameras]
+    names, shifted = (matched_names(cameras, found.by_name) for found in (before, after))
+    told = {
+        camera: _offset(before.by_name[names[camera]], after.by_name[shifted[camera]])
+        for camera in cameras
+        if camera in names and camera in shifted
+    }
+    offsets = {camera: offset for camera, offset in told.items() if offset is not None}
+    return Shifts(offsets, tuple(camera for camera in cameras if camera in names and camera not in offsets))
+
+
+def _offset(before: Path, after: Path) -> int | None:
+    """What most of the shifted files say, if anything; the largest are looked at: pictures of nobody are all alike."""
+    if not (before.is_dir() and after.is_dir()):
+        return None
+    shifted = sorted(json_files(after), key=lambda file: -file.stat().st_size)[:COMPARED]
+    by_size: dict[int, list[Path]] = {file.stat().st_size: [] for file in shifted}
+    for file in json_files(before):
+        by_size.get(file.stat().st_size, []).append(file)
+    votes: Counter[int] = Counter()
+    for file in shifted:
+        size = file.stat().st_size
+        same = [other for other in by_size[size] if size < MAX_SYNC_BYTES and other.read_bytes() == file.read_bytes()]
+        numbers = number_in(same[0].name) if len(same) == 1 else None, number_in(file.name)
+        if None not in numbers:
+            votes[numbers[0] - numbers[1]] += 1  # pyright: ignore[reportOperatorIssue]
+    best = votes.most_common(1)
+    return best[0][0] if best and best[0][1] > sum(votes.values()) // 2 else None

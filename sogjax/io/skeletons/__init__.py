@@ -1,0 +1,1 @@
+"""Skeletons of other programs as bodies: a reader for each format, chosen by the content of the file."""

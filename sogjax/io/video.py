@@ -1,0 +1,206 @@
+"""The images of a recording, time step by time step, and writing videos."""
+
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Any, TypeVar
+
+import cv2
+import numpy as np
+from jaxtyping import UInt8
+
+from sogjax.errors import InputError
+from sogjax.io.files import atomic_path
+from sogjax.io.image_file import evened, read_image
+from sogjax.io.image_folder import ImageStream
+from sogjax.io.recording import Recording
+from sogjax.io.source import open_source, open_with_least_work
+from sogjax.io.video_file import frame_times
+from sogjax.model.yuv_picture import YuvPicture
+
+Item = TypeVar("Item")
+
+
+def read_frames(recording: Recording, start: int = 0, stop: int | None = None) -> Iterator[list[Any]]:
+    """The images of each time step, BGR, in the order of the rig's cameras; None where a camera is missing.
+
+    `start` and `stop` count from the recording's first frame. Threads decode the cameras, one time step
+    ahead of the consumer; when the consumer stops, all files are closed.
+
+    Raises:
+        InputError: a video ends early or changes its size.
+    """
+    return read_prepared(recording, lambda camera, image: image, start, stop)
+
+
+def read_prepared(
+    recording: Recording,
+    prepare: Callable[[int, Any], Item],
+    start: int = 0,
+    stop: int | None = None,
+    workers: int | None = None,
+    planes: bool = False,
+) -> Iterator[list[Item]]:
+    """The same, but what `prepare` makes of each image (None where a camera is missing) and the number of its camera.
+
+    The decoding threads do that, so a large image need not outlive the moment in which it was decoded. There are
+    `workers` of them, by default one for each core. With `planes`, an image may come in its video's own colours
+    (`YuvPicture`), which spares the conversion of every pixel, unless the colours of its camera are to be evened out.
+
+    Raises:
+        InputError: a video ends early or changes its size.
+    """
+    stop = recording.num_frames if stop is None else min(stop, recording.num_frames)
+    if not 0 <= start <= stop:
+        raise ValueError(f"frames {start} to {stop} are not in a recording of {recording.num_frames} frames")
+    return _decoded_ahead(recording, prepare, start, stop, workers or os.cpu_count() or 1, planes)
+
+
+def _decoded_ahead(
+    recording: Recording, prepare: Callable[[int, Any], Item], start: int, stop: int, workers: int, planes: bool
+) -> Iterator[list[Item]]:
+    if start == stop:
+        return
+    cameras = recording.rig.names
+    threads = max(1, workers // len(cameras))
+    with ExitStack() as stack:
+        pool = stack.enter_context(ThreadPoolExecutor(min(len(cameras), workers)))
+        opened = [
+            pool.submit(
+                open_with_least_work if planes and camera not in recording.color_gains else open_source,
+                recording.sources[camera],
+                max(recording.first_frame + start + recording.frame_offset[camera], 0),
+                threads,
+                recording.picked.get(camera),
+            )
+            for camera in cameras
+        ]
+        stack.callback(_close_all, opened)
+        sources = [future.result() for future in opened]
+
+        ended: set[int] = set()
+
+        def decoded(camera: int, frame: int) -> Item:
+            name = cameras[camera]
+            if camera in ended or not recording.has_image(name, frame):
+                return prepare(camera, None)
+            image = _checked(recording, name, sources[camera].read(), frame)
+            if image is None:
+                ended.add(camera)  # what might still come would be images of other frames
+            return prepare(camera, None if recording.is_missing(name, frame) else image)
+
+        decode = lambda frame: [pool.submit(decoded, camera, frame) for camera in range(len(cameras))]
+        upcoming = decode(start)
+        stack.callback(lambda: wait(upcoming))
+        for frame in range(start, stop):
+            images = [future.result() for future in upcoming]
+            upcoming[:] = decode(frame + 1) if frame + 1 < stop else []
+            yield images
+
+
+def _close_all(opened: list[Future[ImageStream[Any]]]) -> None:
+    wait(opened)
+    for future in opened:
+        if future.exception() is None:
+            future.result().close()
+
+
+def _checked(
+    recording: Recording, camera: str, image: np.ndarray | YuvPicture | None, frame: int
+) -> np.ndarray | YuvPicture | None:
+    source, number = recording.sources[camera], recording.first_frame + frame
+    if image is None and recording.fewest_cameras is not None:
+        return None
+    if image is None:
+        raise InputError(
+            f"{source}: ends before frame {number}, though its header promises more; "
+            f"set `last_frame: {number - 1}` in recording.yaml, or convert the video again"
+        )
+    size = (image.shape[1], image.shape[0])
+    if size != recording.rig.image_size(camera):
+        raise InputError(f"{source}: its frame {number} is {size[0]}x{size[1]}, unlike the first; convert it again")
+    return image if isinstance(image, YuvPicture) else evened(image, recording.color_gains.get(camera))
+
+
+def read_still(recording: Recording, camera: str, path: Path) -> UInt8[np.ndarray, "height width 3"]:
+    """A single picture of a camera, BGR, in the same colours as its frames.
+
+    Raises:
+        InputError: no such file, or no image.
+    """
+    return evened(read_image(path), recording.color_gains.get(camera))
+
+
+class VideoWriter:
+    """Writes an mp4 (codec mp4v), within a `with` block; it gets its name only when it is complete.
+
+    The codec stores even sizes only: the last row or column of an odd image is left out.
+    """
+
+    def __init__(self, path: Path, fps: float):
+        if path.suffix.lower() != ".mp4":
+            raise InputError(f"{path}: videos are written as .mp4 only; change the extension")
+        self._path, self._fps = path, fps
+        self._stack = ExitStack()
+        self._writer: cv2.VideoWriter | None = None
+        self._shape: tuple[int, ...] | None = None
+        self._count = 0
+
+    def __enter__(self) -> "VideoWriter":
+        self._temporary = self._stack.enter_context(atomic_path(self._path))
+        return self
+
+    def write(self, image: UInt8[np.ndarray, "height width 3"]) -> None:
+        """Append an image (BGR); all are of one size."""
+        writer = self._writer = self._writer or self._open(image)
+        self._shape = self._shape or image.shape
+        if image.shape != self._shape:
+            raise ValueError(f"{self._path}: an image of shape {image.shape} after one of {self._shape}")
+        writer.write(np.ascontiguousarray(image))
+        self._count += 1
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Finish the file, or remove it after an error, where no image was written, or where some are missing.
+
+        Raises:
+            InputError: not all images are in the file.
+        """
+        if self._writer is not None:
+            self._writer.release()
+        if error is not None:
+            self._stack.__exit__(kind, error, traceback)
+            return
+        with self._stack:
+            self._check_whole()
+
+    def _check_whole(self) -> None:
+        """The codec does not say that the disk is full."""
+        if self._writer is None:
+            raise ValueError(f"{self._path}: no image was written")
+        try:
+            found = len(frame_times(self._temporary))
+        except InputError:
+            found = 0
+        if found != self._count:
+            raise InputError(
+                f"{self._path}: could not be written completely ({found} of {self._count} images are in it; the "
+                "disk may be full); choose another disk"
+            )
+
+    def _open(self, image: UInt8[np.ndarray, "height width 3"]) -> cv2.VideoWriter:
+        height, width = image.shape[:2]
+        writer = cv2.VideoWriter(str(self._temporary), cv2.VideoWriter.fourcc(*"mp4v"), self._fps, (width, height))
+        if not writer.isOpened():
+            raise InputError(
+                f"{self._path}: a video of {width}x{height} at {self._fps:g} fps cannot be written "
+                "there; choose another folder"
+            )
+        return writer

@@ -1,0 +1,137 @@
+"""How likely a limb is far from where a pose puts it, calibrated on rendered recordings.
+
+How well a body lies on what is seen of it in a frame, in absolute terms: what a verdict on a run follows from.
+"""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from sogjax.energy.foreground import cover
+from sogjax.energy.posed import Posed
+from sogjax.energy.views import Windows
+from sogjax.model.camera import Camera, project
+from sogjax.quality.limb_evidence import DENSITY, BlobEvidence, JudgedLimbs
+
+FAR = 0.1
+"""Metres, mean over the limb's joints: farther off is lost."""
+LEAST_USUAL, MOST_USUAL = 0.0, 0.7
+"""A blob whose colours fit less than the one, or that is more often background than the other, from the beginning, is
+measured against these: it may never have been right."""
+ADAPTATION, LARGEST_STEPS = 0.1, (0.15, 0.1)
+"""How what is usual follows what is seen: a part of the difference, of which no more counts than the steps."""
+UNSEEN = 0.02
+"""Part of a blob's area in the pictures below which what is seen of it says little."""
+
+
+class Weights(NamedTuple):
+    """Of a logistic regression."""
+
+    constant: float
+    worse: float
+    """By how much the colours fit worse than usual, log likelihood."""
+    contradicted: float
+    """By how much more often than usual the background is seen in the limb's place."""
+
+
+WITH_BACKGROUND = Weights(-5.9, 4.0, 5.9)
+WITHOUT = Weights(-3.2, 3.7, 0.0)
+"""Both from `experiments/limb_doubt.py`, which judges each half of the sequences by weights from the other."""
+
+
+class LimbMeasures(NamedTuple):
+    """What tells whether a limb is lost: means of the third of its blobs that fits worst."""
+
+    worse: Float[Array, "*frame limb"]
+    contradicted: Float[Array, "*frame limb"]
+
+
+class Judgement(eqx.Module):
+    """What is thought of the bodies and their limbs in one frame."""
+
+    doubt: Float[Array, "limb"]
+    """How likely each is more than `FAR` off."""
+    usual: Float[Array, "2 blob"]
+    """What `own` and `contradicted` of `BlobEvidence` usually are, for the next frame; a limb in doubt keeps what
+    it had."""
+    explained: Float[Array, "actor"] | None = None
+    """As `FrameFit` has it; None: not measured."""
+    overlap: Float[Array, "actor camera"] | None = None
+
+
+def judgement(
+    limbs: JudgedLimbs, evidence: BlobEvidence, usual: Float[Array, "2 blob"], has_background: bool
+) -> Judgement:
+    """Of the limbs, from the evidence for their blobs and what was usual before (NaN in the first frame)."""
+    measures = limb_measures(limbs, evidence, usual)
+    doubt = limb_doubt(measures, WITH_BACKGROUND if has_background else WITHOUT)
+    trust = 1.0 - jnp.max(jnp.where(limbs.members, doubt[:, None], 0.0), axis=0, initial=0.0)
+    rate = ADAPTATION * trust * _certainty(evidence)
+    seen, known = _seen(evidence), _known(evidence, usual)
+    largest = jnp.asarray(LARGEST_STEPS, known.dtype)[:, None]
+    return Judgement(doubt, known + rate[None] * jnp.clip(seen - known, -largest, largest))
+
+
+def limb_measures(limbs: JudgedLimbs, evidence: BlobEvidence, usual: Float[Array, "2 blob"]) -> LimbMeasures:
+    """Of the limbs in one frame."""
+    certainty, (own, contradicted) = _certainty(evidence), _known(evidence, usual)
+    more = evidence.contradicted - jnp.minimum(contradicted, MOST_USUAL)
+    return LimbMeasures(
+        worse=-limbs.mean_of_worst(certainty * (evidence.own - jnp.maximum(own, LEAST_USUAL))),
+        contradicted=-limbs.mean_of_worst(-certainty * more),
+    )
+
+
+def limb_doubt(measures: LimbMeasures, weights: Weights) -> Float[Array, "*frame limb"]:
+    """How likely limbs are more than `FAR` off."""
+    return jax.nn.sigmoid(
+        weights.constant + weights.worse * measures.worse + weights.contradicted * measures.contradicted
+    )
+
+
+def _seen(evidence: BlobEvidence) -> Float[Array, "2 blob"]:
+    return jnp.stack([evidence.own, evidence.contradicted])
+
+
+def _known(evidence: BlobEvidence, usual: Float[Array, "2 blob"]) -> Float[Array, "2 blob"]:
+    """What is usual; what is seen where nothing is known yet."""
+    return jnp.where(jnp.isfinite(usual), usual, _seen(evidence))
+
+
+def _certainty(evidence: BlobEvidence) -> Float[Array, "blob"]:
+    return evidence.seen / (evidence.seen + UNSEEN)
+
+
+CLEARLY = 0.3
+"""Log odds from which a cell is foreground, and below minus which it is background; others do not count."""
+
+
+class FrameFit(eqx.Module):
+    """Of each actor in a frame."""
+
+    explained: Float[Array, "actor"]
+    """Part of its visible area that shows its blobs' own colours, and no background where that is known."""
+    overlap: Float[Array, "actor camera"]
+    """Of its silhouette with the foreground around it (intersection over union); NaN where no background is known."""
+
+
+def frame_fit(
+    limbs: JudgedLimbs, evidence: BlobEvidence, posed: Posed, cameras: Camera, windows: Windows | None
+) -> FrameFit:
+    """Of posed bodies, from the evidence for their blobs and the foreground around each actor."""
+    actors = np.array(limbs.actor_of_blob, int)
+    own = jnp.asarray(actors[None, :] == np.arange(actors.max() + 1)[:, None], posed.blobs.sigmas.dtype)
+    areas = own * (evidence.seen * posed.blobs.sigmas**2)[None, :]
+    explained = jnp.sum(areas * evidence.explained[None, :], axis=1) / (jnp.sum(areas, axis=1) + 1e-9)
+    if windows is None:
+        return FrameFit(explained, jnp.full((len(own), cameras.image_size.shape[0]), jnp.nan, explained.dtype))
+    seen = jax.vmap(project, in_axes=(0, None))(cameras, posed.blobs)
+    covered = jax.vmap(cover, in_axes=(0, 0, None))(windows, seen, jnp.asarray(DENSITY, explained.dtype))
+    shown, empty = ((odds > CLEARLY).astype(explained.dtype) for odds in (windows.odds, -windows.odds))
+    total = lambda values: jnp.sum(values, axis=(2, 3))
+    both, either = total(covered * shown), total(shown) + total(covered * empty)
+    return FrameFit(explained, jnp.where(either > 0.0, both / jnp.maximum(either, 1e-6), jnp.nan).T)

@@ -1,0 +1,160 @@
+"""The limbs of a body, of all actors, as arrays for the compiled step.
+
+What the pictures say for and against the blobs of a body, where a pose puts them.
+"""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, UInt8
+
+from sogjax.energy.posed import Posed
+from sogjax.energy.views import Windows
+from sogjax.model.body import Body
+from sogjax.model.camera import Camera, distort, near_picture, project
+from sogjax.model.limbs import limb_blobs
+from sogjax.model.sog import Sog
+from sogjax.scene.foreground import SubjectColors, own_color, own_density, subject_density
+
+WORST = 1.0 / 3.0
+"""Part of a limb's blobs that is looked at: those that fit worst, as a limb is lost from some joint on."""
+
+
+class JudgedLimbs(eqx.Module):
+    """Which blobs are a limb's."""
+
+    members: Bool[Array, "limb blob"]
+    worst: Float[Array, "limb blob"]
+    """What each of a limb's blobs counts, in the order of how well they fit, the worst first."""
+    of_other_parts: Float[Array, "blob blob"]
+    """1 for two blobs of different limbs, or of which one belongs to none; else 0."""
+    actor_of_blob: tuple[int, ...] = eqx.field(static=True)
+
+    @classmethod
+    def from_body(cls, body: Body) -> "JudgedLimbs":
+        """Of a body, or several beside each other."""
+        members = limb_blobs(body)
+        counts = np.ceil(WORST * members.sum(axis=1, keepdims=True))
+        worst = (np.arange(members.shape[1]) < counts) / np.maximum(counts, 1.0)
+        parts = np.where(members.any(axis=0), members.argmax(axis=0), -1) if len(members) else np.zeros(body.num_blobs)
+        return cls(
+            members=jnp.asarray(members),
+            worst=jnp.asarray(worst, body.blob_sigmas.dtype),
+            of_other_parts=jnp.asarray(parts[:, None] != parts[None, :], body.blob_sigmas.dtype),
+            actor_of_blob=tuple(body.skeleton.trees[joint] for joint in body.blobs.joints),
+        )
+
+    def mean_of_worst(self, values: Float[Array, "blob"]) -> Float[Array, "limb"]:
+        """The mean of the lowest third of the values of each limb's blobs."""
+        ordered = jnp.sort(jnp.where(self.members, values[None, :], jnp.inf), axis=1)
+        return jnp.sum(jnp.where(self.worst > 0.0, ordered, 0.0) * self.worst, axis=1)
+
+
+SAMPLES = ((0.0, 0.0), (0.6, 0.0), (-0.6, 0.0), (0.0, 0.6), (0.0, -0.6))
+"""Where a blob is looked at, in units of its size."""
+DEPTH_SCALE = 0.16
+"""Metres of depth over which a blob comes to hide another."""
+DENSITY = 2.0
+"""Of a blob's middle along a ray, as in the foreground term."""
+BACKGROUND = -0.3
+"""Log odds below which a sample speaks for the background."""
+BEYOND = 0.2
+"""Of the picture's size, outside it, where the lens model still means something."""
+
+
+class BlobEvidence(NamedTuple):
+    """Of each blob, over all cameras, where other limbs and the trunk do not hide it."""
+
+    own: Float[Array, "blob"]
+    """Log likelihood of the colours seen, as the blob's own against any of the subject's; mean of the samples."""
+    contradicted: Float[Array, "blob"]
+    """Part of the samples that are background; 0 where none is known."""
+    seen: Float[Array, "blob"]
+    """Part of its area in all pictures that is seen."""
+    explained: Float[Array, "blob"]
+    """How far the samples show the blob's own colours (0 to 1), and no background; their mean."""
+
+
+def blob_evidence(
+    limbs: JudgedLimbs,
+    posed: Posed,
+    cameras: Camera,
+    windows: Windows | None,
+    cells: UInt8[Array, "camera rows columns 3"],
+    cell_sizes: Float[Array, "camera"],
+    subject: SubjectColors,
+    present: Bool[Array, "camera"] | None = None,
+) -> BlobEvidence:
+    """The evidence for a posed body.
+
+    Args:
+        limbs: of the body.
+        posed: where it is.
+        cameras: that see it.
+        windows: foreground around each actor; None: no background is known.
+        cells: the pictures (sRGB bytes).
+        cell_sizes: their sides, pixels.
+        subject: the colours that the actors have.
+        present: cameras that have a picture; None: all.
+    """
+    seen = jax.vmap(project, in_axes=(0, None))(cameras, posed.blobs)
+    sigmas = jnp.where(seen.mask, seen.sigmas, 1.0)
+    samples = jnp.asarray(SAMPLES, sigmas.dtype)[None, None]
+    places = seen.means[:, :, None] + sigmas[:, :, None, None] * samples
+    colors, inside = jax.vmap(_colors_at)(cameras, cell_sizes, places, cells)
+    if present is not None:
+        inside &= present[:, None, None]
+    own_colors = posed.body.blob_colors[None, :, None]
+    own, alike = own_density(colors, own_colors), own_color(colors, own_colors)
+    against = jnp.zeros(inside.shape, bool) if windows is None else _odds_at(limbs, windows, places) < BACKGROUND
+    areas = jnp.where(seen.mask, seen.sigmas, 0.0) ** 2
+    weights = jnp.where(inside, (areas * _visible(limbs, posed.blobs, seen, cameras))[:, :, None], 0.0)
+    whole = jnp.sum(weights, axis=(0, 2)) + 1e-6
+    mean = lambda values: jnp.sum(weights * values, axis=(0, 2)) / whole
+    return BlobEvidence(
+        own=mean(own - subject_density(colors, subject)),
+        contradicted=mean(against.astype(own.dtype)),
+        seen=whole / (len(SAMPLES) * jnp.sum(areas, axis=0) + 1e-6),
+        explained=mean(jnp.where(against, 0.0, alike)),
+    )
+
+
+def _colors_at(
+    camera: Camera, cell_size: Float[Array, ""], places: Float[Array, "blob sample 2"], cells: UInt8[Array, "_ _ 3"]
+) -> tuple[Float[Array, "blob sample 3"], Bool[Array, "blob sample"]]:
+    """The colours (sRGB, 0 to 1) at undistorted pixels of one camera, and which of these are in its picture."""
+    pixels = places.reshape(-1, 2)
+    recorded = distort(camera, pixels)
+    inside = jnp.all((recorded > -0.5) & (recorded < camera.image_size[None, :] - 0.5), axis=1)
+    inside &= near_picture(camera, pixels, BEYOND)
+    cell = jnp.floor((jnp.where(inside[:, None], recorded, 0.0) + 0.5) / cell_size).astype(jnp.int32)
+    colors = cells[cell[:, 1], cell[:, 0]].astype(places.dtype) / 255.0
+    return colors.reshape(*places.shape[:2], 3), inside.reshape(places.shape[:2])
+
+
+def _visible(limbs: JudgedLimbs, blobs: Sog, seen: Sog, cameras: Camera) -> Float[Array, "camera blob"]:
+    """How much of each blob's middle is left visible by blobs of other parts of a body."""
+    sigmas = jnp.where(seen.mask, seen.sigmas, 1.0)
+    depths = blobs.sigmas[None, :] * cameras.focal_length[:, None] / sigmas
+    apart = sum((seen.means[:, :, None, k] - seen.means[:, None, :, k]) ** 2 for k in range(2))
+    before = jnp.clip((depths[:, None, :] - depths[:, :, None]) / DEPTH_SCALE + 0.5, 0.0, 1.0)
+    height = jnp.where(seen.mask, DENSITY, 0.0)[:, :, None] * limbs.of_other_parts[None]
+    hiding = height * before * jnp.exp((-0.5 / sigmas**2)[:, :, None] * apart)
+    return jnp.where(seen.mask, jnp.exp(-jnp.sum(hiding, axis=1)), 0.0)
+
+
+def _odds_at(
+    limbs: JudgedLimbs, windows: Windows, places: Float[Array, "camera blob sample 2"]
+) -> Float[Array, "camera blob sample"]:
+    """Log odds of foreground in the windows of the blobs' actors; 0 outside them."""
+    actors = np.array(limbs.actor_of_blob, int)
+    first = jnp.stack([windows.x[..., 0], windows.y[..., 0]], axis=-1)[:, actors, None]
+    cell = jnp.floor((places - first) / windows.step[:, actors, None] + 0.5)
+    columns, rows = windows.odds.shape[-2:]
+    inside = jnp.all(cell >= 0.0, axis=-1) & (cell[..., 0] < columns) & (cell[..., 1] < rows)
+    cell = jnp.where(inside[..., None], cell, 0.0).astype(jnp.int32)
+    camera = np.arange(places.shape[0])[:, None, None]
+    return jnp.where(inside, windows.odds[camera, actors[None, :, None], cell[..., 0], cell[..., 1]], 0.0)

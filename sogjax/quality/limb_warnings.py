@@ -1,0 +1,104 @@
+"""Stretches of a motion in which a limb is in doubt.
+
+Joints that are bent as far as they can be: nobody stands so for long, but what is not seen ends up there.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from sogjax.io.motion import Motion
+from sogjax.model.body import Body
+
+DOUBTFUL = 0.5
+"""A limb is in doubt where it is more likely lost than not."""
+AT_LEAST = 3
+"""Frames: shorter stretches are not reported, and shorter gaps between them do not count."""
+
+
+@dataclass(frozen=True)
+class DoubtfulLimb:
+    """A limb and the frames over which it is in doubt."""
+
+    name: str
+    first_frame: int
+    last_frame: int
+    doubt: float
+    """Mean over the stretch: how likely the limb is more than 10 cm off."""
+
+    def __str__(self) -> str:
+        frames = f"frames {self.first_frame} to {self.last_frame}"
+        return f"{self.name} doubtful in {frames} ({100.0 * self.doubt:.0f} % likely more than 10 cm off)"
+
+
+def in_doubt(motion: Motion) -> Bool[np.ndarray, "frame limb"]:
+    """Which limbs are in doubt in which frames; none where they were not judged."""
+    if motion.limb_doubt is None:
+        return np.zeros((motion.num_frames, 0), bool)
+    return motion.limb_doubt > DOUBTFUL
+
+
+def doubtful_limbs(motion: Motion) -> tuple[DoubtfulLimb, ...]:
+    """All stretches, by their first frames."""
+    if motion.limb_doubt is None or motion.limb_names is None:
+        return ()
+    found = [
+        DoubtfulLimb(str(name), int(motion.frame[first]), int(motion.frame[stop - 1]), float(doubt[first:stop].mean()))
+        for name, doubt in zip(motion.limb_names, motion.limb_doubt.T, strict=True)
+        for first, stop in _stretches(doubt)
+    ]
+    return tuple(sorted(found, key=lambda limb: (limb.first_frame, limb.name)))
+
+
+def _stretches(doubt: Float[np.ndarray, "frame"]) -> list[tuple[int, int]]:
+    """[first, end) of the stretches of one limb."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], doubt > DOUBTFUL, [False]]).astype(int)))
+    joined: list[list[int]] = []
+    for first, stop in edges.reshape(-1, 2).tolist():
+        if joined and first - joined[-1][1] < AT_LEAST:
+            joined[-1][1] = stop
+        else:
+            joined.append([first, stop])
+    return [(first, stop) for first, stop in joined if stop - first >= AT_LEAST]
+
+
+AT_LIMIT = 0.03
+"""Part of its range by which a joint is at most away from its limit."""
+BENT = 0.4
+"""Radians between that limit and the rest pose: straight knees and elbows are at theirs."""
+MOSTLY = 0.5
+"""Share of the frames."""
+
+
+class Limits(NamedTuple):
+    """Of a degree of freedom: the smallest and largest value, and that of the rest pose (radians or metres)."""
+
+    low: float
+    high: float
+    rest: float
+
+
+def limits_of(body: Body) -> dict[str, Limits]:
+    """Of a body's degrees of freedom, by name; infinite where there is no limit."""
+    skeleton = body.skeleton
+    columns = (skeleton.dof_lower, skeleton.dof_upper, body.poses["rest"])
+    rows = zip(*(np.asarray(column, float).tolist() for column in columns), strict=True)
+    return {name: Limits(*row) for name, row in zip(skeleton.dof_names, rows, strict=True)}
+
+
+def strained_joints(motion: Motion, limits: Mapping[str, Limits]) -> dict[str, float]:
+    """The degrees of freedom that are at a limit in most frames, and in what share of them."""
+    found = {}
+    for name, values in zip(motion.dof_names.tolist(), np.asarray(motion.pose).T, strict=True):
+        limit = limits.get(name)
+        if limit is None or not np.isfinite(limit).all():
+            continue
+        near = AT_LIMIT * (limit.high - limit.low)
+        low = float(np.mean(values < limit.low + near)) if limit.rest - limit.low > BENT else 0.0
+        high = float(np.mean(values > limit.high - near)) if limit.high - limit.rest > BENT else 0.0
+        if max(low, high) > MOSTLY:
+            found[name] = max(low, high)
+    return found

@@ -1,0 +1,228 @@
+"""Whether a motion is to be trusted, in absolute terms: what the run itself saw, without a truth."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from sogjax.io.motion import Motion
+from sogjax.quality.limb_warnings import DoubtfulLimb, Limits, doubtful_limbs, strained_joints
+from sogjax.quality.metrics import stretches
+
+OTHER_SUBJECT = 0.6
+"""Of what an actor explains in its example poses: less, and it is another subject, or none."""
+LEAST_EXPLAINED = 0.25
+"""The same for actors of which that is not known, as a part of all."""
+LEAST_OVERLAP, GOOD_OVERLAP = 0.45, 0.57
+"""Of silhouettes with the foreground, the median over frames and cameras: bodies that are followed have 0.6 to 0.75.
+Less than the one is nobody; less than the other must be looked at."""
+WORSE = 0.7
+"""Of what is explained, or overlaps, in most frames: frames below it must be looked at."""
+AT_LEAST = 3
+"""Frames: shorter stretches are not reported."""
+INSIDE = 0.2
+"""Metres between the middles of two actors: nearer, they are inside each other."""
+NUM_WORST = 5
+SHOWN = 4
+"""Findings of each kind that the sentence names."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What is thought of the motion of one actor."""
+
+    actor: str
+    wrong: bool
+    """Nothing of it can be relied on: another subject, or nobody."""
+    findings: tuple[str, ...]
+    """What is wrong, or where to look; none: it looks right."""
+    explained: float | None
+    """Part of the visible area that shows the actor's own colours, the median over the frames; None: not judged."""
+    expected: float | None
+    """What it was in the example poses."""
+    overlap: Mapping[str, float]
+    """Of silhouette and foreground in each camera, the median over the frames; empty where no background is known."""
+    doubtful: tuple[DoubtfulLimb, ...]
+    worst: tuple[int, ...]
+    """The frames to look at first."""
+
+    @property
+    def looks_right(self) -> bool:
+        """Nothing was found."""
+        return not self.findings
+
+    @property
+    def sentence(self) -> str:
+        """In a line; what it rests on, where that is little."""
+        if self.findings:
+            return "; ".join(self.findings)
+        known = self.expected is not None or self.overlap
+        return "looks right" if known else "looks right, as far as that is told without a background or example poses"
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self) | {"looks_right": self.looks_right, "sentence": self.sentence}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> "Verdict":
+        """What `as_dict` gave, read from JSON.
+
+        Raises:
+            KeyError, TypeError: it is something else.
+        """
+        own: dict[str, Any] = {entry.name: content[entry.name] for entry in fields(cls)}
+        own |= {key: tuple(own[key]) for key in ("findings", "worst")}
+        own["doubtful"] = tuple(DoubtfulLimb(**limb) for limb in own["doubtful"])
+        return cls(**own)
+
+
+def verdicts(
+    motions: Mapping[str, Motion],
+    expected: Mapping[str, float],
+    limits: Mapping[str, Mapping[str, Limits]] | None = None,
+) -> dict[str, Verdict]:
+    """Of the actors of a run.
+
+    Args:
+        motions: by actor.
+        expected: what actors explain in their example poses, where that is known.
+        limits: by actor and degree of freedom.
+    """
+    limits = limits or {}
+    return {
+        name: _verdict(name, motion, expected.get(name), _inside(name, motions), limits.get(name, {}))
+        for name, motion in motions.items()
+    }
+
+
+def _verdict(
+    name: str, motion: Motion, expected: float | None, inside: Sequence[str], limits: Mapping[str, Limits]
+) -> Verdict:
+    explained = None if motion.explained is None else float(np.median(motion.explained))
+    overlap = _overlaps(motion)
+    wrong = [*_wrong(explained, expected, overlap), *inside]
+    doubtful = doubtful_limbs(motion)
+    parts = [*_limbs(doubtful), *_bent(motion, limits)]
+    look = [] if wrong else [*_bad_overlaps(overlap), *_bad_stretches(motion), *parts]
+    return Verdict(
+        actor=name,
+        wrong=bool(wrong),
+        findings=(*wrong, *look),
+        explained=explained,
+        expected=expected,
+        overlap=overlap,
+        doubtful=doubtful,
+        worst=worst_frames(motion),
+    )
+
+
+def _overlaps(motion: Motion) -> dict[str, float]:
+    if motion.overlap is None or motion.camera_names is None:
+        return {}
+    columns = zip(motion.camera_names.tolist(), np.asarray(motion.overlap, float).T, strict=True)
+    return {name: float(np.nanmedian(column)) for name, column in columns if np.isfinite(column).any()}
+
+
+def _wrong(explained: float | None, expected: float | None, overlap: Mapping[str, float]) -> list[str]:
+    """What says that nothing can be relied on."""
+    found = []
+    if explained is not None and expected is not None and explained < OTHER_SUBJECT * expected:
+        found.append(
+            f"this is not the subject: {explained:.1%} explained against {expected:.1%} in the example poses "
+            "(another person, other clothes, or pictures whose red and blue are exchanged)"
+        )
+    elif explained is not None and expected is None and explained < LEAST_EXPLAINED:
+        found.append(f"this is not the subject: only {explained:.1%} of the actor is explained by what is seen")
+    if overlap and np.median(list(overlap.values())) < LEAST_OVERLAP:
+        found.append(
+            f"the body is not where somebody is seen: silhouettes overlap to {np.median(list(overlap.values())):.0%} "
+            "(65 % is usual)"
+        )
+    return found
+
+
+def _bad_overlaps(overlap: Mapping[str, float]) -> list[str]:
+    """Silhouettes that overlap little in all cameras, or in some."""
+    if not overlap:
+        return []
+    usual = float(np.median(list(overlap.values())))
+    if usual < GOOD_OVERLAP:
+        return [f"look at all of it: silhouettes overlap to {usual:.0%} (65 % is usual)"]
+    worse = [name for name, value in overlap.items() if value < WORSE * usual]
+    return _shortened([f"look at {name}: overlaps to {overlap[name]:.0%}, others to {usual:.0%}" for name in worse])
+
+
+def _inside(name: str, motions: Mapping[str, Motion]) -> list[str]:
+    """Other actors that are in the same place in most frames."""
+    found = []
+    for other, motion in motions.items():
+        if other != name:
+            apart = np.linalg.norm(_middles(motions[name]) - _middles(motion), axis=-1)
+            share = float(np.mean(apart < INSIDE))
+            if share > 0.5:
+                found.append(f"{name} and {other} are inside each other in {share:.0%} of the frames")
+    return found
+
+
+def _middles(motion: Motion) -> Float[np.ndarray, "frame 3"]:
+    weights = np.asarray(motion.blob_sigma, float) ** 3
+    return np.einsum("fbk,b->fk", motion.blob_means, weights / weights.sum())
+
+
+def _bad_stretches(motion: Motion) -> list[str]:
+    """Frames in which much less of the whole body is explained, or covers foreground, than in most."""
+    bad = _share_of_usual(motion).min(axis=1) < WORSE
+    found = [(int(motion.frame[a]), int(motion.frame[b - 1])) for a, b in stretches(bad, AT_LEAST)]
+    return _shortened([f"look at {_frames(*pair)}: the body fits badly" for pair in found])
+
+
+def _limbs(doubtful: Sequence[DoubtfulLimb]) -> list[str]:
+    return _shortened([f"look at {_frames(limb.first_frame, limb.last_frame)}, {limb.name}" for limb in doubtful])
+
+
+def _bent(motion: Motion, limits: Mapping[str, Limits]) -> list[str]:
+    strained = strained_joints(motion, limits).items()
+    return _shortened([f"look at {name}, at its limit in {share:.0%} of the frames" for name, share in strained])
+
+
+def _frames(first: int, last: int) -> str:
+    return f"frames {first}-{last}" if last > first else f"frame {first}"
+
+
+def _shortened(found: list[str]) -> list[str]:
+    more = len(found) - SHOWN
+    return found if more <= 0 else [*found[:SHOWN], f"and {more} more"]
+
+
+def _share_of_usual(motion: Motion) -> Float[np.ndarray, "frame measure"]:
+    """Each measure of a frame over its median; 1 where there is none."""
+    measures = [np.ones(motion.num_frames)]
+    if motion.explained is not None:
+        measures.append(motion.explained / max(float(np.median(motion.explained)), 1e-6))
+    if motion.overlap is not None and np.isfinite(motion.overlap).any():
+        known = np.isfinite(motion.overlap).any(axis=1)
+        means = np.ones(motion.num_frames)
+        means[known] = np.nanmean(motion.overlap[known], axis=1)
+        measures.append(means / max(float(np.median(means[known])), 1e-6))
+    return np.stack(measures, axis=1)
+
+
+def worst_frames(motion: Motion, count: int = NUM_WORST) -> tuple[int, ...]:
+    """The frames that fit worst, by limbs in doubt first; none close to another, in the order of time."""
+    doubt = np.zeros(motion.num_frames) if motion.limb_doubt is None else motion.limb_doubt.max(axis=1, initial=0.0)
+    badness = doubt + (1.0 - _share_of_usual(motion)).max(axis=1)
+    apart = max(motion.num_frames // (4 * count), 1)
+    return tuple(int(motion.frame[row]) for row in np.sort(_peaks(badness, count, apart)))
+
+
+def _peaks(values: Float[np.ndarray, "frame"], count: int, apart: int) -> Int[np.ndarray, "peak"]:
+    """The rows of the highest values, so many rows apart at least."""
+    chosen: list[int] = []
+    for row in np.argsort(-values, kind="stable").tolist():
+        if all(abs(row - other) >= apart for other in chosen):
+            chosen.append(row)
+        if len(chosen) == count:
+            break
+    return np.array(chosen, int)

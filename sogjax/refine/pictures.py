@@ -1,0 +1,205 @@
+"""What the pictures of a clip say near the poses that were tracked: read once, kept while they are adjusted."""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int, UInt8
+
+from sogjax.energy.appearance import BlobKinds, ColorWindows
+from sogjax.energy.neighbours import margins, near_pairs
+from sogjax.energy.pairs import SparsePairs
+from sogjax.energy.similarity import similarity_among
+from sogjax.energy.views import Views
+from sogjax.model.body import Body
+from sogjax.model.camera import Camera, project
+from sogjax.refine.camera_moves import Sights
+from sogjax.scene.color_clusters import SLOTS, SPARE, Kinds, kinds_of, odds_where_told
+from sogjax.search.search_energy import blob_kinds
+from sogjax.search.seen_frame import cells_at
+from sogjax.tracking.capacity import first_capacities, larger_capacities
+from sogjax.tracking.culling import BLOCK_STEP, Capacities, actor_of_blobs, block_capacity, body_boxes
+from sogjax.tracking.frame import Beside, FrameCells, TrackState, on_device
+from sogjax.tracking.tracker import Tracker
+
+COLUMNS, ROWS = 40, 64
+"""Cells of a window; those of a standing person are 3 cm wide."""
+SAMPLES = 2
+"""Places along each side of a cell at which the picture is looked at."""
+BORDER = 0.08
+"""Around a body's box, as a part of its size: adjusted poses stay near those that were tracked."""
+BLOCK_HEADROOM = 1.1
+USUAL_BLOBS = 2048
+"""Of a picture."""
+
+
+class ClipPictures(eqx.Module):
+    """The pictures of some frames; the first axis of every array counts them."""
+
+    views: Views
+    windows: ColorWindows
+    kinds: BlobKinds = eqx.field()
+    """Without that axis."""
+
+    @property
+    def num_frames(self) -> int:
+        """How many."""
+        return self.windows.x.shape[0]
+
+
+class Reader(eqx.Module):
+    """Makes the pictures of a clip from cells, for one body."""
+
+    tracker: Tracker
+    kinds: Kinds = eqx.field(static=True)
+    inside: Float[np.ndarray, "camera rows columns"]
+    """1 for the cells of a picture, 0 for padding."""
+
+    @classmethod
+    def from_tracker(cls, tracker: Tracker, shape: tuple[int, int]) -> "Reader":
+        """For cells of so many rows and columns."""
+        grids = tracker.reader.candidates.grids
+        inside = np.zeros((len(grids), *shape), np.float32)
+        for k, grid in enumerate(grids):
+            inside[k, : grid.rows, : grid.columns] = 1.0
+        body = tracker.body
+        return cls(tracker, kinds_of(np.asarray(body.blob_colors), np.asarray(body.blob_sigmas) ** 2), inside)
+
+    def pictures(self, cells: Sequence[FrameCells], poses: Float[np.ndarray, "frame dof"]) -> ClipPictures:
+        """Of frames, near the poses in them.
+
+        Raises:
+            InputError: more image blobs than the largest capacity.
+        """
+        tables = jnp.asarray(np.concatenate([self.kinds.tables, self.kinds.whole[None]]), jnp.float32)
+        states = [TrackState.from_pose(jnp.asarray(pose, jnp.float32)) for pose in poses]
+        capacities = first_capacities(self.tracker, states[0], on_device(cells[0])[0])
+        found: list[Views] = []
+        windows = []
+        while len(found) < len(states):
+            frame, state = on_device(cells[len(found)]), states[len(found)]
+            views, near, matching = _views(self.tracker, *frame, state, capacities)
+            counts = int(jnp.max(near)), int(jnp.max(matching))
+            if not capacities.hold(*counts):
+                capacities = larger_capacities(capacities, *counts, 0)
+                found = []  # all frames have the same room, so that one program serves them
+                continue
+            found.append(views)
+        for frame, state in zip(map(on_device, cells), states, strict=True):
+            present = jnp.ones(len(self.inside), bool) if frame[1].present is None else frame[1].present
+            shown = jnp.where(present[:, None, None], self.inside, 0.0)
+            windows.append(_windows(self.tracker, frame[0], shown, tables, state.previous))
+        stack = lambda *leaves: jnp.stack(leaves)
+        kinds = blob_kinds(self.kinds, self.tracker.body.num_blobs)
+        return ClipPictures(jax.tree.map(stack, *found), jax.tree.map(stack, *windows), kinds)
+
+
+def bytes_of_frame(cameras: int, num_blobs: int) -> int:
+    """About how much memory the pictures of a frame take."""
+    kinds = -(-num_blobs // SLOTS) + SPARE
+    return 4 * cameras * (num_blobs * USUAL_BLOBS + COLUMNS * ROWS * kinds)
+
+
+class NearPairs(eqx.Module):
+    """The pairs of blobs that matter near some poses of all frames."""
+
+    pairs: SparsePairs
+    capacity: int = eqx.field(static=True)
+
+    @classmethod
+    def of(
+        cls,
+        tracker: Tracker,
+        body: Body,
+        pictures: ClipPictures,
+        poses: Float[Array, "frame dof"],
+        capacity: int,
+        sights: Sights | None = None,
+    ) -> "NearPairs":
+        """With room for at least `capacity` blocks in each frame; `sights` has a velocity of each frame's blobs."""
+        exponent = similarity_among(tracker.terms).exponent
+        while True:
+            pairs, count = _pairs(body, pictures.views, poses, exponent, max(capacity, BLOCK_STEP), sights)
+            most = int(jnp.max(count))
+            if most <= capacity:
+                return cls(pairs, capacity)
+            capacity = block_capacity(most, BLOCK_HEADROOM)
+
+
+@eqx.filter_jit
+def _views(
+    tracker: Tracker,
+    cells: UInt8[Array, "camera rows columns 3"],
+    beside: Beside,
+    state: TrackState,
+    capacities: Capacities,
+) -> tuple[Views, Int[Array, "camera"], Int[Array, "camera"]]:
+    return tracker.views(cells, state, capacities, beside)
+
+
+@eqx.filter_jit
+def _pairs(
+    body: Body,
+    views: Views,
+    poses: Float[Array, "frame dof"],
+    exponent: Float[Array, ""],
+    capacity: int,
+    sights: Sights | None,
+) -> tuple[SparsePairs, Int[Array, "frame"]]:
+    def one(frame: tuple[Views, Array, Array | None]) -> tuple[SparsePairs, Int[Array, ""]]:
+        seen_by, pose, velocities = frame
+        blobs, cameras = body.posed_blobs(pose), seen_by.cameras
+        if sights is None or velocities is None:
+            seen = jax.vmap(project, in_axes=(0, None))(cameras, blobs)
+        else:
+            seen = Sights(sights.moves, velocities).seen(cameras, blobs)
+        similarities = seen_by.color_similarities
+        return near_pairs(seen_by.images, similarities, seen, margins(cameras), exponent, capacity)
+
+    return jax.lax.map(one, (views, poses, None if sights is None else sights.velocities))
+
+
+@eqx.filter_jit
+def _windows(
+    tracker: Tracker,
+    cells: UInt8[Array, "camera rows columns 3"],
+    inside: Float[Array, "camera rows columns"],
+    tables: Float[Array, "kind bin bin bin"],
+    pose: Float[Array, "dof"],
+) -> ColorWindows:
+    """Grids around a body: what each kind of blob would explain there."""
+    cameras, body = tracker.cameras, tracker.body
+    odds = odds_where_told(cells.astype(tables.dtype) / 255.0, inside, tracker.reader.empty, tables[:-1])
+    actors = actor_of_blobs(body.skeleton, body.blobs.joints)
+    around = jax.vmap(body_boxes, in_axes=(None, 0, None, None))
+    boxes = around(body.posed_blobs(pose), cameras, actors, jnp.asarray(BORDER, pose.dtype))[:, 0]
+    real = jnp.all(jnp.isfinite(boxes), axis=(1, 2))
+    boxes = jnp.where(real[:, None, None], boxes, jnp.array([[[0.0, 0.0], [1.0, 1.0]]], boxes.dtype))
+    step = (boxes[:, 1] - boxes[:, 0]) / jnp.array([[COLUMNS, ROWS]], boxes.dtype)
+    along = lambda axis, count, parts: (
+        boxes[:, 0, axis, None]
+        + (jnp.arange(count * parts, dtype=boxes.dtype) + 0.5)[None] / parts * step[:, axis, None]
+    )
+    sizes = jnp.asarray([grid.cell_size for grid in tracker.reader.candidates.grids], boxes.dtype)
+    looked_at = jax.vmap(_looked_at)(odds, sizes, cameras, along(0, COLUMNS, SAMPLES), along(1, ROWS, SAMPLES))
+    split = looked_at.reshape(*looked_at.shape[:2], COLUMNS, SAMPLES, ROWS, SAMPLES)
+    free = jnp.broadcast_to(real[:, None, None], (len(sizes), COLUMNS, ROWS)).astype(boxes.dtype)
+    scale = jnp.ones(len(sizes), boxes.dtype)
+    return ColorWindows(along(0, COLUMNS, 1), along(1, ROWS, 1), step, jnp.mean(split, axis=(3, 5)), free, scale)
+
+
+def _looked_at(
+    odds: Float[Array, "kind rows columns"],
+    cell_size: Float[Array, ""],
+    camera: Camera,
+    x: Float[Array, "n"],
+    y: Float[Array, "m"],
+) -> Float[Array, "kind n m"]:
+    """The log odds at the places of a grid in one camera; 0 outside its picture."""
+    shape = (x.shape[0], y.shape[0])
+    pixels = jnp.stack([jnp.broadcast_to(x[:, None], shape), jnp.broadcast_to(y[None], shape)], axis=-1)
+    cell, inside = cells_at(camera, cell_size, pixels.reshape(-1, 2))
+    values = odds[:, cell[:, 1], cell[:, 0]]
+    return jnp.where(inside[None], values, 0.0).reshape(-1, *shape)

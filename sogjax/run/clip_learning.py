@@ -1,0 +1,106 @@
+"""Learning the backgrounds of a recording's cameras from its clip: reading samples, and refusing unsuitable clips."""
+
+import os
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import cv2
+import numpy as np
+from jaxtyping import Bool
+
+from sogjax.io.background_cache import Arrays
+from sogjax.io.recording import Recording
+from sogjax.io.sampled_frames import camera_samples, spread_frames
+from sogjax.model.rotation import axis_vector
+from sogjax.run.terminal import say
+from sogjax.scene.background import CameraBackground
+from sogjax.scene.clip_background import MOST_SAMPLES, SampledCamera, learnt_background
+from sogjax.scene.clip_steadiness import FEWEST_SAMPLES, moves, shaking
+from sogjax.scene.moving_zone import moving_zones
+from sogjax.scene.plate_difference import working_size
+
+MOST_BYTES = 2**30
+"""Of samples in memory; beyond, fewer frames are looked at."""
+MUCH_UNKNOWN = 0.15
+"""Share of the pictures from which on an unknown background is said."""
+PARTS = ("picture", "spread", "known")
+"""Of a `CameraBackground`."""
+
+
+LeftOut = Mapping[str, Mapping[int, Bool[np.ndarray, "rows columns"]]]
+"""By camera and frame (counted from the recording's first), where the tracked bodies are."""
+
+
+class UnsuitableError(Exception):
+    """Why nothing can be learnt from a clip, and the remedy."""
+
+
+def sampled_frames(recording: Recording) -> list[int]:
+    """The frames that a background is learnt from, counted from the recording's first."""
+    sizes = [working_size(*recording.rig.image_size(name)) for name in recording.rig.names]
+    room = MOST_BYTES // (3 * sum(width * height for width, height in sizes))
+    return spread_frames(recording.num_frames, int(np.clip(room, MOST_SAMPLES // 2, MOST_SAMPLES)))
+
+
+def learn(recording: Recording, left_out: LeftOut | None) -> Arrays:
+    """Picture, spread and `known` of every camera, by names."""
+    names = recording.rig.names
+    workers = min(len(names), os.cpu_count() or 1)
+    with ThreadPoolExecutor(workers) as pool:
+        sampled = dict(enumerate(pool.map(lambda name: _sampled(recording, name), names)))
+        if not moves(sampled):
+            raise UnsuitableError(
+                "nobody moves in the clip, and who stands still cannot be told from the room; give pictures of the "
+                "empty scene as background/CAMERA.jpg, or a clip in which the subject moves about"
+            )
+        shaken = _shaken(recording, list(pool.map(shaking, sampled.values())))
+        sampled = {k: one for k, one in sampled.items() if names[k] not in shaken}
+        cameras = {k: recording.rig.camera(name) for k, name in enumerate(names)}
+        spans = range(min(len(one.movements) for one in sampled.values()))
+        movements = [{k: one.movements[span] for k, one in sampled.items()} for span in spans]
+        zones = moving_zones(movements, cameras, axis_vector(recording.up))
+        of_one = lambda k: learnt_background(sampled[k], zones[k], (left_out or {}).get(names[k]))
+        learnt = dict(zip(sampled, pool.map(of_one, sampled), strict=True))
+    sizes = [working_size(*recording.rig.image_size(name)) for name in names]
+    found = {name: learnt.get(k, CameraBackground.nothing(*sizes[k])) for k, name in enumerate(names)}
+    _say_unknown(recording, 1.0 - float(np.mean([background.known.mean() for background in learnt.values()])))
+    return {f"{name}.{part}": getattr(background, part) for name, background in found.items() for part in PARTS}
+
+
+def _sampled(recording: Recording, name: str) -> SampledCamera:
+    size = working_size(*recording.rig.image_size(name))
+    small = lambda image: cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    frames = sampled_frames(recording)
+    images = camera_samples(recording, name, frames, small) if len(frames) >= FEWEST_SAMPLES else {}
+    if len(images) < FEWEST_SAMPLES:
+        few = f"{len(images) or len(frames)} frames" + ("" if len(frames) < FEWEST_SAMPLES else f" of {name}")
+        raise UnsuitableError(
+            f"{few} are too few to tell the subject from the room (at least {FEWEST_SAMPLES} are needed); give a "
+            "longer clip, or pictures of the empty scene as background/CAMERA.jpg"
+        )
+    return SampledCamera.from_images(images)
+
+
+def _shaken(recording: Recording, shifts: Sequence[float]) -> set[str]:
+    """Cameras that move, of which nothing can be learnt; that is said, or refused where hardly any other is left."""
+    moved = {name: shift for name, shift in zip(recording.rig.names, shifts, strict=True) if shift}
+    if not moved:
+        return set()
+    scale = lambda name: max(recording.rig.image_size(name)) / max(working_size(*recording.rig.image_size(name)))
+    shown = ", ".join(f"{name} by up to {scale(name) * shift:.1f} px" for name, shift in moved.items())
+    said = (
+        f"cameras move during the clip ({shown}), and neither a background nor the calibration holds for them; film "
+        "with cameras that stand firmly, or leave these out with cameras=[...]"
+    )
+    if len(recording.rig.names) - len(moved) < 2:
+        raise UnsuitableError(said)
+    say(f"warning: {recording.path}: {said}")
+    return set(moved)
+
+
+def _say_unknown(recording: Recording, share: float) -> None:
+    if share > MUCH_UNKNOWN:
+        say(
+            f"warning: {recording.path}: the background of {share:.0%} of the pictures stays unknown, since the "
+            "subject hardly leaves its place; pictures of the empty scene as background/CAMERA.jpg help"
+        )

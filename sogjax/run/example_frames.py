@@ -1,0 +1,193 @@
+"""Example poses from the frames of the videos, where a recording has none."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from sogjax.actor.frame_choice import SeenShape, seen_shape, spread_choice, subject_cubes
+from sogjax.actor.make import subjects_of
+from sogjax.errors import InputError, counted
+from sogjax.io.example_poses import ExamplePose, frame_name
+from sogjax.io.recording import Recording
+from sogjax.model.rotation import axis_vector
+from sogjax.run.background import background_or_reason
+from sogjax.run.example_people import AGREEING, OTHERWISE, num_people_seen, people_examples
+from sogjax.run.sampled_masks import sampled_masks
+from sogjax.run.terminal import say
+from sogjax.scene.background import CameraBackground
+from sogjax.settings.method import ImagesConfig
+
+NUM_TRIED, NUM_EXAMPLES = 8, 5
+"""Frames in which the pose is looked for, and those of them that the actor is made of."""
+FEWEST_EXAMPLES = 2
+WAYS = (
+    "Without example poses, the background is learnt from the videos, and frames of them are taken as example poses. "
+    "Other ways, the easiest first: pictures of the empty scene (background/CAMERA.jpg); frames of your choice "
+    "(`example_poses: [0, 150]` in recording.yaml); pictures of clear poses with masks (example_poses/POSE/CAMERA.jpg, "
+    "CAMERA.mask.png); an actor file (actor=FILE)"
+)
+"""What is done by itself where a recording has no example poses, and what else can be done."""
+LEAST_KNOWN, MOSTLY_KNOWN = 0.6, 0.95
+"""Part of the silhouettes where the background must be, and had better be, known."""
+FEW_CAMERAS = 4
+"""Fewer of them see too little of a body."""
+
+
+def with_examples(
+    recording: Recording, images: ImagesConfig, actors: int | None = None
+) -> tuple[Recording, tuple[CameraBackground, ...] | None, int | None]:
+    """The recording with example poses, its own or frames of its videos, and the background that their masks need.
+
+    The number is that of the frames to keep, those in which the pose is found best; None: all, since they were given.
+    `actors` is how many people the example poses show; None: as many as they name, or one.
+
+    Raises:
+        InputError: as `with_example_frames` and `check_actors`.
+    """
+    check_actors(recording, actors)
+    if not recording.example_poses:
+        return (*with_example_frames(recording, images, 1 if actors is None else actors), NUM_EXAMPLES)
+    found = background_or_reason(recording, images) if _need_background(recording) else None
+    return recording, None if isinstance(found, str) else found, None
+
+
+def check_actors(recording: Recording, actors: int | None, num_files: int | None = None) -> None:
+    """Check the number of actors that is asked for against the actor files, if any, or else the example poses.
+
+    Raises:
+        InputError: it is no number of people, or another one than theirs.
+    """
+    if actors is None:
+        return
+    if actors < 1:
+        raise InputError(f"actors={actors}: must be a whole number of at least 1, or null")
+    if num_files is not None:
+        if num_files != actors:
+            raise InputError(
+                f"actors={actors}: the actors come from actor=, which gives {counted(num_files, 'file')}; leave actors "
+                f"out, or give {counted(actors, 'file')}"
+            )
+        return
+    subjects = subjects_of(recording) if recording.example_poses else ()
+    if subjects and len(subjects) != actors:
+        named = ", ".join(str(name) for name in subjects if name is not None)
+        raise InputError(
+            f"actors={actors}: the example poses of {recording.path} show {counted(len(subjects), 'actor')}"
+            f"{f' ({named})' if named else ''}, and they count; leave actors out, or add example poses of the others, "
+            "each with its `actor`, to recording.yaml"
+        )
+
+
+def _need_background(recording: Recording) -> bool:
+    """Whether some picture of an example pose has neither a mask nor a picture of the empty scene."""
+    without = lambda example: [
+        name for name in example.images if name not in example.masks and name not in recording.background
+    ]
+    return any(example.frame is not None or without(example) for example in recording.example_poses)
+
+
+def with_example_frames(
+    recording: Recording, images: ImagesConfig, actors: int = 1
+) -> tuple[Recording, tuple[CameraBackground, ...]]:
+    """The recording with frames of its videos as example poses, and the background that their masks need.
+
+    Raises:
+        InputError: no background can be learnt, or no frames show `actors` people whole and apart from it and each
+            other.
+    """
+    learnt = _background(recording, images)
+    examples = _person_examples(recording, learnt) if actors == 1 else _people_examples(recording, learnt, actors)
+    return replace(recording, example_poses=examples), learnt
+
+
+def _person_examples(recording: Recording, learnt: Sequence[CameraBackground]) -> tuple[ExamplePose, ...]:
+    shapes = seen_shapes(recording, learnt)
+    if (problem := unsuitable(shapes, lambda: num_people_seen(recording, learnt))) is not None:
+        raise _no_examples(recording, problem)
+    chosen = spread_choice([shape for shape in shapes if shape.agreement > AGREEING], NUM_TRIED)
+    _say_chosen(recording, [shape.frame for shape in chosen], len(shapes))
+    say(f"the actor would gain most from {most_helpful(chosen, len(recording.rig.names))}")
+    name = lambda shape: frame_name(shape.frame + recording.first_frame)
+    return tuple(ExamplePose(name(shape), None, {}, {}, None, shape.frame) for shape in chosen)
+
+
+def _people_examples(recording: Recording, learnt: Sequence[CameraBackground], actors: int) -> tuple[ExamplePose, ...]:
+    examples = people_examples(recording, learnt, actors, NUM_TRIED)
+    if isinstance(examples, str):
+        raise _no_examples(recording, examples)
+    frames = dict.fromkeys(example.frame for example in examples if example.frame is not None)
+    _say_chosen(recording, list(frames), None)
+    return examples
+
+
+def _no_examples(recording: Recording, problem: str) -> InputError:
+    return InputError(f"{recording.path}: no example poses can be taken from the videos, since {problem}. {WAYS}")
+
+
+def _say_chosen(recording: Recording, frames: Sequence[int], num_seen: int | None) -> None:
+    shown = ", ".join(str(frame + recording.first_frame) for frame in frames)
+    looked_at = "" if num_seen is None else f" ({counted(num_seen, 'frame')} looked at)"
+    say(f"example poses: frames {shown} of the videos{looked_at}")
+
+
+def _background(recording: Recording, images: ImagesConfig) -> tuple[CameraBackground, ...]:
+    found = background_or_reason(recording, images)
+    if isinstance(found, str):
+        raise InputError(
+            f"{recording.path}: there is no actor=FILE, there are no example poses, and none can be taken from the "
+            f"videos: {found}. {WAYS}"
+        )
+    return found
+
+
+def unsuitable(shapes: Sequence[SeenShape], num_people: Callable[[], int]) -> str | None:
+    """Why no example poses of one person can be taken from frames, and the remedy; None: they can.
+
+    `num_people` counts better than the parts of the hulls do, but takes seconds: a body may be seen in parts.
+    """
+    if show_several(shapes) and (people := num_people()) != 1:
+        return several_people(people)
+    if shapes and np.median([shape.known for shape in shapes]) < LEAST_KNOWN:
+        return (
+            "the subject stands in the same place throughout, and what is behind is never seen; give pictures of the "
+            "empty scene as background/CAMERA.jpg"
+        )
+    if sum(shape.agreement > AGREEING for shape in shapes) < FEWEST_EXAMPLES:
+        return (
+            "nobody is seen in them whole and apart from the background; give pictures of the empty scene as "
+            "background/CAMERA.jpg, or example_poses/POSE/CAMERA.jpg with CAMERA.mask.png"
+        )
+    return None
+
+
+def show_several(shapes: Sequence[SeenShape]) -> bool:
+    """Whether most frames show more than one body."""
+    return bool(shapes) and float(np.median([shape.num_bodies for shape in shapes])) > 1.0
+
+
+def several_people(seen: int) -> str:
+    """What is said where one person is asked for and so many are seen; 0: nobody knows how many."""
+    shown = f"{seen} people" if seen > 1 else "more than one person"
+    return f"they show {shown}; make an actor of each with actors={max(seen, 2)}, {OTHERWISE}"
+
+
+def most_helpful(chosen: Sequence[SeenShape], num_cameras: int) -> str:
+    """What would improve an actor that is made of frames most."""
+    if np.mean([shape.known for shape in chosen]) < MOSTLY_KNOWN:
+        return "pictures of the empty scene (background/CAMERA.jpg): a part of it is never seen in the videos"
+    if num_cameras < FEW_CAMERAS:
+        return f"more cameras: there are {num_cameras}"
+    return "pictures of a T-pose, of bent elbows and of a squat (example_poses/POSE/CAMERA.jpg)"
+
+
+def seen_shapes(recording: Recording, learnt: Sequence[CameraBackground]) -> list[SeenShape]:
+    """What frames spread over the videos show, where somebody is seen."""
+    seen, up = sampled_masks(recording, learnt), axis_vector(recording.up)
+    cubes = subject_cubes(seen.masks, seen.cameras)
+    shapes = [
+        seen_shape(frame, masks, seen.unknown, seen.cameras, cube, up)
+        for frame, masks, cube in zip(seen.frames, seen.masks, cubes, strict=True)
+        if cube is not None
+    ]
+    return [shape for shape in shapes if shape is not None]

@@ -1,0 +1,134 @@
+"""Example poses of several people from the frames of the videos in which they stand apart."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool
+
+from sogjax.actor.frame_choice import Mask, SeenShape, seen_shape, spread_moments, subject_cubes
+from sogjax.actor.people import PersonSeen, people_apart, told_apart
+from sogjax.errors import counted
+from sogjax.io.example_poses import ExamplePose, frame_name
+from sogjax.io.recording import Recording
+from sogjax.model.rotation import axis_vector
+from sogjax.run.sampled_masks import SampledMasks, sampled_masks
+from sogjax.scene.background import CameraBackground
+from sogjax.scene.cells import CellGrid
+from sogjax.scene.plate_difference import reduced_mask
+
+LIGHT = 0.05
+"""Standard deviation of the background's light, as a part of it: dark trousers must not pass for a shadow. Shadows are
+told by lying on the floor."""
+AGREEING = 0.45
+"""Least agreement of everybody's hull and silhouettes in a frame."""
+FEWEST_APART = 2
+"""Frames in which all stand apart; fewer make no actors."""
+OTHERWISE = (
+    "list frames in which each stands alone as example_poses in recording.yaml, such as [{frame: 12, actor: anna}, "
+    "{frame: 300, actor: ben}], or give actor files with actor=[...]"
+)
+
+Moment = tuple[SeenShape, ...]
+
+
+def person_name(number: int) -> str:
+    """How the actor of one of several people is called, counted from 0."""
+    return f"person_{number + 1}"
+
+
+def num_people_seen(recording: Recording, learnt: Sequence[CameraBackground]) -> int:
+    """How many people most frames show that show any; 0: none does."""
+    seen = sampled_masks(recording, learnt, LIGHT)
+    return most_seen([len(people) for people in everybody(seen, recording.up)])
+
+
+def most_seen(counts: Sequence[int]) -> int:
+    """The number of people that is seen most often, of several that are equally often the largest; 0: none is seen."""
+    found = Counter(count for count in counts if count)
+    return max(found, key=lambda count: (found[count], count), default=0)
+
+
+def people_examples(
+    recording: Recording, learnt: Sequence[CameraBackground], actors: int, count: int
+) -> tuple[ExamplePose, ...] | str:
+    """At most `count` frames as example poses of each of several people, or why there are none, with the remedy."""
+    seen = sampled_masks(recording, learnt, LIGHT)
+    moments = everybody(seen, recording.up)
+    apart = [people for people in moments if len(people) == actors]
+    if len(apart) < FEWEST_APART:
+        return too_few_apart(actors, [len(people) for people in moments])
+    told = told_apart(apart, recording.fps)
+    if len(told) < max(FEWEST_APART, len(apart) // 2):
+        return (
+            f"the {actors} people stand apart in {counted(len(apart), 'frame')}, but their colours are too much alike "
+            f"to tell who is who; {OTHERWISE}"
+        )
+    shapes = [_shapes([moment[k] for moment in told], seen, recording.up) for k in range(actors)]
+    chosen = spread_moments(suitable_moments(shapes), count)
+    if len(chosen) < FEWEST_APART:
+        return (
+            f"the {actors} people are never seen whole and apart from the background; give pictures of the empty scene "
+            f"as background/CAMERA.jpg, or {OTHERWISE}"
+        )
+    by_frame = {moment[0].frame: moment for moment in told}
+    frames = [moment[0].frame for moment in chosen]
+    return tuple(
+        _example(recording, person_name(k), by_frame[frame][k], seen.grids) for k in range(actors) for frame in frames
+    )
+
+
+def too_few_apart(actors: int, counts: Sequence[int]) -> str:
+    """The sentence on frames that show other numbers of people."""
+    most = most_seen(counts)
+    if not most:
+        return f"nobody is seen apart from the background; give pictures of the empty scene, or {OTHERWISE}"
+    shown = "one person" if most == 1 else f"{most} people"
+    return (
+        f"actors={actors}, but {actors} people stand apart in {sum(n == actors for n in counts)} of "
+        f"{counted(len(counts), 'frame')}, and {shown} in {sum(n == most for n in counts)}; "
+        f"give actors={most}, or {OTHERWISE}"
+    )
+
+
+def everybody(seen: SampledMasks, up: str) -> list[list[PersonSeen]]:
+    """The people in each of some frames; none, where too few cameras show any."""
+    cubes = subject_cubes(seen.masks, seen.cameras)
+    rows = zip(seen.frames, seen.masks, seen.pictures, cubes, strict=True)
+    return [
+        [] if cube is None else people_apart(frame, masks, seen.unknown, pictures, seen.cameras, cube, axis_vector(up))
+        for frame, masks, pictures, cube in rows
+    ]
+
+
+def suitable_moments(shapes: Sequence[Mapping[int, SeenShape]]) -> list[Moment]:
+    """The frames in which everybody is seen well, from the shapes of each person by frame."""
+    frames = sorted(set.intersection(*(set(of_person) for of_person in shapes)))
+    moments = [tuple(of_person[frame] for of_person in shapes) for frame in frames]
+    return [moment for moment in moments if min(shape.agreement for shape in moment) > AGREEING]
+
+
+def _shapes(person: Sequence[PersonSeen], seen: SampledMasks, up: str) -> dict[int, SeenShape]:
+    """What the silhouettes of one person tell, by frame; cameras in which others hide him show nothing of him."""
+    shapes: dict[int, SeenShape] = {}
+    cubes = subject_cubes([one.masks for one in person], seen.cameras)
+    for one, cube in zip(person, cubes, strict=True):
+        if cube is None:
+            continue
+        unknown = {k: seen.unknown[k] & region for k, region in one.regions.items()}
+        cameras = {k: seen.cameras[k] for k in one.masks}
+        if (shape := seen_shape(one.frame, one.masks, unknown, cameras, cube, axis_vector(up))) is not None:
+            shapes[one.frame] = replace(shape, whole=shape.whole * len(cameras) / len(seen.cameras))
+    return shapes
+
+
+def _example(recording: Recording, actor: str, person: PersonSeen, grids: Sequence[CellGrid]) -> ExamplePose:
+    name = frame_name(person.frame + recording.first_frame)
+    within = {recording.rig.names[k]: reduced_mask(in_pixels(mask, grids[k])) for k, mask in person.regions.items()}
+    return ExamplePose(name, actor, {}, {}, None, person.frame, within)
+
+
+def in_pixels(cells: Mask, grid: CellGrid) -> Bool[np.ndarray, "height width"]:
+    """A mask of cells as one of the pictures' size."""
+    return np.kron(cells, np.ones((grid.cell_size, grid.cell_size), bool))[: grid.height, : grid.width]

@@ -1,0 +1,147 @@
+"""The first poses from keypoints that another program left beside a recording: nothing has to be searched."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import permutations
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, UInt8
+
+from sogjax.energy.frame_energy import still_energy
+from sogjax.energy.similarity import similarity_among
+from sogjax.io.keypoints.load import Keypoints, load_keypoints
+from sogjax.io.recording import Recording
+from sogjax.model.body import Body, concatenate
+from sogjax.run import build
+from sogjax.run.pipeline import Preparation, cells_of_frame, read_pictures
+from sogjax.run.terminal import say
+from sogjax.search.keypoint_people import triangulated_people
+from sogjax.search.keypoint_pose import KeypointPose, pose_of_keypoints
+from sogjax.settings.run import TrackConfig
+from sogjax.tracking.capacity import first_capacities
+from sogjax.tracking.culling import Capacities
+from sogjax.tracking.frame import Beside, TrackState, on_device
+from sogjax.tracking.tracker import Tracker
+
+LEAST_ON = 0.7
+"""Share of the points that the body's landmarks must be on."""
+LEAST_POINTS = 10
+"""Points that a pose must be fitted to."""
+MOST_ACTORS = 4
+"""Of whom it is tried who is who."""
+CAMERAS = 3
+"""Fewer do not tell whose keypoints of one camera are whose of another."""
+CLEARLY = 1.05
+"""By which factor the pictures must be more similar to be sure who is who."""
+
+
+def keypoint_starts(
+    recording: Recording, bodies: Sequence[Body], config: TrackConfig, frame: int, keypoints: Keypoints | None = None
+) -> list[Float[Array, "dof"]] | None:
+    """The poses of bodies, upright in the recording's world, in a frame counted from the recording's first.
+
+    Who of several is who, the colours in the pictures tell. None where the recording has no keypoints, they give no
+    poses that most of them agree with, or it is not clear who is who.
+
+    Args:
+        recording: with the cameras.
+        bodies: the actors.
+        config: with which they are tracked.
+        frame: counted from the recording's first.
+        keypoints: those of the recording, if they were read already.
+
+    Raises:
+        InputError: none of the keypoint files can be used, or the frame cannot be read.
+    """
+    points = frame_points(recording, frame, len(bodies), keypoints)
+    if points is None or len(bodies) > MOST_ACTORS or (len(bodies) > 1 and len(recording.rig) < CAMERAS):
+        return None
+    scheme, people = points
+    # Of each body in the place of each person.
+    found = [[pose_of_keypoints(body, recording.up, scheme, person) for person in people] for body in bodies]
+    order = _who_is_who(recording, bodies, config, frame, found)
+    if order is None:
+        return None
+    poses = [found[k][person] for k, person in enumerate(order)]
+    if not all(_good(body, pose, frame + recording.first_frame) for body, pose in zip(bodies, poses, strict=True)):
+        return None
+    return [jnp.asarray(p.pose, b.poses["rest"].dtype) for b, p in zip(bodies, poses, strict=True) if p is not None]
+
+
+def keypoint_start(
+    recording: Recording, body: Body, frame: int, keypoints: Keypoints | None = None
+) -> Float[Array, "dof"] | None:
+    """The same of a single body."""
+    found = keypoint_starts(recording, [body], TrackConfig(), frame, keypoints)
+    return None if found is None else found[0]
+
+
+def frame_points(recording: Recording, frame: int, num_people: int, keypoints: Keypoints | None = None):
+    """The scheme and, by person, the triangulated keypoints of a frame; None where there are none."""
+    if keypoints is not None:
+        keypoints = keypoints.between(frame, frame + 1)
+    else:
+        keypoints = load_keypoints(replace(recording, first_frame=recording.first_frame + frame, num_frames=1))
+        for warning in () if keypoints is None else keypoints.warnings:
+            say(f"warning: {warning}")
+    if keypoints is None or len(recording.rig) < 2:
+        return None
+    points = triangulated_people(keypoints, recording.rig, num_people).points[0]
+    return keypoints.scheme, np.asarray(points, float)
+
+
+def _good(body: Body, found: KeypointPose | None, shown: int) -> bool:
+    """Whether a pose agrees with most of its keypoints, which is said."""
+    if found is None:
+        return False
+    good = found.on >= LEAST_ON and found.num_points >= LEAST_POINTS
+    what = f"{found.num_points} keypoints, {100.0 * found.on:.0f} % of them on the body"
+    say(f"pose of {body.name} in frame {shown} from {what}{'' if good else ': not sure, so it is searched for'}")
+    return good
+
+
+def _who_is_who(
+    recording: Recording,
+    bodies: Sequence[Body],
+    config: TrackConfig,
+    frame: int,
+    found: list[list[KeypointPose | None]],
+) -> tuple[int, ...] | None:
+    """By body the person that it is, by how similar the pictures are; None where that is not clear."""
+    if len(bodies) == 1:
+        return (0,)
+    if any(pose is None for of_body in found for pose in of_body):
+        return None
+    orders = [*permutations(range(len(bodies)))]
+    grids = build.cell_grids(recording, config.images.depth)
+    tracker = build.tracker(recording, concatenate(bodies), grids, config)
+    pictures = next(iter(read_pictures(recording, Preparation(grids), frame, frame + 1)))
+    cells, beside = on_device(cells_of_frame([picture.cells for picture in pictures]))
+    poses = [np.concatenate([_pose(found[k][person]) for k, person in enumerate(order)]) for order in orders]
+    states = [TrackState.from_pose(jnp.asarray(pose, tracker.normalizers.dtype)) for pose in poses]
+    capacities = first_capacities(tracker, states[0], cells)
+    values = np.array([float(_similarity(tracker, state, cells, beside, capacities)) for state in states])
+    best, second = np.sort(values)[::-1][:2]
+    if not best > CLEARLY * max(second, 0.0):
+        say(f"who is who in frame {frame + recording.first_frame} is not clear, so poses are searched for")
+        return None
+    return orders[int(values.argmax())]
+
+
+def _pose(found: KeypointPose | None) -> Float[np.ndarray, "dof"]:
+    assert found is not None
+    return found.pose
+
+
+@eqx.filter_jit
+def _similarity(
+    tracker: Tracker,
+    state: TrackState,
+    cells: UInt8[Array, "camera rows columns 3"],
+    beside: Beside,
+    capacities: Capacities,
+) -> Float[Array, ""]:
+    views, _, _ = tracker.views(cells, state, capacities, beside)
+    return still_energy(tracker.body, state.previous, views, (similarity_among(tracker.terms),))

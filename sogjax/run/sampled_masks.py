@@ -1,0 +1,98 @@
+"""What is not the background in frames spread over a whole clip, in cells."""
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import cv2
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from sogjax.actor.frame_choice import Mask
+from sogjax.io.recording import Recording
+from sogjax.io.sampled_frames import camera_samples, spread_frames
+from sogjax.model.camera import Camera
+from sogjax.run.build import cell_grids
+from sogjax.scene.background import CameraBackground, stack_background
+from sogjax.scene.cells import CellGrid
+from sogjax.scene.foreground import SHADOW, EmptyScene, log_odds
+from sogjax.scene.segmentation import largest_parts
+from sogjax.scene.visual_hull import resized
+
+MOST_LOOKED_AT = 40
+DEPTH = 9
+"""Of the quad-tree whose cells are looked at."""
+FOREGROUND = 0.5
+"""Log odds above which a cell counts as foreground."""
+
+Picture = UInt8[np.ndarray, "_rows _columns 3"]
+
+
+@dataclass(frozen=True)
+class SampledMasks:
+    """Frames of a clip; everything by camera (its index in the rig)."""
+
+    frames: list[int]
+    """Counted from the recording's first, ascending."""
+    masks: list[dict[int, Mask]]
+    """Of each of them: what is not the background."""
+    pictures: list[dict[int, Picture]]
+    """The cells' colours, BGR."""
+    unknown: dict[int, Mask]
+    """Where nothing is known of the background."""
+    cameras: dict[int, Camera]
+    """For pictures of the masks' size."""
+    grids: tuple[CellGrid, ...]
+
+
+def sampled_masks(recording: Recording, learnt: Sequence[CameraBackground], shadow: float = SHADOW) -> SampledMasks:
+    """Of at most `MOST_LOOKED_AT` frames that all cameras have.
+
+    `shadow` is the standard deviation of the light that a shadow takes, as a part of the background's: what is darker
+    by more is not the background.
+    """
+    grids = cell_grids(recording, DEPTH)
+    empty = EmptyScene.from_background(stack_background(learnt, grids), shadow)
+    sampled = _samples(recording, grids)
+    frames = sorted(set.intersection(*(set(of_camera) for of_camera in sampled)))
+    pictures = [{k: of_camera[frame] for k, of_camera in enumerate(sampled)} for frame in frames]
+    known = np.asarray(empty.known)
+    sides = [(grid.width / grid.cell_size, grid.height / grid.cell_size) for grid in grids]
+    return SampledMasks(
+        frames=frames,
+        masks=[_masks(_odds(list(shown.values()), grids, empty), grids) for shown in pictures],
+        pictures=pictures,
+        unknown={k: ~known[k, : grid.rows, : grid.columns] for k, grid in enumerate(grids)},
+        cameras={k: resized(recording.rig.camera(name), sides[k]) for k, name in enumerate(recording.rig.names)},
+        grids=grids,
+    )
+
+
+def _samples(recording: Recording, grids: Sequence[CellGrid]) -> list[dict[int, Picture]]:
+    """The cells (BGR) of frames spread over the videos, camera by camera."""
+    names = recording.rig.names
+    frames = spread_frames(recording.num_frames, MOST_LOOKED_AT)
+    with ThreadPoolExecutor(min(len(names), os.cpu_count() or 1)) as pool:
+        read = lambda k: camera_samples(recording, names[k], frames, grids[k].averages)
+        return list(pool.map(read, range(len(names))))
+
+
+def _odds(
+    pictures: Sequence[Picture], grids: Sequence[CellGrid], empty: EmptyScene
+) -> Float[np.ndarray, "camera rows columns"]:
+    shape = empty.known.shape
+    cells = np.zeros((*shape, 3), np.float32)
+    for k, (picture, grid) in enumerate(zip(pictures, grids, strict=True)):
+        cells[k, : grid.rows, : grid.columns] = picture[..., ::-1] / 255.0
+    return np.asarray(log_odds(jnp.asarray(cells), empty, None))
+
+
+def _masks(odds: Float[np.ndarray, "camera rows columns"], grids: Sequence[CellGrid]) -> dict[int, Mask]:
+    return {k: _mask(odds[k, : grid.rows, : grid.columns]) for k, grid in enumerate(grids)}
+
+
+def _mask(odds: Float[np.ndarray, "rows columns"]) -> Mask:
+    found = cv2.morphologyEx((odds > FOREGROUND).astype(np.uint8), cv2.MORPH_OPEN, np.ones((2, 2), np.uint8))
+    return largest_parts(found > 0)

@@ -1,0 +1,119 @@
+"""The background of all cameras as cells, for the tracker.
+
+What a camera shows when nobody stands before it: a picture, how far it varies, and where it is known.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import cv2
+import equinox as eqx
+import numpy as np
+from jaxtyping import Array, Bool, Float, UInt8
+
+from sogjax.scene.cells import CellGrid, stack_shape
+from sogjax.scene.plate_difference import EDGE_NOISE
+
+
+class BackgroundCells(eqx.Module):
+    """What every cell shows when nobody stands before it; padded to the largest camera, where nothing is known."""
+
+    colors: UInt8[Array | np.ndarray, "camera rows columns 3"]
+    """RGB."""
+    spread: Float[Array | np.ndarray, "camera rows columns"]
+    """Standard deviation of a channel, in units of the full range (0..1)."""
+    known: Bool[Array | np.ndarray, "camera rows columns"]
+    """False where nothing may be concluded from the colour."""
+
+
+NOISE_FLOOR = 2.0
+"""Grey levels: rounding, compression and noise of a still scene together are seldom less."""
+KNOWN_SHARE = 0.75
+"""A cell is known if so much of it is."""
+
+Origin = Literal["picture", "clip"]
+
+
+@dataclass(frozen=True)
+class CameraBackground:
+    """The background of one camera, at any size."""
+
+    picture: UInt8[np.ndarray, "_h _w 3"]
+    """BGR."""
+    spread: Float[np.ndarray, "_h _w"]
+    """Standard deviation of a grey level: noise, what flickers, and edges that are not quite in place."""
+    known: Bool[np.ndarray, "_h _w"]
+    """False where the background was never seen, or may be the subject."""
+    origin: Origin
+    """A photograph of the empty scene, or learnt from the clip."""
+
+    @classmethod
+    def from_plate(cls, picture: UInt8[np.ndarray, "_h _w 3"]) -> "CameraBackground":
+        """The background from a photograph of the empty scene, known everywhere."""
+        spread = np.hypot(NOISE_FLOOR, EDGE_NOISE * local_contrast(picture)).astype(np.float32)
+        return cls(picture, spread, np.ones(picture.shape[:2], bool), "picture")
+
+    @classmethod
+    def nothing(cls, width: int, height: int) -> "CameraBackground":
+        """A background of which nothing is known."""
+        empty = np.zeros((height, width), np.float32)
+        return cls(np.zeros((height, width, 3), np.uint8), empty + NOISE_FLOOR, empty > 0, "clip")
+
+
+def local_contrast(picture: np.ndarray) -> Float[np.ndarray, "_h _w"]:
+    """The largest difference of neighbouring pixels, in grey levels."""
+    return cv2.morphologyEx(picture, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8)).max(axis=-1).astype(np.float32)
+
+
+def stack_background(backgrounds: Sequence[CameraBackground], grids: Sequence[CellGrid]) -> BackgroundCells:
+    """The cells of one background per camera, whatever their sizes, padded to the largest grid."""
+    rows, columns = stack_shape(tuple(grids))
+    colors = np.zeros((len(grids), rows, columns, 3), np.uint8)
+    spread = np.zeros((len(grids), rows, columns), np.float32)
+    known = np.zeros((len(grids), rows, columns), bool)
+    for camera, (background, grid) in enumerate(zip(backgrounds, grids, strict=True)):
+        part = (camera, slice(grid.rows), slice(grid.columns))
+        colors[part], spread[part], known[part] = background_cells_of(background, grid)
+    return BackgroundCells(colors, spread, known)
+
+
+def background_cells_of(
+    background: CameraBackground, grid: CellGrid
+) -> tuple[UInt8[np.ndarray, "rows columns 3"], Float[np.ndarray, "rows columns"], Bool[np.ndarray, "rows columns"]]:
+    """Colours (RGB), spread (0..1) and `known` of the cells of one camera, averaged over what is known of each."""
+    weight = background.known.astype(np.float32)
+    share = cell_means(weight, grid)
+    safe = np.maximum(share, 1e-6)
+    light = cell_means(background.picture.astype(np.float32) * weight[..., None], grid) / safe[..., None]
+    spread = cell_means(background.spread.astype(np.float32) * weight, grid) / safe / 255.0
+    known = share >= KNOWN_SHARE
+    colors = np.rint(np.where(known[..., None], light, 0.0)).clip(0, 255).astype(np.uint8)[..., ::-1]
+    return colors, np.where(known, spread, NOISE_FLOOR / 255.0).astype(np.float32), known
+
+
+def cell_means(values: Float[np.ndarray, "..."], grid: CellGrid) -> Float[np.ndarray, "..."]:
+    """Mean over every cell of a grid of what is given at another size of the same picture.
+
+    By summed areas, so a cell may end within a pixel of the smaller picture.
+    """
+    rows = _edges(grid.rows, grid.cell_size, grid.height, values.shape[0])
+    columns = _edges(grid.columns, grid.cell_size, grid.width, values.shape[1])
+    sums = np.zeros((values.shape[0] + 1, values.shape[1] + 1, *values.shape[2:]))
+    sums[1:, 1:] = values.cumsum(axis=0, dtype=float).cumsum(axis=1)
+    across = _between(_between(sums, rows, 0), columns, 1)
+    whole = np.diff(across, axis=0)
+    area = np.outer(np.diff(rows), np.diff(columns))
+    return (np.diff(whole, axis=1) / area.reshape(*area.shape, *([1] * (values.ndim - 2)))).astype(np.float32)
+
+
+def _edges(count: int, cell_size: int, full: int, small: int) -> Float[np.ndarray, "edge"]:
+    """Where cells begin and end, in pixels of the smaller picture; the last one ends with it."""
+    return np.minimum(np.arange(count + 1) * cell_size, full) * (small / full)
+
+
+def _between(sums: Float[np.ndarray, "..."], places: Float[np.ndarray, "edge"], axis: int) -> np.ndarray:
+    """Linear interpolation of sums at places between pixels."""
+    low = np.minimum(places.astype(int), sums.shape[axis] - 2)
+    part = (places - low).reshape([-1 if k == axis else 1 for k in range(sums.ndim)])
+    return (1.0 - part) * np.take(sums, low, axis) + part * np.take(sums, low + 1, axis)

@@ -1,0 +1,121 @@
+"""Learning the background of a camera from frames spread over a clip (see docs/guide/background.md)."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+
+from sogjax.scene.background import NOISE_FLOOR, CameraBackground, local_contrast
+from sogjax.scene.clip_light import EvenSamples, even_samples
+from sogjax.scene.neighbour_growth import grown, modes_of
+from sogjax.scene.plate_difference import EDGE_NOISE, disc
+
+MOST_SAMPLES = 60
+"""Frames of a clip that are looked at."""
+FEWEST_AGREEING = 8
+"""Samples that must show the same colour before it counts as a background that was uncovered."""
+SPANS = 8
+"""Parts of a clip in which movement is looked for."""
+MOVING_WIDTH = 0.008
+"""Width of what moves, in units of the picture's longer side; anything narrower is an edge, or flickers."""
+
+Picture = UInt8[np.ndarray, "rows columns 3"]
+Mask = Bool[np.ndarray, "rows columns"]
+
+
+@dataclass(frozen=True)
+class SampledCamera:
+    """The samples of one camera, in one light, and what can be told of each pixel alone."""
+
+    frames: tuple[int, ...]
+    """Counted from the recording's first."""
+    even: EvenSamples
+    noise: float
+    """Standard deviation of a channel where nothing happens, grey levels."""
+    tolerance: UInt8[np.ndarray, "rows columns"]
+    """Difference up to which two samples of a pixel may show the same thing, grey levels."""
+    movements: tuple[Mask, ...]
+    """Where something moves, for each of `SPANS` parts of the clip."""
+
+    @classmethod
+    def from_images(cls, images: Mapping[int, Picture]) -> "SampledCamera":
+        """From pictures by frame."""
+        even = even_samples(np.stack(list(images.values())))
+        noise = _noise(even)
+        contrast = local_contrast(even.reference)
+        tolerance = np.clip(4.0 + 3.0 * noise + EDGE_NOISE * contrast, 0, 60).astype(np.uint8)
+        spans = np.array_split(np.arange(len(images)), min(SPANS, len(images)))
+        overlapping = [np.arange(max(span[0] - 1, 0), span[-1] + 1) for span in spans]
+        moving = tuple(_moving(even.images[span], tolerance) for span in overlapping)
+        return cls(tuple(images), even, noise, tolerance, moving)
+
+
+def learnt_background(
+    camera: SampledCamera, zone: Mask, left_out: Mapping[int, Mask] | None = None
+) -> CameraBackground:
+    """The background of one camera.
+
+    Outside of the zone it is the mean of all samples. Inside it is what was uncovered: a colour that at least
+    `FEWEST_AGREEING` samples show and that continues the background around it, or is seen at the same times.
+
+    Args:
+        camera: its samples.
+        zone: where the subject may stand (`moving_zones`).
+        left_out: by frame where the tracked body is, widened; these pixels are not looked at. Everything else then
+            is background, wherever enough samples agree.
+    """
+    images = camera.even.images
+    if left_out:
+        zone = zone | np.any([*left_out.values()], axis=0)
+    picture, spread = _means(images)
+    known = np.ones(zone.shape, bool)
+    if zone.any():
+        samples = np.ascontiguousarray(images[:, zone].transpose(0, 2, 1))
+        usable = np.ones((len(images), samples.shape[2]), bool)
+        for k, frame in enumerate(camera.frames):
+            if left_out is not None and frame in left_out:
+                usable[k] = ~left_out[frame][zone]
+        modes = modes_of(samples, usable, camera.tolerance[zone])
+        if left_out is None:
+            chosen = grown(modes, zone, picture, camera.tolerance, FEWEST_AGREEING)
+        else:
+            chosen = np.where(modes.counts[0] >= FEWEST_AGREEING, 0, -1)
+        pick = np.maximum(chosen, 0)
+        at = np.arange(len(chosen))
+        picture[zone], spread[zone] = modes.colors[pick, :, at], modes.deviations[pick, at]
+        known[zone] = chosen >= 0
+    spread = np.sqrt(spread**2 + NOISE_FLOOR**2 + camera.even.drift**2)
+    return CameraBackground(np.rint(picture).clip(0, 255).astype(np.uint8), spread, known, "clip")
+
+
+def _noise(even: EvenSamples) -> float:
+    """By the middle of all differences to the median, in the calmer half of the samples' pixels."""
+    chosen = even.images[:: max(len(even.images) // 12, 1), ::2, ::2]
+    apart = cv2.absdiff(chosen, np.broadcast_to(even.reference[::2, ::2], chosen.shape).copy())
+    return float(1.48 * np.median(apart.mean(axis=0)))
+
+
+def _moving(images: UInt8[np.ndarray, "sample rows columns 3"], tolerance: UInt8[np.ndarray, "rows columns"]) -> Mask:
+    """Where the samples differ by more than noise, over more than an edge's width."""
+    low, high = images[0].copy(), images[0].copy()
+    for image in images[1:]:
+        cv2.min(low, image, low)
+        cv2.max(high, image, high)
+    differs = (high - low).max(axis=-1) > 2.0 * tolerance
+    width = 2 * max(round(0.5 * MOVING_WIDTH * max(differs.shape)), 1) + 1
+    return cv2.morphologyEx(differs.astype(np.uint8), cv2.MORPH_OPEN, disc(width)) > 0
+
+
+def _means(
+    images: UInt8[np.ndarray, "sample rows columns 3"],
+) -> tuple[Float[np.ndarray, "rows columns 3"], Float[np.ndarray, "rows columns"]]:
+    """Mean and standard deviation over time."""
+    total = np.zeros(images.shape[1:], np.float32)
+    squares = np.zeros(images.shape[1:], np.float32)
+    for image in images:
+        cv2.accumulate(image, total)
+        cv2.accumulateSquare(image, squares)
+    mean = total / len(images)
+    return mean, np.sqrt(np.maximum(squares / len(images) - mean**2, 0.0).mean(axis=-1))

@@ -1,0 +1,138 @@
+"""Kinds of blobs of a body by their colours, and what cells say for each kind against the background."""
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+from scipy.cluster.vq import kmeans2
+
+from sogjax.scene.foreground import (
+    COLOR_BINS,
+    LARGEST,
+    TEMPER,
+    EmptyScene,
+    background_surprise,
+    color_bins,
+    subject_colors,
+)
+
+NUM_COLORS = 6
+"""Skin, hair, shirt, trousers, shoes, and what lies between two of them."""
+SLOTS = 8
+"""Blobs of a kind, at most: a colour of more blobs is several kinds, so that one program serves all actors."""
+SPARE = 4
+"""Kinds beside as many as the blobs would fill."""
+PICTURE_SMOOTHING = 0.05
+"""Share of any colour in the colours of a picture whose background is not known."""
+ALIKE = 0.1
+"""Of a channel: colours this near to each other are taken for the same, in what speaks against a body."""
+UNKNOWN_BACKGROUND = 0.6
+"""What colours count where the background is not known, as a part of what they count where it is."""
+
+
+@dataclass(frozen=True)
+class Kinds:
+    """The blobs of a body by colour, and the log density of the colours of each kind."""
+
+    members: tuple[tuple[int, ...], ...]
+    """At most `SLOTS` each; empty for kinds that a body does not need."""
+    tables: Float[np.ndarray, "kind bin bin bin"]
+    whole: Float[np.ndarray, "bin bin bin"]
+    """Of the whole body."""
+
+
+def kinds_of(colors: Float[np.ndarray, "blob 3"], areas: Float[np.ndarray, "blob"]) -> Kinds:
+    """The kinds of a body's blobs, from their colours (sRGB) and how much of the body each is."""
+    colors, areas = np.asarray(colors, float), np.asarray(areas, float)
+    members = _by_color(colors)
+    tables = [subject_colors(colors[np.array(part)], areas[np.array(part)]) for part in members]
+    return _padded(members, tables, subject_colors(colors, areas), len(colors))
+
+
+def _by_color(colors: Float[np.ndarray, "blob 3"]) -> list[list[int]]:
+    """Blobs of about the same colour, at most `SLOTS` together."""
+    most, kinds = _num_kinds(len(colors)), []
+    for count in range(min(NUM_COLORS, len(np.unique(np.round(colors, 2), axis=0))), 0, -1):
+        labels = (
+            kmeans2(colors, count, minit="++", rng=np.random.default_rng(0))[1]
+            if count > 1
+            else np.zeros(len(colors), int)
+        )
+        parts = [np.flatnonzero(labels == k).tolist() for k in range(count)]
+        kinds = [part[k : k + SLOTS] for part in parts for k in range(0, len(part), SLOTS)]
+        if len(kinds) <= most:
+            break
+    return kinds
+
+
+def _num_kinds(num_blobs: int) -> int:
+    return -(-num_blobs // SLOTS) + SPARE
+
+
+def _padded(
+    members: list[list[int]], tables: list[np.ndarray], whole: Float[np.ndarray, "bin bin bin"], num_blobs: int
+) -> Kinds:
+    missing = _num_kinds(num_blobs) - len(members)
+    every = tuple(tuple(part) for part in [*members, *[[]] * missing])
+    return Kinds(every, np.stack([*tables, *[np.zeros_like(whole)] * missing]), whole)
+
+
+def kind_odds(
+    cells: Float[Array, "camera rows columns 3"],
+    inside: Float[Array, "camera rows columns"],
+    background: EmptyScene | None,
+    tables: Float[Array, "kind bin bin bin"],
+) -> Float[Array, "camera kind rows columns"]:
+    """Log odds of each kind of blob against the background in every cell, within `LARGEST`.
+
+    Where the background is not known, what the picture shows elsewhere stands for it: a colour that is everywhere says
+    little. `inside` is 1 for the cells of the pictures, 0 for padding.
+    """
+    unknown = picture_surprise(cells, inside)
+    surprise, temper = unknown, jnp.full_like(unknown, TEMPER * UNKNOWN_BACKGROUND)
+    if background is not None:
+        surprise = jnp.where(background.known, background_surprise(cells, background), unknown)
+        temper = jnp.where(background.known, TEMPER, temper)
+    bins = color_bins(cells)
+    densities = jax.lax.map(lambda table: table[bins], tables)
+    odds = jnp.moveaxis(temper[None] * (surprise[None] + densities), 0, 1)
+    return jnp.clip(odds, -LARGEST, LARGEST) * inside[:, None]
+
+
+def odds_where_told(
+    cells: Float[Array, "camera rows columns 3"],
+    inside: Float[Array, "camera rows columns"],
+    background: EmptyScene | None,
+    tables: Float[Array, "kind bin bin bin"],
+) -> Float[Array, "camera kind rows columns"]:
+    """`kind_odds`, but where a kind looks as the background does, nothing is held against it.
+
+    A black shoe on a black floor is the floor's black to a grey level, or is not, for all of its cells and in every
+    frame: such cells must not be counted as if each one told. Where the background is known no better than a kind's
+    own colours are (`ALIKE`), what is left speaks against the kind.
+    """
+    odds = kind_odds(cells, inside, background, tables)
+    if background is None:
+        return odds
+    least = kind_odds(cells, inside, background.blurred(ALIKE), tables)
+    return jnp.maximum(odds, jnp.minimum(least, 0.0))
+
+
+def picture_surprise(
+    cells: Float[Array, "camera rows columns 3"], inside: Float[Array, "camera rows columns"]
+) -> Float[Array, "camera rows columns"]:
+    """Minus the logarithm of the density of each cell's colour among those of its picture."""
+    coarse = COLOR_BINS // 2
+
+    def of_camera(colors: Float[Array, "rows columns 3"], counted: Float[Array, "rows columns"]) -> Array:
+        index = tuple(part // 2 for part in color_bins(colors))
+        table = jnp.zeros((coarse,) * 3, colors.dtype).at[index].add(counted)
+        for axis in range(3):
+            smaller, larger = jnp.roll(table, 1, axis), jnp.roll(table, -1, axis)
+            table = 0.5 * table + 0.25 * (smaller + larger)
+        density = table / jnp.maximum(jnp.sum(counted), 1.0) * coarse**3
+        return -jnp.log((1.0 - PICTURE_SMOOTHING) * density + PICTURE_SMOOTHING)[index]
+
+    return jax.vmap(of_camera)(cells, inside)

@@ -1,0 +1,206 @@
+"""Foreground against background: what the colour of a cell says about whether somebody is seen there.
+
+How likely each pixel of a picture shows something before the background, to look at.
+"""
+
+from typing import Any
+
+import cv2
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, UInt8
+
+from sogjax.scene.background import BackgroundCells, CameraBackground
+from sogjax.scene.plate_difference import working_size
+
+LARGEST = 2.0
+"""No cell says more than this: what disturbs one (a reflection, a wrong plate) disturbs its neighbours too."""
+SMALLEST_SPREAD = 0.015
+"""Of a channel: even the same place under the same light differs by so much (compression, a lens that breathes)."""
+SHADOW = 0.25
+"""Standard deviation of the light that a shadow or a reflection takes or adds, as a part of the background's."""
+SUBJECT_SPREAD = 0.07
+"""Of a channel: how far what is seen of a subject lies from the colours of its blobs."""
+SUBJECT_SHADING = 0.25
+"""The same in brightness, as a part of it: folds, and limbs that turn away from the light."""
+SUBJECT_UNKNOWN = 0.3
+"""Share of a subject whose colours are none of its blobs': any colour."""
+COLOR_BINS = 32
+"""Of each channel, in the table of a subject's colours."""
+TEMPER = 0.5
+"""Part of the logarithm that counts: neighbouring cells err together."""
+_LIGHT_STEPS = (0.15, 0.08, 0.05)
+"""How far cells may be off to count in each estimate of a frame's light."""
+_LIGHT_STRIDE = 3
+"""Every so many rows and columns are enough for it."""
+_NORMAL = (2.0 * np.pi) ** 1.5
+
+Cells = Float[Array, "camera rows columns"]
+SubjectColors = Float[Array, "bin bin bin"]
+"""Logarithm of the density of a subject's colours at the middle of each bin of sRGB; 0 is that of any colour."""
+
+
+def subject_colors(
+    colors: Float[np.ndarray, "blob 3"], areas: Float[np.ndarray, "blob"]
+) -> Float[np.ndarray, "bin bin bin"]:
+    """The colours of a subject, from those of its blobs (sRGB) and how much of it each is."""
+    middle = (np.arange(COLOR_BINS) + 0.5) / COLOR_BINS
+    places = np.stack(np.meshgrid(middle, middle, middle, indexing="ij"), axis=-1).reshape(-1, 3)
+    density = np.full(len(places), SUBJECT_UNKNOWN)
+    for color, share in zip(np.asarray(colors, float), np.asarray(areas, float) / np.sum(areas), strict=True):
+        distance, peak = _color_gaussian(places, color)
+        density += (1.0 - SUBJECT_UNKNOWN) * share * peak * np.exp(-0.5 * distance)
+    return np.log(density).reshape(COLOR_BINS, COLOR_BINS, COLOR_BINS)
+
+
+def _color_gaussian(colors: Any, color: Any) -> tuple[Any, Any]:
+    """Squared distances of colours from those of a blob, in standard deviations, and the density there.
+
+    A Gaussian that is longer along the blob's own colour, as shading makes that darker or brighter. Arrays of numpy or
+    jax that broadcast, channels last.
+    """
+    off, length = colors - color, (color * color).sum(axis=-1)
+    along, squared = (off * color).sum(axis=-1), (off * off).sum(axis=-1)
+    variance = SUBJECT_SPREAD**2
+    distance = (squared - along**2 / (variance / SUBJECT_SHADING**2 + length)) / variance
+    return distance, 1.0 / (_NORMAL * variance * (variance + SUBJECT_SHADING**2 * length) ** 0.5)
+
+
+def own_density(colors: Float[Array, "*#place 3"], color: Float[Array, "*#place 3"]) -> Float[Array, "*place"]:
+    """Logarithm of the density of colours (sRGB) where blobs of some colours are seen; 0 is that of any colour."""
+    distance, peak = _color_gaussian(colors, color)
+    return jnp.log((1.0 - SUBJECT_UNKNOWN) * peak * jnp.exp(-0.5 * distance) + SUBJECT_UNKNOWN)
+
+
+def own_color(colors: Float[Array, "*#place 3"], color: Float[Array, "*#place 3"]) -> Float[Array, "*place"]:
+    """How far colours (sRGB) are those of blobs, lit as they may be: 1 for the same, towards 0 for others."""
+    return jnp.exp(-0.5 * _color_gaussian(colors, color)[0])
+
+
+def subject_density(colors: Float[Array, "*place 3"], subject: SubjectColors) -> Float[Array, "*place"]:
+    """The same where some blob of a subject is seen."""
+    red, green, blue = color_bins(colors)
+    place = (red * COLOR_BINS + green) * COLOR_BINS + blue
+    return subject.reshape(-1).at[place].get(mode="promise_in_bounds")
+
+
+class EmptyScene(eqx.Module):
+    """What is compared with every frame: the background channel by channel, and what follows from it alone."""
+
+    planes: tuple[Cells, Cells, Cells]
+    """Red, green and blue of the background, sRGB, 0 to 1."""
+    precision: Cells
+    """1 / variance of a channel."""
+    shade: Cells
+    """Share of the way along its own colour that a shadow explains, divided by the colour's squared length."""
+    volume: Cells
+    """Logarithm of the Gaussian's volume in colours."""
+    known: Bool[Array, "camera rows columns"]
+
+    def filled_by(self, other: "EmptyScene") -> "EmptyScene":
+        """The same, with what another background of the same cells knows where this one knows nothing."""
+        return jax.tree.map(lambda own, others: jnp.where(self.known, own, others), self, other)
+
+    @classmethod
+    def from_background(cls, background: BackgroundCells, shadow: float = SHADOW) -> "EmptyScene":
+        """The background may be darker or brighter by a factor (a shadow), at a cost: a longer Gaussian that way.
+
+        `shadow` is that factor's standard deviation.
+        """
+        dtype = jnp.result_type(float)
+        variance = jnp.maximum(jnp.asarray(background.spread, dtype), SMALLEST_SPREAD) ** 2
+        red, green, blue = (jnp.asarray(background.colors[..., k], dtype) / 255.0 for k in range(3))
+        return cls._of((red, green, blue), variance, shadow, jnp.asarray(background.known))
+
+    @classmethod
+    def _of(
+        cls, planes: tuple[Cells, Cells, Cells], variance: Cells, shadow: float, known: Bool[Array, "..."]
+    ) -> "EmptyScene":
+        length = sum(plane * plane for plane in planes)
+        volume = jnp.log(_NORMAL * variance * jnp.sqrt(variance + shadow**2 * length))
+        return cls(planes, 1.0 / variance, 1.0 / (variance / shadow**2 + length), volume, known)
+
+    def blurred(self, spread: float) -> "EmptyScene":
+        """The same background, each channel of which is known no better than to a standard deviation."""
+        return self._of(self.planes, jnp.maximum(1.0 / self.precision, spread**2), SHADOW, self.known)
+
+
+def log_odds(
+    cells: Float[Array, "camera rows columns 3"], empty: EmptyScene, subject: SubjectColors | None
+) -> Float[Array, "camera rows columns"]:
+    """Logarithm of foreground over background, within `LARGEST`; 0 where the background is unknown.
+
+    Each is the density of the cell's colour: a place of the subject's own colours says little either way. Colours are
+    sRGB, 0 to 1; slow changes of the light are taken out first. A subject that is None may have any colours.
+    """
+    seen = [cells[..., k] for k in range(3)]
+    odds = _surprise(seen, empty)
+    if subject is not None:
+        odds = odds + subject_density(cells, subject)
+    return jnp.where(empty.known, jnp.clip(TEMPER * odds, -LARGEST, LARGEST), 0.0)
+
+
+def background_surprise(
+    cells: Float[Array, "camera rows columns 3"], empty: EmptyScene
+) -> Float[Array, "camera rows columns"]:
+    """Minus the logarithm of the density of each cell's colour, if the background is seen there."""
+    return _surprise([cells[..., k] for k in range(3)], empty)
+
+
+def _surprise(seen: list[Cells], empty: EmptyScene) -> Cells:
+    gains = _light(seen, empty)
+    expected = [gain[:, None, None] * plane for gain, plane in zip(gains, empty.planes, strict=True)]
+    off = [s - e for s, e in zip(seen, expected, strict=True)]
+    squared = sum(o * o for o in off)
+    along = sum(o * e for o, e in zip(off, expected, strict=True))
+    return 0.5 * (squared - along * along * empty.shade) * empty.precision + empty.volume
+
+
+def color_bins(cells: Float[Array, "*cell 3"]) -> tuple[Array, Array, Array]:
+    """The bin of each cell's colour in a table of colours."""
+    red, green, blue = (jnp.clip(cells[..., k] * COLOR_BINS, 0, COLOR_BINS - 1).astype(jnp.int32) for k in range(3))
+    return red, green, blue
+
+
+def foreground_weights(odds: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
+    """How much the colour of a cell counts: 1 where it may be foreground, down to 0 where it is background."""
+    return jnp.clip(1.0 + odds / LARGEST, 0.0, 1.0)
+
+
+def _light(seen: list[Cells], empty: EmptyScene) -> list[Float[Array, "camera"]]:
+    """The gain of each channel that makes the background most like a frame, wherever that shows it."""
+    part = lambda values: values[:, ::_LIGHT_STRIDE, ::_LIGHT_STRIDE]
+    seen, planes, known = [part(s) for s in seen], [part(plane) for plane in empty.planes], part(empty.known)
+    gains = [jnp.ones(known.shape[0], known_as.dtype) for known_as in seen]
+    for step in _LIGHT_STEPS:
+        rest = [s - gain[:, None, None] * plane for s, gain, plane in zip(seen, gains, planes, strict=True)]
+        weight = jnp.where(known, jnp.exp(-0.5 / step**2 * sum(r * r for r in rest)), 0.0)
+        gains = [_gain(weight, s, plane) for s, plane in zip(seen, planes, strict=True)]
+    return gains
+
+
+def _gain(weight: Cells, seen: Cells, plane: Cells) -> Float[Array, "camera"]:
+    """By least squares; 1 where nothing tells."""
+    total = jnp.sum(weight * plane * plane, axis=(1, 2))
+    found = jnp.sum(weight * plane * seen, axis=(1, 2)) / jnp.maximum(total, 1e-6)
+    return jnp.where(total > 1e-2, found, 1.0)
+
+
+_log_odds = jax.jit(log_odds)
+
+
+def foreground_probability(
+    image: UInt8[np.ndarray, "height width 3"], background: CameraBackground
+) -> Float[np.ndarray, "rows columns"]:
+    """For each pixel (BGR) at the working size, as the tracker has it for cells; a half where nothing is known."""
+    size = working_size(image.shape[1], image.shape[0])
+    small = lambda part: cv2.resize(part, size, interpolation=cv2.INTER_AREA)
+    known = small(background.known.astype(np.float32)) > 0.999
+    empty = BackgroundCells(
+        small(background.picture)[None, ..., ::-1], small(background.spread)[None] / 255.0, known[None]
+    )
+    seen = (small(image)[None, ..., ::-1] / 255.0).astype(np.float32)
+    odds = _log_odds(seen, EmptyScene.from_background(empty), None)
+    return np.asarray(1.0 / (1.0 + np.exp(-odds[0] / TEMPER)), np.float32)

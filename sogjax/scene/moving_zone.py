@@ -1,0 +1,142 @@
+"""Where the subject may be hidden in the pictures of a clip: the part of the room in which something moves.
+
+A pixel that never changes shows the wall, or somebody who stands still: its colour alone cannot tell. Two things do.
+What is enclosed by movement may be the subject in every camera. And where the movement is carved out of space by all
+cameras together, it is as high as a body if the whole subject moves. If it is not, the subject may only wave its arms;
+then trunk and legs stand near all that moves, and no pixel that never changes counts as background there.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float
+
+from sogjax.model.camera import Camera
+from sogjax.scene.plate_difference import closed, disc
+from sogjax.scene.visual_hull import VOXELS, Cube, cube_around, resized, voxel_pixels
+
+SMALLEST_ROOM = 2.6
+"""Metres: the cube of space that is looked at is at least so large."""
+WHOLE_BODY = 1.6
+"""Metres: what moves over less height than this may be only a part of a body. (Lifted arms alone: up to 1.5 m.)"""
+REACH = 0.6
+"""Metres on the floor from what moves to what belongs to it and stands still."""
+TALLEST = 2.1
+"""Metres from the highest moving place down to the floor, or up from the lowest, in that case."""
+SEEING = 0.7
+"""Share of the cameras that must have a place in their pictures."""
+MANY = 5
+"""From so many cameras on, one of them may fail to see a movement."""
+
+Mask = Bool[np.ndarray, "_h _w"]
+
+
+def moving_zones(
+    movements: Sequence[Mapping[int, Mask]], cameras: Mapping[int, Camera], up: Float[np.ndarray, "3"]
+) -> dict[int, Mask]:
+    """The zone in each camera's picture, from where things move in it during a few spans of the clip.
+
+    Args:
+        movements: for every span by camera.
+        cameras: of the recording.
+        up: the world's vertical.
+    """
+    anywhere = {camera: np.any([span[camera] for span in movements], axis=0) for camera in movements[0]}
+    zones = {camera: filled(mask) for camera, mask in anywhere.items()}
+    seeing = [camera for camera, mask in anywhere.items() if mask.any()]
+    if len(seeing) < 2:
+        return zones
+    small = {c: resized(cameras[c], (anywhere[c].shape[1], anywhere[c].shape[0])) for c in seeing}
+    found = cube_around([anywhere[c] for c in seeing], [small[c] for c in seeing])
+    cube = Cube(found.centre, max(found.size, SMALLEST_ROOM))
+    pixels = {c: voxel_pixels(cube, small[c], anywhere[c].shape) for c in seeing}
+    spans = [_carved([pixels[c].hits(_widened(span[c], pixels[c].footprint)) for c in seeing]) for span in movements]
+    seen = np.sum([pixels[c].inside for c in seeing], axis=0) >= SEEING * len(seeing)
+    hidden = {
+        c: anywhere[c] | pixels[c].silhouette_of(seen & unseen)
+        for c, unseen in zip(seeing, _by_others(spans), strict=True)
+    }
+    moving = [_upright(span.hull & seen, up) for span in spans]
+    upright = [block for block in moving if block.any()]
+    if upright and moving_height(np.any(upright, axis=0)) * cube.spacing < WHOLE_BODY:
+        standing = _from_upright(np.all(_standing(upright, cube.spacing), axis=0), up)
+        hidden = {c: mask | pixels[c].silhouette_of(standing) for c, mask in hidden.items()}
+    return zones | {c: filled(mask) for c, mask in hidden.items()}
+
+
+@dataclass(frozen=True)
+class _Carved:
+    """Where something moves in space, as far as the cameras tell."""
+
+    hull: Bool[np.ndarray, "voxel"]
+    """All cameras together, of many all but one."""
+    without: tuple[Bool[np.ndarray, "voxel"], ...]
+    """Of many cameras, the same without each of them in turn; nothing where they are few."""
+
+
+def _carved(hits: Sequence[Bool[np.ndarray, "voxel"]]) -> _Carved:
+    misses = np.sum([~hit for hit in hits], axis=0)
+    if len(hits) < MANY:
+        return _Carved(misses == 0, tuple(np.zeros_like(hit) for hit in hits))
+    return _Carved(misses <= 1, tuple(misses - ~hit <= 1 for hit in hits))
+
+
+def _by_others(spans: Sequence[_Carved]) -> list[Bool[np.ndarray, "voxel"]]:
+    """By camera, where the others see something move during some span: it may come straight towards the camera."""
+    return [np.any(of_one, axis=0) for of_one in zip(*(span.without for span in spans), strict=True)]
+
+
+def filled(mask: Mask) -> Mask:
+    """The mask without small gaps, and with what it encloses."""
+    joined = closed(mask, 2 * max(round(0.012 * max(mask.shape)), 1) + 1) | mask
+    framed = np.pad(joined, 1).astype(np.uint8)
+    labels = cv2.connectedComponents(1 - framed, connectivity=4)[1]
+    return (labels != labels[0, 0])[1:-1, 1:-1]
+
+
+def _widened(mask: Mask, footprint: int) -> Mask:
+    return cv2.dilate(mask.astype(np.uint8), np.ones((footprint + 1, footprint + 1), np.uint8)) > 0
+
+
+def moving_height(moving: Bool[np.ndarray, "x y z"]) -> int:
+    """The longest run of heights, in voxels, at each of which something moves."""
+    longest = run = 0
+    for level in np.any(moving, axis=(0, 1)):
+        run = run + 1 if level else 0
+        longest = max(longest, run)
+    return longest
+
+
+def _standing(spans: Sequence[Bool[np.ndarray, "x y z"]], spacing: float) -> list[Bool[np.ndarray, "x y z"]]:
+    """For each span, upright pillars as high as a body around the convex outline of what moves, seen from above."""
+    low, high = np.percentile(np.nonzero(np.any(spans, axis=0))[2], [2, 99])
+    height = slice(max(round(high - TALLEST / spacing), 0), round(low + TALLEST / spacing))
+    rooms = []
+    for block in spans:
+        room = np.zeros_like(block)
+        room[_convex(np.any(block, axis=2), REACH / spacing), height] = True
+        rooms.append(room)
+    return rooms
+
+
+def _convex(plan: Bool[np.ndarray, "x y"], border: float) -> Bool[np.ndarray, "x y"]:
+    """Every part of a plan made convex, with a border."""
+    outlines, _ = cv2.findContours(plan.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    canvas = np.zeros(plan.shape, np.uint8)
+    for outline in outlines:
+        cv2.fillConvexPoly(canvas, cv2.convexHull(outline), 1)
+    return cv2.dilate(canvas, disc(2 * round(border) + 1)) > 0
+
+
+def _upright(voxels: Bool[np.ndarray, "voxel"], up: Float[np.ndarray, "3"]) -> Bool[np.ndarray, "x y z"]:
+    """Voxels as a block whose last axis points up."""
+    axis = int(np.argmax(np.abs(up)))
+    block = np.moveaxis(voxels.reshape(VOXELS, VOXELS, VOXELS), axis, 2)
+    return block if up[axis] > 0 else np.flip(block, 2)
+
+
+def _from_upright(block: Bool[np.ndarray, "x y z"], up: Float[np.ndarray, "3"]) -> Bool[np.ndarray, "voxel"]:
+    axis = int(np.argmax(np.abs(up)))
+    return np.moveaxis(block if up[axis] > 0 else np.flip(block, 2), 2, axis).reshape(-1)

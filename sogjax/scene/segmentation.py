@@ -1,0 +1,160 @@
+"""Masks of a subject from pictures of several cameras and of the empty scene."""
+
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+
+from sogjax.model.camera import Camera
+from sogjax.scene.plate_difference import Difference, closed, disc, plate_difference, reduced_mask
+from sogjax.scene.visual_hull import LOW_VOXELS, VoxelPixels, cube_around, resized, voxel_pixels, without_floor
+
+LARGEST_SHARE = 0.5
+"""Where more of a picture than this differs, the camera was moved or the light changed, and no subject can be found."""
+SMALLEST_SHARE = 1e-3
+"""Share of the picture: less is not a subject."""
+SMALLEST_PART = 0.1
+"""Parts of a mask smaller than this share of the largest one are dropped."""
+GRAB_CUT_ITERATIONS = 2
+MANY = 5
+"""From so many cameras on, one of them may miss a part of the subject."""
+UNCHANGED = 3.0
+"""Squared differences, in units of the noise, below which a pixel is certainly background."""
+
+Mask = Bool[np.ndarray, "_h _w"]
+
+
+def masks_from_plates(
+    images: Mapping[int, UInt8[np.ndarray, "_h _w 3"]],
+    plates: Mapping[int, UInt8[np.ndarray, "_h _w 3"]],
+    known: Mapping[int, Mask],
+    cameras: Mapping[int, Camera],
+    up: Float[np.ndarray, "3"],
+    unknown: Mapping[int, Mask] | None = None,
+) -> dict[int, Mask]:
+    """Masks of the cameras that have a picture of the empty scene, at the pictures' size.
+
+    What differs from the plate in colour is the subject; what is only darker may be its shadow, and is the subject
+    where the other cameras' changed regions meet above the floor. OpenCV's grabCut then finds the outline.
+
+    Args:
+        images: the subject, by camera.
+        plates: the empty scene, for the cameras whose masks are wanted.
+        known: masks of other cameras, which help.
+        cameras: all of these cameras.
+        up: the world's vertical.
+        unknown: where the empty scene is not known, by camera at any size; None: it is known everywhere. There the
+            other cameras decide.
+
+    Returns:
+        Masks by camera; a camera is absent if no subject could be told apart from its plate.
+    """
+    with ThreadPoolExecutor() as pool:
+        compare = lambda k: plate_difference(images[k], plates[k], (unknown or {}).get(k))
+        found = pool.map(compare, plates)
+        differences = dict(zip(plates, found, strict=True))
+        guesses = {camera: first_guess(difference) for camera, difference in differences.items()}
+        guesses = {camera: guess for camera, guess in guesses.items() if is_subject(guess)}
+        guesses |= _seen_together({c: differences[c] for c in guesses}, guesses, known, cameras, up)
+        cuts = pool.map(lambda camera: cut_out(differences[camera], guesses[camera]), guesses)
+        sized = {camera: _enlarged(mask, images[camera]) for camera, mask in zip(guesses, cuts, strict=True)}
+    return {camera: mask for camera, mask in sized.items() if is_subject(mask)}
+
+
+def first_guess(difference: Difference) -> Bool[np.ndarray, "rows columns"]:
+    """The subject as one camera alone shows it: what differs in colour, and changed places enclosed by it."""
+    different = closed(difference.different, 5)
+    return largest_parts(different | (_without_holes(different) & difference.changed))
+
+
+def cut_out(difference: Difference, guess: Bool[np.ndarray, "rows columns"]) -> Bool[np.ndarray, "rows columns"]:
+    """A guess with its outline corrected by OpenCV's grabCut, in the box around it."""
+    rows, columns = np.nonzero(guess)
+    border = 12 + int(0.08 * max(np.ptp(rows), np.ptp(columns)))
+    box = (
+        slice(max(rows.min() - border, 0), rows.max() + border),
+        slice(max(columns.min() - border, 0), columns.max() + border),
+    )
+    labels = _labels(guess[box].astype(np.uint8), difference.change[box], difference.unexplained[box])
+    subject = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
+    if subject.all():  # grabCut needs both; a box without background is one that the subject fills
+        return guess
+    cv2.setRNGSeed(0)  # its clusters start at random; a mask must not change from run to run
+    crop, model = np.ascontiguousarray(difference.image[box]), lambda: np.zeros((1, 65))
+    cv2.grabCut(crop, labels, (0, 0, 1, 1), model(), model(), GRAB_CUT_ITERATIONS, cv2.GC_INIT_WITH_MASK)
+    cut = np.zeros_like(guess)
+    cut[box] = largest_parts(np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD)))
+    return cut
+
+
+def largest_parts(mask: Bool[np.ndarray, "rows columns"]) -> Bool[np.ndarray, "rows columns"]:
+    """The mask without small separate parts."""
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
+    if count < 2:
+        return mask
+    areas = stats[1:, cv2.CC_STAT_AREA]
+    return np.isin(labels, np.flatnonzero(areas >= SMALLEST_PART * areas.max()) + 1)
+
+
+def _labels(guess: UInt8[np.ndarray, "rows columns"], change: np.ndarray, unexplained: np.ndarray) -> np.ndarray:
+    """What grabCut may change: pixels near the guess's outline that the difference leaves open."""
+    labels = np.where(guess > 0, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
+    labels[(cv2.erode(guess, disc(5)) > 0) & (unexplained > 10.0)] = cv2.GC_FGD
+    far = cv2.dilate(guess, disc(9)) == 0
+    labels[far | ((change < UNCHANGED) & (guess == 0))] = cv2.GC_BGD
+    return labels
+
+
+def _seen_together(
+    differences: Mapping[int, Difference],
+    guesses: Mapping[int, Mask],
+    known: Mapping[int, Mask],
+    cameras: Mapping[int, Camera],
+    up: Float[np.ndarray, "3"],
+) -> dict[int, Mask]:
+    """Better guesses from all cameras together; empty if their regions do not meet."""
+    small_known = {camera: reduced_mask(mask) for camera, mask in known.items()}
+    subjects = {**guesses, **small_known}
+    if len(subjects) < 2 or not guesses:
+        return {}
+    regions = {c: differences[c].open | guesses[c] if c in guesses else small_known[c] for c in subjects}
+    small = {c: resized(cameras[c], (mask.shape[1], mask.shape[0])) for c, mask in subjects.items()}
+    seen = {c: differences[c].changed | guesses[c] if c in guesses else small_known[c] for c in subjects}
+    cube = cube_around([largest_parts(seen[c]) for c in subjects], [small[c] for c in subjects])
+    pixels = {c: voxel_pixels(cube, small[c], mask.shape) for c, mask in subjects.items()}
+    misses = np.sum([~pixels[c].hits(_widened(region, 1)) for c, region in regions.items()], axis=0)
+    hull = misses <= (1 if len(subjects) >= MANY else 0)
+    above_floor = without_floor(hull, up)
+    better = {c: _confirmed(differences[c], pixels[c], hull, above_floor) for c in guesses}
+    return {camera: guess for camera, guess in better.items() if is_subject(guess)}
+
+
+def _confirmed(difference: Difference, pixels: VoxelPixels, hull: np.ndarray, above_floor: np.ndarray) -> Mask:
+    """Different colours near the hull, and all changes where it stands above the floor."""
+    stands = pixels.silhouette_of(above_floor)
+    low = pixels.footprint * LOW_VOXELS  # feet are as near as this to what stands, the rim of a shadow seldom is
+    near = _widened(pixels.silhouette_of(hull), pixels.footprint) & _widened(stands, low)
+    different = closed(difference.different & near, 5) & difference.changed
+    return largest_parts(different | (difference.open & stands))
+
+
+def _widened(mask: Mask, pixels: int) -> Mask:
+    return cv2.dilate(mask.astype(np.uint8), disc(2 * pixels + 1)) > 0
+
+
+def is_subject(mask: Mask) -> bool:
+    """Whether a region is neither almost nothing nor most of the picture."""
+    return SMALLEST_SHARE < float(mask.mean()) < LARGEST_SHARE
+
+
+def _without_holes(mask: Bool[np.ndarray, "rows columns"]) -> Bool[np.ndarray, "rows columns"]:
+    framed = np.pad(mask, 1).astype(np.uint8)
+    labels = cv2.connectedComponents(1 - framed, connectivity=4)[1]
+    return (labels != labels[0, 0])[1:-1, 1:-1]
+
+
+def _enlarged(mask: Mask, image: UInt8[np.ndarray, "_h _w 3"]) -> Mask:
+    size = (image.shape[1], image.shape[0])
+    return cv2.resize(mask.astype(np.float32), size, interpolation=cv2.INTER_LINEAR) > 0.5

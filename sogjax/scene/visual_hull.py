@@ -1,0 +1,191 @@
+"""A coarse visual hull: the part of space that no camera's region leaves out.
+
+Whether the masks of several cameras show one thing: each is compared with the visual hull of the others.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import cv2
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+from scipy.ndimage import binary_opening
+
+from sogjax.model.camera import NEAR, Camera, distort, near_picture, project_points
+from sogjax.scene.plate_difference import disc, reduced_mask
+
+VOXELS = 64
+"""Voxels along each side of the cube."""
+SIDE = 1.3
+"""The cube's side, in units of the subject's size."""
+LOW = 0.2
+"""Height above the floor, in units of the subject's size, below which something may be a shadow."""
+LOW_VOXELS = round(LOW / SIDE * VOXELS)
+"""The same in voxels."""
+
+
+@dataclass(frozen=True)
+class Cube:
+    """A cube of voxels that holds a subject; lengths in metres, world."""
+
+    centre: Float[np.ndarray, "3"]
+    size: float
+    """The subject's, roughly."""
+
+    @property
+    def spacing(self) -> float:
+        """Distance of neighbouring voxels."""
+        return SIDE * self.size / VOXELS
+
+    @property
+    def points(self) -> Float[np.ndarray, "voxel 3"]:
+        """The voxels' centres; the last axis varies fastest."""
+        steps = (np.arange(VOXELS) - (VOXELS - 1) / 2) * self.spacing
+        return (np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1) + self.centre).reshape(-1, 3)
+
+
+@dataclass(frozen=True)
+class VoxelPixels:
+    """Where the voxels of a cube lie in one camera's picture."""
+
+    rows: np.ndarray
+    columns: np.ndarray
+    inside: Bool[np.ndarray, "voxel"]
+    shape: tuple[int, int]
+    footprint: int
+    """Width of a voxel in pixels."""
+
+    def hits(self, region: Bool[np.ndarray, "rows columns"]) -> Bool[np.ndarray, "voxel"]:
+        """Which voxels lie in a region, or outside of the picture, where nothing is known."""
+        return region[self.rows, self.columns] | ~self.inside
+
+    def silhouette_of(self, voxels: Bool[np.ndarray, "voxel"]) -> Bool[np.ndarray, "rows columns"]:
+        """The picture of some of the voxels."""
+        shown = voxels & self.inside
+        canvas = np.zeros(self.shape, np.uint8)
+        canvas[self.rows[shown], self.columns[shown]] = 1
+        element = np.ones((self.footprint + 2, self.footprint + 2), np.uint8)
+        return cv2.morphologyEx(canvas, cv2.MORPH_CLOSE, element) > 0
+
+
+def resized(camera: Camera, size: tuple[float | int, float | int]) -> Camera:
+    """The camera of the same pictures at another width and height, in whatever these are counted."""
+    before, matrix = np.asarray(camera.image_size), np.array(camera.intrinsics)
+    scale = (np.asarray(size) / before).astype(before.dtype)
+    matrix[:2, :2] *= scale[:, None]
+    matrix[:2, 2] = (matrix[:2, 2] + 0.5) * scale - 0.5
+    changed = (jnp.asarray(matrix), jnp.asarray(scale * before))
+    return eqx.tree_at(lambda c: (c.intrinsics, c.image_size), camera, changed)
+
+
+def cube_around(masks: Sequence[Bool[np.ndarray, "_h _w"]], cameras: Sequence[Camera]) -> Cube:
+    """The cube that holds the subject of most of the masks.
+
+    Its centre is the point with the least sum of distances to the rays through the masks' centres, so that a camera
+    whose mask is wrong does not move it far.
+    """
+    rays = [_central_ray(mask, camera) for mask, camera in zip(masks, cameras, strict=True)]
+    eyes, directions, angles = (np.array(part) for part in zip(*rays, strict=True))
+    across = np.eye(3) - directions[:, :, None] * directions[:, None, :]
+    weights = np.ones(len(rays))
+    centre = np.zeros(3)
+    for _ in range(10):
+        weighted = weights[:, None, None] * across
+        centre = np.linalg.solve(weighted.sum(axis=0), np.einsum("nij,nj->i", weighted, eyes))
+        distances = np.linalg.norm(np.einsum("nij,nj->ni", across, centre - eyes), axis=1)
+        weights = 1.0 / np.maximum(distances, 0.05)
+    return Cube(centre, float(np.median(np.linalg.norm(centre - eyes, axis=1) * angles)))
+
+
+def _central_ray(mask: Bool[np.ndarray, "_h _w"], camera: Camera) -> tuple[np.ndarray, np.ndarray, float]:
+    """Eye, direction of the mask's centre, and the mask's larger side as a tangent."""
+    rows, columns = np.nonzero(mask)
+    matrix, pose = np.asarray(camera.intrinsics, float), np.asarray(camera.camera_from_world, float)
+    direction = pose[:3, :3].T @ np.linalg.solve(matrix, [columns.mean(), rows.mean(), 1.0])
+    side = max(np.ptp(rows) / matrix[1, 1], np.ptp(columns) / matrix[0, 0])
+    return -pose[:3, :3].T @ pose[:3, 3], direction / np.linalg.norm(direction), float(side)
+
+
+def voxel_pixels(cube: Cube, camera: Camera, shape: tuple[int, int]) -> VoxelPixels:
+    """Project the voxels into a picture of `shape` (rows, columns)."""
+    points = jnp.asarray(cube.points, camera.intrinsics.dtype)
+    pixels, depths = (np.asarray(part) for part in _picture_pixels(camera, points))
+    columns, rows = np.rint(np.where(depths[:, None] > NEAR, pixels, -1.0)).astype(int).T
+    inside = (depths > NEAR) & (rows >= 0) & (rows < shape[0]) & (columns >= 0) & (columns < shape[1])
+    nearest = max(float(np.median(depths)), NEAR)
+    footprint = int(np.ceil(cube.spacing * float(camera.focal_length) / nearest))
+    return VoxelPixels(np.where(inside, rows, 0), np.where(inside, columns, 0), inside, shape, min(footprint, 64))
+
+
+@eqx.filter_jit
+def _picture_pixels(camera: Camera, points: Float[Array, "n 3"]) -> tuple[Float[Array, "n 2"], Float[Array, "n"]]:
+    """Pixels as recorded, and depths; far outside the picture, where a lens model folds back, the depth is 0."""
+    pixels, depths = project_points(camera, points)
+    near = near_picture(camera, pixels, 0.5)
+    return jnp.where(near[:, None], distort(camera, pixels), -1.0), jnp.where(near, depths, 0.0)
+
+
+def without_floor(occupied: Bool[np.ndarray, "voxel"], up: Float[np.ndarray, "3"]) -> Bool[np.ndarray, "voxel"]:
+    """The voxels without those that lie low on the floor with nothing above them, as a shadow does."""
+    block = occupied.reshape(VOXELS, VOXELS, VOXELS)
+    axis = int(np.argmax(np.abs(up)))
+    upright = np.moveaxis(block if up[axis] > 0 else np.flip(block, axis), axis, 2)
+    heights = np.nonzero(upright)[2]
+    if not len(heights):
+        return occupied
+    top = int(np.percentile(heights, 2)) + LOW_VOXELS
+    kept = upright.copy()
+    kept[:, :, :top] &= binary_opening(upright, np.ones((1, 1, LOW_VOXELS)))[:, :, :top]
+    kept = np.moveaxis(kept, 2, axis)
+    return (kept if up[axis] > 0 else np.flip(kept, axis)).reshape(-1)
+
+
+AGREEING = 0.75
+"""Share of a mask that the hull of all cameras must cover. Good masks have 0.93 and more, and so had the
+rough ones of a real recording; a mask without legs leaves the others with about a half."""
+OWN_COVERAGE = 0.2
+"""Weight of a camera's own coverage: where the rest agrees as well without either of two, the worse one is wrong."""
+
+Mask = Bool[np.ndarray, "_h _w"]
+
+
+def disagreeing_cameras(masks: Mapping[int, Mask], cameras: Mapping[int, Camera]) -> dict[int, float]:
+    """Cameras whose masks the others do not confirm, and which share of each mask the hull covers without them.
+
+    Points of space that all masks hold (the visual hull) project onto the whole of every mask if the masks show one
+    thing: "silhouette coherence" (Hernandez, Schmitt and Cipolla, PAMI 2007). While some mask is covered too little,
+    the camera is taken out without which the rest agree best, until two are left, of which either may be wrong.
+    """
+    left = list(masks)
+    out: dict[int, float] = {}
+    covered = hull_coverage(masks, cameras)
+    while len(left) > 2 and min(covered.values()) < AGREEING:
+        rest = lambda camera: {other: masks[other] for other in left if other != camera}
+        without = {camera: hull_coverage(rest(camera), cameras) for camera in left}
+        worst = max(left, key=lambda camera: sum(without[camera].values()) - OWN_COVERAGE * covered[camera])
+        out[worst] = covered[worst]
+        left.remove(worst)
+        covered = without[worst]
+    return out
+
+
+def hull_coverage(masks: Mapping[int, Mask], cameras: Mapping[int, Camera]) -> dict[int, float]:
+    """The share of each mask that the visual hull of all of them covers: 1 where they agree."""
+    small = {camera: reduced_mask(mask) for camera, mask in masks.items()}
+    shrunk = {camera: resized(cameras[camera], (mask.shape[1], mask.shape[0])) for camera, mask in small.items()}
+    cube = cube_around([*small.values()], [shrunk[camera] for camera in small])
+    pixels = {camera: voxel_pixels(cube, shrunk[camera], mask.shape) for camera, mask in small.items()}
+    hull = np.all(
+        [pixels[camera].hits(widened_by_half_a_voxel(mask, pixels[camera])) for camera, mask in small.items()], axis=0
+    )
+    return {
+        camera: float((pixels[camera].silhouette_of(hull) & mask).sum() / max(mask.sum(), 1))
+        for camera, mask in small.items()
+    }
+
+
+def widened_by_half_a_voxel(mask: Mask, pixels: VoxelPixels) -> Mask:
+    """A thin limb may lie between the centres of voxels."""
+    return cv2.dilate(mask.astype(np.uint8), disc(2 * (pixels.footprint // 2) + 1)) > 0

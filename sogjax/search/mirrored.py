@@ -1,0 +1,197 @@
+"""Poses that look alike: back to front, or with limbs exchanged.
+
+Poses turned as a whole: about the vertical, and to lie or stand on the head.
+"""
+
+import itertools
+from collections.abc import Sequence
+from functools import partial
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from sogjax.model.body import Body
+from sogjax.model.limbs import limb_blobs, limbs
+from sogjax.search.rough_pose import heading_dof, root_turns
+
+SIDES = (("left", "right"), ("Left", "Right"), ("l_", "r_"), ("L_", "R_"))
+"""Beginnings or parts of names that tell the two sides."""
+ITERATIONS = 30
+POSED_AT_ONCE = 64
+POSE_SPREAD = 0.05
+"""Metres that a radian from the start counts as, in a fit to points."""
+
+
+def other_side(names: tuple[str, ...]) -> Int[np.ndarray, "name"]:
+    """For each name the index of its counterpart on the other side; itself, where it has none."""
+    index = {name: k for k, name in enumerate(names)}
+    return np.array([index.get(_exchanged(name), k) for k, name in enumerate(names)], int)
+
+
+def _exchanged(name: str) -> str:
+    for left, right in SIDES:
+        if left in name:
+            return name.replace(left, right)
+        if right in name:
+            return name.replace(right, left)
+    return name
+
+
+def look_alikes(body: Body, pose: Float[np.ndarray, "dof"]) -> Float[np.ndarray, "other dof"]:
+    """Poses whose silhouettes are nearly that of a pose.
+
+    Half turned with the sides exchanged, with one pair of limbs exchanged, and with all but one pair.
+    """
+    blobs = other_side(body.blobs.names)
+    means = means_of(body, pose[None])[0]
+    if np.all(blobs == np.arange(len(blobs))):
+        return pose[None][:0]
+    exchanged = [np.arange(len(blobs))]
+    for pair in _limb_pairs(body):
+        exchanged += [pair, np.setdiff1d(np.arange(len(blobs)), pair)]
+    targets = np.repeat(means[None], len(exchanged), axis=0)
+    for target, which in zip(targets, exchanged, strict=True):
+        target[which] = means[blobs[which]]
+    starts = np.stack([pose, pose[other_side(body.skeleton.dof_names)]])
+    fitted, costs = fitted_to_blobs(
+        body, jnp.asarray(np.tile(starts, (len(targets), 1))), jnp.asarray(np.repeat(targets, 2, axis=0))
+    )
+    better = np.asarray(costs).reshape(-1, 2).argmin(axis=1)
+    return np.asarray(fitted).reshape(-1, 2, len(pose))[np.arange(len(better)), better]
+
+
+def sides_apart(body: Body, poses: Float[np.ndarray, "start dof"]) -> Float[np.ndarray, "start"]:
+    """How far the limbs of a pair are from each other, as a part of the least that they are in any named pose.
+
+    Mean distance of a limb's blobs from those of its counterpart, of the pair for which that is least; infinite for a
+    body without sides.
+    """
+    others, pairs = other_side(body.blobs.names), _limb_pairs(body)
+    if not pairs:
+        return np.full(len(poses), np.inf)
+    named = means_of(body, np.stack([np.asarray(pose) for pose in body.poses.values()]))
+    between = lambda means: np.stack(
+        [np.linalg.norm(means[:, pair] - means[:, others[pair]], axis=-1).mean(axis=1) for pair in pairs], axis=1
+    )
+    return (between(means_of(body, poses)) / between(named).min(axis=0)).min(axis=1)
+
+
+def _limb_pairs(body: Body) -> list[Int[np.ndarray, "blob"]]:
+    """The blobs of each pair of limbs that are each other's counterpart."""
+    dofs = other_side(body.skeleton.dof_names)
+    every_limb, blobs = limbs(body.skeleton), limb_blobs(body)
+    found = []
+    for limb, of_limb in zip(every_limb, blobs, strict=True):
+        if np.all(dofs[limb] == limb) or limb.min() > dofs[limb].min():
+            continue
+        others = [k for k, other in enumerate(every_limb) if np.isin(other, dofs[limb]).any()]
+        found.append(np.flatnonzero(of_limb | blobs[others].any(axis=0)))
+    return found
+
+
+def means_of(body: Body, poses: Float[np.ndarray, "start dof"]) -> Float[np.ndarray, "start blob 3"]:
+    """The blobs of a body in poses (metres, world)."""
+    size = POSED_AT_ONCE
+    padded = np.concatenate([poses, np.repeat(poses[-1:], -len(poses) % size, axis=0)])
+    parts = [np.asarray(_means(body, jnp.asarray(padded[k : k + size]))) for k in range(0, len(poses), size)]
+    return np.concatenate(parts)[: len(poses)]
+
+
+@eqx.filter_jit
+def _means(body: Body, poses: Array) -> Float[Array, "start blob 3"]:
+    return jax.vmap(lambda pose: body.posed_blobs(pose).means)(poses)
+
+
+@eqx.filter_jit
+def fitted_to_blobs(
+    body: Body, starts: Float[Array, "start dof"], targets: Float[Array, "start blob 3"], iterations: int = ITERATIONS
+) -> tuple[Float[Array, "start dof"], Float[Array, "start"]]:
+    """Poses whose blobs lie near some points, and how far off they are (metres, root of the mean square)."""
+    return jax.vmap(partial(_fit, body, iterations))(starts, targets)
+
+
+def _fit(body: Body, iterations: int, start: Array, target: Array) -> tuple[Array, Array]:
+    # A tracked pose may be beyond a limit; what is not to move is not to be moved back either.
+    lower, upper = jnp.minimum(body.skeleton.dof_lower, start), jnp.maximum(body.skeleton.dof_upper, start)
+
+    def step(_: Array, pose: Array) -> Array:
+        frames = body.skeleton.world_from_joint(pose)
+        means = body.blobs.points_world(frames)
+        jacobian = body.skeleton.point_jacobian(frames, body.blobs.joints, means).reshape(-1, pose.shape[0])
+        curvature = jnp.matmul(jacobian.T, jacobian, precision="highest")
+        curvature = curvature + POSE_SPREAD**2 * jnp.eye(pose.shape[0], dtype=pose.dtype)
+        pull = jnp.matmul(jacobian.T, (target - means).reshape(-1), precision="highest")
+        move = jnp.linalg.solve(curvature, pull)
+        move = move / jnp.maximum(jnp.max(jnp.abs(move)) / 0.5, 1.0)
+        return jnp.clip(pose + move, lower, upper)
+
+    pose = jax.lax.fori_loop(0, iterations, step, start)
+    off = body.blobs.points_world(body.skeleton.world_from_joint(pose)) - target
+    return pose, jnp.sqrt(jnp.mean(jnp.sum(off * off, axis=-1)))
+
+
+STEP = np.pi / 6.0
+"""Radians between the values of each turning degree of freedom that are tried."""
+TILTED = 0.4
+"""Radians: how far from the wanted direction a body's vertical may be."""
+DIFFERENT = 0.45
+"""Radians between turns that count as different."""
+
+
+def turned_to(
+    body: Body, poses: Sequence[Float[np.ndarray, "dof"]], headings: Float[np.ndarray, "heading"], up: str
+) -> Float[np.ndarray, "start dof"]:
+    """Every pose at every heading (radians about the vertical)."""
+    turn = heading_dof(body, up)
+    if turn is None:
+        return np.stack(poses)
+    starts = np.repeat(np.stack(poses), len(headings), axis=0)
+    starts[:, turn[0]] = np.tile(headings / turn[1], len(poses))
+    return starts
+
+
+def turns_with_vertical(
+    body: Body,
+    poses: Sequence[Float[np.ndarray, "dof"]],
+    vertical: Float[np.ndarray, "3"],
+    wanted: Float[np.ndarray, "3"],
+) -> Float[np.ndarray, "start dof"]:
+    """Poses turned about the root so that what is its vertical in the rest pose points in a wanted direction.
+
+    All headings of it, about half a radian apart.
+    """
+    turns = root_turns(body)
+    values = np.arange(-np.pi, np.pi - 1e-6, STEP)
+    tables = [np.array([about(axis, value) for value in values]) for axis, _, _ in turns]
+    tried = []
+    for combination in itertools.product(range(len(values)), repeat=len(turns)):
+        rotation = np.eye(3)
+        for table, index in zip(tables, combination, strict=True):
+            rotation = rotation @ table[index]
+        off = float(np.arccos(np.clip(rotation @ vertical @ wanted, -1.0, 1.0)))
+        if off < TILTED:
+            tried.append((off, rotation, values[list(combination)]))
+    found: list[tuple[np.ndarray, np.ndarray]] = []
+    for _, rotation, angles in sorted(tried, key=lambda each: each[0]):
+        if all(_angle(rotation, other) > DIFFERENT for other, _ in found):
+            found.append((rotation, angles))
+    turned_poses = [pose.copy() for _ in found for pose in poses]
+    for k, (_, angles) in enumerate(found):
+        for pose in turned_poses[k * len(poses) : (k + 1) * len(poses)]:
+            for (_, dof, weight), value in zip(turns, angles, strict=True):
+                pose[dof] = value / weight
+    return np.stack(turned_poses)
+
+
+def about(axis: Float[np.ndarray, "3"], angle: float) -> Float[np.ndarray, "3 3"]:
+    """The rotation about an axis (Rodrigues)."""
+    x, y, z = axis / np.linalg.norm(axis)
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+
+
+def _angle(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.arccos(np.clip(0.5 * (np.trace(a.T @ b) - 1.0), -1.0, 1.0)))

@@ -1,0 +1,122 @@
+"""Where a body may be in one frame: the parts of space that look like it in all cameras, and how they lie."""
+
+from dataclasses import dataclass
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+from scipy.ndimage import gaussian_filter, maximum_filter
+
+from sogjax.model.camera import NEAR, Camera, project_points
+from sogjax.model.rotation import axis_vector
+from sogjax.search.seen_frame import SeenFrame, cells_at
+
+MOST_VOXELS = 150_000
+FINEST = 0.08
+"""Metres between voxels, at least."""
+REACH = 0.8
+"""How far from the middle of the cameras places are looked for, as a part of the cameras' distance from it."""
+HEIGHTS = 1.6
+"""Metres above and below the middle of the cameras."""
+SEEN_BY = 0.5
+"""Part of the cameras (and two of them) that must see a place."""
+TRUNK = 0.13
+"""Metres, standard deviation: what is smoothed over to find the thickest part of a body."""
+APART = 0.4
+"""Metres between places that count as different."""
+BODY_REACH = 0.95
+"""Metres around a place in which the rest of the body is."""
+THICK, TALL = 0.35, 1.3
+"""Metres: how far from a body's axis, and along it from the middle, what is seen is taken for its length."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place where a body may be."""
+
+    centre: Float[np.ndarray, "3"]
+    """Metres, world: of what looks like the body there."""
+    axis: Float[np.ndarray, "3"]
+    """The direction in which that is longest."""
+    slenderness: float
+    """How much longer it is than wide; 1 or more."""
+    score: float
+    length: float
+    """Metres, how long it is in that direction: the height of somebody who stands straight."""
+
+
+def places(frame: SeenFrame, up: str, count: int) -> list[Place]:
+    """The places that look most like the body, best first, at most `count`."""
+    grid, spacing = _voxels(frame.cameras, up)
+    shape = grid.shape[:3]
+    flat = jnp.asarray(grid.reshape(-1, 3), frame.odds.dtype)
+    scores = np.array(_voxel_scores(frame, flat), float).reshape(shape)
+    smooth = gaussian_filter(np.maximum(scores, -1.0), TRUNK / spacing, mode="constant", cval=-1.0)
+    peaks = np.argwhere((smooth == maximum_filter(smooth, size=3)) & (smooth > -0.9))
+    peaks = peaks[np.argsort(-smooth[tuple(peaks.T)])]
+    found: list[Place] = []
+    for peak in peaks:
+        place = _place_at(grid, scores, tuple(map(int, peak)), float(smooth[tuple(peak)]))
+        if all(np.linalg.norm(place.centre - other.centre) >= APART for other in found):
+            found.append(place)
+        if len(found) == count:
+            break
+    return found
+
+
+def _place_at(grid: np.ndarray, scores: np.ndarray, peak: tuple[int, ...], score: float) -> Place:
+    """The place around a peak: the centre and the longest direction of what looks like the body near it."""
+    weights, points = np.maximum(scores - 0.5 * score, 0.0).reshape(-1), grid.reshape(-1, 3)
+    centre = grid[peak]
+    for radius in (0.6, BODY_REACH):
+        near = (np.linalg.norm(points - centre, axis=1) < radius) * weights
+        if near.sum() <= 0.0:
+            return Place(grid[peak], np.array([0.0, 0.0, 1.0]), 1.0, score, 0.0)
+        centre = near @ points / near.sum()
+    off = points - centre
+    values, vectors = np.linalg.eigh((near[:, None] * off).T @ off / near.sum())
+    axis = vectors[:, 2]
+    solid = (weights > 0.0) & (np.linalg.norm(np.cross(off, axis), axis=1) < THICK) & (np.abs(off @ axis) < TALL)
+    low, high = np.percentile(off[solid] @ axis, (0.5, 99.5)) if solid.any() else (0.0, 0.0)
+    return Place(centre, axis, float(np.sqrt(values[2] / max(values[1], 1e-9))), score, float(high - low))
+
+
+def _voxels(cameras: Camera, up: str) -> tuple[Float[np.ndarray, "a b c 3"], float]:
+    """A grid of places (metres, world) around what the cameras look at, and its spacing."""
+    world = np.asarray(cameras.camera_from_world, float)
+    centres = -np.einsum("cji,cj->ci", world[:, :3, :3], world[:, :3, 3])
+    middle = nearest_point(centres, world[:, 2, :3])
+    distance = float(np.median(np.linalg.norm(centres - middle, axis=1)))
+    reach = max(REACH * distance, 0.5)
+    vertical = np.abs(axis_vector(up)) > 0.5
+    extent = np.where(vertical, min(HEIGHTS, reach), reach)
+    spacing = max(FINEST, float(np.prod(2.0 * extent) / MOST_VOXELS) ** (1.0 / 3.0))
+    axes = [np.arange(-n, n + 1) * spacing for n in np.ceil(extent / spacing).astype(int)]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1) + middle, spacing
+
+
+def nearest_point(
+    points: Float[np.ndarray, "line 3"], directions: Float[np.ndarray, "line 3"]
+) -> Float[np.ndarray, "3"]:
+    """The point nearest to lines; where all are parallel, the one of them nearest to the lines' points."""
+    directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    across = np.eye(3)[None] - directions[:, :, None] * directions[:, None, :]
+    return np.linalg.lstsq(across.sum(axis=0), np.einsum("lij,lj->i", across, points), rcond=1e-9)[0]
+
+
+@eqx.filter_jit
+def _voxel_scores(frame: SeenFrame, points: Float[Array, "voxel 3"]) -> Float[Array, "voxel"]:
+    """Mean log odds over the cameras that see a voxel; very low where too few do."""
+
+    def one_camera(camera: Camera, odds: Array, size: Array) -> tuple[Array, Array]:
+        pixels, depth = project_points(camera, points)
+        cell, inside = cells_at(camera, size, jnp.where(depth[:, None] > NEAR, pixels, -1e6))
+        window = lambda values: jax.lax.reduce_window(values, 0.0, jax.lax.add, (3, 3), (1, 1), "SAME") / 9.0
+        return jnp.where(inside, window(odds)[cell[:, 1], cell[:, 0]], 0.0), inside.astype(odds.dtype)
+
+    values, seen = jax.lax.map(lambda each: one_camera(*each), (frame.cameras, frame.whole, frame.cell_sizes))
+    by = jnp.sum(seen, axis=0)
+    enough = (by >= SEEN_BY * seen.shape[0] - 1e-3) & (by >= min(2, seen.shape[0]))
+    return jnp.where(enough, jnp.sum(values, axis=0) / jnp.maximum(by, 1.0), -2.0)

@@ -1,0 +1,257 @@
+"""The pose of a body in one frame without a hint: places, turns and named poses tried at once, the best refined."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from sogjax.energy.appearance import ColorWindows
+from sogjax.energy.term import Term
+from sogjax.model.body import Body
+from sogjax.model.limbs import limbs, with_other_limb
+from sogjax.model.rotation import axis_vector
+from sogjax.scene.color_clusters import Kinds, kinds_of
+from sogjax.search.mirrored import look_alikes, means_of, turned_to, turns_with_vertical
+from sogjax.search.places import Place, places
+from sogjax.search.rough_pose import shifts
+from sogjax.search.search_energy import LARGEST_ANGLE, LARGEST_TRANSLATION, SearchEnergy, climbed, scores
+from sogjax.search.seen_frame import SeenFrame
+from sogjax.solve.solution import Scales
+from sogjax.tracking.solving import pose_scales
+
+NUM_PLACES = 4
+NUM_HEADINGS = 12
+BODY_RADIUS = 1.15
+"""Metres around a place at which pictures are looked at."""
+UPRIGHT = 0.8
+"""Cosine of the angle between a body's longest direction and the vertical above which it is not lying."""
+SLENDER = 1.5
+"""A body less slender says nothing of its direction."""
+NUM_AT_PLACE, FIRST_ITERATIONS = (16, 8, 4, 4), 8
+"""Starts that are climbed a little way: at the best place, the next and so on."""
+NUM_SECOND, SECOND_ITERATIONS = 6, 10
+"""Those of them whose limbs are tried another way, and how far these are climbed."""
+NUM_LAST, LAST_ITERATIONS = 4, 25
+LIMBS_TRIED = (3, 1)
+"""Ways to hold a limb that are climbed, of all that are scored: of the best pose, of each other."""
+NUM_DRAWN = 16
+"""Ways to hold a limb that are drawn at random, beside those of the named poses."""
+LIMB_APART = 0.01
+"""`DIFFERENT`, for poses that differ in one limb."""
+POOR = 0.3
+"""Places that look less like the body than this part of the best are left out."""
+DIFFERENT = 0.1
+"""Metres, mean distance of the blobs: poses farther apart are different optima."""
+
+Report = Callable[[float], None]
+"""Called with the share of some work that is done, 0 to 1."""
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """A pose that nothing near is better than."""
+
+    pose: Float[np.ndarray, "dof"]
+    energy: float
+
+
+@dataclass(frozen=True)
+class Searcher:
+    """What a search for one body needs beside the frame."""
+
+    body: Body
+    kinds: Kinds
+    terms: Sequence[Term]
+    up: str
+
+    @classmethod
+    def of_body(cls, body: Body, terms: Sequence[Term], up: str) -> "Searcher":
+        """For a body in its colours."""
+        return cls(body, kinds_of(np.asarray(body.blob_colors), np.asarray(body.blob_sigmas) ** 2), terms, up)
+
+    @property
+    def scales(self) -> Scales:
+        """Bounds on the steps of climbs."""
+        return pose_scales(self.body.skeleton, largest_angle=LARGEST_ANGLE, largest_translation=LARGEST_TRANSLATION)
+
+    def energy(self, frame: SeenFrame) -> SearchEnergy:
+        """Of poses in a frame."""
+        return SearchEnergy.from_terms(self.body, frame.cameras, self.terms, self.kinds)
+
+
+def unreported(share: float) -> None:
+    """Nobody asks how far a search is."""
+
+
+def search(searcher: Searcher, frame: SeenFrame, count: int = NUM_LAST, report: Report = unreported) -> list[Optimum]:
+    """The best different poses of a body in one frame, best first; none, if nothing looks like it.
+
+    `report` is called with the share of the work that is done.
+    """
+    found = places(frame, searcher.up, NUM_PLACES)
+    if not found:
+        return []
+    found = [place for place in found if place.score >= POOR * found[0].score] or found[:1]
+    hunt = Hunt.of_places(searcher, frame, np.stack([place.centre for place in found]))
+    tried = _starts(searcher, found)
+    tried = hunt.climbed(_spread_best(searcher.body, hunt.scored(tried)), FIRST_ITERATIONS)
+    tried = _best(searcher.body, tried, NUM_SECOND)
+    report(0.3)
+    for share in (0.6, 0.85):
+        tried = _best(searcher.body, _with_better_limbs(hunt, tried), NUM_LAST)
+        report(share)
+    tried = hunt.climbed(_with_look_alikes(hunt, tried), LAST_ITERATIONS)
+    report(1.0)
+    best = _best(searcher.body, tried, count)
+    return [Optimum(pose, float(value)) for pose, value in zip(best.poses, best.values, strict=True)]
+
+
+@dataclass(frozen=True)
+class Tried:
+    """Poses that were tried, where, and their energies."""
+
+    poses: Float[np.ndarray, "start dof"]
+    where: Int[np.ndarray, "start"]
+    """The number of the place."""
+    values: Float[np.ndarray, "start"]
+
+    def __getitem__(self, chosen: np.ndarray) -> "Tried":
+        """Some of them."""
+        return Tried(self.poses[chosen], self.where[chosen], self.values[chosen])
+
+    @classmethod
+    def of(cls, parts: Sequence["Tried"]) -> "Tried":
+        """All of several."""
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("poses", "where", "values")))
+
+
+@dataclass(frozen=True)
+class Hunt:
+    """A search at some places of one frame."""
+
+    searcher: Searcher
+    energy: SearchEnergy
+    windows: ColorWindows
+
+    @classmethod
+    def of_places(cls, searcher: Searcher, frame: SeenFrame, centres: Float[np.ndarray, "place 3"]) -> "Hunt":
+        """Always the same number of places, so that one program serves all."""
+        padded = np.pad(centres, ((0, NUM_PLACES - len(centres)), (0, 0)), mode="edge")
+        return cls(searcher, searcher.energy(frame), _windows(frame, jnp.asarray(padded, frame.odds.dtype)))
+
+    def scored(self, tried: Tried) -> Tried:
+        """With their energies."""
+        return Tried(tried.poses, tried.where, scores(self.energy, self.windows, tried.where, tried.poses))
+
+    def climbed(self, tried: Tried, iterations: int) -> Tried:
+        """The tops of the hills that they are on, as far as so many iterations lead."""
+        scales = self.searcher.scales
+        poses, values = climbed(self.energy, self.windows, tried.where, tried.poses, scales, iterations)
+        return Tried(poses, tried.where, values)
+
+
+def _starts(searcher: Searcher, found: Sequence[Place]) -> Tried:
+    """Every named pose in every direction at every place."""
+    body, up = searcher.body, axis_vector(searcher.up)
+    named = [np.asarray(pose) for pose in body.poses.values()]
+    headings = np.arange(NUM_HEADINGS) * 2.0 * np.pi / NUM_HEADINGS - np.pi
+    upright = turned_to(body, named, headings, searcher.up)
+    parts = []
+    for k, place in enumerate(found):
+        directions = _other_verticals(place, up)
+        lying = [turns_with_vertical(body, named, up, direction) for direction in directions]
+        poses = _centred(body, np.concatenate([upright, *lying]), place.centre)
+        parts.append(Tried(poses, np.full(len(poses), k), np.zeros(len(poses))))
+    return Tried.of(parts)
+
+
+def _other_verticals(place: Place, up: Float[np.ndarray, "3"]) -> list[Float[np.ndarray, "3"]]:
+    """In which directions the body's vertical may point there, beside upwards."""
+    along = place.axis if place.axis @ up > 0.0 else -place.axis
+    lying = place.slenderness > SLENDER and along @ up < UPRIGHT
+    return [along, -along] if lying else [-up]
+
+
+def _centred(body: Body, poses: np.ndarray, centre: Float[np.ndarray, "3"]) -> Float[np.ndarray, "start dof"]:
+    """Poses moved so that their centre is at a point."""
+    return (poses + (centre[None] - centres_of(body, poses)) @ np.asarray(shifts(body)).T).astype(poses.dtype)
+
+
+def centres_of(body: Body, poses: Float[np.ndarray, "start dof"]) -> Float[np.ndarray, "start 3"]:
+    """The middle of a body in poses, weighted by area."""
+    areas = np.asarray(body.blob_sigmas) ** 2
+    return np.einsum("sbi,b->si", means_of(body, poses), areas / areas.sum())
+
+
+@eqx.filter_jit
+def _windows(frame: SeenFrame, centres: Float[Array, "place 3"]) -> ColorWindows:
+    radius = jnp.asarray(BODY_RADIUS, centres.dtype)
+    return jax.lax.map(lambda centre: frame.windows(centre, radius), centres)
+
+
+def _with_better_limbs(hunt: Hunt, tried: Tried) -> Tried:
+    """The poses, and each with one limb held in other ways, climbed if that looks promising."""
+    body, variants, source = hunt.searcher.body, [], []
+    every_limb = limbs(body.skeleton)
+    for k, pose in enumerate(tried.poses):
+        for j, limb in enumerate(every_limb):
+            others = np.concatenate([tried.poses, _drawn(body, limb, NUM_DRAWN)])
+            variants.append(with_other_limb(body, pose, limb, others)[1:])
+            source += [(k, j)] * len(variants[-1])
+    of_pose, of_limb = np.array(source).T
+    scored = hunt.scored(Tried(np.concatenate(variants), tried.where[of_pose], np.zeros(len(of_pose))))
+    chosen = []
+    for k, j in sorted(set(source)):
+        here = np.flatnonzero((of_pose == k) & (of_limb == j))
+        here = here[np.argsort(-scored.values[here])]
+        chosen.extend(
+            here[different(body, scored.poses[here], scored.values[here], LIMBS_TRIED[min(k, 1)], LIMB_APART)]
+        )
+    return hunt.climbed(Tried.of([tried, scored[np.array(chosen)]]), SECOND_ITERATIONS)
+
+
+def _drawn(body: Body, limb: Int[np.ndarray, "limb"], count: int) -> Float[np.ndarray, "start dof"]:
+    """Poses with a limb held at random within its limits."""
+    lower, upper = np.asarray(body.skeleton.dof_lower), np.asarray(body.skeleton.dof_upper)
+    poses = np.zeros((count, len(lower)), np.float32)
+    poses[:, limb] = np.random.default_rng(0).uniform(lower[limb], upper[limb], (count, len(limb)))
+    return poses
+
+
+def _with_look_alikes(hunt: Hunt, tried: Tried) -> Tried:
+    """The poses, and what looks like the best of them."""
+    others = look_alikes(hunt.searcher.body, tried.poses[0])
+    return Tried.of([tried, Tried(others, np.full(len(others), tried.where[0]), np.zeros(len(others)))])
+
+
+def _spread_best(body: Body, tried: Tried) -> Tried:
+    """The best at each place, not too many of them nearly the same; more at the better places."""
+    chosen = []
+    for place, count in zip(np.unique(tried.where), NUM_AT_PLACE, strict=False):
+        here = tried[tried.where == place]
+        likely = here[np.argsort(-here.values)[: 8 * count]]
+        chosen.append(_best(body, likely, count))
+    return Tried.of(chosen)
+
+
+def _best(body: Body, tried: Tried, count: int) -> Tried:
+    """The best different ones, best first."""
+    return tried[different(body, tried.poses, tried.values, count)]
+
+
+def different(
+    body: Body, poses: np.ndarray, values: np.ndarray, count: int, apart: float = DIFFERENT
+) -> Int[np.ndarray, "best"]:
+    """Which poses are the best `count` that lie so far (metres) from each other, best first."""
+    means = means_of(body, poses)
+    left, best = np.argsort(-values), []
+    left = left[np.isfinite(values[left])]
+    while len(left) and len(best) < count:
+        best.append(left[0])
+        distances = np.linalg.norm(means[left] - means[left[0]], axis=-1).mean(axis=1)
+        left = left[distances >= apart]
+    return np.array(best, int)

@@ -1,0 +1,171 @@
+"""The energy of a search: how well a pose explains the pictures, within the joints' limits, and climbing it."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from sogjax.energy.appearance import Appearance, BlobKinds, ColorWindows
+from sogjax.energy.foreground import Foreground
+from sogjax.energy.frame_energy import FrameEnergy
+from sogjax.energy.posed import Frame, History, Posed
+from sogjax.energy.priors import AccelerationPenalty
+from sogjax.energy.similarity import Similarity
+from sogjax.energy.term import Penalty, Term, Terms
+from sogjax.energy.views import Views, whole_image_overlap
+from sogjax.model.body import Body
+from sogjax.model.camera import Camera
+from sogjax.model.skeleton import Skeleton
+from sogjax.model.sog import Sog
+from sogjax.scene.color_clusters import SLOTS, Kinds
+from sogjax.solve.gauss_newton import GaussNewton
+from sogjax.solve.solution import QuadraticModel, Scales
+
+COMFORT = 0.002
+"""Weight of `Discomfort`, where a body that explains all that it covers gains about 1."""
+LIMITS = 5.0
+"""By what the weights of the other terms are multiplied in this energy."""
+SILHOUETTE = 0.5
+"""The area of a body in a picture, as a part of that of the discs of its blobs (which overlap)."""
+NARROWEST = 0.5
+"""Radians, the least range of a joint that is counted."""
+LARGEST_ANGLE, LARGEST_TRANSLATION = 0.3, 0.15
+"""Bounds on a step of the climb: radians, metres."""
+DISC = 1.35
+"""Radius of the disc that a blob of sigma 1 stands for."""
+AT_ONCE, SCORED_AT_ONCE = 8, 64
+"""Poses that are climbed, and scored, in one call."""
+
+
+class Discomfort(Penalty):
+    """How far joints are from the rest pose, as a part of their range, squared.
+
+    Of two poses that look the same, the one that twists less is more likely.
+    """
+
+    def value(self, posed: Posed, frame: Frame) -> Float[Array, ""]:
+        """The sum over the degrees of freedom that have limits."""
+        return jnp.sum((posed.pose / _ranges(posed.body.skeleton, posed.pose)) ** 2)
+
+    def quadratic(self, posed: Posed, frame: Frame) -> QuadraticModel:
+        """Exact."""
+        inverse = 2.0 * self.weight / _ranges(posed.body.skeleton, posed.pose) ** 2
+        return QuadraticModel(self.part(posed, frame), -inverse * posed.pose, jnp.diag(inverse))
+
+
+def _ranges(skeleton: Skeleton, pose: Float[Array, "dof"]) -> Float[Array, "dof"]:
+    """How far each degree of freedom goes to the side on which it is."""
+    bound = jnp.where(pose < 0.0, -skeleton.dof_lower, skeleton.dof_upper)
+    return jnp.maximum(bound, NARROWEST)
+
+
+class SearchEnergy(eqx.Module):
+    """The energy of poses of one body, with everything but what is seen around each of them."""
+
+    body: Body
+    cameras: Camera
+    terms: Terms
+    """All but the appearance."""
+    kinds: BlobKinds
+
+    @classmethod
+    def from_terms(cls, body: Body, cameras: Camera, terms: Sequence[Term], kinds: Kinds) -> "SearchEnergy":
+        """With the terms of tracking that need no windows, lists or history."""
+        others = [term for term in terms if not isinstance(term, (Similarity, Foreground, AccelerationPenalty))]
+        others = [eqx.tree_at(lambda term: term.weight, term, LIMITS * term.weight) for term in others]
+        return cls(body, cameras, (*others, Discomfort(COMFORT)), blob_kinds(kinds, body.num_blobs))
+
+    def appearance(self, windows: ColorWindows) -> Appearance:
+        """In units of the body's own area in the pictures, so that it does not matter how large it is seen."""
+        whole = jnp.mean(windows.scale**2 / whole_image_overlap(self.cameras.image_size))
+        size = SILHOUETTE * jnp.pi * jnp.sum((DISC * self.body.blob_sigmas) ** 2)
+        return Appearance(1.0 / (size * whole), windows, self.kinds)
+
+    def of_windows(self, windows: ColorWindows) -> FrameEnergy:
+        """The energy with what is seen around some poses."""
+        num_cameras, dtype = windows.x.shape[0], windows.x.dtype
+        nothing = Sog(
+            jnp.zeros((num_cameras, 0, 2), dtype),
+            jnp.zeros((num_cameras, 0), dtype),
+            jnp.zeros((num_cameras, 0, 3), dtype),
+            jnp.zeros((num_cameras, 0), bool),
+        )
+        views = Views(
+            self.cameras,
+            nothing,
+            jnp.zeros((num_cameras, self.body.num_blobs, 0), dtype),
+            whole_image_overlap(self.cameras.image_size),
+        )
+        return FrameEnergy(
+            self.body, views, History.unknown(self.body.poses["rest"]), (self.appearance(windows), *self.terms)
+        )
+
+
+def scores(
+    energy: SearchEnergy,
+    windows: ColorWindows,
+    place: Int[np.ndarray, "start"],
+    poses: Float[np.ndarray, "start dof"],
+) -> Float[np.ndarray, "start"]:
+    """The energies of poses, each in the windows of its place."""
+    return _in_parts(partial(_scores, energy, windows), SCORED_AT_ONCE, place, poses)[0]
+
+
+def blob_kinds(kinds: Kinds, num_blobs: int) -> BlobKinds:
+    """The kinds of the blobs as arrays."""
+    members, real = np.zeros((len(kinds.members), SLOTS), int), np.zeros((len(kinds.members), SLOTS))
+    slots = np.zeros(num_blobs, int)
+    for k, part in enumerate(kinds.members):
+        members[k, : len(part)], real[k, : len(part)] = part, 1.0
+        slots[list(part)] = k * SLOTS + np.arange(len(part))
+    return BlobKinds(jnp.asarray(members), jnp.asarray(real, jnp.result_type(float)), jnp.asarray(slots))
+
+
+@eqx.filter_jit
+def _scores(energy: SearchEnergy, windows: ColorWindows, place: Array, poses: Array) -> tuple[Float[Array, "start"]]:
+    def one(start: tuple[Array, Array]) -> Float[Array, ""]:
+        return energy.of_windows(jax.tree.map(lambda leaf: leaf[start[0]], windows))(start[1])
+
+    together = lambda leaf: leaf.reshape(-1, AT_ONCE, *leaf.shape[1:])
+    return (jax.lax.map(jax.vmap(one), (together(place), together(poses))).reshape(-1),)
+
+
+def climbed(
+    energy: SearchEnergy,
+    windows: ColorWindows,
+    place: Int[np.ndarray, "start"],
+    poses: Float[np.ndarray, "start dof"],
+    scales: Scales,
+    iterations: int,
+) -> tuple[Float[np.ndarray, "start dof"], Float[np.ndarray, "start"]]:
+    """Every pose climbed and its energy."""
+    climb = partial(_climbed, energy, windows, scales, jnp.asarray(iterations))
+    ends, values = _in_parts(climb, AT_ONCE, place, poses)
+    return ends, values
+
+
+def _in_parts(function: Callable[..., tuple[Array, ...]], size: int, place: np.ndarray, poses: np.ndarray) -> list[Any]:
+    """The results for all starts, always the same number at once, so that one program serves all."""
+    count = len(poses)
+    padded = [np.concatenate([part, np.repeat(part[-1:], -count % size, axis=0)]) for part in (place, poses)]
+    parts = [jax.device_get(function(*(part[k : k + size] for part in padded))) for k in range(0, count, size)]
+    return [np.concatenate(part)[:count] for part in zip(*parts, strict=True)]
+
+
+@eqx.filter_jit
+def _climbed(
+    energy: SearchEnergy, windows: ColorWindows, scales: Scales, iterations: Array, place: Array, poses: Array
+) -> tuple[Float[Array, "start dof"], Float[Array, "start"]]:
+    solver = GaussNewton(epsilon=0.01, max_iterations=iterations)
+
+    def climb(index: Array, pose: Array) -> tuple[Array, Array]:
+        here = jax.tree.map(lambda leaf: leaf[index], windows)
+        solution = solver.maximize(energy.of_windows(here), pose, scales)
+        return solution.params, solution.value
+
+    return jax.vmap(climb)(place, poses)

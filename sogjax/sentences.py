@@ -1,6 +1,0 @@
-"""Words for sentences that people read."""
-
-
-def counted(count: int, noun: str, plural: str | None = None) -> str:
-    """A number with its noun, such as `1 frame` or `2 frames`; `plural` where that is not the noun with an s."""
-    return f"{count} {noun if count == 1 else plural or f'{noun}s'}"
