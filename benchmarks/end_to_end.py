@@ -15,7 +15,7 @@ from track_speed import demo_recording
 
 from sogjax.cli.config.overrides import quoted_value
 from sogjax.io.recording import Recording, open_recording
-from sogjax.io.threads import ahead
+from sogjax.io.threads import prefetch
 from sogjax.io.video import read_prepared
 from sogjax.run.pipeline import FRAMES_AHEAD
 from sogjax.run.run_numbers import row_numbers
@@ -67,7 +67,7 @@ def main() -> None:
 
 def decoding_rate(recording: Recording, frames: int) -> float:
     """Multi-view frames per second when nothing is done with the pictures, without opening the files."""
-    pictures = ahead(read_prepared(recording, lambda camera, image: None, 0, frames, planes=True), FRAMES_AHEAD)
+    pictures = prefetch(read_prepared(recording, lambda camera, image: None, 0, frames, planes=True), FRAMES_AHEAD)
     next(pictures)
     begin = time.perf_counter()
     count = sum(1 for _ in pictures)

@@ -189,8 +189,8 @@ def test_several_actors_and_empty_folders_are_refused(capsys, tracked):
 def test_a_window_larger_than_memory_is_refused(capsys, tracked, monkeypatch):
     motion = tracked[1]
     each = bytes_of_frame(2, motion.blob_means.shape[1])
-    monkeypatch.setattr("sogjax.run.adjust_checks.available_memory", lambda: 30 * each)
-    monkeypatch.setattr("sogjax.run.adjust_checks.bytes_of_frame", lambda *_: 5 * each)
+    monkeypatch.setattr("sogjax.run.memory.available_memory", lambda: 30 * each)
+    monkeypatch.setattr("sogjax.refine.pictures.bytes_of_frame", lambda *_: 5 * each)
     found = sentence(capsys, tracked, "window=24")
     assert "window=24" in found
     assert "fewer cameras" in found

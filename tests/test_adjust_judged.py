@@ -13,7 +13,7 @@ from motion_cases import walking_motion
 from sogjax.io.motion import motion_from_poses
 from sogjax.io.recording import open_recording
 from sogjax.model.limbs import limb_names
-from sogjax.quality.limb_confidence import Judgement
+from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.run import adjust_clip, adjust_judged
 from sogjax.run.job import Job
 from sogjax.run.prefix import Prefix
@@ -46,9 +46,9 @@ def test_old_and_new_colours_are_judged_on_the_same_cells_read_once(job, monkeyp
         for at, _ in enumerate(frames):
             ahead.append(len(read) - at)
             told = jnp.full(count, doubt if tracker.body is new else 0.1)
-            yield Judgement(told, jnp.zeros((2, old.num_blobs)), jnp.ones(1), jnp.ones((1, 2)))
+            yield LimbConfidence(told, jnp.zeros((2, old.num_blobs)), jnp.ones(1), jnp.ones((1, 2)))
 
-    monkeypatch.setattr(adjust_judged, "judged_poses", judged)
+    monkeypatch.setattr(adjust_judged, "confidence_of_poses", judged)
     motion = motion_from_poses(old, np.zeros((FRAMES, old.skeleton.num_dofs)), 25.0)
     found, prefix, after = adjust_judged.judged_with_colors(job, new, coming(), Prefix({}), motion)
     assert read == [*range(FRAMES)]

@@ -16,9 +16,9 @@ from sogjax.model.limbs import limb_names, limbs
 from sogjax.search import merge_passes as both_ways
 from sogjax.search.backward_pass import Compared, Pass, part_gains
 from sogjax.search.body_parts import PartArrays, body_parts, merged_pose
-from sogjax.search.merge_passes import told_both_ways
+from sogjax.search.merge_passes import merge_passes
 from sogjax.search.mirrored import means_of
-from sogjax.search.select_parts import APART, BIAS, CHANGE, best_choice, stretches, taken_parts
+from sogjax.search.select_parts import APART, BIAS, CHANGE, best_choice, select_parts, stretches
 from sogjax.tracking.capacity import with_room
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import PartialCells
@@ -50,7 +50,7 @@ def with_lost_limb(walking_dog, doubt=0.9):
 def test_a_lost_limb_comes_back_from_the_other_side(walking_dog):
     tracker, cells, right = walking_dog
     passed, limb = with_lost_limb(walking_dog)
-    found = told_both_ways(tracker, passed, backwards(cells))
+    found = merge_passes(tracker, passed, backwards(cells))
     rows = sorted(found.frames)
     assert {*range(LOST.start, LOST.stop)} <= {*rows} <= {*range(LOST.start - 1, LOST.stop + 1)}
     assert found.parts == {limb_names(tracker.body)[limb]: {*rows}}
@@ -63,16 +63,16 @@ def test_a_lost_limb_comes_back_from_the_other_side(walking_dog):
 def test_what_holds_then_is_said_with_it(walking_dog):
     tracker, cells, right = walking_dog
     passed, limb = with_lost_limb(walking_dog)
-    found = told_both_ways(tracker, passed, backwards(cells)).frames[LOST.start]
+    found = merge_passes(tracker, passed, backwards(cells)).frames[LOST.start]
     assert found.terms["similarity"] > 0.9 * right.energy
-    assert found.judged.doubt[limb] < 0.3
+    assert found.judged.error_probability[limb] < 0.3
 
 
 def test_nothing_is_read_where_no_limb_is_in_doubt(walking_dog):
     tracker, cells, _ = walking_dog
     asked = []
     passed, _ = with_lost_limb(walking_dog, doubt=0.1)
-    assert not told_both_ways(tracker, passed, backwards(cells, asked)).frames
+    assert not merge_passes(tracker, passed, backwards(cells, asked)).frames
     assert asked == []
 
 
@@ -81,7 +81,7 @@ def test_a_right_pass_stays_though_it_is_doubted(walking_dog):
     doubts = np.zeros_like(right.doubts)
     doubts[LOST] = 0.9
     asked = []
-    assert not told_both_ways(tracker, replace(right, doubts=doubts), backwards(cells, asked)).frames
+    assert not merge_passes(tracker, replace(right, doubts=doubts), backwards(cells, asked)).frames
     assert asked == [(0, LOST.stop)]
 
 
@@ -90,15 +90,17 @@ def test_a_clip_that_ends_in_doubt_is_looked_at_from_its_last_frame(walking_dog)
     doubts = np.zeros_like(right.doubts)
     doubts[-2:] = 0.9
     asked = []
-    told_both_ways(tracker, replace(right, doubts=doubts), backwards(cells, asked))
+    merge_passes(tracker, replace(right, doubts=doubts), backwards(cells, asked))
     assert asked == [(0, FRAMES)]
 
 
 def test_a_clip_of_one_frame_that_is_in_doubt_is_looked_at_once(walking_dog):
     tracker, cells, right = walking_dog
-    only = replace(right, poses=right.poses[:1], doubts=np.full_like(right.doubts[:1], 0.9), usual=right.usual[:1])
+    only = replace(
+        right, poses=right.poses[:1], doubts=np.full_like(right.doubts[:1], 0.9), baseline=right.baseline[:1]
+    )
     asked = []
-    assert not told_both_ways(tracker, only, backwards(cells, asked)).frames
+    assert not merge_passes(tracker, only, backwards(cells, asked)).frames
     assert asked == [(0, 1)]
 
 
@@ -116,7 +118,7 @@ def test_a_frame_that_two_passes_revise_counts_once(walking_dog, monkeypatch):
         return Compared(cells[:begin][::-1], poses, column(10.0 * right.energy), column(2.0 * APART)), begin
 
     monkeypatch.setattr(both_ways, "compared_backwards", compared)
-    found = told_both_ways(tracker, replace(right, doubts=doubts), backwards(cells))
+    found = merge_passes(tracker, replace(right, doubts=doubts), backwards(cells))
     assert {*found.frames} == {*range(9)}
     assert found.parts == {parts[0].name: {*range(9)}}
 
@@ -147,7 +149,7 @@ def test_what_sees_more_image_blobs_than_there_is_room_for_is_valued_with_more_r
     monkeypatch.setattr(
         both_ways, "compared_backwards", lambda t, p, *rest: compared(t, replace(p, capacities=right.capacities), *rest)
     )
-    one, two = (told_both_ways(tracker, each, backwards(cells)) for each in (replace(passed, capacities=small), passed))
+    one, two = (merge_passes(tracker, each, backwards(cells)) for each in (replace(passed, capacities=small), passed))
     assert one.parts == two.parts
     assert one.frames[row].energy == pytest.approx(two.frames[row].energy, rel=1e-4)
 
@@ -158,7 +160,7 @@ def test_a_lost_limb_comes_back_though_a_camera_is_missing_in_some_frames(walkin
     passed, limb = with_lost_limb(walking_dog)
     present = np.arange(len(cells[0])) != 1
     some = [PartialCells(frame, present) if LOST.start <= k < LOST.stop else frame for k, frame in enumerate(cells)]
-    found = told_both_ways(tracker, passed, backwards(some))
+    found = merge_passes(tracker, passed, backwards(some))
     assert found.parts.keys() == {limb_names(tracker.body)[limb]}
     assert {*range(LOST.start, LOST.stop)} <= {*found.frames}
 
@@ -178,7 +180,7 @@ def test_a_limb_of_one_of_two_actors_comes_back(walking_dog):
     poses, doubts = right.poses.copy(), np.zeros_like(right.doubts)
     poses[LOST, limbs(body.skeleton)[limb][0]] += 0.8
     doubts[LOST, limb] = 0.9
-    found = told_both_ways(tracker, replace(right, poses=poses, doubts=doubts), backwards(cells))
+    found = merge_passes(tracker, replace(right, poses=poses, doubts=doubts), backwards(cells))
     assert found.parts.keys() == {limb_names(body)[limb]}
     assert {*range(LOST.start, LOST.stop)} <= {*found.frames}
     for row, revised in found.frames.items():
@@ -216,10 +218,10 @@ def test_limbs_are_left_where_the_trunk_is_elsewhere_and_slight_gains_are_none()
     limb = next(k for k, part in enumerate(parts) if part.whole is not None)
     apart, gains = np.full((6, len(parts)), 0.01), np.full((6, len(parts)), -0.1)
     apart[2:4, limb], gains[2:4, limb] = 2.0 * APART, 10.0 * CHANGE * APART
-    assert taken_parts(parts, apart, gains, 1.0)[:, limb].tolist() == [False, False, True, True, False, False]
-    assert not taken_parts(parts, apart, np.where(gains > 0.0, 0.5 * BIAS, 0.0), 1.0).any()
+    assert select_parts(parts, apart, gains, 1.0)[:, limb].tolist() == [False, False, True, True, False, False]
+    assert not select_parts(parts, apart, np.where(gains > 0.0, 0.5 * BIAS, 0.0), 1.0).any()
     apart[:, 0] = 2.0 * APART
-    assert not taken_parts(parts, apart, gains, 1.0).any()
+    assert not select_parts(parts, apart, gains, 1.0).any()
 
 
 def test_a_limb_is_taken_to_its_place_though_the_trunk_is_turned():

@@ -16,7 +16,9 @@ def test_the_level_is_set_once_beside_other_flags(monkeypatch):
     monkeypatch.setenv(COMPILER_VARIABLE, "--xla_dump_to=there")
     for _ in range(2):
         use_compiler_options()
-        assert compiler_options.os.environ[COMPILER_VARIABLE] == "--xla_dump_to=there --xla_backend_optimization_level=1"
+        assert (
+            compiler_options.os.environ[COMPILER_VARIABLE] == "--xla_dump_to=there --xla_backend_optimization_level=1"
+        )
 
 
 def test_a_level_that_somebody_names_stays(monkeypatch):

@@ -17,7 +17,7 @@ from sogjax.model.camera import project
 from sogjax.model.color import from_rgb
 from sogjax.model.sog import Sog
 from sogjax.scene.background import BackgroundCells
-from sogjax.scene.foreground import EmptyScene
+from sogjax.scene.foreground import BackgroundModel
 from sogjax.scene.quadtree import keep_blobs
 from sogjax.tracking.culling import (
     BLOB_RADIUS,
@@ -104,9 +104,9 @@ def test_blobs_of_the_background_are_left_out_and_others_weighted(scene):
         jnp.ones(rgb.shape[:3], bool).at[:, rows:, columns:].set(False),
     )
     reader = eqx.tree_at(
-        lambda r: (r.color_tolerance, r.empty),
+        lambda r: (r.color_tolerance, r.background),
         tracker.reader,
-        (jnp.asarray(-1.0), EmptyScene.from_background(background)),
+        (jnp.asarray(-1.0), BackgroundModel.from_background(background)),
         is_leaf=lambda leaf: leaf is None,
     )
     _, leaves = eqx.filter_jit(lambda reader, rgb: reader.leaves(rgb))(reader, rgb)

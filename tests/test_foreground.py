@@ -16,10 +16,12 @@ from sogjax.energy.posed import Frame, History, Posed
 from sogjax.energy.views import COLUMNS, ROWS, Windows, windows_around
 from sogjax.scene.background import BackgroundCells
 from sogjax.scene.color_clusters import kind_odds, odds_where_told
-from sogjax.scene.foreground import LARGEST, EmptyScene, foreground_weights, log_odds, subject_colors
+from sogjax.scene.foreground import LARGEST, BackgroundModel, foreground_weights, log_odds, subject_colors
 
 WALL, SHIRT, SKIN = (0.5, 0.6, 0.7), (0.1, 0.2, 0.6), (0.6, 0.42, 0.33)
-odds_of = jax.jit(lambda cells, background, subject: log_odds(cells, EmptyScene.from_background(background), subject))
+odds_of = jax.jit(
+    lambda cells, background, subject: log_odds(cells, BackgroundModel.from_background(background), subject)
+)
 
 
 def wall(rows=12, columns=15, color=WALL):
@@ -78,7 +80,7 @@ def test_a_hand_over_a_floor_of_its_colour_is_undecided():
 
 def test_nothing_is_held_against_a_shoe_on_a_floor_of_its_colour():
     floor, shoe = wall(color=(0.1, 0.1, 0.11)), (0.13, 0.13, 0.13)
-    tables, empty = jnp.stack([subject(shoe), subject(SKIN)]), EmptyScene.from_background(floor)
+    tables, empty = jnp.stack([subject(shoe), subject(SKIN)]), BackgroundModel.from_background(floor)
     cells = seen(floor, SKIN)
     usual, told = (odds(cells, jnp.ones(floor.known.shape), empty, tables)[0] for odds in (kind_odds, odds_where_told))
     assert float(usual[0, 10, 10]) < -1.0

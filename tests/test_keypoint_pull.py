@@ -12,7 +12,7 @@ from rig_cases import ring_rig
 from sog_cases import in_float64
 
 from sogjax.energy.keypoint_views import LEAST, KeypointViews, SeenKeypoints, belonging, body_sizes
-from sogjax.energy.keypoints import KeypointPull
+from sogjax.energy.keypoints import KeypointTerm
 from sogjax.energy.posed import Posed
 from sogjax.model.camera import project_points
 
@@ -41,7 +41,7 @@ def body(double):
 def pull(**values):
     marks = values.pop("landmarks", ((0, 1, 2),))
     offsets = values.pop("offsets", jnp.zeros((len(marks), COUNT, 3)))
-    return in_float64(KeypointPull(1.0, landmarks=marks, mirrored=MIRRORED, groups=GROUPS, offsets=offsets, **values))
+    return in_float64(KeypointTerm(1.0, landmarks=marks, mirrored=MIRRORED, groups=GROUPS, offsets=offsets, **values))
 
 
 def projected(cameras, body, pose):

@@ -14,11 +14,11 @@ from rig_cases import ring_rig
 from sogjax.energy.posed import Posed
 from sogjax.model.body import concatenate
 from sogjax.model.limbs import joint_limbs, limb_names, limb_slices
-from sogjax.quality.limb_confidence import WITH_BACKGROUND, WITHOUT, LimbMeasures, judgement, limb_doubt
-from sogjax.quality.limb_evidence import BlobEvidence, JudgedLimbs, blob_evidence
+from sogjax.quality.limb_confidence import WITH_BACKGROUND, WITHOUT, LimbMeasures, error_probability, limb_confidence
+from sogjax.quality.limb_evidence import BlobEvidence, LimbBlobs, blob_evidence
 from sogjax.quality.limb_warnings import doubtful_limbs
 from sogjax.scene.background import BackgroundCells
-from sogjax.scene.foreground import EmptyScene, own_density, subject_colors, subject_density
+from sogjax.scene.foreground import BackgroundModel, own_density, subject_colors, subject_density
 from sogjax.tracking.frame import PartialCells
 from sogjax.tracking.frame_by_frame import track
 
@@ -38,9 +38,9 @@ def judging(body, rig, with_background):
     reader = replace(
         tracker.reader,
         subject=jnp.asarray(table, jnp.float32),
-        empty=EmptyScene.from_background(empty) if with_background else None,
+        background=BackgroundModel.from_background(empty) if with_background else None,
     )
-    return replace(tracker, reader=reader, limbs=JudgedLimbs.from_body(body), pairs="sparse")
+    return replace(tracker, reader=reader, limbs=LimbBlobs.from_body(body), pairs="sparse")
 
 
 @pytest.fixture(scope="module", params=[True, False], ids=["background", "none"])
@@ -54,7 +54,7 @@ def dog(request):
 @eqx.filter_jit
 def evidence_of(tracker, pose, cells, present=None):
     windows = None
-    if tracker.reader.empty is not None:
+    if tracker.reader.background is not None:
         odds = tracker.reader.odds(cells.astype(jnp.float32) / 255.0)
         windows = tracker.reader.windows(odds, tracker.cameras, tracker.boxes(tracker.start(pose)))
     posed, reader = Posed.from_pose(tracker.body, pose), tracker.reader
@@ -63,31 +63,31 @@ def evidence_of(tracker, pose, cells, present=None):
     )
 
 
-def judged(tracker, pose, cells, usual):
+def judged(tracker, pose, cells, baseline):
     evidence = evidence_of(tracker, jnp.asarray(pose), jnp.asarray(cells))
-    return judgement(tracker.limbs, evidence, usual, tracker.reader.empty is not None)
+    return limb_confidence(tracker.limbs, evidence, baseline, tracker.reader.background is not None)
 
 
 def test_only_a_limb_that_is_elsewhere_is_in_doubt(dog):
     tracker, pose, cells = dog
     names = limb_names(tracker.body)
     before = judged(tracker, pose, cells, jnp.full((2, tracker.body.num_blobs), jnp.nan))
-    assert float(before.doubt.max()) < 0.1
-    after = judged(tracker, moved(tracker.body, pose, ELSEWHERE), cells, before.usual)
-    assert float(after.doubt[names.index(LIMB)]) > 0.5
-    others = np.delete(np.asarray(after.doubt), names.index(LIMB))
+    assert float(before.error_probability.max()) < 0.1
+    after = judged(tracker, moved(tracker.body, pose, ELSEWHERE), cells, before.baseline)
+    assert float(after.error_probability[names.index(LIMB)]) > 0.5
+    others = np.delete(np.asarray(after.error_probability), names.index(LIMB))
     assert others.max() < 0.3
 
 
 def test_a_limb_in_doubt_does_not_become_usual(dog):
     tracker, pose, cells = dog
-    usual = judged(tracker, pose, cells, jnp.full((2, tracker.body.num_blobs), jnp.nan)).usual
+    baseline = judged(tracker, pose, cells, jnp.full((2, tracker.body.num_blobs), jnp.nan)).baseline
     wrong, k = moved(tracker.body, pose, ELSEWHERE), limb_names(tracker.body).index(LIMB)
     doubts = []
     for _ in range(60):
-        found = judged(tracker, wrong, cells, usual)
-        usual = found.usual
-        doubts.append(float(found.doubt[k]))
+        found = judged(tracker, wrong, cells, baseline)
+        baseline = found.baseline
+        doubts.append(float(found.error_probability[k]))
     assert doubts[-1] > 0.5 > 0.1 > doubts[0] - doubts[-1]
 
 
@@ -105,7 +105,7 @@ def test_the_step_judges(dog):
     tracker, pose, cells = dog
     frames = [cells] * 3
     one_by_one = [frame.result for frame in track(tracker, jnp.asarray(pose), frames)]
-    doubts = np.stack([result.limbs.doubt for result in one_by_one])
+    doubts = np.stack([result.limbs.error_probability for result in one_by_one])
     assert doubts.shape == (3, len(limb_names(tracker.body)))
     unjudged = [f.result for f in track(replace(tracker, limbs=None), jnp.asarray(pose), frames)]
     assert unjudged[-1].limbs is None
@@ -115,7 +115,7 @@ def test_the_step_judges(dog):
         PartialCells(cells, np.arange(5) != 1),
         next(track(tracker, jnp.asarray(pose), frames)).capacities,
     )
-    assert np.isfinite(np.asarray(state.usual)).all()
+    assert np.isfinite(np.asarray(state.baseline)).all()
 
 
 def test_what_hides_a_limb_is_no_evidence_against_it():
@@ -143,8 +143,8 @@ def test_densities_of_colours_are_those_of_the_subjects_table():
 def test_doubt_grows_with_every_measure():
     for weights in (WITH_BACKGROUND, WITHOUT):
         values = jnp.linspace(0.0, 1.0, 5)
-        worse = limb_doubt(LimbMeasures(values, jnp.full(5, 0.2)), weights)
-        against = limb_doubt(LimbMeasures(jnp.full(5, 0.2), values), weights)
+        worse = error_probability(LimbMeasures(values, jnp.full(5, 0.2)), weights)
+        against = error_probability(LimbMeasures(jnp.full(5, 0.2), values), weights)
         assert (np.diff(worse) > 0.0).all()
         assert (np.diff(against) >= 0.0).all()
 
@@ -183,10 +183,10 @@ def test_stretches_join_over_short_gaps_and_short_ones_are_left_out():
 
 def test_background_that_was_always_seen_in_a_limb_s_place_is_no_reason_for_doubt():
     """Dark shoes on a dark floor: what counts is that more is seen than usual."""
-    limbs = JudgedLimbs.from_body(shipped("dog"))
+    limbs = LimbBlobs.from_body(shipped("dog"))
     blobs = limbs.members.shape[1]
     evidence = BlobEvidence(jnp.full(blobs, 1.0), jnp.full(blobs, 0.9), jnp.ones(blobs), jnp.ones(blobs))
     fits = jnp.ones(blobs)
-    always = judgement(limbs, evidence, jnp.stack([fits, jnp.full(blobs, 0.6)]), True)
-    suddenly = judgement(limbs, evidence, jnp.stack([fits, jnp.zeros(blobs)]), True)
-    assert float(always.doubt.max()) < 0.05 < 0.2 < float(suddenly.doubt.min())
+    always = limb_confidence(limbs, evidence, jnp.stack([fits, jnp.full(blobs, 0.6)]), True)
+    suddenly = limb_confidence(limbs, evidence, jnp.stack([fits, jnp.zeros(blobs)]), True)
+    assert float(always.error_probability.max()) < 0.05 < 0.2 < float(suddenly.error_probability.min())

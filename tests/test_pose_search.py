@@ -17,8 +17,8 @@ from sogjax.scene.quadtree import Candidates
 from sogjax.search.found_pose import FoundPose, search_pose, search_poses
 from sogjax.search.mirrored import look_alikes, other_side, sides_apart, turns_with_vertical
 from sogjax.search.places import nearest_point
-from sogjax.search.pose_confidence import SURE, Agreement, Evidence, agreed_confidence, confidence
-from sogjax.search.pose_search import Searcher
+from sogjax.search.pose_confidence import SURE, Agreement, Evidence, agreed_confidence, pose_confidence
+from sogjax.search.pose_search import PoseSearch
 from sogjax.search.seen_frame import SeenFrame
 from sogjax.tracking.culling import ImageReader
 
@@ -43,7 +43,7 @@ def frames_of(images, rig=RIG, depth=8):
 
 
 def searcher(body):
-    return Searcher.of_body(body, TERMS, "z")
+    return PoseSearch.of_body(body, TERMS, "z")
 
 
 def over(images, others):
@@ -116,12 +116,12 @@ def test_variants_differ_in_one_limb_only_and_are_all_different():
 
 def test_a_pose_is_sure_only_if_every_condition_is_met():
     good = Evidence(1.5, 0.03, 0.03, 0.9, 0.87, 0.85, 1.3, 0.7, known=1.0)
-    assert confidence(good) > SURE
+    assert pose_confidence(good) > SURE
     for name in ("energy", "margin", "later_margin", "foreground", "worst_foreground", "not_background", "gain"):
-        assert confidence(replace(good, **{name: 0.0})) < 0.99 * SURE
+        assert pose_confidence(replace(good, **{name: 0.0})) < 0.99 * SURE
     # Where no background is known, less of what is seen looks like foreground.
-    assert confidence(replace(good, foreground=0.5)) < 0.5
-    assert confidence(replace(good, foreground=0.5, known=0.0)) > SURE
+    assert pose_confidence(replace(good, foreground=0.5)) < 0.5
+    assert pose_confidence(replace(good, foreground=0.5, known=0.0)) > SURE
 
 
 def test_two_searches_that_agree_are_sure_unless_there_is_a_reason_why_both_may_be_wrong():

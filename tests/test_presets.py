@@ -62,7 +62,7 @@ def test_every_number_of_the_paper_reaches_the_tracker(recording, tmp_path):
     found = fields(tracker.reader, "color_radius", "color_tolerance")
     assert found == numbers(color_radius=0.15, color_tolerance=0.15)
     assert (tracker.reader.color_space, tracker.reader.box_around) == ("hsv", "last")
-    assert tracker.reader.empty is None
+    assert tracker.reader.background is None
     assert float(tracker.extrapolation) == 0.5
     assert tracker.pairs == "dense"
     # Pictures as large as the paper's: 162 x 121.5 cells of 8 pixels.
@@ -73,8 +73,8 @@ def test_every_number_of_the_paper_reaches_the_tracker(recording, tmp_path):
 def test_the_paper_uses_no_plates_where_there_are_some(recording, tmp_path):
     plates = {name: file for name in recording.rig.names for file in [still(tmp_path / f"{name}.png")]}
     recording = replace(recording, background=plates)
-    assert tracker_of(recording, tmp_path).reader.empty is not None
-    assert tracker_of(recording, tmp_path, "preset=paper").reader.empty is None
+    assert tracker_of(recording, tmp_path).reader.background is not None
+    assert tracker_of(recording, tmp_path, "preset=paper").reader.background is None
 
 
 def still(path):

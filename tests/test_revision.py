@@ -8,7 +8,7 @@ from command_line import actor_file, done, trackable
 from sogjax.errors import InputError
 from sogjax.io.motion import load_motion
 from sogjax.io.recording import open_recording
-from sogjax.quality.limb_confidence import Judgement
+from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.run import revision, track
 from sogjax.run.build import cell_grids
 from sogjax.run.cells import cells_of_clip
@@ -33,8 +33,8 @@ def moved_farther(tracker, passed):
     """What is found where one frame is farther along the first axis."""
     pose, cameras = passed.poses[ROW].copy(), len(tracker.normalizers)
     pose[0] += FARTHER
-    rows = passed.doubts[ROW], passed.usual[ROW], np.array([0.5]), np.full((1, cameras), 0.25)
-    judged = Judgement(*(jnp.asarray(row) for row in rows))
+    rows = passed.doubts[ROW], passed.baseline[ROW], np.array([0.5]), np.full((1, cameras), 0.25)
+    judged = LimbConfidence(*(jnp.asarray(row) for row in rows))
     return Revision({ROW: Revised(pose, 7.0, {"similarity": 8.0}, judged)}, {"left arm": {ROW}})
 
 
@@ -42,11 +42,11 @@ def moved_farther(tracker, passed):
 def farther(monkeypatch):
     """One frame is found to be farther along the first axis."""
 
-    def told_both_ways(tracker, passed, frames):
+    def merge_passes(tracker, passed, frames):
         assert len(list(frames(2, 6))) == 4
         return moved_farther(tracker, passed)
 
-    monkeypatch.setattr(revision, "told_both_ways", told_both_ways)
+    monkeypatch.setattr(revision, "merge_passes", merge_passes)
 
 
 @pytest.mark.parametrize(("overlay", "rerun"), SHOWN.values(), ids=SHOWN)
@@ -85,12 +85,12 @@ def test_frames_read_backwards_are_those_of_the_part_that_is_tracked(capsys, tmp
         monkeypatch.setattr(track, "known_opening", lambda *_: opening)
         command = [word for word in command if not word.startswith("actor=")]
 
-    def told_both_ways(tracker, passed, frames):
+    def merge_passes(tracker, passed, frames):
         assert len(passed.poses) == FRAMES - start
         seen.extend(frames(2, 6))
         return moved_farther(tracker, passed)
 
-    monkeypatch.setattr(revision, "told_both_ways", told_both_ways)
+    monkeypatch.setattr(revision, "merge_passes", merge_passes)
     done(capsys, *command, "outputs.overlay=false", "outputs.rerun=false", f"start={start}", "out=run")
     grids = cell_grids(recording, 4)
     expected = cells_of_clip(recording, grids, ImagesConfig(depth=4), (start + 2, start + 6))
@@ -101,10 +101,10 @@ def test_frames_read_backwards_are_those_of_the_part_that_is_tracked(capsys, tmp
 
 
 def test_a_pass_backwards_that_fails_is_said_and_the_motion_stays(capsys, tmp_path, monkeypatch, command):
-    def told_both_ways(tracker, passed, frames):
+    def merge_passes(tracker, passed, frames):
         raise InputError("a frame has too many image blobs")
 
-    monkeypatch.setattr(revision, "told_both_ways", told_both_ways)
+    monkeypatch.setattr(revision, "merge_passes", merge_passes)
     shown = ["outputs.overlay=false", "outputs.rerun=false"]
     _, err = done(capsys, *command, *shown, "out=run")
     assert "warning: not told both ways, the first pass stays as it is: a frame has too many image blobs" in err

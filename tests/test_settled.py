@@ -29,7 +29,7 @@ def command(tmp_path, monkeypatch):
 @pytest.fixture
 def farther(monkeypatch):
     """One frame is found to be farther along the first axis."""
-    monkeypatch.setattr(revision, "told_both_ways", lambda tracker, passed, frames: moved_farther(tracker, passed))
+    monkeypatch.setattr(revision, "merge_passes", lambda tracker, passed, frames: moved_farther(tracker, passed))
 
 
 @pytest.fixture
@@ -50,7 +50,7 @@ def higher(monkeypatch):
 
 def tracks_nothing(context):
     context.setattr(frame_by_frame, "_step", lambda *_: pytest.fail("a frame was tracked again"))
-    context.setattr(revision, "told_both_ways", lambda *_: pytest.fail("told both ways again"))
+    context.setattr(revision, "merge_passes", lambda *_: pytest.fail("told both ways again"))
 
 
 def test_a_run_stopped_while_its_revised_files_are_written(capsys, tmp_path, monkeypatch, command, farther):

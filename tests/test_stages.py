@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from sogjax.io.threads import Behind, ahead
+from sogjax.io.threads import Writer, prefetch
 
 
 @pytest.fixture(autouse=True)
@@ -35,14 +35,14 @@ def noted(count, made, closed):
 
 def test_items_come_in_order_from_another_thread():
     made, closed = [], []
-    assert list(ahead(noted(50, made, closed), 3)) == list(range(50))
+    assert list(prefetch(noted(50, made, closed), 3)) == list(range(50))
     assert closed[0] is not threading.current_thread()
 
 
 def test_a_slow_taker_holds_the_maker_back():
     """With room for three, four are made beside the one that was taken: three wait and one has no room yet."""
     made, closed = [], []
-    items = ahead(noted(50, made, closed), 3)
+    items = prefetch(noted(50, made, closed), 3)
     assert next(items) == 0
     wait_for(lambda: len(made) == 5)
     time.sleep(0.05)
@@ -57,7 +57,7 @@ def test_an_error_of_the_maker_comes_after_the_items_before_it():
         yield 2
         raise KeyError("three")
 
-    items = ahead(failing(), 5)
+    items = prefetch(failing(), 5)
     assert [next(items), next(items)] == [1, 2]
     with pytest.raises(KeyError, match="three"):
         next(items)
@@ -65,7 +65,7 @@ def test_an_error_of_the_maker_comes_after_the_items_before_it():
 
 def test_everything_put_is_consumed_in_order():
     taken = []
-    with Behind(taken.extend, 2) as behind:
+    with Writer(taken.extend, 2) as behind:
         for k in range(50):
             behind.put(k)
     assert taken == list(range(50))
@@ -80,7 +80,7 @@ def test_a_slow_consumer_holds_the_putter_back():
             taken.append(item)
 
     put = []
-    with Behind(consume, 2) as behind:
+    with Writer(consume, 2) as behind:
         putter = threading.Thread(target=lambda: [(behind.put(k), put.append(k)) for k in range(20)])
         putter.start()
         wait_for(lambda: len(put) == 3)  # one in the consumer's hand, two waiting
@@ -97,13 +97,13 @@ def test_an_error_of_the_consumer_is_raised_where_items_are_put():
         raise OSError("disk full")
 
     def put_for_ever():
-        with Behind(consume, 2) as behind:
+        with Writer(consume, 2) as behind:
             while True:
                 behind.put(0)
 
     with pytest.raises(OSError, match="disk full"):
         put_for_ever()
-    with pytest.raises(OSError, match="disk full"), Behind(consume, 2) as behind:
+    with pytest.raises(OSError, match="disk full"), Writer(consume, 2) as behind:
         behind.put(0)
 
 
@@ -112,7 +112,7 @@ def test_what_was_put_before_an_error_is_still_consumed(error):
     taken = []
 
     def put_and_fail():
-        with Behind(taken.extend, 4) as behind:
+        with Writer(taken.extend, 4) as behind:
             for k in range(4):
                 behind.put(k)
             raise error

@@ -13,7 +13,7 @@ from sogjax.energy.posed import Posed
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.quality.limb_confidence import frame_fit
-from sogjax.quality.limb_evidence import JudgedLimbs, blob_evidence
+from sogjax.quality.limb_evidence import LimbBlobs, blob_evidence
 from sogjax.scene.foreground import subject_colors
 
 ROWS = 160
@@ -68,12 +68,12 @@ def _explained(
 ) -> float:
     colors = subject_colors(np.asarray(body.blob_colors), np.asarray(body.blob_sigmas) ** 2)
     arrays = (jnp.asarray(part) for part in (cells, sides, present, colors.astype(np.float32)))
-    return float(_fit(body, JudgedLimbs.from_body(body), pose, rig, *arrays))
+    return float(_fit(body, LimbBlobs.from_body(body), pose, rig, *arrays))
 
 
 @eqx.filter_jit
 def _fit(
-    body: Body, limbs: JudgedLimbs, pose: Array, rig: Camera, cells: Array, sides: Array, present: Array, colors: Array
+    body: Body, limbs: LimbBlobs, pose: Array, rig: Camera, cells: Array, sides: Array, present: Array, colors: Array
 ) -> Float[Array, ""]:
     posed = Posed.from_pose(body, pose)
     evidence = blob_evidence(limbs, posed, rig, None, cells, sides, colors, present)

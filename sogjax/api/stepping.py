@@ -7,7 +7,7 @@ from typing import Any
 from jaxtyping import Array, UInt8
 
 from sogjax.api.tracking import actor_list, track_settings
-from sogjax.energy.keypoints import keypoint_pull_among
+from sogjax.energy.keypoints import keypoint_term_among
 from sogjax.energy.term import Term
 from sogjax.errors import InputError
 from sogjax.io.recording import Recording
@@ -93,7 +93,7 @@ def read_cells(
             f"0 <= start < stop <= {recording.num_frames}"
         )
     cells = _cells(recording, Preparation(grids), start, last)
-    pulled = keypoint_pull_among(tracker.terms) is not None
+    pulled = keypoint_term_among(tracker.terms) is not None
     keypoints = ClipKeypoints.of_recording(recording) if pulled else None
     return iter(with_keypoints(keypoints, cells, range(start, last)))  # pyright: ignore[reportReturnType]
 

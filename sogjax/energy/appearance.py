@@ -43,7 +43,7 @@ class ColorWindows(eqx.Module):
         return jnp.pi / 4.0 * self.step[..., 0] * self.step[..., 1]
 
 
-class BlobKinds(eqx.Module):
+class BlobClusters(eqx.Module):
     """Which blobs are of a kind, as arrays of one shape for all actors: a large kind is several."""
 
     members: Int[Array, "kind slot"]
@@ -71,7 +71,7 @@ class Appearance(ImageTerm):
     """
 
     windows: ColorWindows
-    kinds: BlobKinds
+    kinds: BlobClusters
     density: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=2.0)
     """A_q in the middle of a blob, as in the foreground term."""
 

@@ -21,7 +21,7 @@ from sogjax.model.sog import Sog
 from sogjax.solve.solution import QuadraticModel
 
 
-def springs_model(
+def gauss_newton_model(
     posed: Posed,
     cameras: Camera,
     pulls_of: Callable[[Sog], ImagePulls],
@@ -88,4 +88,4 @@ def images_model(terms: Sequence[ImageTerm], posed: Posed, frame: Frame) -> Quad
         ]
         return reduce(lambda a, b: jax.tree.map(add, a, b), weighted)
 
-    return springs_model(posed, frame.views.cameras, pulls_of, frame.views.normalizers)
+    return gauss_newton_model(posed, frame.views.cameras, pulls_of, frame.views.normalizers)

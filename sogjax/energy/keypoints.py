@@ -31,7 +31,7 @@ class PointPulls(NamedTuple):
     """The curvature of springs to where the points are drawn."""
 
 
-class KeypointPull(Term):
+class KeypointTerm(Term):
     """The mean over cameras and keypoints of `log(1 + r / outlier)`, times the body's share of the picture.
 
     `r` is the sum over the people of `belongs confidence exp(-d^2 / 2 S^2)`, d being the distance of the keypoint from
@@ -153,6 +153,6 @@ class KeypointPull(Term):
         return jnp.log(total / self.outlier), pulls, jnp.sum(stiffness, axis=1) / scale**2
 
 
-def keypoint_pull_among(terms: Terms) -> KeypointPull | None:
+def keypoint_term_among(terms: Terms) -> KeypointTerm | None:
     """The pull of the keypoints; None: the energy has none."""
-    return next((term for term in terms if isinstance(term, KeypointPull)), None)
+    return next((term for term in terms if isinstance(term, KeypointTerm)), None)

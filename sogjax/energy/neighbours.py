@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.energy.pairs import MEMBERS, TILE, SparsePairs, image_quantities
 from sogjax.model.camera import Camera, project
-from sogjax.model.compiled import chosen_indices, computed_once
+from sogjax.model.compiled import chosen_indices, stage_barrier
 from sogjax.model.sog import Sog
 
 NEGLIGIBLE = 1e-4
@@ -57,9 +57,9 @@ def near_pairs(
     images, color_similarities = _whole_tiles(images, color_similarities)
     num_cameras, num_bodies, num_images = color_similarities.shape
     running = margin[0] > 0.0
-    flags = computed_once(running, _flags, images, color_similarities, seen, margin, exponent)
-    chosen, count = computed_once(running, partial(chosen_indices, capacity=capacity * MEMBERS), flags.reshape(-1))
-    tile, body_index, first, real = computed_once(
+    flags = stage_barrier(running, _flags, images, color_similarities, seen, margin, exponent)
+    chosen, count = stage_barrier(running, partial(chosen_indices, capacity=capacity * MEMBERS), flags.reshape(-1))
+    tile, body_index, first, real = stage_barrier(
         running, partial(_blocks_of, tiles=flags.shape[1], members=flags.shape[2], num_bodies=num_bodies), chosen, count
     )
     slots = jnp.arange(TILE, dtype=chosen.dtype)[:, None]

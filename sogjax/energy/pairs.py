@@ -11,7 +11,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from sogjax.model.compiled import computed_once
+from sogjax.model.compiled import stage_barrier
 from sogjax.model.sog import Sog
 
 TILE = 8
@@ -116,7 +116,7 @@ class SparsePairs(eqx.Module):
 
     def staged(self, function: Callable[..., Results], *arguments: Any) -> Results:
         """The results of a function over pairs, finished before they are used."""
-        return computed_once(self.variances[0, 0, 0] > 0.0, function, *arguments)
+        return stage_barrier(self.variances[0, 0, 0] > 0.0, function, *arguments)
 
     def sum_over_body(self, values: Slots) -> Float[Array, "camera image"]:
         """For each image blob the sum over its pairs."""

@@ -54,7 +54,7 @@ class Channel(Generic[Item]):
             yield item
 
 
-def ahead(items: Iterable[Item], room: int) -> Generator[Item, None, None]:
+def prefetch(items: Iterable[Item], room: int) -> Generator[Item, None, None]:
     """The items, made by a thread that is up to `room` of them ahead; it ends when the iterator does or is closed."""
     channel: Channel[Item] = Channel(room)
     thread = Thread(target=_fill, args=(channel, items), name="ahead", daemon=True)
@@ -82,7 +82,7 @@ def _fill(channel: Channel[Item], items: Iterable[Item]) -> None:
         channel.finish(error)
 
 
-class Behind(Generic[Item]):
+class Writer(Generic[Item]):
     """A `with` block whose items a thread consumes; at most `room` of them wait.
 
     At the end of the block everything that was put has been consumed, also when the block was left by an error. An
@@ -95,7 +95,7 @@ class Behind(Generic[Item]):
         self._error: BaseException | None = None
         self._thread = Thread(target=self._run, name="behind", daemon=True)
 
-    def __enter__(self) -> "Behind[Item]":
+    def __enter__(self) -> "Writer[Item]":
         self._thread.start()
         return self
 

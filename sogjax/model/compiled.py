@@ -22,7 +22,7 @@ Arguments = ParamSpec("Arguments")
 Results = TypeVar("Results")
 
 
-def computed_once(
+def stage_barrier(
     true_at_run_time: Bool[Array, ""],
     function: Callable[Arguments, Results],
     *arguments: Arguments.args,

@@ -15,11 +15,11 @@ from sogjax.energy.foreground import cover
 from sogjax.energy.posed import Posed
 from sogjax.energy.views import Windows
 from sogjax.model.camera import Camera, project
-from sogjax.quality.limb_evidence import DENSITY, BlobEvidence, JudgedLimbs
+from sogjax.quality.limb_evidence import DENSITY, BlobEvidence, LimbBlobs
 
 FAR = 0.1
 """Metres, mean over the limb's joints: farther off is lost."""
-LEAST_USUAL, MOST_USUAL = 0.0, 0.7
+LEAST_BASELINE, MOST_BASELINE = 0.0, 0.7
 """A blob whose colours fit less than the one, or that is more often background than the other, from the beginning, is
 measured against these: it may never have been right."""
 ADAPTATION, LARGEST_STEPS = 0.1, (0.15, 0.1)
@@ -50,12 +50,12 @@ class LimbMeasures(NamedTuple):
     contradicted: Float[Array, "*frame limb"]
 
 
-class Judgement(eqx.Module):
+class LimbConfidence(eqx.Module):
     """What is thought of the bodies and their limbs in one frame."""
 
-    doubt: Float[Array, "limb"]
+    error_probability: Float[Array, "limb"]
     """How likely each is more than `FAR` off."""
-    usual: Float[Array, "2 blob"]
+    baseline: Float[Array, "2 blob"]
     """What `own` and `contradicted` of `BlobEvidence` usually are, for the next frame; a limb in doubt keeps what
     it had."""
     explained: Float[Array, "actor"] | None = None
@@ -63,30 +63,30 @@ class Judgement(eqx.Module):
     overlap: Float[Array, "actor camera"] | None = None
 
 
-def judgement(
-    limbs: JudgedLimbs, evidence: BlobEvidence, usual: Float[Array, "2 blob"], has_background: bool
-) -> Judgement:
+def limb_confidence(
+    limbs: LimbBlobs, evidence: BlobEvidence, baseline: Float[Array, "2 blob"], has_background: bool
+) -> LimbConfidence:
     """Of the limbs, from the evidence for their blobs and what was usual before (NaN in the first frame)."""
-    measures = limb_measures(limbs, evidence, usual)
-    doubt = limb_doubt(measures, WITH_BACKGROUND if has_background else WITHOUT)
-    trust = 1.0 - jnp.max(jnp.where(limbs.members, doubt[:, None], 0.0), axis=0, initial=0.0)
+    measures = limb_measures(limbs, evidence, baseline)
+    probability = error_probability(measures, WITH_BACKGROUND if has_background else WITHOUT)
+    trust = 1.0 - jnp.max(jnp.where(limbs.members, probability[:, None], 0.0), axis=0, initial=0.0)
     rate = ADAPTATION * trust * _certainty(evidence)
-    seen, known = _seen(evidence), _known(evidence, usual)
+    seen, known = _seen(evidence), _known(evidence, baseline)
     largest = jnp.asarray(LARGEST_STEPS, known.dtype)[:, None]
-    return Judgement(doubt, known + rate[None] * jnp.clip(seen - known, -largest, largest))
+    return LimbConfidence(probability, known + rate[None] * jnp.clip(seen - known, -largest, largest))
 
 
-def limb_measures(limbs: JudgedLimbs, evidence: BlobEvidence, usual: Float[Array, "2 blob"]) -> LimbMeasures:
+def limb_measures(limbs: LimbBlobs, evidence: BlobEvidence, baseline: Float[Array, "2 blob"]) -> LimbMeasures:
     """Of the limbs in one frame."""
-    certainty, (own, contradicted) = _certainty(evidence), _known(evidence, usual)
-    more = evidence.contradicted - jnp.minimum(contradicted, MOST_USUAL)
+    certainty, (own, contradicted) = _certainty(evidence), _known(evidence, baseline)
+    more = evidence.contradicted - jnp.minimum(contradicted, MOST_BASELINE)
     return LimbMeasures(
-        worse=-limbs.mean_of_worst(certainty * (evidence.own - jnp.maximum(own, LEAST_USUAL))),
+        worse=-limbs.mean_of_worst(certainty * (evidence.own - jnp.maximum(own, LEAST_BASELINE))),
         contradicted=-limbs.mean_of_worst(-certainty * more),
     )
 
 
-def limb_doubt(measures: LimbMeasures, weights: Weights) -> Float[Array, "*frame limb"]:
+def error_probability(measures: LimbMeasures, weights: Weights) -> Float[Array, "*frame limb"]:
     """How likely limbs are more than `FAR` off."""
     return jax.nn.sigmoid(
         weights.constant + weights.worse * measures.worse + weights.contradicted * measures.contradicted
@@ -97,9 +97,9 @@ def _seen(evidence: BlobEvidence) -> Float[Array, "2 blob"]:
     return jnp.stack([evidence.own, evidence.contradicted])
 
 
-def _known(evidence: BlobEvidence, usual: Float[Array, "2 blob"]) -> Float[Array, "2 blob"]:
+def _known(evidence: BlobEvidence, baseline: Float[Array, "2 blob"]) -> Float[Array, "2 blob"]:
     """What is usual; what is seen where nothing is known yet."""
-    return jnp.where(jnp.isfinite(usual), usual, _seen(evidence))
+    return jnp.where(jnp.isfinite(baseline), baseline, _seen(evidence))
 
 
 def _certainty(evidence: BlobEvidence) -> Float[Array, "blob"]:
@@ -120,7 +120,7 @@ class FrameFit(eqx.Module):
 
 
 def frame_fit(
-    limbs: JudgedLimbs, evidence: BlobEvidence, posed: Posed, cameras: Camera, windows: Windows | None
+    limbs: LimbBlobs, evidence: BlobEvidence, posed: Posed, cameras: Camera, windows: Windows | None
 ) -> FrameFit:
     """Of posed bodies, from the evidence for their blobs and the foreground around each actor."""
     actors = np.array(limbs.actor_of_blob, int)

@@ -23,7 +23,7 @@ WORST = 1.0 / 3.0
 """Part of a limb's blobs that is looked at: those that fit worst, as a limb is lost from some joint on."""
 
 
-class JudgedLimbs(eqx.Module):
+class LimbBlobs(eqx.Module):
     """Which blobs are a limb's."""
 
     members: Bool[Array, "limb blob"]
@@ -34,7 +34,7 @@ class JudgedLimbs(eqx.Module):
     actor_of_blob: tuple[int, ...] = eqx.field(static=True)
 
     @classmethod
-    def from_body(cls, body: Body) -> "JudgedLimbs":
+    def from_body(cls, body: Body) -> "LimbBlobs":
         """Of a body, or several beside each other."""
         members = limb_blobs(body)
         counts = np.ceil(WORST * members.sum(axis=1, keepdims=True))
@@ -79,7 +79,7 @@ class BlobEvidence(NamedTuple):
 
 
 def blob_evidence(
-    limbs: JudgedLimbs,
+    limbs: LimbBlobs,
     posed: Posed,
     cameras: Camera,
     windows: Windows | None,
@@ -135,7 +135,7 @@ def _colors_at(
     return colors.reshape(*places.shape[:2], 3), inside.reshape(places.shape[:2])
 
 
-def _visible(limbs: JudgedLimbs, blobs: Sog, seen: Sog, cameras: Camera) -> Float[Array, "camera blob"]:
+def _visible(limbs: LimbBlobs, blobs: Sog, seen: Sog, cameras: Camera) -> Float[Array, "camera blob"]:
     """How much of each blob's middle is left visible by blobs of other parts of a body."""
     sigmas = jnp.where(seen.mask, seen.sigmas, 1.0)
     depths = blobs.sigmas[None, :] * cameras.focal_length[:, None] / sigmas
@@ -147,7 +147,7 @@ def _visible(limbs: JudgedLimbs, blobs: Sog, seen: Sog, cameras: Camera) -> Floa
 
 
 def _odds_at(
-    limbs: JudgedLimbs, windows: Windows, places: Float[Array, "camera blob sample 2"]
+    limbs: LimbBlobs, windows: Windows, places: Float[Array, "camera blob sample 2"]
 ) -> Float[Array, "camera blob sample"]:
     """Log odds of foreground in the windows of the blobs' actors; 0 outside them."""
     actors = np.array(limbs.actor_of_blob, int)

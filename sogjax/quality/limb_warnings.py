@@ -89,7 +89,7 @@ def limits_of(body: Body) -> dict[str, Limits]:
     return {name: Limits(*row) for name, row in zip(skeleton.dof_names, rows, strict=True)}
 
 
-def strained_joints(motion: Motion, limits: Mapping[str, Limits]) -> dict[str, float]:
+def joints_at_limits(motion: Motion, limits: Mapping[str, Limits]) -> dict[str, float]:
     """The degrees of freedom that are at a limit in most frames, and in what share of them."""
     found = {}
     for name, values in zip(motion.dof_names.tolist(), np.asarray(motion.pose).T, strict=True):

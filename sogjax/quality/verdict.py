@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from sogjax.io.motion import Motion
-from sogjax.quality.limb_warnings import DoubtfulLimb, Limits, doubtful_limbs, strained_joints
+from sogjax.quality.limb_warnings import DoubtfulLimb, Limits, doubtful_limbs, joints_at_limits
 from sogjax.quality.metrics import stretches
 
 OTHER_SUBJECT = 0.6
@@ -183,7 +183,7 @@ def _limbs(doubtful: Sequence[DoubtfulLimb]) -> list[str]:
 
 
 def _bent(motion: Motion, limits: Mapping[str, Limits]) -> list[str]:
-    strained = strained_joints(motion, limits).items()
+    strained = joints_at_limits(motion, limits).items()
     return _shortened([f"look at {name}, at its limit in {share:.0%} of the frames" for name, share in strained])
 
 

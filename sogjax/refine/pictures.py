@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int, UInt8
 
-from sogjax.energy.appearance import BlobKinds, ColorWindows
+from sogjax.energy.appearance import BlobClusters, ColorWindows
 from sogjax.energy.neighbours import margins, near_pairs
 from sogjax.energy.pairs import SparsePairs
 from sogjax.energy.similarity import similarity_among
@@ -16,8 +16,8 @@ from sogjax.energy.views import Views
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, project
 from sogjax.refine.camera_moves import Sights
-from sogjax.scene.color_clusters import SLOTS, SPARE, Kinds, kinds_of, odds_where_told
-from sogjax.search.search_energy import blob_kinds
+from sogjax.scene.color_clusters import SLOTS, SPARE, ColorClusters, color_clusters, odds_where_told
+from sogjax.search.search_energy import blob_clusters
 from sogjax.search.seen_frame import cells_at
 from sogjax.tracking.capacity import first_capacities, larger_capacities
 from sogjax.tracking.culling import BLOCK_STEP, Capacities, actor_of_blobs, block_capacity, body_boxes
@@ -40,7 +40,7 @@ class ClipPictures(eqx.Module):
 
     views: Views
     windows: ColorWindows
-    kinds: BlobKinds = eqx.field()
+    kinds: BlobClusters = eqx.field()
     """Without that axis."""
 
     @property
@@ -53,7 +53,7 @@ class Reader(eqx.Module):
     """Makes the pictures of a clip from cells, for one body."""
 
     tracker: Tracker
-    kinds: Kinds = eqx.field(static=True)
+    kinds: ColorClusters = eqx.field(static=True)
     inside: Float[np.ndarray, "camera rows columns"]
     """1 for the cells of a picture, 0 for padding."""
 
@@ -65,7 +65,7 @@ class Reader(eqx.Module):
         for k, grid in enumerate(grids):
             inside[k, : grid.rows, : grid.columns] = 1.0
         body = tracker.body
-        return cls(tracker, kinds_of(np.asarray(body.blob_colors), np.asarray(body.blob_sigmas) ** 2), inside)
+        return cls(tracker, color_clusters(np.asarray(body.blob_colors), np.asarray(body.blob_sigmas) ** 2), inside)
 
     def pictures(self, cells: Sequence[FrameCells], poses: Float[np.ndarray, "frame dof"]) -> ClipPictures:
         """Of frames, near the poses in them.
@@ -92,7 +92,7 @@ class Reader(eqx.Module):
             shown = jnp.where(present[:, None, None], self.inside, 0.0)
             windows.append(_windows(self.tracker, frame[0], shown, tables, state.previous))
         stack = lambda *leaves: jnp.stack(leaves)
-        kinds = blob_kinds(self.kinds, self.tracker.body.num_blobs)
+        kinds = blob_clusters(self.kinds, self.tracker.body.num_blobs)
         return ClipPictures(jax.tree.map(stack, *found), jax.tree.map(stack, *windows), kinds)
 
 
@@ -171,7 +171,7 @@ def _windows(
 ) -> ColorWindows:
     """Grids around a body: what each kind of blob would explain there."""
     cameras, body = tracker.cameras, tracker.body
-    odds = odds_where_told(cells.astype(tables.dtype) / 255.0, inside, tracker.reader.empty, tables[:-1])
+    odds = odds_where_told(cells.astype(tables.dtype) / 255.0, inside, tracker.reader.background, tables[:-1])
     actors = actor_of_blobs(body.skeleton, body.blobs.joints)
     around = jax.vmap(body_boxes, in_axes=(None, 0, None, None))
     boxes = around(body.posed_blobs(pose), cameras, actors, jnp.asarray(BORDER, pose.dtype))[:, 0]

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
-from sogjax.energy.keypoints import keypoint_pull_among
+from sogjax.energy.keypoints import keypoint_term_among
 from sogjax.io.ground_truth import load_ground_truth
 from sogjax.io.motion import Motion, motion_from_poses
 from sogjax.io.recording import Recording
@@ -121,7 +121,7 @@ def _job(recording: Recording, actor: Body, motion: Motion, config: TrackConfig,
     frames = (first, int(motion.frame[-1]) - recording.first_frame + 1)
     keypoints = clip_keypoints(recording, config)
     tracker = build.tracker(recording, body, grids, config, keypoint_terms(keypoints, body, config))
-    if keypoints is not None and keypoint_pull_among(tracker.terms) is not None:
+    if keypoints is not None and keypoint_term_among(tracker.terms) is not None:
         rows = np.unique(np.linspace(0, motion.num_frames - 1, FRAMES).astype(int))
         told = motion.frame[rows] - recording.first_frame
         tracker = knowing_offsets(tracker, keypoints, told, motion.pose[rows])

@@ -8,12 +8,12 @@ import numpy as np
 
 from sogjax.io.motion import Motion
 from sogjax.model.body import Body
-from sogjax.quality.limb_confidence import Judgement
+from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.run.job import Job
 from sogjax.run.judged_frames import Judged
 from sogjax.run.prefix import JUDGEMENT, Prefix
 from sogjax.tracking.frame import FrameCells
-from sogjax.tracking.known_poses import judged_poses
+from sogjax.tracking.known_poses import confidence_of_poses
 
 MORE_DOUBT = 0.02
 """About a limb, on average over the frames, that new colours may cause."""
@@ -45,18 +45,18 @@ def more_doubtful(motion: Motion, than: Motion) -> bool:
     return doubt(motion) > doubt(than) + MORE_DOUBT
 
 
-def _judgements(jobs: Sequence[Job], cells: Iterable[FrameCells], motion: Motion) -> list[list[Judgement]]:
+def _judgements(jobs: Sequence[Job], cells: Iterable[FrameCells], motion: Motion) -> list[list[LimbConfidence]]:
     """Of each job's body in every frame, frame by frame, so that cells need not be kept."""
     parts = zip(jobs, tee(cells, len(jobs)), strict=True)
-    each = [judged_poses(job.tracker, np.asarray(motion.pose), part) for job, part in parts]
-    found: list[list[Judgement]] = [[] for _ in jobs]
+    each = [confidence_of_poses(job.tracker, np.asarray(motion.pose), part) for job, part in parts]
+    found: list[list[LimbConfidence]] = [[] for _ in jobs]
     for frame in zip(*each, strict=True):
         for judgements, judgement in zip(found, frame, strict=True):
             judgements.append(judgement)
     return found
 
 
-def _told(job: Job, found: list[Judgement], prefix: Prefix, motion: Motion) -> tuple[Prefix, Motion]:
+def _told(job: Job, found: list[LimbConfidence], prefix: Prefix, motion: Motion) -> tuple[Prefix, Motion]:
     """The frames and the motion with what was said of them, if anything was."""
     if not found:
         return prefix, motion

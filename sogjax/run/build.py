@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from sogjax.energy.frame_energy import standard_terms
-from sogjax.energy.keypoints import KeypointPull
+from sogjax.energy.keypoints import KeypointTerm
 from sogjax.energy.overlap import EXACT_EXPONENT, PRINTED_EXPONENT
 from sogjax.energy.priors import RestPenalty
 from sogjax.energy.term import Term, Terms, added_terms
@@ -18,11 +18,11 @@ from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.color import COLOR_RADIUS
-from sogjax.quality.limb_evidence import JudgedLimbs
+from sogjax.quality.limb_evidence import LimbBlobs
 from sogjax.quality.markers import MARKER_RULES, MarkerRule
 from sogjax.run.background import CHOICES, background_cells
 from sogjax.scene.cells import CellGrid
-from sogjax.scene.foreground import EmptyScene, SubjectColors, subject_colors
+from sogjax.scene.foreground import BackgroundModel, SubjectColors, subject_colors
 from sogjax.scene.quadtree import Candidates
 from sogjax.settings.method import ColorConfig, EnergyConfig, ImagesConfig, SolverConfig
 from sogjax.settings.run import TrackConfig
@@ -208,7 +208,7 @@ def image_reader(
         box_enlargement=at_least("images.box_enlargement", config.images.box_enlargement, 0.0),
         color_space=space,
         box_around=box_around(config.images),
-        empty=_empty_scene(recording, grids, config.images),
+        background=_background_model(recording, grids, config.images),
         subject=_subject(bodies) if bodies else None,
     )
 
@@ -228,7 +228,7 @@ def tracker(
         scales=solver_scales(config.solver, body),
         extrapolation=config.tracking.extrapolation,
         pairs=pair_choice(config.energy),
-        limbs=JudgedLimbs.from_body(body) if config.outputs.confidence else None,
+        limbs=LimbBlobs.from_body(body) if config.outputs.confidence else None,
     )
 
 
@@ -244,12 +244,12 @@ def varied(tracker: Tracker, config: TrackConfig) -> Tracker:
     return replace(
         tracker,
         reader=reader,
-        terms=_tracking_terms(config.energy, [term for term in tracker.terms if isinstance(term, KeypointPull)]),
+        terms=_tracking_terms(config.energy, [term for term in tracker.terms if isinstance(term, KeypointTerm)]),
         solver=solver(config.solver),
         scales=solver_scales(config.solver, tracker.body),
         extrapolation=config.tracking.extrapolation,
         pairs=pair_choice(config.energy),
-        limbs=JudgedLimbs.from_body(tracker.body) if config.outputs.confidence else None,
+        limbs=LimbBlobs.from_body(tracker.body) if config.outputs.confidence else None,
     )
 
 
@@ -266,11 +266,13 @@ def _subject(bodies: Sequence[Body]) -> SubjectColors:
     return jnp.asarray(subject_colors(colors, areas), jnp.result_type(float))
 
 
-def _empty_scene(recording: Recording, grids: tuple[CellGrid, ...], config: ImagesConfig) -> EmptyScene | None:
+def _background_model(
+    recording: Recording, grids: tuple[CellGrid, ...], config: ImagesConfig
+) -> BackgroundModel | None:
     """What frames are compared with; None: nothing is known of the background.
 
     Raises:
         InputError: the background that the settings ask for cannot be had.
     """
     found = background_cells(recording, grids, config)
-    return None if found is None else EmptyScene.from_background(found)
+    return None if found is None else BackgroundModel.from_background(found)

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from sogjax.energy.keypoint_views import SeenKeypoints
-from sogjax.energy.keypoints import KeypointPull
+from sogjax.energy.keypoints import KeypointTerm
 from sogjax.io.keypoints.load import Keypoints, load_keypoints
 from sogjax.io.keypoints.scheme import KeypointScheme
 from sogjax.io.recording import Recording
@@ -66,17 +66,17 @@ def clip_keypoints(recording: Recording, config: TrackConfig) -> ClipKeypoints |
     return ClipKeypoints.of_recording(recording) if config.energy.keypoint_weight > 0.0 else None
 
 
-def keypoint_terms(keypoints: ClipKeypoints | None, body: Body, config: TrackConfig) -> tuple[KeypointPull, ...]:
+def keypoint_terms(keypoints: ClipKeypoints | None, body: Body, config: TrackConfig) -> tuple[KeypointTerm, ...]:
     """The term of the energy that they are; none without keypoints."""
     if keypoints is None:
         return ()
     return (keypoint_pull(keypoints.found.scheme, body, config.energy.keypoint_weight),)
 
 
-def keypoint_pull(scheme: KeypointScheme, body: Body, weight: float) -> KeypointPull:
+def keypoint_pull(scheme: KeypointScheme, body: Body, weight: float) -> KeypointTerm:
     """The pull of keypoints of a scheme on the landmarks of a body, or of several that are one."""
     marks = [scheme.on(names) for names in _landmarks_by_actor(body)]
-    return KeypointPull(
+    return KeypointTerm(
         weight,
         landmarks=tuple(tuple(of_actor.tolist()) for of_actor in marks),
         mirrored=tuple(scheme.mirrored.tolist()),

@@ -24,7 +24,7 @@ from sogjax.io.video import read_frames
 from sogjax.model.body import Body
 from sogjax.run.clip_keypoints import ClipKeypoints
 from sogjax.run.keypoint_start import keypoint_starts
-from sogjax.run.pose_search import Beginning, PoseSearch, tried_frames
+from sogjax.run.pose_search import Beginning, ClipSearch, tried_frames
 from sogjax.run.terminal import alive, say
 from sogjax.search.found_pose import FoundPose
 from sogjax.search.rough_pose import check_rough_pose, rough_pose
@@ -119,7 +119,7 @@ def first_poses(
         if known is not None:
             return known
     if descriptions is None:
-        search = PoseSearch(recording, bodies, config, terms)
+        search = ClipSearch(recording, bodies, config, terms)
         beginning = clear_beginning(search, frame, recording.num_frames if last is None else last)
         return [jnp.asarray(pose) for pose in search.carried(beginning, frame)]
     if frame + recording.first_frame > 0:
@@ -146,7 +146,7 @@ def rough_descriptions(recording: Recording, bodies: Sequence[Body], config: Tra
     return [given[body.name] for body in bodies]
 
 
-def clear_beginning(search: PoseSearch, first: int, last: int, picture: Path | None = None) -> Beginning:
+def clear_beginning(search: ClipSearch, first: int, last: int, picture: Path | None = None) -> Beginning:
     """The first of some frames from `first` up to `last` in which the poses of all actors are sure.
 
     Raises:
@@ -188,7 +188,7 @@ def searched_poses(
     Raises:
         InputError: the pictures show nothing in an actor's colours where the cameras look.
     """
-    found = PoseSearch(recording, bodies, config, terms).beginning(frame).poses
+    found = ClipSearch(recording, bodies, config, terms).beginning(frame).poses
     lost = [body.name for body, pose in zip(bodies, found, strict=True) if not pose.energy > 0.0]
     if lost:
         raise InputError(
@@ -202,5 +202,5 @@ def _remedy(recording: Recording) -> str:
     return f"the rough pose into {recording.path / 'initial_pose.yaml'}"
 
 
-def _background_remedy(search: PoseSearch) -> str:
+def _background_remedy(search: ClipSearch) -> str:
     return "" if search.has_background else "; pictures of the empty scene (background/) help most"

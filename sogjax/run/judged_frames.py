@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from sogjax.model.body import Body
 from sogjax.model.limbs import joint_limbs, limb_names
-from sogjax.quality.limb_confidence import Judgement
+from sogjax.quality.limb_confidence import LimbConfidence
 
 
 @dataclass(frozen=True)
@@ -22,10 +22,10 @@ class Judged:
     cameras: tuple[str, ...]
 
     @classmethod
-    def of(cls, judgements: Sequence[Judgement], cameras: Sequence[str]) -> "Judged":
+    def of(cls, judgements: Sequence[LimbConfidence], cameras: Sequence[str]) -> "Judged":
         """Of frames one after the other."""
         rows = lambda name: np.stack([np.asarray(getattr(each, name), float) for each in judgements])
-        return cls(rows("doubt"), rows("explained"), rows("overlap"), tuple(cameras))
+        return cls(rows("error_probability"), rows("explained"), rows("overlap"), tuple(cameras))
 
     def of_actor(self, actor: int, body: Body, limbs: slice) -> dict[str, Any]:
         """What a motion says of an actor, whose limbs are a part of all."""

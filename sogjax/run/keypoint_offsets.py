@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from sogjax.energy.keypoint_views import SeenKeypoints
-from sogjax.energy.keypoints import KeypointPull, keypoint_pull_among
+from sogjax.energy.keypoints import KeypointTerm, keypoint_term_among
 from sogjax.run.clip_keypoints import ClipKeypoints
 from sogjax.run.job import Job
 from sogjax.run.pipeline import PictureReader, Preparation, cells_of_frame
@@ -32,7 +32,7 @@ def told_offsets(job: Job, read: PictureReader) -> Tracker:
         InputError: a video cannot be read, or a picture has too many image blobs.
     """
     first, count = job.begin, min(FRAMES, job.frames[1] - job.begin)
-    pull = keypoint_pull_among(job.tracker.terms)
+    pull = keypoint_term_among(job.tracker.terms)
     if job.keypoints is None or pull is None or count < FEWEST or len(job.grids) < 2:
         return job.tracker
     lightly = eqx.tree_at(lambda p: p.weight, pull, LITTLE * pull.weight)
@@ -52,7 +52,7 @@ def knowing_offsets(
     poses: Float[np.ndarray, "frame dof"],
 ) -> Tracker:
     """The tracker with the offsets that frames with known poses tell; `frames` counts from the recording's first."""
-    pull = keypoint_pull_among(tracker.terms)
+    pull = keypoint_term_among(tracker.terms)
     assert pull is not None
     seen = SeenKeypoints(keypoints.seen.pixels[frames], keypoints.seen.confidence[frames])
     seen, poses_there = jax.tree.map(jnp.asarray, seen), jnp.asarray(poses, tracker.normalizers.dtype)
@@ -61,9 +61,9 @@ def knowing_offsets(
     return with_pull(tracker, eqx.tree_at(lambda p: p.offsets, pull, offsets))
 
 
-def with_pull(tracker: Tracker, pull: KeypointPull) -> Tracker:
+def with_pull(tracker: Tracker, pull: KeypointTerm) -> Tracker:
     """The tracker with another pull of the keypoints."""
-    terms = tuple(pull if isinstance(term, KeypointPull) else term for term in tracker.terms)
+    terms = tuple(pull if isinstance(term, KeypointTerm) else term for term in tracker.terms)
     return eqx.tree_at(lambda t: t.terms, tracker, terms)
 
 

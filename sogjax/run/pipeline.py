@@ -12,7 +12,7 @@ from jaxtyping import Array, Float, UInt8
 
 from sogjax.errors import InputError
 from sogjax.io.recording import Recording
-from sogjax.io.threads import ahead
+from sogjax.io.threads import prefetch
 from sogjax.io.video import read_prepared
 from sogjax.model.yuv_picture import YuvPicture
 from sogjax.run.clock import StageTimes
@@ -125,7 +125,7 @@ def tracked_frames(
         InputError: a video ends early, or a picture has too many image blobs.
     """
     waiting: deque[list[Picture]] = deque()
-    with closing(ahead(pictures, FRAMES_AHEAD)) as ready:
+    with closing(prefetch(pictures, FRAMES_AHEAD)) as ready:
 
         def cells() -> Iterator[FrameCells]:
             for frame in progress(times.timed("decode", ready), count, "tracking"):

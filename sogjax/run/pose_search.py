@@ -17,7 +17,7 @@ from sogjax.scene.cells import padded_cells, stack_shape
 from sogjax.search.found_pose import FoundPose, search_poses
 from sogjax.search.mirrored import means_of, sides_apart
 from sogjax.search.pose_confidence import Agreement, followed
-from sogjax.search.pose_search import Optimum, Report, Searcher, unreported
+from sogjax.search.pose_search import Optimum, PoseSearch, Report, unreported
 from sogjax.search.seen_frame import SeenFrame
 from sogjax.settings.run import TrackConfig
 
@@ -48,7 +48,7 @@ class Beginning:
 
 
 @dataclass(frozen=True)
-class PoseSearch:
+class ClipSearch:
     """What searches of a recording's frames need; bodies stand upright in its world."""
 
     recording: Recording
@@ -69,14 +69,14 @@ class PoseSearch:
         return build.image_reader(self.recording, self._grids, self.config, self.bodies)
 
     @cached_property
-    def _searchers(self) -> list[Searcher]:
+    def _searchers(self) -> list[PoseSearch]:
         terms = build.energy_terms(self.config.energy, self.terms)
-        return [Searcher.of_body(body, terms, self.recording.up) for body in self.bodies]
+        return [PoseSearch.of_body(body, terms, self.recording.up) for body in self.bodies]
 
     @property
     def has_background(self) -> bool:
         """Whether anything is known of the empty scene."""
-        return self._reader.empty is not None
+        return self._reader.background is not None
 
     @cached_property
     def _searched(self) -> dict[int, list[FoundPose]]:
@@ -166,7 +166,7 @@ class PoseSearch:
         forward = frame + (count - 1) * step <= last
         return [frame + (k if forward else -k) * step for k in range(count)]
 
-    def _seen(self, searcher: Searcher, cells: np.ndarray, present: np.ndarray) -> SeenFrame:
+    def _seen(self, searcher: PoseSearch, cells: np.ndarray, present: np.ndarray) -> SeenFrame:
         return SeenFrame.from_cells(self._cameras, self._reader, cells, searcher.kinds, present.tolist())
 
     def _cells(self, frames: Sequence[int]) -> Iterator[tuple[int, tuple[UInt8[np.ndarray, "_ _ _ 3"], np.ndarray]]]:

@@ -8,14 +8,19 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from sogjax.model.sog import Sog
-from sogjax.quality.limb_confidence import Judgement
+from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import FrameResult, TrackedFrame, TrackState
 
 TERM = "term_"
 """Before the name of a term of the energy, in the names of columns."""
 COLUMNS = ("pose", "energy", "iterations", "evaluations", "converged", "num_near", "num_matching", "num_blocks")
-JUDGEMENT = {"limb_doubt": "doubt", "limb_usual": "usual", "explained": "explained", "overlap": "overlap"}
+JUDGEMENT = {
+    "limb_doubt": "error_probability",
+    "limb_usual": "baseline",
+    "explained": "explained",
+    "overlap": "overlap",
+}
 """Columns of runs whose frames are judged."""
 CAPACITY, CAPACITIES = "capacity_{}", ("near", "matching", "blocks")
 _NEEDED = {*COLUMNS, *(CAPACITY.format(name) for name in CAPACITIES)}
@@ -58,8 +63,8 @@ class Prefix:
         state = TrackState.from_pose(start)
         for pose in self.rows["pose"][-2:]:
             state = state.advanced(jnp.asarray(pose))
-        usual = self.rows.get("limb_usual")
-        return state if usual is None else replace(state, usual=jnp.asarray(usual[-1]))
+        baseline = self.rows.get("limb_usual")
+        return state if baseline is None else replace(state, baseline=jnp.asarray(baseline[-1]))
 
     def result(self, frame: int, images: Sog) -> FrameResult:
         """The result of one frame; image blobs are not kept."""
@@ -67,7 +72,7 @@ class Prefix:
         judged = {name: values[key] for key, name in JUDGEMENT.items() if key in values}
         return FrameResult(
             terms={name.removeprefix(TERM): value for name, value in values.items() if name.startswith(TERM)},
-            limbs=Judgement(**judged) if judged else None,
+            limbs=LimbConfidence(**judged) if judged else None,
             images=images,
             **{name: values[name] for name in COLUMNS},
         )

@@ -11,7 +11,7 @@ from sogjax.run.job import Job
 from sogjax.run.prefix import JUDGEMENT, TERM, Prefix
 from sogjax.run.terminal import alive, say
 from sogjax.search.backward_pass import Pass
-from sogjax.search.merge_passes import Revised, in_doubt, told_both_ways
+from sogjax.search.merge_passes import Revised, in_doubt, merge_passes
 from sogjax.settings.method import ImagesConfig
 from sogjax.tracking.frame import FrameCells
 
@@ -35,7 +35,7 @@ class Reviser:
             say(f"limbs in doubt in {counted(doubtful, 'frame')}: tracked backwards around them, too")
         try:
             with alive("tracking backwards"):
-                found = told_both_ways(job.tracker, passed, self._backwards)
+                found = merge_passes(job.tracker, passed, self._backwards)
         except InputError as error:
             say(f"warning: not told both ways, the first pass stays as it is: {error}")
             return None

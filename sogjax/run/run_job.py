@@ -12,7 +12,7 @@ import numpy as np
 from sogjax.energy.term import Term
 from sogjax.errors import counted
 from sogjax.io.recording import Recording
-from sogjax.io.threads import Behind
+from sogjax.io.threads import Writer
 from sogjax.model.body import Body
 from sogjax.run.backwards import frames_backwards, tracked_backwards
 from sogjax.run.cells import picture_reader
@@ -206,7 +206,7 @@ def _streamed(
         pictures = read(job.recording, streams.preparation(job.grids), last - count, last) if count else iter(())
         known = lambda cells: follow(job.with_keypoints(cells, range(last - count, last)))
         frames = tracked_frames(pictures, count, streams.times, known)
-        with closing(frames), Behind(streams.consume, FRAMES_BEHIND) as behind:
+        with closing(frames), Writer(streams.consume, FRAMES_BEHIND) as behind:
             for done in frames:
                 used.append(float(np.mean(done.tracked.result.num_matching)))
                 if missing is not None:

@@ -17,7 +17,7 @@ from sogjax.model.camera import Camera
 from sogjax.run.build import cell_grids
 from sogjax.scene.background import CameraBackground, stack_background
 from sogjax.scene.cells import CellGrid
-from sogjax.scene.foreground import SHADOW, EmptyScene, log_odds
+from sogjax.scene.foreground import SHADOW, BackgroundModel, log_odds
 from sogjax.scene.segmentation import largest_parts
 from sogjax.scene.visual_hull import resized
 
@@ -54,7 +54,7 @@ def sampled_masks(recording: Recording, learnt: Sequence[CameraBackground], shad
     by more is not the background.
     """
     grids = cell_grids(recording, DEPTH)
-    empty = EmptyScene.from_background(stack_background(learnt, grids), shadow)
+    empty = BackgroundModel.from_background(stack_background(learnt, grids), shadow)
     sampled = _samples(recording, grids)
     frames = sorted(set.intersection(*(set(of_camera) for of_camera in sampled)))
     pictures = [{k: of_camera[frame] for k, of_camera in enumerate(sampled)} for frame in frames]
@@ -80,7 +80,7 @@ def _samples(recording: Recording, grids: Sequence[CellGrid]) -> list[dict[int, 
 
 
 def _odds(
-    pictures: Sequence[Picture], grids: Sequence[CellGrid], empty: EmptyScene
+    pictures: Sequence[Picture], grids: Sequence[CellGrid], empty: BackgroundModel
 ) -> Float[np.ndarray, "camera rows columns"]:
     shape = empty.known.shape
     cells = np.zeros((*shape, 3), np.float32)

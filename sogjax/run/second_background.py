@@ -25,7 +25,7 @@ from sogjax.run.terminal import progress, say
 from sogjax.scene.background import stack_background
 from sogjax.scene.cells import CellGrid
 from sogjax.scene.clip_background import FEWEST_AGREEING
-from sogjax.scene.foreground import EmptyScene
+from sogjax.scene.foreground import BackgroundModel
 from sogjax.scene.plate_difference import working_size
 from sogjax.search.search_energy import DISC
 from sogjax.settings.method import ImagesConfig
@@ -78,7 +78,7 @@ def learnt_again(
 
 def unknown_share(tracker: Tracker, recording: Recording, grids: Sequence[CellGrid], images: ImagesConfig) -> float:
     """How much of the pictures a background that was learnt from the clip leaves open; 0 without such a one."""
-    empty = tracker.reader.empty
+    empty = tracker.reader.background
     if empty is None or _from_pictures(recording, images):
         return 0.0
     inside = np.zeros(np.asarray(empty.known).shape, bool)
@@ -102,9 +102,9 @@ def knowing_the_body(
         InputError: a video cannot be read.
     """
     learnt = clip_backgrounds_without(recording, body_masks(recording, tracker.body, poses))
-    again, before = EmptyScene.from_background(stack_background(learnt, grids)), tracker.reader.empty
+    again, before = BackgroundModel.from_background(stack_background(learnt, grids)), tracker.reader.background
     assert before is not None
-    return eqx.tree_at(lambda t: t.reader.empty, tracker, again.filled_by(before))
+    return eqx.tree_at(lambda t: t.reader.background, tracker, again.filled_by(before))
 
 
 def body_masks(recording: Recording, body: Body, poses: Mapping[int, Array]) -> LeftOut:

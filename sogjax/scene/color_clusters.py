@@ -12,7 +12,7 @@ from sogjax.scene.foreground import (
     COLOR_BINS,
     LARGEST,
     TEMPER,
-    EmptyScene,
+    BackgroundModel,
     background_surprise,
     color_bins,
     subject_colors,
@@ -33,7 +33,7 @@ UNKNOWN_BACKGROUND = 0.6
 
 
 @dataclass(frozen=True)
-class Kinds:
+class ColorClusters:
     """The blobs of a body by colour, and the log density of the colours of each kind."""
 
     members: tuple[tuple[int, ...], ...]
@@ -43,7 +43,7 @@ class Kinds:
     """Of the whole body."""
 
 
-def kinds_of(colors: Float[np.ndarray, "blob 3"], areas: Float[np.ndarray, "blob"]) -> Kinds:
+def color_clusters(colors: Float[np.ndarray, "blob 3"], areas: Float[np.ndarray, "blob"]) -> ColorClusters:
     """The kinds of a body's blobs, from their colours (sRGB) and how much of the body each is."""
     colors, areas = np.asarray(colors, float), np.asarray(areas, float)
     members = _by_color(colors)
@@ -73,16 +73,16 @@ def _num_kinds(num_blobs: int) -> int:
 
 def _padded(
     members: list[list[int]], tables: list[np.ndarray], whole: Float[np.ndarray, "bin bin bin"], num_blobs: int
-) -> Kinds:
+) -> ColorClusters:
     missing = _num_kinds(num_blobs) - len(members)
     every = tuple(tuple(part) for part in [*members, *[[]] * missing])
-    return Kinds(every, np.stack([*tables, *[np.zeros_like(whole)] * missing]), whole)
+    return ColorClusters(every, np.stack([*tables, *[np.zeros_like(whole)] * missing]), whole)
 
 
 def kind_odds(
     cells: Float[Array, "camera rows columns 3"],
     inside: Float[Array, "camera rows columns"],
-    background: EmptyScene | None,
+    background: BackgroundModel | None,
     tables: Float[Array, "kind bin bin bin"],
 ) -> Float[Array, "camera kind rows columns"]:
     """Log odds of each kind of blob against the background in every cell, within `LARGEST`.
@@ -104,7 +104,7 @@ def kind_odds(
 def odds_where_told(
     cells: Float[Array, "camera rows columns 3"],
     inside: Float[Array, "camera rows columns"],
-    background: EmptyScene | None,
+    background: BackgroundModel | None,
     tables: Float[Array, "kind bin bin bin"],
 ) -> Float[Array, "camera kind rows columns"]:
     """`kind_odds`, but where a kind looks as the background does, nothing is held against it.

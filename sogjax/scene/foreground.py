@@ -86,7 +86,7 @@ def subject_density(colors: Float[Array, "*place 3"], subject: SubjectColors) ->
     return subject.reshape(-1).at[place].get(mode="promise_in_bounds")
 
 
-class EmptyScene(eqx.Module):
+class BackgroundModel(eqx.Module):
     """What is compared with every frame: the background channel by channel, and what follows from it alone."""
 
     planes: tuple[Cells, Cells, Cells]
@@ -99,12 +99,12 @@ class EmptyScene(eqx.Module):
     """Logarithm of the Gaussian's volume in colours."""
     known: Bool[Array, "camera rows columns"]
 
-    def filled_by(self, other: "EmptyScene") -> "EmptyScene":
+    def filled_by(self, other: "BackgroundModel") -> "BackgroundModel":
         """The same, with what another background of the same cells knows where this one knows nothing."""
         return jax.tree.map(lambda own, others: jnp.where(self.known, own, others), self, other)
 
     @classmethod
-    def from_background(cls, background: BackgroundCells, shadow: float = SHADOW) -> "EmptyScene":
+    def from_background(cls, background: BackgroundCells, shadow: float = SHADOW) -> "BackgroundModel":
         """The background may be darker or brighter by a factor (a shadow), at a cost: a longer Gaussian that way.
 
         `shadow` is that factor's standard deviation.
@@ -117,18 +117,18 @@ class EmptyScene(eqx.Module):
     @classmethod
     def _of(
         cls, planes: tuple[Cells, Cells, Cells], variance: Cells, shadow: float, known: Bool[Array, "..."]
-    ) -> "EmptyScene":
+    ) -> "BackgroundModel":
         length = sum(plane * plane for plane in planes)
         volume = jnp.log(_NORMAL * variance * jnp.sqrt(variance + shadow**2 * length))
         return cls(planes, 1.0 / variance, 1.0 / (variance / shadow**2 + length), volume, known)
 
-    def blurred(self, spread: float) -> "EmptyScene":
+    def blurred(self, spread: float) -> "BackgroundModel":
         """The same background, each channel of which is known no better than to a standard deviation."""
         return self._of(self.planes, jnp.maximum(1.0 / self.precision, spread**2), SHADOW, self.known)
 
 
 def log_odds(
-    cells: Float[Array, "camera rows columns 3"], empty: EmptyScene, subject: SubjectColors | None
+    cells: Float[Array, "camera rows columns 3"], empty: BackgroundModel, subject: SubjectColors | None
 ) -> Float[Array, "camera rows columns"]:
     """Logarithm of foreground over background, within `LARGEST`; 0 where the background is unknown.
 
@@ -143,13 +143,13 @@ def log_odds(
 
 
 def background_surprise(
-    cells: Float[Array, "camera rows columns 3"], empty: EmptyScene
+    cells: Float[Array, "camera rows columns 3"], empty: BackgroundModel
 ) -> Float[Array, "camera rows columns"]:
     """Minus the logarithm of the density of each cell's colour, if the background is seen there."""
     return _surprise([cells[..., k] for k in range(3)], empty)
 
 
-def _surprise(seen: list[Cells], empty: EmptyScene) -> Cells:
+def _surprise(seen: list[Cells], empty: BackgroundModel) -> Cells:
     gains = _light(seen, empty)
     expected = [gain[:, None, None] * plane for gain, plane in zip(gains, empty.planes, strict=True)]
     off = [s - e for s, e in zip(seen, expected, strict=True)]
@@ -169,7 +169,7 @@ def foreground_weights(odds: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
     return jnp.clip(1.0 + odds / LARGEST, 0.0, 1.0)
 
 
-def _light(seen: list[Cells], empty: EmptyScene) -> list[Float[Array, "camera"]]:
+def _light(seen: list[Cells], empty: BackgroundModel) -> list[Float[Array, "camera"]]:
     """The gain of each channel that makes the background most like a frame, wherever that shows it."""
     part = lambda values: values[:, ::_LIGHT_STRIDE, ::_LIGHT_STRIDE]
     seen, planes, known = [part(s) for s in seen], [part(plane) for plane in empty.planes], part(empty.known)
@@ -202,5 +202,5 @@ def foreground_probability(
         small(background.picture)[None, ..., ::-1], small(background.spread)[None] / 255.0, known[None]
     )
     seen = (small(image)[None, ..., ::-1] / 255.0).astype(np.float32)
-    odds = _log_odds(seen, EmptyScene.from_background(empty), None)
+    odds = _log_odds(seen, BackgroundModel.from_background(empty), None)
     return np.asarray(1.0 / (1.0 + np.exp(-odds[0] / TEMPER)), np.float32)

@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.model.camera import Camera, undistort, undistorted_sizes
-from sogjax.model.compiled import chosen_indices, computed_once
+from sogjax.model.compiled import chosen_indices, stage_barrier
 from sogjax.model.sog import Sog
 from sogjax.scene.cells import CellGrid
 
@@ -95,7 +95,7 @@ def quadtree_of_planes(
 ) -> tuple[list[Float[Array, "candidate"]], Bool[Array, "candidate"]]:
     """The same, of colours that lie channel by channel, which is quicker; any number of channels."""
     running = ~jnp.isnan(color_tolerance)
-    levels = computed_once(running, partial(_levels, shape=candidates.shape, num_levels=candidates.num_levels), cells)
+    levels = stage_barrier(running, partial(_levels, shape=candidates.shape, num_levels=candidates.num_levels), cells)
     inside = jnp.split(candidates.inside, np.cumsum([planes[0].size for planes in levels])[:-1])
     leaves: list[Array] = []
     covered = jnp.zeros(levels[-1][0].shape, bool)
@@ -104,9 +104,9 @@ def quadtree_of_planes(
         leaf = fits & ~covered
         if level > 0:
             leaf = leaf & _uniform(levels[level], color_tolerance)
-            covered = computed_once(running, _children, covered | leaf)
+            covered = stage_barrier(running, _children, covered | leaf)
         leaves.append(leaf.reshape(-1))
-    return computed_once(running, _node_colors, levels), jnp.concatenate(leaves[::-1])
+    return stage_barrier(running, _node_colors, levels), jnp.concatenate(leaves[::-1])
 
 
 def _levels(cells: Planes, shape: tuple[int, int], num_levels: int) -> list[Planes]:

@@ -40,8 +40,8 @@ class Pass:
 
     poses: Float[np.ndarray, "frame dof"]
     doubts: Float[np.ndarray, "frame limb"]
-    usual: Float[np.ndarray, "frame 2 blob"]
-    """As in `Judgement`."""
+    baseline: Float[np.ndarray, "frame 2 blob"]
+    """As in `LimbConfidence`."""
     energy: float
     """Of a frame, the mean of its magnitude."""
     capacities: Capacities
@@ -55,8 +55,8 @@ class Pass:
         energy = np.abs([float(frame.result.energy) for frame in frames]).mean()
         return cls(
             column(frame.result.pose for frame in frames),
-            column(limbs.doubt for limbs in judged if limbs is not None),
-            column(limbs.usual for limbs in judged if limbs is not None),
+            column(limbs.error_probability for limbs in judged if limbs is not None),
+            column(limbs.baseline for limbs in judged if limbs is not None),
             float(energy),
             frames[-1].capacities,
         )
@@ -82,8 +82,8 @@ def compared_backwards(
     begin = min(last + 1, total)  # no frame behind the clip's last one: its pose is where the pass begins
     after = [min(begin + k, total - 1) for k in (0, 1)]
     pose, before = (jnp.asarray(passed.poses[row]) for row in after)
-    known, usual = 2 if begin < total else 0, jnp.asarray(passed.usual[after[0]])
-    start = TrackState(pose, before, jnp.asarray(known), usual)
+    known, baseline = 2 if begin < total else 0, jnp.asarray(passed.baseline[after[0]])
+    start = TrackState(pose, before, jnp.asarray(known), baseline)
     found, seen = Compared([], [], [], []), []
     lowest = max(0, begin - MOST_FRAMES, first - MOST_BEFORE)
 

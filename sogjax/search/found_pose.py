@@ -7,11 +7,19 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from sogjax.model.body import Body
-from sogjax.search.pose_confidence import SURE, Agreement, Evidence, agreed_confidence, confidence, explained, followed
-from sogjax.search.pose_search import Report, Searcher, search, unreported
+from sogjax.search.pose_confidence import (
+    SURE,
+    Agreement,
+    Evidence,
+    agreed_confidence,
+    explained,
+    followed,
+    pose_confidence,
+)
+from sogjax.search.pose_search import PoseSearch, Report, search, unreported
 from sogjax.search.seen_frame import SeenFrame
 
-FrameMaker = Callable[[Searcher, int], SeenFrame]
+FrameMaker = Callable[[PoseSearch, int], SeenFrame]
 """A frame as it is compared with one body: that which is searched (0) and those that come next."""
 
 
@@ -51,7 +59,7 @@ class Path:
     poses: Float[np.ndarray, "frame dof"]
 
 
-def search_pose(searcher: Searcher, frames: Sequence[SeenFrame], report: Report = unreported) -> Path:
+def search_pose(searcher: PoseSearch, frames: Sequence[SeenFrame], report: Report = unreported) -> Path:
     """The pose of a body in the first of some frames, which explains the later ones too."""
     optima = search(searcher, frames[0], report=lambda share: report(SEARCHED * share))
     if not optima:
@@ -61,7 +69,7 @@ def search_pose(searcher: Searcher, frames: Sequence[SeenFrame], report: Report 
     best = int(np.argmax(paths.energies[0]))
     seen = explained(searcher, frames[0], paths.poses[0, best])
     evidence = Evidence.of(paths, best, seen, float(frames[0].known))
-    likely = confidence(evidence)
+    likely = pose_confidence(evidence)
     found = FoundPose(
         pose=paths.poses[0, best],
         energy=evidence.energy,
@@ -75,7 +83,7 @@ def search_pose(searcher: Searcher, frames: Sequence[SeenFrame], report: Report 
 
 def search_poses(
     bodies: Sequence[Body],
-    searchers: Sequence[Searcher],
+    searchers: Sequence[PoseSearch],
     make: FrameMaker,
     num_frames: int,
     report: Report = unreported,

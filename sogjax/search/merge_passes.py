@@ -14,10 +14,10 @@ from jaxtyping import Array, Bool, Float, UInt8
 
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History
-from sogjax.quality.limb_confidence import Judgement
+from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.search.backward_pass import SURE_FRAMES, FramesBackwards, Pass, compared_backwards
 from sogjax.search.body_parts import body_parts, merged_pose
-from sogjax.search.select_parts import stretches, taken_parts
+from sogjax.search.select_parts import select_parts, stretches
 from sogjax.tracking.capacity import Needed, with_room
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import Beside, FrameCells, TrackState, on_device
@@ -36,7 +36,7 @@ class Revised:
     pose: Float[np.ndarray, "dof"]
     energy: float
     terms: dict[str, float]
-    judged: Judgement
+    judged: LimbConfidence
 
 
 @dataclass
@@ -52,7 +52,7 @@ def in_doubt(passed: Pass) -> Bool[np.ndarray, "frame"]:
     return passed.doubts.max(axis=1, initial=0.0) > DOUBTFUL
 
 
-def told_both_ways(tracker: Tracker, passed: Pass, frames: FramesBackwards) -> Revision:
+def merge_passes(tracker: Tracker, passed: Pass, frames: FramesBackwards) -> Revision:
     """Where another pass explains parts of the body better, among the frames around those that are in doubt.
 
     Args:
@@ -87,7 +87,7 @@ class _Revising:
         found, begin = compared_backwards(self.tracker, self.passed, self.frames, self.parts, first, last)
         rows = begin - 1 - np.arange(len(found.poses))
         ends = (begin == len(self.passed.poses), bool(rows[-1] == 0))
-        taken = taken_parts(self.parts, np.stack(found.apart), np.stack(found.gains), self.passed.energy, ends)
+        taken = select_parts(self.parts, np.stack(found.apart), np.stack(found.gains), self.passed.energy, ends)
         changed, poses = np.flatnonzero(taken.any(axis=1)), self.passed.poses
         for k in changed:
             poses[rows[k]] = merged_pose(self.tracker.body, self.parts, poses[rows[k]], found.poses[k], taken[k])
@@ -104,11 +104,11 @@ class _Revising:
         poses = self.passed.poses
         before, before_that = (jnp.asarray(poses[max(row - j, 0)]) for j in (1, 2))
         history = History(before, before_that, jnp.asarray(row >= 2))
-        pose, usual = jnp.asarray(poses[row]), jnp.asarray(self.passed.usual[row])
+        pose, baseline = jnp.asarray(poses[row]), jnp.asarray(self.passed.baseline[row])
         shown, room = on_device(cells), self.passed.capacities
-        value = with_room(lambda room: _valued(self.tracker, history, *shown, room, pose, usual), room)
+        value = with_room(lambda room: _valued(self.tracker, history, *shown, room, pose, baseline), room)
         energy, terms, judged = jax.device_get(value)
-        self.passed.doubts[row] = judged.doubt
+        self.passed.doubts[row] = judged.error_probability
         values = {name: float(term) for name, term in terms.items()}
         self.revision.frames[row] = Revised(poses[row].copy(), float(energy), values, judged)
 
@@ -121,10 +121,10 @@ def _valued(
     beside: Beside,
     capacities: Capacities,
     pose: Float[Array, "dof"],
-    usual: Float[Array, "2 blob"],
-) -> tuple[tuple[Float[Array, ""], dict[str, Float[Array, ""]], Judgement], Needed]:
+    baseline: Float[Array, "2 blob"],
+) -> tuple[tuple[Float[Array, ""], dict[str, Float[Array, ""]], LimbConfidence], Needed]:
     """Energy, terms and doubts of a pose that is known; and the room that they need."""
     views, near, matching = tracker.views(cells, TrackState.from_pose(pose), capacities, beside)
     energy = FrameEnergy(tracker.body, views, history, tracker.terms)
-    judged = tracker.judged(pose, usual, views.windows, cells, beside.present)
+    judged = tracker.judged(pose, baseline, views.windows, cells, beside.present)
     return (energy(pose), energy.values(pose), judged), (jnp.max(near), jnp.max(matching))

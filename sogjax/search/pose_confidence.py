@@ -18,7 +18,7 @@ from sogjax.energy.appearance import ColorWindows
 from sogjax.energy.posed import Posed
 from sogjax.model.limbs import limb_blobs
 from sogjax.search.mirrored import means_of
-from sogjax.search.pose_search import Hunt, Optimum, Searcher, Tried, centres_of
+from sogjax.search.pose_search import Hypotheses, Optimum, PlacedSearch, PoseSearch, centres_of
 from sogjax.search.search_energy import SearchEnergy
 from sogjax.search.seen_frame import SeenFrame
 
@@ -42,7 +42,7 @@ class Followed:
         return np.linalg.norm(self.means[:, :, None] - self.means[:, None], axis=-1).mean(axis=-1)
 
 
-def followed(searcher: Searcher, optima: Sequence[Optimum], frames: Iterable[SeenFrame]) -> Followed:
+def followed(searcher: PoseSearch, optima: Sequence[Optimum], frames: Iterable[SeenFrame]) -> Followed:
     """Hypotheses climbed in the frame that they were found in, and from there in those that come after it."""
     poses, energies = [np.stack([optimum.pose for optimum in optima])], []
     for frame in frames:
@@ -55,14 +55,14 @@ def followed(searcher: Searcher, optima: Sequence[Optimum], frames: Iterable[See
     return Followed(everything, np.stack(energies), means.reshape(*everything.shape[:2], -1, 3))
 
 
-def _climbed(searcher: Searcher, frame: SeenFrame, poses: Float[np.ndarray, "hypothesis dof"]) -> Tried:
+def _climbed(searcher: PoseSearch, frame: SeenFrame, poses: Float[np.ndarray, "hypothesis dof"]) -> Hypotheses:
     """The hypotheses climbed, those near each other in the same windows."""
     centres = centres_of(searcher.body, poses)
     first = [int(np.argmax(np.linalg.norm(centres - centre, axis=1) < SAME_WINDOW)) for centre in centres]
     places, where = np.unique(first, return_inverse=True)
     middles = np.stack([centres[np.array(first) == place].mean(axis=0) for place in places])
-    hunt = Hunt.of_places(searcher, frame, middles)
-    return hunt.climbed(Tried(poses, where, np.zeros(len(poses))), ITERATIONS)
+    hunt = PlacedSearch.of_places(searcher, frame, middles)
+    return hunt.climbed(Hypotheses(poses, where, np.zeros(len(poses))), ITERATIONS)
 
 
 CLEARLY = 0.1
@@ -82,9 +82,9 @@ class Explained(eqx.Module):
     """What is lost without a limb, for its size, as a part of what the whole body gains for its own."""
 
 
-def explained(searcher: Searcher, frame: SeenFrame, pose: Float[np.ndarray, "dof"]) -> Explained:
+def explained(searcher: PoseSearch, frame: SeenFrame, pose: Float[np.ndarray, "dof"]) -> Explained:
     """What a pose explains of a frame."""
-    hunt = Hunt.of_places(searcher, frame, centres_of(searcher.body, pose[None]))
+    hunt = PlacedSearch.of_places(searcher, frame, centres_of(searcher.body, pose[None]))
     return _explained(hunt.energy, hunt.windows, jnp.asarray(limb_blobs(searcher.body)), jnp.asarray(pose))
 
 
@@ -221,7 +221,7 @@ class Evidence:
         )
 
 
-def confidence(evidence: Evidence) -> float:
+def pose_confidence(evidence: Evidence) -> float:
     """How likely the pose is right, from one search, as the condition has it that is met least."""
     return _likely(each.shortfall(getattr(evidence, each.name), evidence.known) for each in CONDITIONS)
 

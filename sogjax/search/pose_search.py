@@ -14,7 +14,7 @@ from sogjax.energy.term import Term
 from sogjax.model.body import Body
 from sogjax.model.limbs import limbs, with_other_limb
 from sogjax.model.rotation import axis_vector
-from sogjax.scene.color_clusters import Kinds, kinds_of
+from sogjax.scene.color_clusters import ColorClusters, color_clusters
 from sogjax.search.mirrored import look_alikes, means_of, turned_to, turns_with_vertical
 from sogjax.search.places import Place, places
 from sogjax.search.rough_pose import shifts
@@ -60,18 +60,18 @@ class Optimum:
 
 
 @dataclass(frozen=True)
-class Searcher:
+class PoseSearch:
     """What a search for one body needs beside the frame."""
 
     body: Body
-    kinds: Kinds
+    kinds: ColorClusters
     terms: Sequence[Term]
     up: str
 
     @classmethod
-    def of_body(cls, body: Body, terms: Sequence[Term], up: str) -> "Searcher":
+    def of_body(cls, body: Body, terms: Sequence[Term], up: str) -> "PoseSearch":
         """For a body in its colours."""
-        return cls(body, kinds_of(np.asarray(body.blob_colors), np.asarray(body.blob_sigmas) ** 2), terms, up)
+        return cls(body, color_clusters(np.asarray(body.blob_colors), np.asarray(body.blob_sigmas) ** 2), terms, up)
 
     @property
     def scales(self) -> Scales:
@@ -87,7 +87,7 @@ def unreported(share: float) -> None:
     """Nobody asks how far a search is."""
 
 
-def search(searcher: Searcher, frame: SeenFrame, count: int = NUM_LAST, report: Report = unreported) -> list[Optimum]:
+def search(searcher: PoseSearch, frame: SeenFrame, count: int = NUM_LAST, report: Report = unreported) -> list[Optimum]:
     """The best different poses of a body in one frame, best first; none, if nothing looks like it.
 
     `report` is called with the share of the work that is done.
@@ -96,7 +96,7 @@ def search(searcher: Searcher, frame: SeenFrame, count: int = NUM_LAST, report: 
     if not found:
         return []
     found = [place for place in found if place.score >= POOR * found[0].score] or found[:1]
-    hunt = Hunt.of_places(searcher, frame, np.stack([place.centre for place in found]))
+    hunt = PlacedSearch.of_places(searcher, frame, np.stack([place.centre for place in found]))
     tried = _starts(searcher, found)
     tried = hunt.climbed(_spread_best(searcher.body, hunt.scored(tried)), FIRST_ITERATIONS)
     tried = _best(searcher.body, tried, NUM_SECOND)
@@ -111,7 +111,7 @@ def search(searcher: Searcher, frame: SeenFrame, count: int = NUM_LAST, report: 
 
 
 @dataclass(frozen=True)
-class Tried:
+class Hypotheses:
     """Poses that were tried, where, and their energies."""
 
     poses: Float[np.ndarray, "start dof"]
@@ -119,42 +119,42 @@ class Tried:
     """The number of the place."""
     values: Float[np.ndarray, "start"]
 
-    def __getitem__(self, chosen: np.ndarray) -> "Tried":
+    def __getitem__(self, chosen: np.ndarray) -> "Hypotheses":
         """Some of them."""
-        return Tried(self.poses[chosen], self.where[chosen], self.values[chosen])
+        return Hypotheses(self.poses[chosen], self.where[chosen], self.values[chosen])
 
     @classmethod
-    def of(cls, parts: Sequence["Tried"]) -> "Tried":
+    def of(cls, parts: Sequence["Hypotheses"]) -> "Hypotheses":
         """All of several."""
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("poses", "where", "values")))
 
 
 @dataclass(frozen=True)
-class Hunt:
+class PlacedSearch:
     """A search at some places of one frame."""
 
-    searcher: Searcher
+    searcher: PoseSearch
     energy: SearchEnergy
     windows: ColorWindows
 
     @classmethod
-    def of_places(cls, searcher: Searcher, frame: SeenFrame, centres: Float[np.ndarray, "place 3"]) -> "Hunt":
+    def of_places(cls, searcher: PoseSearch, frame: SeenFrame, centres: Float[np.ndarray, "place 3"]) -> "PlacedSearch":
         """Always the same number of places, so that one program serves all."""
         padded = np.pad(centres, ((0, NUM_PLACES - len(centres)), (0, 0)), mode="edge")
         return cls(searcher, searcher.energy(frame), _windows(frame, jnp.asarray(padded, frame.odds.dtype)))
 
-    def scored(self, tried: Tried) -> Tried:
+    def scored(self, tried: Hypotheses) -> Hypotheses:
         """With their energies."""
-        return Tried(tried.poses, tried.where, scores(self.energy, self.windows, tried.where, tried.poses))
+        return Hypotheses(tried.poses, tried.where, scores(self.energy, self.windows, tried.where, tried.poses))
 
-    def climbed(self, tried: Tried, iterations: int) -> Tried:
+    def climbed(self, tried: Hypotheses, iterations: int) -> Hypotheses:
         """The tops of the hills that they are on, as far as so many iterations lead."""
         scales = self.searcher.scales
         poses, values = climbed(self.energy, self.windows, tried.where, tried.poses, scales, iterations)
-        return Tried(poses, tried.where, values)
+        return Hypotheses(poses, tried.where, values)
 
 
-def _starts(searcher: Searcher, found: Sequence[Place]) -> Tried:
+def _starts(searcher: PoseSearch, found: Sequence[Place]) -> Hypotheses:
     """Every named pose in every direction at every place."""
     body, up = searcher.body, axis_vector(searcher.up)
     named = [np.asarray(pose) for pose in body.poses.values()]
@@ -165,8 +165,8 @@ def _starts(searcher: Searcher, found: Sequence[Place]) -> Tried:
         directions = _other_verticals(place, up)
         lying = [turns_with_vertical(body, named, up, direction) for direction in directions]
         poses = _centred(body, np.concatenate([upright, *lying]), place.centre)
-        parts.append(Tried(poses, np.full(len(poses), k), np.zeros(len(poses))))
-    return Tried.of(parts)
+        parts.append(Hypotheses(poses, np.full(len(poses), k), np.zeros(len(poses))))
+    return Hypotheses.of(parts)
 
 
 def _other_verticals(place: Place, up: Float[np.ndarray, "3"]) -> list[Float[np.ndarray, "3"]]:
@@ -193,7 +193,7 @@ def _windows(frame: SeenFrame, centres: Float[Array, "place 3"]) -> ColorWindows
     return jax.lax.map(lambda centre: frame.windows(centre, radius), centres)
 
 
-def _with_better_limbs(hunt: Hunt, tried: Tried) -> Tried:
+def _with_better_limbs(hunt: PlacedSearch, tried: Hypotheses) -> Hypotheses:
     """The poses, and each with one limb held in other ways, climbed if that looks promising."""
     body, variants, source = hunt.searcher.body, [], []
     every_limb = limbs(body.skeleton)
@@ -203,7 +203,7 @@ def _with_better_limbs(hunt: Hunt, tried: Tried) -> Tried:
             variants.append(with_other_limb(body, pose, limb, others)[1:])
             source += [(k, j)] * len(variants[-1])
     of_pose, of_limb = np.array(source).T
-    scored = hunt.scored(Tried(np.concatenate(variants), tried.where[of_pose], np.zeros(len(of_pose))))
+    scored = hunt.scored(Hypotheses(np.concatenate(variants), tried.where[of_pose], np.zeros(len(of_pose))))
     chosen = []
     for k, j in sorted(set(source)):
         here = np.flatnonzero((of_pose == k) & (of_limb == j))
@@ -211,7 +211,7 @@ def _with_better_limbs(hunt: Hunt, tried: Tried) -> Tried:
         chosen.extend(
             here[different(body, scored.poses[here], scored.values[here], LIMBS_TRIED[min(k, 1)], LIMB_APART)]
         )
-    return hunt.climbed(Tried.of([tried, scored[np.array(chosen)]]), SECOND_ITERATIONS)
+    return hunt.climbed(Hypotheses.of([tried, scored[np.array(chosen)]]), SECOND_ITERATIONS)
 
 
 def _drawn(body: Body, limb: Int[np.ndarray, "limb"], count: int) -> Float[np.ndarray, "start dof"]:
@@ -222,23 +222,23 @@ def _drawn(body: Body, limb: Int[np.ndarray, "limb"], count: int) -> Float[np.nd
     return poses
 
 
-def _with_look_alikes(hunt: Hunt, tried: Tried) -> Tried:
+def _with_look_alikes(hunt: PlacedSearch, tried: Hypotheses) -> Hypotheses:
     """The poses, and what looks like the best of them."""
     others = look_alikes(hunt.searcher.body, tried.poses[0])
-    return Tried.of([tried, Tried(others, np.full(len(others), tried.where[0]), np.zeros(len(others)))])
+    return Hypotheses.of([tried, Hypotheses(others, np.full(len(others), tried.where[0]), np.zeros(len(others)))])
 
 
-def _spread_best(body: Body, tried: Tried) -> Tried:
+def _spread_best(body: Body, tried: Hypotheses) -> Hypotheses:
     """The best at each place, not too many of them nearly the same; more at the better places."""
     chosen = []
     for place, count in zip(np.unique(tried.where), NUM_AT_PLACE, strict=False):
         here = tried[tried.where == place]
         likely = here[np.argsort(-here.values)[: 8 * count]]
         chosen.append(_best(body, likely, count))
-    return Tried.of(chosen)
+    return Hypotheses.of(chosen)
 
 
-def _best(body: Body, tried: Tried, count: int) -> Tried:
+def _best(body: Body, tried: Hypotheses, count: int) -> Hypotheses:
     """The best different ones, best first."""
     return tried[different(body, tried.poses, tried.values, count)]
 

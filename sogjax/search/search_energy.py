@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from sogjax.energy.appearance import Appearance, BlobKinds, ColorWindows
+from sogjax.energy.appearance import Appearance, BlobClusters, ColorWindows
 from sogjax.energy.foreground import Foreground
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import Frame, History, Posed
@@ -22,12 +22,12 @@ from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.skeleton import Skeleton
 from sogjax.model.sog import Sog
-from sogjax.scene.color_clusters import SLOTS, Kinds
+from sogjax.scene.color_clusters import SLOTS, ColorClusters
 from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.solve.solution import QuadraticModel, Scales
 
-COMFORT = 0.002
-"""Weight of `Discomfort`, where a body that explains all that it covers gains about 1."""
+REST_WEIGHT = 0.002
+"""Weight of `RestPrior`, where a body that explains all that it covers gains about 1."""
 LIMITS = 5.0
 """By what the weights of the other terms are multiplied in this energy."""
 SILHOUETTE = 0.5
@@ -42,7 +42,7 @@ AT_ONCE, SCORED_AT_ONCE = 8, 64
 """Poses that are climbed, and scored, in one call."""
 
 
-class Discomfort(Penalty):
+class RestPrior(Penalty):
     """How far joints are from the rest pose, as a part of their range, squared.
 
     Of two poses that look the same, the one that twists less is more likely.
@@ -71,14 +71,14 @@ class SearchEnergy(eqx.Module):
     cameras: Camera
     terms: Terms
     """All but the appearance."""
-    kinds: BlobKinds
+    kinds: BlobClusters
 
     @classmethod
-    def from_terms(cls, body: Body, cameras: Camera, terms: Sequence[Term], kinds: Kinds) -> "SearchEnergy":
+    def from_terms(cls, body: Body, cameras: Camera, terms: Sequence[Term], kinds: ColorClusters) -> "SearchEnergy":
         """With the terms of tracking that need no windows, lists or history."""
         others = [term for term in terms if not isinstance(term, (Similarity, Foreground, AccelerationPenalty))]
         others = [eqx.tree_at(lambda term: term.weight, term, LIMITS * term.weight) for term in others]
-        return cls(body, cameras, (*others, Discomfort(COMFORT)), blob_kinds(kinds, body.num_blobs))
+        return cls(body, cameras, (*others, RestPrior(REST_WEIGHT)), blob_clusters(kinds, body.num_blobs))
 
     def appearance(self, windows: ColorWindows) -> Appearance:
         """In units of the body's own area in the pictures, so that it does not matter how large it is seen."""
@@ -116,14 +116,14 @@ def scores(
     return _in_parts(partial(_scores, energy, windows), SCORED_AT_ONCE, place, poses)[0]
 
 
-def blob_kinds(kinds: Kinds, num_blobs: int) -> BlobKinds:
+def blob_clusters(kinds: ColorClusters, num_blobs: int) -> BlobClusters:
     """The kinds of the blobs as arrays."""
     members, real = np.zeros((len(kinds.members), SLOTS), int), np.zeros((len(kinds.members), SLOTS))
     slots = np.zeros(num_blobs, int)
     for k, part in enumerate(kinds.members):
         members[k, : len(part)], real[k, : len(part)] = part, 1.0
         slots[list(part)] = k * SLOTS + np.arange(len(part))
-    return BlobKinds(jnp.asarray(members), jnp.asarray(real, jnp.result_type(float)), jnp.asarray(slots))
+    return BlobClusters(jnp.asarray(members), jnp.asarray(real, jnp.result_type(float)), jnp.asarray(slots))
 
 
 @eqx.filter_jit

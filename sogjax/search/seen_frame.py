@@ -12,8 +12,8 @@ from sogjax.energy.appearance import ColorWindows
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, distort, near_picture, project, project_points
 from sogjax.model.sog import Sog
-from sogjax.scene.color_clusters import Kinds, kind_odds
-from sogjax.scene.foreground import EmptyScene
+from sogjax.scene.color_clusters import ColorClusters, kind_odds
+from sogjax.scene.foreground import BackgroundModel
 from sogjax.tracking.culling import ImageReader
 
 SIDE = 40
@@ -45,7 +45,7 @@ class SeenFrame(eqx.Module):
         cameras: Camera,
         reader: ImageReader,
         cells: UInt8[np.ndarray | Array, "camera rows columns 3"],
-        kinds: Kinds,
+        kinds: ColorClusters,
         present: Sequence[bool] | None = None,
     ) -> "SeenFrame":
         """The frame as a reader of pictures understands it; without a background, if the reader has none.
@@ -58,9 +58,11 @@ class SeenFrame(eqx.Module):
         inside = np.zeros((len(grids), *cells.shape[1:3]), np.float32)
         for k, grid in enumerate(grids):
             inside[k, : grid.rows, : grid.columns] = 1.0 if present is None or present[k] else 0.0
-        odds = _odds(jnp.asarray(cells), jnp.asarray(inside), reader.empty, tables)
+        odds = _odds(jnp.asarray(cells), jnp.asarray(inside), reader.background, tables)
         known = (
-            0.0 if reader.empty is None else np.sum(np.asarray(reader.empty.known) * inside) / max(inside.sum(), 1.0)
+            0.0
+            if reader.background is None
+            else np.sum(np.asarray(reader.background.known) * inside) / max(inside.sum(), 1.0)
         )
         sizes = jnp.asarray([grid.cell_size for grid in grids], dtype)
         return cls(cameras, odds, sizes, jnp.asarray(known, dtype))
@@ -128,7 +130,7 @@ def _is_tuple(value: object) -> bool:
 
 
 @eqx.filter_jit
-def _odds(cells: Array, inside: Array, background: EmptyScene | None, tables: Array) -> Array:
+def _odds(cells: Array, inside: Array, background: BackgroundModel | None, tables: Array) -> Array:
     return kind_odds(cells.astype(tables.dtype) / 255.0, inside.astype(tables.dtype), background, tables)
 
 

@@ -22,7 +22,7 @@ def stretches(marked: Bool[np.ndarray, "frame"], gap: int = 1) -> list[tuple[int
     return [(int(part[0]), int(part[-1])) for part in parts]
 
 
-def taken_parts(
+def select_parts(
     parts: Sequence[Part],
     apart: Float[np.ndarray, "frame part"],
     gains: Float[np.ndarray, "frame part"],

@@ -19,7 +19,7 @@ from sogjax.io.cell_cache import CellsOfClip
 from sogjax.io.files import atomic_path
 from sogjax.model.body import Body
 from sogjax.model.limbs import limb_blobs, limb_names, limbs
-from sogjax.quality.limb_confidence import LimbMeasures, judgement, limb_measures
+from sogjax.quality.limb_confidence import LimbMeasures, limb_confidence, limb_measures
 from sogjax.quality.limb_evidence import blob_evidence
 from sogjax.run.terminal import say
 from sogjax.settings.compose import track_config
@@ -143,12 +143,12 @@ class LimbTrials:
             InputError: it is known nowhere.
         """
         source, tracker, cells = self._tracker(trial)
-        usual: Float[np.ndarray, "frame 2 blob"] = np.zeros((0, 2, tracker.body.num_blobs))
+        baseline: Float[np.ndarray, "frame 2 blob"] = np.zeros((0, 2, tracker.body.num_blobs))
         columns: dict[str, list[Any]] = {key: [] for key in ("kind", "name", "worse", "contradicted", "error")}
         for run in runs:
-            start = usual[run.follows] if run.follows else np.full((2, tracker.body.num_blobs), np.nan, np.float32)
+            start = baseline[run.follows] if run.follows else np.full((2, tracker.body.num_blobs), np.nan, np.float32)
             measures, before = measured(tracker, cells, run, start)
-            usual = before if run.kind == PLAIN else usual
+            baseline = before if run.kind == PLAIN else baseline
             if run.frames[0] >= source.truth.num_frames:
                 continue
             errors = limb_errors(source.bodies, source.truth, run.frames, run.poses)
@@ -189,10 +189,10 @@ def _true_start(body: Body, source: Source) -> Float[np.ndarray, "dof"]:
 
 
 def measured(
-    tracker: Tracker, cells: CellsOfClip, run: Tracked, usual: Float[np.ndarray, "2 blob"]
+    tracker: Tracker, cells: CellsOfClip, run: Tracked, baseline: Float[np.ndarray, "2 blob"]
 ) -> tuple[LimbMeasures, Float[np.ndarray, "frame 2 blob"]]:
     """What tells of the limbs in every frame of a run, and what was usual before it."""
-    found, history, now = [], [], jnp.asarray(usual)
+    found, history, now = [], [], jnp.asarray(baseline)
     for frame, pose, before in zip(run.frames, run.poses, run.before, strict=True):
         history.append(np.asarray(now))
         measures, now = _measured(tracker, jnp.asarray(cells[frame]), jnp.asarray(before), jnp.asarray(pose), now)
@@ -202,7 +202,7 @@ def measured(
 
 @eqx.filter_jit
 def _measured(
-    tracker: Tracker, cells: Array, before: Array, pose: Array, usual: Array
+    tracker: Tracker, cells: Array, before: Array, pose: Array, baseline: Array
 ) -> tuple[LimbMeasures, Float[Array, "2 blob"]]:
     """The step's own judgement of a pose that was found already."""
     reader, limbs = tracker.reader, tracker.limbs
@@ -213,4 +213,6 @@ def _measured(
     windows = None if odds is None else reader.windows(odds, tracker.cameras, boxes)
     posed = Posed.from_pose(tracker.body, pose)
     evidence = blob_evidence(limbs, posed, tracker.cameras, windows, cells, reader.cell_sizes, reader.subject)
-    return limb_measures(limbs, evidence, usual), judgement(limbs, evidence, usual, windows is not None).usual
+    return limb_measures(limbs, evidence, baseline), limb_confidence(
+        limbs, evidence, baseline, windows is not None
+    ).baseline

@@ -22,7 +22,7 @@ from sogjax.run.second_background import MUCH_UNKNOWN, knowing_the_body, unknown
 from sogjax.run.terminal import say
 from sogjax.run.track import track_recording
 from sogjax.search.backward_pass import Pass
-from sogjax.search.merge_passes import told_both_ways
+from sogjax.search.merge_passes import merge_passes
 from sogjax.settings.compose import track_config
 from sogjax.settings.run import TrackConfig
 from sogjax.study.experiment import Experiment
@@ -135,7 +135,7 @@ def _revised(tracker: Tracker, tracked: Sequence[TrackedFrame], cells: CellsOfCl
     """The results of the frames, told both ways as `track` does."""
     results = [frame.result for frame in tracked]
     passed = Pass.from_frames(tracked)
-    found = told_both_ways(tracker, passed, lambda first, stop: (cells[k] for k in range(stop - 1, first - 1, -1)))
+    found = merge_passes(tracker, passed, lambda first, stop: (cells[k] for k in range(stop - 1, first - 1, -1)))
     for row, revised in found.frames.items():
         results[row] = replace(results[row], pose=revised.pose)
     return results

@@ -15,10 +15,10 @@ from sogjax.energy.views import Windows, windows_around
 from sogjax.errors import InputError
 from sogjax.model.camera import Camera, project
 from sogjax.model.color import averaging_space, convert, from_rgb
-from sogjax.model.compiled import computed_once
+from sogjax.model.compiled import stage_barrier
 from sogjax.model.skeleton import Skeleton
 from sogjax.model.sog import Sog
-from sogjax.scene.foreground import EmptyScene, SubjectColors, foreground_weights, log_odds
+from sogjax.scene.foreground import BackgroundModel, SubjectColors, foreground_weights, log_odds
 from sogjax.scene.quadtree import Candidates, keep_blobs, keep_blobs_of_planes, quadtree_of_planes
 
 CAPACITIES = (256, 512, 768, 1024, 1536, 2048, 3072, 4096, 6144, 8192, 16384, 32768, 65536)
@@ -86,7 +86,7 @@ class ImageReader(eqx.Module):
     color_space: str = eqx.field(static=True)
     box_around: BoxAround = eqx.field(static=True, default="predicted")
     """Whether boxes hold the last pose only, or the predicted one too."""
-    empty: EmptyScene | None = None
+    background: BackgroundModel | None = None
     """The empty scene, so that image blobs count by how little they look like it; None: all count fully."""
     subject: SubjectColors | None = None
     """The colours that the actors have; None: any."""
@@ -100,15 +100,15 @@ class ImageReader(eqx.Module):
 
     def odds(self, cells: Float[Array, "camera rows columns 3"]) -> Float[Array, "camera rows columns"] | None:
         """Log odds of foreground against background of all cells; None where no background is known."""
-        if self.empty is None:
+        if self.background is None:
             return None
-        return computed_once(self.true_at_run_time, log_odds, cells, self.empty, self.subject)
+        return stage_barrier(self.true_at_run_time, log_odds, cells, self.background, self.subject)
 
     def windows(
         self, odds: Float[Array, "camera rows columns"], cameras: Camera, boxes: Float[Array, "camera actor 2 2"]
     ) -> Windows:
         """The log odds of cells in the boxes."""
-        return computed_once(self.true_at_run_time, windows_around, odds, self.cell_sizes, cameras, boxes)
+        return stage_barrier(self.true_at_run_time, windows_around, odds, self.cell_sizes, cameras, boxes)
 
     @property
     def cell_sizes(self) -> Float[Array, "camera"]:
@@ -117,7 +117,7 @@ class ImageReader(eqx.Module):
 
     @property
     def true_at_run_time(self) -> Bool[Array, ""]:
-        """True, which the compiler cannot know (see `computed_once`)."""
+        """True, which the compiler cannot know (see `stage_barrier`)."""
         return ~jnp.isnan(self.color_tolerance)
 
     def _leaf_planes(
@@ -125,7 +125,7 @@ class ImageReader(eqx.Module):
     ) -> tuple[list[Float[Array, "camera candidate"]], Bool[Array, "camera candidate"]]:
         """The same, the colours channel by channel, then the weights of `foreground_weights`, if there are odds."""
         space = averaging_space(self.color_space)
-        planes = computed_once(self.true_at_run_time, partial(_color_planes, space=space), cells)
+        planes = stage_barrier(self.true_at_run_time, partial(_color_planes, space=space), cells)
         if odds is not None:
             planes = [*planes, FOREGROUND_CONTRAST * foreground_weights(odds)]
         means, leaves = jax.vmap(quadtree_of_planes, in_axes=(0, 0, None))(
@@ -177,7 +177,7 @@ class ImageReader(eqx.Module):
             similarities = pair_color_similarities(image, body, self.color_space, self.color_radius)
             return similarities if weights is None else similarities * weights[None, :]
 
-        similarities = computed_once(self.true_at_run_time, jax.vmap(compare), near, weights)
+        similarities = stage_barrier(self.true_at_run_time, jax.vmap(compare), near, weights)
         mask = near.mask & jnp.any(similarities > 0.0, axis=1)
         return eqx.tree_at(lambda sog: sog.mask, near, mask), similarities, jnp.sum(mask, axis=1)
 

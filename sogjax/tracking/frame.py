@@ -11,7 +11,7 @@ from jaxtyping import Array, Bool, Float, Int, UInt8
 
 from sogjax.energy.keypoint_views import SeenKeypoints
 from sogjax.model.sog import Sog
-from sogjax.quality.limb_confidence import Judgement
+from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.tracking.culling import Capacities
 
 
@@ -59,8 +59,8 @@ class TrackState(eqx.Module):
     previous: Float[Array, "dof"]
     before_previous: Float[Array, "dof"]
     num_known: Int[Array, ""]
-    usual: Float[Array, "2 blob"] | None = None
-    """What was seen in the blobs' places so far (`Judgement.usual`); NaN where nothing is known, None: not judged."""
+    baseline: Float[Array, "2 blob"] | None = None
+    """What was seen in the blobs' places so far (`LimbConfidence.baseline`); NaN where unknown, None: not judged."""
     expected: Float[Array, "dof"] | None = None
     """The pose that the next frame is expected to show; None: as the last two poses say."""
 
@@ -73,7 +73,7 @@ class TrackState(eqx.Module):
         """The state after a frame whose pose was found; the first one has no history but itself."""
         first = self.num_known == 0
         before = jnp.where(first, pose, self.previous)
-        return TrackState(pose, before, jnp.minimum(self.num_known + 1, 2), self.usual)
+        return TrackState(pose, before, jnp.minimum(self.num_known + 1, 2), self.baseline)
 
 
 class FrameResult(eqx.Module):
@@ -91,7 +91,7 @@ class FrameResult(eqx.Module):
     num_matching: Int[Array, "camera"]
     num_blocks: Int[Array, ""]
     """Blocks of near pairs; 0 where all pairs were compared."""
-    limbs: Judgement | None
+    limbs: LimbConfidence | None
     """What is thought of the limbs; None: they are not judged."""
     images: Sog
     """The image blobs that were used, for each camera (working colour space)."""

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from sogjax.energy.keypoint_views import SeenKeypoints
-from sogjax.energy.keypoints import KeypointPull
+from sogjax.energy.keypoints import KeypointTerm
 from sogjax.energy.posed import Posed
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
@@ -29,7 +29,7 @@ class _Sums(NamedTuple):
 
 @eqx.filter_jit
 def estimated_offsets(
-    pull: KeypointPull,
+    pull: KeypointTerm,
     body: Body,
     cameras: Camera,
     normalizers: Float[Array, "camera"],

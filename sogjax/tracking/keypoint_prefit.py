@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from sogjax.energy.keypoint_views import KeypointViews
-from sogjax.energy.keypoints import KeypointPull
+from sogjax.energy.keypoints import KeypointTerm
 from sogjax.energy.posed import Posed
 from sogjax.energy.priors import LimitPenalty
 from sogjax.model.body import Body
@@ -31,7 +31,7 @@ class _Led(eqx.Module):
     body: Body
     cameras: Camera
     views: KeypointViews
-    pull: KeypointPull
+    pull: KeypointTerm
     limits: LimitPenalty
 
     def __call__(self, pose: Float[Array, "dof"]) -> Float[Array, ""]:
@@ -42,13 +42,13 @@ class _Led(eqx.Module):
         return self.pull.model(posed, self.cameras, self.views) + self.limits.model(posed)
 
 
-class Guide(eqx.Module):
+class KeypointPrefit(eqx.Module):
     """The keypoints of a frame."""
 
     body: Body
     cameras: Camera
     views: KeypointViews
-    pull: KeypointPull
+    pull: KeypointTerm
 
     def followed(self, pose: Float[Array, "dof"], scales: Scales) -> Float[Array, "dof"]:
         """From an expected pose to where the keypoints lead."""

@@ -13,20 +13,20 @@ from jaxtyping import Array, Bool, Float, Int, UInt8
 from sogjax.energy.coloring import Coloring
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.keypoint_views import KeypointViews
-from sogjax.energy.keypoints import keypoint_pull_among
+from sogjax.energy.keypoints import keypoint_term_among
 from sogjax.energy.posed import History, Posed
 from sogjax.energy.term import Terms
 from sogjax.energy.views import Views, Windows
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.color import from_rgb
-from sogjax.model.compiled import computed_once
-from sogjax.quality.limb_confidence import Judgement, frame_fit, judgement
-from sogjax.quality.limb_evidence import JudgedLimbs, blob_evidence
+from sogjax.model.compiled import stage_barrier
+from sogjax.quality.limb_confidence import LimbConfidence, frame_fit, limb_confidence
+from sogjax.quality.limb_evidence import LimbBlobs, blob_evidence
 from sogjax.solve.solution import Scales, Solution, Solver
 from sogjax.tracking.culling import Capacities, ImageReader, actor_of_blobs, body_boxes, union_boxes
 from sogjax.tracking.frame import NOTHING, Beside, FrameResult, PartialCells, TrackState, WithKeypoints, on_device
-from sogjax.tracking.keypoint_prefit import Guide
+from sogjax.tracking.keypoint_prefit import KeypointPrefit
 from sogjax.tracking.solving import solve_near
 
 NO_ROOM = "a frame has more image blobs than the tracker has room for; make a new one, beginning with this frame"
@@ -49,7 +49,7 @@ class Tracker(eqx.Module):
     """alpha of Section 5.3."""
     pairs: PairChoice = eqx.field(static=True, default="dense")
     """Whether all pairs of blobs are compared, or those near each other."""
-    limbs: JudgedLimbs | None = None
+    limbs: LimbBlobs | None = None
     """Which are judged in every frame; None: none."""
     capacities: Capacities | None = None
     """Room for image blobs of a step that is given none."""
@@ -69,9 +69,9 @@ class Tracker(eqx.Module):
 
     def with_memory(self, state: TrackState) -> TrackState:
         """The state with all that a step hands on to the next one, so that every step takes the same."""
-        if self.limbs is None or self.reader.subject is None or state.usual is not None:
+        if self.limbs is None or self.reader.subject is None or state.baseline is not None:
             return state
-        return replace(state, usual=jnp.full((2, self.body.num_blobs), jnp.nan, self.body.blob_sigmas.dtype))
+        return replace(state, baseline=jnp.full((2, self.body.num_blobs), jnp.nan, self.body.blob_sigmas.dtype))
 
     def predicted(self, state: TrackState) -> Float[Array, "dof"]:
         """Theta_0 of Section 5.3: linear extrapolation of the last two poses, unless a pose is expected."""
@@ -105,7 +105,7 @@ class Tracker(eqx.Module):
         rgb = cells.astype(self.cameras.intrinsics.dtype) / 255.0
         odds, boxes = self.reader.odds(rgb), self.boxes(state)
         near_blobs = partial(self.reader.near_blobs, capacity=capacities.near)
-        near, weights, num_near = computed_once(self.reader.true_at_run_time, near_blobs, rgb, odds, boxes)
+        near, weights, num_near = stage_barrier(self.reader.true_at_run_time, near_blobs, rgb, odds, boxes)
         windows = None if odds is None else self.reader.windows(odds, self.cameras, boxes)
         normalizers = self.normalizers
         if present is not None:
@@ -133,7 +133,7 @@ class Tracker(eqx.Module):
         self, beside: Beside, pose: Float[Array, "dof"], normalizers: Float[Array, "camera"]
     ) -> KeypointViews | None:
         """Keypoints as the energy takes them, near a pose; None: there are none, or none of its terms looks at them."""
-        pull = keypoint_pull_among(self.terms)
+        pull = keypoint_term_among(self.terms)
         if pull is None or beside.keypoints is None:
             return None
         return pull.views(beside.keypoints, self.cameras, Posed.from_pose(self.body, pose), normalizers)
@@ -169,11 +169,11 @@ class Tracker(eqx.Module):
 
     def led(self, state: TrackState, beside: Beside) -> TrackState:
         """The state, expecting the pose to which keypoints lead; the same where there are none."""
-        pull = keypoint_pull_among(self.terms)
+        pull = keypoint_term_among(self.terms)
         views = self.keypoint_views(beside, state.previous, self.normalizers)
         if pull is None or views is None:
             return state
-        guide = Guide(self.body, self.cameras, views, pull)
+        guide = KeypointPrefit(self.body, self.cameras, views, pull)
         return replace(state, expected=guide.followed(self.predicted(state), self.scales))
 
     def found(
@@ -213,26 +213,26 @@ class Tracker(eqx.Module):
         """The same with what the cameras say of the limbs, if they are to be judged."""
         if self.limbs is None or self.reader.subject is None:
             return state, result
-        usual = self.with_memory(state).usual
-        assert usual is not None
-        found = self.judged(result.pose, usual, views.windows, cells, present)
-        return replace(state, usual=found.usual), replace(result, limbs=found)
+        baseline = self.with_memory(state).baseline
+        assert baseline is not None
+        found = self.judged(result.pose, baseline, views.windows, cells, present)
+        return replace(state, baseline=found.baseline), replace(result, limbs=found)
 
     def judged(
         self,
         pose: Float[Array, "dof"],
-        usual: Float[Array, "2 blob"],
+        baseline: Float[Array, "2 blob"],
         windows: Windows | None,
         cells: UInt8[Array, "camera rows columns 3"],
         present: Bool[Array, "camera"] | None = None,
-    ) -> Judgement:
+    ) -> LimbConfidence:
         """What the cameras say of a pose and its limbs."""
         assert self.limbs is not None
         assert self.reader.subject is not None
         posed, sizes = Posed.from_pose(self.body, pose), self.reader.cell_sizes
         evidence = blob_evidence(self.limbs, posed, self.cameras, windows, cells, sizes, self.reader.subject, present)
         fit = frame_fit(self.limbs, evidence, posed, self.cameras, windows)
-        found = judgement(self.limbs, evidence, usual, windows is not None)
+        found = limb_confidence(self.limbs, evidence, baseline, windows is not None)
         return replace(found, explained=fit.explained, overlap=fit.overlap)
 
     def _solved(
