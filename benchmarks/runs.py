@@ -26,7 +26,7 @@ from sogjax.run.track import track_recording
 from sogjax.settings.compose import track_config
 from sogjax.settings.run import TrackConfig
 from sogjax.tracking.capacity import first_capacities
-from sogjax.tracking.frame import TrackState
+from sogjax.tracking.frame import FrameInput, TrackState
 
 SOLVERS = ("gauss_newton", "lbfgs", "conditioned_ascent")
 
@@ -89,9 +89,9 @@ def stage_quantities(scene: Scene) -> Iterator[Quantity]:
     grids, frames = job.grids, (0, 1)
     cells = jnp.asarray(cells_of_clip(scene.recording, grids, scene.config().images, frames)[0])
     state = TrackState.from_pose(job.start)
-    capacities = first_capacities(job.tracker, state, cells)
+    capacities = first_capacities(job.tracker, state, FrameInput(cells))
     leaves = eqx.filter_jit(lambda reader, cells: reader.leaves(cells.astype(jnp.float32) / 255.0))
-    views = eqx.filter_jit(lambda tracker, state, cells: tracker.views(cells, state, capacities)[0])
+    views = eqx.filter_jit(lambda tracker, state, cells: tracker.views(FrameInput(cells), state, capacities)[0])
     near = eqx.filter_jit(
         lambda tracker, state, views: views.near(
             tracker.body.posed_blobs(state.previous), similarity_among(tracker.terms).exponent, capacities.blocks
@@ -100,7 +100,7 @@ def stage_quantities(scene: Scene) -> Iterator[Quantity]:
     seen = views(job.tracker, state, cells)
     quadratic = eqx.filter_jit(lambda objective, pose: objective.quadratic(pose))
     judged = eqx.filter_jit(
-        lambda tracker, state, views: tracker.judged(state.previous, state.usual, views.windows, cells)
+        lambda tracker, state, views: tracker.judged(state.previous, state.baseline, views.windows, FrameInput(cells))
     )
     objective = FrameEnergy(job.tracker.body, seen, History.unknown(job.start), job.tracker.terms)
     objective = eqx.filter_jit(lambda energy, pose: energy.near(pose, capacities.blocks)[0])(objective, job.start)

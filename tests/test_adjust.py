@@ -30,7 +30,7 @@ from sogjax.run.memory import available_memory
 from sogjax.synth.render import render_recording
 from sogjax.synth.settings import SynthSettings
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import TrackState
+from sogjax.tracking.frame import FrameInput, TrackState
 
 DEPTH = 6
 GRADIENT = 2e-3
@@ -50,7 +50,7 @@ def test_a_frame_has_the_gradient_of_its_energy_by_pose_and_shape(scene):
     tracker, pose, rig = scene
     cells = cells_of(rig, draw(tracker.body, pose, rig), DEPTH)
     near = jnp.asarray(moved(tracker.body, pose, {"root_x": 0.02, "left_elbow": -0.1, "left_clavicle_raise": 0.2}))
-    views, _, _ = tracker.views(jnp.asarray(cells), TrackState.from_pose(near), Capacities(1024, 1024))
+    views, _, _ = tracker.views(FrameInput(jnp.asarray(cells)), TrackState.from_pose(near), Capacities(1024, 1024))
     shape = ClipShape.from_body(tracker.body, "z")
     params = jnp.asarray(0.01 * np.random.default_rng(0).normal(size=shape.num_params), jnp.float32)
     terms = (*standard_terms(), RestPenalty(1e-3))
@@ -189,8 +189,8 @@ def test_several_actors_and_empty_folders_are_refused(capsys, tracked):
 def test_a_window_larger_than_memory_is_refused(capsys, tracked, monkeypatch):
     motion = tracked[1]
     each = bytes_of_frame(2, motion.blob_means.shape[1])
-    monkeypatch.setattr("sogjax.run.memory.available_memory", lambda: 30 * each)
-    monkeypatch.setattr("sogjax.refine.pictures.bytes_of_frame", lambda *_: 5 * each)
+    monkeypatch.setattr(adjust_checks, "available_memory", lambda: 30 * each)
+    monkeypatch.setattr(adjust_checks, "bytes_of_frame", lambda *_: 5 * each)
     found = sentence(capsys, tracked, "window=24")
     assert "window=24" in found
     assert "fewer cameras" in found

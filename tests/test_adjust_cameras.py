@@ -29,7 +29,7 @@ from sogjax.refine.frame_models import frame_model, shape_rates
 from sogjax.refine.pictures import Reader
 from sogjax.run.adjust_cameras import camera_lines, check_cameras, moved_rig, moves_of, write_cameras
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import TrackState
+from sogjax.tracking.frame import FrameInput, TrackState
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,7 @@ def test_a_frame_has_the_gradient_of_its_energy_by_the_moves_of_the_cameras(scen
     tracker, pose, rig = scene
     cells = cells_of(rig, draw(tracker.body, pose, rig), DEPTH)
     near = jnp.asarray(moved(tracker.body, pose, {"root_x": 0.02, "left_elbow": -0.1}))
-    views, _, _ = tracker.views(jnp.asarray(cells), TrackState.from_pose(near), Capacities(1024, 1024))
+    views, _, _ = tracker.views(FrameInput(jnp.asarray(cells)), TrackState.from_pose(near), Capacities(1024, 1024))
     shape = ClipShape.from_body(tracker.body, "z")
     none, terms = jnp.zeros(shape.num_params), standard_terms()
     rng = np.random.default_rng(0)

@@ -21,7 +21,7 @@ from sogjax.search.mirrored import means_of
 from sogjax.search.select_parts import APART, BIAS, CHANGE, best_choice, select_parts, stretches
 from sogjax.tracking.capacity import with_room
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import PartialCells
+from sogjax.tracking.frame import FrameInput
 from sogjax.tracking.frame_by_frame import track
 
 LOST = slice(4, 7)
@@ -159,7 +159,7 @@ def test_a_lost_limb_comes_back_though_a_camera_is_missing_in_some_frames(walkin
     tracker, cells, _ = walking_dog
     passed, limb = with_lost_limb(walking_dog)
     present = np.arange(len(cells[0])) != 1
-    some = [PartialCells(frame, present) if LOST.start <= k < LOST.stop else frame for k, frame in enumerate(cells)]
+    some = [FrameInput(frame, present) if LOST.start <= k < LOST.stop else frame for k, frame in enumerate(cells)]
     found = merge_passes(tracker, passed, backwards(some))
     assert found.parts.keys() == {limb_names(tracker.body)[limb]}
     assert {*range(LOST.start, LOST.stop)} <= {*found.frames}

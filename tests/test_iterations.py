@@ -11,7 +11,7 @@ from sogjax.solve.ascent import ConditionedAscent
 from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.solve.optimistix import OptimistixSolver
 from sogjax.tracking.capacity import first_capacities
-from sogjax.tracking.frame import TrackState
+from sogjax.tracking.frame import FrameInput, TrackState
 from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.iterations import best_after
 
@@ -31,7 +31,7 @@ def test_it_leads_upwards_from_the_start_to_what_tracking_finds(solver):
     tracker, cells = make_tracker(body, rig, 6, solver), cells_of(rig, draw(body, truth, rig), 6)
     (tracked,) = track(tracker, start, [cells])
     state = TrackState.from_pose(start)
-    room = first_capacities(tracker, state, jnp.asarray(cells))
+    room = first_capacities(tracker, state, FrameInput(jnp.asarray(cells)))
     counts = jnp.arange(int(tracked.result.iterations) + 1)
     poses, energies = best_after(tracker, state, jnp.asarray(cells), room, counts)
     np.testing.assert_array_equal(poses[0], start)

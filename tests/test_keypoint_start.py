@@ -53,7 +53,7 @@ def test_it_is_used_where_nothing_else_is_given(folder, monkeypatch):
     def forbidden(*_):
         raise AssertionError("searched")
 
-    monkeypatch.setattr(first_pose, "PoseSearch", forbidden)
+    monkeypatch.setattr(first_pose, "ClipSearch", forbidden)
     recording = open_recording(folder)
     body, config = upright(HUMAN, recording), track_config(recording=folder)
     (pose,) = first_pose.first_poses(recording, [body], config, 1)

@@ -20,7 +20,7 @@ from sogjax.model.camera import project_points
 from sogjax.run import run_job
 from sogjax.run.clip_keypoints import keypoint_pull
 from sogjax.solve.gauss_newton import GaussNewton
-from sogjax.tracking.frame import WithKeypoints
+from sogjax.tracking.frame import FrameInput
 from sogjax.tracking.frame_by_frame import track
 
 SCHEME = named_scheme("HALPE_26")
@@ -61,7 +61,7 @@ def arm_error(tracker, pose, true):
 
 def tracked(tracker, rig, start, true, seen):
     cells = cells_of(rig, draw(tracker.body, true, rig), 6)
-    frames = [cells if seen is None else WithKeypoints(cells, seen)] * 2
+    frames = [FrameInput(cells, keypoints=seen)] * 2
     return np.asarray([*track(tracker, jnp.asarray(start), frames)][-1].result.pose)
 
 

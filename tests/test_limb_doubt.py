@@ -19,7 +19,7 @@ from sogjax.quality.limb_evidence import BlobEvidence, LimbBlobs, blob_evidence
 from sogjax.quality.limb_warnings import doubtful_limbs
 from sogjax.scene.background import BackgroundCells
 from sogjax.scene.foreground import BackgroundModel, own_density, subject_colors, subject_density
-from sogjax.tracking.frame import PartialCells
+from sogjax.tracking.frame import FrameInput
 from sogjax.tracking.frame_by_frame import track
 
 DEPTH = 6
@@ -112,7 +112,7 @@ def test_the_step_judges(dog):
     np.testing.assert_allclose(unjudged[-1].pose, one_by_one[-1].pose, atol=1e-5)
     state, _ = eqx.filter_jit(tracker.step)(
         tracker.start(pose),
-        PartialCells(cells, np.arange(5) != 1),
+        FrameInput(cells, np.arange(5) != 1),
         next(track(tracker, jnp.asarray(pose), frames)).capacities,
     )
     assert np.isfinite(np.asarray(state.baseline)).all()

@@ -23,7 +23,7 @@ from sogjax.io.source import look_at_source
 from sogjax.io.video import read_frames
 from sogjax.run import pipeline
 from sogjax.solve.gauss_newton import GaussNewton
-from sogjax.tracking.frame import PartialCells
+from sogjax.tracking.frame import FrameInput
 from sogjax.tracking.frame_by_frame import track
 
 LIGHT = ("outputs.overlay=false", "outputs.rerun=false", "outputs.bvh=false")
@@ -115,7 +115,7 @@ def test_a_missing_camera_is_as_good_as_none():
     poses = [moved(body, standing(body, 1.1), {"root_x": 0.01 * k, "root_yaw": 0.03 * k}) for k in range(3)]
     frames = [cells_of(rig, draw(body, pose, rig), 6) for pose in poses]
     present = np.array([True, False, True, True])
-    partly = [PartialCells(np.where(present[:, None, None, None], cells, 0), present) for cells in frames]
+    partly = [FrameInput(np.where(present[:, None, None, None], cells, 0), present) for cells in frames]
     others = rig.select(tuple(name for name, here in zip(rig.names, present, strict=True) if here))
     results = lambda rig, frames: [
         tracked.result for tracked in track(make_tracker(body, rig, 6, GaussNewton()), jnp.asarray(poses[0]), frames)

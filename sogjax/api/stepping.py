@@ -4,8 +4,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from jaxtyping import Array, UInt8
-
 from sogjax.api.tracking import actor_list, track_settings
 from sogjax.energy.keypoints import keypoint_term_among
 from sogjax.energy.term import Term
@@ -16,11 +14,11 @@ from sogjax.run.cells import picture_reader
 from sogjax.run.clip_keypoints import ClipKeypoints, with_keypoints
 from sogjax.run.job import Job
 from sogjax.run.keypoint_offsets import told_offsets
-from sogjax.run.pipeline import Preparation, cells_of_frame, read_pictures
+from sogjax.run.pipeline import Preparation, frame_input, read_pictures
 from sogjax.run.recordings import with_cameras
 from sogjax.tracking.capacity import first_capacities
 from sogjax.tracking.culling import Capacities, capacity_for
-from sogjax.tracking.frame import PartialCells, WithKeypoints, on_device
+from sogjax.tracking.frame import AnyFrame, on_device
 from sogjax.tracking.tracker import Tracker
 
 ROOM = 2
@@ -57,14 +55,11 @@ def make_tracker(
     recording = with_cameras(recording, config.cameras)
     job = Job.from_config(recording, actors, config, terms=terms)
     tracker = replace(told_offsets(job, picture_reader(config.images)), first_pose=job.start)
-    cells = next(read_cells(recording, tracker, job.frames[0], job.frames[0] + 1))
-    seen, _ = on_device(cells)
-    return replace(tracker, capacities=_with_more_room(first_capacities(tracker, tracker.start(), seen)))
+    frame = on_device(next(read_cells(recording, tracker, job.frames[0], job.frames[0] + 1)))
+    return replace(tracker, capacities=_with_more_room(first_capacities(tracker, tracker.start(), frame)))
 
 
-def read_cells(
-    recording: Recording, tracker: Tracker, start: int = 0, stop: int | None = None
-) -> Iterator[UInt8[Array, "camera rows columns 3"] | PartialCells | WithKeypoints]:
+def read_cells(recording: Recording, tracker: Tracker, start: int = 0, stop: int | None = None) -> Iterator[AnyFrame]:
     """What a tracker's step takes of each frame: the pictures of all cameras, averaged to cells (sRGB).
 
     Args:
@@ -74,8 +69,8 @@ def read_cells(
         stop: the frame before which to stop; None: the end.
 
     Returns:
-        An iterator with the cells of each frame, as bytes; where a camera has no picture, they say so too
-        (`PartialCells`), and where the recording has keypoints that count, these are with them (`WithKeypoints`).
+        An iterator with the cells of each frame, as bytes; where a camera has no picture, or keypoints count, with
+        these in a `FrameInput`.
 
     Raises:
         InputError: a picture cannot be read, another number of cameras, or no such frames.
@@ -92,18 +87,12 @@ def read_cells(
             f"start={start} stop={stop}: {recording.path} has the frames 0 to {recording.num_frames - 1}; choose "
             f"0 <= start < stop <= {recording.num_frames}"
         )
-    cells = _cells(recording, Preparation(grids), start, last)
+    pictures = read_pictures(recording, Preparation(grids), start, last)
+    frames = (on_device(frame_input([picture.cells for picture in shown])) for shown in pictures)
     pulled = keypoint_term_among(tracker.terms) is not None
     keypoints = ClipKeypoints.of_recording(recording) if pulled else None
-    return iter(with_keypoints(keypoints, cells, range(start, last)))  # pyright: ignore[reportReturnType]
-
-
-def _cells(
-    recording: Recording, preparation: Preparation, start: int, stop: int
-) -> Iterator[UInt8[Array, "camera rows columns 3"] | PartialCells]:
-    for pictures in read_pictures(recording, preparation, start, stop):
-        cells, beside = on_device(cells_of_frame([picture.cells for picture in pictures]))
-        yield cells if beside.present is None else PartialCells(cells, beside.present)
+    known = with_keypoints(keypoints, frames, range(start, last))
+    return (frame.cells if frame[1:] == (None, None) else frame for frame in known)
 
 
 def _with_more_room(first: Capacities) -> Capacities:

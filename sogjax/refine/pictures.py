@@ -21,7 +21,7 @@ from sogjax.search.search_energy import blob_clusters
 from sogjax.search.seen_frame import cells_at
 from sogjax.tracking.capacity import first_capacities, larger_capacities
 from sogjax.tracking.culling import BLOCK_STEP, Capacities, actor_of_blobs, block_capacity, body_boxes
-from sogjax.tracking.frame import Beside, FrameCells, TrackState, on_device
+from sogjax.tracking.frame import AnyFrame, FrameInput, TrackState, on_device
 from sogjax.tracking.tracker import Tracker
 
 COLUMNS, ROWS = 40, 64
@@ -67,7 +67,7 @@ class Reader(eqx.Module):
         body = tracker.body
         return cls(tracker, color_clusters(np.asarray(body.blob_colors), np.asarray(body.blob_sigmas) ** 2), inside)
 
-    def pictures(self, cells: Sequence[FrameCells], poses: Float[np.ndarray, "frame dof"]) -> ClipPictures:
+    def pictures(self, cells: Sequence[AnyFrame], poses: Float[np.ndarray, "frame dof"]) -> ClipPictures:
         """Of frames, near the poses in them.
 
         Raises:
@@ -75,12 +75,12 @@ class Reader(eqx.Module):
         """
         tables = jnp.asarray(np.concatenate([self.kinds.tables, self.kinds.whole[None]]), jnp.float32)
         states = [TrackState.from_pose(jnp.asarray(pose, jnp.float32)) for pose in poses]
-        capacities = first_capacities(self.tracker, states[0], on_device(cells[0])[0])
+        capacities = first_capacities(self.tracker, states[0], on_device(cells[0]))
         found: list[Views] = []
         windows = []
         while len(found) < len(states):
             frame, state = on_device(cells[len(found)]), states[len(found)]
-            views, near, matching = _views(self.tracker, *frame, state, capacities)
+            views, near, matching = _views(self.tracker, frame, state, capacities)
             counts = int(jnp.max(near)), int(jnp.max(matching))
             if not capacities.hold(*counts):
                 capacities = larger_capacities(capacities, *counts, 0)
@@ -88,9 +88,9 @@ class Reader(eqx.Module):
                 continue
             found.append(views)
         for frame, state in zip(map(on_device, cells), states, strict=True):
-            present = jnp.ones(len(self.inside), bool) if frame[1].present is None else frame[1].present
+            present = jnp.ones(len(self.inside), bool) if frame.present is None else frame.present
             shown = jnp.where(present[:, None, None], self.inside, 0.0)
-            windows.append(_windows(self.tracker, frame[0], shown, tables, state.previous))
+            windows.append(_windows(self.tracker, jnp.asarray(frame.cells), shown, tables, state.previous))
         stack = lambda *leaves: jnp.stack(leaves)
         kinds = blob_clusters(self.kinds, self.tracker.body.num_blobs)
         return ClipPictures(jax.tree.map(stack, *found), jax.tree.map(stack, *windows), kinds)
@@ -131,12 +131,11 @@ class NearPairs(eqx.Module):
 @eqx.filter_jit
 def _views(
     tracker: Tracker,
-    cells: UInt8[Array, "camera rows columns 3"],
-    beside: Beside,
+    frame: FrameInput,
     state: TrackState,
     capacities: Capacities,
 ) -> tuple[Views, Int[Array, "camera"], Int[Array, "camera"]]:
-    return tracker.views(cells, state, capacities, beside)
+    return tracker.views(frame, state, capacities)
 
 
 @eqx.filter_jit

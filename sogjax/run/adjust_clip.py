@@ -28,14 +28,14 @@ from sogjax.run.cells import picture_reader
 from sogjax.run.clip_keypoints import clip_keypoints, keypoint_terms
 from sogjax.run.job import Job
 from sogjax.run.keypoint_offsets import FRAMES, knowing_offsets
-from sogjax.run.pipeline import PictureReader, Preparation, cells_of_frame
+from sogjax.run.pipeline import PictureReader, Preparation, frame_input
 from sogjax.run.prefix import Prefix
 from sogjax.run.recordings import upright
 from sogjax.run.second_background import learnt_again
 from sogjax.run.terminal import progress, say
 from sogjax.scene.cells import stack_shape
 from sogjax.settings.run import TrackConfig
-from sogjax.tracking.frame import FrameCells
+from sogjax.tracking.frame import FrameInput
 
 CLEARLY = 1.01
 """By which factor new colours must explain more to be taken: those of example poses were measured within masks."""
@@ -157,17 +157,17 @@ class _Source:
         reader = Reader.from_tracker(self.job.tracker, stack_shape(self.job.grids))
         return reader.pictures(self.cells(rows), poses)
 
-    def cells(self, rows: Int[np.ndarray, "row"]) -> list[FrameCells]:
+    def cells(self, rows: Int[np.ndarray, "row"]) -> list[FrameInput]:
         """Of the rows."""
         return list(self.coming(rows))
 
-    def coming(self, rows: Int[np.ndarray, "row"]) -> Iterator[FrameCells]:
+    def coming(self, rows: Int[np.ndarray, "row"]) -> Iterator[FrameInput]:
         """Of the rows, one after the other."""
         frames = (self.motion.frame[rows] - self.job.recording.first_frame).tolist()
         wanted, first, last = set(frames), min(frames), max(frames) + 1
         coming = self.read(self.job.recording, Preparation(self.job.grids), first, last)
         shown = progress(coming, last - first, "reading")
-        cells = (cells_of_frame([picture.cells for picture in pictures]) for pictures in shown)
+        cells = (frame_input([picture.cells for picture in pictures]) for pictures in shown)
         known = self.job.with_keypoints(cells, range(first, last))
         yield from (frame for number, frame in enumerate(known, first) if number in wanted)
 

@@ -12,7 +12,7 @@ from sogjax.model.body import Body
 from sogjax.refine.clip_programs import term_values
 from sogjax.refine.clip_shape import frames_by_spread
 from sogjax.refine.pictures import NearPairs, Reader
-from sogjax.tracking.frame import FrameCells, on_device
+from sogjax.tracking.frame import FrameInput
 from sogjax.tracking.tracker import Tracker
 
 NUM_FRAMES = 6
@@ -57,9 +57,9 @@ def measured_colors(
     return colored(body, back_projected_colors(body, views, space))
 
 
-def mean_similarity(tracker: Tracker, cells: list[FrameCells], poses: Float[np.ndarray, "chosen dof"]) -> float:
+def mean_similarity(tracker: Tracker, cells: list[FrameInput], poses: Float[np.ndarray, "chosen dof"]) -> float:
     """Of the tracker's body in some frames."""
-    shape = on_device(cells[0])[0].shape[1:3]
+    shape = cells[0].cells.shape[1:3]
     pictures = Reader.from_tracker(tracker, (int(shape[0]), int(shape[1]))).pictures(cells, poses)
     at = jnp.asarray(poses, jnp.float32)
     pairs = NearPairs.of(tracker, tracker.body, pictures, at, 0)

@@ -12,7 +12,7 @@ from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.run.job import Job
 from sogjax.run.judged_frames import Judged
 from sogjax.run.prefix import JUDGEMENT, Prefix
-from sogjax.tracking.frame import FrameCells
+from sogjax.tracking.frame import FrameInput
 from sogjax.tracking.known_poses import confidence_of_poses
 
 MORE_DOUBT = 0.02
@@ -20,7 +20,7 @@ MORE_DOUBT = 0.02
 
 
 def judged_with_colors(
-    job: Job, body: Body, cells: Iterable[FrameCells], prefix: Prefix, motion: Motion
+    job: Job, body: Body, cells: Iterable[FrameInput], prefix: Prefix, motion: Motion
 ) -> tuple[Job, Prefix, Motion]:
     """The job with a body of new colours, unless these make a limb more doubtful; and what is said of the poses.
 
@@ -45,7 +45,7 @@ def more_doubtful(motion: Motion, than: Motion) -> bool:
     return doubt(motion) > doubt(than) + MORE_DOUBT
 
 
-def _judgements(jobs: Sequence[Job], cells: Iterable[FrameCells], motion: Motion) -> list[list[LimbConfidence]]:
+def _judgements(jobs: Sequence[Job], cells: Iterable[FrameInput], motion: Motion) -> list[list[LimbConfidence]]:
     """Of each job's body in every frame, frame by frame, so that cells need not be kept."""
     parts = zip(jobs, tee(cells, len(jobs)), strict=True)
     each = [confidence_of_poses(job.tracker, np.asarray(motion.pose), part) for job, part in parts]

@@ -7,12 +7,12 @@ from jaxtyping import Array, Float
 from sogjax.io.cell_cache import cell_cache
 from sogjax.io.recording import Recording
 from sogjax.run.clock import StageTimes
-from sogjax.run.pipeline import Preparation, cells_of_frame, read_pictures
+from sogjax.run.pipeline import Preparation, frame_input, read_pictures
 from sogjax.run.prefix import Prefix
 from sogjax.run.terminal import progress, say
 from sogjax.scene.cells import CellGrid
 from sogjax.settings.method import ImagesConfig
-from sogjax.tracking.frame import FrameCells, TrackedFrame
+from sogjax.tracking.frame import FrameInput, TrackedFrame
 from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.tracker import Tracker
 
@@ -21,7 +21,7 @@ BLOCK = 48
 
 
 def tracked_backwards(
-    tracker: Tracker, start: Float[Array, "dof"], frames: Iterable[FrameCells], count: int, times: StageTimes
+    tracker: Tracker, start: Float[Array, "dof"], frames: Iterable[FrameInput], count: int, times: StageTimes
 ) -> Prefix:
     """`count` frames that come backwards, tracked from a rough pose of the first to come; in the order of the clip.
 
@@ -39,7 +39,7 @@ def tracked_backwards(
 
 def frames_backwards(
     recording: Recording, grids: tuple[CellGrid, ...], images: ImagesConfig, first: int, last: int
-) -> Iterator[FrameCells]:
+) -> Iterator[FrameInput]:
     """The cells of the frames from `first` to before `last`, the last one first.
 
     Raises:
@@ -54,4 +54,4 @@ def frames_backwards(
     for stop in range(last, first, -BLOCK):
         block = list(read_pictures(recording, Preparation(grids), max(first, stop - BLOCK), stop))
         for pictures in reversed(block):
-            yield cells_of_frame([picture.cells for picture in pictures])
+            yield frame_input([picture.cells for picture in pictures])

@@ -16,7 +16,7 @@ from sogjax.model.limbs import joint_limbs
 from sogjax.run.terminal import say
 from sogjax.search.triangulation import undistorted
 from sogjax.settings.run import TrackConfig
-from sogjax.tracking.frame import FrameCells, WithKeypoints
+from sogjax.tracking.frame import FrameInput
 
 
 @dataclass(frozen=True)
@@ -44,15 +44,15 @@ class ClipKeypoints:
         by_frame = lambda values: np.ascontiguousarray(np.moveaxis(values, 1, 0), np.float32)
         return cls(found, SeenKeypoints(by_frame(straight), by_frame(found.confidence)))
 
-    def beside(self, frames: Iterable[FrameCells], numbers: Iterable[int]) -> Iterator[FrameCells]:
+    def beside(self, frames: Iterable[FrameInput], numbers: Iterable[int]) -> Iterator[FrameInput]:
         """Frames with their keypoints; `numbers` counts them from the recording's first."""
         for frame, number in zip(frames, numbers, strict=False):
-            yield WithKeypoints(frame, SeenKeypoints(self.seen.pixels[number], self.seen.confidence[number]))  # pyright: ignore[reportArgumentType]
+            yield frame._replace(keypoints=SeenKeypoints(self.seen.pixels[number], self.seen.confidence[number]))
 
 
 def with_keypoints(
-    keypoints: ClipKeypoints | None, frames: Iterable[FrameCells], numbers: Iterable[int]
-) -> Iterable[FrameCells]:
+    keypoints: ClipKeypoints | None, frames: Iterable[FrameInput], numbers: Iterable[int]
+) -> Iterable[FrameInput]:
     """Frames with their keypoints, if there are any; `numbers` counts them from the recording's first."""
     return frames if keypoints is None else keypoints.beside(frames, numbers)
 

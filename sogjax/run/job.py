@@ -20,7 +20,7 @@ from sogjax.run.recordings import upright
 from sogjax.scene.cells import CellGrid, stack_shape
 from sogjax.settings.run import TrackConfig
 from sogjax.tracking.capacity import compile_counts
-from sogjax.tracking.frame import FrameCells
+from sogjax.tracking.frame import FrameInput
 from sogjax.tracking.tracker import Tracker
 
 
@@ -81,7 +81,7 @@ class Job:
             tracker = building.result()
         return cls(recording, bodies, frames, grids, tracker, start, begin, keypoints)
 
-    def with_keypoints(self, frames: Iterable[FrameCells], numbers: Iterable[int]) -> Iterable[FrameCells]:
+    def with_keypoints(self, frames: Iterable[FrameInput], numbers: Iterable[int]) -> Iterable[FrameInput]:
         """Frames with what detectors saw in them; `numbers` counts them from the recording's first."""
         return with_keypoints(self.keypoints, frames, numbers)
 

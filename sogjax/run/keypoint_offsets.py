@@ -10,7 +10,7 @@ from sogjax.energy.keypoint_views import SeenKeypoints
 from sogjax.energy.keypoints import KeypointTerm, keypoint_term_among
 from sogjax.run.clip_keypoints import ClipKeypoints
 from sogjax.run.job import Job
-from sogjax.run.pipeline import PictureReader, Preparation, cells_of_frame
+from sogjax.run.pipeline import PictureReader, Preparation, frame_input
 from sogjax.run.terminal import progress, say
 from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.keypoint_bias import estimated_offsets
@@ -37,7 +37,7 @@ def told_offsets(job: Job, read: PictureReader) -> Tracker:
         return job.tracker
     lightly = eqx.tree_at(lambda p: p.weight, pull, LITTLE * pull.weight)
     pictures = read(job.recording, Preparation(job.grids), first, first + count)
-    cells = (cells_of_frame([picture.cells for picture in frame]) for frame in pictures)
+    cells = (frame_input([picture.cells for picture in frame]) for frame in pictures)
     shown = progress(cells, count, "tracking, to learn the keypoints' places")
     frames = job.with_keypoints(shown, range(first, first + count))
     tracked = track(with_pull(job.tracker, lightly), job.start, frames)

@@ -7,7 +7,7 @@ from itertools import permutations
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, UInt8
+from jaxtyping import Array, Float
 
 from sogjax.energy.frame_energy import still_energy
 from sogjax.energy.similarity import similarity_among
@@ -15,14 +15,14 @@ from sogjax.io.keypoints.load import Keypoints, load_keypoints
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body, concatenate
 from sogjax.run import build
-from sogjax.run.pipeline import Preparation, cells_of_frame, read_pictures
+from sogjax.run.pipeline import Preparation, frame_input, read_pictures
 from sogjax.run.terminal import say
 from sogjax.search.keypoint_people import triangulated_people
 from sogjax.search.keypoint_pose import KeypointPose, pose_of_keypoints
 from sogjax.settings.run import TrackConfig
 from sogjax.tracking.capacity import first_capacities
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import Beside, TrackState, on_device
+from sogjax.tracking.frame import FrameInput, TrackState, on_device
 from sogjax.tracking.tracker import Tracker
 
 LEAST_ON = 0.7
@@ -118,11 +118,11 @@ def _who_is_who(
     grids = build.cell_grids(recording, config.images.depth)
     tracker = build.tracker(recording, concatenate(bodies), grids, config)
     pictures = next(iter(read_pictures(recording, Preparation(grids), frame, frame + 1)))
-    cells, beside = on_device(cells_of_frame([picture.cells for picture in pictures]))
+    known = on_device(frame_input([picture.cells for picture in pictures]))
     poses = [np.concatenate([_pose(found[k][person]) for k, person in enumerate(order)]) for order in orders]
     states = [TrackState.from_pose(jnp.asarray(pose, tracker.normalizers.dtype)) for pose in poses]
-    capacities = first_capacities(tracker, states[0], cells)
-    values = np.array([float(_similarity(tracker, state, cells, beside, capacities)) for state in states])
+    capacities = first_capacities(tracker, states[0], known)
+    values = np.array([float(_similarity(tracker, state, known, capacities)) for state in states])
     best, second = np.sort(values)[::-1][:2]
     if not best > CLEARLY * max(second, 0.0):
         say(f"who is who in frame {frame + recording.first_frame} is not clear, so poses are searched for")
@@ -139,9 +139,8 @@ def _pose(found: KeypointPose | None) -> Float[np.ndarray, "dof"]:
 def _similarity(
     tracker: Tracker,
     state: TrackState,
-    cells: UInt8[Array, "camera rows columns 3"],
-    beside: Beside,
+    frame: FrameInput,
     capacities: Capacities,
 ) -> Float[Array, ""]:
-    views, _, _ = tracker.views(cells, state, capacities, beside)
+    views, _, _ = tracker.views(frame, state, capacities)
     return still_energy(tracker.body, state.previous, views, (similarity_among(tracker.terms),))

@@ -18,7 +18,7 @@ from sogjax.model.yuv_picture import YuvPicture
 from sogjax.run.clock import StageTimes
 from sogjax.run.terminal import progress
 from sogjax.scene.cells import CellGrid, padded_cells, stack_shape
-from sogjax.tracking.frame import FrameCells, PartialCells, TrackedFrame
+from sogjax.tracking.frame import FrameInput, TrackedFrame
 from sogjax.tracking.tracker import Tracker
 
 FRAMES_AHEAD = 3
@@ -52,11 +52,11 @@ PictureReader = Callable[[Recording, "Preparation", int, int], Iterator[list[Pic
 """Called with a recording, what to make of each picture, the first frame and the one after the last."""
 
 
-FrameTracker = Callable[[Tracker, Float[Array, "dof"], Iterable[FrameCells]], Iterator[TrackedFrame]]
+FrameTracker = Callable[[Tracker, Float[Array, "dof"], Iterable[FrameInput]], Iterator[TrackedFrame]]
 """Finds the poses of frames from their cells in turn, as `sogjax.tracking.frame_by_frame.track` does."""
 
 
-Follow = Callable[[Iterable[FrameCells]], Iterator[TrackedFrame]]
+Follow = Callable[[Iterable[FrameInput]], Iterator[TrackedFrame]]
 """The same with a tracker that knows where it begins."""
 
 
@@ -99,8 +99,8 @@ def read_pictures(recording: Recording, preparation: Preparation, first: int, la
     return read_prepared(recording, preparation, first, last, planes=True)
 
 
-def cells_of_frame(cells: Sequence[UInt8[np.ndarray, "rows columns 3"] | None]) -> FrameCells:
-    """The cells of all cameras; None: a camera is missing.
+def frame_input(cells: Sequence[UInt8[np.ndarray, "rows columns 3"] | None]) -> FrameInput:
+    """The frame with the cells of all cameras; None: a camera has no picture.
 
     Raises:
         InputError: all cameras are missing.
@@ -110,7 +110,7 @@ def cells_of_frame(cells: Sequence[UInt8[np.ndarray, "rows columns 3"] | None]) 
         raise InputError("a frame has no picture from any camera; track the frames before or after it (start=, stop=)")
     stacked = np.stack([np.zeros_like(some) if of_camera is None else of_camera for of_camera in cells])
     present = np.array([of_camera is not None for of_camera in cells])
-    return stacked if present.all() else PartialCells(stacked, present)
+    return FrameInput(stacked, None if present.all() else present)
 
 
 def tracked_frames(
@@ -127,11 +127,11 @@ def tracked_frames(
     waiting: deque[list[Picture]] = deque()
     with closing(prefetch(pictures, FRAMES_AHEAD)) as ready:
 
-        def cells() -> Iterator[FrameCells]:
+        def cells() -> Iterator[FrameInput]:
             for frame in progress(times.timed("decode", ready), count, "tracking"):
                 waiting.append(frame)
                 times.add("cells", sum(picture.seconds for picture in frame))
-                yield cells_of_frame([picture.cells for picture in frame])
+                yield frame_input([picture.cells for picture in frame])
 
         begin = time.perf_counter()
         for tracked in follow(cells()):

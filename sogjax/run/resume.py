@@ -10,12 +10,12 @@ from jaxtyping import Array, Float
 from sogjax.model.sog import Sog
 from sogjax.run.pipeline import FrameTracker
 from sogjax.run.prefix import Prefix
-from sogjax.tracking.frame import FrameCells, TrackedFrame, TrackState, on_device
+from sogjax.tracking.frame import FrameInput, TrackedFrame, TrackState, on_device
 from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.scan import image_blobs
 from sogjax.tracking.tracker import Tracker
 
-Frames = Iterable[FrameCells]
+Frames = Iterable[FrameInput]
 
 
 def resumed(prefix: Prefix, shown: bool, with_images: bool) -> FrameTracker:
@@ -50,8 +50,8 @@ def _again(
     """The frames of a prefix, without tracking them."""
     state, capacities = TrackState.from_pose(start), prefix.capacities
     for index, frame in enumerate(frames):
-        cells, beside = on_device(frame)
-        images = image_blobs(tracker, state, cells, capacities, beside) if with_images else _no_blobs(len(cells))
+        known = on_device(frame)
+        images = image_blobs(tracker, state, known, capacities) if with_images else _no_blobs(len(known.cells))
         result = prefix.result(index, images)
         yield TrackedFrame(index, result, capacities, tracker.reader.color_space, 0.0)
         state = state.advanced(result.pose)

@@ -13,7 +13,7 @@ from sogjax.run.terminal import alive, say
 from sogjax.search.backward_pass import Pass
 from sogjax.search.merge_passes import Revised, in_doubt, merge_passes
 from sogjax.settings.method import ImagesConfig
-from sogjax.tracking.frame import FrameCells
+from sogjax.tracking.frame import FrameInput
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Reviser:
         say(f"taken from the backward pass in {counted(len(found.frames), 'frame')}: {parts}")
         return Prefix(_revised(rows, found.frames))
 
-    def _backwards(self, begin: int, stop: int) -> Iterable[FrameCells]:
+    def _backwards(self, begin: int, stop: int) -> Iterable[FrameInput]:
         """The cells of some rows, the last one first."""
         begin, stop = self.job.frames[0] + begin, self.job.frames[0] + stop
         frames = frames_backwards(self.job.recording, self.job.grids, self.images, begin, stop)

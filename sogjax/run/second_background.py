@@ -20,7 +20,7 @@ from sogjax.run.clip_learning import LeftOut, sampled_frames
 from sogjax.run.clock import StageTimes
 from sogjax.run.job import Job
 from sogjax.run.kept_run import KeptRun
-from sogjax.run.pipeline import PictureReader, Preparation, cells_of_frame
+from sogjax.run.pipeline import PictureReader, Preparation, frame_input
 from sogjax.run.terminal import progress, say
 from sogjax.scene.background import stack_background
 from sogjax.scene.cells import CellGrid
@@ -159,7 +159,7 @@ def _first_pass(job: Job, images: ImagesConfig, read: PictureReader) -> dict[int
         frame_of = range(job.frames[0], job.frames[0] + prefix.num_frames)
         poses = {frame: prefix.pose(k) for k, frame in enumerate(frame_of) if frame in sampled}
     pictures = read(job.recording, Preparation(job.grids), job.begin, job.frames[1])
-    cells = (cells_of_frame([picture.cells for picture in frame]) for frame in pictures)
+    cells = (frame_input([picture.cells for picture in frame]) for frame in pictures)
     shown = progress(cells, job.frames[1] - job.begin, "tracking, to learn the background")
     for done in track(job.tracker, job.start, job.with_keypoints(shown, range(job.begin, job.frames[1]))):
         if job.begin + done.index in sampled:

@@ -7,7 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, UInt8
+from jaxtyping import Array, Bool, Float
 
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History
@@ -15,7 +15,7 @@ from sogjax.model.body import Body
 from sogjax.search.body_parts import Part, PartArrays
 from sogjax.tracking.capacity import Needed, with_room
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import Beside, FrameCells, TrackedFrame, TrackState, on_device
+from sogjax.tracking.frame import AnyFrame, FrameInput, TrackedFrame, TrackState, on_device
 from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.tracker import Tracker
 
@@ -30,7 +30,7 @@ SURE_FRAMES = 3
 MOST_FRAMES = 240
 """Tracked backwards from one frame, at most: so many frames' cells are held in memory."""
 
-FramesBackwards = Callable[[int, int], Iterable[FrameCells]]
+FramesBackwards = Callable[[int, int], Iterable[AnyFrame]]
 """The cells of the frames from the first to before the second, the last one first."""
 
 
@@ -66,7 +66,7 @@ class Pass:
 class Compared:
     """The frames of a backward pass beside the other, the last one first."""
 
-    cells: list[FrameCells]
+    cells: list[AnyFrame]
     poses: list[Float[np.ndarray, "dof"]]
     gains: list[Float[np.ndarray, "part"]]
     """By how much the energy rises if a part is taken from the backward pass."""
@@ -87,7 +87,7 @@ def compared_backwards(
     found, seen = Compared([], [], [], []), []
     lowest = max(0, begin - MOST_FRAMES, first - MOST_BEFORE)
 
-    def coming() -> Iterable[FrameCells]:
+    def coming() -> Iterable[AnyFrame]:
         for frame in frames(lowest, begin):
             seen.append(frame)
             yield frame
@@ -120,23 +120,22 @@ def _apart(
 
 def part_gains(
     tracker: Tracker,
-    frame: FrameCells,
+    frame: AnyFrame,
     capacities: Capacities,
     parts: PartArrays,
     first: Float[Array, "dof"],
     second: Float[Array, "dof"],
 ) -> Float[Array, "part"]:
     """The gains, with larger capacities where either pose sees more image blobs."""
-    cells, beside = on_device(frame)
-    return with_room(lambda room: _gains(tracker, cells, room, beside, parts, first, second), capacities)
+    known = on_device(frame)
+    return with_room(lambda room: _gains(tracker, known, room, parts, first, second), capacities)
 
 
 @eqx.filter_jit
 def _gains(
     tracker: Tracker,
-    cells: UInt8[Array, "camera rows columns 3"],
+    frame: FrameInput,
     capacities: Capacities,
-    beside: Beside,
     parts: PartArrays,
     first: Float[Array, "dof"],
     second: Float[Array, "dof"],
@@ -148,7 +147,7 @@ def _gains(
     mixed = jnp.concatenate([parts.mixed(tracker.body, first, second), parts.mixed(tracker.body, second, first)])
 
     def seen_near(at: Float[Array, "dof"]) -> tuple[Float[Array, "part"], Needed]:
-        views, near, matching = tracker.views(cells, TrackState.from_pose(at), capacities, beside)
+        views, near, matching = tracker.views(frame, TrackState.from_pose(at), capacities)
         energy = FrameEnergy(tracker.body, views, History.unknown(at), tracker.terms)
         values = jax.lax.map(energy, jnp.concatenate([first[None], second[None], mixed]))
         into_first, into_second = values[2:].reshape(2, -1)

@@ -10,7 +10,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, UInt8
+from jaxtyping import Array, Bool, Float
 
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History
@@ -20,7 +20,7 @@ from sogjax.search.body_parts import body_parts, merged_pose
 from sogjax.search.select_parts import select_parts, stretches
 from sogjax.tracking.capacity import Needed, with_room
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import Beside, FrameCells, TrackState, on_device
+from sogjax.tracking.frame import AnyFrame, FrameInput, TrackState, on_device
 from sogjax.tracking.tracker import Tracker
 
 DOUBTFUL = 0.3
@@ -99,14 +99,14 @@ class _Revising:
         self._tried.add(last)
         self._looked_at += len(rows)
 
-    def _value(self, row: int, cells: FrameCells) -> None:
+    def _value(self, row: int, frame: AnyFrame) -> None:
         """Note what a revised pose is worth."""
         poses = self.passed.poses
         before, before_that = (jnp.asarray(poses[max(row - j, 0)]) for j in (1, 2))
         history = History(before, before_that, jnp.asarray(row >= 2))
         pose, baseline = jnp.asarray(poses[row]), jnp.asarray(self.passed.baseline[row])
-        shown, room = on_device(cells), self.passed.capacities
-        value = with_room(lambda room: _valued(self.tracker, history, *shown, room, pose, baseline), room)
+        known, room = on_device(frame), self.passed.capacities
+        value = with_room(lambda room: _valued(self.tracker, history, known, room, pose, baseline), room)
         energy, terms, judged = jax.device_get(value)
         self.passed.doubts[row] = judged.error_probability
         values = {name: float(term) for name, term in terms.items()}
@@ -117,14 +117,13 @@ class _Revising:
 def _valued(
     tracker: Tracker,
     history: History,
-    cells: UInt8[Array, "camera rows columns 3"],
-    beside: Beside,
+    frame: FrameInput,
     capacities: Capacities,
     pose: Float[Array, "dof"],
     baseline: Float[Array, "2 blob"],
 ) -> tuple[tuple[Float[Array, ""], dict[str, Float[Array, ""]], LimbConfidence], Needed]:
     """Energy, terms and doubts of a pose that is known; and the room that they need."""
-    views, near, matching = tracker.views(cells, TrackState.from_pose(pose), capacities, beside)
+    views, near, matching = tracker.views(frame, TrackState.from_pose(pose), capacities)
     energy = FrameEnergy(tracker.body, views, history, tracker.terms)
-    judged = tracker.judged(pose, baseline, views.windows, cells, beside.present)
+    judged = tracker.judged(pose, baseline, views.windows, frame)
     return (energy(pose), energy.values(pose), judged), (jnp.max(near), jnp.max(matching))

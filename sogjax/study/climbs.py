@@ -18,7 +18,7 @@ from sogjax.run.job import Job
 from sogjax.settings.run import TrackConfig
 from sogjax.tracking.capacity import first_capacities, larger_capacities
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import TrackState
+from sogjax.tracking.frame import FrameInput, TrackState
 from sogjax.tracking.solving import solve_near
 from sogjax.tracking.tracker import Tracker
 
@@ -103,7 +103,7 @@ class _Climber:
         seen_from = TrackState(last, 2.0 * last - predicted, jnp.asarray(0))
         seen_cells = jnp.asarray(cells)
         if self.capacities is None:
-            self.capacities = first_capacities(self.tracker, seen_from, seen_cells)
+            self.capacities = first_capacities(self.tracker, seen_from, FrameInput(seen_cells))
         while True:
             capacities = self.capacities
             found, parts, counts = _climbed(
@@ -124,7 +124,7 @@ def _climbed(
     start: Float[Array, "dof"],
     capacities: Capacities,
 ) -> tuple[Float[Array, "dof"], dict[str, Array], tuple[Array, Array, Array]]:
-    views, near, matching = tracker.views(cells, seen_from, capacities)
+    views, near, matching = tracker.views(FrameInput(cells), seen_from, capacities)
     objective = FrameEnergy(tracker.body, views, history, tracker.terms)
     if tracker.pairs == "sparse":
         solution, blocks = solve_near(tracker.solver, objective, start, tracker.scales, capacities.blocks)

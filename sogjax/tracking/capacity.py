@@ -11,7 +11,7 @@ from jaxtyping import Array, Int, UInt8
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History
 from sogjax.tracking.culling import CAPACITIES, Capacities, block_capacity, capacity_for
-from sogjax.tracking.frame import TrackState
+from sogjax.tracking.frame import FrameInput, TrackState
 from sogjax.tracking.tracker import Tracker
 
 HEADROOM = 1.4
@@ -52,9 +52,9 @@ def larger_capacities(capacities: Capacities, near: int, matching: int, blocks: 
     )
 
 
-def first_capacities(tracker: Tracker, state: TrackState, cells: UInt8[Array, "camera rows columns 3"]) -> Capacities:
+def first_capacities(tracker: Tracker, state: TrackState, frame: FrameInput) -> Capacities:
     """Capacities with headroom for what the first frame needs."""
-    near, matching, blocks = (int(count.max()) for count in _counts(tracker, state, cells))
+    near, matching, blocks = (int(count.max()) for count in _counts(tracker, state, jnp.asarray(frame.cells)))
     room = capacity_for(near, HEADROOM)
     if tracker.pairs == "dense":
         return Capacities(room, capacity_for(matching, HEADROOM))
@@ -76,7 +76,7 @@ def _counts(
     """
     num_candidates = tracker.reader.candidates.sigmas.shape[-1]
     everything = Capacities(near=capacity_for(min(num_candidates, CAPACITIES[-1])), matching=CAPACITIES[0])
-    views, near, matching = tracker.views(cells, state, everything)
+    views, near, matching = tracker.views(FrameInput(cells), state, everything)
     if tracker.pairs == "dense":
         return near, matching, jnp.asarray(0)
     objective = FrameEnergy(tracker.body, views, History.unknown(state.previous), tracker.terms)

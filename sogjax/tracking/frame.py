@@ -15,42 +15,25 @@ from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.tracking.culling import Capacities
 
 
-class PartialCells(NamedTuple):
-    """The cells of a frame of which some cameras have no picture."""
+class FrameInput(NamedTuple):
+    """What is known of one frame before it is tracked."""
 
     cells: UInt8[np.ndarray | Array, "camera rows columns 3"]
-    present: Bool[np.ndarray | Array, "camera"]
-
-
-class WithKeypoints(NamedTuple):
-    """The cells of a frame, and what keypoint detectors saw in it."""
-
-    cells: UInt8[np.ndarray | Array, "camera rows columns 3"] | PartialCells
-    keypoints: SeenKeypoints
-
-
-FrameCells = UInt8[np.ndarray | Array, "camera rows columns 3"] | PartialCells | WithKeypoints
-
-
-class Beside(NamedTuple):
-    """What is known of a frame beside its cells."""
-
-    present: Bool[Array, "camera"] | None = None
+    """The colours of the cells (sRGB); those of a camera without a picture mean nothing."""
+    present: Bool[np.ndarray | Array, "camera"] | None = None
     """The cameras that have a picture; None: all have."""
     keypoints: SeenKeypoints | None = None
+    """What keypoint detectors saw; None: nothing is known."""
 
 
-NOTHING = Beside()
+AnyFrame = FrameInput | UInt8[np.ndarray | Array, "camera rows columns 3"]
+"""A frame of which perhaps only the cells are known."""
 
 
-def on_device(frame: FrameCells) -> tuple[UInt8[Array, "camera rows columns 3"], Beside]:
-    """The cells of a frame, and what else is known of it."""
-    if isinstance(frame, WithKeypoints):
-        cells, beside = on_device(frame.cells)  # pyright: ignore[reportArgumentType]
-        return cells, beside._replace(keypoints=jax.tree.map(jnp.asarray, frame.keypoints))
-    if isinstance(frame, PartialCells):
-        return jnp.asarray(frame.cells), Beside(jnp.asarray(frame.present))
-    return jnp.asarray(frame), NOTHING
+def on_device(frame: AnyFrame) -> FrameInput:
+    """The frame with its arrays on jax's device."""
+    known = frame if isinstance(frame, FrameInput) else FrameInput(frame)
+    return FrameInput(*jax.tree.map(jnp.asarray, known))
 
 
 class TrackState(eqx.Module):

@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 
 from sogjax.tracking.capacity import first_capacities, larger_capacities
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import FrameCells, TrackedFrame, TrackState, on_device, on_host
+from sogjax.tracking.frame import AnyFrame, TrackedFrame, TrackState, on_device, on_host
 from sogjax.tracking.tracker import Tracker
 
 _step = eqx.filter_jit(Tracker.step)
@@ -18,7 +18,7 @@ _step = eqx.filter_jit(Tracker.step)
 def track(
     tracker: Tracker,
     start: Float[Array, "dof"] | TrackState,
-    frames: Iterable[FrameCells],
+    frames: Iterable[AnyFrame],
     capacities: Capacities | None = None,
 ) -> Iterator[TrackedFrame]:
     """Track the frames one after the other from a rough pose of the first one, or from where another run stopped.
@@ -34,11 +34,11 @@ def track(
     state = tracker.with_memory(start if isinstance(start, TrackState) else TrackState.from_pose(start))
     for index, frame in enumerate(frames):
         begin = time.perf_counter()
-        cells, beside = on_device(frame)
+        known = on_device(frame)
         if capacities is None:
-            capacities = first_capacities(tracker, state, cells)
+            capacities = first_capacities(tracker, state, known)
         while True:
-            next_state, result = _step(tracker, state, cells, capacities, beside)
+            next_state, result = _step(tracker, state, known, capacities)
             needed = jax.device_get((result.num_near, result.num_matching, result.num_blocks))
             near, matching, blocks = (int(count.max()) for count in needed)
             if capacities.hold(near, matching, blocks):

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, UInt8
 
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import TrackState
+from sogjax.tracking.frame import FrameInput, TrackState
 from sogjax.tracking.tracker import Tracker
 
 
@@ -22,7 +22,7 @@ def best_after(
 
     The frame is solved again for every count, so no solver needs to know that it is watched.
     """
-    seen = tracker.views(cells, state, capacities)
+    seen = tracker.views(FrameInput(cells), state, capacities)
 
     def after(count: Int[Array, ""]) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
         stopped = eqx.tree_at(lambda t: t.solver.max_iterations, tracker, count)

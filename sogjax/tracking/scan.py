@@ -9,7 +9,7 @@ from jaxtyping import Array, UInt8
 
 from sogjax.model.sog import Sog
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import NOTHING, Beside, FrameResult, TrackState
+from sogjax.tracking.frame import FrameInput, FrameResult, TrackState
 from sogjax.tracking.tracker import Tracker
 
 ClipCells = UInt8[Array, "frame camera rows columns 3"]
@@ -23,12 +23,6 @@ def without_images(result: FrameResult) -> FrameResult:
 
 
 @eqx.filter_jit
-def image_blobs(
-    tracker: Tracker,
-    state: TrackState,
-    cells: UInt8[Array, "camera rows columns 3"],
-    capacities: Capacities,
-    beside: Beside = NOTHING,
-) -> Sog:
+def image_blobs(tracker: Tracker, state: TrackState, frame: FrameInput, capacities: Capacities) -> Sog:
     """The image blobs of a frame that was tracked already."""
-    return tracker.views(cells, tracker.led(state, beside), capacities, beside)[0].images
+    return tracker.views(frame, tracker.led(state, frame), capacities)[0].images

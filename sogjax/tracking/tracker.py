@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int, UInt8
+from jaxtyping import Array, Float, Int
 
 from sogjax.energy.coloring import Coloring
 from sogjax.energy.frame_energy import FrameEnergy
@@ -25,7 +25,7 @@ from sogjax.quality.limb_confidence import LimbConfidence, frame_fit, limb_confi
 from sogjax.quality.limb_evidence import LimbBlobs, blob_evidence
 from sogjax.solve.solution import Scales, Solution, Solver
 from sogjax.tracking.culling import Capacities, ImageReader, actor_of_blobs, body_boxes, union_boxes
-from sogjax.tracking.frame import NOTHING, Beside, FrameResult, PartialCells, TrackState, WithKeypoints, on_device
+from sogjax.tracking.frame import AnyFrame, FrameInput, FrameResult, TrackState, on_device
 from sogjax.tracking.keypoint_prefit import KeypointPrefit
 from sogjax.tracking.solving import solve_near
 
@@ -90,19 +90,30 @@ class Tracker(eqx.Module):
             boxes = union_boxes(boxes, around(self.predicted(state)))
         return boxes
 
+    def rgb(self, frame: FrameInput) -> Float[Array, "camera rows columns 3"]:
+        """The colours of a frame's cells (sRGB, 0 to 1)."""
+        return jnp.asarray(frame.cells).astype(self.cameras.intrinsics.dtype) / 255.0
+
+    def windows(self, frame: FrameInput, state: TrackState) -> Windows | None:
+        """The log odds of foreground around the actors; None where no background is known."""
+        odds = self.reader.odds(self.rgb(frame))
+        if odds is None:
+            return None
+        windows = self.reader.windows(odds, self.cameras, self.boxes(state))
+        return windows if frame.present is None else windows.of_present(jnp.asarray(frame.present))
+
     def views(
         self,
-        cells: UInt8[Array, "camera rows columns 3"],
+        frame: FrameInput,
         state: TrackState,
         capacities: Capacities,
-        beside: Beside = NOTHING,
     ) -> tuple[Views, Int[Array, "camera"], Int[Array, "camera"]]:
         """What the cameras see, culled, and the counts that must be held against the capacities.
 
         A camera that is not present sees nothing, and the similarity is the mean over the others.
         """
-        present = beside.present
-        rgb = cells.astype(self.cameras.intrinsics.dtype) / 255.0
+        present = None if frame.present is None else jnp.asarray(frame.present)
+        rgb = self.rgb(frame)
         odds, boxes = self.reader.odds(rgb), self.boxes(state)
         near_blobs = partial(self.reader.near_blobs, capacity=capacities.near)
         near, weights, num_near = stage_barrier(self.reader.true_at_run_time, near_blobs, rgb, odds, boxes)
@@ -123,29 +134,28 @@ class Tracker(eqx.Module):
                 near, weights, body, capacities.matching
             )
         coloring = Coloring(self.reader.color_radius, self.reader.color_space, weights)
-        keypoints = self.keypoint_views(beside, state.previous, normalizers)
+        keypoints = self.keypoint_views(frame, state.previous, normalizers)
         views = Views(
             self.cameras, images, similarities, normalizers, coloring=coloring, windows=windows, keypoints=keypoints
         )
         return views, num_near, num_matching
 
     def keypoint_views(
-        self, beside: Beside, pose: Float[Array, "dof"], normalizers: Float[Array, "camera"]
+        self, frame: FrameInput, pose: Float[Array, "dof"], normalizers: Float[Array, "camera"]
     ) -> KeypointViews | None:
         """Keypoints as the energy takes them, near a pose; None: there are none, or none of its terms looks at them."""
         pull = keypoint_term_among(self.terms)
-        if pull is None or beside.keypoints is None:
+        if pull is None or frame.keypoints is None:
             return None
-        return pull.views(beside.keypoints, self.cameras, Posed.from_pose(self.body, pose), normalizers)
+        return pull.views(frame.keypoints, self.cameras, Posed.from_pose(self.body, pose), normalizers)
 
     def step(
         self,
         state: TrackState,
-        cells: UInt8[Array, "camera rows columns 3"] | PartialCells | WithKeypoints,
+        frame: AnyFrame,
         capacities: Capacities | None = None,
-        beside: Beside = NOTHING,
     ) -> tuple[TrackState, FrameResult]:
-        """Find the pose of one frame from its cells (sRGB bytes); `beside`: what else is known of it.
+        """Find the pose of one frame from its cells (sRGB bytes), or from all that is known of it.
 
         With `capacities`, whether these sufficed is for the caller to see in the counts. Without, the tracker's own
         are used, and a frame that needs more is an error when it is computed.
@@ -153,24 +163,23 @@ class Tracker(eqx.Module):
         Raises:
             ValueError: there are none.
         """
-        if isinstance(cells, PartialCells | WithKeypoints):
-            cells, beside = on_device(cells)
+        frame = on_device(frame)
         if capacities is not None:
-            state = self.led(state, beside)
-            seen = self.views(cells, state, capacities, beside)
-            return self._judged(*self.found(state, seen, capacities), seen[0], cells, beside.present)
+            state = self.led(state, frame)
+            seen = self.views(frame, state, capacities)
+            return self._judged(*self.found(state, seen, capacities), seen[0], frame)
         if self.capacities is None:
             raise ValueError("the tracker has no capacities; give some, or take one of sogjax.make_tracker")
-        state, result = self.step(state, cells, self.capacities, beside)
+        state, result = self.step(state, frame, self.capacities)
         room = self.capacities
         cut_off = jnp.any(result.num_near > room.near) | jnp.any(result.num_matching > room.matching)
         cut_off |= result.num_blocks > room.blocks
         return eqx.error_if((state, result), cut_off, NO_ROOM)
 
-    def led(self, state: TrackState, beside: Beside) -> TrackState:
+    def led(self, state: TrackState, frame: FrameInput) -> TrackState:
         """The state, expecting the pose to which keypoints lead; the same where there are none."""
         pull = keypoint_term_among(self.terms)
-        views = self.keypoint_views(beside, state.previous, self.normalizers)
+        views = self.keypoint_views(frame, state.previous, self.normalizers)
         if pull is None or views is None:
             return state
         guide = KeypointPrefit(self.body, self.cameras, views, pull)
@@ -207,15 +216,14 @@ class Tracker(eqx.Module):
         state: TrackState,
         result: FrameResult,
         views: Views,
-        cells: UInt8[Array, "camera rows columns 3"],
-        present: Bool[Array, "camera"] | None,
+        frame: FrameInput,
     ) -> tuple[TrackState, FrameResult]:
         """The same with what the cameras say of the limbs, if they are to be judged."""
         if self.limbs is None or self.reader.subject is None:
             return state, result
         baseline = self.with_memory(state).baseline
         assert baseline is not None
-        found = self.judged(result.pose, baseline, views.windows, cells, present)
+        found = self.judged(result.pose, baseline, views.windows, frame)
         return replace(state, baseline=found.baseline), replace(result, limbs=found)
 
     def judged(
@@ -223,13 +231,13 @@ class Tracker(eqx.Module):
         pose: Float[Array, "dof"],
         baseline: Float[Array, "2 blob"],
         windows: Windows | None,
-        cells: UInt8[Array, "camera rows columns 3"],
-        present: Bool[Array, "camera"] | None = None,
+        frame: FrameInput,
     ) -> LimbConfidence:
         """What the cameras say of a pose and its limbs."""
         assert self.limbs is not None
         assert self.reader.subject is not None
         posed, sizes = Posed.from_pose(self.body, pose), self.reader.cell_sizes
+        cells, present = jnp.asarray(frame.cells), None if frame.present is None else jnp.asarray(frame.present)
         evidence = blob_evidence(self.limbs, posed, self.cameras, windows, cells, sizes, self.reader.subject, present)
         fit = frame_fit(self.limbs, evidence, posed, self.cameras, windows)
         found = limb_confidence(self.limbs, evidence, baseline, windows is not None)
