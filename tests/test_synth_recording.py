@@ -218,7 +218,7 @@ def test_a_recording_is_rendered_once(tmp_path, monkeypatch):
         (out / "recording.yaml").write_text("fps: 30\n")
         return out
 
-    monkeypatch.setattr("sogjax.synth.render.render_recording", counted)
+    monkeypatch.setattr("sogjax.synth.cache.render_recording", counted)
     first = cached_recording(SMALL, tmp_path)
     assert cached_recording(dataclasses.replace(SMALL), tmp_path) == first
     assert cached_recording(dataclasses.replace(SMALL, noise=0.02), tmp_path) != first
