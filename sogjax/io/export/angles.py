@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from sogjax.errors import InputError
 from sogjax.io.export.bones import frame_time, world_turn
 from sogjax.io.files import atomic_path
-from sogjax.io.motion import Motion
+from sogjax.io.motion_data import MotionData
 from sogjax.model.rotation import world_from_upright
 
 _OPENSIM_FROM_BODY = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
@@ -68,7 +68,7 @@ _PAIRS = (
 )
 
 
-def joint_angles(motion: Motion, up: str = "z") -> dict[str, Float[np.ndarray, "frame"]]:
+def joint_angles(motion: MotionData, up: str = "z") -> dict[str, Float[np.ndarray, "frame"]]:
     """Angles (degrees) and the pelvis' place (metres, Y up as in TRC) by OpenSim's names.
 
     Angles lie within half a turn; those of the pelvis go on from frame to frame.
@@ -99,7 +99,7 @@ def joint_angles(motion: Motion, up: str = "z") -> dict[str, Float[np.ndarray, "
     return columns
 
 
-def _turned(motion: Motion, joints: list[str], pair: _Pair, up: str) -> Float[np.ndarray, "frame 3 3"]:
+def _turned(motion: MotionData, joints: list[str], pair: _Pair, up: str) -> Float[np.ndarray, "frame 3 3"]:
     """The lower bone's axes in the upper one's, or in the ground's, all with OpenSim's axes."""
     opensim_from_bone = _OPENSIM_FROM_BODY @ world_from_upright(up).T
     rotation = lambda name: motion.world_from_joint[:, joints.index(name), :3, :3].astype(float)
@@ -109,7 +109,7 @@ def _turned(motion: Motion, joints: list[str], pair: _Pair, up: str) -> Float[np
     return opensim_from_bone @ relative @ opensim_from_bone.T
 
 
-def write_angles_csv(path: Path, motion: Motion, up: str = "z") -> None:
+def write_angles_csv(path: Path, motion: MotionData, up: str = "z") -> None:
     """Write one row per frame, after a line starting with `#` that gives the units, and the columns' names.
 
     Raises:
@@ -124,7 +124,7 @@ def write_angles_csv(path: Path, motion: Motion, up: str = "z") -> None:
             writer.writerow([row[0], *(f"{value:.6f}" for value in row[1:])])
 
 
-def write_mot(path: Path, motion: Motion, up: str = "z") -> None:
+def write_mot(path: Path, motion: MotionData, up: str = "z") -> None:
     """Write OpenSim's motion file.
 
     Raises:

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sogjax.errors import InputError
-from sogjax.io.motion import Motion
+from sogjax.io.motion_data import MotionData
 from sogjax.model.rotation import world_from_upright
 
 CONSTANT = 1e-4
@@ -29,7 +29,7 @@ class Bones:
     """The joints that make each bone, parents first; the last one's frame is the bone's."""
 
 
-def bones_of(motion: Motion) -> Bones:
+def bones_of(motion: MotionData) -> Bones:
     """The bones that the joints of a motion make."""
     chains = _chains(motion)
     names = _unique_names([[str(motion.joint_names[j]) for j in chain] for chain in chains])
@@ -44,7 +44,7 @@ def world_turn(up: str, to: str) -> Float[np.ndarray, "3 3"]:
 
 
 def bone_frames(
-    motion: Motion, bones: Bones, up: str, to: str
+    motion: MotionData, bones: Bones, up: str, to: str
 ) -> tuple[Float[np.ndarray, "frame bone 3 3"], Float[np.ndarray, "frame bone 3"]]:
     """Rotations and origins (metres) of the bones, in a world turned from the vertical `up` to `to`.
 
@@ -55,7 +55,7 @@ def bone_frames(
     return turn @ frames[..., :3, :3] @ turn.T, frames[..., :3, 3] @ turn.T
 
 
-def frame_time(path: Path, motion: Motion) -> float:
+def frame_time(path: Path, motion: MotionData) -> float:
     """Seconds from one frame to the next, for a format that has one number for it.
 
     Raises:
@@ -73,7 +73,7 @@ def frame_time(path: Path, motion: Motion) -> float:
     return float(steps[0] if len(steps) else 1) / motion.fps
 
 
-def _chains(motion: Motion) -> list[list[int]]:
+def _chains(motion: MotionData) -> list[list[int]]:
     """The joints that make one bone each, parents first.
 
     A joint continues its parent's chain if it is the only child and does not leave the origin; also, in the
@@ -99,7 +99,7 @@ def _chains(motion: Motion) -> list[list[int]]:
     return chains
 
 
-def _slides(motion: Motion, joint: int) -> bool:
+def _slides(motion: MotionData, joint: int) -> bool:
     """Whether the offset of a joint from its parent changes."""
     parent = motion.world_from_joint[:, motion.joint_parents[joint]]
     apart = motion.world_from_joint[:, joint, :3, 3] - parent[:, :3, 3]

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from sogjax.io.export.bones import CONSTANT, bone_frames, bones_of, frame_time, world_turn
 from sogjax.io.files import atomic_path
-from sogjax.io.motion import Motion
+from sogjax.io.motion_data import MotionData
 
 PER_METRE = {"m": 1.0, "cm": 100.0}
 """The units of length that a BVH file may be written in; the file itself does not say which."""
@@ -46,7 +46,7 @@ class _Bone:
         return np.zeros(3) if self.is_root else np.median(self.positions, axis=0)
 
 
-def write_bvh(path: Path, motion: Motion, up: str = "z", unit: str = "m") -> None:
+def write_bvh(path: Path, motion: MotionData, up: str = "z", unit: str = "m") -> None:
     """Write `motion`, whose world has the vertical `up`, as BVH with Y up; lengths in `unit` (`m`, `cm`).
 
     One-axis joints that share their origin become one BVH joint with three rotation channels. The root, and
@@ -74,7 +74,7 @@ def write_bvh(path: Path, motion: Motion, up: str = "z", unit: str = "m") -> Non
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def _root_bone(motion: Motion, up: str, scale: float) -> _Bone:
+def _root_bone(motion: MotionData, up: str, scale: float) -> _Bone:
     """The tree of bones, with lengths times `scale`."""
     found = bones_of(motion)
     rotations, positions = bone_frames(motion, found, up, "y")

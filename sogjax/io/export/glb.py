@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from sogjax.errors import InputError
 from sogjax.io.export.bones import Bones, bone_frames, bones_of, world_turn
 from sogjax.io.files import atomic_path
-from sogjax.io.motion import Motion
+from sogjax.io.motion_data import MotionData
 
 FLOAT, UINT16, UINT32 = 5126, 5123, 5125
 _COMPONENTS = {FLOAT: np.dtype("<f4"), UINT16: np.dtype("<u2"), UINT32: np.dtype("<u4")}
@@ -65,7 +65,7 @@ class _Content:
         return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 
-def write_glb(path: Path, motion: Motion, up: str = "z") -> None:
+def write_glb(path: Path, motion: MotionData, up: str = "z") -> None:
     """Write a motion whose world has the vertical `up`.
 
     Raises:
@@ -115,7 +115,7 @@ def _local(
     return quaternions, offsets
 
 
-def _animation(content: _Content, motion: Motion, turns: np.ndarray, offsets: np.ndarray) -> dict[str, Any]:
+def _animation(content: _Content, motion: MotionData, turns: np.ndarray, offsets: np.ndarray) -> dict[str, Any]:
     """A track of rotation for every bone, and of translation for those that move in their parent's frame."""
     seconds = (motion.frame - motion.frame[0]) / motion.fps
     times = content.accessor(seconds, "SCALAR", bounds=True)
@@ -132,7 +132,7 @@ def _animation(content: _Content, motion: Motion, turns: np.ndarray, offsets: np
 
 def _add_skin(
     content: _Content,
-    motion: Motion,
+    motion: MotionData,
     bones: Bones,
     rotations: Float[np.ndarray, "bone 3 3"],
     positions: Float[np.ndarray, "bone 3"],

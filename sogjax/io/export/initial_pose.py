@@ -10,13 +10,13 @@ import yaml
 from sogjax.errors import InputError
 from sogjax.io.export.bones import bones_of
 from sogjax.io.files import atomic_path
-from sogjax.io.motion import Motion
+from sogjax.io.motion_data import MotionData
 
 DIGITS = 5
 """Of radians and metres."""
 
 
-def write_initial_pose(path: Path, motions: Sequence[Motion], frame: int | None = None) -> None:
+def write_initial_pose(path: Path, motions: Sequence[MotionData], frame: int | None = None) -> None:
     """Write the poses of one frame, by the recording's numbers; None: the motions' first.
 
     With several motions the file is a mapping of their actors to poses.
@@ -35,11 +35,11 @@ def write_initial_pose(path: Path, motions: Sequence[Motion], frame: int | None 
         temporary.write_text(f"# Frame {_number(motions[0], frame)} of a motion.\n{text}", encoding="utf-8")
 
 
-def _number(motion: Motion, frame: int | None) -> int:
+def _number(motion: MotionData, frame: int | None) -> int:
     return int(motion.frame[0]) if frame is None else frame
 
 
-def _pose(path: Path, motion: Motion, frame: int | None) -> dict[str, Any]:
+def _pose(path: Path, motion: MotionData, frame: int | None) -> dict[str, Any]:
     if motion.num_frames == 0:
         raise InputError(f"{path}: the motion has no frames")
     wanted = _number(motion, frame)

@@ -20,7 +20,7 @@ from sogjax.errors import InputError
 from sogjax.io.export.bones import bone_frames, bones_of, frame_time, world_turn
 from sogjax.io.files import atomic_path
 from sogjax.io.keypoints.scheme import named_scheme
-from sogjax.io.motion import Motion
+from sogjax.io.motion_data import MotionData
 from sogjax.model.rotation import forward_axis
 
 _JOINTS = {"hip": "Hip", "knee": "Knee", "ankle": "Ankle", "shoulder": "Shoulder", "elbow": "Elbow", "wrist": "Wrist"}
@@ -41,7 +41,7 @@ _ROLL = re.compile(r"_roll\d*$")
 
 
 def marker_points(
-    motion: Motion, up: str, to: str, markers: str | None = None
+    motion: MotionData, up: str, to: str, markers: str | None = None
 ) -> tuple[list[str], Float[np.ndarray, "frame marker 3"]]:
     """Names and positions (metres) of the points, in a world turned from the vertical `up` to `to`.
 
@@ -74,7 +74,7 @@ MAX_FRAMES = 65_535
 """A C3D header counts no further; more frames would be lost silently."""
 
 
-def write_c3d(path: Path, motion: Motion, up: str = "z", markers: str | None = None) -> None:
+def write_c3d(path: Path, motion: MotionData, up: str = "z", markers: str | None = None) -> None:
     """Write the points of `marker_points`; POINT:X_SCREEN and Y_SCREEN say which axes point forward and up.
 
     Raises:
@@ -118,7 +118,7 @@ def _signed(axis: str) -> str:
     return f"{'-' if axis.startswith('-') else '+'}{axis[-1].upper()}"
 
 
-def write_csv(path: Path, motion: Motion, up: str = "z") -> None:
+def write_csv(path: Path, motion: MotionData, up: str = "z") -> None:
     """Write one row per frame, after a line starting with `#` that gives unit and vertical, and the columns' names.
 
     Raises:
@@ -136,7 +136,7 @@ def write_csv(path: Path, motion: Motion, up: str = "z") -> None:
             writer.writerow([frame, f"{seconds:.6f}", *(f"{value:.6f}" for value in np.asarray(row))])
 
 
-def write_trc(path: Path, motion: Motion, up: str = "z", markers: str | None = None) -> None:
+def write_trc(path: Path, motion: MotionData, up: str = "z", markers: str | None = None) -> None:
     """Write the points of `marker_points`; those that OpenSim's models know have their names there.
 
     X, Y, Z are Y, Z, X of a world with z up, as in Pose2Sim's files.
@@ -150,7 +150,7 @@ def write_trc(path: Path, motion: Motion, up: str = "z", markers: str | None = N
 
 
 def _write(
-    path: Path, motion: Motion, rate: float, names: list[str], positions: Float[np.ndarray, "frame marker 3"]
+    path: Path, motion: MotionData, rate: float, names: list[str], positions: Float[np.ndarray, "frame marker 3"]
 ) -> None:
     count, first = motion.num_frames, int(motion.frame[0])
     header = [

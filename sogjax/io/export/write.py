@@ -9,9 +9,9 @@ from sogjax.io.export.angles import write_mot
 from sogjax.io.export.bvh import write_bvh
 from sogjax.io.export.glb import write_glb
 from sogjax.io.export.points import write_c3d, write_csv, write_trc
-from sogjax.io.motion import Motion, save_motion
+from sogjax.io.motion_data import MotionData, save_motion
 
-WRITERS: dict[str, Callable[[Path, Motion, str], None]] = {
+WRITERS: dict[str, Callable[[Path, MotionData, str], None]] = {
     ".bvh": write_bvh,
     ".c3d": write_c3d,
     ".csv": write_csv,
@@ -23,7 +23,7 @@ WRITERS: dict[str, Callable[[Path, Motion, str], None]] = {
 """By file ending: a function of the path, the motion, and the vertical of the motion's world."""
 
 
-def motion_writer(path: Path) -> Callable[[Path, Motion, str], None]:
+def motion_writer(path: Path) -> Callable[[Path, MotionData, str], None]:
     """What writes a motion in the format that the ending of `path` names.
 
     Raises:
@@ -36,7 +36,7 @@ def motion_writer(path: Path) -> Callable[[Path, Motion, str], None]:
     return writer
 
 
-def export_motion(motion: Motion, path: Path, up: str | None = None) -> None:
+def export_motion(motion: MotionData, path: Path, up: str | None = None) -> None:
     """Write `motion` in the format that the ending of `path` names.
 
     `up` is the vertical of the motion's world, where it is not what the motion says.
