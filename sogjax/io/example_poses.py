@@ -18,8 +18,6 @@ from sogjax.io.image_file import IMAGE_SUFFIXES, read_image, read_mask
 from sogjax.io.initial_pose import InitialPose, parse_initial_pose
 from sogjax.io.yaml_entry import Entry
 
-_OPTIONAL = ("actor", "initial_pose")
-
 
 @dataclass(frozen=True)
 class ExampleSettings:
@@ -59,34 +57,25 @@ def _example(entry: Entry) -> ExampleSettings:
         frame = _frame(entry)
         return ExampleSettings(frame_name(frame), frame=frame)
     from_video = "frame" in entry.value
-    fields = entry.fields(("frame",) if from_video else ("name",), _OPTIONAL)
+    fields = entry.fields(("frame",) if from_video else ("name",), ("actor", "initial_pose"))
     given = {key: value for key, value in fields.items() if value.value is not None}
     frame = _frame(fields["frame"]) if from_video else None
     return ExampleSettings(
         name=_folder(fields["name"]) if frame is None else frame_name(frame),
-        actor=_actor(given["actor"]) if "actor" in given else None,
+        actor=given["actor"].file_name() if "actor" in given else None,
         initial_pose=parse_initial_pose(given["initial_pose"]) if "initial_pose" in given else None,
         frame=frame,
     )
 
 
 def _frame(entry: Entry) -> int:
-    if isinstance(entry.value, bool) or not isinstance(entry.value, int):
-        raise entry.error("the number of a frame of the videos, or {name: FOLDER} or {frame: NUMBER} with its keys")
-    return entry.value
+    return entry.whole("the number of a frame of the videos, or {name: FOLDER} or {frame: NUMBER} with its keys")
 
 
 def _folder(entry: Entry) -> str:
     name = entry.text()
     if objection(name) is not None:
         raise entry.error("the name of a folder in example_poses/")
-    return name
-
-
-def _actor(entry: Entry) -> str:
-    name = entry.text()
-    if (wanted := objection(name)) is not None:
-        raise entry.error(wanted)
     return name
 
 

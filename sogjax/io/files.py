@@ -1,9 +1,4 @@
-"""Files that are either complete or absent: write under a temporary name, then rename.
-
-Names in files that become file names: none of them may lead out of its folder.
-
-Files that are read whole, and refused if they are larger than their kind can be.
-"""
+"""Files: written in one piece or not at all, named without leading out of their folder, read up to a size."""
 
 import errno
 import uuid
@@ -66,10 +61,6 @@ def disk_trouble_told(path: Path) -> Iterator[None]:
         raise InputError(f"{path}: could not be written ({error.strerror}); choose another disk") from error
 
 
-MAX_BYTES = 100
-"""Of a name; file systems allow 255, and prefixes and extensions are added."""
-
-
 def objection(name: str) -> str | None:
     """Why a name cannot be the name of a file in any folder; None where it can.
 
@@ -81,8 +72,8 @@ def objection(name: str) -> str | None:
         return "a name of printable characters"
     if name.startswith(".") or name != name.strip():
         return "a name that does not begin with a dot and has no space at either end"
-    if len(name.encode(errors="replace")) > MAX_BYTES:
-        return f"a name of at most {MAX_BYTES} bytes"
+    if len(name.encode(errors="replace")) > 100:  # file systems allow 255, and prefixes and extensions are added
+        return "a name of at most 100 bytes"
     return None
 
 
@@ -100,3 +91,22 @@ def read_bounded(path: Path, max_bytes: int) -> bytes:
     if len(content) > max_bytes:
         raise InputError(f"{path}: is larger than {max_bytes} bytes; give a file of the right kind")
     return content
+
+
+def read_text(path: Path, max_bytes: int) -> str:
+    """The text of a file.
+
+    Raises:
+        InputError: it cannot be read, has more than `max_bytes` or is no text.
+    """
+    try:
+        return read_bounded(path, max_bytes).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: is not text ({error.reason}); give a file of the right kind") from error
+
+
+def visible_files(folder: Path) -> list[Path]:
+    """What is in a folder, sorted by name, without hidden files; nothing where there is no such folder."""
+    if not folder.is_dir():
+        return []
+    return sorted(path for path in folder.iterdir() if not path.name.startswith("."))
