@@ -46,6 +46,16 @@ def _rename(temporary: Path, path: Path) -> None:
         raise InputError(f"{path}: was removed, or its folder was, while being written; write it again") from error
 
 
+def write_file(path: Path, content: str | bytes) -> None:
+    """Write a whole file, or leave what is there as it was.
+
+    Raises:
+        InputError: as `atomic_path`.
+    """
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
 @contextmanager
 def disk_trouble_told(path: Path) -> Iterator[None]:
     """Turn a full or broken disk into one sentence about `path`.

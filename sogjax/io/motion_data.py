@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
 from sogjax.errors import InputError, counted
-from sogjax.io.files import atomic_path
+from sogjax.io.npz_file import save_npz
 
 FORMAT_VERSION = 1
 DEFAULT_UP = "z"
@@ -103,9 +103,7 @@ def save_motion(path: Path, motion: MotionData) -> None:
         names = motion.landmark_names.tolist()
         arrays["points"] = np.stack([motion.joint(name) for name in names], axis=1).astype(np.float32)
         arrays["point_names"] = np.array(names, str)
-    arrays["format_version"] = np.array(FORMAT_VERSION)
-    with atomic_path(path) as temporary, temporary.open("wb") as file:
-        np.savez_compressed(file, **arrays)  # pyright: ignore[reportArgumentType]
+    save_npz(path, arrays | {"format_version": np.array(FORMAT_VERSION)})
 
 
 def arrays_of(motion: MotionData) -> dict[str, np.ndarray]:

@@ -52,8 +52,8 @@ def read_recording_settings(path: Path) -> RecordingSettings:
         InputError: no YAML, an unknown key, or a value of the wrong kind.
     """
     entry = read_yaml(path) if path.exists() else Entry(path, "", None)
-    entries = {} if entry.value is None else entry.fields((), _READERS)
-    return RecordingSettings(**{key: _READERS[key](value) for key, value in entries.items() if value.value is not None})
+    given = {} if entry.value is None else entry.given(_READERS)
+    return RecordingSettings(**{key: _READERS[key](value) for key, value in given.items()})
 
 
 def _fps(entry: Entry) -> float:

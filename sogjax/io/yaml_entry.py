@@ -66,6 +66,11 @@ class Entry:
                 )
         return self.fields_at_least(required)
 
+    def given(self, optional: Collection[str], required: Collection[str] = ()) -> dict[str, "Entry"]:
+        """The entries of a mapping whose keys are prescribed, without optional ones that are empty."""
+        entries = self.fields(required, optional)
+        return {key: entry for key, entry in entries.items() if key in required or entry.value is not None}
+
     def items(self) -> list["Entry"]:
         """The entries of a list."""
         if not isinstance(self.value, list):
@@ -89,11 +94,11 @@ class Entry:
             raise self.error(f"{what}{few}")
         return self.value
 
-    def file_name(self) -> str:
+    def file_name(self, expected: str | None = None) -> str:
         """A text that may become the name of a file: it leads into no other folder."""
         name = self.text()
         if (wanted := objection(name)) is not None:
-            raise self.error(wanted)
+            raise self.error(expected or wanted)
         return name
 
     def whole(self, expected: str, lowest: int | float = -math.inf, highest: int | float = math.inf) -> int:
