@@ -2,11 +2,14 @@
 
 import errno
 import uuid
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TypeVar
 
 from sogjax.errors import InputError
+
+Parsed = TypeVar("Parsed")
 
 _DISK_TROUBLE = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS}
 
@@ -113,6 +116,20 @@ def read_text(path: Path, max_bytes: int) -> str:
         return read_bounded(path, max_bytes).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: is not text ({error.reason}); give a file of the right kind") from error
+
+
+def read_parsed(path: Path, what: str, parse: Callable[[str], Parsed], remedy: str, max_bytes: int) -> Parsed:
+    """What `parse` makes of the text of a file of the format `what`.
+
+    Raises:
+        InputError: it cannot be read, has more than `max_bytes`, is no text, or `parse` refuses it.
+    """
+    content = read_bounded(path, max_bytes)
+    try:
+        return parse(content.decode("utf-8-sig"))
+    except (ValueError, SyntaxError, RecursionError) as error:
+        reason = " ".join(str(error).split())
+        raise InputError(f"{path}: is not readable as {what} ({reason}); {remedy}") from error
 
 
 def visible_files(folder: Path) -> list[Path]:

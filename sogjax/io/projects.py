@@ -11,15 +11,13 @@ from sogjax.errors import InputError
 from sogjax.io.calibration.load import find_calibrations
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.io.camera_names import matched_names
-from sogjax.io.files import read_text
+from sogjax.io.files import read_parsed
 from sogjax.io.keypoint_files import files_in, json_files, number_in
 from sogjax.io.recording_files import POSE, POSE_SYNC, PROJECT, SYNCHRONIZED
 from sogjax.io.recording_settings import FASTEST, RecordingSettings
 
 CONFIG = PROJECT.name
 """A trial's stands in its folder, those of participant and session in the folders around it."""
-
-MAX_BYTES = 2**20
 
 
 @dataclass(frozen=True)
@@ -131,12 +129,7 @@ def _freemocap(path: Path) -> Project:
 
 
 def _toml(path: Path) -> dict[str, Any]:
-    text = read_text(path, MAX_BYTES)
-    try:
-        return tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        reason = " ".join(str(error).split())
-        raise InputError(f"{path}: is not readable as TOML ({reason}); correct it") from error
+    return read_parsed(path, "TOML", tomllib.loads, "correct it", max_bytes=2**20)
 
 
 class Shifts(NamedTuple):

@@ -10,7 +10,7 @@ import yaml
 
 from sogjax.errors import InputError
 from sogjax.io.calibration.rig import CameraEntry, rig_from_entries
-from sogjax.io.calibration.toml import write_toml
+from sogjax.io.calibration.tables import write_toml
 from sogjax.io.ground_truth import GroundTruth, save_ground_truth
 from sogjax.io.recording_files import CALIBRATION, GROUND_TRUTH, INITIAL_POSE, SETTINGS
 from sogjax.synth.anatomy import Anatomy, Pose
