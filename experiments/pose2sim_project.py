@@ -17,7 +17,7 @@ import numpy as np
 from omegaconf import MISSING
 
 from sogjax.errors import InputError
-from sogjax.io.calibration.toml import write_toml
+from sogjax.io.calibration.tables import write_toml
 from sogjax.io.keypoints.scheme import KeypointScheme
 from sogjax.io.keypoints.write import pictures_to_write, write_pose2sim
 from sogjax.io.motion import Motion, load_motion

@@ -8,7 +8,7 @@ import numpy as np
 from sogjax.check.hypotheses import mirrored_rig, unit_rig
 from sogjax.io.calibration.load import load_calibration
 from sogjax.io.calibration.rig import CameraRig
-from sogjax.io.calibration.toml import write_toml
+from sogjax.io.calibration.tables import write_toml
 from sogjax.model.camera import Camera
 from sogjax.synth.cache import cached_recording
 from sogjax.synth.settings import SynthSettings

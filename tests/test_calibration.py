@@ -9,7 +9,7 @@ from small_recording import toml_camera, write_calibration
 from sogjax.errors import InputError
 from sogjax.io.calibration.load import find_calibrations, load_calibration
 from sogjax.io.calibration.rig import CameraEntry, rig_from_entries
-from sogjax.io.calibration.toml import write_toml
+from sogjax.io.calibration.tables import write_toml
 from sogjax.model.camera import distort, project_points
 
 

@@ -16,7 +16,7 @@ from small_recording import make_recording
 from sogjax.errors import InputError
 from sogjax.io.calibration.load import find_calibrations, load_calibration, save_calibration
 from sogjax.io.calibration.skeletool import write_skeletool
-from sogjax.io.calibration.toml import write_toml
+from sogjax.io.calibration.tables import write_toml
 from sogjax.io.recording import open_recording
 from sogjax.model.camera import distort, project_points
 

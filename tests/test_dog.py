@@ -9,7 +9,7 @@ from drawn_scene import draw, in_colors, moved, standing
 from rig_cases import ring_rig
 
 from sogjax.io.actor_file import load_body
-from sogjax.io.calibration.toml import write_toml
+from sogjax.io.calibration.tables import write_toml
 from sogjax.io.ground_truth import GroundTruth, load_ground_truth, save_ground_truth
 from sogjax.io.motion import load_motion
 

@@ -15,6 +15,7 @@ from sogjax.io.ground_truth import load_ground_truth
 from sogjax.io.image_file import read_image, read_mask
 from sogjax.io.initial_pose import load_initial_poses
 from sogjax.io.recording import open_recording
+from sogjax.io.recording_files import RECORDING_FILES
 from sogjax.io.video import read_frames
 from sogjax.model.camera import distort, project_points
 from sogjax.synth import render as render_module
@@ -40,6 +41,11 @@ def stage():
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     return render_recording(SMALL, tmp_path_factory.mktemp("synth") / "walk", workers=1)
+
+
+def test_a_rendered_recording_is_of_the_registered_files(folder):
+    rendered = {part.name for part in RECORDING_FILES if part.rendered}
+    assert {path.name for path in folder.iterdir()} == rendered - {"keypoints", "pose"}
 
 
 def camera_of(settings, index=0):

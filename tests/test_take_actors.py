@@ -13,7 +13,7 @@ from sogjax.cli import actor as actor_command
 from sogjax.cli.sweep import actors
 from sogjax.errors import InputError
 from sogjax.io.actor_file import load_body
-from sogjax.io.recording_settings import posed_subjects
+from sogjax.io.recording_files import posed_subjects
 from sogjax.model.body import Body
 from sogjax.settings.run import ActorConfig, TrackConfig
 

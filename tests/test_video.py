@@ -24,7 +24,7 @@ from small_recording import (
 )
 
 from sogjax.errors import InputError
-from sogjax.io import image_folder
+from sogjax.io import source
 from sogjax.io.image_file import read_image, read_mask
 from sogjax.io.recording import open_recording
 from sogjax.io.video import VideoWriter, read_frames
@@ -86,7 +86,7 @@ def test_decoding_runs_ahead_of_the_consumer_in_other_threads(tmp_path, monkeypa
         read_by.append(threading.get_ident())
         return read_image(path)
 
-    monkeypatch.setattr(image_folder, "read_image", spy)
+    monkeypatch.setattr(source, "read_image", spy)
     frames = read_frames(recording)
     next(frames)
     for _ in range(200):

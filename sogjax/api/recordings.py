@@ -14,6 +14,7 @@ from sogjax.io import motion as motions
 from sogjax.io.ground_truth import GroundTruth, load_ground_truth
 from sogjax.io.motion import Motion
 from sogjax.io.recording import Recording
+from sogjax.io.recording_files import GROUND_TRUTH
 from sogjax.io.video import read_frames
 from sogjax.quality.evaluation import Evaluation, GroupEvaluation, evaluate_motions
 from sogjax.quality.markers import MarkerRule
@@ -24,8 +25,6 @@ from sogjax.settings.compose import composed_without_hydra
 from sogjax.synth.cache import cached_recording
 from sogjax.synth.settings import SynthSettings
 from sogjax.view.projection import frame_range
-
-TRUTH = "ground_truth.npz"
 
 
 def open_recording(path: str | Path, cameras: Sequence[str] | None = None) -> Recording:
@@ -74,10 +73,12 @@ def load_truth(source: Recording | str | Path) -> GroundTruth:
     """
     path = source.ground_truth if isinstance(source, Recording) else Path(source)
     if path is not None and path.is_dir():
-        path = path / TRUTH
+        path = GROUND_TRUTH.of(path)
     if path is None or not path.exists():
         where = source.path if isinstance(source, Recording) else path
-        raise InputError(f"{where}: there is no ground truth; give a recording with a {TRUTH}, or such a file")
+        raise InputError(
+            f"{where}: there is no ground truth; give a recording with a {GROUND_TRUTH.name}, or such a file"
+        )
     return load_ground_truth(path)
 
 

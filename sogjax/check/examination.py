@@ -44,6 +44,7 @@ from sogjax.check.synchronisation import (
 )
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.io.recording import Recording
+from sogjax.io.recording_files import SETTINGS
 from sogjax.io.recording_settings import read_recording_settings
 
 STILL = 1e-3
@@ -106,7 +107,7 @@ def examined(recording: Recording, start: int, frames: int, largest_offset: int,
     findings += said
     good = [camera for camera in range(len(names)) if camera not in fits or not fits[camera].is_wrong]
     size = subject_size(hulls_of(relative, [*photographed, *filmed]), good, geometry.scale, recording.up)
-    unit = read_recording_settings(recording.path / "recording.yaml").unit
+    unit = read_recording_settings(SETTINGS.of(recording.path)).unit
     findings += scale_findings(size, geometry, unit)
     gains, told = _exposure(names, photographed, filmed)
     findings += told

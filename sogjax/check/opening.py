@@ -11,9 +11,8 @@ from sogjax.errors import InputError
 from sogjax.io.calibration.load import load_calibration
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.io.example_poses import check_size, find_background, find_example_poses
-from sogjax.io.ground_truth import load_ground_truth
-from sogjax.io.initial_pose import read_initial_poses
 from sogjax.io.projects import Project, calibrations_of, named_as_sources, named_calibration, project_in
+from sogjax.io.recording_files import BACKGROUND, EXAMPLE_POSES, RECORDING_FILES, SETTINGS
 from sogjax.io.recording_settings import RecordingSettings, read_recording_settings
 from sogjax.io.source import find_sources, look_at_source
 
@@ -28,10 +27,10 @@ def opening_problems(path: Path, first: InputError) -> list[Finding]:
         try:
             return look()
         except InputError as error:
-            said.append(str(error))
+            said.extend({str(error)}.difference(said))
             return None
 
-    settings = tried(lambda: read_recording_settings(path / "recording.yaml")) or RecordingSettings()
+    settings = tried(lambda: read_recording_settings(SETTINGS.of(path))) or RecordingSettings()
     project = tried(lambda: project_in(path))
     settings = project.filled_in(settings) if project else settings
     sources = tried(lambda: find_sources(path)) or {}
@@ -44,11 +43,10 @@ def opening_problems(path: Path, first: InputError) -> list[Finding]:
         for camera in sized.names:
             if camera in sizes:
                 tried(lambda camera=camera: check_size(sources[camera], sizes[camera], sized, camera))
-        tried(lambda: find_background(path / "background", sized, calibrated))
-        tried(lambda: find_example_poses(path / "example_poses", sized, calibrated, settings.example_poses, None))
-    for name, read in (("initial_pose.yaml", read_initial_poses), ("ground_truth.npz", load_ground_truth)):
-        if (path / name).exists():
-            tried(lambda name=name, read=read: read(path / name))
+        tried(lambda: find_background(BACKGROUND.of(path), sized, calibrated))
+        tried(lambda: find_example_poses(EXAMPLE_POSES.of(path), sized, calibrated, settings.example_poses, None))
+    for part in RECORDING_FILES:
+        tried(lambda part=part: part.checked(path))
     if str(first) not in said:
         said.insert(0, str(first))
     return [_finding(sentence) for sentence in said]

@@ -15,6 +15,7 @@ from sogjax.errors import InputError, counted
 from sogjax.io.files import atomic_path
 from sogjax.io.offsets_file import offsets_line, write_frame_offsets
 from sogjax.io.recording import Recording, open_recording
+from sogjax.io.recording_files import SETTINGS
 from sogjax.run.outputs import results_folder
 from sogjax.run.terminal import alive, progress, say
 from sogjax.view.plots import write_png
@@ -107,6 +108,6 @@ def _offer_offsets(config: CheckConfig, recording: Recording, found: Examination
     offsets = {name: offset for name, offset in found.offsets.items() if offset}
     print(offsets_line(offsets))
     if config.write:
-        path = recording.path / "recording.yaml"
+        path = SETTINGS.of(recording.path)
         kept = write_frame_offsets(path, offsets)
         say(f"{path}: frame_offset was written{'' if kept is None else f'; the previous file is {kept}'}")

@@ -6,6 +6,7 @@ from sogjax.cli.config.schemas import EvaluateConfig
 from sogjax.errors import InputError
 from sogjax.io.ground_truth import GroundTruth, load_ground_truth
 from sogjax.io.motion import Motion, load_motion
+from sogjax.io.recording_files import GROUND_TRUTH
 from sogjax.quality.evaluation import GroupEvaluation, evaluate_motions
 from sogjax.run.build import marker_rule
 from sogjax.run.outputs import actor_name, free_path
@@ -37,11 +38,12 @@ def truth_file(path: Path) -> Path:
     """
     if not path.is_dir():
         return path
-    if not (path / "ground_truth.npz").is_file():
+    truth = GROUND_TRUTH.of(path)
+    if not truth.is_file():
         raise InputError(
             f"truth={path}: this folder holds no ground_truth.npz; give that file, or a recording that has one"
         )
-    return path / "ground_truth.npz"
+    return truth
 
 
 def named_motions(paths: list[Path], truth: GroundTruth) -> dict[str, Motion]:

@@ -10,9 +10,8 @@ from sogjax.errors import InputError
 from sogjax.io.calibration.load import load_calibration, save_calibration
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.io.export.angles import write_angles_csv
-from sogjax.io.export.initial_pose import write_initial_pose
 from sogjax.io.export.points import write_c3d, write_trc
-from sogjax.io.export.write import export_motion
+from sogjax.io.export.write import export_motion, write_initial_pose
 from sogjax.io.motion import DEFAULT_UP, Motion, load_motion
 from sogjax.io.recording import open_recording
 from sogjax.io.skeletons.skeletool_motion import read_skeletool_motion, write_skeletool_motion

@@ -14,6 +14,7 @@ from sogjax.errors import InputError, counted
 from sogjax.io.example_poses import ExamplePose
 from sogjax.io.image_file import write_mask
 from sogjax.io.recording import Recording
+from sogjax.io.recording_files import EXAMPLE_POSES
 from sogjax.io.video import read_prepared
 from sogjax.run.background import background_or_reason
 from sogjax.run.example_frames import with_examples
@@ -128,7 +129,7 @@ def mask_sheet(
 
 def _check_apart(recording: Recording, out: Path) -> None:
     """Masks that were given must not be overwritten."""
-    given = (recording.path / "example_poses").resolve()
+    given = EXAMPLE_POSES.of(recording.path).resolve()
     if out.resolve() == given or given in out.resolve().parents or out.resolve() == recording.path.resolve():
         raise InputError(
             f"out={out}: lies in the recording, whose own masks would be overwritten; choose another folder, check "

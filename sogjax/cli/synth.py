@@ -7,18 +7,13 @@ from typing import TypeVar
 
 from sogjax.cli.config.schemas import SynthConfig
 from sogjax.errors import InputError
+from sogjax.io.recording_files import RECORDING_FILES
 from sogjax.run.terminal import progress
 from sogjax.synth.detector import DetectorSettings
 from sogjax.synth.render import render_recording
 from sogjax.synth.settings import SynthSettings
 
 Part = TypeVar("Part", SynthSettings, DetectorSettings)
-
-RENDERED = (
-    *("calibration.toml", "recording.yaml", "ground_truth.npz", "initial_pose.yaml"),
-    *("videos", "example_poses", "background", "keypoints", "pose"),
-)
-"""What a rendered recording consists of."""
 
 
 def run(config: SynthConfig) -> Path:
@@ -47,7 +42,8 @@ def _part(schema: type[Part], config: SynthConfig) -> Part:
 
 def _replace(out: Path, settings: SynthSettings, detector: DetectorSettings) -> None:
     """Render a recording in place of an older one, which is removed once the new one is complete."""
-    strange = sorted(path.name for path in out.iterdir() if path.name not in RENDERED)
+    rendered = [part.name for part in RECORDING_FILES if part.rendered]
+    strange = sorted(path.name for path in out.iterdir() if path.name not in rendered)
     if strange:
         raise InputError(f"out={out}: holds {strange[0]}, not part of a rendered recording; choose another folder")
     with TemporaryDirectory(prefix=f".{out.name[:80]}.", suffix=".tmp", dir=out.absolute().parent) as beside:

@@ -60,7 +60,7 @@ def body_from(content: Entry, metres: float | None = None) -> Body:
     document = content.fields(
         ("name", "joints", "dofs", "blobs", "poses"), ("unit", "color_space", "landmarks", "shape", "explained")
     )
-    name = actor_rows.plain_name(document["name"])
+    name = document["name"].file_name()
     metres = metres or 1.0
     if "unit" in document:
         metres = METRES[document["unit"].choice(METRES, "a unit of length")]
@@ -77,6 +77,7 @@ def body_from(content: Entry, metres: float | None = None) -> Body:
     colors = [
         actor_rows.color(row, place, space) for row, place in zip(blob_rows, document["blobs"].items(), strict=True)
     ]
+    explained = document["explained"].number("a part of 1", 0.0, 1.0) if "explained" in document else 0.0
     known = (skeleton.names, names(blob_rows), names(blob_rows), names(landmark_rows))
     return Body(
         name=name,
@@ -92,7 +93,7 @@ def body_from(content: Entry, metres: float | None = None) -> Body:
         shape_groups=tuple(
             actor_rows.shape_group(row, dict(zip(_SHAPE_FIELDS, known, strict=True))) for row in shape_rows
         ),
-        explained=jnp.asarray(_explained(document), jnp.float32),
+        explained=jnp.asarray(explained, jnp.float32),
     )
 
 
@@ -106,15 +107,6 @@ def save_body(path: Path, body: Body) -> None:
     text = "\n".join(_lines(body)) + "\n"
     with atomic_path(Path(path)) as temporary:
         temporary.write_text(text, encoding="utf-8")
-
-
-def _explained(document: dict[str, Entry]) -> float:
-    if "explained" not in document:
-        return 0.0
-    value = document["explained"].number()
-    if not 0.0 <= value <= 1.0:
-        raise document["explained"].error("a part of 1")
-    return value
 
 
 _SHAPE_FIELDS = ("joint_offsets", "blob_offsets", "blob_sigmas", "landmark_offsets")

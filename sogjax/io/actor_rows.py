@@ -6,7 +6,6 @@ import numpy as np
 from jaxtyping import Float
 
 from sogjax.errors import InputError
-from sogjax.io.files import objection
 from sogjax.io.yaml_entry import Entry
 from sogjax.model.body import ShapeGroup
 from sogjax.model.rotation import UP_AXES, axis_vector
@@ -34,7 +33,7 @@ def table(entry: Entry, required: Sequence[str], optional: Sequence[str] = ()) -
     rows = [item.fields(required, optional) for item in items]
     seen: set[str] = set()
     for row in rows:
-        name = plain_name(row["name"])
+        name = row["name"].file_name()
         if name in seen:
             raise row["name"].error("a name that no row before it has")
         seen.add(name)
@@ -52,14 +51,6 @@ def filled_table(entry: Entry, required: Sequence[str], optional: Sequence[str] 
 def names(rows: list[Row]) -> tuple[str, ...]:
     """The names of a table's rows."""
     return tuple(row["name"].text() for row in rows)
-
-
-def plain_name(entry: Entry) -> str:
-    """A name without slashes: files are named after bodies, and `ACTOR/NAME` names the parts of several."""
-    name = entry.text()
-    if (wanted := objection(name)) is not None:
-        raise entry.error(wanted)
-    return name
 
 
 def parent_name(entry: Entry) -> str | None:
@@ -143,10 +134,7 @@ def color(row: Row, place: Entry, space: str) -> list[float]:
         raise InputError(f"{place.path}: {place.key} needs one key `color`, three numbers in the space {space}")
     low, high = (0.0, 1.0) if space in ("rgb", "hsv") else (-1.5, 1.5)
     expected = f"three numbers from {low:g} to {high:g}: a colour in the space {space}"
-    values = row[spellings[0]].numbers(expected)
-    if min(values) < low or max(values) > high:
-        raise row[spellings[0]].error(expected)
-    return values
+    return row[spellings[0]].numbers(expected, low, high)
 
 
 def pose(entry: Entry, dof_names: Sequence[str]) -> Float[np.ndarray, "dof"]:

@@ -1,14 +1,10 @@
-"""Which of two lists of names mean the same cameras, where another program named them in its own way.
-
-Which cameras of a recording are used, and messages where calibration and videos do not fit together.
-"""
+"""Cameras by their names: which of two lists mean the same ones, and which of a recording are used."""
 
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from sogjax.errors import InputError
-from sogjax.io.recording_settings import RecordingSettings
 
 
 def matched_names(wanted: Iterable[str], found: Iterable[str]) -> dict[str, str]:
@@ -42,24 +38,24 @@ def _holds(words: list[str], part: list[str]) -> bool:
 def chosen_cameras(
     path: Path,
     calibration: Path,
-    settings: RecordingSettings,
+    listed: tuple[str, ...] | None,
     calibrated: tuple[str, ...],
     sources: Mapping[str, Path],
 ) -> tuple[str, ...]:
-    """The cameras to use: those that recording.yaml names, else all, which then must all be whole.
+    """The cameras to use: those that are `listed` in recording.yaml, else all, which then must all be whole.
 
     Args:
         path: the recording.
         calibration: its file.
-        settings: of recording.yaml.
+        listed: None where recording.yaml lists none.
         calibrated: the cameras of the calibration.
         sources: by camera its video or folder of images.
 
     Raises:
         InputError: a camera without calibration or without video.
     """
-    wanted = settings.cameras or tuple(dict.fromkeys((*calibrated, *sources)))
-    otherwise = "" if settings.cameras else ", or list the cameras to use as `cameras:` in recording.yaml"
+    wanted = listed or tuple(dict.fromkeys((*calibrated, *sources)))
+    otherwise = "" if listed else ", or list the cameras to use as `cameras:` in recording.yaml"
     wrong = next((camera for camera in wanted if camera not in calibrated or camera not in sources), None)
     if wrong is None:
         return wanted
@@ -92,20 +88,3 @@ def _refuse_other_name(
         f"{video}: {calibration.name} has no camera of this name, and its camera {camera!r} has no video; rename "
         f"the video to {new_name} if it is that camera's{otherwise}"
     )
-
-
-def folder_around(path: Path) -> str:
-    """The remedy if something inside a recording was given instead of it; else empty."""
-    inside = path.is_file() or path.name in (
-        "videos",
-        "images",
-        "background",
-        "example_poses",
-        "keypoints",
-        "pose",
-        "synchronized_videos",
-    )
-    for folder in path.resolve().parents[:2] if inside else ():
-        if any((folder / name).is_dir() for name in ("videos", "images", "synchronized_videos")):
-            return f"give the folder of the recording, {folder}"
-    return ""

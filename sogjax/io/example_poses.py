@@ -1,7 +1,4 @@
-"""The entries of `example_poses` in `recording.yaml`: folders of pictures, or frames of the videos.
-
-The single images of a recording: empty scenes and example poses, matched to the cameras by name.
-"""
+"""Example poses: what `recording.yaml` lists of them, and their images, matched to the cameras by name."""
 
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -13,12 +10,10 @@ from jaxtyping import Bool
 
 from sogjax.errors import InputError
 from sogjax.io.calibration.rig import CameraRig
-from sogjax.io.files import objection
+from sogjax.io.files import visible_files
 from sogjax.io.image_file import IMAGE_SUFFIXES, read_image, read_mask
 from sogjax.io.initial_pose import InitialPose, parse_initial_pose
 from sogjax.io.yaml_entry import Entry
-
-_OPTIONAL = ("actor", "initial_pose")
 
 
 @dataclass(frozen=True)
@@ -49,48 +44,28 @@ def read_examples(entry: Entry) -> tuple[ExampleSettings, ...]:
     return tuple(examples)
 
 
-def frame_name(frame: int) -> str:
-    """How the example pose that a frame of the videos shows is called."""
-    return f"frame_{frame}"
-
-
 def _example(entry: Entry) -> ExampleSettings:
     if not isinstance(entry.value, dict):
         frame = _frame(entry)
         return ExampleSettings(frame_name(frame), frame=frame)
-    from_video = "frame" in entry.value
-    fields = entry.fields(("frame",) if from_video else ("name",), _OPTIONAL)
-    given = {key: value for key, value in fields.items() if value.value is not None}
-    frame = _frame(fields["frame"]) if from_video else None
+    key = "frame" if "frame" in entry.value else "name"
+    given = entry.given(("actor", "initial_pose"), required=(key,))
+    frame = _frame(given["frame"]) if key == "frame" else None
     return ExampleSettings(
-        name=_folder(fields["name"]) if frame is None else frame_name(frame),
-        actor=_actor(given["actor"]) if "actor" in given else None,
+        name=given["name"].file_name("the name of a folder in example_poses/") if frame is None else frame_name(frame),
+        actor=given["actor"].file_name() if "actor" in given else None,
         initial_pose=parse_initial_pose(given["initial_pose"]) if "initial_pose" in given else None,
         frame=frame,
     )
 
 
 def _frame(entry: Entry) -> int:
-    if isinstance(entry.value, bool) or not isinstance(entry.value, int):
-        raise entry.error("the number of a frame of the videos, or {name: FOLDER} or {frame: NUMBER} with its keys")
-    return entry.value
+    return entry.whole("the number of a frame of the videos, or {name: FOLDER} or {frame: NUMBER} with its keys")
 
 
-def _folder(entry: Entry) -> str:
-    name = entry.text()
-    if objection(name) is not None:
-        raise entry.error("the name of a folder in example_poses/")
-    return name
-
-
-def _actor(entry: Entry) -> str:
-    name = entry.text()
-    if (wanted := objection(name)) is not None:
-        raise entry.error(wanted)
-    return name
-
-
-_MASK_SUFFIX = ".mask.png"
+def frame_name(frame: int) -> str:
+    """How the example pose that a frame of the videos shows is called."""
+    return f"frame_{frame}"
 
 
 @dataclass(frozen=True)
@@ -117,7 +92,7 @@ def find_background(folder: Path, rig: CameraRig, calibrated: Iterable[str]) -> 
     Raises:
         InputError: an image of no calibrated camera, of another size, or one that does not open.
     """
-    images = _by_camera(folder, _files(folder, mask=False), set(calibrated))
+    images = _by_camera(folder, calibrated, mask=False)
     images = {camera: images[camera] for camera in rig.names if camera in images}
     _check_sizes(rig, images, {})
     return images
@@ -134,7 +109,7 @@ def find_example_poses(
 
     Args:
         folder: where their images are.
-        rig: the cameras.
+        rig: the cameras that are used.
         calibrated: names of all cameras of the calibration.
         settings: what recording.yaml lists.
         frames: the numbers of the frames of the videos; None: not known.
@@ -144,18 +119,16 @@ def find_example_poses(
             frame.
     """
     if settings is None:
-        folders = sorted(path.name for path in folder.iterdir() if path.is_dir()) if folder.is_dir() else []
-        settings = tuple(ExampleSettings(name) for name in folders if not name.startswith("."))
-    known = set(calibrated)
+        settings = tuple(ExampleSettings(path.name) for path in visible_files(folder) if path.is_dir())
     return tuple(
-        _example_pose(folder / entry.name, rig, known, entry)
+        _from_images(folder / entry.name, rig, calibrated, entry)
         if entry.frame is None
-        else _of_frame(folder, entry, entry.frame, frames or range(entry.frame, entry.frame + 1))
+        else _from_videos(folder, entry, entry.frame, frames or range(entry.frame, entry.frame + 1))
         for entry in settings
     )
 
 
-def _of_frame(folder: Path, entry: ExampleSettings, frame: int, frames: range) -> ExamplePose:
+def _from_videos(folder: Path, entry: ExampleSettings, frame: int, frames: range) -> ExamplePose:
     if frame not in frames:
         raise InputError(
             f"{folder.parent / 'recording.yaml'}: example_poses: there is no frame {frame}; "
@@ -164,34 +137,28 @@ def _of_frame(folder: Path, entry: ExampleSettings, frame: int, frames: range) -
     return ExamplePose(entry.name, entry.actor, {}, {}, entry.initial_pose, frame - frames[0])
 
 
-def _example_pose(folder: Path, rig: CameraRig, calibrated: set[str], entry: ExampleSettings) -> ExamplePose:
+def _from_images(folder: Path, rig: CameraRig, calibrated: Iterable[str], entry: ExampleSettings) -> ExamplePose:
     if not folder.is_dir():
         raise InputError(f"{folder}: there is no such example pose; make the folder or correct recording.yaml")
-    images = _by_camera(folder, _files(folder, mask=False), calibrated)
-    masks = _by_camera(folder, _files(folder, mask=True), calibrated)
+    images, masks = (_by_camera(folder, calibrated, mask) for mask in (False, True))
     for camera, mask in masks.items():
         if camera not in images:
             raise InputError(f"{mask}: is a mask without its image; add {camera}.jpg or {camera}.png")
-    images = {camera: images[camera] for camera in rig.names if camera in images}
-    masks = {camera: masks[camera] for camera in rig.names if camera in masks}
+    images, masks = ({name: paths[name] for name in rig.names if name in paths} for paths in (images, masks))
     if not images:
         raise InputError(f"{folder}: holds no image of any camera; put CAMERA.jpg files there or remove it")
     _check_sizes(rig, images, masks)
     return ExamplePose(entry.name, entry.actor, images, masks, entry.initial_pose)
 
 
-def _files(folder: Path, mask: bool) -> list[Path]:
-    if not folder.is_dir():
-        return []
-    files = sorted(path for path in folder.iterdir() if not path.name.startswith("."))
-    is_mask = lambda path: path.name.endswith(_MASK_SUFFIX)
-    return [path for path in files if path.suffix.lower() in IMAGE_SUFFIXES and is_mask(path) == mask]
-
-
-def _by_camera(folder: Path, files: list[Path], calibrated: set[str]) -> dict[str, Path]:
+def _by_camera(folder: Path, calibrated: Iterable[str], mask: bool) -> dict[str, Path]:
+    """The masks of a folder, or its other images, by the cameras that they are named after."""
+    suffix = ".mask.png"
     found: dict[str, Path] = {}
-    for path in files:
-        camera = path.name.removesuffix(_MASK_SUFFIX).removesuffix(path.suffix)
+    for path in visible_files(folder):
+        if path.suffix.lower() not in IMAGE_SUFFIXES or path.name.endswith(suffix) != mask:
+            continue
+        camera = path.name.removesuffix(suffix).removesuffix(path.suffix)
         if camera not in calibrated:
             raise InputError(
                 f"{path}: there is no camera {camera!r} in the calibration, which has: "

@@ -1,17 +1,15 @@
-"""Files that are either complete or absent: write under a temporary name, then rename.
-
-Names in files that become file names: none of them may lead out of its folder.
-
-Files that are read whole, and refused if they are larger than their kind can be.
-"""
+"""Files: written in one piece or not at all, named without leading out of their folder, read up to a size."""
 
 import errno
 import uuid
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TypeVar
 
 from sogjax.errors import InputError
+
+Parsed = TypeVar("Parsed")
 
 _DISK_TROUBLE = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS}
 
@@ -51,6 +49,16 @@ def _rename(temporary: Path, path: Path) -> None:
         raise InputError(f"{path}: was removed, or its folder was, while being written; write it again") from error
 
 
+def write_file(path: Path, content: str | bytes) -> None:
+    """Write a whole file, or leave what is there as it was.
+
+    Raises:
+        InputError: as `atomic_path`.
+    """
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
 @contextmanager
 def disk_trouble_told(path: Path) -> Iterator[None]:
     """Turn a full or broken disk into one sentence about `path`.
@@ -66,10 +74,6 @@ def disk_trouble_told(path: Path) -> Iterator[None]:
         raise InputError(f"{path}: could not be written ({error.strerror}); choose another disk") from error
 
 
-MAX_BYTES = 100
-"""Of a name; file systems allow 255, and prefixes and extensions are added."""
-
-
 def objection(name: str) -> str | None:
     """Why a name cannot be the name of a file in any folder; None where it can.
 
@@ -81,8 +85,8 @@ def objection(name: str) -> str | None:
         return "a name of printable characters"
     if name.startswith(".") or name != name.strip():
         return "a name that does not begin with a dot and has no space at either end"
-    if len(name.encode(errors="replace")) > MAX_BYTES:
-        return f"a name of at most {MAX_BYTES} bytes"
+    if len(name.encode(errors="replace")) > 100:  # file systems allow 255, and prefixes and extensions are added
+        return "a name of at most 100 bytes"
     return None
 
 
@@ -100,3 +104,36 @@ def read_bounded(path: Path, max_bytes: int) -> bytes:
     if len(content) > max_bytes:
         raise InputError(f"{path}: is larger than {max_bytes} bytes; give a file of the right kind")
     return content
+
+
+def read_text(path: Path, max_bytes: int) -> str:
+    """The text of a file.
+
+    Raises:
+        InputError: it cannot be read, has more than `max_bytes` or is no text.
+    """
+    try:
+        return read_bounded(path, max_bytes).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: is not text ({error.reason}); give a file of the right kind") from error
+
+
+def read_parsed(path: Path, what: str, parse: Callable[[str], Parsed], remedy: str, max_bytes: int) -> Parsed:
+    """What `parse` makes of the text of a file of the format `what`.
+
+    Raises:
+        InputError: it cannot be read, has more than `max_bytes`, is no text, or `parse` refuses it.
+    """
+    content = read_bounded(path, max_bytes)
+    try:
+        return parse(content.decode("utf-8-sig"))
+    except (ValueError, SyntaxError, RecursionError) as error:
+        reason = " ".join(str(error).split())
+        raise InputError(f"{path}: is not readable as {what} ({reason}); {remedy}") from error
+
+
+def visible_files(folder: Path) -> list[Path]:
+    """What is in a folder, sorted by name, without hidden files; nothing where there is no such folder."""
+    if not folder.is_dir():
+        return []
+    return sorted(path for path in folder.iterdir() if not path.name.startswith("."))

@@ -7,8 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sogjax.errors import InputError, counted
-from sogjax.io.files import atomic_path
-from sogjax.io.npz_file import float_array, number, read_npz, text_array
+from sogjax.io.npz_file import float_array, number, read_npz, save_npz, text_array
 
 
 @dataclass
@@ -78,8 +77,7 @@ def save_ground_truth(path: Path, truth: GroundTruth) -> None:
         arrays |= {"markers": truth.markers, "marker_names": np.array(truth.marker_names, str)}
     if truth.joints is not None:
         arrays |= {"joints": truth.joints, "joint_names": np.array(truth.joint_names, str)}
-    with atomic_path(path) as temporary:
-        np.savez_compressed(temporary, **arrays)  # pyright: ignore[reportArgumentType]
+    save_npz(path, arrays)
 
 
 def _points(

@@ -1,4 +1,4 @@
-"""Rough poses of the subjects in frame 0, as a person writes them down (`initial_pose.yaml`)."""
+"""`initial_pose.yaml`: rough poses of the subjects in frame 0, as a person writes them down."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ class InitialPose:
     pose: str | dict[str, float] | None = None
     """The name of one of the body's poses, or values of degrees of freedom (radians, metres)."""
     position: tuple[float, float, float] | None = None
-    """Of the root, metres, world."""
+    """Where the root is, metres, world."""
     heading: float | None = None
     """Degrees about the world's vertical."""
     landmarks: dict[str, tuple[float, float, float]] = field(default_factory=dict)
@@ -64,14 +64,14 @@ def parse_initial_pose(entry: Entry) -> InitialPose:
     Raises:
         InputError: an unknown key or a wrong value.
     """
-    fields = {key: value for key, value in entry.fields((), _KEYS).items() if value.value is not None}
-    if not fields.keys() & {"pose", "position", "landmarks"}:
+    given = entry.given(_KEYS)
+    if not given.keys() & {"pose", "position", "landmarks"}:
         raise entry.error("'pose' and 'position', or 'landmarks'")
-    landmarks = fields["landmarks"].mapping() if "landmarks" in fields else {}
+    landmarks = given["landmarks"].mapping() if "landmarks" in given else {}
     return InitialPose(
-        pose=_pose(fields["pose"]) if "pose" in fields else None,
-        position=_point(fields["position"]) if "position" in fields else None,
-        heading=fields["heading"].number("degrees") if "heading" in fields else None,
+        pose=_pose(given["pose"]) if "pose" in given else None,
+        position=_point(given["position"]) if "position" in given else None,
+        heading=given["heading"].number("degrees") if "heading" in given else None,
         landmarks={name: _point(landmark) for name, landmark in landmarks.items()},
     )
 

@@ -4,12 +4,9 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from sogjax.io.image_folder import visible_files
+from sogjax.io.files import visible_files
+from sogjax.io.recording_files import KEYPOINTS, OUTPUT_DATA, POSE
 
-FOLDERS = ("keypoints", "pose")
-"""In a recording, the first that has files counts; Pose2Sim writes `pose/`."""
-
-_FREEMOCAP = ("output_data/raw_data", "output_data")
 _FREEMOCAP_NAME = re.compile(r"mediapipe_?2dData.*\.npy$", re.I)
 _ENDINGS = re.compile(r"[_-](json|keypoints|openpose|alphapose|mediapipe|predictions|results)$", re.I)
 
@@ -34,13 +31,13 @@ class KeypointFiles:
 
 
 def find_keypoints(recording: Path) -> KeypointFiles | None:
-    """The keypoint files of a recording; None where there are none."""
-    for name in FOLDERS:
-        found = files_in(recording / name)
+    """The keypoint files of a recording, in the first folder that has any; None where there are none."""
+    for part in (KEYPOINTS, POSE):
+        found = files_in(part.of(recording))
         if found is not None:
             return found
-    for folder in _FREEMOCAP:
-        for path in visible_files(recording / folder):
+    for folder in (OUTPUT_DATA.of(recording) / "raw_data", OUTPUT_DATA.of(recording)):
+        for path in visible_files(folder):
             if path.is_file() and _FREEMOCAP_NAME.match(path.name):
                 return KeypointFiles(path.parent, {}, path)
     return None

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
 from sogjax.errors import InputError
+from sogjax.io.files import atomic_path
 
 MAX_BYTES = 4 * 2**30
 """Bytes that the arrays of one file may take in memory."""
@@ -44,6 +45,16 @@ def read_npz(path: Path) -> dict[str, np.ndarray]:
         raise
     except _UNREADABLE as error:
         raise InputError(f"{path}: is not readable as npz without pickles ({error}); write it again") from error
+
+
+def save_npz(path: Path, arrays: dict[str, np.ndarray]) -> None:
+    """Write arrays, compressed, as a whole file or not at all.
+
+    Raises:
+        InputError: the folder cannot be written, or the disk is full.
+    """
+    with atomic_path(path) as temporary, temporary.open("wb") as file:
+        np.savez_compressed(file, **arrays)  # pyright: ignore[reportArgumentType]
 
 
 def check_npy(path: Path) -> None:

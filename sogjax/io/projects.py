@@ -1,7 +1,4 @@
-"""Folders of other programs that are recordings as they are: projects of Pose2Sim, recordings of FreeMoCap.
-
-Time offsets that Pose2Sim found: its `pose-sync/` holds the files of `pose/` under shifted numbers.
-"""
+"""Folders of other programs that are recordings as they are: projects of Pose2Sim, recordings of FreeMoCap."""
 
 import tomllib
 from collections import Counter
@@ -14,15 +11,13 @@ from sogjax.errors import InputError
 from sogjax.io.calibration.load import find_calibrations
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.io.camera_names import matched_names
+from sogjax.io.files import read_parsed
 from sogjax.io.keypoint_files import files_in, json_files, number_in
+from sogjax.io.recording_files import POSE, POSE_SYNC, PROJECT, SYNCHRONIZED
 from sogjax.io.recording_settings import FASTEST, RecordingSettings
-from sogjax.io.source import SYNCHRONIZED
-from sogjax.io.text_lines import read_text
 
-CONFIG = "Config.toml"
-"""Of Pose2Sim; a trial's stands in its folder, those of participant and session in the folders around it."""
-
-MAX_BYTES = 2**20
+CONFIG = PROJECT.name
+"""A trial's stands in its folder, those of participant and session in the folders around it."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +60,7 @@ def project_in(path: Path) -> Project | None:
     """
     if (path / CONFIG).is_file():
         return _pose2sim(path)
-    if (path / SYNCHRONIZED).is_dir():
+    if SYNCHRONIZED.of(path).is_dir():
         return _freemocap(path)
     return None
 
@@ -134,18 +129,7 @@ def _freemocap(path: Path) -> Project:
 
 
 def _toml(path: Path) -> dict[str, Any]:
-    text = read_text(path, MAX_BYTES)
-    try:
-        return tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        reason = " ".join(str(error).split())
-        raise InputError(f"{path}: is not readable as TOML ({reason}); correct it") from error
-
-
-FOLDER, SHIFTED = "pose", "pose-sync"
-COMPARED = 5
-"""Shifted files of a camera that are looked for among those that were not."""
-MAX_SYNC_BYTES = 2**20
+    return read_parsed(path, "TOML", tomllib.loads, "correct it", max_bytes=2**20)
 
 
 class Shifts(NamedTuple):
@@ -168,19 +152,19 @@ class Shifts(NamedTuple):
         shown = ", ".join(f"{camera} by {offset:+d}" for camera, offset in self.offsets.items() if offset)
         if shown:
             remedy = "write `frame_offset` into recording.yaml if that is wrong"
-            found.append(f"frames are shifted as in {SHIFTED}/ ({shown}); {remedy}")
+            found.append(f"frames are shifted as in {POSE_SYNC.name}/ ({shown}); {remedy}")
         if self.untold:
             found.append(
-                f"{SHIFTED}/ does not tell by how much frames of {', '.join(self.untold)} are shifted, since its files "
-                f"there are not those of {FOLDER}/ under other numbers: none are; synchronise again, or write "
-                "`frame_offset` into recording.yaml"
+                f"{POSE_SYNC.name}/ does not tell by how much frames of {', '.join(self.untold)} are shifted, since "
+                f"its files there are not those of {POSE.name}/ under other numbers: none are; synchronise again, or "
+                "write `frame_offset` into recording.yaml"
             )
         return tuple(found)
 
 
 def pose2sims_shifts(path: Path, cameras: Iterable[str]) -> Shifts:
     """What the files of a project say of these cameras; nothing where Pose2Sim has not synchronised it."""
-    before, after = (files_in(path / name) for name in (FOLDER, SHIFTED))
+    before, after = (files_in(part.of(path)) for part in (POSE, POSE_SYNC))
     if before is None or after is None:
         return Shifts({}, ())
     cameras = [*cameras]
@@ -198,14 +182,15 @@ def _offset(before: Path, after: Path) -> int | None:
     """What most of the shifted files say, if anything; the largest are looked at: pictures of nobody are all alike."""
     if not (before.is_dir() and after.is_dir()):
         return None
-    shifted = sorted(json_files(after), key=lambda file: -file.stat().st_size)[:COMPARED]
+    compared, most_bytes = 5, 2**20
+    shifted = sorted(json_files(after), key=lambda file: -file.stat().st_size)[:compared]
     by_size: dict[int, list[Path]] = {file.stat().st_size: [] for file in shifted}
     for file in json_files(before):
         by_size.get(file.stat().st_size, []).append(file)
     votes: Counter[int] = Counter()
     for file in shifted:
         size = file.stat().st_size
-        same = [other for other in by_size[size] if size < MAX_SYNC_BYTES and other.read_bytes() == file.read_bytes()]
+        same = [other for other in by_size[size] if size < most_bytes and other.read_bytes() == file.read_bytes()]
         numbers = number_in(same[0].name) if len(same) == 1 else None, number_in(file.name)
         if None not in numbers:
             votes[numbers[0] - numbers[1]] += 1  # pyright: ignore[reportOperatorIssue]

@@ -10,11 +10,9 @@ import numpy as np
 from sogjax.errors import InputError
 from sogjax.io.calibration.load import load_calibration
 from sogjax.io.calibration.rig import CameraRig
-from sogjax.io.camera_names import chosen_cameras, folder_around
+from sogjax.io.camera_names import chosen_cameras
 from sogjax.io.example_poses import ExamplePose, check_size, find_background, find_example_poses
-from sogjax.io.ground_truth import load_ground_truth
 from sogjax.io.image_file import ColorGains
-from sogjax.io.initial_pose import read_initial_poses
 from sogjax.io.projects import (
     Project,
     Shifts,
@@ -24,12 +22,10 @@ from sogjax.io.projects import (
     pose2sims_shifts,
     project_in,
 )
-from sogjax.io.recording_frames import TimedImages, frame_rate, frames_in_common, images_by_time, uneven
+from sogjax.io.recording_files import BACKGROUND, EXAMPLE_POSES, GROUND_TRUTH, INITIAL_POSE, SETTINGS, folder_around
+from sogjax.io.recording_frames import TimedImages, clip_frames, uneven
 from sogjax.io.recording_settings import RecordingSettings, read_recording_settings
-from sogjax.io.source import find_sources, look_at_source
-
-FAR_CAMERA = 100.0
-"""Metres from the origin at which a camera's place is suspected to be in other units."""
+from sogjax.io.source import SourceInfo, find_sources, look_at_source
 
 DEFAULT_UP = "z"
 
@@ -107,90 +103,98 @@ def open_recording(path: Path) -> Recording:
     if not path.is_dir():
         what = "this is a file" if path.is_file() else "there is no such folder"
         raise InputError(f"{path}: {what}; {folder_around(path) or 'give the folder of a recording'}")
-    given, project = read_recording_settings(path / "recording.yaml"), project_in(path)
+    given, project = read_recording_settings(SETTINGS.of(path)), project_in(path)
     settings = project.filled_in(given) if project else given
-    calibration = _calibration(path, settings, project)
-    sources = find_sources(path)
-    calibrated = named_as_sources(load_calibration(calibration, settings.unit), sources, project)
-    cameras = chosen_cameras(path, calibration, settings, calibrated.names, sources)
-    rig = calibrated.select(cameras)
-    sources = {camera: sources[camera] for camera in cameras}
-    for key, by_camera in settings.by_camera.items():
-        strange = next((camera for camera in by_camera if camera not in calibrated.names), None)
-        if strange is not None:
-            raise InputError(
-                f"{path / 'recording.yaml'}: {key}: there is no camera {strange!r} in the calibration; "
-                f"its cameras are: {', '.join(calibrated.names)}"
-            )
-    shifts = (pose2sims_shifts(path, cameras) if project else Shifts({}, ())).without(settings.frame_offset)
-    exact = {camera: settings.frame_offset.get(camera, shifts.offsets.get(camera, 0)) for camera in cameras}
+    calibrated, sources = _calibrated(path, settings, project)
+    _check_by_camera(path, settings, calibrated)
+    shifts = (pose2sims_shifts(path, sources) if project else Shifts({}, ())).without(settings.frame_offset)
+    exact = {camera: settings.frame_offset.get(camera, shifts.offsets.get(camera, 0)) for camera in sources}
     offsets = {camera: round(offset) for camera, offset in exact.items()}
-    with ThreadPoolExecutor() as pool:
-        infos = dict(zip(cameras, pool.map(look_at_source, sources.values()), strict=True))
-    rig = rig.with_sizes({camera: info.size for camera, info in infos.items()})
-    for camera in cameras:
-        check_size(sources[camera], infos[camera].size, rig, camera)
-    fps = frame_rate(path, settings, infos)
-    timed = images_by_time(sources, infos, fps) if settings.time_stamps else {}
-    counts = {camera: len(timed[camera].picked) if camera in timed else infos[camera].num_frames for camera in cameras}
-    if project is not None:
-        settings = project.within(settings, min(counts[camera] - offsets[camera] for camera in cameras))
-    first, count, warnings = frames_in_common(path, settings, counts, offsets)
+    rig, infos = _sized(calibrated.select(tuple(sources)), sources)
+    frames = clip_frames(path, settings, project, sources, infos, offsets)
     return Recording(
         path=path,
         name=path.resolve().name,
         rig=rig,
-        fps=fps,
+        fps=frames.fps,
         up=settings.up or DEFAULT_UP,
-        first_frame=first,
-        num_frames=count,
+        first_frame=frames.numbers[0],
+        num_frames=len(frames.numbers),
         sources=sources,
         frame_offset=offsets,
         frame_part={camera: exact[camera] - offset for camera, offset in offsets.items() if exact[camera] != offset},
-        background=find_background(path / "background", rig, calibrated.names),
+        background=find_background(BACKGROUND.of(path), rig, calibrated.names),
         example_poses=find_example_poses(
-            path / "example_poses", rig, calibrated.names, settings.example_poses, range(first, first + count)
+            EXAMPLE_POSES.of(path), rig, calibrated.names, settings.example_poses, frames.numbers
         ),
-        initial_poses=_initial_poses(path / "initial_pose.yaml"),
-        ground_truth=_ground_truth(path / "ground_truth.npz"),
+        initial_poses=INITIAL_POSE.checked(path),
+        ground_truth=GROUND_TRUTH.checked(path),
         warnings=(
-            *warnings,
+            *frames.warnings,
             *(f"{path}: {warning}" for warning in shifts.warnings),
             *_doubts(path, given, rig, project),
-            *uneven(sources, infos, timed, settings.fewest_cameras),
+            *uneven(sources, infos, frames.timed, settings.fewest_cameras),
         ),
-        num_images=counts,
-        picked={camera: images.picked for camera, images in timed.items()},
-        missing=_missing(settings, cameras, timed, offsets),
-        color_gains={camera: settings.color_gains[camera] for camera in cameras if camera in settings.color_gains},
+        num_images=frames.num_images,
+        picked={camera: images.picked for camera, images in frames.timed.items()},
+        missing=_missing(settings, frames.timed, offsets),
+        color_gains={camera: settings.color_gains[camera] for camera in sources if camera in settings.color_gains},
         keypoint_scheme=_scheme(path, settings.keypoint_scheme),
         fewest_cameras=settings.fewest_cameras,
     )
 
 
-ADD_CALIBRATION = "add calibration.toml, or a calibration of another program (README, Formats)"
+def _calibrated(path: Path, settings: RecordingSettings, project: Project | None) -> tuple[CameraRig, dict[str, Path]]:
+    """All calibrated cameras, and the videos or folders of images of those that are used."""
+    calibration = _calibration(path, settings, project)
+    sources = find_sources(path)
+    rig = named_as_sources(load_calibration(calibration, settings.unit), sources, project)
+    cameras = chosen_cameras(path, calibration, settings.cameras, rig.names, sources)
+    return rig, {camera: sources[camera] for camera in cameras}
 
 
 def _calibration(path: Path, settings: RecordingSettings, project: Project | None) -> Path:
+    """The calibration that recording.yaml names, else the only one that there is."""
     if settings.calibration is not None:
         named = named_calibration(path, settings.calibration, project)
         if not named.is_file():
-            raise InputError(f"{path / 'recording.yaml'}: calibration: there is no file {named}; correct the name")
+            raise InputError(f"{SETTINGS.of(path)}: calibration: there is no file {named}; correct the name")
         return named
     found = calibrations_of(path, project)
     if not found:
-        raise InputError(f"{path}: holds no calibration file; {folder_around(path) or ADD_CALIBRATION}")
+        add = "add calibration.toml, or a calibration of another program (README, Formats)"
+        raise InputError(f"{path}: holds no calibration file; {folder_around(path) or add}")
     if len(found) > 1:
         names = ", ".join(file.name for file in found)
         raise InputError(f"{path}: holds several calibrations ({names}); name one as `calibration:` in recording.yaml")
     return found[0]
 
 
+def _check_by_camera(path: Path, settings: RecordingSettings, calibrated: CameraRig) -> None:
+    for key, by_camera in settings.by_camera.items():
+        strange = next((camera for camera in by_camera if camera not in calibrated.names), None)
+        if strange is not None:
+            raise InputError(
+                f"{SETTINGS.of(path)}: {key}: there is no camera {strange!r} in the calibration; "
+                f"its cameras are: {', '.join(calibrated.names)}"
+            )
+
+
+def _sized(rig: CameraRig, sources: dict[str, Path]) -> tuple[CameraRig, dict[str, SourceInfo]]:
+    """The cameras with the sizes of their pictures, which are those of the calibration, and what the files say."""
+    with ThreadPoolExecutor() as pool:
+        infos = dict(zip(sources, pool.map(look_at_source, sources.values()), strict=True))
+    rig = rig.with_sizes({camera: info.size for camera, info in infos.items()})
+    for camera, source in sources.items():
+        check_size(source, infos[camera].size, rig, camera)
+    return rig, infos
+
+
 def _missing(
-    settings: RecordingSettings, cameras: tuple[str, ...], timed: dict[str, TimedImages], offsets: dict[str, int]
+    settings: RecordingSettings, timed: dict[str, TimedImages], offsets: dict[str, int]
 ) -> dict[str, tuple[tuple[int, int], ...]]:
     """What recording.yaml leaves out and, where cameras may be missing, frames whose own image was lost."""
-    missing = {camera: settings.missing[camera] for camera in cameras if camera in settings.missing}
+    missing = {camera: settings.missing[camera] for camera in offsets if camera in settings.missing}
     if settings.fewest_cameras is not None:
         for camera, images in timed.items():
             lost = tuple((frame - offsets[camera], frame - offsets[camera]) for frame in images.lost)
@@ -203,31 +207,17 @@ def _scheme(path: Path, named: str | None) -> str | None:
     return str(path / named) if named is not None and (path / named).is_file() else named
 
 
-def _initial_poses(path: Path) -> Path | None:
-    if not path.exists():
-        return None
-    read_initial_poses(path)
-    return path
-
-
-def _ground_truth(path: Path) -> Path | None:
-    if not path.exists():
-        return None
-    load_ground_truth(path)
-    return path
-
-
-def _doubts(path: Path, settings: RecordingSettings, rig: CameraRig, project: Project | None) -> tuple[str, ...]:
-    """Sentences on what may be wrong; `settings` are those of recording.yaml alone."""
+def _doubts(path: Path, given: RecordingSettings, rig: CameraRig, project: Project | None) -> list[str]:
+    """Sentences on what may be wrong with the world; `given` are the settings of recording.yaml alone."""
     doubts = []
-    if project is not None and settings.up is None:
-        doubts += [project.doubt] if project.doubt else []
-    elif settings.up is None:
+    if given.up is None and project is None:
         doubts.append(f"{path}: does not give the vertical; {DEFAULT_UP} is assumed (`up:` in recording.yaml)")
+    elif given.up is None and project is not None and project.doubt:
+        doubts.append(project.doubt)
     distances = np.linalg.norm(np.asarray(rig.cameras.camera_from_world)[:, :3, 3], axis=-1)
-    if distances.max() > FAR_CAMERA:
+    if distances.max() > 100.0:  # metres, at which a camera's place is suspected to be in other units
         doubts.append(
             f"{path}: camera {rig.names[int(distances.argmax())]!r} stands {distances.max():.0f} m "
             "from the origin; if the calibration is in millimetres, write `unit: mm` into recording.yaml"
         )
-    return tuple(doubts)
+    return doubts

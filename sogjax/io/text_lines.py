@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sogjax.errors import InputError
-from sogjax.io.files import read_bounded
+from sogjax.io.files import read_text
 
 LARGEST = 1e9
 """No such file holds a larger number."""
@@ -86,15 +86,3 @@ class Lines:
         if value != round(value) or not 0 <= value <= min(at_most, self.left):
             raise self.error(expected)
         return int(value)
-
-
-def read_text(path: Path, max_bytes: int) -> str:
-    """The text of a file.
-
-    Raises:
-        InputError: it cannot be read, has more than `max_bytes` or is no text.
-    """
-    try:
-        return read_bounded(path, max_bytes).decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: is not text ({error.reason}); give a file of the right kind") from error

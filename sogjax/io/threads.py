@@ -1,85 +1,35 @@
-"""Stages of work in threads of their own, joined by bounded queues: a slow stage makes the others wait."""
+"""Stages of work in threads of their own with few items between them: a slow stage makes the others wait."""
 
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
-from threading import Condition, Thread
+from concurrent.futures import ThreadPoolExecutor
+from queue import Queue
+from threading import Thread
 from types import TracebackType
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 Item = TypeVar("Item")
 
-
-class Channel(Generic[Item]):
-    """A queue between two threads, with room for a few items, that either side can end."""
-
-    def __init__(self, room: int):
-        self._items: deque[Item] = deque()
-        self._room = room
-        self._changed = Condition()
-        self._finished = self._closed = False
-        self._error: BaseException | None = None
-
-    def put(self, item: Item) -> bool:
-        """Append an item as soon as there is room; False if no one takes items any more."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._closed or len(self._items) < self._room)
-            if not self._closed:
-                self._items.append(item)
-                self._changed.notify_all()
-            return not self._closed
-
-    def finish(self, error: BaseException | None = None) -> None:
-        """There is nothing more to put; an error is raised where the items are taken, after the last one."""
-        with self._changed:
-            self._finished, self._error = True, error
-            self._changed.notify_all()
-
-    def close(self) -> None:
-        """Nothing more is taken; what is still here is dropped."""
-        with self._changed:
-            self._closed = True
-            self._items.clear()
-            self._changed.notify_all()
-
-    def __iter__(self) -> Iterator[Item]:
-        while True:
-            with self._changed:
-                self._changed.wait_for(lambda: bool(self._items) or self._finished)
-                if not self._items:
-                    if self._error is not None:
-                        raise self._error
-                    return
-                item = self._items.popleft()
-                self._changed.notify_all()
-            yield item
+_END: Any = object()
 
 
 def prefetch(items: Iterable[Item], room: int) -> Generator[Item, None, None]:
-    """The items, made by a thread that is up to `room` of them ahead; it ends when the iterator does or is closed."""
-    channel: Channel[Item] = Channel(room)
-    thread = Thread(target=_fill, args=(channel, items), name="ahead", daemon=True)
-    thread.start()
-    try:
-        yield from channel
-    finally:
-        channel.close()
-        thread.join()
+    """The items, made by a thread: one is in the making while up to `room` wait.
 
-
-def _fill(channel: Channel[Item], items: Iterable[Item]) -> None:
+    The thread ends, and closes `items`, when this iterator ends or is closed. An error is raised after the items
+    before it.
+    """
     iterator = iter(items)
-    error: BaseException | None = None
-    try:
-        for item in iterator:
-            if not channel.put(item):
-                break
-    except BaseException as raised:  # told to the thread that takes the items
-        error = raised
-    finally:
-        close = getattr(iterator, "close", None)
-        if close is not None:
-            close()
-        channel.finish(error)
+    with ThreadPoolExecutor(1, "prefetch") as thread:
+        ahead = deque(thread.submit(next, iterator, _END) for _ in range(room + 1))
+        try:
+            while (item := ahead.popleft().result()) is not _END:
+                ahead.append(thread.submit(next, iterator, _END))
+                yield item
+        finally:
+            for made in ahead:
+                made.cancel()
+            thread.submit(getattr(iterator, "close", lambda: None)).result()
 
 
 class Writer(Generic[Item]):
@@ -91,9 +41,9 @@ class Writer(Generic[Item]):
 
     def __init__(self, consume: Callable[[Iterator[Item]], None], room: int):
         self._consume = consume
-        self._channel: Channel[Item] = Channel(room)
+        self._items: Queue[Item] = Queue(room)
         self._error: BaseException | None = None
-        self._thread = Thread(target=self._run, name="behind", daemon=True)
+        self._thread = Thread(target=self._run, name="writer", daemon=True)
 
     def __enter__(self) -> "Writer[Item]":
         self._thread.start()
@@ -101,13 +51,14 @@ class Writer(Generic[Item]):
 
     def put(self, item: Item) -> None:
         """Hand an item over; waits until there is room."""
-        if not self._channel.put(item):
-            self._raise()
+        self._raise()
+        self._items.put(item)
+        self._raise()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        self._channel.finish()
+        self._items.put(_END)
         self._thread.join()
         if error is None:
             self._raise()
@@ -117,9 +68,10 @@ class Writer(Generic[Item]):
             raise self._error
 
     def _run(self) -> None:
+        items = iter(self._items.get, _END)
         try:
-            self._consume(iter(self._channel))
+            self._consume(items)
         except BaseException as error:  # told to the thread that puts the items
             self._error = error
-        finally:
-            self._channel.close()
+        for _ in items:
+            pass  # whoever puts an item must not wait for ever

@@ -15,9 +15,8 @@ from jaxtyping import UInt8
 from sogjax.errors import InputError
 from sogjax.io.files import atomic_path
 from sogjax.io.image_file import evened, read_image
-from sogjax.io.image_folder import ImageStream
 from sogjax.io.recording import Recording
-from sogjax.io.source import open_source, open_with_least_work
+from sogjax.io.source import ImageStream, open_source, open_with_least_work
 from sogjax.io.video_file import frame_times
 from sogjax.model.yuv_picture import YuvPicture
 

@@ -12,11 +12,10 @@ from yaml.composer import ComposerError
 from yaml.constructor import ConstructorError
 
 from sogjax.errors import InputError, counted
-from sogjax.io.files import read_bounded
+from sogjax.io.files import objection, read_bounded
 
 MAX_BYTES = 1_000_000
 """No person writes a larger file."""
-
 _LARGEST = float(np.finfo(np.float32).max)
 
 
@@ -67,6 +66,11 @@ class Entry:
                 )
         return self.fields_at_least(required)
 
+    def given(self, optional: Collection[str], required: Collection[str] = ()) -> dict[str, "Entry"]:
+        """The entries of a mapping whose keys are prescribed, without optional ones that are empty."""
+        entries = self.fields(required, optional)
+        return {key: entry for key, entry in entries.items() if key in required or entry.value is not None}
+
     def items(self) -> list["Entry"]:
         """The entries of a list."""
         if not isinstance(self.value, list):
@@ -90,18 +94,39 @@ class Entry:
             raise self.error(f"{what}{few}")
         return self.value
 
-    def number(self, expected: str = "a finite number") -> float:
-        """A finite number that float32 can hold; `1e-3`, which YAML reads as text, is one too."""
+    def file_name(self, expected: str | None = None) -> str:
+        """A text that may become the name of a file: it leads into no other folder."""
+        name = self.text()
+        if (wanted := objection(name)) is not None:
+            raise self.error(expected or wanted)
+        return name
+
+    def whole(self, expected: str, lowest: int | float = -math.inf, highest: int | float = math.inf) -> int:
+        """A whole number within limits."""
+        if isinstance(self.value, bool) or not isinstance(self.value, int) or not lowest <= self.value <= highest:
+            raise self.error(expected)
+        return self.value
+
+    def number(self, expected: str = "a finite number", lowest: float = -_LARGEST, highest: float = _LARGEST) -> float:
+        """A number within limits that float32 can hold; `1e-3`, which YAML reads as text, is one too."""
         number = _float(self.value)
-        if not abs(number) <= _LARGEST:
+        if not lowest <= number <= highest:
             raise self.error(expected)
         return number
 
-    def numbers(self, expected: str = "a list of three finite numbers", count: int = 3) -> list[float]:
-        """A list of `count` numbers."""
-        if not isinstance(self.value, list) or len(self.value) != count:
+    def numbers(
+        self,
+        expected: str = "a list of three finite numbers",
+        lowest: float = -_LARGEST,
+        highest: float = _LARGEST,
+    ) -> list[float]:
+        """A list of three numbers within limits."""
+        if not isinstance(self.value, list) or len(self.value) != 3:
             raise self.error(expected)
-        return [item.number() for item in self.items()]
+        numbers = [item.number() for item in self.items()]
+        if min(numbers) < lowest or max(numbers) > highest:
+            raise self.error(expected)
+        return numbers
 
 
 def read_yaml(path: Path) -> Entry:

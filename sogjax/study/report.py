@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from sogjax.errors import InputError
+from sogjax.io.recording_files import GROUND_TRUTH
 from sogjax.run.outputs import results_folder
 from sogjax.run.terminal import say
 from sogjax.study.document import Section, write_html, write_markdown
@@ -66,7 +67,7 @@ def _check_truth(recordings: Sequence[str]) -> None:
         InputError: a folder without ground truth.
     """
     for path in map(Path, recordings):
-        if path.is_dir() and not (path / "ground_truth.npz").is_file():
+        if path.is_dir() and not GROUND_TRUTH.of(path).is_file():
             raise InputError(f"{path}: has no ground_truth.npz; give a recording with ground truth")
 
 

@@ -16,6 +16,7 @@ from sogjax.io.actor_file import load_body, save_body
 from sogjax.io.cell_cache import CellsOfClip
 from sogjax.io.ground_truth import GroundTruth, load_ground_truth
 from sogjax.io.recording import Recording
+from sogjax.io.recording_files import files_of
 from sogjax.model.body import Body, concatenate
 from sogjax.run import build
 from sogjax.run.cells import cells_of_clip
@@ -29,8 +30,6 @@ from sogjax.synth.cache import cached_recording
 from sogjax.synth.settings import MOTIONS, SynthSettings
 from sogjax.tracking.tracker import Tracker
 
-PARTS = ("videos", "images", "background", "example_poses")
-"""Folders of a recording."""
 _IN_NAME = ("motion", "seed", "actors", "frames")
 MOST_FRAMES = 60
 """That are rendered of a motion; a study of fewer frames tracks the first ones of the same recording."""
@@ -169,7 +168,6 @@ def rendered_source(settings: Mapping[str, Any], num_frames: int, folder: Path, 
 
 def _state_of(path: Path) -> str:
     """Where a recording is, and names, sizes and times of last change of all that belongs to it."""
-    inside = [file for part in PARTS for file in (path / part).rglob("*")]
-    files = sorted(file for file in [*path.iterdir(), *inside] if file.is_file())
-    looked = [(str(file.relative_to(path)), (state := file.stat()).st_size, state.st_mtime_ns) for file in files]
+    states = [(file, file.stat()) for file in files_of(path)]
+    looked = [(str(file.relative_to(path)), state.st_size, state.st_mtime_ns) for file, state in states]
     return f"{path.resolve()} {hashlib.sha256(repr(looked).encode()).hexdigest()[:16]}"

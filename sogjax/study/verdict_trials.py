@@ -15,6 +15,7 @@ from sogjax.errors import InputError
 from sogjax.io.files import atomic_path
 from sogjax.io.ground_truth import GroundTruth, load_ground_truth
 from sogjax.io.motion import Motion, load_motion, save_motion
+from sogjax.io.recording_files import GROUND_TRUTH
 from sogjax.model.body import Body
 from sogjax.quality.limb_warnings import Limits, limits_of
 from sogjax.quality.markers import joint_errors
@@ -196,7 +197,7 @@ class VerdictTrials:
         return []
 
     def _truth(self, sequence: str) -> GroundTruth:
-        return load_ground_truth(cached_recording(self.synth[sequence]) / "ground_truth.npz")
+        return load_ground_truth(GROUND_TRUTH.of(cached_recording(self.synth[sequence])))
 
 
 def _read(place: Path) -> dict[str, Any] | None:

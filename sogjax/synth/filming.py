@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
+from sogjax.io import recording_files
 from sogjax.io.files import atomic_path
 from sogjax.io.video import VideoWriter
 from sogjax.synth.anatomy import Pose
@@ -42,7 +43,7 @@ def film(stage: Stage, cameras: Sequence[int], folder: Path) -> Iterator[None]:
         plates[camera] = plate_of(stage.scene, stage.views[camera])
         if stage.settings.background:
             empty = stage.sensors[camera].exposed(plates[camera].total, _rng(stage, camera, _EMPTY, 0))
-            _write_image(folder / "background" / f"{stage.views[camera].name}.jpg", empty)
+            _write_image(recording_files.BACKGROUND.of(folder) / f"{stage.views[camera].name}.jpg", empty)
         yield
     if stage.settings.example_poses:
         yield from _stills(stage, _bare(stage, plates), folder)
@@ -60,7 +61,7 @@ def _stills(stage: Stage, plates: dict[int, Plate], folder: Path) -> Iterator[No
     for actor, person in enumerate(stage.people):
         for number, pose in enumerate(EXAMPLE_POSES):
             shots = _shots(stage.bare, stage, plates, [person], [stage.example_pose(actor, pose)])
-            place = folder / "example_poses" / example_folder(stage, actor, pose)
+            place = recording_files.EXAMPLE_POSES.of(folder) / example_folder(stage, actor, pose)
             for camera, shot in shots:
                 rng = _rng(stage, camera, _STILL, 10 * actor + number)
                 name = stage.views[camera].name
@@ -73,7 +74,7 @@ def _videos(stage: Stage, plates: dict[int, Plate], folder: Path) -> Iterator[No
     with ExitStack() as stack:
         writers = {}
         for camera in plates:
-            path = folder / "videos" / f"{stage.views[camera].name}.mp4"
+            path = recording_files.VIDEOS.of(folder) / f"{stage.views[camera].name}.mp4"
             writers[camera] = stack.enter_context(VideoWriter(path, stage.settings.fps))
         for frame in range(stage.settings.frames):
             for camera, shot in _shots(stage.scene, stage, plates, stage.people, stage.poses(frame)):

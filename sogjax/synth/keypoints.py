@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from sogjax.errors import InputError
+from sogjax.io import recording_files
 from sogjax.io.keypoints.scheme import KeypointScheme, named_scheme
 from sogjax.io.keypoints.write import WRITERS, pictures_to_write
 from sogjax.synth.detector import DetectorSettings, Sight, detected
@@ -22,7 +23,8 @@ Found = Float[np.ndarray, "found keypoint 3"]
 
 def keypoint_folder(detector: DetectorSettings) -> str:
     """Where the program leaves its files in a recording."""
-    return "pose" if detector.keypoints == "pose2sim" else "keypoints"
+    part = recording_files.POSE if detector.keypoints == "pose2sim" else recording_files.KEYPOINTS
+    return part.name
 
 
 def scheme_of(detector: DetectorSettings) -> KeypointScheme:

@@ -10,8 +10,9 @@ import yaml
 
 from sogjax.errors import InputError
 from sogjax.io.calibration.rig import CameraEntry, rig_from_entries
-from sogjax.io.calibration.toml import write_toml
+from sogjax.io.calibration.tables import write_toml
 from sogjax.io.ground_truth import GroundTruth, save_ground_truth
+from sogjax.io.recording_files import CALIBRATION, GROUND_TRUTH, INITIAL_POSE, SETTINGS
 from sogjax.synth.anatomy import Anatomy, Pose
 from sogjax.synth.crew import film_all, num_workers
 from sogjax.synth.detector import DetectorSettings
@@ -106,17 +107,17 @@ def _write_descriptions(stage: Stage, folder: Path) -> None:
         )
         for view in stage.views
     ]
-    write_toml(folder / "calibration.toml", rig_from_entries(folder / "calibration.toml", entries))
-    save_ground_truth(folder / "ground_truth.npz", ground_truth_of(stage))
+    write_toml(CALIBRATION.of(folder), rig_from_entries(CALIBRATION.of(folder), entries))
+    save_ground_truth(GROUND_TRUTH.of(folder), ground_truth_of(stage))
     rough = [_rough(stage, actor, 0, stage.poses(0)[actor]) for actor in range(stage.settings.actors)]
     several = dict(zip(stage.settings.actor_names, rough, strict=True))
-    _write_yaml(folder / "initial_pose.yaml", rough[0] if len(rough) == 1 else several)
-    _write_yaml(folder / "recording.yaml", _description(stage))
+    _write_yaml(INITIAL_POSE.of(folder), rough[0] if len(rough) == 1 else several)
+    _write_yaml(SETTINGS.of(folder), _description(stage))
 
 
 def _description(stage: Stage) -> dict:
     settings = stage.settings
-    description: dict = {"fps": settings.fps, "calibration": "calibration.toml", "unit": "m", "up": "z"}
+    description: dict = {"fps": settings.fps, "calibration": CALIBRATION.name, "unit": "m", "up": "z"}
     if settings.example_poses:
         description["example_poses"] = [
             {

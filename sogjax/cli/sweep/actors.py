@@ -7,7 +7,7 @@ from pathlib import Path
 
 from sogjax.cli import actor as actor_command
 from sogjax.errors import InputError
-from sogjax.io.recording_settings import OWN_ACTOR, actor_files, named_subjects, posed_subjects
+from sogjax.io.recording_files import ACTOR, SETTINGS, named_subjects, posed_subjects
 from sogjax.run.terminal import say
 from sogjax.settings.run import ActorConfig, TrackConfig
 
@@ -37,15 +37,15 @@ class Subjects:
         Raises:
             InputError: the take's settings cannot be read, or there is no actor of one of its subjects.
         """
-        if self.makes and (take / OWN_ACTOR).is_file():
-            return [str(take / OWN_ACTOR)]
+        if self.makes and ACTOR.of(take).is_file():
+            return [str(ACTOR.of(take))]
         subjects = named_subjects(take)
         if not subjects and not self.makes:
             raise InputError(
-                f"actor={self.folder}: is a folder of actors by the names of subjects, but {take / 'recording.yaml'} "
+                f"actor={self.folder}: is a folder of actors by the names of subjects, but {SETTINGS.of(take)} "
                 "does not name its own; add `subject: NAME` there"
             )
-        files = actor_files(self.folder, subjects)
+        files = [self.folder / f"{subject}.yaml" for subject in subjects]
         for subject, file in zip(subjects, files, strict=True):
             if file.is_file() and not (self.makes and config.overwrite):
                 continue

@@ -10,6 +10,7 @@ from typing import Any
 from sogjax.cli.config.overrides import quoted_value
 from sogjax.errors import InputError, counted
 from sogjax.io.projects import calibrations_of, project_in
+from sogjax.io.recording_files import SETTINGS
 from sogjax.io.source import find_sources
 from sogjax.run.terminal import say
 
@@ -123,7 +124,7 @@ def _spelled_out(patterns: Sequence[object]) -> list[str]:
 
 def _is_recording(path: Path) -> bool:
     """Whether a folder has anything of a recording, whole or not."""
-    if (path / "recording.yaml").exists():
+    if SETTINGS.of(path).exists():
         return True
     try:
         return bool(calibrations_of(path, project_in(path)) or find_sources(path))

@@ -15,11 +15,6 @@ from sogjax.errors import InputError, counted
 from sogjax.io.calibration.rig import METRES, CameraEntry, CameraRig, rig_from_entries
 from sogjax.io.files import read_bounded
 
-MAX_BYTES = 4 * 2**20
-MAX_NESTING = 16
-"""Brackets, or dashes in one line: OpenCV's parser goes one call deeper for each."""
-MAX_INDENT = 64
-
 _INTRINSIC = re.compile(r"^K_.+:", re.M)
 _EXTRINSIC = re.compile(r"^(R|Rot|T)_.+:", re.M)
 
@@ -118,7 +113,7 @@ def _matrix(where: str, content: Content, key: str, count: int | None = None) ->
 
 
 def _text(path: Path) -> str:
-    return read_bounded(path, MAX_BYTES).decode("utf-8-sig", errors="replace").replace("\r\n", "\n")
+    return read_bounded(path, 4 * 2**20).decode("utf-8-sig", errors="replace").replace("\r\n", "\n")
 
 
 def _content(path: Path, text: str) -> Content:
@@ -135,12 +130,13 @@ def _content(path: Path, text: str) -> Content:
 
 
 def _too_deep(text: str) -> bool:
+    """Whether OpenCV's parser, which goes one call deeper for each bracket and each dash of a line, may not end."""
     depth = deepest = 0
     for character in re.findall(r"[\[\]{}]", text):
         depth += 1 if character in "[{" else -1
         deepest = max(deepest, depth)
     indent = max((len(space) for space in re.findall(r"^[ \t-]*", text, re.M)), default=0)
-    return deepest > MAX_NESTING or indent > MAX_INDENT
+    return deepest > 16 or indent > 64
 
 
 def _value(node: cv2.FileNode) -> object:

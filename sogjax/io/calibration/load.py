@@ -6,14 +6,11 @@ from pathlib import Path
 
 from sogjax.errors import InputError
 from sogjax.io.calibration.easymocap import other_half, read_easymocap, recognises_easymocap
-from sogjax.io.calibration.panoptic import read_panoptic, recognises_panoptic
 from sogjax.io.calibration.qualisys import read_qualisys, recognises_qualisys
 from sogjax.io.calibration.rig import METRES_PER_UNIT, CameraRig
 from sogjax.io.calibration.skeletool import read_skeletool, recognises_skeletool, write_skeletool
-from sogjax.io.calibration.toml import read_toml, recognises_toml, write_toml
-
-MAX_BYTES = 16 * 2**20
-_HEAD_BYTES = 64 * 2**10
+from sogjax.io.calibration.tables import read_panoptic, read_toml, recognises_panoptic, recognises_toml, write_toml
+from sogjax.io.files import visible_files
 
 
 @dataclass(frozen=True)
@@ -53,9 +50,7 @@ def load_calibration(path: Path, unit: str | None = None) -> CameraRig:
         raise InputError(f"{path}: unknown unit {unit!r} for its lengths; use {' or '.join(METRES_PER_UNIT)}")
     if not path.is_file():
         raise InputError(f"{path}: there is no such calibration file; correct the name or calibrate the cameras")
-    if path.stat().st_size > MAX_BYTES:
-        raise InputError(f"{path}: has {path.stat().st_size} bytes, too many for a calibration; give the right file")
-    found = calibration_format(path)
+    found = _format(path)
     if found is None:
         known = ", ".join(known.name for known in FORMATS)
         raise InputError(f"{path}: is not a calibration of a known format; export it as one of: {known}")
@@ -79,21 +74,21 @@ def find_calibrations(folder: Path) -> list[Path]:
 
     Of a pair `intri.yml` and `extri.yml` only one is among them.
     """
-    files = sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))
-    found = {path: calibration_format(path) for path in files}
-    found = {path: known for path, known in found.items() if path.stem == "calibration" or known is not None}
     kept: list[Path] = []
-    for path, known in found.items():
-        if not (known is not None and known.read is read_easymocap and other_half(path) in kept):
+    for path in visible_files(folder):
+        known = _format(path) if path.is_file() else None
+        named = path.is_file() and path.stem == "calibration"
+        twice = known is not None and known.read is read_easymocap and other_half(path) in kept
+        if (named or known is not None) and not twice:
             kept.append(path)
     return kept
 
 
-def calibration_format(path: Path) -> CalibrationFormat | None:
+def _format(path: Path) -> CalibrationFormat | None:
     """The format of a file by its content, or None; a file that cannot be read has none."""
     try:
         with path.open("rb") as file:
-            text = file.read(_HEAD_BYTES).decode("utf-8-sig", errors="replace")
+            text = file.read(64 * 2**10).decode("utf-8-sig", errors="replace")
     except OSError:
         return None
     if "\0" in text:

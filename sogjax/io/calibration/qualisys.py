@@ -12,10 +12,10 @@ import numpy as np
 from jaxtyping import Float
 
 from sogjax.errors import InputError
-from sogjax.io.calibration.rig import LARGEST, METRES, CameraEntry, CameraRig, rig_from_entries
+from sogjax.io.calibration.rig import LARGEST, MAX_BYTES, METRES, CameraEntry, CameraRig, rig_from_entries
+from sogjax.io.files import read_parsed, read_text
 
-SUBPIXELS = 64.0
-HALF_TURN = np.diag([1.0, -1.0, -1.0])
+_SUBPIXELS = 64.0
 
 _DISTORTION = (
     "radialDistortion1",
@@ -37,17 +37,11 @@ def read_qualisys(path: Path, unit: str = "mm") -> CameraRig:
     Raises:
         InputError: no XML, XML with a DOCTYPE or entities, a missing attribute, or a wrong value.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: is not readable as text ({error}); export it again") from error
+    text = read_text(path, MAX_BYTES)
     declared = re.search(r"<!\s*(DOCTYPE|ENTITY)", text, re.I)
     if declared:
         raise InputError(f"{path}: holds <!{declared[1]}, which is not read for safety; take it out")
-    try:
-        root = ElementTree.fromstring(text)
-    except (ElementTree.ParseError, ValueError, RecursionError) as error:
-        raise InputError(f"{path}: is not readable as XML ({error}); export it again") from error
+    root = read_parsed(path, "XML", ElementTree.fromstring, "export it again", MAX_BYTES)
     return rig_from_entries(path, [_entry(path, camera, unit) for camera in root.iter("camera")])
 
 
@@ -61,16 +55,11 @@ def _entry(path: Path, camera: ElementTree.Element, unit: str) -> CameraEntry:
     if abs(_number(where, intrinsic, "skew", 0.0)) > 0:
         raise InputError(f"{where}: its skew is {intrinsic.get('skew')}; calibrate it without skew")
     left, top, size = _picture(where, camera, intrinsic)
-    matrix = np.array(
-        [
-            [value("focalLengthU") / SUBPIXELS, 0.0, value("centerPointU") / SUBPIXELS - left],
-            [0.0, value("focalLengthV") / SUBPIXELS, value("centerPointV") / SUBPIXELS - top],
-            [0.0, 0.0, 1.0],
-        ]
-    )
+    matrix = np.diag([value("focalLengthU") / _SUBPIXELS, value("focalLengthV") / _SUBPIXELS, 1.0])
+    matrix[:2, 2] = value("centerPointU") / _SUBPIXELS - left, value("centerPointV") / _SUBPIXELS - top
     turn = np.array([[_number(where, transform, f"r{row}{column}") for column in (1, 2, 3)] for row in (1, 2, 3)])
     centre = np.array([_number(where, transform, axis) for axis in "xyz"]) * METRES[unit]
-    rotation = _tidy(HALF_TURN @ turn)
+    rotation = _tidy(np.diag([1.0, -1.0, -1.0]) @ turn)
     return CameraEntry(
         name=name,
         intrinsics=matrix,
@@ -91,7 +80,7 @@ def _picture(
         return left, top, (_whole(where, right - left + 1), _whole(where, bottom - top + 1))
     if intrinsic.get("sensorMaxU") is None or intrinsic.get("sensorMaxV") is None:
         return 0.0, 0.0, None
-    sides = [(_number(where, intrinsic, f"sensorMax{side}") + 1) / SUBPIXELS for side in "UV"]
+    sides = [(_number(where, intrinsic, f"sensorMax{side}") + 1) / _SUBPIXELS for side in "UV"]
     return 0.0, 0.0, (_whole(where, sides[0]), _whole(where, sides[1]))
 
 

@@ -1,12 +1,8 @@
-"""Numbers out of the nested lists of a parsed file.
-
-The calibrated cameras of a recording, by name, and the checks that every calibration passes.
-"""
+"""The calibrated cameras of a recording, by name, and the checks that every calibration passes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -18,60 +14,17 @@ from sogjax.errors import InputError, counted
 from sogjax.io.files import objection
 from sogjax.model.camera import Camera
 
-
-def numbers(where: str, table: Mapping[str, Any], key: str, shape: tuple[int | None, ...]) -> Float[np.ndarray, "..."]:
-    """The numbers under `key`, of `shape` (None: any length); NaN and infinity pass.
-
-    Raises:
-        InputError: no such key, or something else there; `where` begins the sentence.
-    """
-    if key not in table:
-        raise InputError(f"{where}: has no {key!r}; add it, or calibrate the camera again")
-    try:
-        values = np.array(table[key], float)
-    except (TypeError, ValueError, OverflowError):
-        values = np.empty(())
-    fits = values.ndim == len(shape) and all(n in (None, m) for n, m in zip(shape, values.shape, strict=True))
-    if not fits:
-        wanted = " x ".join("n" if n is None else str(n) for n in shape)
-        raise InputError(f"{where}: {key} = {_short(table[key])} is not {wanted} numbers; correct it")
-    return values
-
-
-def image_size(where: str, table: Mapping[str, Any], key: str) -> tuple[int, int]:
-    """Width and height in pixels.
-
-    Raises:
-        InputError: no two whole numbers.
-    """
-    size = numbers(where, table, key, (2,))
-    if not (np.isfinite(size).all() and (size == np.round(size)).all()):
-        raise InputError(f"{where}: {key} = {table[key]} is not two whole numbers; give width and height in pixels")
-    return int(size[0]), int(size[1])
-
-
-def _short(value: object) -> str:
-    try:
-        text = " ".join(repr(value).split())
-    except (ValueError, RecursionError):  # a number of thousands of digits, a list nested as deep
-        text = f"a {type(value).__name__}"
-    return text if len(text) <= 200 else f"{text[:197]}..."
-
-
-ROTATION_TOLERANCE = 1e-3
-"""How far a rotation matrix of a file may be from orthonormal: files with four digits pass."""
+MAX_BYTES = 16 * 2**20
+"""A larger file is no calibration."""
 
 METRES_PER_UNIT = {"m": 1.0, "mm": 1e-3}
 """The units of length that `unit` may name."""
 
 METRES = METRES_PER_UNIT | {"cm": 1e-2}
-"""The same, and those that a format may prescribe."""
-
-LARGEST_SIDE = 100_000
-"""Pixels. No camera takes larger pictures."""
-
+"""All units of length that a format may prescribe."""
 
 LARGEST = 1e12
+"""No number of a calibration is larger."""
 
 
 @dataclass(frozen=True)
@@ -156,7 +109,7 @@ def rig_from_entries(path: Path, entries: Sequence[CameraEntry]) -> CameraRig:
         Camera(
             intrinsics=stack([entry.intrinsics for entry in entries]),
             camera_from_world=stack([_camera_from_world(entry) for entry in entries]),
-            distortion=stack([_five_coefficients(entry) for entry in entries]),
+            distortion=stack([np.pad(entry.distortion, (0, 5 - len(entry.distortion))) for entry in entries]),
             image_size=stack([np.array(entry.size or (np.nan, np.nan)) for entry in entries]),
             fisheye=jnp.array([entry.fisheye for entry in entries]) if any(e.fisheye for e in entries) else None,
         ),
@@ -178,22 +131,14 @@ def _check(path: Path, entry: CameraEntry) -> None:
     for what, values in arrays.items():
         if not (np.abs(values) < LARGEST).all():  # NaN fails too
             raise InputError(f"{where}: its {what} {_text(values)} is not finite; calibrate it again")
-    if entry.size is not None and not 0 < min(entry.size) <= max(entry.size) <= LARGEST_SIDE:
+    if entry.size is not None and not 0 < min(entry.size) <= max(entry.size) <= 100_000:
         raise InputError(
             f"{where}: its size {list(entry.size)} is not positive or too large; give width and height in pixels"
         )
-    matrix = entry.intrinsics
-    if min(matrix[0, 0], matrix[1, 1]) <= 0:
-        focal = f"{matrix[0, 0]:g} and {matrix[1, 1]:g}"
-        raise InputError(f"{where}: its focal lengths {focal} are not positive; give them in pixels")
-    if np.abs(matrix[[0, 1, 2, 2], [1, 0, 0, 1]]).max() > 1e-6 * matrix[0, 0] or abs(matrix[2, 2] - 1) > 1e-6:
-        raise InputError(
-            f"{where}: its matrix {_text(matrix)} is not [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]; "
-            "calibrate it without skew"
-        )
+    _check_intrinsics(where, entry.intrinsics)
     rotation = entry.rotation
     deviation = np.abs(rotation @ rotation.T - np.eye(3)).max()
-    if deviation > ROTATION_TOLERANCE or np.linalg.det(rotation) < 0:
+    if deviation > 1e-3 or np.linalg.det(rotation) < 0:  # files with four digits pass
         raise InputError(
             f"{where}: {_text(rotation)} is not a rotation matrix (determinant {np.linalg.det(rotation):.3g}, "
             f"R R^T differs from 1 by {deviation:.3g}); calibrate it again or export it with more digits"
@@ -205,16 +150,23 @@ def _check(path: Path, entry: CameraEntry) -> None:
         raise InputError(f"{where}: it has {given}; give k1 k2 p1 p2 [k3]")
 
 
+def _check_intrinsics(where: str, matrix: Float[np.ndarray, "3 3"]) -> None:
+    if min(matrix[0, 0], matrix[1, 1]) <= 0:
+        focal = f"{matrix[0, 0]:g} and {matrix[1, 1]:g}"
+        raise InputError(f"{where}: its focal lengths {focal} are not positive; give them in pixels")
+    if np.abs(matrix[[0, 1, 2, 2], [1, 0, 0, 1]]).max() > 1e-6 * matrix[0, 0] or abs(matrix[2, 2] - 1) > 1e-6:
+        raise InputError(
+            f"{where}: its matrix {_text(matrix)} is not [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]; "
+            "calibrate it without skew"
+        )
+
+
 def _camera_from_world(entry: CameraEntry) -> Float[np.ndarray, "4 4"]:
     u, _, vt = np.linalg.svd(entry.rotation)
     transform = np.eye(4)
     transform[:3, :3] = u @ vt
     transform[:3, 3] = entry.translation
     return transform
-
-
-def _five_coefficients(entry: CameraEntry) -> Float[np.ndarray, "5"]:
-    return np.pad(entry.distortion, (0, 5 - len(entry.distortion)))
 
 
 def _text(values: np.ndarray) -> str:

@@ -7,15 +7,13 @@ import numpy as np
 from jaxtyping import Float
 
 from sogjax.errors import InputError, counted
-from sogjax.io.calibration.rig import METRES, CameraEntry, CameraRig, rig_from_entries
-from sogjax.io.files import atomic_path
+from sogjax.io.calibration.rig import MAX_BYTES, METRES, CameraEntry, CameraRig, rig_from_entries
+from sogjax.io.files import read_text, write_file
 
 HEADER = "Skeletool Camera Calibration File V1.0"
 
 _COUNTS = {"sensor": 2, "size": 2, "animated": 1, "intrinsic": 16, "extrinsic": 16, "radial": 1}
 _MOVING = ("intrinsic", "extrinsic", "radial")
-_PIXEL = 0.005
-"""Millimetres: a side of a pixel of a written file, whose sensor this project does not know."""
 
 
 def recognises_skeletool(text: str) -> bool:
@@ -41,10 +39,7 @@ def read_skeletool(path: Path, unit: str = "mm") -> CameraRig:
     Raises:
         InputError: no such file, a missing key, a wrong value, or a camera that moves.
     """
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: is not readable as text ({error}); export it again") from error
+    lines = read_text(path, MAX_BYTES).splitlines()
     cameras: list[_Camera] = []
     frame = ""
     for number, line in enumerate(lines, 1):
@@ -67,6 +62,7 @@ def write_skeletool(path: Path, rig: CameraRig) -> None:
     Raises:
         InputError: a camera whose distortion has more than one radial coefficient, or of unknown image size.
     """
+    pixel = 0.005  # millimetres: the sensor's size is not known here
     lines = [HEADER]
     for name in rig.names:
         camera, (width, height) = rig.camera(name), rig.image_size(name)
@@ -84,15 +80,14 @@ def write_skeletool(path: Path, rig: CameraRig) -> None:
         extrinsic[:3, 3] /= METRES["mm"]
         lines += [
             f"name          {name}",
-            f"  sensor      {_words(np.array([width, height]) * _PIXEL)}",
+            f"  sensor      {_words(np.array([width, height]) * pixel)}",
             f"  size        {width} {height}",
             "  animated    0",
             f"  intrinsic   {_words(intrinsic)}",
             f"  extrinsic   {_words(extrinsic)}",
             f"  radial      {_words(distortion[:1])}",
         ]
-    with atomic_path(path) as temporary:
-        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_file(path, "\n".join(lines) + "\n")
 
 
 def _take(where: str, camera: _Camera, key: str, words: list[str], frame: str) -> None:

@@ -4,25 +4,21 @@ Each angle is that of a bone relative to the one above it, both straight in the 
 forward, Y up, Z to the right) the relative rotation is R = Rz Rx Ry; the hand's is R = Rx Rz Ry.
 """
 
-import csv
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
-from scipy.spatial.transform import Rotation
 
 from sogjax.errors import InputError
-from sogjax.io.export.bones import frame_time, world_turn
-from sogjax.io.files import atomic_path
-from sogjax.io.motion import Motion
+from sogjax.io.export.bones import euler_angles, frame_time, world_turn
+from sogjax.io.export.points import write_columns
+from sogjax.io.files import write_file
+from sogjax.io.motion_data import MotionData
 from sogjax.model.rotation import world_from_upright
 
 _OPENSIM_FROM_BODY = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """A body's axes are x forward, y to its left, z up."""
-_PLACE = ("pelvis_tx", "pelvis_ty", "pelvis_tz")
-"""Metres; all other columns are degrees."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +64,7 @@ _PAIRS = (
 )
 
 
-def joint_angles(motion: Motion, up: str = "z") -> dict[str, Float[np.ndarray, "frame"]]:
+def joint_angles(motion: MotionData, up: str = "z") -> dict[str, Float[np.ndarray, "frame"]]:
     """Angles (degrees) and the pelvis' place (metres, Y up as in TRC) by OpenSim's names.
 
     Angles lie within half a turn; those of the pelvis go on from frame to frame.
@@ -82,24 +78,21 @@ def joint_angles(motion: Motion, up: str = "z") -> dict[str, Float[np.ndarray, "
         raise InputError(
             "joint angles are known of bodies with the joints of the default one (root_roll, left_knee, ...)"
         )
+    place = ("pelvis_tx", "pelvis_ty", "pelvis_tz")
     columns: dict[str, np.ndarray] = {}
     for pair in pairs:
         frames = motion.world_from_joint[:, joints.index(pair.below)].astype(float)
         turned = _turned(motion, joints, pair, up)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # at 90 degrees about the middle axis one of many is chosen
-            angles = Rotation.from_matrix(turned).as_euler(pair.order, degrees=True)
-        if (
-            pair.above is None
-        ):  # a person who turns round and round; other angles would stay a turn off after 90 degrees
+        angles = euler_angles(turned, pair.order)
+        if pair.above is None:  # a person who turns round and round; others would stay a turn off after 90 degrees
             angles = np.unwrap(angles, axis=0, period=360.0)
         columns |= {name: sign * angles[:, pair.order.index(axis)] for name, axis, sign in pair.names}
         if pair.above is None:
-            columns |= dict(zip(_PLACE, world_turn(up, "y") @ frames[:, :3, 3].T, strict=True))
+            columns |= dict(zip(place, world_turn(up, "y") @ frames[:, :3, 3].T, strict=True))
     return columns
 
 
-def _turned(motion: Motion, joints: list[str], pair: _Pair, up: str) -> Float[np.ndarray, "frame 3 3"]:
+def _turned(motion: MotionData, joints: list[str], pair: _Pair, up: str) -> Float[np.ndarray, "frame 3 3"]:
     """The lower bone's axes in the upper one's, or in the ground's, all with OpenSim's axes."""
     opensim_from_bone = _OPENSIM_FROM_BODY @ world_from_upright(up).T
     rotation = lambda name: motion.world_from_joint[:, joints.index(name), :3, :3].astype(float)
@@ -109,22 +102,17 @@ def _turned(motion: Motion, joints: list[str], pair: _Pair, up: str) -> Float[np
     return opensim_from_bone @ relative @ opensim_from_bone.T
 
 
-def write_angles_csv(path: Path, motion: Motion, up: str = "z") -> None:
+def write_angles_csv(path: Path, motion: MotionData, up: str = "z") -> None:
     """Write one row per frame, after a line starting with `#` that gives the units, and the columns' names.
 
     Raises:
         InputError: as `joint_angles`; a path that cannot be written.
     """
-    columns = joint_angles(motion, up)
-    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        file.write("# angles: degrees, pelvis_tx pelvis_ty pelvis_tz: m with y up, time: s\n")
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["frame", "time", *columns])
-        for row in zip(motion.frame.tolist(), motion.time.tolist(), *columns.values(), strict=True):
-            writer.writerow([row[0], *(f"{value:.6f}" for value in row[1:])])
+    note = "angles: degrees, pelvis_tx pelvis_ty pelvis_tz: m with y up, time: s"
+    write_columns(path, motion, note, joint_angles(motion, up))
 
 
-def write_mot(path: Path, motion: Motion, up: str = "z") -> None:
+def write_mot(path: Path, motion: MotionData, up: str = "z") -> None:
     """Write OpenSim's motion file.
 
     Raises:
@@ -135,5 +123,4 @@ def write_mot(path: Path, motion: Motion, up: str = "z") -> None:
     header = [path.stem, "version=1", f"nRows={motion.num_frames}", f"nColumns={len(columns)}", "inDegrees=yes"]
     rows = zip(*columns.values(), strict=True)
     lines = [*header, "endheader", "\t".join(columns), *("\t".join(f"{value:.6f}" for value in row) for row in rows)]
-    with atomic_path(path) as temporary:
-        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_file(path, "\n".join(lines) + "\n")

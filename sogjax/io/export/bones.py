@@ -1,21 +1,20 @@
 """The bones of a motion: what other programs know of a skeleton, each of them a few one-axis joints of one origin."""
 
+import warnings
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
+from scipy.spatial.transform import Rotation
 
 from sogjax.errors import InputError
-from sogjax.io.motion import Motion
+from sogjax.io.motion_data import MotionData
 from sogjax.model.rotation import world_from_upright
 
 CONSTANT = 1e-4
 """Metres within which an offset counts as constant."""
-
-_SAME_PLACE = 1e-5
-"""Metres within which joints share their origin."""
 
 
 @dataclass(frozen=True)
@@ -29,13 +28,13 @@ class Bones:
     """The joints that make each bone, parents first; the last one's frame is the bone's."""
 
 
-def bones_of(motion: Motion) -> Bones:
+def bones_of(motion: MotionData) -> Bones:
     """The bones that the joints of a motion make."""
     chains = _chains(motion)
     names = _unique_names([[str(motion.joint_names[j]) for j in chain] for chain in chains])
     bone_of = {joint: bone for bone, chain in enumerate(chains) for joint in chain} | {-1: -1}
     parents = tuple(bone_of[int(motion.joint_parents[chain[0]])] for chain in chains)
-    return Bones(tuple(names), parents, tuple(tuple(chain) for chain in chains))
+    return Bones(tuple(names), parents, tuple(map(tuple, chains)))
 
 
 def world_turn(up: str, to: str) -> Float[np.ndarray, "3 3"]:
@@ -44,7 +43,7 @@ def world_turn(up: str, to: str) -> Float[np.ndarray, "3 3"]:
 
 
 def bone_frames(
-    motion: Motion, bones: Bones, up: str, to: str
+    motion: MotionData, bones: Bones, up: str, to: str
 ) -> tuple[Float[np.ndarray, "frame bone 3 3"], Float[np.ndarray, "frame bone 3"]]:
     """Rotations and origins (metres) of the bones, in a world turned from the vertical `up` to `to`.
 
@@ -55,7 +54,27 @@ def bone_frames(
     return turn @ frames[..., :3, :3] @ turn.T, frames[..., :3, 3] @ turn.T
 
 
-def frame_time(path: Path, motion: Motion) -> float:
+def in_parents(
+    bones: Bones, rotations: Float[np.ndarray, "frame bone 3 3"], positions: Float[np.ndarray, "frame bone 3"]
+) -> tuple[Float[np.ndarray, "frame bone 3 3"], Float[np.ndarray, "frame bone 3"]]:
+    """The rotations and origins of bones in the frames of their parents; those of roots as they are."""
+    turns, offsets = rotations.copy(), positions.copy()
+    for bone, above in enumerate(bones.parents):
+        if above >= 0:
+            to_parent = np.swapaxes(rotations[:, above], -1, -2)
+            turns[:, bone] = to_parent @ rotations[:, bone]
+            offsets[:, bone] = np.einsum("tij,tj->ti", to_parent, positions[:, bone] - positions[:, above])
+    return turns, offsets
+
+
+def euler_angles(rotations: Float[np.ndarray, "frame 3 3"], order: str) -> Float[np.ndarray, "frame 3"]:
+    """Degrees about three axes, each turned by the ones before it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # at 90 degrees about the middle axis one of many is chosen
+        return Rotation.from_matrix(rotations).as_euler(order, degrees=True)
+
+
+def frame_time(path: Path, motion: MotionData) -> float:
     """Seconds from one frame to the next, for a format that has one number for it.
 
     Raises:
@@ -63,8 +82,7 @@ def frame_time(path: Path, motion: Motion) -> float:
     """
     ending = path.suffix.lstrip(".").upper()
     steps = np.unique(np.diff(motion.frame))
-    if motion.num_frames == 0:
-        raise InputError(f"{path}: the motion has no frames; export one that has")
+    check_frames(path, motion)
     if len(steps) > 1:
         raise InputError(
             f"{path}: {ending} needs evenly spaced frames, but the motion's lie {steps[0]} to {steps[-1]} apart; "
@@ -73,7 +91,17 @@ def frame_time(path: Path, motion: Motion) -> float:
     return float(steps[0] if len(steps) else 1) / motion.fps
 
 
-def _chains(motion: Motion) -> list[list[int]]:
+def check_frames(path: Path, motion: MotionData) -> None:
+    """Check that there is anything to write.
+
+    Raises:
+        InputError: there is no frame.
+    """
+    if motion.num_frames == 0:
+        raise InputError(f"{path}: the motion has no frames; export one that has")
+
+
+def _chains(motion: MotionData) -> list[list[int]]:
     """The joints that make one bone each, parents first.
 
     A joint continues its parent's chain if it is the only child and does not leave the origin; also, in the
@@ -82,24 +110,19 @@ def _chains(motion: Motion) -> list[list[int]]:
     parents = motion.joint_parents
     origins = motion.world_from_joint[..., :3, 3]
     num_children = np.bincount(parents[parents >= 0], minlength=len(parents))
-    chains: list[list[int]] = []
-    chain_of: dict[int, list[int]] = {}
+    chain_of: list[list[int]] = []
     for joint, parent in enumerate(parents.tolist()):
         continues = False
         if parent >= 0 and num_children[parent] == 1:
             apart = np.linalg.norm(origins[:, joint] - origins[:, parent], axis=-1).max()
             at_root = parents[chain_of[parent][0]] < 0
-            continues = apart < _SAME_PLACE or bool(at_root and _slides(motion, joint))
-        if continues:
-            chain_of[joint] = chain_of[parent]
-            chain_of[joint].append(joint)
-        else:
-            chain_of[joint] = [joint]
-            chains.append(chain_of[joint])
-    return chains
+            continues = apart < 1e-5 or bool(at_root and _slides(motion, joint))  # metres
+        chain_of.append(chain_of[parent] if continues else [])
+        chain_of[joint].append(joint)
+    return [chain for joint, chain in enumerate(chain_of) if chain[0] == joint]
 
 
-def _slides(motion: Motion, joint: int) -> bool:
+def _slides(motion: MotionData, joint: int) -> bool:
     """Whether the offset of a joint from its parent changes."""
     parent = motion.world_from_joint[:, motion.joint_parents[joint]]
     apart = motion.world_from_joint[:, joint, :3, 3] - parent[:, :3, 3]

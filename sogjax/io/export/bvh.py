@@ -3,24 +3,19 @@
 Y is up, +Z is where a body in its rest pose looks, lengths are metres unless asked otherwise, angles degrees.
 """
 
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
-from scipy.spatial.transform import Rotation
 
-from sogjax.io.export.bones import CONSTANT, bone_frames, bones_of, frame_time, world_turn
-from sogjax.io.files import atomic_path
-from sogjax.io.motion import Motion
+from sogjax.io.export.bones import CONSTANT, bone_frames, bones_of, euler_angles, frame_time, in_parents, world_turn
+from sogjax.io.files import write_file
+from sogjax.io.motion_data import MotionData
 
 PER_METRE = {"m": 1.0, "cm": 100.0}
 """The units of length that a BVH file may be written in; the file itself does not say which."""
-
-_SHORTEST_END = 0.01
-_DEFAULT_END = 0.05
 
 
 @dataclass
@@ -31,7 +26,7 @@ class _Bone:
     is_root: bool
     positions: Float[np.ndarray, "frame 3"]
     angles: Float[np.ndarray, "frame 3"]
-    """Degrees about Z, X, Y, each turned by the ones before it."""
+    """Degrees about Z, X, Y, each turned by the ones before it, without jumps of a turn."""
     end: Float[np.ndarray, "3"]
     """Where the bone ends, if it has no children."""
     children: list["_Bone"] = field(default_factory=list)
@@ -46,7 +41,7 @@ class _Bone:
         return np.zeros(3) if self.is_root else np.median(self.positions, axis=0)
 
 
-def write_bvh(path: Path, motion: Motion, up: str = "z", unit: str = "m") -> None:
+def write_bvh(path: Path, motion: MotionData, up: str = "z", unit: str = "m") -> None:
     """Write `motion`, whose world has the vertical `up`, as BVH with Y up; lengths in `unit` (`m`, `cm`).
 
     One-axis joints that share their origin become one BVH joint with three rotation channels. The root, and
@@ -70,30 +65,25 @@ def write_bvh(path: Path, motion: Motion, up: str = "z", unit: str = "m") -> Non
         f"Frame Time: {seconds:.9f}",
     ]
     lines += [_numbers(row) for row in np.concatenate(channels, axis=1)]
-    with atomic_path(path) as temporary:
-        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_file(path, "\n".join(lines) + "\n")
 
 
-def _root_bone(motion: Motion, up: str, scale: float) -> _Bone:
+def _root_bone(motion: MotionData, up: str, scale: float) -> _Bone:
     """The tree of bones, with lengths times `scale`."""
     found = bones_of(motion)
     rotations, positions = bone_frames(motion, found, up, "y")
-    turn = world_turn(up, "y")
-    blobs = motion.blob_means.astype(float) @ turn.T
+    turns, offsets = in_parents(found, rotations, positions)
+    blobs = motion.blob_means[0].astype(float) @ world_turn(up, "y").T
     bones: list[_Bone] = []
     for index, (name, above) in enumerate(zip(found.names, found.parents, strict=True)):
-        position, rotation = positions[:, index], rotations[:, index]
-        attached = (blobs[0, np.isin(motion.blob_joint, found.chains[index])] - position[0]) @ rotation[0]
-        if above >= 0:
-            to_parent = np.swapaxes(rotations[:, above], -1, -2)
-            position = np.einsum("tij,tj->ti", to_parent, position - positions[:, above])
-            rotation = to_parent @ rotation
+        of_bone = np.isin(motion.blob_joint, found.chains[index])
+        attached = (blobs[of_bone] - positions[0, index]) @ rotations[0, index]
         bone = _Bone(
             name=name,
             is_root=above < 0,
-            positions=position * scale,
-            angles=_euler_angles(rotation),
-            end=_end(attached, position[0]) * scale,
+            positions=offsets[:, index] * scale,
+            angles=np.unwrap(euler_angles(turns[:, index], "ZXY"), axis=0, period=360.0),
+            end=_end(attached, offsets[0, index]) * scale,
         )
         bones.append(bone)
         if above >= 0:
@@ -102,22 +92,15 @@ def _root_bone(motion: Motion, up: str, scale: float) -> _Bone:
     return roots[0] if len(roots) == 1 else _common_root(roots)
 
 
-def _euler_angles(rotation: Float[np.ndarray, "frame 3 3"]) -> Float[np.ndarray, "frame 3"]:
-    """Degrees about Z, X, Y without jumps of a turn."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # at X = 90 degrees scipy says that it chooses one of many
-        angles = Rotation.from_matrix(rotation).as_euler("ZXY", degrees=True)
-    return np.unwrap(angles, axis=0, period=360.0)
-
-
 def _end(attached: Float[np.ndarray, "blob 3"], offset: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
-    """The farthest blob of a bone, or a short continuation of its parent."""
+    """Where a bone without children ends: at its farthest blob, else a little beyond its parent; metres."""
+    shortest, usual = 0.01, 0.05
     if len(attached):
         farthest = attached[np.linalg.norm(attached, axis=-1).argmax()]
-        if np.linalg.norm(farthest) > _SHORTEST_END:
+        if np.linalg.norm(farthest) > shortest:
             return farthest
     length = np.linalg.norm(offset)
-    return _DEFAULT_END * (offset / length if length > _SHORTEST_END else np.array([0.0, 1.0, 0.0]))
+    return usual * (offset / length if length > shortest else np.array([0.0, 1.0, 0.0]))
 
 
 def _common_root(roots: list[_Bone]) -> _Bone:

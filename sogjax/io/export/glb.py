@@ -12,21 +12,12 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from sogjax.errors import InputError
-from sogjax.io.export.bones import Bones, bone_frames, bones_of, world_turn
-from sogjax.io.files import atomic_path
-from sogjax.io.motion import Motion
+from sogjax.io.export.bones import Bones, bone_frames, bones_of, check_frames, in_parents, world_turn
+from sogjax.io.files import write_file
+from sogjax.io.motion_data import MotionData
 
-FLOAT, UINT16, UINT32 = 5126, 5123, 5125
-_COMPONENTS = {FLOAT: np.dtype("<f4"), UINT16: np.dtype("<u2"), UINT32: np.dtype("<u4")}
-_STILL = 1e-6
-"""Metres within which a bone's offset counts as constant and needs no track."""
-
-BLOB_RADII = 1.35
-"""Half the height of the octahedron that shows a blob, in sigmas: a disc of this radius fits its picture best."""
-
-_CORNERS = np.concatenate([np.eye(3), -np.eye(3)])
-_FACES = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]])
+_FLOAT, _UINT16, _UINT32 = 5126, 5123, 5125
+_COMPONENTS = {_FLOAT: np.dtype("<f4"), _UINT16: np.dtype("<u2"), _UINT32: np.dtype("<u4")}
 
 
 class _Content:
@@ -36,7 +27,7 @@ class _Content:
         self.tree: dict[str, Any] = {"accessors": [], "bufferViews": []}
         self.binary = bytearray()
 
-    def accessor(self, values: np.ndarray, kind: str, component: int = FLOAT, bounds: bool = False) -> int:
+    def accessor(self, values: np.ndarray, kind: str, component: int = _FLOAT, bounds: bool = False) -> int:
         """Append an array, its first axis counting the elements; the number of its accessor."""
         data = np.ascontiguousarray(values, _COMPONENTS[component])
         entry: dict[str, Any] = {
@@ -65,17 +56,17 @@ class _Content:
         return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 
-def write_glb(path: Path, motion: Motion, up: str = "z") -> None:
+def write_glb(path: Path, motion: MotionData, up: str = "z") -> None:
     """Write a motion whose world has the vertical `up`.
 
     Raises:
         InputError: no frames, or a path that cannot be written.
     """
-    if motion.num_frames == 0:
-        raise InputError(f"{path}: the motion has no frames; export one that has")
+    check_frames(path, motion)
     bones = bones_of(motion)
     rotations, positions = bone_frames(motion, bones, up, "y")
-    turns, offsets = _local(bones, rotations, positions)
+    local_rotations, offsets = in_parents(bones, rotations, positions)
+    turns = _quaternions(local_rotations)
     content = _Content()
     children = [[k for k, above in enumerate(bones.parents) if above == bone] for bone in range(len(bones.names))]
     nodes = [
@@ -94,35 +85,25 @@ def write_glb(path: Path, motion: Motion, up: str = "z") -> None:
         nodes.append({"name": "blobs", "mesh": 0, "skin": 0})
         roots.append(len(nodes) - 1)
     content.tree |= {"scene": 0, "scenes": [{"nodes": roots}]}
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(content.written())
+    write_file(path, content.written())
 
 
-def _local(
-    bones: Bones, rotations: Float[np.ndarray, "frame bone 3 3"], positions: Float[np.ndarray, "frame bone 3"]
-) -> tuple[Float[np.ndarray, "frame bone 4"], Float[np.ndarray, "frame bone 3"]]:
-    """Quaternions (x y z w, without jumps of sign) and offsets of the bones in the frames of their parents."""
-    offsets, turns = positions.copy(), rotations.copy()
-    for bone, above in enumerate(bones.parents):
-        if above >= 0:
-            to_parent = np.swapaxes(rotations[:, above], -1, -2)
-            offsets[:, bone] = np.einsum("tij,tj->ti", to_parent, positions[:, bone] - positions[:, above])
-            turns[:, bone] = to_parent @ rotations[:, bone]
-    quaternions = Rotation.from_matrix(turns.reshape(-1, 3, 3)).as_quat().reshape(*turns.shape[:2], 4)
+def _quaternions(rotations: Float[np.ndarray, "frame bone 3 3"]) -> Float[np.ndarray, "frame bone 4"]:
+    """Rotations as x y z w, without jumps of sign."""
+    quaternions = Rotation.from_matrix(rotations.reshape(-1, 3, 3)).as_quat().reshape(*rotations.shape[:2], 4)
     jumps = np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0
-    signs = np.cumprod(np.where(jumps, -1.0, 1.0), axis=0)
-    quaternions[1:] *= signs[..., None]
-    return quaternions, offsets
+    quaternions[1:] *= np.cumprod(np.where(jumps, -1.0, 1.0), axis=0)[..., None]
+    return quaternions
 
 
-def _animation(content: _Content, motion: Motion, turns: np.ndarray, offsets: np.ndarray) -> dict[str, Any]:
+def _animation(content: _Content, motion: MotionData, turns: np.ndarray, offsets: np.ndarray) -> dict[str, Any]:
     """A track of rotation for every bone, and of translation for those that move in their parent's frame."""
     seconds = (motion.frame - motion.frame[0]) / motion.fps
     times = content.accessor(seconds, "SCALAR", bounds=True)
     samplers, channels = [], []
     for bone in range(turns.shape[1]):
         tracks = {"rotation": content.accessor(turns[:, bone], "VEC4")}
-        if np.ptp(offsets[:, bone], axis=0).max() > _STILL:
+        if np.ptp(offsets[:, bone], axis=0).max() > 1e-6:  # metres
             tracks["translation"] = content.accessor(offsets[:, bone], "VEC3")
         for path, output in tracks.items():
             channels.append({"sampler": len(samplers), "target": {"node": bone, "path": path}})
@@ -132,18 +113,21 @@ def _animation(content: _Content, motion: Motion, turns: np.ndarray, offsets: np
 
 def _add_skin(
     content: _Content,
-    motion: Motion,
+    motion: MotionData,
     bones: Bones,
     rotations: Float[np.ndarray, "bone 3 3"],
     positions: Float[np.ndarray, "bone 3"],
     centres: Float[np.ndarray, "blob 3"],
 ) -> None:
     """An octahedron for each blob, which moves with its bone; given is the first frame, in glTF's axes."""
+    radii = 1.35  # half the height of an octahedron, in sigmas: a disc of this radius fits the blob's picture best
+    vertices = np.concatenate([np.eye(3), -np.eye(3)])
+    triangles = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]])
     bone_of = {joint: bone for bone, chain in enumerate(bones.chains) for joint in chain}
     owner = np.array([bone_of[int(joint)] for joint in motion.blob_joint])
-    corners = centres[:, None] + BLOB_RADII * motion.blob_sigma[:, None, None] * _CORNERS
-    faces = _FACES + len(_CORNERS) * np.arange(len(centres))[:, None, None]
-    joints, weights = (np.zeros((len(centres), len(_CORNERS), 4)) for _ in range(2))
+    corners = centres[:, None] + radii * motion.blob_sigma[:, None, None] * vertices
+    faces = triangles + len(vertices) * np.arange(len(centres))[:, None, None]
+    joints, weights = (np.zeros((len(centres), len(vertices), 4)) for _ in range(2))
     joints[..., 0], weights[..., 0] = owner[:, None], 1.0
     bind = np.zeros((len(bones.names), 4, 4))
     bind[:, :3, :3] = np.swapaxes(rotations, -1, -2)
@@ -151,10 +135,10 @@ def _add_skin(
     bind[:, 3, 3] = 1.0
     attributes = {
         "POSITION": content.accessor(corners.reshape(-1, 3), "VEC3", bounds=True),
-        "JOINTS_0": content.accessor(joints.reshape(-1, 4), "VEC4", UINT16),
+        "JOINTS_0": content.accessor(joints.reshape(-1, 4), "VEC4", _UINT16),
         "WEIGHTS_0": content.accessor(weights.reshape(-1, 4), "VEC4"),
     }
-    indices = content.accessor(faces.reshape(-1), "SCALAR", UINT32)
+    indices = content.accessor(faces.reshape(-1), "SCALAR", _UINT32)
     matrices = content.accessor(np.swapaxes(bind, -1, -2).reshape(-1, 16), "MAT4")  # column by column
     content.tree["meshes"] = [{"name": "blobs", "primitives": [{"attributes": attributes, "indices": indices}]}]
     content.tree["skins"] = [{"joints": list(range(len(bones.names))), "inverseBindMatrices": matrices}]

@@ -1,15 +1,9 @@
-"""Which points of a motion marker files hold: joint centres and extremities under OpenSim's usual names.
-
-C3D, the file format of marker systems: joint centres and extremities, in millimetres, in the motion's own world.
-
-Comma-separated values: the origins of all bones in metres, in the motion's own world, whose vertical is stated.
-
-TRC, the tab-separated marker file of OpenSim: joint centres and extremities, in metres, Y up.
-"""
+"""Points of a motion as other programs' marker files and tables hold them: C3D, TRC, CSV."""
 
 import csv
 import importlib
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +14,7 @@ from sogjax.errors import InputError
 from sogjax.io.export.bones import bone_frames, bones_of, frame_time, world_turn
 from sogjax.io.files import atomic_path
 from sogjax.io.keypoints.scheme import named_scheme
-from sogjax.io.motion import Motion
+from sogjax.io.motion_data import MotionData
 from sogjax.model.rotation import forward_axis
 
 _JOINTS = {"hip": "Hip", "knee": "Knee", "ankle": "Ankle", "shoulder": "Shoulder", "elbow": "Elbow", "wrist": "Wrist"}
@@ -33,15 +27,13 @@ def _both_sides(names: dict[str, str]) -> dict[str, str]:
 
 OPENSIM_NAMES = {"root": "Hip", "neck": "Neck"} | _both_sides(_JOINTS)
 """The names that OpenSim models for video have (Pose2Sim's), by those of the default body's bones."""
-OPENSIM_ENDS = {"head_top": "Head"} | _both_sides(_ENDS)
-"""The same of the landmarks where a body ends."""
-EVERY_BONE = "all"
-_ROLL = re.compile(r"_roll\d*$")
-"""Bones that only turn about the line to the next joint: their origins are no joint centres."""
+_OPENSIM_ENDS = {"head_top": "Head"} | _both_sides(_ENDS)
+"""The names that these models have of landmarks where a body ends."""
+_EVERY_BONE = "all"
 
 
 def marker_points(
-    motion: Motion, up: str, to: str, markers: str | None = None
+    motion: MotionData, up: str, to: str, markers: str | None = None
 ) -> tuple[list[str], Float[np.ndarray, "frame marker 3"]]:
     """Names and positions (metres) of the points, in a world turned from the vertical `up` to `to`.
 
@@ -55,41 +47,41 @@ def marker_points(
     Raises:
         InputError: no such scheme, or the motion lacks one of its points.
     """
-    if markers not in (None, EVERY_BONE):
+    if markers not in (None, _EVERY_BONE):
         scheme = named_scheme(str(markers))
         points = np.stack([motion.joint(name).astype(float) for name in scheme.landmarks], axis=1)
         return list(scheme.keypoints), points @ world_turn(up, to).T
     bones = bones_of(motion)
     _, positions = bone_frames(motion, bones, up, to)
-    kept = [k for k, name in enumerate(bones.names) if markers == EVERY_BONE or not _ROLL.search(name)]
+    # Bones that only turn about the line to the next joint have origins that are no joint centres.
+    rolls = lambda name: re.search(r"_roll\d*$", name) is not None
+    kept = [k for k, name in enumerate(bones.names) if markers == _EVERY_BONE or not rolls(name)]
     names = [OPENSIM_NAMES.get(bones.names[k], bones.names[k]) for k in kept]
     known = [] if motion.landmark_names is None else motion.landmark_names.tolist()
-    ends = [name for name in OPENSIM_ENDS if name in known]
+    ends = [name for name in _OPENSIM_ENDS if name in known]
     places = [motion.joint(name).astype(float) @ world_turn(up, to).T for name in ends]
-    return names + [OPENSIM_ENDS[name] for name in ends], np.stack([*positions[:, kept].swapaxes(0, 1), *places], 1)
+    return names + [_OPENSIM_ENDS[name] for name in ends], np.stack([*positions[:, kept].swapaxes(0, 1), *places], 1)
 
 
-MILLIMETRES = 1000.0
-MAX_FRAMES = 65_535
-"""A C3D header counts no further; more frames would be lost silently."""
+def write_c3d(path: Path, motion: MotionData, up: str = "z", markers: str | None = None) -> None:
+    """Write C3D, the format of marker systems: the points of `marker_points` in millimetres, in the motion's world.
 
-
-def write_c3d(path: Path, motion: Motion, up: str = "z", markers: str | None = None) -> None:
-    """Write the points of `marker_points`; POINT:X_SCREEN and Y_SCREEN say which axes point forward and up.
+    POINT:X_SCREEN and Y_SCREEN say which axes point forward and up.
 
     Raises:
         InputError: ezc3d is not installed; no frames, too many or uneven ones; or a path that cannot be written.
     """
+    most_frames = 65_535  # a C3D header counts no further; more frames would be lost silently
     ezc3d = require_ezc3d(str(path))
     rate = 1.0 / frame_time(path, motion)
-    if motion.num_frames > MAX_FRAMES:
+    if motion.num_frames > most_frames:
         raise InputError(
-            f"{path}: C3D holds at most {MAX_FRAMES} frames, but the motion has {motion.num_frames}; "
+            f"{path}: C3D holds at most {most_frames} frames, but the motion has {motion.num_frames}; "
             "write .trc or .csv, or track it in parts"
         )
     names, positions = marker_points(motion, up, up, markers)
     points = np.ones((4, len(names), motion.num_frames))
-    points[:3] = MILLIMETRES * positions.transpose(2, 1, 0)
+    points[:3] = 1000.0 * positions.transpose(2, 1, 0)
     file = ezc3d.c3d()
     parameters = file["parameters"]["POINT"]
     parameters["RATE"]["value"] = [rate]
@@ -118,26 +110,35 @@ def _signed(axis: str) -> str:
     return f"{'-' if axis.startswith('-') else '+'}{axis[-1].upper()}"
 
 
-def write_csv(path: Path, motion: Motion, up: str = "z") -> None:
-    """Write one row per frame, after a line starting with `#` that gives unit and vertical, and the columns' names.
+def write_csv(path: Path, motion: MotionData, up: str = "z") -> None:
+    """Write the origins of all bones, in metres in the motion's own world, whose vertical is stated, as CSV.
 
     Raises:
         InputError: a path that cannot be written.
     """
     bones = bones_of(motion)
     _, positions = bone_frames(motion, bones, up, up)
-    columns = ["frame", "time", *(f"{name}.{axis}" for name in bones.names for axis in "xyz")]
-    flat = positions.reshape(motion.num_frames, 3 * len(bones.names))
+    names = [f"{name}.{axis}" for name in bones.names for axis in "xyz"]
+    flat = positions.reshape(motion.num_frames, len(names))
+    write_columns(path, motion, f"unit: m, time: s, up: {up}", dict(zip(names, flat.T, strict=True)))
+
+
+def write_columns(path: Path, motion: MotionData, note: str, columns: Mapping[str, Float[np.ndarray, "frame"]]) -> None:
+    """Write CSV: after a line starting with `#` with a note, and the columns' names, one row per frame.
+
+    Raises:
+        InputError: a path that cannot be written.
+    """
     with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        file.write(f"# unit: m, time: s, up: {up}\n")
+        file.write(f"# {note}\n")
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        for frame, seconds, row in zip(motion.frame.tolist(), motion.time.tolist(), flat, strict=True):
-            writer.writerow([frame, f"{seconds:.6f}", *(f"{value:.6f}" for value in np.asarray(row))])
+        writer.writerow(["frame", "time", *columns])
+        for frame, *row in zip(motion.frame.tolist(), motion.time.tolist(), *columns.values(), strict=True):
+            writer.writerow([frame, *(f"{value:.6f}" for value in row)])
 
 
-def write_trc(path: Path, motion: Motion, up: str = "z", markers: str | None = None) -> None:
-    """Write the points of `marker_points`; those that OpenSim's models know have their names there.
+def write_trc(path: Path, motion: MotionData, up: str = "z", markers: str | None = None) -> None:
+    """Write TRC, OpenSim's tab-separated marker file: the points of `marker_points` in metres, Y up.
 
     X, Y, Z are Y, Z, X of a world with z up, as in Pose2Sim's files.
 
@@ -145,24 +146,21 @@ def write_trc(path: Path, motion: Motion, up: str = "z", markers: str | None = N
         InputError: no frames, unevenly spaced frames, or a path that cannot be written; a keypoint scheme that is not
             known, or a motion that lacks one of its points.
     """
-    rate = 1.0 / frame_time(path, motion)
-    _write(path, motion, rate, *marker_points(motion, up, "y", markers))
-
-
-def _write(
-    path: Path, motion: Motion, rate: float, names: list[str], positions: Float[np.ndarray, "frame marker 3"]
-) -> None:
-    count, first = motion.num_frames, int(motion.frame[0])
+    rate = f"{1.0 / frame_time(path, motion):.6f}"
+    names, positions = marker_points(motion, up, "y", markers)
+    count = str(motion.num_frames)
+    facts = {
+        **{"DataRate": rate, "CameraRate": rate, "NumFrames": count, "NumMarkers": str(len(names)), "Units": "m"},
+        **{"OrigDataRate": rate, "OrigDataStartFrame": str(int(motion.frame[0])), "OrigNumFrames": count},
+    }
     header = [
         ["PathFileType", "4", "(X/Y/Z)", path.name],
-        ["DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units", "OrigDataRate", "OrigDataStartFrame"],
-        [f"{rate:.6f}", f"{rate:.6f}", str(count), str(len(names)), "m", f"{rate:.6f}", str(first)],
+        [*facts],
+        [*facts.values()],
         ["Frame#", "Time", *(cell for name in names for cell in (name, "", ""))],
         ["", "", *(f"{axis}{k}" for k in range(1, len(names) + 1) for axis in "XYZ")],
         [],
     ]
-    header[1].append("OrigNumFrames")
-    header[2].append(str(count))
     rows = (
         [str(frame), f"{seconds:.6f}", *(f"{value:.6f}" for value in points.ravel())]
         for frame, seconds, points in zip(motion.frame.tolist(), motion.time.tolist(), positions, strict=True)

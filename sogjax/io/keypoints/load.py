@@ -12,7 +12,6 @@ from jaxtyping import Float
 
 from sogjax.errors import InputError, counted
 from sogjax.io.camera_names import matched_names
-from sogjax.io.image_folder import numbered_images
 from sogjax.io.keypoint_files import KeypointFiles, files_in, find_keypoints, number_in
 from sogjax.io.keypoints.camera_keypoints import (
     CameraKeypoints,
@@ -25,7 +24,7 @@ from sogjax.io.keypoints.camera_keypoints import (
 from sogjax.io.keypoints.people import check_counts, told_scheme
 from sogjax.io.keypoints.scheme import KeypointScheme, named_scheme
 from sogjax.io.recording import Recording
-from sogjax.io.source import videos_in
+from sogjax.io.source import numbered_images, videos_in
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Float
 
 from sogjax.errors import InputError
+from sogjax.io.files import read_text
 from sogjax.io.keypoints.scheme import LARGEST_COUNT, KeypointScheme, shipped_schemes
-from sogjax.io.text_lines import read_text
 
 MOST_PEOPLE = 100
 """In a picture of a file; no detector finds more."""

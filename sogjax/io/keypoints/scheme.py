@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from sogjax.errors import InputError
-from sogjax.io.actor_rows import Row, filled_table, names
-from sogjax.io.yaml_entry import Entry, read_yaml
+from sogjax.io.actor_rows import filled_table, names
+from sogjax.io.yaml_entry import read_yaml
 
 LARGEST_COUNT = 1000
 """Keypoints of one person; no detector gives more."""
@@ -90,32 +90,19 @@ def load_scheme(path: Path) -> KeypointScheme:
         InputError: the file is no such scheme; the message names the key, its value and what was expected.
     """
     content = read_yaml(path).fields(("name", "count", "keypoints"))
-    count = _whole(content["count"], 1, LARGEST_COUNT)
+    count = content["count"].whole(f"a whole number from 1 to {LARGEST_COUNT}", 1, LARGEST_COUNT)
     rows = filled_table(content["keypoints"], ("name", "index", "landmark", "within"))
-    indices = tuple(_whole(row["index"], 0, count - 1) for row in rows)
+    place = f"a whole number from 0 to {count - 1}"
+    indices = tuple(row["index"].whole(place, 0, count - 1) for row in rows)
     for row, index in zip(rows, indices, strict=True):
         if indices.count(index) > 1:
             raise row["index"].error("an index that no other keypoint has")
+    distance = f"a distance in metres from 0 to {FARTHEST:g}"
     return KeypointScheme(
         name=content["name"].text(),
         count=count,
         keypoints=names(rows),
         indices=indices,
         landmarks=tuple(row["landmark"].text() for row in rows),
-        within=tuple(_distance(row) for row in rows),
+        within=tuple(row["within"].number(distance, 0.0, FARTHEST) for row in rows),
     )
-
-
-def _whole(entry: Entry, lowest: int, highest: int) -> int:
-    value = entry.value
-    if isinstance(value, bool) or not isinstance(value, int) or not lowest <= value <= highest:
-        raise entry.error(f"a whole number from {lowest} to {highest}")
-    return value
-
-
-def _distance(row: Row) -> float:
-    expected = f"a distance in metres from 0 to {FARTHEST:g}"
-    value = row["within"].number(expected)
-    if not 0.0 <= value <= FARTHEST:
-        raise row["within"].error(expected)
-    return value
