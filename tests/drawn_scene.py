@@ -72,7 +72,6 @@ def make_tracker(body, rig, depth=6, solver=None, color_space="hsv_cylinder", to
         candidates=Candidates.from_grids(grids_of(rig, depth), rig.cameras),
         color_radius=0.3,
         color_tolerance=tolerance,
-        box_enlargement=0.15,
         color_space=color_space,
     )
     return Tracker(

@@ -109,12 +109,17 @@ def test_videos_of_different_length(capsys, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("command", SCHEMAS)
 def test_help_lists_every_option_with_its_default(capsys, command):
-    out, err = done(capsys, command, "--help")
-    assert err == ""
-    for key, default, text in help_lines(SCHEMAS[command]):
+    usual, _ = done(capsys, command, "--help")
+    out, err = done(capsys, command, "--help", "all")
+    assert (out, err) == done(capsys, command, "--help=all")
+    for key, default, text, expert in help_lines(SCHEMAS[command]):
         assert f"  {key}={default}\n" in out
+        assert (f"  {key}={default}\n" in usual) != expert
         assert text
     assert all(len(line) < 120 for line in out.splitlines())
+    hidden = sum(line.expert for line in help_lines(SCHEMAS[command]))
+    assert (f"sogjax {command} --help all lists {hidden} more" in usual) == (hidden > 0)
+    assert sum(re.match(r"  [\w.]+=", line) is not None for line in usual.splitlines()) <= 25 + 5  # and sets of options
 
 
 def test_help_of_the_whole_names_every_command(capsys):
@@ -126,9 +131,9 @@ def test_help_of_the_whole_names_every_command(capsys):
 
 @pytest.mark.parametrize("command", SCHEMAS)
 def test_defaults_in_the_help_are_the_defaults_of_the_command(command):
-    required = [f"{key}=x.bvh" for key, default, _ in help_lines(SCHEMAS[command]) if default == "required"]
+    required = [f"{key}=x.bvh" for key, default, *_ in help_lines(SCHEMAS[command]) if default == "required"]
     config = composed(command, required)
-    for key, default, _ in help_lines(SCHEMAS[command]):
+    for key, default, *_ in help_lines(SCHEMAS[command]):
         value = config
         for part in key.split("."):
             value = getattr(value, f"{part}_" if iskeyword(part) else part)

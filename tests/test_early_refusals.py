@@ -4,12 +4,14 @@ import subprocess
 import sys
 
 import pytest
+from command_line import refused
 
 from sogjax.cli.config.composition import CALIBRATIONS, FORMATS, MOTIONS, check_endings, composed
 from sogjax.errors import InputError
 from sogjax.io.export.write import WRITERS
 from sogjax.settings.compose import track_config
 from sogjax.settings.run import OutputsConfig
+from sogjax.settings.wrong_values import REMOVED
 
 
 def test_the_endings_are_those_of_the_writers():
@@ -55,6 +57,15 @@ def test_an_option_with_the_name_of_a_config_group(word, shown):
 def test_a_wrong_value_for_it_is_one_sentence():
     with pytest.raises(InputError, match="images"):
         composed("view", ["motion=m", "recording=r", "out=a.rrd", "images=maybe"])
+
+
+@pytest.mark.parametrize("key", [*REMOVED])
+def test_a_setting_that_there_was_once_is_refused_with_the_reason(capsys, key):
+    words = ("actor", "out=a.yaml") if key == "energy" else ("track",)
+    value = ".capped=true" if key == "energy" else "=1"
+    assert refused(capsys, *words, "recording=r", f"{key}{value}").startswith(
+        f"sogjax: {key}: is not a setting any more: "
+    )
 
 
 def test_one_switch_for_the_motion_only():

@@ -33,7 +33,6 @@ def frames_of(images, rig=RIG, depth=8):
         candidates=Candidates.from_grids(grids, rig.cameras),
         color_radius=0.3,
         color_tolerance=0.1,
-        box_enlargement=0.15,
         color_space="hsv_cylinder",
     )
     cells = stack_cells(images, grids)

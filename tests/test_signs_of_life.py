@@ -1,12 +1,13 @@
 """Signs of life: bars with the time left, lines where there is no terminal, and silence where little time passes."""
 
 import io
+import re
 import time
 
 import pytest
 
 from sogjax.run import terminal
-from sogjax.run.terminal import Work, alive, bar, progress, remaining
+from sogjax.run.terminal import Work, alive, progress, say
 
 
 class Terminal(io.StringIO):
@@ -14,53 +15,53 @@ class Terminal(io.StringIO):
         return True
 
 
-@pytest.fixture
-def clock(monkeypatch):
-    """Five seconds pass whenever it is looked at."""
-    now = iter(range(1000, 100_000, 5))
+def worked(out, count=4, seconds=0.03):
+    """What is shown of some items that take so long each."""
+    assert list(progress((time.sleep(seconds) or k for k in range(count)), count, "tracking", out)) == [*range(count)]
+    return out.getvalue()
+
+
+def test_where_there_is_no_terminal_a_line_comes_every_ten_seconds(monkeypatch):
+    now = iter(range(1000, 100_000, 5))  # five seconds pass whenever it is looked at
     monkeypatch.setattr(terminal.time, "monotonic", lambda: float(next(now)))
-
-
-def test_where_there_is_no_terminal_a_line_comes_every_ten_seconds(clock):
     out = io.StringIO()
-    assert list(progress(range(8), 8, "tracking", out)) == list(range(8))
+    assert list(progress(range(8), 8, "tracking", out)) == [*range(8)]
     lines = out.getvalue().splitlines()
-    assert len(lines) == 2  # after 15 and 30 of 40 seconds
-    assert "3/8" in lines[0]
-    assert lines[0].endswith("left")
+    assert [re.search(r"tracking: (\d)/8 .*\ds/it", line)[1] for line in lines] == ["4", "6", "8"]
 
 
-def test_short_work_says_nothing():
-    out = io.StringIO()
-    list(progress(range(8), 8, "tracking", out))
-    assert out.getvalue() == ""
+@pytest.mark.parametrize("out", [io.StringIO(), Terminal()])
+def test_short_work_says_nothing(out):
+    assert worked(out) == ""
+    say("a message", out)
+    assert out.getvalue() == "a message\n"
 
 
-def test_a_bar_has_the_time_left_and_none_at_the_end(clock):
-    out = Terminal()
-    list(progress(range(4), 4, "tracking", out))
-    _, first, *_, last = [text for text in out.getvalue().split("\r") if text]
-    assert "10 s left" in first
-    assert "left" not in last
-    assert "4/4" in last
-
-
-@pytest.mark.parametrize(("seconds", "said"), [(12.4, "12 s"), (200.0, "3 min"), (9000.0, "2.5 h")])
-def test_times_as_people_say_them(seconds, said):
-    assert remaining(seconds) == said
+def test_a_bar_has_the_time_left_and_ends_with_a_line(monkeypatch):
+    monkeypatch.setattr(terminal, "SHOWN_AFTER", 0.05)
+    drawn = worked(Terminal(), 12)
+    assert re.search(r"tracking: .* [2-9]/12 \[00:00<00:00, .*it/s\]", drawn)
+    assert "12/12" in drawn.splitlines()[-1]
+    assert drawn.endswith("\n")
 
 
 def test_the_first_item_which_waits_for_programs_says_nothing_of_the_others(monkeypatch):
-    now = iter((0.0, 60.0, 61.0, 62.0, 63.0))
-    monkeypatch.setattr(terminal.time, "monotonic", lambda: next(now))
+    monkeypatch.setattr(terminal, "SHOWN_AFTER", 0.05)
     out = Terminal()
-    list(progress(range(4), 4, "tracking", out))
-    assert "1/4  " in out.getvalue()
-    assert "2/4 1.0/s, 2 s left" in out.getvalue()
+    list(progress((time.sleep(1.0 if k == 0 else 0.03) or k for k in range(12)), 12, "tracking", out))
+    rates = [float(rate) for rate in re.findall(r"([0-9.]+)it/s", out.getvalue())]
+    assert rates
+    assert min(rates) > 12 / 1.3
 
 
-def test_nothing_is_divided_by_nothing_done():
-    assert "0/5" in bar("tracking", 0, 5, 3.0)
+def test_a_message_stands_above_the_bar(monkeypatch):
+    monkeypatch.setattr(terminal, "SHOWN_AFTER", 0.05)
+    out = Terminal()
+    for k in progress((time.sleep(0.03) or k for k in range(20)), 20, "tracking", out):
+        if k == 10:
+            say("a message", out)
+    said = out.getvalue()
+    assert re.search(r"\r *\ra message\n\rtracking: .*/20", said)
 
 
 def test_work_without_a_count_shows_that_it_goes_on(monkeypatch):
@@ -84,9 +85,9 @@ def test_work_whose_share_is_known_says_how_long_the_rest_takes(monkeypatch):
         deadline = time.monotonic() + 5.0
         while "left" not in out.getvalue() and time.monotonic() < deadline:
             time.sleep(0.01)
-    assert "so far, about 0 s left" in out.getvalue()
+    assert "so far, about 00:00 left" in out.getvalue()
 
 
 def test_time_left_follows_from_the_share_that_is_done():
-    assert Work(0.25).left(20.0) == ", about 60 s left"
+    assert Work(0.25).left(20.0) == ", about 01:00 left"
     assert Work(0.0).left(20.0) == Work(1.0).left(20.0) == ""

@@ -285,7 +285,6 @@ def test_a_body_to_start_from_with_something_wrong(capsys, recording, tmp_path):
         ("color.space=foo", ("color.space=foo", "hsv_cylinder")),
         ("color.radius=0", ("color.radius=0",)),
         ("energy.pairs=foo", ("energy.pairs=foo", "dense", "sparse")),
-        ("energy.gradient=foo", ("energy.gradient=foo", "autodiff")),
         ("energy.limit_weight=-1", ("energy.limit_weight=-1",)),
         ("energy.limit_weight=nan", ("energy.limit_weight=nan", "finite")),
         ("energy.limit_weight=much", ("energy.limit_weight=much", "number")),

@@ -14,7 +14,7 @@ from sogjax.run.keypoint_actor import with_rough_poses
 from sogjax.run.recordings import body_named, keypoint_actor_or, with_cameras
 from sogjax.run.terminal import progress, say
 from sogjax.settings.compose import composed_without_hydra
-from sogjax.settings.method import ImagesConfig
+from sogjax.settings.method import EnergyConfig, ImagesConfig
 from sogjax.settings.run import ActorConfig
 
 Actor = Body
@@ -90,7 +90,7 @@ def fit_actor(recording: Recording, subject: str | None = None, **settings: Any)
         body,
         config.subject,
         space,
-        energy_terms(config.energy),
+        energy_terms(EnergyConfig()),
         say,
         progress,
         config.symmetric,

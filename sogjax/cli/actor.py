@@ -22,7 +22,7 @@ from sogjax.run.keypoint_actor import with_rough_poses
 from sogjax.run.outputs import free_path, results_folder
 from sogjax.run.recordings import body_named, check_scale, keypoint_actor_or, opened
 from sogjax.run.terminal import progress, say
-from sogjax.settings.method import ImagesConfig
+from sogjax.settings.method import EnergyConfig, ImagesConfig
 from sogjax.settings.run import ActorConfig
 
 NOTICED = 0.15
@@ -91,7 +91,7 @@ def actor_verdict(mean_iou: float, explained: float, num_warnings: int) -> str:
 def _made(recording: Recording, body: Body, config: ActorConfig) -> tuple[Recording, MadeActor]:
     """The actor of the example poses, the recording's own or frames of its videos, and the recording with these."""
     space, _ = color_space_and_radius(config.color)
-    terms = energy_terms(config.energy)
+    terms = energy_terms(EnergyConfig())
     recording, learnt, best = with_examples(recording, ImagesConfig(), config.actors)
     recording = with_rough_poses(recording, body)
     made = make_actor(recording, body, config.subject, space, terms, say, progress, config.symmetric, learnt, best)

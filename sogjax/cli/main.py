@@ -50,6 +50,7 @@ def _terminate(number: int, frame: FrameType | None) -> None:
 
 INTERRUPTED, TERMINATED = 130, 143
 """Exit status after Ctrl-C and SIGTERM, as in shells."""
+HELP = ("-h", "--help")
 USAGE = "usage: sogjax COMMAND [key=value ...] [-m for a sweep], sogjax COMMAND --help"
 
 
@@ -62,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from sogjax.run.clock import STARTING, age_of_process, clocked, stage
     from sogjax.run.compilation_cache import use_compilation_cache, use_compiler_options
 
-    if not arguments or arguments[0] in ("-h", "--help", "help"):
+    if not arguments or arguments[0] in (*HELP, "help"):
         print(_overview())
         return 0 if arguments else 2
     if arguments[0] == "--version":
@@ -71,8 +72,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     command, overrides = arguments[0], arguments[1:]
     if command not in SCHEMAS:
         return _wrong_input(f"no command {command!r}; use one of {', '.join(SCHEMAS)} ({USAGE})")
-    if any(word in ("-h", "--help") for word in overrides):
-        print(command_help(command))
+    if any(word.partition("=")[0] in HELP for word in overrides):
+        print(command_help(command, everything=any(word.rpartition("=")[2] == "all" for word in overrides)))
         return 0
     try:
         use_compiler_options()
@@ -95,20 +96,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def command_help(command: str) -> str:
-    """Every option of a command with its default, unit and the paper's symbol."""
+def command_help(command: str, everything: bool = False) -> str:
+    """The options of a command with default, unit and the paper's symbol; those for experts only with `everything`."""
     from sogjax.cli.config.composition import SCHEMAS, config_groups
+    from sogjax.errors import counted
     from sogjax.settings.option import help_lines
 
     schema = SCHEMAS[command]
     lines = [f"sogjax {command} [key=value ...]", "", (schema.__doc__ or "").strip(), ""]
-    for key, default, text in help_lines(schema):
-        lines += textwrap.wrap(f"{key}={default}", 118, initial_indent="  ")
-        lines += textwrap.wrap(text, 110, initial_indent="        ", subsequent_indent="        ")
+    options = help_lines(schema)
+    shown = [option for option in options if everything or not option.expert]
+    for option in shown:
+        lines += textwrap.wrap(f"{option.key}={option.default}", 118, initial_indent="  ")
+        lines += textwrap.wrap(option.text, 110, initial_indent="        ", subsequent_indent="        ")
     groups = config_groups(command)
     if groups:
         lines += ["", "sets of options by name, such as " + f"{next(iter(groups))}={next(iter(groups.values()))[0]}:"]
         lines += [f"  {group}={' | '.join(names)}" for group, names in groups.items()]
+    if hidden := len(options) - len(shown):
+        lines += ["", f"sogjax {command} --help all lists {counted(hidden, 'more setting')}"]
     return "\n".join(lines)
 
 

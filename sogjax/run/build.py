@@ -26,10 +26,10 @@ from sogjax.scene.foreground import BackgroundModel, SubjectColors, subject_colo
 from sogjax.scene.quadtree import Candidates
 from sogjax.settings.method import ColorConfig, EnergyConfig, ImagesConfig, SolverConfig
 from sogjax.settings.run import TrackConfig
-from sogjax.solve.ascent import ConditionedAscent
+from sogjax.solve.ascent import ConditionedAscent, gradient_ascent
 from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.solve.optimistix import OptimistixSolver
-from sogjax.solve.solution import Scales, Solver
+from sogjax.solve.solution import Solver
 from sogjax.tracking.culling import BoxAround, ImageReader
 from sogjax.tracking.solving import pose_scales
 from sogjax.tracking.tracker import PairChoice, Tracker
@@ -82,18 +82,14 @@ def check(config: TrackConfig) -> None:
     energy_terms(config.energy)
     pair_choice(config.energy)
     solver(config.solver)
-    for key in ("first_angle", "first_translation", "largest_angle", "largest_translation"):
-        at_least(f"solver.{key}", getattr(config.solver, key), 1e-6)
     between("images.depth", config.images.depth, 1, MAX_DEPTH)
     between("tracking.extrapolation", config.tracking.extrapolation, 0.0, 2.0)
     if not np.isfinite(config.images.color_tolerance):
         raise InputError(f"images.color_tolerance={config.images.color_tolerance}: must be a number")
-    at_least("images.box_enlargement", config.images.box_enlargement, 0.0)
     at_least("energy.keypoint_weight", config.energy.keypoint_weight, 0.0)
     at_least("energy.rest_weight", config.energy.rest_weight, 0.0)
     box_around(config.images)
     one_of("images.background", config.images.background, CHOICES)
-    marker_rule(config.outputs.markers, "outputs.markers")
     at_least("outputs.overlay_width", config.outputs.overlay_width, 64)
 
 
@@ -112,13 +108,11 @@ def energy_terms(config: EnergyConfig, further: Sequence[Term] = ()) -> Terms:
             name.
     """
     exponent = one_of("energy.overlap_exponent", config.overlap_exponent, ("exact", "printed"))
-    gradient = one_of("energy.gradient", config.gradient, ("forward", "autodiff"))
     standard = standard_terms(
         limit_weight=at_least("energy.limit_weight", config.limit_weight, 0.0),
         acceleration_weight=at_least("energy.acceleration_weight", config.acceleration_weight, 0.0),
         exponent=EXACT_EXPONENT if exponent == "exact" else PRINTED_EXPONENT,
         capped=config.capped,
-        gradient="forward" if gradient == "forward" else "autodiff",
         foreground_weight=at_least("energy.foreground_weight", config.foreground_weight, 0.0),
     )
     terms = (*standard, *added_terms("energy.terms", config.terms, [term.name for term in standard]), *further)
@@ -159,25 +153,8 @@ def solver(config: SolverConfig) -> Solver:
         return GaussNewton(
             epsilon=config.epsilon, min_iterations=config.min_iterations, max_iterations=config.max_iterations
         )
-    conditioned = method == "conditioned_ascent"
-    return ConditionedAscent(
-        epsilon=config.epsilon,
-        grow=at_least("solver.grow", config.grow, 1.0) if conditioned else 1.0,
-        shrink=between("solver.shrink", config.shrink, 0.0, 1.0) if conditioned else 1.0,
-        min_iterations=config.min_iterations,
-        max_iterations=config.max_iterations,
-    )
-
-
-def solver_scales(config: SolverConfig, body: Body) -> Scales:
-    """First and largest steps for the degrees of freedom of a body."""
-    return pose_scales(
-        body.skeleton,
-        config.first_angle,
-        config.first_translation,
-        config.largest_angle,
-        config.largest_translation,
-    )
+    ascent = ConditionedAscent if method == "conditioned_ascent" else gradient_ascent
+    return ascent(epsilon=config.epsilon, min_iterations=config.min_iterations, max_iterations=config.max_iterations)
 
 
 def device_cameras(recording: Recording) -> Camera:
@@ -205,7 +182,6 @@ def image_reader(
         candidates=candidates,
         color_radius=radius,
         color_tolerance=config.images.color_tolerance,
-        box_enlargement=at_least("images.box_enlargement", config.images.box_enlargement, 0.0),
         color_space=space,
         box_around=box_around(config.images),
         background=_background_model(recording, grids, config.images),
@@ -225,7 +201,7 @@ def tracker(
         reader=image_reader(recording, grids, config, [body]),
         terms=_tracking_terms(config.energy, terms),
         solver=solver(config.solver),
-        scales=solver_scales(config.solver, body),
+        scales=pose_scales(body.skeleton),
         extrapolation=config.tracking.extrapolation,
         pairs=pair_choice(config.energy),
         limbs=LimbBlobs.from_body(body) if config.outputs.confidence else None,
@@ -238,7 +214,6 @@ def varied(tracker: Tracker, config: TrackConfig) -> Tracker:
         tracker.reader,
         color_radius=color_space_and_radius(config.color)[1],
         color_tolerance=config.images.color_tolerance,
-        box_enlargement=config.images.box_enlargement,
         box_around=box_around(config.images),
     )
     return replace(
@@ -246,7 +221,7 @@ def varied(tracker: Tracker, config: TrackConfig) -> Tracker:
         reader=reader,
         terms=_tracking_terms(config.energy, [term for term in tracker.terms if isinstance(term, KeypointTerm)]),
         solver=solver(config.solver),
-        scales=solver_scales(config.solver, tracker.body),
+        scales=pose_scales(tracker.body.skeleton),
         extrapolation=config.tracking.extrapolation,
         pairs=pair_choice(config.energy),
         limbs=LimbBlobs.from_body(tracker.body) if config.outputs.confidence else None,

@@ -1,6 +1,8 @@
-"""Kept programs that cannot be read are deleted: jax compiles them, but writes none where a file lies already.
+"""Compiled programs kept on disk, so that the next start is quicker.
 
-Compiled programs kept on disk, so that the next start is quicker.
+jax keeps them. Here is what it leaves to others: a folder for each jaxlib and kind of processor, a trial whether this
+machine takes back what it kept, a bound on the size of all, and files that cannot be read, which are deleted, since jax
+compiles their programs again but writes none where a file lies already.
 """
 
 import contextlib
@@ -10,10 +12,9 @@ import os
 import platform
 import re
 import sys
-import tempfile
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
+from functools import partial
 from importlib.metadata import entry_points, version
 from pathlib import Path
 from typing import Any
@@ -22,56 +23,17 @@ from sogjax.errors import InputError
 from sogjax.io.cache_folder import OFF, default_cache_dir, named_folder, sweep
 from sogjax.io.files import atomic_path
 
-NOT_READ, NOT_WRITTEN = (
-    re.compile(rf"Error {what} persistent compilation cache entry for '([^']+)'") for what in ("reading", "writing")
-)
-"""How jax's warnings begin, with the program's name."""
-
-
-def forget_unread(folder: Path) -> None:
-    """From now on delete what jax says it cannot read in a folder, instead of showing the warning.
-
-    That a program is compiled once more is nothing that a person has to know.
-    """
-    warnings.filterwarnings("always", message=NOT_READ.pattern)
-    before = warnings.showwarning
-    warnings.showwarning = _Deleting(folder, before.others if isinstance(before, _Deleting) else before)
-
-
-def delete_programs(folder: Path, name: str) -> None:
-    """Delete all programs of a name: which of them cannot be read is not told."""
-    for path in folder.glob(f"{glob.escape(name)}-*cache"):
-        with contextlib.suppress(OSError):
-            path.unlink()
-
-
-@dataclass(frozen=True)
-class _Deleting:
-    """In place of `warnings.showwarning`."""
-
-    folder: Path
-    others: Callable[..., None]
-    """Shows all other warnings."""
-
-    def __call__(self, message: Warning | str, *further: Any, **named: Any) -> None:
-        if (unread := NOT_READ.match(str(message))) is not None:
-            delete_programs(self.folder, unread[1])
-        else:
-            self.others(message, *further, **named)
-
-
 VARIABLE = "SOGJAX_COMPILATION_CACHE"
 """The environment variable with the folder, or `off`; without it programs lie beside other things that are kept."""
 LARGEST = 1_000_000_000
 """Bytes to which kept programs are cut back once a day; a recording of its own takes about three million."""
 TRIED, REFUSED = "tried", "refused"
 """Names of files in the folder: kept programs were taken there; were not, and why."""
+COMPILER_VARIABLE, LEVEL = "XLA_FLAGS", "--xla_backend_optimization_level"
 _NOT_OF_THIS_MACHINE = "AOT result"
 """Part of what is written to standard error about a program that may not run on this processor."""
-
-
-COMPILER_VARIABLE = "XLA_FLAGS"
-LEVEL = "--xla_backend_optimization_level"
+_DAMAGED = re.compile(r"Error (reading|writing) persistent compilation cache entry for '([^']+)'")
+"""How jax's warnings begin, with the program's name."""
 
 
 def use_compiler_options() -> None:
@@ -96,22 +58,22 @@ def use_compilation_cache() -> None:
     name = os.environ.get(VARIABLE, "")
     if name.lower() == OFF or (not name and os.environ.get("JAX_COMPILATION_CACHE_DIR")):
         return
-    own = programs_folder()
-    if own is None:
+    folder = programs_folder()
+    if folder is None:
         return
     try:
-        own.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         if not name:
             return
         reason = error.strerror or str(error)
         raise InputError(f"{VARIABLE}={name}: no folder can be made there ({reason}); choose another") from error
-    if not os.access(own, os.W_OK) or refusal(own):
+    if not os.access(folder, os.W_OK) or refusal(folder):
         return
-    sweep(own.parent, "*/*-cache", LARGEST)
-    _use(str(own))
-    forget_unread(own)
-    if not (own / TRIED).exists() and not _taken_back(own):
+    sweep(folder.parent, "*/*-cache", LARGEST)
+    _use(str(folder))
+    forget_unread(folder)
+    if not (folder / TRIED).exists() and not _taken_back(folder):
         _use(None)
 
 
@@ -128,6 +90,17 @@ def programs_folder() -> Path | None:
         except InputError:
             return None
     return chosen / f"jaxlib-{version('jaxlib')}-{_processor()}"
+
+
+def _processor() -> str:
+    """A short name for the kind of processor and its features."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = [platform.processor()]
+    kinds = ("model name", "flags", "Features", "CPU part")
+    described = sorted({line for line in lines if line.startswith(kinds)}) or [platform.machine()]
+    return hashlib.sha256("\n".join(described).encode()).hexdigest()[:12]
 
 
 def refusal(folder: Path) -> str:
@@ -160,9 +133,8 @@ def _use(folder: str | None) -> None:
         "jax_persistent_cache_min_entry_size_bytes": -1,
     }
     for key, value in options.items():
-        if value is None:
-            os.environ.pop(key.upper(), None)
-        else:
+        os.environ.pop(key.upper(), None)
+        if value is not None:
             os.environ[key.upper()] = str(value)
         if "jax" in sys.modules:
             sys.modules["jax"].config.update(key, value)
@@ -172,13 +144,38 @@ def _use(folder: str | None) -> None:
         reset_cache()  # jax looks up the folder once only
 
 
+def forget_unread(folder: Path) -> None:
+    """From now on delete what jax says it cannot read in a folder, instead of showing the warning.
+
+    That a program is compiled once more is nothing that a person has to know.
+    """
+    warnings.filterwarnings("always", message="Error reading persistent compilation cache")
+    before = warnings.showwarning
+    others = before.args[1] if isinstance(before, partial) else before
+    warnings.showwarning = partial(_delete_or_show, folder, others)
+
+
+def _delete_or_show(folder: Path, show: Any, message: Warning | str, *further: Any, **named: Any) -> None:
+    """In place of `warnings.showwarning`: delete the program that a warning says cannot be read, or show another."""
+    if (unread := _DAMAGED.match(str(message))) is not None and unread[1] == "reading":
+        _delete_programs(folder, unread[2])
+    else:
+        show(message, *further, **named)
+
+
+def _delete_programs(folder: Path, name: str) -> None:
+    """Delete all programs of a name: which of them cannot be read is not told."""
+    for path in folder.glob(f"{glob.escape(name)}-*cache"):
+        with contextlib.suppress(OSError):
+            path.unlink()
+
+
 def _taken_back(folder: Path) -> bool:
     """Whether a program that was just kept is taken back, which is noted; not where the disk was in the way."""
     said = complaints()
     refused = [line for line in said if _NOT_OF_THIS_MACHINE in line]
-    for line in said:
-        if (damaged := NOT_READ.match(line) or NOT_WRITTEN.match(line)) is not None:
-            delete_programs(folder, damaged[1])
+    for damaged in filter(None, map(_DAMAGED.match, said)):
+        _delete_programs(folder, damaged[2])
     if refused or not said:
         with contextlib.suppress(InputError, OSError), atomic_path(folder / (REFUSED if refused else TRIED)) as file:
             file.write_text("\n".join(refused), encoding="utf-8")
@@ -186,50 +183,33 @@ def _taken_back(folder: Path) -> bool:
 
 
 def complaints() -> list[str]:
-    """What is said, line by line, where a program is kept and taken back."""
+    """What is said of the disk and of the machine, line by line, where a program is kept and taken back."""
     import jax
     import jax.numpy as jnp
 
-    with warnings.catch_warnings(record=True) as found:
+    with warnings.catch_warnings(record=True) as found, _standard_error() as lines:
         warnings.simplefilter("always")
         one = jnp.ones(3)
-        try:
-            with tempfile.TemporaryFile() as said:
-                with _standard_error_to(said.fileno()):
-                    for _ in range(2):  # the second function is the same program, but jax does not know that
-                        jax.jit(lambda x: jnp.sin(x) * 2.0 + 1.0)(one).block_until_ready()
-                said.seek(0)
-                lines = said.read().decode(errors="replace").splitlines()
-        except OSError as error:  # no room for temporary files
-            return [*_of_the_disk(found), str(error)]
-    return [*_of_the_disk(found), *(line for line in lines if _NOT_OF_THIS_MACHINE in line)]
-
-
-def _of_the_disk(found: Sequence[warnings.WarningMessage]) -> list[str]:
-    told = [str(each.message) for each in found]
-    return [text for text in told if NOT_READ.match(text) or NOT_WRITTEN.match(text)]
+        for _ in range(2):  # the second function is the same program, but jax does not know that
+            jax.jit(lambda x: jnp.sin(x) * 2.0 + 1.0)(one).block_until_ready()
+    of_the_disk = [text for warning in found if _DAMAGED.match(text := str(warning.message))]
+    return of_the_disk + [line for line in lines if _NOT_OF_THIS_MACHINE in line]
 
 
 @contextlib.contextmanager
-def _standard_error_to(file: int) -> Iterator[None]:
-    """Send what is written to the process's standard error, by compiled code as well, to an open file instead."""
+def _standard_error() -> Iterator[list[str]]:
+    """The lines that the process writes to standard error within the block, those of compiled code as well."""
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)  # what is too much is lost instead of waited for
     sys.stderr.flush()
-    before = os.dup(2)
-    os.dup2(file, 2)
+    before, lines = os.dup(2), []
+    os.dup2(writing, 2)
     try:
-        yield
+        yield lines
     finally:
         sys.stderr.flush()
         os.dup2(before, 2)
         os.close(before)
-
-
-def _processor() -> str:
-    """A short name for the kind of processor and its features."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        lines = [platform.processor()]
-    kinds = ("model name", "flags", "Features", "CPU part")
-    described = sorted({line for line in lines if line.startswith(kinds)}) or [platform.machine()]
-    return hashlib.sha256("\n".join(described).encode()).hexdigest()[:12]
+        os.close(writing)
+        with os.fdopen(reading, encoding="utf-8", errors="replace") as said:
+            lines += said.read().splitlines()

@@ -20,7 +20,6 @@ from sogjax.io.projects import CONFIG
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.quality.evaluation import evaluate_motions
-from sogjax.run.build import marker_rule
 from sogjax.run.clock import WRITING, stage
 from sogjax.run.run import Run
 from sogjax.run.streams import file_name
@@ -143,11 +142,11 @@ def _write_results(result: Run, out: Path, wanted: OutputsConfig, config: Any, m
     with atomic_path(out / "config.yaml") as temporary:
         temporary.write_text(OmegaConf.to_yaml(config))
     result.files.append(out / "config.yaml")
-    evaluate(result, wanted)
+    evaluate(result)
     judge(result)
     write_metrics(out / METRICS, result)
     result.files.append(out / METRICS)
-    if wanted.worst and write_worst(out / WORST, result):
+    if not wanted.motion_only and write_worst(out / WORST, result):
         result.files.append(out / WORST)
     result.files += streamed
 
@@ -157,7 +156,7 @@ def actor_name(path: Path, motion: Motion) -> str:
     return motion.actor or path.stem.removeprefix("motion").removeprefix("_") or "actor"
 
 
-def evaluate(result: Run, wanted: OutputsConfig) -> None:
+def evaluate(result: Run) -> None:
     """Compare with the ground truth, if there is one."""
     if result.recording.ground_truth is None:
         return
@@ -166,6 +165,9 @@ def evaluate(result: Run, wanted: OutputsConfig) -> None:
         say(f"warning: {result.recording.ground_truth} knows {', '.join(truth.subjects)}; nothing was compared")
         return
     try:
-        result.evaluation = evaluate_motions(result.motions, truth, rule=marker_rule(wanted.markers, "outputs.markers"))
+        result.evaluation = evaluate_motions(
+            result.motions,
+            truth,
+        )
     except InputError as error:
         say(f"warning: not compared with the truth: {error}")

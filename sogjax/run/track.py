@@ -78,7 +78,7 @@ def _run_in(folder: RunFolder, recording: Recording, config: TrackConfig, comman
     origin = origin_of(recording, config, bodies)
     going_on, kept = folder.goes_on(origin), folder.kept
     if folder.ended:
-        return _ended(folder, recording, config.outputs)
+        return _ended(folder, recording)
     if bodies is None and going_on:
         bodies = kept.actors()
     anew, found = bodies is None, []
@@ -148,7 +148,7 @@ def _report_actors(recording: Recording, made: Sequence[MadeActor], out: Path) -
         say(f"{actor.body.name}: silhouettes and masks agree to {report.mean_iou:.2f}; see {folder / 'report.md'}")
 
 
-def _ended(folder: RunFolder, recording: Recording, wanted: OutputsConfig) -> Run:
+def _ended(folder: RunFolder, recording: Recording) -> Run:
     """A run that ended before."""
     say(f"{folder.path}: the run has already ended; nothing to do")
     files = [folder.path / name for name in folder.note["files"]]
@@ -158,7 +158,7 @@ def _ended(folder: RunFolder, recording: Recording, wanted: OutputsConfig) -> Ru
     missing = recording.num_missing(frames.tolist())
     result = Run(recording, [], motions, StageTimes(), float("nan"), files=files, missing=missing)
     result.verdicts = kept_verdicts(folder.path / METRICS)
-    evaluate(result, wanted)
+    evaluate(result)
     return result
 
 

@@ -3,15 +3,15 @@
 from dataclasses import dataclass
 from typing import Any
 
-from sogjax.settings.option import option
+from sogjax.settings.option import expert, option
 
 
 @dataclass
 class ColorConfig:
     """Colour space and similarity (Eq. 7)."""
 
-    space: str = option("hsv_cylinder", "hsv_cylinder | hsv_cone | hsv (the paper's) | rgb | lab")
-    radius: float | None = option(None, "[eps_sim] colours farther apart do not match; null: the space's own")
+    space: str = expert("hsv_cylinder", "hsv_cylinder | hsv_cone | hsv (the paper's) | rgb | lab")
+    radius: float | None = expert(None, "[eps_sim] colours farther apart do not match; null: the space's own")
 
 
 @dataclass
@@ -19,10 +19,9 @@ class ImagesConfig:
     """Pictures to Sums of Gaussians (Section 4.1) and culling (Section 6)."""
 
     depth: int = option(8, "levels of the quad-tree below its root, the smallest power of two that holds a picture")
-    color_tolerance: float = option(0.1, "[eps_col] a node splits above this standard deviation; < 0: always")
-    box_enlargement: float = option(0.15, "border around an actor's box, as a share of its size")
-    box_around: str = option(
-        "predicted", "predicted: the box holds the last pose and the predicted one | last: the last"
+    color_tolerance: float = expert(0.1, "[eps_col] a node splits above this standard deviation; < 0: always")
+    box_around: str = expert(
+        "predicted", "predicted: an actor's box holds the last pose and the predicted one | last: the last"
     )
     background: str = option(
         "auto", "pictures: of the empty scene | clip: learnt from the clip | auto: pictures, else the clip | none"
@@ -36,15 +35,14 @@ class EnergyConfig:
 
     limit_weight: float = option(1.0, "[w_l] weight of the joint limits, 1/rad^2")
     acceleration_weight: float = option(0.01, "[w_a] weight of smooth motion, 1/rad^2")
-    foreground_weight: float = option(0.2, "weight of covering what is not background, and nothing that is; 0: off")
-    rest_weight: float = option(1e-5, "weight, while tracking, of joints of small range being near rest; 0: off")
-    keypoint_weight: float = option(
+    foreground_weight: float = expert(0.2, "weight of covering what is not background, and nothing that is; 0: off")
+    rest_weight: float = expert(1e-5, "weight, while tracking, of joints of small range being near rest; 0: off")
+    keypoint_weight: float = expert(
         0.7, "weight of being near keypoints that other programs left beside the recording; 0: off"
     )
-    overlap_exponent: str = option("exact", "exact | printed: Eq. 6 with or without the 1/2 that Eq. 2 implies")
-    capped: bool = option(True, "the cap of Eq. 8 against blobs that hide each other")
-    pairs: str = option("sparse", "dense: all pairs of blobs | sparse: pairs near each other, equal to 1e-4")
-    gradient: str = option("forward", "forward: closed form beside the value | autodiff: plain reverse mode")
+    overlap_exponent: str = expert("exact", "exact | printed: Eq. 6 with or without the 1/2 that Eq. 2 implies")
+    capped: bool = expert(True, "the cap of Eq. 8 against blobs that hide each other")
+    pairs: str = expert("sparse", "dense: all pairs of blobs | sparse: pairs near each other, equal to 1e-4")
     terms: Any = option(None, "further terms, {NAME:{term:MODULE.CLASS,weight:1}} with the class's numbers; null: none")
 
 
@@ -52,25 +50,19 @@ class EnergyConfig:
 class SolverConfig:
     """The solver (Eq. 11, 12)."""
 
-    method: str = option(
+    method: str = expert(
         "gauss_newton", "conditioned_ascent | gradient_ascent | gauss_newton | bfgs | lbfgs | nonlinear_cg"
     )
-    epsilon: float = option(0.01, "[epsilon] stop when a step is shorter than this, rad and m; other solvers: 0.002")
-    min_iterations: int = option(1, "[n_iter] least number of iterations; other solvers: 10")
-    max_iterations: int = option(50, "largest number of iterations; other solvers: 200")
-    grow: float = option(1.2, "[mu+] growth of a step size while the gradient keeps its sign")
-    shrink: float = option(0.5, "[mu-] shrinkage of a step size where the gradient changes sign")
-    first_angle: float = option(0.02, "[sigma_0] length of the first step of the angles, rad")
-    first_translation: float = option(0.01, "[sigma_0] length of the first step of the translations, m")
-    largest_angle: float = option(0.15, "bound on a step of an angle, rad")
-    largest_translation: float = option(0.05, "bound on a step of a translation, m")
+    epsilon: float = expert(0.01, "[epsilon] stop when a step is shorter than this, rad and m; other solvers: 0.002")
+    min_iterations: int = expert(1, "[n_iter] least number of iterations; other solvers: 10")
+    max_iterations: int = expert(50, "largest number of iterations; other solvers: 200")
 
 
 @dataclass
 class TrackingConfig:
     """Prediction and the first frame (Section 5.3)."""
 
-    extrapolation: float = option(0.5, "[alpha] share of the last motion that is added to predict the next pose")
+    extrapolation: float = expert(0.5, "[alpha] share of the last motion that is added to predict the next pose")
     both_ways: bool = option(
         True,
         "where limbs are in doubt, track backwards, too, and take each limb from the better pass; needs "

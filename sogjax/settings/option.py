@@ -2,15 +2,30 @@
 
 from collections.abc import Callable
 from dataclasses import field, fields, is_dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 REQUIRED: Any = "???"
 """In place of a default: the setting must be given. (OmegaConf's own mark.)"""
 
 
+class HelpLine(NamedTuple):
+    """What `--help` says of a setting."""
+
+    key: str
+    default: str
+    text: str
+    expert: bool
+    """Whether only `--help all` lists it."""
+
+
 def option(default: Any, help_text: str) -> Any:
-    """A config field with its default and the text that `--help` prints."""
+    """A setting with its default and the text that `--help` prints."""
     return field(default=default, metadata={"help": help_text})
+
+
+def expert(default: Any, help_text: str) -> Any:
+    """A setting that few need, so that only `--help all` prints it."""
+    return field(default=default, metadata={"help": help_text, "expert": True})
 
 
 def group(schema: Callable[[], Any], help_text: str) -> Any:
@@ -23,15 +38,16 @@ def option_key(name: str) -> str:
     return name.removesuffix("_")
 
 
-def help_lines(schema: type, prefix: str = "") -> list[tuple[str, str, str]]:
-    """(key, default, text) of every option of a schema, groups unfolded."""
-    lines: list[tuple[str, str, str]] = []
+def help_lines(schema: type, prefix: str = "") -> list[HelpLine]:
+    """The settings of a schema, groups unfolded."""
+    lines: list[HelpLine] = []
     example = schema()
     for entry in fields(schema):
-        default = getattr(example, entry.name)
+        default, said = getattr(example, entry.name), entry.metadata
         if is_dataclass(default):
             lines += help_lines(type(default), f"{prefix}{entry.name}.")
         else:
             shown = "required" if default == REQUIRED else "null" if default is None else str(default)
-            lines.append((prefix + option_key(entry.name), shown, entry.metadata["help"]))
+            key = prefix + option_key(entry.name)
+            lines.append(HelpLine(key, shown, said.get("help", ""), said.get("expert", False)))
     return lines

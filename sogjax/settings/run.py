@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from sogjax.settings.method import ColorConfig, EnergyConfig, ImagesConfig, SolverConfig, TrackingConfig
-from sogjax.settings.option import REQUIRED, group, option
+from sogjax.settings.option import REQUIRED, expert, group, option
 
 OVERWRITE = "replace the results of an earlier run"
 
@@ -13,19 +13,19 @@ OVERWRITE = "replace the results of an earlier run"
 class OutputsConfig:
     """Files to write beside the motion."""
 
-    motion_only: bool = option(False, "none of them: no overlay, no Rerun file, no other format, whatever they say")
+    motion_only: bool = option(
+        False, "none of them: no overlay, no picture, no Rerun file, no other format, whatever they say"
+    )
     overlay: bool = option(True, "overlay.mp4, the skeleton on every camera's pictures")
-    worst: bool = option(True, "worst.png, the five frames that fit worst, to look at first")
-    overlay_width: int = option(1920, "width of the overlay video, px")
+    overlay_width: int = expert(1920, "width of the overlay video, px")
     rerun: bool = option(True, "motion.rrd, for the Rerun viewer")
-    rerun_images: bool = option(True, "put the pictures into motion.rrd")
-    bvh: bool = option(True, "motion.bvh")
+    rerun_images: bool = expert(True, "put the pictures into motion.rrd")
+    bvh: bool = expert(True, "motion.bvh")
     formats: list[str] | None = option(None, "further formats of the motion, some of [trc,c3d,glb,csv,mot]; null: none")
     pose2sim: bool = option(
         False, "PROJECT/pose-3d/TRIAL_FIRST-LAST.trc of a Pose2Sim project, which its next steps read (HALPE_26)"
     )
-    markers: str = option("scaled", "scaled | closest: how markers are attached for metrics.json, as for evaluate")
-    confidence: bool = option(
+    confidence: bool = expert(
         True, "how likely each limb is more than 10 cm off: in motion.npz, motion.rrd, the overlay and the summary"
     )
 
@@ -33,7 +33,7 @@ class OutputsConfig:
         """The outputs, all of them off where only the motion is asked for."""
         if not self.motion_only:
             return self
-        return replace(self, overlay=False, worst=False, rerun=False, bvh=False, formats=None, pose2sim=False)
+        return replace(self, overlay=False, rerun=False, bvh=False, formats=None, pose2sim=False)
 
 
 @dataclass
@@ -88,7 +88,6 @@ class ActorConfig:
     cameras: list[str] | None = option(None, "cameras to use; null: all")
     overwrite: bool = option(False, OVERWRITE)
     color: ColorConfig = group(ColorConfig, "")
-    energy: EnergyConfig = group(EnergyConfig, "")
 
 
 @dataclass

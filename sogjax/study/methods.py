@@ -7,6 +7,7 @@ import numpy as np
 from sogjax.run.build import color_space_and_radius
 from sogjax.settings.compose import track_config
 from sogjax.settings.run import TrackConfig
+from sogjax.solve.ascent import ConditionedAscent
 from sogjax.study.experiment import Experiment
 from sogjax.study.summary import RowSummary
 from sogjax.study.table import ruled_table, significance
@@ -67,8 +68,9 @@ def overview_table(rows: Sequence[RowSummary]) -> str:
 
 
 def _solver(config: TrackConfig) -> str:
-    solver, is_ascent = config.solver, config.solver.method == "conditioned_ascent"
-    steps = f", mu+ {solver.grow:g}, mu- {solver.shrink:g}" if is_ascent else ""
+    solver, ascent = config.solver, ConditionedAscent()
+    factors = f", mu+ {float(ascent.grow):g}, mu- {float(ascent.shrink):g}"
+    steps = factors if solver.method == "conditioned_ascent" else ""
     least = f"n_iter {solver.min_iterations}, epsilon {solver.epsilon:g}"
     name = {"gauss_newton": "Gauss-Newton"}.get(solver.method, solver.method.replace("_", " "))
     return f"{name}{steps}, {least}"

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from sogjax.settings.option import group, option
+from sogjax.settings.option import expert, group, option
 
 USUAL_FRAMES = 40
 """Of each recording that are tracked where neither the study nor the experiment says how many."""
@@ -20,7 +20,7 @@ class ReportConfig:
         lambda: [f"{motion}:{seed}" for motion in ("walk", "arms", "squat_kick", "cartwheel") for seed in (0, 1)],
         "folders of recordings with ground truth, or MOTION:SEED of rendered ones",
     )
-    compared: list[str] | None = option(
+    compared: list[str] | None = expert(
         None, "recordings of the experiments with the paper's method, which is slow; null: one seed of each motion"
     )
     frames: int | None = option(
@@ -30,8 +30,8 @@ class ReportConfig:
     overrides: list[str] = group(
         lambda: [], "options of track for all runs, of color, images, energy, solver or tracking: [solver=lbfgs]"
     )
-    pictures: int = option(6, "worst frames to show")
-    note: str = option("", "sentence for the report, such as what else the machine was running")
+    pictures: int = expert(6, "worst frames to show")
+    note: str = expert("", "sentence for the report, such as what else the machine was running")
     overwrite: bool = option(
         False, "accepted as by other commands; the report is replaced in any case, existing runs are kept"
     )

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from sogjax.errors import InputError
-from sogjax.settings.option import option
+from sogjax.settings.option import expert, option
 
 PROGRAMS = ("none", "openpose", "pose2sim", "mmpose", "alphapose", "mediapipe")
 
@@ -30,19 +30,19 @@ class DetectorSettings:
         "simulated keypoint files beside the recording, as a program writes them: none, openpose, pose2sim (RTMPose), "
         "mmpose, alphapose, mediapipe",
     )
-    keypoint_scheme: str | None = option(
+    keypoint_scheme: str | None = expert(
         None, "their scheme, by name or file; null: the program's usual one, as BODY_25 of openpose"
     )
-    keypoint_noise: float = option(5.0, "their noise, pixels on each axis where a person is 1000 pixels tall")
-    keypoint_outliers: float = option(0.05, "share of keypoints that are gross outliers")
-    keypoint_exchanges: float = option(
+    keypoint_noise: float = expert(5.0, "their noise, pixels on each axis where a person is 1000 pixels tall")
+    keypoint_outliers: float = expert(0.05, "share of keypoints that are gross outliers")
+    keypoint_exchanges: float = expert(
         0.03, "share of people in pictures whose left and right arms, legs or both are exchanged"
     )
-    keypoint_strangers: float = option(0.05, "share of pictures in which somebody is found who is not there")
-    keypoint_bias: float = option(
+    keypoint_strangers: float = expert(0.05, "share of pictures in which somebody is found who is not there")
+    keypoint_bias: float = expert(
         0.0, "metres by which each keypoint of a person is off in the same direction of its bone in all pictures"
     )
-    keypoint_missing: float = option(0.0, "share of pictures without a file")
+    keypoint_missing: float = expert(0.0, "share of pictures without a file")
 
     def check(self) -> None:
         """Refuse values that cannot be simulated.

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from sogjax.errors import InputError
-from sogjax.settings.option import option
+from sogjax.settings.option import expert, option
 
 MOTIONS = ("walk", "arms", "squat_kick", "cartwheel", "pass", "run", "sit", "throw", "dance", "hug", "fight")
 PAIRED = ("hug", "fight")
@@ -30,15 +30,15 @@ class SynthSettings:
     fps: float = option(30.0, "frames per second")
     frames: int = option(60, "number of frames")
     seed: int = option(0, "people, clothes, room, cameras and noise are drawn from it")
-    noise: float = option(0.012, "standard deviation of the sensor noise, in units of the brightest value")
-    camera_variation: float = option(
+    noise: float = expert(0.012, "standard deviation of the sensor noise, in units of the brightest value")
+    camera_variation: float = expert(
         0.03, "standard deviation of the cameras' exposures (a share), and a third of it of their colour balance"
     )
-    radius: float = option(4.0, "radius of the ring of cameras in metres, 3.5 to 4.5")
-    distortion: float = option(0.0, "radial lens distortion k1 of all cameras (OpenCV's model), -0.3 to 0.1")
+    radius: float = expert(4.0, "radius of the ring of cameras in metres, 3.5 to 4.5")
+    distortion: float = expert(0.0, "radial lens distortion k1 of all cameras (OpenCV's model), -0.3 to 0.1")
     example_poses: bool = option(True, "whether four still poses of each actor are photographed too, with masks")
     background: bool = option(True, "whether the empty scene is photographed too")
-    shadows: bool = option(True, "whether people throw shadows")
+    shadows: bool = expert(True, "whether people throw shadows")
     props: str = option(
         "auto",
         "furniture among the people, in the plates too but not in the example poses: none, table, chairs, "

@@ -81,9 +81,9 @@ class ImageReader(eqx.Module):
     """eps_sim of Eq. 7."""
     color_tolerance: Float[Array, ""] = eqx.field(converter=jnp.asarray)
     """eps_col of Section 4.1."""
-    box_enlargement: Float[Array, ""] = eqx.field(converter=jnp.asarray)
-    """Part of the box's size that is added on each side."""
     color_space: str = eqx.field(static=True)
+    box_enlargement: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=0.15)
+    """Part of the box's size that is added on each side."""
     box_around: BoxAround = eqx.field(static=True, default="predicted")
     """Whether boxes hold the last pose only, or the predicted one too."""
     background: BackgroundModel | None = None
