@@ -12,7 +12,7 @@ from sogjax.actor.silhouettes import load_images
 from sogjax.cli.config.schemas import SegmentConfig
 from sogjax.errors import InputError, counted
 from sogjax.io.example_poses import ExamplePose
-from sogjax.io.image_file import write_mask
+from sogjax.io.image_file import write_image, write_mask
 from sogjax.io.recording import Recording
 from sogjax.io.video import read_prepared
 from sogjax.run.background import background_or_reason
@@ -23,7 +23,6 @@ from sogjax.run.terminal import alive, progress, say
 from sogjax.scene.background import CameraBackground
 from sogjax.scene.foreground import foreground_probability
 from sogjax.settings.method import ImagesConfig
-from sogjax.view.plots import write_png
 from sogjax.view.sheets import GREEN, RED, Tile, background_sheet, contact_sheet
 
 BACKGROUND = "background"
@@ -68,7 +67,7 @@ def _masks(recording: Recording, example: ExamplePose, out: Path, learnt: Sequen
         older.unlink()
     for camera, mask in found.masks.items():
         write_mask(out / example.name / f"{recording.rig.names[camera]}.mask.png", mask)
-    write_png(out / f"{example.name}.png", mask_sheet(recording, example, images, found))
+    write_image(out / f"{example.name}.png", mask_sheet(recording, example, images, found))
     return out / f"{example.name}.png"
 
 
@@ -103,7 +102,7 @@ def _background_sheets(recording: Recording, choice: str, frames: list[int], fol
         title = f"{recording.name}, {name}: background from the {background.origin}"
         sheet = background_sheet(title, background.picture, background.spread, background.known, pictures)
         paths.append(folder / f"{name}.png")
-        write_png(paths[-1], sheet)
+        write_image(paths[-1], sheet)
     return paths
 
 

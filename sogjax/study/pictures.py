@@ -15,8 +15,7 @@ from sogjax.study.record import RunRecord
 from sogjax.study.runner import motions_of
 from sogjax.study.source import Source
 from sogjax.study.summary import RowSummary
-from sogjax.view.bar_chart import Bars, bar_chart
-from sogjax.view.charts import Means, mean_chart
+from sogjax.view.charts import Bars, Means, bar_chart, mean_chart
 from sogjax.view.overlay import overlay_frame, write_label
 from sogjax.view.projection import picture_points
 
