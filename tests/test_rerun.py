@@ -14,10 +14,10 @@ from rig_cases import black, opencv_pixels, recording_of, ring_rig
 from sogjax.errors import InputError
 from sogjax.io.ground_truth import GroundTruth
 from sogjax.view.bones import bones_from_motion
-from sogjax.view.rerun.comparison import write_comparison
+from sogjax.view.rerun.comparison import write_comparison, write_iterations
 from sogjax.view.rerun.curves import plots_with
-from sogjax.view.rerun.file import ImageBlobs, view_command, write_rerun
-from sogjax.view.rerun.iterations import write_iterations
+from sogjax.view.rerun.file import ImageBlobs, write_rerun
+from sogjax.view.rerun.viewer import view_command
 
 
 def read_back(path):

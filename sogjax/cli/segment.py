@@ -23,7 +23,8 @@ from sogjax.run.terminal import alive, progress, say
 from sogjax.scene.background import CameraBackground
 from sogjax.scene.foreground import foreground_probability
 from sogjax.settings.method import ImagesConfig
-from sogjax.view.sheets import GREEN, RED, Tile, background_sheet, contact_sheet
+from sogjax.view.sheets import background_sheet
+from sogjax.view.tiles import GREEN, RED, Tile, contact_sheet
 
 BACKGROUND = "background"
 """Folder of the background's sheets."""

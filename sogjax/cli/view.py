@@ -18,8 +18,8 @@ from sogjax.run.recordings import file_list, opened
 from sogjax.run.terminal import progress, say
 from sogjax.view.overlay import overlay_frame
 from sogjax.view.projection import frame_range
-from sogjax.view.rerun.file import view_command, write_rerun
-from sogjax.view.screenshot import drawn_frames, rerun_screenshot
+from sogjax.view.rerun.file import write_rerun
+from sogjax.view.rerun.viewer import drawn_frames, rerun_screenshot, view_command
 
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")
 """Environment variables that name the display, if there is one."""

@@ -11,8 +11,7 @@ from sogjax.io.calibration.rig import CameraRig
 from sogjax.io.files import atomic_path
 from sogjax.io.image_file import write_image
 from sogjax.scene.plate_difference import reduced_mask
-from sogjax.view.body_picture import body_picture
-from sogjax.view.sheets import LEGEND, SilhouetteView, silhouette_sheet
+from sogjax.view.sheets import LEGEND, SilhouetteView, body_picture, silhouette_sheet
 
 
 def report_folder(actor: Path) -> Path:

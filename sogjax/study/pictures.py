@@ -16,8 +16,9 @@ from sogjax.study.runner import motions_of
 from sogjax.study.source import Source
 from sogjax.study.summary import RowSummary
 from sogjax.view.charts import Bars, Means, bar_chart, mean_chart
-from sogjax.view.overlay import overlay_frame, write_label
+from sogjax.view.overlay import overlay_frame
 from sogjax.view.projection import picture_points
+from sogjax.view.tiles import write_label
 
 CAMERAS_SHOWN = 3
 TILE, JPEG_QUALITY = 300, 75
