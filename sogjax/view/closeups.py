@@ -30,10 +30,7 @@ def closeups(
     """
     step = max(len(rig) / CAMERAS, 1.0)
     chosen = [int(k * step) for k in range(min(CAMERAS, len(rig)))]
-    overlays = {
-        k: Overlay(rig, motions, cameras=[rig.names[k]], width=rig.image_size(rig.names[k])[0], columns=1)
-        for k in chosen
-    }
+    overlays = {k: Overlay(rig, motions, cameras=[rig.names[k]], width=rig.image_size(rig.names[k])[0]) for k in chosen}
     rows = []
     for frame, images in frames:
         means = [motion.blob_means[motion.frame == frame].reshape(-1, 3) for motion in motions]

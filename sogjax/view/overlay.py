@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 from sogjax.errors import InputError
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.io.motion import Motion
-from sogjax.view.bones import Bones, actor_palette, blob_palette, bones_from_motion, doubtful_edges
+from sogjax.view.bones import Bones, actor_palette, bones_from_motion, doubtful_edges
 from sogjax.view.projection import picture_points
 from sogjax.view.tiles import Fit, grid_for, shrink, write_label
 
@@ -33,10 +33,6 @@ class _Actor:
     colors: UInt8[np.ndarray, "3 3"]
     doubtful: Bool[np.ndarray, "frame edge"]
     """Which bones belong to a limb in doubt."""
-    blob_pixels: Float[np.ndarray, "camera frame blob 2"]
-    blob_radii: Float[np.ndarray, "camera frame blob"]
-    """Both without blobs where these are not drawn."""
-    blob_colors: UInt8[np.ndarray, "blob 3"]
 
 
 class Overlay:
@@ -47,8 +43,6 @@ class Overlay:
         motions: one for each actor.
         cameras: the names of those to show, in this order; default all.
         width: largest width of the grid in pixels.
-        columns: tiles in a row; default as suits a wide screen.
-        blobs: draw the blobs too, as circles of radius sigma.
         bones: the lines of each actor; default those of its motion.
 
     Raises:
@@ -62,8 +56,6 @@ class Overlay:
         *,
         cameras: Sequence[str] | None = None,
         width: int = WIDTH,
-        columns: int | None = None,
-        blobs: bool = False,
         bones: Sequence[Bones] | None = None,
     ) -> None:
         names = tuple(rig.names if cameras is None else cameras)
@@ -74,11 +66,11 @@ class Overlay:
         self.shown = [rig.names.index(name) for name in names]
         chosen = rig.select(names)
         sizes = [chosen.image_size(name) for name in names]
-        self.grid = grid_for(sizes, width, columns)
+        self.grid = grid_for(sizes, width)
         self.fits = [self.grid.fit(k, size) for k, size in enumerate(sizes)]
         lines = [bones_from_motion(motion) for motion in motions] if bones is None else bones
         self.actors = [
-            _projected(chosen, self.fits, motion, lines[number], number, blobs) for number, motion in enumerate(motions)
+            _projected(chosen, self.fits, motion, lines[number], number) for number, motion in enumerate(motions)
         ]
 
     def tile(self, camera: int, image: np.ndarray) -> np.ndarray:
@@ -115,38 +107,24 @@ def overlay_frame(
     *,
     cameras: Sequence[str] | None = None,
     width: int = WIDTH,
-    columns: int | None = None,
-    blobs: bool = False,
 ) -> UInt8[np.ndarray, "h w 3"]:
     """One grid (BGR); see `Overlay`, which is faster for several frames."""
-    return Overlay(rig, motions, cameras=cameras, width=width, columns=columns, blobs=blobs).draw(images, frame)
+    return Overlay(rig, motions, cameras=cameras, width=width).draw(images, frame)
 
 
-def _projected(rig: CameraRig, fits: list[Fit], motion: Motion, bones: Bones, number: int, blobs: bool) -> _Actor:
+def _projected(rig: CameraRig, fits: list[Fit], motion: Motion, bones: Bones, number: int) -> _Actor:
     """Project an actor, and scale to the tiles."""
-    means = motion.blob_means if blobs else motion.blob_means[:, :0]
-    sigmas = motion.blob_sigma if blobs else motion.blob_sigma[:0]
-    points = bones.points(motion)
-    pixels, depths = picture_points(rig, np.concatenate([points, means.astype(np.float32)], axis=1))
-    pixels = np.stack([fit.pixels(part) for fit, part in zip(fits, pixels, strict=True)])
-    focal = np.asarray(rig.cameras.focal_length, np.float32) * np.array([fit.scale_x for fit in fits], np.float32)
-    count = points.shape[1]
+    pixels, _ = picture_points(rig, bones.points(motion))
     return _Actor(
         row_of={int(frame): row for row, frame in enumerate(motion.frame)},
         bones=bones,
-        pixels=pixels[:, :, :count],
+        pixels=np.stack([fit.pixels(part) for fit, part in zip(fits, pixels, strict=True)]),
         colors=actor_palette(number),
         doubtful=doubtful_edges(motion, bones),
-        blob_pixels=pixels[:, :, count:],
-        blob_radii=focal[:, None, None] * sigmas.astype(np.float32) / np.maximum(depths[:, :, count:], 1e-3),
-        blob_colors=blob_palette(motion, number)[: len(sigmas)],
     )
 
 
 def _draw_actor(area: np.ndarray, actor: _Actor, camera: int, row: int) -> None:
-    for k, point in _fixed_points(actor.blob_pixels[camera, row]).items():
-        radius = int(min(float(actor.blob_radii[camera, row, k]), 4096.0) * 2**BITS)
-        cv2.circle(area, point, radius, _bgr(actor.blob_colors[k]), 1, cv2.LINE_AA, BITS)
     thick = max(1, round(area.shape[0] / 200))
     points = _fixed_points(actor.pixels[camera, row])
     for (a, b), side, doubtful in zip(actor.bones.edges, actor.bones.sides, actor.doubtful[row], strict=True):

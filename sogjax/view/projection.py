@@ -91,12 +91,12 @@ class PictureCamera:
     maps: tuple[np.ndarray, np.ndarray] | None
     """For `cv2.remap` of the smaller picture; None without distortion."""
 
-    def jpeg(self, image: UInt8[np.ndarray, "h w 3"], quality: int) -> bytes:
+    def jpeg(self, image: UInt8[np.ndarray, "h w 3"]) -> bytes:
         """A picture (BGR) as recorded, made smaller and freed of distortion."""
         small = shrink(image, self.size)
         if self.maps is not None:
             small = cv2.remap(small, *self.maps, cv2.INTER_LINEAR)
-        return cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
+        return cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, 80])[1].tobytes()
 
     def pixels(self, pixels: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
         """Undistorted pixels of the picture as recorded, as pixels of the small one."""

@@ -66,20 +66,19 @@ class Fit:
         return area
 
 
-def grid_for(image_sizes: Sequence[tuple[int, int]], width: int, columns: int | None = None) -> TileGrid:
+def grid_for(image_sizes: Sequence[tuple[int, int]], width: int) -> TileGrid:
     """A grid at most `width` pixels wide for pictures of the given sizes, none of them enlarged.
 
-    Without a number of columns, its shape comes as near to 16:9 as its number of tiles allows.
+    Its shape comes as near to 16:9 as its number of tiles allows.
     """
     count = len(image_sizes)
     aspect = float(np.median([w / h for w, h in image_sizes]))
-    if columns is None:
-        rows = lambda n: -(-count // n)
-        empty = lambda n: (n * rows(n) - count) / count
-        columns = min(range(1, count + 1), key=lambda n: abs(np.log(n * aspect / rows(n) / (16 / 9))) + empty(n))
+    rows = lambda n: -(-count // n)
+    empty = lambda n: (n * rows(n) - count) / count
+    columns = min(range(1, count + 1), key=lambda n: abs(np.log(n * aspect / rows(n) / (16 / 9))) + empty(n))
     tile = min(width // columns, max(w for w, _ in image_sizes))
     even = lambda side: max(2, int(side) // 2 * 2)
-    return TileGrid(columns, -(-count // columns), (even(tile), even(round(tile / aspect))))
+    return TileGrid(columns, rows(columns), (even(tile), even(round(tile / aspect))))
 
 
 def shrink(image: np.ndarray, size: tuple[int, int]) -> np.ndarray:

@@ -50,7 +50,7 @@ def write_comparison(
         scene.log_cameras()
         for frame, pictures in enumerate(frames or (), first):
             scene.set_frame(frame)
-            scene.log_pictures([camera.jpeg(image, 75) for camera, image in zip(scene.cameras, pictures, strict=True)])
+            scene.log_pictures([camera.jpeg(image) for camera, image in zip(scene.cameras, pictures, strict=True)])
         stream.reset_time()
         scene.log_markers(truth, first, stop)
         stream.send_blueprint(comparison_layout(recording, list(runs), plots, scene.eye(), frames is not None))
@@ -89,7 +89,7 @@ def write_iterations(
         scene.extend(steps.blob_means[-1])
         scene.log_cameras()
         scene.log_pictures(
-            [camera.jpeg(image, 80) for camera, image in zip(scene.cameras, pictures or [], strict=False)], static=True
+            [camera.jpeg(image) for camera, image in zip(scene.cameras, pictures or [], strict=False)], static=True
         )
         bones = bones_from_motion(steps)
         times = [rr.TimeColumn(ITERATION, sequence=np.arange(steps.num_frames))]

@@ -1,7 +1,7 @@
-"""Curves of a Rerun file: what was found in each frame, and in each iteration."""
+"""Curves of a Rerun file: what was found in each frame."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,7 @@ import rerun as rr
 
 from sogjax.io.motion import Motion
 from sogjax.view.bones import LEFT, MIDDLE, RIGHT, actor_palette
-from sogjax.view.rerun.stream import FRAME, ITERATION, entity_part, time_columns
+from sogjax.view.rerun.stream import entity_part, time_columns
 
 _COLORS = ((90, 170, 255), (255, 170, 60), (120, 220, 120), (255, 110, 120), (190, 140, 255), (240, 220, 90))
 _DOUBT = "doubt_"
@@ -60,16 +60,6 @@ def log_curves(stream: rr.RecordingStream, motion: Motion, actor: str | None, cu
     for name, values in curves.items():
         scalars = rr.Scalars.columns(scalars=np.asarray(values, float))
         stream.send_columns(_curve(name, actor), time_columns(motion), scalars)
-
-
-def log_traces(stream: rr.RecordingStream, motion: Motion, traces: Mapping[str, Sequence[np.ndarray]]) -> None:
-    """Log curves over the iterations, one array for each of a motion's frames."""
-    for name, by_frame in traces.items():
-        values = np.concatenate([np.asarray(values, float) for values in by_frame])
-        frames = np.repeat(motion.frame, [len(values) for values in by_frame])
-        times = [rr.TimeColumn(ITERATION, sequence=np.arange(len(values))), rr.TimeColumn(FRAME, sequence=frames)]
-        stream.log(f"/curves/trace/{name}", rr.SeriesLines(names=name), static=True)
-        stream.send_columns(f"/curves/trace/{name}", times, rr.Scalars.columns(scalars=values))
 
 
 def plots_with(curves: Iterable[str]) -> dict[str, str]:

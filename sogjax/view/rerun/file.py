@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from itertools import repeat
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple
@@ -16,13 +15,10 @@ from sogjax.io.motion import Motion
 from sogjax.io.recording import Recording
 from sogjax.view.bones import Bones, actor_palette, blob_palette, bones_from_motion
 from sogjax.view.projection import frame_range
-from sogjax.view.rerun.curves import log_curve_looks, log_curves, log_traces, own_curves, plots_with
+from sogjax.view.rerun.curves import log_curve_looks, log_curves, own_curves, plots_with
 from sogjax.view.rerun.layout import tracking_layout
 from sogjax.view.rerun.scene import Scene, log_body, log_doubts, log_look
 from sogjax.view.rerun.stream import actor_entity, camera_entity, rerun_stream
-
-QUALITY = 80
-"""Quality of the JPEG pictures, 0 to 100."""
 
 
 class ImageBlobs(NamedTuple):
@@ -40,13 +36,7 @@ def write_rerun(
     *,
     names: Sequence[str] | None = None,
     frames: Iterable[Sequence[np.ndarray | None]] | None = None,
-    image_blobs: Iterable[Sequence[ImageBlobs | None]] | None = None,
-    blob_colors: Sequence[Float[np.ndarray, "_ 3"]] | None = None,
-    terms: Mapping[str, Float[np.ndarray, "frame"]] | None = None,
-    traces: Mapping[str, Sequence[np.ndarray]] | None = None,
     truth: GroundTruth | None = None,
-    picture_width: int = 640,
-    quality: int = QUALITY,
     progress: Callable[[Iterable[int], int, str], Iterable[int]] = lambda items, count, title: items,
 ) -> None:
     """Write cameras, pictures, bodies, markers and curves, with a layout that opens well.
@@ -59,24 +49,16 @@ def write_rerun(
         motions: one for each actor.
         names: the actors' names; default `actor`, `actor_2`, ...
         frames: BGR pictures of all cameras, from the motions' first frame to their last; None: no pictures.
-        image_blobs: the pictures' blobs, in the same order.
-        blob_colors: sRGB in 0..1 of each actor's blobs; default by the side of the body.
-        terms: further curves by name over the first motion's frames, such as `limit_penalty`.
-        traces: curves by name over the iterations, one array for each of the first motion's frames.
         truth: markers to show beside the bodies.
-        picture_width: largest width of the stored pictures in pixels.
-        quality: of the JPEG pictures, 0 to 100.
         progress: wraps the frames' numbers to show progress: (numbers, count, title).
     """
     names = list(names) if names else ["actor", *(f"actor_{k + 2}" for k in range(len(motions) - 1))][: len(motions)]
     first, stop = frame_range(recording, motions)
-    with RerunFile(path, recording, names, blob_colors=blob_colors, picture_width=picture_width) as file:
-        file.write(motions, terms or {})
-        if frames is not None or image_blobs is not None:
-            numbers = progress(range(first, stop), stop - first, "Rerun file")
-            for frame, pictures, blobs in zip(numbers, frames or repeat(()), image_blobs or repeat(()), strict=False):
-                file.write_pictures(frame, [file.jpeg(k, image, quality) for k, image in enumerate(pictures)], blobs)
-        file.write_traces(motions[0], traces or {})
+    with RerunFile(path, recording, names) as file:
+        file.write(motions, {})
+        if frames is not None:
+            for frame, pictures in zip(progress(range(first, stop), stop - first, "Rerun file"), frames, strict=False):
+                file.write_pictures(frame, [file.jpeg(k, image) for k, image in enumerate(pictures)], ())
         file.write_markers(truth)
 
 
@@ -114,9 +96,9 @@ class RerunFile:
         self._scene = Scene(self._stream, self._recording, self._picture_width)
         return self
 
-    def jpeg(self, camera: int, image: np.ndarray | None, quality: int = QUALITY) -> bytes | None:
+    def jpeg(self, camera: int, image: np.ndarray | None) -> bytes | None:
         """A camera's picture (BGR) as it is stored; thread-safe."""
-        return None if image is None else self._scene.cameras[camera].jpeg(image, quality)
+        return None if image is None else self._scene.cameras[camera].jpeg(image)
 
     def write(self, motions: Sequence[Motion], terms: Mapping[str, Float[np.ndarray, "frame"]]) -> None:
         """Write the bodies and curves of the frames that follow.
@@ -152,11 +134,6 @@ class RerunFile:
                 points = rr.Points2D(pixels, radii=radii, colors=_color_bytes(sog.colors))
                 self._stream.log(f"{camera_entity(camera.name)}/blobs", points)
         self._stream.reset_time()
-
-    def write_traces(self, motion: Motion, traces: Mapping[str, Sequence[np.ndarray]]) -> None:
-        """Write curves by name over the iterations, one array for each of the motion's frames."""
-        log_traces(self._stream, motion, traces)
-        self._plots |= {"trace": "Within frames (timeline: iteration)"} if traces else {}
 
     def write_markers(self, truth: GroundTruth | None) -> None:
         """Write true markers beside the bodies, over the frames that were written."""
