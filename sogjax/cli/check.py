@@ -6,9 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
 
+from sogjax.check.calibration import unit_rig
 from sogjax.check.examination import Examination, examined
 from sogjax.check.findings import SEVERITIES, Finding
-from sogjax.check.hypotheses import unit_rig
 from sogjax.check.opening import opening_problems
 from sogjax.cli.config.schemas import CheckConfig
 from sogjax.errors import InputError, counted
