@@ -21,7 +21,7 @@ from sogjax.study.script import run_script, settings_from
 from sogjax.study.search_tables import kinds_line, reliability, sure_table, write_searches, wrong_table
 from sogjax.study.searches import Search, Searches, drawn_trials
 from sogjax.study.study import Study
-from sogjax.view.reliability_chart import reliability_chart
+from sogjax.view.charts import reliability_chart
 
 
 @dataclass

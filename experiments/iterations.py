@@ -17,7 +17,7 @@ from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from
 from sogjax.study.settings import ReportConfig
 from sogjax.study.source import source_named
-from sogjax.view.rerun.iterations import write_iterations
+from sogjax.view.rerun.comparison import write_iterations
 
 
 @dataclass

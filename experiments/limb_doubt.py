@@ -22,7 +22,7 @@ from sogjax.study.limb_trials import PLAIN, JudgedLimb, LimbTrial, LimbTrials
 from sogjax.study.machine import machine_line
 from sogjax.study.script import run_script, settings_from
 from sogjax.study.study import Study
-from sogjax.view.limb_chart import limb_chart
+from sogjax.view.charts import limb_chart
 
 
 @dataclass

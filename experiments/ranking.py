@@ -29,7 +29,7 @@ from sogjax.study.machine import machine_line
 from sogjax.study.ranking import RankedTrack, ranking_of
 from sogjax.study.ranking_tables import curves_of, limbs_table, terms_table, verdicts_table, write_csv
 from sogjax.study.script import HELP, run_script, settings_from
-from sogjax.view.ranking_chart import ranking_chart
+from sogjax.view.charts import ranking_chart
 
 
 @dataclass

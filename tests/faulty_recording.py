@@ -5,7 +5,7 @@ import shutil
 import cv2
 import numpy as np
 
-from sogjax.check.hypotheses import mirrored_rig, unit_rig
+from sogjax.check.calibration import mirrored_rig, unit_rig
 from sogjax.io.calibration.load import load_calibration
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.io.calibration.tables import write_toml

@@ -20,8 +20,7 @@ from sogjax.model.body import Attachments, Body
 from sogjax.model.bones import bone_lengths
 from sogjax.model.shape import ShapeModel
 from sogjax.run.actor_report import report_folder, report_page, write_actor_report
-from sogjax.view.body_picture import BACKGROUND, body_picture
-from sogjax.view.sheets import BOTH, ONLY_BODY, ONLY_MASK, SilhouetteView, silhouette_sheet
+from sogjax.view.sheets import BACKGROUND, BOTH, ONLY_BODY, ONLY_MASK, SilhouetteView, body_picture, silhouette_sheet
 
 SIGMA = 0.2
 HALF = np.sqrt(2.0 * np.log(2.0))

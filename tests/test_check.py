@@ -14,11 +14,11 @@ from rig_cases import ring_rig
 from small_recording import make_recording, shared_recording, toml_camera, write_calibration
 
 from sogjax.check.agreement import smallest_shift
+from sogjax.check.appearance import exposure, exposure_findings
 from sogjax.check.cameras import camera_findings, nearest_point, rig_geometry
 from sogjax.check.examination import examined
-from sogjax.check.exposure import exposure, exposure_findings
 from sogjax.check.motion import CameraMotion, barcodes, correlation, lag_curve
-from sogjax.check.silhouettes import Moment
+from sogjax.check.pictures import Moment
 from sogjax.check.synchronisation import synchrony
 from sogjax.errors import InputError
 from sogjax.io.offsets_file import write_frame_offsets
@@ -190,12 +190,12 @@ def test_exposure_compares_those_whose_subject_is_known():
     levels, walls = (100, 100, 60, 100), (10, 200, 90, 240)
     pictures = {k: np.where(mask[..., None], level, wall).astype(np.uint8) + np.zeros((20, 30, 3), np.uint8)
                 for k, (level, wall) in enumerate(zip(levels, walls, strict=True))}  # fmt: skip
-    found = exposure([Moment("one", False, pictures, dict.fromkeys(range(3), mask))], 4)
+    found = exposure([Moment(pictures, dict.fromkeys(range(3), mask))], 4)
     assert found.of_subject
     np.testing.assert_allclose(found.gains, [[1.0] * 3, [1.0] * 3, [0.6] * 3, [np.nan] * 3])
     (finding,) = exposure_findings(("a", "b", "c", "d"), found, "example poses")
     assert finding.cameras == ("c",)
-    assert not exposure([Moment("one", False, pictures, dict.fromkeys(range(2), mask))], 4).of_subject
+    assert not exposure([Moment(pictures, dict.fromkeys(range(2), mask))], 4).of_subject
 
 
 @pytest.mark.parametrize("name", ["real_tpose"])
@@ -329,7 +329,7 @@ def test_points_that_move_in_space_give_both_cameras_the_same_barcode():
     for centre in (np.array([4.0, 0.0, 1.0]), np.array([0.5, -4.0, 2.0])):
         rays = points - centre
         rays /= np.linalg.norm(rays, axis=1, keepdims=True)
-        motions.append(CameraMotion(energy, (20, 20), rays, centre))
+        motions.append(CameraMotion(energy, rays, centre))
     first, second = barcodes(*motions)
     assert correlation(first, second) == pytest.approx(1.0, abs=0.05)
     late = np.roll(second, -4, axis=0)  # the second camera shows what happens four steps earlier in its file

@@ -10,8 +10,8 @@ from command_line import actor_file, refused, trackable
 from rig_cases import opencv_pixels, ring_rig
 from small_recording import make_recording, toml_camera, write_calibration
 
+from sogjax.check.calibration import unit_rig
 from sogjax.check.cameras import rig_geometry
-from sogjax.check.hypotheses import unit_rig
 from sogjax.check.opening import opening_problems
 from sogjax.check.scale import implausible_distance, scale_findings
 from sogjax.cli.config.composition import SCHEMAS, composed

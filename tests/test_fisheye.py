@@ -40,7 +40,7 @@ def test_a_viewers_picture_shows_a_point_where_a_pinhole_camera_does(tmp_path):
     image = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
     cv2.circle(image, tuple(int(v) for v in np.round(16 * recorded_pixel(point))), 6 * 16, (255, 255, 255), -1, 16, 4)
     camera = picture_camera(rig, "wide", SIZE[0])
-    shown = cv2.imdecode(np.frombuffer(camera.jpeg(image, 95), np.uint8), cv2.IMREAD_GRAYSCALE).astype(float)
+    shown = cv2.imdecode(np.frombuffer(camera.jpeg(image), np.uint8), cv2.IMREAD_GRAYSCALE).astype(float)
     y, x = np.mgrid[: SIZE[1], : SIZE[0]]
     centre = np.array([(shown * x).sum(), (shown * y).sum()]) / shown.sum()
     undistorted, _ = project_points(rig.camera("wide"), jnp.asarray(point[None]))

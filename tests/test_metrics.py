@@ -12,7 +12,6 @@ from sogjax.errors import InputError
 from sogjax.io.ground_truth import GroundTruth
 from sogjax.quality.evaluation import evaluate_motion, evaluate_motions
 from sogjax.quality.metrics import lost_points, mean_per_frame, mean_per_point, std_per_point, summarize
-from sogjax.view.plots import plot_per_point, write_png
 
 
 @settings(max_examples=30, deadline=None)
@@ -85,17 +84,3 @@ def test_json_and_table_tell_millimetres(tmp_path):
     assert content["lost"] == [{"name": "STRN", "first_frame": 1, "last_frame": 11, "mean_mm": pytest.approx(300.0)}]
     assert "275.0" in result.table()
     assert "lost: STRN in frames 1 to 11, 300 mm" in result.table()
-
-
-def inked(picture):
-    return np.argwhere((picture == (200, 110, 30)).all(axis=2))
-
-
-def test_a_higher_bar_is_drawn_higher(tmp_path):
-    bars = inked(plot_per_point(np.array([0.05, np.nan, 0.1]), ["a", "b", "c"], "x"))
-    columns = np.unique(bars[:, 1])
-    heights = [(bars[:, 1] == columns[0]).sum(), (bars[:, 1] == columns[-1]).sum()]
-    assert heights[0] / heights[1] == pytest.approx(0.5, abs=0.02)
-    assert np.diff(columns).max() > 100
-    write_png(tmp_path / "a.png", plot_per_point(np.full(3, np.nan), ["a", "b", "c"], "empty"))
-    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")

@@ -13,7 +13,7 @@ from rendered_person import rendered_person
 from rig_cases import ring_rig
 from small_recording import SIZE, frame_of, make_recording, toml_camera, write_calibration, write_video
 
-from sogjax.check.clip import read_clip
+from sogjax.check.pictures import read_clip
 from sogjax.cli.main import main
 from sogjax.errors import InputError
 from sogjax.io import video

@@ -14,10 +14,10 @@ from rig_cases import black, opencv_pixels, recording_of, ring_rig
 from sogjax.errors import InputError
 from sogjax.io.ground_truth import GroundTruth
 from sogjax.view.bones import bones_from_motion
-from sogjax.view.rerun.comparison import write_comparison
+from sogjax.view.rerun.comparison import write_comparison, write_iterations
 from sogjax.view.rerun.curves import plots_with
-from sogjax.view.rerun.file import ImageBlobs, view_command, write_rerun
-from sogjax.view.rerun.iterations import write_iterations
+from sogjax.view.rerun.file import ImageBlobs, RerunFile, write_rerun
+from sogjax.view.rerun.viewer import view_command
 
 
 def read_back(path):
@@ -37,10 +37,9 @@ def motion():
 
 def test_bodies_and_curves_are_in_the_file_frame_by_frame(tmp_path, motion):
     penalty = np.arange(6.0)
-    traces = {"energy": [np.arange(3.0) + 10 * k for k in range(6)]}
     path = tmp_path / "motion.rrd"
-    recording = recording_of(ring_rig(), 10)
-    write_rerun(path, recording, [motion], names=["ann"], terms={"limit_penalty": penalty}, traces=traces)
+    with RerunFile(path, recording_of(ring_rig(), 10), ["ann"]) as file:
+        file.write([motion], {"limit_penalty": penalty})
     found = read_back(path)
     blobs = found["/world/actors/ann/blobs"]
     np.testing.assert_allclose(blobs["Ellipsoids3D:centers"][-6:], motion.blob_means, atol=1e-6)
@@ -51,10 +50,6 @@ def test_bodies_and_curves_are_in_the_file_frame_by_frame(tmp_path, motion):
     np.testing.assert_allclose(np.ravel(similarity["Scalars:scalars"]), motion.similarity)
     assert similarity["frame"] == list(range(2, 8))
     np.testing.assert_allclose(np.ravel(found["/curves/penalties/limit_penalty"]["Scalars:scalars"]), penalty)
-    trace = found["/curves/trace/energy"]
-    np.testing.assert_allclose(np.ravel(trace["Scalars:scalars"]), np.concatenate(traces["energy"]))
-    assert trace["iteration"] == list(range(18))
-    assert trace["frame"] == [2 + k // 3 for k in range(18)]
     assert len(RrdReader(path).blueprints()) == 1
 
 
@@ -67,7 +62,7 @@ def test_pictures_are_freed_of_distortion_so_that_the_pinhole_holds(tmp_path):
         x, y = opencv_pixels(rig, name, point)
         cv2.circle(image, (round(x * 16), round(y * 16)), 6 * 16, (255, 255, 255), -1, cv2.LINE_AA, 4)
     path = tmp_path / "motion.rrd"
-    write_rerun(path, recording_of(rig, 1), [motion], frames=[images], picture_width=640, quality=95)
+    write_rerun(path, recording_of(rig, 1), [motion], frames=[images])
     found = read_back(path)
     for name in rig.names:
         stored = found[f"/world/cameras/{name}"]
@@ -93,7 +88,11 @@ def test_image_blobs_and_markers_lie_in_the_small_picture_and_the_world(tmp_path
     path = tmp_path / "motion.rrd"
     truth = GroundTruth(50.0, markers, ("a", "b"))
     recording = recording_of(rig, 8)
-    write_rerun(path, recording, [motion], image_blobs=[[sog]] * 6, truth=truth, picture_width=160)
+    with RerunFile(path, recording, ["ann"], picture_width=160) as file:
+        file.write([motion], {})
+        for frame in motion.frame:
+            file.write_pictures(int(frame), [], [sog])
+        file.write_markers(truth)
     found = read_back(path)
     blobs = found["/world/cameras/cam0/blobs"]
     np.testing.assert_allclose(blobs["Points2D:positions"][0], [[0, 0], [160, 120]])

@@ -10,9 +10,8 @@ import pytest
 from motion_cases import walking_motion
 from rig_cases import black, recording_of, ring_rig
 
-from sogjax.view.rerun.comparison import write_comparison
+from sogjax.view.rerun.comparison import write_comparison, write_iterations
 from sogjax.view.rerun.file import write_rerun
-from sogjax.view.rerun.iterations import write_iterations
 
 DRIVERS = [path for folder in ("/usr/share", "/etc") for path in Path(folder).glob("vulkan/icd.d/*.json")]
 BLUE, YELLOW, RED = (64, 156, 255), (255, 236, 140), (255, 96, 64)

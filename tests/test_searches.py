@@ -9,7 +9,7 @@ from sogjax.study.found_pose import FoundError, kind_of, other_side
 from sogjax.study.search_tables import least_share, reliability, sure_table, write_searches, wrong_table
 from sogjax.study.searches import Search, Trial, drawn_trials
 from sogjax.study.verdicts import LimbErrors
-from sogjax.view.reliability_chart import reliability_chart
+from sogjax.view.charts import reliability_chart
 
 LIMBS = ("trunk", "left arm", "right arm", "left leg", "right leg")
 TRIAL = Trial(3, "walk", {"motion": "walk"}, 4, 0, True, 17)

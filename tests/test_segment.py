@@ -8,7 +8,7 @@ from rig_cases import ring_rig
 from sogjax.io.image_file import read_mask
 from sogjax.synth.render import render_recording
 from sogjax.synth.settings import SynthSettings
-from sogjax.view.sheets import GREEN, TITLE_HEIGHT, Tile, contact_sheet
+from sogjax.view.tiles import GREEN, TITLE_HEIGHT, Tile, contact_sheet
 
 
 def iou(a, b):

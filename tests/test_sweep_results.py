@@ -9,7 +9,7 @@ import pytest
 from sogjax.cli.sweep import results as sweep_results
 from sogjax.cli.sweep.results import Failure, Member, finish_sweep
 from sogjax.run.run_numbers import COLUMNS, Numbers
-from sogjax.view.plots import SIZE, plot_per_point
+from sogjax.view.charts import bar_chart
 
 
 def numbers(error_mm):
@@ -21,11 +21,11 @@ def labels(monkeypatch):
     """What is written into the chart: titles and labels."""
     seen = []
 
-    def drawn(errors, names, title, *, failed):
-        seen.append((list(names), title, list(failed)))
-        return plot_per_point(errors, names, title, failed=failed)
+    def drawn(panels, *, value):
+        seen.extend((list(panel.rows), panel.title, list(panel.failed)) for panel in panels)
+        return bar_chart(panels, value=value)
 
-    monkeypatch.setattr(sweep_results, "plot_per_point", drawn)
+    monkeypatch.setattr(sweep_results, "bar_chart", drawn)
     return seen
 
 
@@ -55,8 +55,10 @@ def test_members_without_overrides_of_their_own_have_a_name(tmp_path, labels):
 
 def red_share(picture, number, count):
     """Of the pixels above a member's place, how many are red."""
-    left, right = (64 + (SIZE[0] - 64 - 16) * (number + k) / count for k in (0.0, 1.0))
-    part = picture[34 : SIZE[1] - 40, int(left) : int(right)].astype(int)
+    dark = (picture < 100).all(axis=2)
+    first, last = np.flatnonzero(dark.mean(axis=0) > 0.5)[[0, -1]]  # the frame's left and right line
+    left, right = (first + (last - first) * (number + k) / count for k in (0.0, 1.0))
+    part = picture[:, int(left) + 1 : int(right)].astype(int)
     return np.mean(part[..., 2] - part[..., :2].max(axis=-1) > 60)
 
 

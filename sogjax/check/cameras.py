@@ -4,28 +4,12 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Array, Float, Shaped
+from jaxtyping import Float
 
 from sogjax.check.findings import Finding, listed
 from sogjax.errors import counted
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.model.rotation import UP_AXES, axis_vector
-
-NARROW, WIDE = 8.0, 150.0
-"""Degrees: fields of view outside this range are taken for mistakes."""
-OFF_CENTRE = 0.12
-"""Of the picture's size: principal points farther from its middle are taken for mistakes."""
-SMALL_ANGLE = 8.0
-"""Degrees between the cameras' directions below which depth is hardly visible."""
-UPRIGHT = 0.5
-"""Cosine between the vertical and the pictures' upward direction, on average, below which `up` is doubted."""
-TOWARDS = 0.8
-"""Cosine between a viewing direction and the direction to what all cameras look at."""
-APART = 0.1
-"""Extent of a set-up in units of the cameras' distance from the origin, at least: inverse poses put all cameras near
-one place."""
-BELOW_FLOOR = 0.1
-"""Camera heights, in units of the distance to what is looked at, that a rough zero of the floor explains."""
 
 
 @dataclass(frozen=True)
@@ -39,13 +23,13 @@ class RigGeometry:
     uprights: Float[np.ndarray, "camera 3"]
     """The pictures' upward directions, unit vectors."""
     heights: Float[np.ndarray, "camera"]
-    """Over the plane through the world's origin, along `up`."""
+    """Heights over the plane through the world's origin, along `up`."""
     fields: Float[np.ndarray, "camera 2"]
     """Horizontal and vertical fields of view in degrees."""
     target: Float[np.ndarray, "3"]
     """The point that is nearest to all optical axes: what the cameras look at."""
     distances: Float[np.ndarray, "camera"]
-    """From each camera to the target along its optical axis; negative behind it."""
+    """Distances from the cameras to the target along their optical axes; negative behind them."""
     baselines: Float[np.ndarray, "camera camera"]
 
     @property
@@ -65,7 +49,8 @@ class RigGeometry:
             }
             for name, centre, height, field, distance in rows
         }
-        return {"cameras": cameras, "target_m": self.target.round(4).tolist(), "baselines_m": _rounded(self.baselines)}
+        baselines = self.baselines.round(4).tolist()
+        return {"cameras": cameras, "target_m": self.target.round(4).tolist(), "baselines_m": baselines}
 
 
 def rig_geometry(rig: CameraRig, up: str) -> RigGeometry:
@@ -73,22 +58,27 @@ def rig_geometry(rig: CameraRig, up: str) -> RigGeometry:
     poses = np.asarray(rig.cameras.camera_from_world, float)
     matrices = np.asarray(rig.cameras.intrinsics, float)
     sizes = np.asarray(rig.cameras.image_size, float)
-    rotations = poses[:, :3, :3]
-    centres = -np.einsum("nji,nj->ni", rotations, poses[:, :3, 3])
-    forwards = rotations[:, 2]
+    centres, forwards = _rays_of(poses)
     target = nearest_point(centres, forwards)
     focal = np.stack([matrices[:, 0, 0], matrices[:, 1, 1]], axis=1)
     return RigGeometry(
         names=rig.names,
         centres=centres,
         forwards=forwards,
-        uprights=-rotations[:, 1],
+        uprights=-poses[:, 1, :3],
         heights=centres @ axis_vector(up),
         fields=2.0 * np.rad2deg(np.arctan(0.5 * sizes / focal)),
         target=target,
         distances=np.einsum("ni,ni->n", target - centres, forwards),
         baselines=np.linalg.norm(centres[:, None] - centres[None, :], axis=-1),
     )
+
+
+def _rays_of(
+    poses: Float[np.ndarray, "camera 4 4"],
+) -> tuple[Float[np.ndarray, "camera 3"], Float[np.ndarray, "camera 3"]]:
+    """Centres and viewing directions of cameras with such poses (camera from world)."""
+    return -np.einsum("nji,nj->ni", poses[:, :3, :3], poses[:, :3, 3]), poses[:, 2, :3]
 
 
 def nearest_point(
@@ -114,16 +104,17 @@ def camera_findings(rig: CameraRig, geometry: RigGeometry, up: str) -> list[Find
 
 
 def _lenses(rig: CameraRig, geometry: RigGeometry) -> list[Finding]:
+    """Fields of view outside of 8 to 150 degrees, and optical axes farther than 12 % from the picture's middle."""
     findings = []
     matrices, sizes = np.asarray(rig.cameras.intrinsics, float), np.asarray(rig.cameras.image_size, float)
     for k, name in enumerate(rig.names):
         across, down = geometry.fields[k]
-        if not NARROW <= across <= WIDE:
+        if not 8.0 <= across <= 150.0:
             what = f"{name} has a field of view of {across:.1f} x {down:.1f} degrees"
             cause, remedy = "a focal length that is not in pixels", "calibrate it again, or convert the focal length"
             findings.append(Finding("warning", "cameras", what, cause, remedy, (name,)))
         off = np.abs((matrices[k, :2, 2] + 0.5) / sizes[k] - 0.5).max()
-        if off > OFF_CENTRE:
+        if off > 0.12:
             x, y = matrices[k, :2, 2]
             what = (
                 f"{name} has its optical axis at pixel ({x:.0f}, {y:.0f}) of {sizes[k, 0]:.0f} x {sizes[k, 1]:.0f}, "
@@ -151,13 +142,14 @@ def _places(geometry: RigGeometry) -> list[Finding]:
 def _directions(rig: CameraRig, geometry: RigGeometry) -> list[Finding]:
     if len(rig) < 2:
         return []
-    if not _converge(rig.cameras.camera_from_world) and _converge(_inverse(rig.cameras.camera_from_world)):
+    poses = np.asarray(rig.cameras.camera_from_world, float)
+    if not _converge(poses) and _converge(np.linalg.inv(poses)):
         what = "the cameras do not look at one place, but would if their poses were inverted"
         cause, remedy = "poses from camera to world instead of from world to camera", "export the inverse poses"
         return [Finding("warning", "calibration", what, cause, remedy)]
     cosines = geometry.forwards @ geometry.forwards.T
     widest = float(np.rad2deg(np.arccos(np.clip(cosines.min(), -1.0, 1.0))))
-    if widest < SMALL_ANGLE:
+    if widest < 8.0:
         what = f"all cameras look in the same direction within {widest:.1f} degrees, so depth is hardly visible"
         return [Finding("note", "cameras", what, "", "place cameras around the subject, at least 30 degrees apart")]
     behind = tuple(name for name, distance in zip(rig.names, geometry.distances, strict=True) if distance <= 0)
@@ -170,43 +162,37 @@ def _directions(rig: CameraRig, geometry: RigGeometry) -> list[Finding]:
     return [Finding("warning", "calibration", what, cause, "calibrate them again, or convert the axes", behind)]
 
 
-def _inverse(poses: Shaped[Array, "camera 4 4"]) -> Float[np.ndarray, "camera 4 4"]:
-    return np.linalg.inv(np.asarray(poses, float))
+def _converge(poses: Float[np.ndarray, "camera 4 4"]) -> bool:
+    """Whether cameras in different places all look, roughly, at one point before them.
 
-
-def _converge(poses: Shaped[Array | np.ndarray, "camera 4 4"]) -> bool:
-    """Whether cameras in different places all look, roughly, at one point before them."""
-    poses = np.asarray(poses, float)
-    centres = -np.einsum("nji,nj->ni", poses[:, :3, :3], poses[:, :3, 3])
-    forwards = poses[:, 2, :3]
+    Their places differ by a tenth of their distance from the origin: inverse poses put all cameras near one place.
+    """
+    centres, forwards = _rays_of(poses)
     towards = nearest_point(centres, forwards) - centres
     distances = np.linalg.norm(towards, axis=1)
     apart = np.linalg.norm(centres - centres.mean(axis=0), axis=1).max()
-    aligned = np.einsum("ni,ni->n", towards, forwards) > TOWARDS * distances
-    return bool(aligned.all() and apart > APART * np.median(np.linalg.norm(poses[:, :3, 3], axis=1)))
+    aligned = np.einsum("ni,ni->n", towards, forwards) > 0.8 * distances
+    return bool(aligned.all() and apart > 0.1 * np.median(np.linalg.norm(poses[:, :3, 3], axis=1)))
 
 
 def _vertical(geometry: RigGeometry, up: str) -> list[Finding]:
+    """A vertical that is not upwards in the pictures, and cameras farther below the floor than a rough zero tells."""
     mean = geometry.uprights.mean(axis=0)
     fits = {axis: float(mean @ axis_vector(axis)) for axis in UP_AXES}
     best = max(fits, key=fits.__getitem__)
     findings = []
-    if fits[up] < UPRIGHT and fits[best] > UPRIGHT:
+    if fits[up] < 0.5 < fits[best]:
         what = f"`up: {up}` is the vertical, but in the pictures {best} points upward"
         remedy = f"write `up: {best}` into recording.yaml"
         findings.append(Finding("warning", "vertical", what, "a wrong `up`", remedy))
-    elif fits[up] < UPRIGHT:
+    elif fits[up] < 0.5:
         what = f"`up: {up}` points upward in hardly any picture, and neither does any other axis"
         cause, remedy = "a world that was never levelled, or pictures turned on their side", "level the calibration"
         findings.append(Finding("warning", "vertical", what, cause, remedy))
-    low = geometry.heights < -BELOW_FLOOR * geometry.scale
+    low = geometry.heights < -0.1 * geometry.scale
     if low.any() and not findings:
         names = tuple(name for name, under in zip(geometry.names, low, strict=True) if under)
         what = f"{listed(names)} stand below the floor, the lowest at {geometry.heights.min():.2f} m"
         cause, remedy = "a world whose zero is not on the floor", "nothing, if intended; else level the calibration"
         findings.append(Finding("note", "vertical", what, cause, remedy, names))
     return findings
-
-
-def _rounded(matrix: np.ndarray) -> list:
-    return matrix.round(4).tolist()

@@ -6,33 +6,32 @@ from typing import Any
 
 import numpy as np
 
-from sogjax.check.agreement import hulls_of
-from sogjax.check.calibration import calibration_findings
-from sogjax.check.cameras import RigGeometry, camera_findings, rig_geometry
-from sogjax.check.clip import Clip, Progress, black_picture, read_clip
-from sogjax.check.exposure import change_findings, exposure, exposure_findings
-from sogjax.check.findings import Finding, worst_first
-from sogjax.check.frames import (
-    jump_findings,
-    missing_findings,
-    repeat_findings,
-    repeated_frames,
-    source_findings,
-    source_frames,
-)
-from sogjax.check.hypotheses import unit_rig
-from sogjax.check.keypoints import keypoint_findings
-from sogjax.check.motion import motion_of, pair_barcodes, with_rig
-from sogjax.check.scale import scale_findings, subject_size
-from sogjax.check.silhouettes import (
-    Moment,
-    example_moments,
+from sogjax.check.agreement import Misfit, hulls_of
+from sogjax.check.appearance import (
+    change_findings,
+    exposure,
+    exposure_findings,
     place_findings,
-    plates_of,
     references_of,
-    video_moments,
-    without_masks_of,
 )
+from sogjax.check.calibration import calibration_findings, unit_rig
+from sogjax.check.cameras import RigGeometry, camera_findings, rig_geometry
+from sogjax.check.findings import Finding, worst_first
+from sogjax.check.frames import clip_findings, jump_findings, repeated_frames, source_findings, source_frames
+from sogjax.check.keypoints import keypoint_findings
+from sogjax.check.motion import motion_of, pair_barcodes
+from sogjax.check.pictures import (
+    Clip,
+    Picture,
+    Progress,
+    example_moments,
+    read_clip,
+    read_plates,
+    stills_in_step,
+    video_moment,
+    working_picture,
+)
+from sogjax.check.scale import SubjectSize, scale_findings, subject_size
 from sogjax.check.synchronisation import (
     FEWEST_STEPS,
     Jump,
@@ -46,10 +45,6 @@ from sogjax.io.calibration.rig import CameraRig
 from sogjax.io.recording import Recording
 from sogjax.io.recording_files import SETTINGS
 from sogjax.io.recording_settings import read_recording_settings
-
-STILL = 1e-3
-"""Mean motion of a camera's pictures (roots of grey values) below which it sees no one move."""
-FEWEST_MOVING = 2
 
 
 @dataclass(frozen=True)
@@ -83,35 +78,22 @@ def examined(recording: Recording, start: int, frames: int, largest_offset: int,
     rig, names = recording.rig, recording.rig.names
     geometry = rig_geometry(rig, recording.up)
     relative = unit_rig(rig, geometry.scale)
-    findings = [Finding("note", "files", warning) for warning in recording.warnings]
-    findings += camera_findings(rig, geometry, recording.up)
     sources = source_frames(recording)
-    findings += source_findings(recording, sources)
-
     clip = read_clip(recording, start, frames, progress)
     repeated = repeated_frames(clip)
-    findings += [*missing_findings(clip), *repeat_findings(clip, repeated)]
-    found, jumps, told = _times(clip, relative, largest_offset)
-    findings += told
+    found, jumps, of_times = _times(clip, relative, largest_offset)
     offsets = [0 if camera in jumps else found.of(camera) for camera in range(len(names))]
-
-    photographed, filmed = example_moments(recording), video_moments(clip, offsets)
-    references = references_of(plates_of(recording), photographed[0] if photographed else None)
-    shown = {camera: picture for moment in reversed(filmed) for camera, picture in moment.pictures.items()}
-    places = place_findings(names, references, shown)
-    elsewhere = {names.index(name) for finding in places for name in finding.cameras}
-    filmed = [without_masks_of(moment, elsewhere) for moment in filmed]
-    findings += places
-    findings += change_findings(names, {k: both for k, both in references.items() if k not in elsewhere}, shown)
-    said, fits = calibration_findings(relative, photographed, filmed)
-    findings += said
-    good = [camera for camera in range(len(names)) if camera not in fits or not fits[camera].is_wrong]
-    size = subject_size(hulls_of(relative, [*photographed, *filmed]), good, geometry.scale, recording.up)
-    unit = read_recording_settings(SETTINGS.of(recording.path)).unit
-    findings += scale_findings(size, geometry, unit)
-    gains, told = _exposure(names, photographed, filmed)
-    findings += told
-    findings += keypoint_findings(recording, start, clip.num_frames)
+    stills = stills_in_step(clip, offsets)
+    seen = _looks(recording, relative, geometry, stills)
+    findings = [
+        *(Finding("note", "files", warning) for warning in recording.warnings),
+        *camera_findings(rig, geometry, recording.up),
+        *source_findings(recording, sources),
+        *clip_findings(clip, repeated),
+        *of_times,
+        *seen.findings,
+        *keypoint_findings(recording, start, clip.num_frames),
+    ]
     numbers = {
         "recording": str(recording.path),
         "up": recording.up,
@@ -120,49 +102,77 @@ def examined(recording: Recording, start: int, frames: int, largest_offset: int,
         "num_frames": {name: source.info.num_frames for name, source in sources.items()},
         "looked_at_frames": [clip.frame_number(0), clip.frame_number(clip.num_frames - 1)],
         "repeated_frames": {names[k]: [clip.frame_number(i) for i in at] for k, at in repeated.items()},
-        "synchronisation": _by_name(found),
-        "silhouettes": {names[k]: asdict(fit) for k, fit in fits.items()},
-        "subject": None if size is None else asdict(size),
-        "gains_blue_green_red": gains,
+        "synchronisation": found.numbers(),
+        "silhouettes": {names[k]: asdict(fit) for k, fit in seen.fits.items()},
+        "subject": None if seen.size is None else asdict(seen.size),
+        "gains_blue_green_red": seen.gains,
         "findings": [asdict(finding) for finding in worst_first(findings)],
     }
-    known = {name: recording.frame_offset[name] + recording.frame_part.get(name, 0.0) for name in names}
-    total = {name: known[name] + offset for name, offset in zip(names, offsets, strict=True)}
-    pictures = tuple(shown[k] if k in shown else black_picture(recording, k) for k in range(len(names)))
+    known = [recording.frame_offset[name] + recording.frame_part.get(name, 0.0) for name in names]
+    total = {name: before + more for name, before, more in zip(names, known, offsets, strict=True)}
+    shown = _first_pictures(stills)
+    pictures = tuple(shown[k] if k in shown else _black(rig, name) for k, name in enumerate(names))
     return Examination(worst_first(findings), numbers, geometry, pictures, total if any(offsets) else {})
 
 
 def _times(clip: Clip, relative: CameraRig, largest_offset: int) -> tuple[Synchrony, dict[int, Jump], list[Finding]]:
     """Offsets between the cameras, jumps in the time of one, and what both mean."""
     names, steps = clip.recording.rig.names, clip.num_frames - 1
-    motions = with_rig(motion_of(clip), relative)
-    moving = sum(motion.mean > STILL for motion in motions) >= FEWEST_MOVING
+    motions = motion_of(clip, relative)
     codes = pair_barcodes(motions)
     found = synchrony(names, codes, steps, largest_offset)
     jumps = find_jumps(codes, steps, found)
     if steps < FEWEST_STEPS:
         return found, jumps, [too_short(clip.num_frames, clip.recording.num_frames)] if len(names) > 1 else []
+    moving = sum(motion.mean > 1e-3 for motion in motions) >= 2  # roots of grey values: less is nobody who moves
     away = [camera for camera, motion in enumerate(motions) if motion.num_seen < FEWEST_STEPS]
     told = synchrony_findings(found, clip.recording.frame_offset, moving, jumps, away)
     return found, jumps, [*told, *jump_findings(clip, jumps)]
 
 
-def _exposure(
-    names: tuple[str, ...], photographed: Sequence[Moment], filmed: Sequence[Moment]
-) -> tuple[dict[str, list[float | None]], list[Finding]]:
-    """The gains of the cameras, blue, green and red, and what they mean.
+@dataclass(frozen=True)
+class _Looks:
+    """What single pictures show."""
 
-    Example poses show the subject whole and in the middle; videos are compared with each camera's still pictures.
-    """
-    moments, label = (photographed, "example poses") if photographed else (filmed, "videos")
-    found = exposure(moments, len(names))
-    gains = [[None if np.isnan(gain) else round(float(gain), 4) for gain in row] for row in found.gains]
-    return dict(zip(names, gains, strict=True)), exposure_findings(names, found, label)
+    findings: list[Finding]
+    fits: dict[int, Misfit]
+    """By camera how its silhouette differs from the others'."""
+    size: SubjectSize | None
+    gains: dict[str, list[float | None]]
+    """Blue, green and red in units of the median camera's."""
 
 
-def _by_name(found: Synchrony) -> dict[str, dict[str, Any]]:
-    rows = zip(found.names, found.offsets, found.sure, found.alike, found.margins, strict=True)
-    return {
-        name: {"offset": int(offset), "sure": bool(sure), "alike": round(float(a), 4), "margin": round(float(m), 4)}
-        for name, offset, sure, a, m in rows
-    }
+def _looks(
+    recording: Recording, relative: CameraRig, geometry: RigGeometry, stills: Sequence[dict[int, Picture]]
+) -> _Looks:
+    """Compare example poses, plates and stills of the videos with each other and with the calibration."""
+    names = recording.rig.names
+    plates = read_plates(recording)
+    photographed = example_moments(recording, plates)
+    references, shown = references_of(plates, photographed), _first_pictures(stills)
+    places = place_findings(names, references, shown)
+    elsewhere = {names.index(name) for finding in places for name in finding.cameras}
+    here = lambda by_camera: {camera: one for camera, one in by_camera.items() if camera not in elsewhere}
+    filmed = [video_moment(pictures, here(plates)) for pictures in stills]
+    changes = change_findings(names, here(references), shown)
+    agreement, fits = calibration_findings(relative, photographed, filmed)
+    good = [camera for camera in range(len(names)) if camera not in fits or not fits[camera].is_wrong]
+    size = subject_size(hulls_of(relative, [*photographed, *filmed]), good, geometry.scale, recording.up)
+    unit = read_recording_settings(SETTINGS.of(recording.path)).unit
+    # example poses show the subject whole and in the middle; videos are compared with each camera's still pictures
+    compared = exposure(photographed or filmed, len(names))
+    of_exposure = exposure_findings(names, compared, "example poses" if photographed else "videos")
+    gains = [[None if np.isnan(gain) else round(float(gain), 4) for gain in row] for row in compared.gains]
+    findings = [*places, *changes, *agreement, *scale_findings(size, geometry, unit), *of_exposure]
+    return _Looks(findings, fits, size, dict(zip(names, gains, strict=True)))
+
+
+def _first_pictures(stills: Sequence[dict[int, Picture]]) -> dict[int, Picture]:
+    """By camera the first of its stills."""
+    return {camera: picture for pictures in reversed(stills) for camera, picture in pictures.items()}
+
+
+def _black(rig: CameraRig, name: str) -> Picture:
+    """What stands for the picture of a camera that is missing."""
+    width, height = rig.image_size(name)
+    return working_picture(np.zeros((height, width, 3), np.uint8))

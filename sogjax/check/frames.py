@@ -8,24 +8,12 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Float
 
-from sogjax.check.clip import Clip
 from sogjax.check.findings import Finding, listed
+from sogjax.check.pictures import Clip
 from sogjax.check.synchronisation import Jump
 from sogjax.errors import counted
 from sogjax.io.recording import Recording
 from sogjax.io.source import SourceInfo, look_at_source
-
-GAP = 1.5
-"""A pause between two frames of a file, in units of the usual one, above which a frame is missing."""
-UNEVEN = 0.2
-"""Share of the usual pause by which most pauses may vary before the rate is called variable."""
-SAME = 0.05
-"""Two frames count as the same if they differ by less than this share of the usual difference in that video,"""
-ELSEWHERE = 0.3
-"""while those of most other cameras differ by more than this share."""
-LEAST_DIFFERENCE = 0.02
-"""Grey values; where frames usually differ by less, nothing can be determined."""
-MOST_LISTED = 5
 
 
 @dataclass(frozen=True)
@@ -34,9 +22,9 @@ class SourceFrames:
 
     info: SourceInfo
     gaps: tuple[int, ...]
-    """Frames of the file after which others are missing by its time stamps."""
+    """Frames of the file after which others are missing: the pause is 1.5 times as long as the median."""
     uneven: bool
-    """Whether its rate varies."""
+    """Whether its rate varies: a quarter of the pauses differ from the median by more than a fifth."""
 
 
 def source_frames(recording: Recording) -> dict[str, SourceFrames]:
@@ -53,8 +41,8 @@ def _source_frames(recording: Recording, name: str) -> SourceFrames:
         return SourceFrames(info, (), False)
     pauses = np.diff(times)
     usual = max(float(np.median(pauses)), 1e-9)
-    gaps = tuple(int(k) for k in np.flatnonzero(pauses > GAP * usual))
-    uneven = float(np.percentile(np.abs(pauses - usual), 75)) > UNEVEN * usual
+    gaps = tuple(int(k) for k in np.flatnonzero(pauses > 1.5 * usual))
+    uneven = float(np.percentile(np.abs(pauses - usual), 75)) > 0.2 * usual
     return SourceFrames(info, gaps, uneven)
 
 
@@ -85,24 +73,30 @@ def source_findings(recording: Recording, sources: dict[str, SourceFrames]) -> l
 
 
 def repeated_frames(clip: Clip) -> dict[int, list[int]]:
-    """By camera the frames of the clip that repeat the one before, while other cameras' do not."""
+    """By camera the frames of the clip that repeat the one before, while those of most other cameras do not.
+
+    They count as the same below 5 % of the difference that is usual in that video, and as others above 30 %.
+    """
     shares = np.stack([_shares(grey, present) for grey, present in zip(clip.grey, clip.present, strict=True)])
     found = {}
     for camera in range(len(shares)):
         others = np.delete(shares, camera, axis=0)
-        moving = _median(others) > ELSEWHERE if len(others) else np.ones(shares.shape[1], bool)
-        twice = np.flatnonzero((shares[camera] < SAME) & moving) + 1
+        moving = _median(others) > 0.3 if len(others) else np.ones(shares.shape[1], bool)
+        twice = np.flatnonzero((shares[camera] < 0.05) & moving) + 1
         if len(twice):
             found[camera] = [int(k) for k in twice]
     return found
 
 
 def _shares(grey: np.ndarray, present: Bool[np.ndarray, "frame"]) -> Float[np.ndarray, "step"]:
-    """How much each frame differs from the one before, in units of the median; NaN where one of them is missing."""
+    """How much each frame differs from the one before, in units of the median; NaN where one of them is missing.
+
+    It is 1 where frames hardly differ at all, so that nothing can be determined.
+    """
     steps = np.array([float(np.abs(b.astype(np.int16) - a).mean()) for a, b in pairwise(grey)])
     seen = present[1:] & present[:-1]
     usual = float(np.median(steps[seen])) if seen.any() else 0.0
-    return np.where(seen, steps / usual if usual > LEAST_DIFFERENCE else 1.0, np.nan)
+    return np.where(seen, steps / usual if usual > 0.02 else 1.0, np.nan)
 
 
 def _median(shares: Float[np.ndarray, "camera step"]) -> Float[np.ndarray, "step"]:
@@ -111,21 +105,17 @@ def _median(shares: Float[np.ndarray, "camera step"]) -> Float[np.ndarray, "step
     return np.nanmedian(np.where(seen.any(axis=0), shares, 0.0), axis=0)
 
 
-def missing_findings(clip: Clip) -> list[Finding]:
-    """Cameras that have no picture in some of the frames, which were left out where they are compared."""
+def clip_findings(clip: Clip, repeated: dict[int, list[int]]) -> list[Finding]:
+    """Cameras that have no picture in some of the frames, where they are not compared, and frames that are repeated."""
     missing = (~clip.present).sum(axis=1)
-    names = tuple(name for name, count in zip(clip.recording.rig.names, missing, strict=True) if count)
-    if not names:
-        return []
-    shown = listed(f"{name} in {count}" for name, count in zip(names, missing[missing > 0], strict=True))
-    what = f"cameras are missing in some of the {counted(clip.num_frames, 'frame')} looked at: {shown}"
-    cause = "a late start, an early end, or what recording.yaml leaves out"
-    return [Finding("note", "frames", what, cause, "look at other frames with start=, if this is not intended", names)]
-
-
-def repeat_findings(clip: Clip, repeated: dict[int, list[int]]) -> list[Finding]:
-    """Findings on repeated frames."""
+    absent = {name: count for name, count in zip(clip.recording.rig.names, missing, strict=True) if count}
     findings = []
+    if absent:
+        shown = listed(f"{name} in {count}" for name, count in absent.items())
+        what = f"cameras are missing in some of the {counted(clip.num_frames, 'frame')} looked at: {shown}"
+        cause = "a late start, an early end, or what recording.yaml leaves out"
+        remedy = "look at other frames with start=, if this is not intended"
+        findings.append(Finding("note", "frames", what, cause, remedy, tuple(absent)))
     for camera, frames in repeated.items():
         name = clip.recording.rig.names[camera]
         what = f"{name} shows the same picture twice, at frame {_places([clip.frame_number(k) for k in frames])}"
@@ -136,7 +126,7 @@ def repeat_findings(clip: Clip, repeated: dict[int, list[int]]) -> list[Finding]
 
 
 def jump_findings(clip: Clip, jumps: dict[int, Jump]) -> list[Finding]:
-    """Findings on jumps of one camera's time against the others'."""
+    """Cameras whose time jumps against the others'."""
     findings = []
     span = f"{clip.frame_number(0)} and {clip.frame_number(clip.num_frames - 1)}"
     for camera, jump in jumps.items():
@@ -151,4 +141,4 @@ def jump_findings(clip: Clip, jumps: dict[int, Jump]) -> list[Finding]:
 
 
 def _places(numbers: Sequence[int]) -> str:
-    return listed((str(number) for number in numbers), MOST_LISTED)
+    return listed((str(number) for number in numbers), 5)

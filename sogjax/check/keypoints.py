@@ -12,14 +12,6 @@ from sogjax.io.recording import Recording
 from sogjax.search.keypoint_people import SAME_PERSON, triangulated_people
 from sogjax.search.triangulation import Rays, distances, poses_of, rays_of
 
-SURE = 0.3
-"""Confidence of the keypoints that are compared."""
-FEWEST = 20
-"""Keypoints of a camera that are compared at least."""
-AGREES, DISAGREES = 0.6, 0.3
-"""Shares of a camera's keypoints near the person whom all cameras see together: of most cameras, of a wrong one."""
-MOST_FRAMES = 30
-
 
 def keypoint_findings(recording: Recording, start: int, frames: int) -> list[Finding]:
     """What there is of keypoints, what of it cannot be used, and cameras whose keypoints are of other pictures.
@@ -27,7 +19,7 @@ def keypoint_findings(recording: Recording, start: int, frames: int) -> list[Fin
     Args:
         recording: whose files are looked at.
         start: the first frame that is compared, counted from the recording's first.
-        frames: how many at most.
+        frames: how many there are, of which 30 are compared at most.
     """
     try:
         keypoints = load_keypoints(recording)
@@ -36,21 +28,15 @@ def keypoint_findings(recording: Recording, start: int, frames: int) -> list[Fin
     if keypoints is None:
         return []
     findings = [Finding("warning", "keypoints", warning) for warning in keypoints.warnings]
-    chosen = np.unique(np.linspace(start, start + frames - 1, min(frames, MOST_FRAMES)).astype(int))
+    chosen = np.unique(np.linspace(start, start + frames - 1, min(frames, 30)).astype(int))
     shares = agreement(keypoints, recording, chosen)
     wrong = suspects(keypoints.cameras, shares)
     for name in wrong:
         share = 100 * shares[keypoints.cameras.index(name)]
-        findings.append(
-            Finding(
-                "warning",
-                "keypoints",
-                f"only {share:.0f} % of the keypoints of {name} are on the person whom the other cameras see",
-                "files of another camera, clip or picture size, or a camera whose calibration or time is wrong",
-                f"run the detector on the recorded pictures of {name}, or remove its files",
-                (name,),
-            )
-        )
+        what = f"only {share:.0f} % of the keypoints of {name} are on the person whom the other cameras see"
+        cause = "files of another camera, clip or picture size, or a camera whose calibration or time is wrong"
+        remedy = f"run the detector on the recorded pictures of {name}, or remove its files"
+        findings.append(Finding("warning", "keypoints", what, cause, remedy, (name,)))
     if not wrong:
         seen = 100.0 * (keypoints.confidence > 0.0).any((2, 3)).mean()
         found = f"{keypoints.scheme.name} of {listed(keypoints.seeing)}: somebody in {seen:.0f} % of the pictures"
@@ -61,7 +47,10 @@ def keypoint_findings(recording: Recording, start: int, frames: int) -> list[Fin
 def agreement(
     keypoints: Keypoints, recording: Recording, frames: Sequence[int] | np.ndarray
 ) -> Float[np.ndarray, "camera"]:
-    """By camera the share of its sure keypoints on the person whom all see together; NaN where too few are seen."""
+    """By camera the share of its keypoints on the person whom all see together; NaN where it has fewer than 20.
+
+    Only those with a confidence of 0.3 or more count.
+    """
     rig = recording.rig
     some = Keypoints(keypoints.scheme, keypoints.cameras, keypoints.points[:, np.asarray(frames, int)])
     points = triangulated_people(some, rig).points[:, 0]
@@ -74,17 +63,17 @@ def agreement(
             weights = some.confidence[camera, frame] * known
             views = Rays(np.repeat(pose[None], persons, axis=0), rays[camera, frame], weights.astype(float))
             misses = distances(views, np.where(known[:, None], points[frame], 0.0))
-            sure = weights >= SURE
+            sure = weights >= 0.3
             hits = ((misses < SAME_PERSON) & sure).sum(-1)
             best = int(hits.argmax())
             near[camera] += hits[best]
             total[camera] += sure[best].sum()
-    return np.where(total >= FEWEST, near / np.maximum(total, 1.0), np.nan)
+    return np.where(total >= 20, near / np.maximum(total, 1.0), np.nan)
 
 
 def suspects(cameras: Sequence[str], shares: Float[np.ndarray, "camera"]) -> list[str]:
-    """Cameras that disagree where most others agree; of two cameras nobody can tell which is wrong."""
+    """Cameras with few keypoints on the person where most others have many; of two nobody can tell which is wrong."""
     told = shares[np.isfinite(shares)]
-    if len(told) < 3 or np.median(told) < AGREES:
+    if len(told) < 3 or np.median(told) < 0.6:
         return []
-    return [name for name, share in zip(cameras, shares, strict=True) if share < DISAGREES]
+    return [name for name, share in zip(cameras, shares, strict=True) if share < 0.3]

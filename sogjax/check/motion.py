@@ -1,6 +1,4 @@
-"""How much moves in each camera's pictures, from a frame to the next, and along which rays.
-
-What moves, seen along epipolar lines: the same planes of space hold the same motion in two cameras.
+"""How much moves in each camera's pictures, from a frame to the next, and what two cameras share of it.
 
 All points of a plane through two cameras lie on one line in each of their pictures. How much moves on the lines of a
 pencil of such planes, over time, is a "motion barcode" that both cameras share, whatever they see otherwise (Pundik
@@ -18,14 +16,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from sogjax.check.clip import Clip
+from sogjax.check.pictures import Clip
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.model.camera import undistort
-
-BLUR = 1.5
-"""Pixels; takes noise and coding artefacts out."""
-NOISE_FACTOR, NOISE_FLOOR = 4.0, 1.0
-"""Differences of grey values count above this many medians of a picture's differences, and above this value."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +30,6 @@ class CameraMotion:
 
     NaN in steps from or to a frame in which the camera is missing.
     """
-    shape: tuple[int, int]
-    """Rows and columns of the pixels."""
     rays: Float[np.ndarray, "pixel 3"]
     """The pixels' directions in the world, unit vectors."""
     centre: Float[np.ndarray, "3"]
@@ -65,9 +56,8 @@ class CameraMotion:
         return mean / max(float(np.linalg.norm(mean)), 1e-12)
 
 
-def motion_of(clip: Clip) -> list[CameraMotion]:
-    """What moves in each camera of a clip."""
-    rig = clip.recording.rig
+def motion_of(clip: Clip, rig: CameraRig) -> list[CameraMotion]:
+    """What moves in each camera of a clip, whose calibration is `rig`."""
     rows = zip(rig.names, clip.grey, clip.present, strict=True)
     return [_camera_motion(rig, name, grey, present) for name, grey, present in rows]
 
@@ -75,34 +65,29 @@ def motion_of(clip: Clip) -> list[CameraMotion]:
 def _camera_motion(
     rig: CameraRig, name: str, grey: UInt8[np.ndarray, "frame h w"], present: Bool[np.ndarray, "frame"]
 ) -> CameraMotion:
-    energy = frame_differences(grey)
+    energy = _frame_differences(grey)
     shape = (max(1, grey.shape[1] // 2), max(1, grey.shape[2] // 2))
     small = np.empty((len(energy), *shape), np.float32)
     for k, step in enumerate(energy):
         small[k] = cv2.resize(step, shape[::-1], interpolation=cv2.INTER_AREA)
     small[~(present[1:] & present[:-1])] = np.nan
-    return CameraMotion(np.sqrt(small).reshape(len(small), shape[0] * shape[1]), shape, *world_rays(rig, name, shape))
+    return CameraMotion(np.sqrt(small).reshape(len(small), shape[0] * shape[1]), *_world_rays(rig, name, shape))
 
 
-def with_rig(motions: Sequence[CameraMotion], rig: CameraRig) -> list[CameraMotion]:
-    """The same pictures under another calibration."""
-    return [
-        CameraMotion(motion.energy, motion.shape, *world_rays(rig, name, motion.shape))
-        for motion, name in zip(motions, rig.names, strict=True)
-    ]
+def _frame_differences(grey: UInt8[np.ndarray, "frame h w"]) -> Float[np.ndarray, "step h w"]:
+    """How much each pixel differs from the frame before, beyond one grey value and four medians of all pixels.
 
-
-def frame_differences(grey: UInt8[np.ndarray, "frame h w"]) -> Float[np.ndarray, "step h w"]:
-    """How much each pixel differs from the frame before, beyond noise."""
-    smooth = [cv2.GaussianBlur(picture.astype(np.float32), (0, 0), BLUR) for picture in grey]
+    A blur takes noise and coding artefacts out.
+    """
+    smooth = [cv2.GaussianBlur(picture.astype(np.float32), (0, 0), 1.5) for picture in grey]
     steps = np.empty((len(grey) - 1, *grey.shape[1:]), np.float32)
     for k in range(len(grey) - 1):
         difference = np.abs(smooth[k + 1] - smooth[k])
-        steps[k] = np.maximum(difference - NOISE_FACTOR * float(np.median(difference)) - NOISE_FLOOR, 0.0)
+        steps[k] = np.maximum(difference - 4.0 * float(np.median(difference)) - 1.0, 0.0)
     return steps
 
 
-def world_rays(
+def _world_rays(
     rig: CameraRig, name: str, shape: tuple[int, int]
 ) -> tuple[Float[np.ndarray, "pixel 3"], Float[np.ndarray, "3"]]:
     """Directions (world, unit vectors) of all pixels of a smaller picture of `shape`, and the camera's place."""
@@ -119,10 +104,6 @@ def world_rays(
 
 
 NUM_PLANES = 64
-FEWEST_COMMON = 5
-"""Steps that two cameras must both see, for their motion to be compared."""
-TAILS = 0.01
-"""Share of the motion at either end that the pencil of planes need not hold."""
 
 PairCodes = dict[tuple[int, int], tuple[Float[np.ndarray, "step plane"], Float[np.ndarray, "step plane"]]]
 """By pair of cameras how much moves in each plane through both, at each step, as either sees it."""
@@ -149,10 +130,7 @@ def barcodes(
     angles = [np.arctan2(motion.rays @ across, motion.rays @ towards) for motion in (first, second)]
     ranges = [_range(motion.total, angle) for motion, angle in zip((first, second), angles, strict=True)]
     low, high = min(low for low, _ in ranges), max(high for _, high in ranges)
-    return (
-        _binned(first, angles[0], low, high),
-        _binned(second, angles[1], low, high),
-    )
+    return _binned(first, angles[0], low, high), _binned(second, angles[1], low, high)
 
 
 def pair_barcodes(motions: Sequence[CameraMotion]) -> PairCodes:
@@ -163,9 +141,10 @@ def pair_barcodes(motions: Sequence[CameraMotion]) -> PairCodes:
 
 
 def _range(weights: Float[np.ndarray, "pixel"], angles: Float[np.ndarray, "pixel"]) -> tuple[float, float]:
+    """The angles between which there is all motion but one per cent at either end."""
     order = np.argsort(angles)
     share = np.cumsum(weights[order], dtype=float) / weights.sum(dtype=float)
-    ends = np.searchsorted(share, [TAILS, 1.0 - TAILS])
+    ends = np.searchsorted(share, [0.01, 0.99])
     low, high = angles[order][np.minimum(ends, len(order) - 1)]
     return float(low), float(max(high, low + 1e-6))
 
@@ -181,9 +160,9 @@ def _binned(
 
 
 def correlation(a: Float[np.ndarray, "step plane"], b: Float[np.ndarray, "_step plane"]) -> float:
-    """Normalised correlation over time and planes, the mean of each plane taken off; 0 where little is seen by both."""
+    """Normalised correlation over time and planes, the mean of each plane taken off; 0 where both see few steps."""
     both = ~(np.isnan(a).any(axis=1) | np.isnan(b).any(axis=1))
-    if both.sum() < FEWEST_COMMON:
+    if both.sum() < 5:
         return 0.0
     a, b = a[both], b[both]
     a, b = a - a.mean(axis=0), b - b.mean(axis=0)
@@ -194,12 +173,6 @@ def lag_curve(
     a: Float[np.ndarray, "step plane"], b: Float[np.ndarray, "_step plane"], most: int
 ) -> Float[np.ndarray, "lag"]:
     """Correlation of a(t + lag) with b(t), for lags from -most to most."""
-    return np.array([correlation(*shifted(a, b, lag)) for lag in range(-most, most + 1)])
-
-
-def shifted(
-    a: Float[np.ndarray, "step plane"], b: Float[np.ndarray, "_step plane"], lag: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """The parts of two series where a(t + lag) and b(t) exist, side by side."""
     count = min(len(a), len(b))
-    return a[max(lag, 0) : count + min(lag, 0)], b[max(-lag, 0) : count - max(lag, 0)]
+    lags = range(-most, most + 1)
+    return np.array([correlation(a[max(k, 0) : count + min(k, 0)], b[max(-k, 0) : count - max(k, 0)]) for k in lags])

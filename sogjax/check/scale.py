@@ -13,27 +13,8 @@ from sogjax.check.findings import Finding
 from sogjax.model.camera import NEAR, distort, project_points
 from sogjax.model.rotation import axis_vector
 
-PERSON = (1.2, 2.6)
-"""Metres: heights of people, raised arms included."""
-SUBJECTS = (0.25, 4.0)
-"""Metres: anything outside this range is not a subject of usual size, but another unit."""
-DISTANCES = (0.4, 40.0)
-"""Metres from cameras to what they look at."""
 EXPECTED_HEIGHT, EXPECTED_DISTANCE = 1.7, 4.0
-HOPELESS = 3.0
-"""A unit of length that is off by more than this is an error."""
-NEAREST, FARTHEST = 0.3, 50.0
-"""Metres from the cameras to what they look at; outside, a person is not tracked."""
-LEAST_ANGLE = 5.0
-"""Degrees between two cameras' directions; otherwise they look at no one point."""
-FLOOR = 0.25
-"""Metres that the lowest point of the subject may be from 0 along the vertical."""
-OUTLIERS = 0.1
-"""Per cent of a silhouette's pixels at either end that are not counted."""
-REACH, SAMPLES = 1.0, 201
-"""Half of the vertical line on which heights are read off, in units of the subject's size, and points on it."""
-
-_UNITS = {"millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254, "feet": 0.3048, "metres": 1.0}
+"""Metres: the height of a person, and the distance from the cameras to what they look at."""
 
 
 @dataclass(frozen=True)
@@ -57,10 +38,11 @@ def subject_size(hulls: Sequence[MomentHull], good: Sequence[int], scale: float,
 def _ends(hull: MomentHull, camera: int, axis: Float[np.ndarray, "3"]) -> tuple[float, float] | None:
     """Lowest and highest point of a silhouette on the vertical line through the subject's middle.
 
-    The visual hull itself is no use: with few cameras it extends beyond head and feet.
+    The visual hull itself is no use: with few cameras it extends beyond head and feet. A thousandth of the silhouette's
+    pixels at either end does not count.
     """
     seen, mask = hull.cameras[camera], hull.masks[camera]
-    heights = np.linspace(-REACH, REACH, SAMPLES) * hull.cube.size
+    heights = np.linspace(-1.0, 1.0, 201) * hull.cube.size
     line = hull.cube.centre + heights[:, None] * axis
     points, depths = project_points(seen, jnp.asarray(line, seen.intrinsics.dtype))
     usable = np.asarray(depths) > NEAR
@@ -72,7 +54,7 @@ def _ends(hull: MomentHull, camera: int, axis: Float[np.ndarray, "3"]) -> tuple[
     order = np.argsort(along)
     silhouette = np.argwhere(mask)[:, ::-1] @ direction
     base = float(hull.cube.centre @ axis)
-    low, high = np.interp(np.percentile(silhouette, [OUTLIERS, 100.0 - OUTLIERS]), along[order], heights[usable][order])
+    low, high = np.interp(np.percentile(silhouette, [0.1, 99.9]), along[order], heights[usable][order])
     return base + float(low), base + float(high)
 
 
@@ -81,16 +63,15 @@ def scale_findings(size: SubjectSize | None, geometry: RigGeometry, unit: str | 
     if size is None:
         return _by_distance(geometry, unit)
     shown = f"the subject is {_length(size.height)} tall according to the calibration"
-    low, high = SUBJECTS
-    if not low <= size.height <= high:
+    if not 0.25 <= size.height <= 4.0:  # no subject of usual size, but another unit
         return [_wrong_unit(f"{shown}, a person about {EXPECTED_HEIGHT} m", EXPECTED_HEIGHT / size.height, unit)]
     findings = []
-    if PERSON[0] <= size.height <= PERSON[1]:
+    if 1.2 <= size.height <= 2.6:  # raised arms included
         findings.append(Finding("ok", "unit", shown))
     else:
         cause = "a subject that is not an adult, masks of only a part of it, or a wrong unit"
         findings.append(Finding("note", "unit", shown, cause, "measure something in the scene, and compare"))
-    if abs(size.lowest) > FLOOR:
+    if abs(size.lowest) > 0.25:
         what = f"the lowest point of the subject is at {size.lowest:.2f} m along the vertical, not near 0"
         cause = "a world whose zero is not on the floor, a wrong `up`, or a subject off the floor"
         findings.append(Finding("note", "vertical", what, cause, "nothing, if intended; else level the calibration"))
@@ -102,39 +83,41 @@ def _by_distance(geometry: RigGeometry, unit: str | None) -> list[Finding]:
     if len(geometry.names) < 2 or not _look_together(geometry):
         return []
     shown = f"the cameras are {_length(geometry.scale)} from what they look at"
-    if DISTANCES[0] <= geometry.scale <= DISTANCES[1]:
+    if 0.4 <= geometry.scale <= 40.0:
         return [Finding("ok", "unit", f"{shown}, which is plausible; there is no silhouette to measure")]
     return [_wrong_unit(f"{shown}, 2 to 8 m is usual", EXPECTED_DISTANCE / geometry.scale, unit)]
 
 
 def _wrong_unit(what: str, factor: float, unit: str | None) -> Finding:
-    """`factor`: what lengths must be multiplied with to be as expected."""
+    """The finding that lengths are only as expected if multiplied with a `factor`; beyond 3, it is an error."""
     given = {"mm": 1e-3}.get(unit or "m", 1.0)
-    likely = min(_UNITS, key=lambda name: abs(np.log(_UNITS[name] / (factor * given))))
+    units = {"millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254, "feet": 0.3048, "metres": 1.0}
+    likely = min(units, key=lambda name: abs(np.log(units[name] / (factor * given))))
     words = {"millimetres": "`unit: mm`", "metres": "`unit: m`"}
     remedy = f"write {words[likely]} into recording.yaml" if likely in words else "convert the translations to metres"
-    severity = "error" if abs(np.log(factor)) > np.log(HOPELESS) else "warning"
+    severity = "error" if abs(np.log(factor)) > np.log(3.0) else "warning"
     return Finding(severity, "unit", what, f"a calibration in {likely}", remedy)
 
 
 def implausible_distance(geometry: RigGeometry, unit: str | None, subject: float) -> str | None:
     """Why nothing can be tracked at the scale of a calibration, and the remedy; None: it can.
 
-    `subject` is the extent of the body in metres: small animals are filmed from nearer, large ones from farther away.
+    `subject` is the extent of the body in metres. A person is filmed from 0.3 to 50 m, small animals also from nearer,
+    large ones from farther away.
     """
     if not _look_together(geometry):
         return None
-    nearest, farthest = NEAREST * min(subject / EXPECTED_HEIGHT, 1.0), FARTHEST * max(subject / EXPECTED_HEIGHT, 1.0)
-    if nearest <= geometry.scale <= farthest:
+    persons = subject / EXPECTED_HEIGHT
+    if 0.3 * min(persons, 1.0) <= geometry.scale <= 50.0 * max(persons, 1.0):
         return None
-    factor = EXPECTED_DISTANCE / geometry.scale * subject / EXPECTED_HEIGHT
+    factor = EXPECTED_DISTANCE / geometry.scale * persons
     shown = f"the cameras are {_length(geometry.scale)} from what they look at, and the body is {_length(subject)} tall"
     return _wrong_unit(shown, factor, unit).sentence()
 
 
 def _look_together(geometry: RigGeometry) -> bool:
-    """Whether two cameras look in directions different enough for a point that they look at."""
-    return bool((geometry.forwards @ geometry.forwards.T).min() < np.cos(np.deg2rad(LEAST_ANGLE)))
+    """Whether the directions of two cameras differ by more than 5 degrees; else they look at no one point."""
+    return bool((geometry.forwards @ geometry.forwards.T).min() < np.cos(np.deg2rad(5.0)))
 
 
 def _length(metres: float) -> str:

@@ -1,10 +1,11 @@
 """Time offsets between cameras, from what moves; and frames that one camera lost or repeated on the way.
 
-Frames that one camera lost or repeated: its offset at the end of a clip differs from that at its beginning.
+Where a camera lost or repeated frames, its offset at the end of a clip differs from that at its beginning.
 """
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -13,15 +14,10 @@ from sogjax.check.findings import Finding, listed
 from sogjax.check.motion import PairCodes, lag_curve
 from sogjax.errors import counted
 
-ALIKE = 0.4
-"""Correlation of two cameras' motion above which its lag counts."""
-SURE_MARGIN = 0.03
-"""How far the mean correlation of a camera with the others must fall away from its offset."""
-SURE_MEAN = 0.35
-"""Mean correlation at the offset, weighted, below which an offset is not believed."""
 FEWEST_STEPS = 8
-"""From a frame to the next, for offsets to be looked for."""
+"""Steps from a frame to the next without which offsets are not looked for."""
 REFITS = 10
+"""Rounds of either fit at most; a few suffice."""
 
 
 @dataclass(frozen=True)
@@ -43,22 +39,33 @@ class Synchrony:
         """The offset of a camera, 0 where it is uncertain."""
         return int(self.offsets[camera]) if self.sure[camera] else 0
 
+    def numbers(self) -> dict[str, dict[str, Any]]:
+        """By camera what was found, as plain numbers."""
+        rows = zip(self.names, self.offsets, self.sure, self.alike, self.margins, strict=True)
+        return {
+            name: {"offset": int(offset), "sure": bool(sure), "alike": round(float(a), 4), "margin": round(float(m), 4)}
+            for name, offset, sure, a, m in rows
+        }
+
 
 def synchrony(names: tuple[str, ...], codes: PairCodes, steps: int, largest: int) -> Synchrony:
-    """Offsets of at most `largest` frames between the cameras, by least squares over all pairs."""
+    """Offsets of at most `largest` frames between the cameras, by least squares over all pairs.
+
+    A camera's offset is believed where its mean correlation with the others is high, and falls away from there.
+    """
     count = len(names)
     most = min(largest, steps // 3)
     curves = {pair: lag_curve(*both, most) for pair, both in codes.items()} if steps >= FEWEST_STEPS else {}
     offsets = _refined(_least_squares(curves, count, most), curves, most)
     offsets = offsets - int(np.bincount(offsets - offsets.min()).argmax()) - offsets.min()
     alike, margins, sharpness = _support(offsets, curves, most)
-    sure = (alike > SURE_MEAN) & (margins > SURE_MARGIN)
+    sure = (alike > 0.35) & (margins > 0.03)
     return Synchrony(names, offsets, sure, alike, margins, sharpness)
 
 
 def _least_squares(curves: Mapping[tuple[int, int], np.ndarray], count: int, most: int) -> Int[np.ndarray, "camera"]:
-    """Offsets that explain the best lags of the pairs, with those that fit badly weighted down (Huber)."""
-    kept = {pair: curve for pair, curve in curves.items() if curve.max() > ALIKE}
+    """Offsets that explain the best lags of pairs that are alike, with those that fit badly weighted down (Huber)."""
+    kept = {pair: curve for pair, curve in curves.items() if curve.max() > 0.4}
     if not kept:
         return np.zeros(count, int)
     rows = np.zeros((len(kept), count))
@@ -147,7 +154,7 @@ def synchrony_findings(
     jumped: Collection[int] = (),
     away: Collection[int] = (),
 ) -> list[Finding]:
-    """Findings on the offsets.
+    """Cameras that are late, early or uncertain.
 
     Args:
         found: the offsets.
@@ -181,14 +188,6 @@ def synchrony_findings(
     return findings
 
 
-LARGEST = 3
-"""Frames lost or repeated within a clip, at most, beyond the offset of the whole."""
-FEWEST_STEPS_OF_JUMPS = 16
-"""In either half."""
-SHARP, LEAST_SHARP = 0.06, 0.01
-"""How far the likeness with the others must fall beside the offset, in the better half and in the other."""
-
-
 @dataclass(frozen=True)
 class Jump:
     """A camera whose time jumps against the others' within a clip."""
@@ -198,16 +197,19 @@ class Jump:
 
 
 def find_jumps(codes: PairCodes, steps: int, whole: Synchrony) -> dict[int, Jump]:
-    """By camera the difference of its offsets in the two halves of a clip, where both are certain."""
+    """By camera the difference of its offsets in the two halves of a clip, where both are certain and sharp.
+
+    Three frames at most are looked for beyond the offset of the whole, in halves of 16 steps or more.
+    """
     half = steps // 2
-    if half < FEWEST_STEPS_OF_JUMPS:
+    if half < 16:
         return {}
-    largest = LARGEST + int(abs(whole.offsets).max())
+    largest = 3 + int(abs(whole.offsets).max())
     early, late = (
         synchrony(whole.names, {pair: (a[part], b[part]) for pair, (a, b) in codes.items()}, half, largest)
         for part in (slice(0, half), slice(half, steps))
     )
     sharp = np.sort([early.sharpness, late.sharpness], axis=0)
-    sure = whole.sure & early.sure & late.sure & (sharp[0] > LEAST_SHARP) & (sharp[1] > SHARP)
+    sure = whole.sure & early.sure & late.sure & (sharp[0] > 0.01) & (sharp[1] > 0.06)
     sure &= early.offsets != late.offsets
     return {int(k): Jump(int(early.offsets[k] - late.offsets[k])) for k in sure.nonzero()[0]}

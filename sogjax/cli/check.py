@@ -6,19 +6,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
 
+from sogjax.check.calibration import unit_rig
 from sogjax.check.examination import Examination, examined
 from sogjax.check.findings import SEVERITIES, Finding
-from sogjax.check.hypotheses import unit_rig
 from sogjax.check.opening import opening_problems
 from sogjax.cli.config.schemas import CheckConfig
 from sogjax.errors import InputError, counted
 from sogjax.io.files import atomic_path
+from sogjax.io.image_file import write_image
 from sogjax.io.offsets_file import offsets_line, write_frame_offsets
 from sogjax.io.recording import Recording, open_recording
 from sogjax.io.recording_files import SETTINGS
 from sogjax.run.outputs import results_folder
 from sogjax.run.terminal import alive, progress, say
-from sogjax.view.plots import write_png
 from sogjax.view.room import room_sheet
 
 
@@ -36,7 +36,7 @@ def run(config: CheckConfig) -> list[Finding]:
         found = examined(recording, start, frames, config.largest_offset, progress)
         with atomic_path(out / "check.json") as temporary:
             temporary.write_text(json.dumps(found.numbers, indent=1))
-        write_png(out / "check.png", _picture(recording, found))
+        write_image(out / "check.png", _picture(recording, found))
     for finding in found.findings:
         print(finding.line())
     _offer_offsets(config, recording, found)

@@ -131,15 +131,14 @@ def _camera(angle: float) -> Camera:
 
 PACKAGES = (
     *("sogjax", "jax", "jaxlib", "optimistix", "equinox", "jaxtyping", "numpy", "scipy"),
-    *("opencv-python-headless", "rerun-sdk", "hydra-core"),
+    *("opencv-python-headless", "rerun-sdk", "hydra-core", "matplotlib"),
 )
 CLASHING = ("opencv-python", "opencv-contrib-python", "opencv-contrib-python-headless")
 """Packages that overwrite opencv-python-headless's files."""
 EXTRAS = {
     "export": ("ezc3d",),
     "video": ("av",),
-    "report": ("matplotlib",),
-    "notebook": ("matplotlib", "ipykernel", "nbmake"),
+    "notebook": ("ipykernel", "nbmake"),
     "joblib": ("hydra-joblib-launcher",),
     "submitit": ("hydra-submitit-launcher",),
     "ray": ("hydra-ray-launcher",),

@@ -12,7 +12,7 @@ from sogjax.actor.silhouettes import load_images
 from sogjax.cli.config.schemas import SegmentConfig
 from sogjax.errors import InputError, counted
 from sogjax.io.example_poses import ExamplePose
-from sogjax.io.image_file import write_mask
+from sogjax.io.image_file import write_image, write_mask
 from sogjax.io.recording import Recording
 from sogjax.io.recording_files import EXAMPLE_POSES
 from sogjax.io.video import read_prepared
@@ -24,8 +24,8 @@ from sogjax.run.terminal import alive, progress, say
 from sogjax.scene.background import CameraBackground
 from sogjax.scene.foreground import foreground_probability
 from sogjax.settings.method import ImagesConfig
-from sogjax.view.plots import write_png
-from sogjax.view.sheets import GREEN, RED, Tile, background_sheet, contact_sheet
+from sogjax.view.sheets import background_sheet
+from sogjax.view.tiles import GREEN, RED, Tile, contact_sheet
 
 BACKGROUND = "background"
 """Folder of the background's sheets."""
@@ -69,7 +69,7 @@ def _masks(recording: Recording, example: ExamplePose, out: Path, learnt: Sequen
         older.unlink()
     for camera, mask in found.masks.items():
         write_mask(out / example.name / f"{recording.rig.names[camera]}.mask.png", mask)
-    write_png(out / f"{example.name}.png", mask_sheet(recording, example, images, found))
+    write_image(out / f"{example.name}.png", mask_sheet(recording, example, images, found))
     return out / f"{example.name}.png"
 
 
@@ -104,7 +104,7 @@ def _background_sheets(recording: Recording, choice: str, frames: list[int], fol
         title = f"{recording.name}, {name}: background from the {background.origin}"
         sheet = background_sheet(title, background.picture, background.spread, background.known, pictures)
         paths.append(folder / f"{name}.png")
-        write_png(paths[-1], sheet)
+        write_image(paths[-1], sheet)
     return paths
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from sogjax.cli.config.schemas import ViewConfig
 from sogjax.errors import InputError
 from sogjax.io.ground_truth import load_ground_truth
+from sogjax.io.image_file import write_image
 from sogjax.io.motion import Motion, load_motion
 from sogjax.io.recording import Recording
 from sogjax.io.video import read_frames
@@ -16,10 +17,9 @@ from sogjax.run.outputs import free_path
 from sogjax.run.recordings import file_list, opened
 from sogjax.run.terminal import progress, say
 from sogjax.view.overlay import overlay_frame
-from sogjax.view.plots import write_png
 from sogjax.view.projection import frame_range
-from sogjax.view.rerun.file import view_command, write_rerun
-from sogjax.view.screenshot import drawn_frames, rerun_screenshot
+from sogjax.view.rerun.file import write_rerun
+from sogjax.view.rerun.viewer import drawn_frames, rerun_screenshot, view_command
 
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")
 """Environment variables that name the display, if there is one."""
@@ -72,7 +72,7 @@ def _write_picture(out: Path, recording: Recording, motions: list[Motion], confi
         say("Rerun's viewer cannot draw here (no Vulkan driver: mesa-vulkan-drivers); the overlay is drawn instead")
         images = pictures[0] if pictures else [None] * len(recording.rig)
         drawn = overlay_frame(images, recording.rig, shown, frame)
-    write_png(out, drawn)
+    write_image(out, drawn)
     print(out)
     return out
 

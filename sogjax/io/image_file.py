@@ -1,4 +1,4 @@
-"""Reading single images and masks, and writing masks.
+"""Reading and writing single images and masks.
 
 Exposure and white balance evened out between cameras: factors of red, green and blue light.
 """
@@ -46,8 +46,18 @@ def write_mask(path: Path, mask: Bool[np.ndarray, "height width"]) -> None:
     Raises:
         InputError: the folder cannot be written.
     """
+    write_image(path, mask.astype(np.uint8) * 255)
+
+
+def write_image(path: Path, image: UInt8[np.ndarray, "height width *channel"]) -> None:
+    """Write a picture (grey or BGR) as JPEG where the path ends in .jpg, else as PNG, in one piece or not at all.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    encoded = cv2.imencode(".jpg" if path.suffix == ".jpg" else ".png", image)[1]
     with atomic_path(path) as temporary:
-        temporary.write_bytes(cv2.imencode(".png", mask.astype(np.uint8) * 255)[1].tobytes())
+        temporary.write_bytes(encoded.tobytes())
 
 
 def _decode(path: Path, flags: int) -> np.ndarray:

@@ -9,10 +9,9 @@ from sogjax.actor.coverage import body_silhouette
 from sogjax.actor.report import ActorReport, FinishedActor, actor_report
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.io.files import atomic_path
+from sogjax.io.image_file import write_image
 from sogjax.scene.plate_difference import reduced_mask
-from sogjax.view.body_picture import body_picture
-from sogjax.view.plots import write_png
-from sogjax.view.sheets import LEGEND, SilhouetteView, silhouette_sheet
+from sogjax.view.sheets import LEGEND, SilhouetteView, body_picture, silhouette_sheet
 
 
 def report_folder(actor: Path) -> Path:
@@ -24,10 +23,10 @@ def write_actor_report(folder: Path, made: FinishedActor, rig: CameraRig) -> Act
     """Write silhouettes_POSE.png, colors.png, actor_report.json and report.md; the page comes last."""
     report = actor_report(made, rig)
     for pose in report.ious:
-        write_png(folder / f"silhouettes_{pose}.png", _pose_sheet(made, rig, report, pose))
+        write_image(folder / f"silhouettes_{pose}.png", _pose_sheet(made, rig, report, pose))
     blobs = made.body.posed_blobs(made.body.poses["rest"])
     means, sigmas, colors = (np.asarray(part, float) for part in (blobs.means, blobs.sigmas, blobs.colors))
-    write_png(folder / "colors.png", body_picture(means, sigmas, colors))
+    write_image(folder / "colors.png", body_picture(means, sigmas, colors))
     _write_text(folder / "actor_report.json", json.dumps(report.as_dict(), indent=2) + "\n")
     _write_text(folder / "report.md", report_page(report))
     return report

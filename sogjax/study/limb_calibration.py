@@ -12,7 +12,7 @@ from scipy.stats import rankdata
 from sogjax.quality.limb_confidence import FAR, WITH_BACKGROUND, WITHOUT, Weights
 from sogjax.study.limb_trials import FOLLOWED, JudgedLimb
 from sogjax.study.table import ruled_table
-from sogjax.view.limb_chart import LimbCurve
+from sogjax.view.charts import LimbCurve
 
 BINS = (0.0, 0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0)
 RIDGE = 1e-4

@@ -15,10 +15,10 @@ from sogjax.study.record import RunRecord
 from sogjax.study.runner import motions_of
 from sogjax.study.source import Source
 from sogjax.study.summary import RowSummary
-from sogjax.view.bar_chart import Bars, bar_chart
-from sogjax.view.charts import Means, mean_chart
-from sogjax.view.overlay import overlay_frame, write_label
+from sogjax.view.charts import Bars, Means, bar_chart, mean_chart
+from sogjax.view.overlay import overlay_frame
 from sogjax.view.projection import picture_points
+from sogjax.view.tiles import write_label
 
 CAMERAS_SHOWN = 3
 TILE, JPEG_QUALITY = 300, 75

@@ -10,7 +10,7 @@ import numpy as np
 from sogjax.io.files import atomic_path
 from sogjax.study.table import ruled_table
 from sogjax.study.verdicts import EQUAL, UNKNOWN, VERDICTS, Ranking
-from sogjax.view.ranking_chart import RankedCurves
+from sogjax.view.charts import RankedCurves
 
 MM = 1000.0
 

@@ -11,7 +11,7 @@ from sogjax.run.terminal import say
 from sogjax.study.document import Section, write_html, write_markdown
 from sogjax.study.done import Done, write_runs
 from sogjax.study.experiment import Experiment, experiment_names
-from sogjax.study.sections.about import about_section, installed_version, methods_section, own_section, versions_section
+from sogjax.study.sections.about import about_section, methods_section, own_section, versions_section
 from sogjax.study.sections.experiment import experiment_section
 from sogjax.study.sections.few_cameras import few_cameras_section
 from sogjax.study.sections.limbs import limbs_section
@@ -32,7 +32,6 @@ def write_report(config: ReportConfig) -> list[Path]:
     """
     names = config.only or [*experiment_names(), *BESIDE]
     experiments = [Experiment.named(name) for name in names if name not in BESIDE]
-    _check_matplotlib()
     _check_truth([*config.recordings, *(config.compared or [])])
     with results_folder(Path(config.out)) as out:
         study = Study.from_config(config, out)
@@ -69,13 +68,3 @@ def _check_truth(recordings: Sequence[str]) -> None:
     for path in map(Path, recordings):
         if path.is_dir() and not GROUND_TRUTH.of(path).is_file():
             raise InputError(f"{path}: has no ground_truth.npz; give a recording with ground truth")
-
-
-def _check_matplotlib() -> None:
-    """Found out before the runs, not after.
-
-    Raises:
-        InputError: matplotlib is not installed.
-    """
-    if installed_version("matplotlib") == "not installed":
-        raise InputError("a report needs matplotlib; install it with pip install 'sogjax[report]'")

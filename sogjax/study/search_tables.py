@@ -12,7 +12,7 @@ from sogjax.io.files import atomic_path
 from sogjax.study.found_pose import RIGHT
 from sogjax.study.searches import Search
 from sogjax.study.table import ruled_table
-from sogjax.view.reliability_chart import Reliability
+from sogjax.view.charts import Reliability
 
 MM = 1000.0
 BINS = 8

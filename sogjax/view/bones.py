@@ -8,11 +8,6 @@ from jaxtyping import Bool, Float, Int, UInt8
 from sogjax.io.motion import Motion
 from sogjax.quality.limb_warnings import in_doubt
 
-SAME_ORIGIN = 1e-4
-"""Metres. One-axis joints nearer than this to their parent in every frame are drawn as one."""
-SHORTEST_TIP = 0.02
-"""Metres. A last joint whose blobs are all nearer gets no bone to its tip."""
-
 LEFT, MIDDLE, RIGHT = 0, 1, 2
 
 _PALETTE = np.array(
@@ -109,7 +104,7 @@ def _side(name: str) -> int:
 
 
 def _drawn_as(motion: Motion) -> Int[np.ndarray, "joint"]:
-    """For each joint the topmost one at the same place; -1 for joints that only place the root in the world.
+    """For each joint the topmost one within 0.1 mm in every frame; -1 for joints that only place the root in the world.
 
     A root's translations are joints of their own, some of which stay on the world's axes: nothing is drawn
     above the first joint that has a blob or more than one child.
@@ -120,7 +115,7 @@ def _drawn_as(motion: Motion) -> Int[np.ndarray, "joint"]:
     drawn_as = np.full(len(parents), -1)
     for j, parent in enumerate(parents):
         if body[j]:
-            together = parent >= 0 and np.abs(origins[:, j] - origins[:, parent]).max() < SAME_ORIGIN
+            together = parent >= 0 and np.abs(origins[:, j] - origins[:, parent]).max() < 1e-4
             drawn_as[j] = drawn_as[parent] if together and drawn_as[parent] >= 0 else j
     return drawn_as
 
@@ -135,12 +130,12 @@ def _body_joints(parents: np.ndarray, blob_joint: np.ndarray) -> np.ndarray:
 
 
 def _tips(motion: Motion, drawn_as: np.ndarray, last: set[int]) -> list[tuple[int, int]]:
-    """(joint, farthest blob) of each last joint that has a blob away from it."""
+    """The pairs (joint, farthest blob) of the last joints that have a blob farther away than 2 cm."""
     blob_as = drawn_as[np.asarray(motion.blob_joint, int)]
     tips = []
     for joint in sorted(last):
         blobs = np.flatnonzero(blob_as == joint)
         lengths = np.linalg.norm(motion.blob_means[0, blobs] - motion.world_from_joint[0, joint, :3, 3], axis=-1)
-        if blobs.size and lengths.max() > SHORTEST_TIP:
+        if blobs.size and lengths.max() > 0.02:
             tips.append((int(joint), int(blobs[lengths.argmax()])))
     return tips

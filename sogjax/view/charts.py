@@ -1,30 +1,36 @@
-"""Charts of studies, drawn with matplotlib (the extra `report`): means with their intervals, calibration curves."""
+"""Charts of experiments, sweeps and judgements, as PNG.
+
+They are drawn by matplotlib, which is imported where a figure is made, since it is slow to import.
+"""
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from jaxtyping import Bool, Float, Int
 
-from sogjax.errors import InputError
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-INK, PAPER, OTHERS = "#1f77b4", "#444444", "#b8c4d0"
-_SIZE = (7.2, 2.8)
-"""Inches."""
-_DPI = 90
-_NAME_HEIGHT = 0.06
-"""Of a line of text beside a panel, in units of the panel's height."""
+MM, PERCENT = 1000.0, 100.0
+INK, REFERENCE, WRONG = "#1f77b4", "#444444", "#d62728"
+"""Colours of what was measured, of what it is compared with, and of what is wrong or failed."""
+
+DPI = 90
+
+Curve = Float[np.ndarray, "frame"]
 
 
 @dataclass(frozen=True)
 class Means:
-    """The means of one panel of a chart."""
+    """One panel of means with their intervals."""
 
     names: Sequence[str]
-    """Of the rows, from left to right."""
+    """The rows, from left to right."""
     means: Sequence[float]
-    """One per row."""
     intervals: Sequence[tuple[float, float]]
     """Low and high of each mean."""
     title: str = "here"
@@ -33,92 +39,205 @@ class Means:
 
 
 def mean_chart(panels: Sequence[Means], *, axis: str, value: str, paper: Mapping[str, float] | None = None) -> bytes:
-    """Means with their intervals beside the paper's figures, as a PNG.
+    """Means with their intervals, with the paper's figures in a panel of their own.
 
     Args:
         panels: what is drawn, one panel each.
         axis: what differs between the rows.
         value: what the means are, with their unit.
-        paper: the paper's figures by row, in a panel of their own.
+        paper: the paper's figures by row.
     """
     ratios = [2.0] * len(panels) + [1.0] * bool(paper)
-    figure = new_figure((max(_SIZE[0], 1.5 * sum(ratios)), _SIZE[1]))
+    members = dict.fromkeys(name for panel in panels for name in panel.members)
+    colors = {name: f"C{1 + number % 9}" for number, name in enumerate(members)}
+    figure = _figure(max(7.2, 1.5 * sum(ratios)) + 0.9 * bool(members), 2.8)
     drawn = figure.subplots(1, len(ratios), squeeze=False, width_ratios=ratios)[0]
-    for panel, content in zip(drawn, panels, strict=False):
-        _draw_means(panel, content.means, content.intervals, content.members)
-        _finish(panel, content.names, axis, value, content.title)
-        _name_lines(panel, content.members)
+    lines = {}
+    for axes, panel in zip(drawn, panels, strict=False):
+        for name, values in panel.members.items():
+            if np.isfinite(values).any():
+                lines[name] = axes.plot(values, color=colors[name], alpha=0.5, linewidth=1)[0]
+        middle, bounds = np.asarray(panel.means, float), np.asarray(panel.intervals, float)
+        spread = np.clip(np.stack([middle - bounds[:, 0], bounds[:, 1] - middle]), 0.0, None)
+        axes.errorbar(range(len(middle)), middle, yerr=np.nan_to_num(spread), fmt="o", color=INK, capsize=4)
+        _label_rows(axes, panel.names, axis, value, panel.title)
     if paper:
-        drawn[-1].plot(range(len(paper)), list(paper.values()), "s-", color=PAPER)
-        _finish(drawn[-1], list(paper), axis, value, "the paper")
-    return png_of(figure)
+        drawn[-1].plot(list(paper.values()), "s-", color=REFERENCE)
+        _label_rows(drawn[-1], list(paper), axis, value, "the paper")
+    if lines:
+        figure.legend(lines.values(), lines, loc="outside right center", fontsize=6, frameon=False)
+    return _png(figure)
 
 
-def _draw_means(
-    panel: Any,
-    means: Sequence[float],
-    intervals: Sequence[tuple[float, float]],
-    members: Mapping[str, Sequence[float]],
-) -> None:
-    places = np.arange(len(means))
-    for values in members.values():
-        panel.plot(places, values, "-", color=OTHERS, linewidth=1)
-    middle, bounds = np.asarray(means, float), np.asarray(intervals, float)
-    spread = np.clip(np.stack([middle - bounds[:, 0], bounds[:, 1] - middle]), 0.0, None)
-    panel.errorbar(places, middle, yerr=np.nan_to_num(spread), fmt="o", color=INK, capsize=4)
+def _label_rows(axes: "Axes", names: Sequence[str], axis: str, value: str, title: str) -> None:
+    letters = max((len(name) for name in names), default=0) * len(names)
+    crowded = letters > 10 * axes.bbox.width / DPI
+    axes.set_xticks(range(len(names)), names, rotation=30 if crowded else 0, ha="right" if crowded else "center")
+    axes.set(xlabel=axis, ylabel=value, ylim=(0.0, 1.06 * axes.get_ylim()[1]))  # room for a whole marker at the top
+    axes.set_title(title, fontsize=9)
+    _grid(axes)
 
 
-def _name_lines(panel: Any, members: Mapping[str, Sequence[float]]) -> None:
-    """The names of the lines right of the panel, at the heights where they end, or as near as a line of text allows."""
-    last = {name: np.asarray(values, float)[np.isfinite(values)][-1:] for name, values in members.items()}
-    named = sorted((name for name, end in last.items() if end.size), key=lambda name: float(last[name][0]))
-    top = panel.get_ylim()[1]
-    heights = spaced([float(last[name][0]) / top for name in named], _NAME_HEIGHT)
-    for name, height in zip(named, heights, strict=True):
-        place, beside = (1.0, height), {"xytext": (4, 0), "textcoords": "offset points"}
-        panel.annotate(name, place, xycoords="axes fraction", va="center", fontsize=6, color=PAPER, **beside)
+@dataclass(frozen=True)
+class Bars:
+    """One panel of bars: a value for every method and row, NaN where there is none."""
+
+    title: str
+    rows: Sequence[str]
+    values: Mapping[str, Sequence[float]]
+    failed: Collection[int] = ()
+    """The numbers of the rows for which the word "failed" stands instead of bars."""
 
 
-def spaced(heights: Sequence[float], apart: float) -> list[float]:
-    """Ascending heights moved apart: upward, but not above 1, and downward where there is no room."""
-    moved = list(heights)
-    for k in range(1, len(moved)):
-        moved[k] = max(moved[k], moved[k - 1] + apart)
-    ceiling = 1.0
-    for k in reversed(range(len(moved))):
-        moved[k] = min(moved[k], ceiling)
-        ceiling = moved[k] - apart
-    return moved
+def bar_chart(panels: Sequence[Bars], *, value: str) -> bytes:
+    """Bars by row and method, a panel below the other; `value` says what they are, with their unit."""
+    longest = max(len(panel.rows) for panel in panels)
+    figure = _figure(min(max(6.0, 0.45 * longest), 90.0), 3.2 * len(panels))
+    every = 1 + longest // 200  # the names of more rows would overlap
+    for axes, panel in zip(figure.subplots(len(panels), 1, squeeze=False)[:, 0], panels, strict=True):
+        places, width = np.arange(len(panel.rows)), 0.8 / len(panel.values)
+        for k, (name, values) in enumerate(panel.values.items()):
+            axes.bar(places + width * (k + 0.5) - 0.4, values, width, label=name)
+        for row in panel.failed:
+            axes.text(row, 0.0, " failed", rotation=90, ha="center", va="bottom", color=WRONG)
+        axes.set_xlim(-0.5, len(panel.rows) - 0.5)
+        axes.set_xticks(places[::every], [name[:40] for name in panel.rows[::every]], rotation=30, ha="right")
+        axes.set_ylabel(value)
+        axes.set_title(panel.title, fontsize=9)
+        axes.set_axisbelow(True)
+        _grid(axes, legend=any(panel.values))
+    return _png(figure)
 
 
-def _finish(panel: Any, names: Sequence[str], axis: str, value: str, title: str) -> None:
-    width = panel.get_position().width * panel.figure.get_figwidth()
-    crowded = max((len(name) for name in names), default=0) * len(names) > 10 * width
-    panel.set_xticks(range(len(names)), names, rotation=30 if crowded else 0, ha="right" if crowded else "center")
-    panel.set_xlabel(axis)
-    panel.set_ylabel(value)
-    panel.set_title(title, fontsize=9)
-    panel.set_ylim(0.0, 1.06 * panel.get_ylim()[1])  # room for a whole marker at the top
-    panel.grid(axis="y", color="#e4e4e4")
+@dataclass(frozen=True)
+class LimbCurve:
+    """What was said of limbs, and what was found."""
+
+    false_alarms: Float[np.ndarray, "threshold"]
+    """The part of the limbs in their places that are above each threshold."""
+    noticed: Float[np.ndarray, "threshold"]
+    """The part of the lost ones that are."""
+    area: float
+    said: Float[np.ndarray, "bin"]
+    """Mean probability in bins."""
+    found: Float[np.ndarray, "bin"]
+    """The part of the bin that is lost."""
 
 
-def new_figure(size: tuple[float, float] = _SIZE) -> Any:
-    """An empty figure that needs no display.
+def limb_chart(curves: Mapping[str, LimbCurve]) -> bytes:
+    """The ROC curve, and shares that were found lost against those that were said, for groups of frames by name."""
+    figure = _figure(8.4, 3.8)
+    roc, shares = figure.subplots(1, 2)
+    for name, curve in curves.items():
+        roc.plot(curve.false_alarms, curve.noticed, linewidth=1.4, label=f"{name}: {curve.area:.3f}")
+        shares.plot(curve.said, curve.found, "o-", markersize=4, linewidth=1.0)
+    roc.set_xscale("symlog", linthresh=0.01)
+    roc.set_xticks([0.0, 0.01, 0.1, 1.0], ["0", "0.01", "0.1", "1"])
+    roc.set(xlim=(0.0, 1.0), ylim=(0.0, 1.02), xlabel="false alarms", ylabel="lost limbs noticed")
+    roc.legend(title="area under the curve", fontsize=7, title_fontsize=7, frameon=False, loc="lower right")
+    shares.plot([0.0, 1.0], [0.0, 1.0], "--", color=REFERENCE, linewidth=0.8)
+    shares.set(xlim=(0.0, 1.0), ylim=(0.0, 1.02), xlabel="probability said", ylabel="share found lost")
+    _grid(roc, "both")
+    _grid(shares, "both")
+    return _png(figure)
 
-    Raises:
-        InputError: matplotlib is not installed.
-    """
-    try:
-        from matplotlib import rc_context
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise InputError("charts need matplotlib; install it with pip install 'sogjax[report]'") from error
+
+@dataclass(frozen=True)
+class RankedCurves:
+    """What the true pose is worth more than the tracked one, under one set of terms."""
+
+    title: str
+    frames: Int[np.ndarray, "frame"]
+    gain: Curve
+    """By what share of the energy the true pose is worth more."""
+    gain_by_term: Mapping[str, Curve]
+    """What each term adds to it."""
+    errors: Mapping[str, Curve]
+    """Metres, by whose pose."""
+    limbs: Mapping[str, tuple[Curve, Curve]]
+    """Metres: the tracked pose's and the optimum's error of each limb that differs."""
+
+
+def ranking_chart(columns: Sequence[RankedCurves]) -> bytes:
+    """Differences of energies, joint errors and errors of limbs over the frames, a column for each set of terms."""
+    figure = _figure(5.2 * len(columns), 7.4)
+    panels = figure.subplots(3, len(columns), squeeze=False, sharex=True, sharey="row")
+    for (worth, errors, limbs), content in zip(panels.T, columns, strict=True):
+        gain = PERCENT * content.gain
+        worth.set_title(content.title, fontsize=9)
+        worth.axhline(0.0, color=REFERENCE, linewidth=0.8)
+        worth.fill_between(content.frames, 0.0, gain, where=gain < 0.0, color=WRONG, alpha=0.25, linewidth=0)
+        worth.plot(content.frames, gain, color="black", linewidth=1.6, label="energy")
+        for name, curve in content.gain_by_term.items():
+            worth.plot(content.frames, PERCENT * curve, linewidth=1.0, label=name)
+        for name, curve in content.errors.items():
+            errors.plot(content.frames, MM * curve, label=name, linewidth=1.2)
+        for number, (name, (tracked, optimum)) in enumerate(content.limbs.items()):
+            limbs.plot(content.frames, MM * tracked, "-", color=f"C{number}", label=name, linewidth=1.2)
+            limbs.plot(content.frames, MM * optimum, "--", color=f"C{number}", linewidth=1.0)
+        worth.set_ylabel("true pose is worth more, %")
+        errors.set_ylabel("mean joint error, mm")
+        limbs.set(xlabel="frame", ylabel="limb (line: tracked, dashed:\noptimum at the truth), mm")
+        _grid(worth, legend=True)
+        _grid(errors, legend=bool(content.errors))
+        _grid(limbs, legend=bool(content.limbs))
+    return _png(figure)
+
+
+@dataclass(frozen=True)
+class Reliability:
+    """Poses that searches found, in the order of their confidence."""
+
+    confidence: Float[np.ndarray, "search"]
+    error: Float[np.ndarray, "search"]
+    """Metres, mean over the joints."""
+    sure: Bool[np.ndarray, "search"]
+    right: Bool[np.ndarray, "search"]
+    bins: Sequence[tuple[int, int]]
+    """The first search of each bin and the one after its last."""
+    limit: float
+    """Metres, above which a pose is wrong."""
+
+
+def reliability_chart(found: Reliability) -> bytes:
+    """Errors over confidence, and the share of right poses in bins of confidence."""
+    figure = _figure(8.4, 3.6)
+    errors, shares = figure.subplots(1, 2)
+    confidence = np.maximum(found.confidence, 1e-4)  # the axis is logarithmic
+    for chosen, marker, label in ((found.sure, "o", "sure"), (~found.sure, "x", "not sure")):
+        for right, color in ((True, INK), (False, WRONG)):
+            those = chosen & (found.right == right)
+            words = f"{label}, {'right' if right else 'wrong'}: {int(those.sum())}"
+            errors.plot(confidence[those], MM * found.error[those], marker, color=color, markersize=4, label=words)
+    errors.axhline(MM * found.limit, color=REFERENCE, linewidth=0.8, linestyle="--")
+    errors.set(xscale="log", yscale="log", xlabel="confidence", ylabel="mean joint error, mm")
+    middles = [float(np.median(confidence[first:stop])) for first, stop in found.bins]
+    right = [float(found.right[first:stop].mean()) for first, stop in found.bins]
+    shares.plot(middles, right, "o-", color=INK, markersize=4)
+    for middle, share, (first, stop) in zip(middles, right, found.bins, strict=True):
+        shares.annotate(f"{stop - first}", (middle, share), xytext=(0, 5), textcoords="offset points", fontsize=6)
+    shares.set(xscale="log", ylim=(0.0, 1.08), xlabel="confidence (median of a bin)", ylabel="share of right poses")
+    _grid(errors, "both", legend=True)
+    _grid(shares, "both")
+    return _png(figure)
+
+
+def _grid(axes: "Axes", which: str = "y", legend: bool = False) -> None:
+    axes.grid(axis=which, color="#e4e4e4")  # pyright: ignore[reportArgumentType]
+    if legend:
+        axes.legend(fontsize=7, frameon=False)
+
+
+def _figure(width: float, height: float) -> "Figure":
+    """An empty figure of a size in inches, which needs no display."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
     with rc_context({"font.size": 8}):
-        return Figure(figsize=size, dpi=_DPI, layout="constrained")
+        return Figure(figsize=(width, height), dpi=DPI, layout="constrained")
 
 
-def png_of(figure: Any) -> bytes:
-    """The picture of a figure."""
+def _png(figure: "Figure") -> bytes:
     stream = io.BytesIO()
     figure.savefig(stream, format="png")
     return stream.getvalue()

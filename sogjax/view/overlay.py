@@ -10,33 +10,29 @@ from jaxtyping import Bool, Float, Int, UInt8
 from sogjax.errors import InputError
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.io.motion import Motion
-from sogjax.view.bones import Bones, actor_palette, blob_palette, bones_from_motion, doubtful_edges
+from sogjax.view.bones import Bones, actor_palette, bones_from_motion, doubtful_edges
 from sogjax.view.projection import picture_points
-from sogjax.view.tiles import Fit, grid_for, shrink
+from sogjax.view.tiles import Fit, grid_for, shrink, write_label
 
-SUBPIXEL_BITS = 4
-DASH, MOST_DASHES = 3.0, 64
-"""Length of a dash in units of the line's width; how many a line has at most, wherever it goes."""
-Point = tuple[int, int]
-Color = tuple[int, int, int]
 WIDTH = 1920
-"""Pixels; the grid's largest width."""
+"""The grid's largest width in pixels."""
+BITS = 4
+"""Fractional bits of OpenCV's fixed-point pixels."""
+Point = tuple[int, int]
 
 
 @dataclass(frozen=True)
-class _Drawing:
+class _Actor:
     """One actor, projected into all cameras."""
 
     row_of: dict[int, int]
     """The motion's row by frame."""
     bones: Bones
     pixels: Float[np.ndarray, "camera frame point 2"]
+    """Pixels of the tiles."""
     colors: UInt8[np.ndarray, "3 3"]
     doubtful: Bool[np.ndarray, "frame edge"]
     """Which bones belong to a limb in doubt."""
-    blob_pixels: Float[np.ndarray, "camera frame blob 2"] | None
-    blob_radii: Float[np.ndarray, "camera frame blob"] | None
-    blob_colors: UInt8[np.ndarray, "blob 3"]
 
 
 class Overlay:
@@ -47,8 +43,6 @@ class Overlay:
         motions: one for each actor.
         cameras: the names of those to show, in this order; default all.
         width: largest width of the grid in pixels.
-        columns: tiles in a row; default as suits a wide screen.
-        blobs: draw the blobs too, as circles of radius sigma.
         bones: the lines of each actor; default those of its motion.
 
     Raises:
@@ -62,8 +56,6 @@ class Overlay:
         *,
         cameras: Sequence[str] | None = None,
         width: int = WIDTH,
-        columns: int | None = None,
-        blobs: bool = False,
         bones: Sequence[Bones] | None = None,
     ) -> None:
         names = tuple(rig.names if cameras is None else cameras)
@@ -74,11 +66,11 @@ class Overlay:
         self.shown = [rig.names.index(name) for name in names]
         chosen = rig.select(names)
         sizes = [chosen.image_size(name) for name in names]
-        self.grid = grid_for(sizes, width, columns)
+        self.grid = grid_for(sizes, width)
         self.fits = [self.grid.fit(k, size) for k, size in enumerate(sizes)]
         lines = [bones_from_motion(motion) for motion in motions] if bones is None else bones
-        self.drawings = [
-            _drawing(chosen, self.fits, motion, lines[actor], actor, blobs) for actor, motion in enumerate(motions)
+        self.actors = [
+            _projected(chosen, self.fits, motion, lines[number], number) for number, motion in enumerate(motions)
         ]
 
     def tile(self, camera: int, image: np.ndarray) -> np.ndarray:
@@ -98,13 +90,10 @@ class Overlay:
         width, height = self.grid.size
         canvas = np.zeros((height, width, 3), np.uint8)
         for k, (camera, fit) in enumerate(zip(self.shown, self.fits, strict=True)):
-            image = images[camera]
-            if image is not None:
-                fit.place(canvas, image)
-            area = canvas[fit.top : fit.top + fit.height, fit.left : fit.left + fit.width]
-            for drawing in self.drawings:
-                if frame in drawing.row_of:
-                    _draw_actor(area, drawing, k, drawing.row_of[frame])
+            area = fit.area(canvas, images[camera])
+            for actor in self.actors:
+                if frame in actor.row_of:
+                    _draw_actor(area, actor, k, actor.row_of[frame])
             write_label(area, self.names[k], (6, 14))
         write_label(canvas, f"frame {frame}", (6, height - 8))
         return canvas
@@ -118,99 +107,60 @@ def overlay_frame(
     *,
     cameras: Sequence[str] | None = None,
     width: int = WIDTH,
-    columns: int | None = None,
-    blobs: bool = False,
 ) -> UInt8[np.ndarray, "h w 3"]:
     """One grid (BGR); see `Overlay`, which is faster for several frames."""
-    overlay = Overlay(rig, motions, cameras=cameras, width=width, columns=columns, blobs=blobs)
-    return overlay.draw(images, frame)
+    return Overlay(rig, motions, cameras=cameras, width=width).draw(images, frame)
 
 
-def _drawing(rig: CameraRig, fits: list[Fit], motion: Motion, bones: Bones, actor: int, blobs: bool) -> _Drawing:
+def _projected(rig: CameraRig, fits: list[Fit], motion: Motion, bones: Bones, number: int) -> _Actor:
     """Project an actor, and scale to the tiles."""
     pixels, _ = picture_points(rig, bones.points(motion))
-    blob_pixels = blob_radii = None
-    if blobs:
-        blob_pixels, depths = picture_points(rig, motion.blob_means.astype(np.float32))
-        focal = np.asarray(rig.cameras.focal_length, np.float32)[:, None, None]
-        scale = np.array([fit.scale_x for fit in fits], np.float32)[:, None, None]
-        blob_radii = scale * focal * motion.blob_sigma.astype(np.float32) / np.maximum(depths, 1e-3)
-        blob_pixels = _in_tiles(fits, blob_pixels)
-    return _Drawing(
+    return _Actor(
         row_of={int(frame): row for row, frame in enumerate(motion.frame)},
         bones=bones,
-        pixels=_in_tiles(fits, pixels),
-        colors=actor_palette(actor),
+        pixels=np.stack([fit.pixels(part) for fit, part in zip(fits, pixels, strict=True)]),
+        colors=actor_palette(number),
         doubtful=doubtful_edges(motion, bones),
-        blob_pixels=blob_pixels,
-        blob_radii=blob_radii,
-        blob_colors=blob_palette(motion, actor),
     )
 
 
-def _in_tiles(
-    fits: list[Fit], pixels: Float[np.ndarray, "camera frame point 2"]
-) -> Float[np.ndarray, "camera frame point 2"]:
-    return np.stack([fit.pixels(part) for fit, part in zip(fits, pixels, strict=True)])
-
-
-def _draw_actor(area: np.ndarray, drawing: _Drawing, camera: int, row: int) -> None:
+def _draw_actor(area: np.ndarray, actor: _Actor, camera: int, row: int) -> None:
     thick = max(1, round(area.shape[0] / 200))
-    if drawing.blob_pixels is not None and drawing.blob_radii is not None:
-        _draw_blobs(area, drawing.blob_pixels[camera, row], drawing.blob_radii[camera, row], drawing.blob_colors)
-    seen, points = _fixed_point(drawing.pixels[camera, row])
-    lines = zip(drawing.bones.edges, drawing.bones.sides, drawing.doubtful[row], strict=True)
-    for (a, b), side, doubtful in lines:
-        if seen[a] and seen[b]:
+    points = _fixed_points(actor.pixels[camera, row])
+    for (a, b), side, doubtful in zip(actor.bones.edges, actor.bones.sides, actor.doubtful[row], strict=True):
+        if a in points and b in points:
             draw = _dashed_line if doubtful else _line
-            draw(area, points[a], points[b], _bgr(drawing.colors[side]), thick)
-    radius = int((0.5 * thick + 1.0) * 2**SUBPIXEL_BITS)
-    for k in range(drawing.bones.num_joints):
-        if seen[k]:
-            cv2.circle(area, points[k], radius, (255, 255, 255), -1, cv2.LINE_AA, SUBPIXEL_BITS)
+            draw(area, points[a], points[b], _bgr(actor.colors[side]), thick)
+    radius = int((0.5 * thick + 1.0) * 2**BITS)
+    for k, point in points.items():
+        if k < actor.bones.num_joints:
+            cv2.circle(area, point, radius, (255, 255, 255), -1, cv2.LINE_AA, BITS)
 
 
-def _line(area: np.ndarray, a: Point, b: Point, color: Color, thick: int) -> None:
-    cv2.line(area, a, b, color, thick, cv2.LINE_AA, SUBPIXEL_BITS)
+def _line(area: np.ndarray, a: Point, b: Point, color: tuple[int, int, int], thick: int) -> None:
+    cv2.line(area, a, b, color, thick, cv2.LINE_AA, BITS)
 
 
-def _dashed_line(area: np.ndarray, a: Point, b: Point, color: Color, thick: int) -> None:
-    """Dashes on a black line, which differ from a limb that is not in doubt by their shape, too."""
+def _dashed_line(area: np.ndarray, a: Point, b: Point, color: tuple[int, int, int], thick: int) -> None:
+    """Dashes on a black line, which differ from a limb that is not in doubt by their shape, too.
+
+    They are 3 widths long; a line has 64 at most, wherever it goes.
+    """
     _line(area, a, b, (0, 0, 0), thick + 2)
     start, along = np.array(a, float), np.array(b, float) - np.array(a, float)
-    count = max(1, round(float(np.hypot(*along)) / (2.0 * DASH * thick * 2**SUBPIXEL_BITS)))
-    for k in range(min(count, MOST_DASHES)):
+    count = max(1, round(float(np.hypot(*along)) / (6.0 * thick * 2**BITS)))
+    for k in range(min(count, 64)):
         begin, end = (np.rint(start + (k + part) / count * along).astype(int) for part in (0.0, 0.5))
         _line(area, (int(begin[0]), int(begin[1])), (int(end[0]), int(end[1])), color, thick)
 
 
-def _draw_blobs(
-    area: np.ndarray,
-    pixels: Float[np.ndarray, "blob 2"],
-    radii: Float[np.ndarray, "blob"],
-    colors: UInt8[np.ndarray, "blob 3"],
-) -> None:
-    seen, points = _fixed_point(pixels)
-    for k in np.flatnonzero(seen):
-        radius = int(min(float(radii[k]), 4096.0) * 2**SUBPIXEL_BITS)
-        cv2.circle(area, points[k], radius, _bgr(colors[k]), 1, cv2.LINE_AA, SUBPIXEL_BITS)
-
-
-def _fixed_point(
-    pixels: Float[np.ndarray, "point 2"],
-) -> tuple[np.ndarray, list[tuple[int, int]]]:
-    """Which points are finite, and all as OpenCV's fixed-point numbers."""
-    seen = ~np.isnan(pixels.sum(axis=1))
-    fixed: Int[np.ndarray, "point 2"] = np.rint(np.where(seen[:, None], pixels, 0) * 2**SUBPIXEL_BITS).astype(int)
-    return seen, [(int(x), int(y)) for x, y in fixed]
+def _fixed_points(pixels: Float[np.ndarray, "point 2"]) -> dict[int, Point]:
+    """The points that are finite, by their numbers, as OpenCV's fixed-point numbers."""
+    seen = np.flatnonzero(~np.isnan(pixels.sum(axis=1)))
+    fixed: Int[np.ndarray, "seen 2"] = np.rint(pixels[seen] * 2**BITS).astype(int)
+    return {int(k): (int(x), int(y)) for k, (x, y) in zip(seen, fixed, strict=True)}
 
 
 def _bgr(rgb: UInt8[np.ndarray, "3"]) -> tuple[int, int, int]:
     red, green, blue = (int(value) for value in rgb)
     return blue, green, red
-
-
-def write_label(area: np.ndarray, text: str, corner: tuple[int, int]) -> None:
-    """Small white text on a dark rim, readable on any picture."""
-    for color, thick in (((0, 0, 0), 3), ((255, 255, 255), 1)):
-        cv2.putText(area, text, corner, cv2.FONT_HERSHEY_SIMPLEX, 0.42, color, thick, cv2.LINE_AA)

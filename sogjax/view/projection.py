@@ -1,9 +1,4 @@
-"""Which frames of a recording a view shows.
-
-Points of whole motions in the pictures of all cameras, lens distortion included.
-
-Cameras as a viewer without lens distortion needs them.
-"""
+"""Points of the world in the pictures of a recording's cameras, as recorded and freed of lens distortion."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,26 +18,8 @@ from sogjax.io.recording import Recording
 from sogjax.model.camera import NEAR, Camera, distort, near_picture, project_points
 from sogjax.view.tiles import shrink
 
-
-def frame_range(recording: Recording, motions: Sequence[Motion]) -> tuple[int, int]:
-    """[first, stop) of the frames from the motions' first to their last, by the recording's own numbers.
-
-    Raises:
-        InputError: the recording does not have them all.
-    """
-    first = min(int(motion.frame[0]) for motion in motions)
-    stop = max(int(motion.frame[-1]) for motion in motions) + 1
-    end = recording.first_frame + recording.num_frames
-    if first < recording.first_frame or stop > end:
-        raise InputError(
-            f"{recording.path}: the motion has frames {first} to {stop - 1}, the recording "
-            f"{recording.first_frame} to {end - 1}; give the recording that was tracked"
-        )
-    return first, stop
-
-
 POINTS_AT_ONCE = 8192
-"""Every motion is projected in blocks of this size, so that the projection is compiled once for a rig."""
+"""Motions are projected in blocks of this size, so that the projection is compiled once for a rig."""
 
 
 def picture_points(
@@ -114,12 +91,12 @@ class PictureCamera:
     maps: tuple[np.ndarray, np.ndarray] | None
     """For `cv2.remap` of the smaller picture; None without distortion."""
 
-    def jpeg(self, image: UInt8[np.ndarray, "h w 3"], quality: int) -> bytes:
+    def jpeg(self, image: UInt8[np.ndarray, "h w 3"]) -> bytes:
         """A picture (BGR) as recorded, made smaller and freed of distortion."""
         small = shrink(image, self.size)
         if self.maps is not None:
             small = cv2.remap(small, *self.maps, cv2.INTER_LINEAR)
-        return cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
+        return cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, 80])[1].tobytes()
 
     def pixels(self, pixels: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
         """Undistorted pixels of the picture as recorded, as pixels of the small one."""
@@ -147,3 +124,20 @@ def picture_camera(rig: CameraRig, name: str, picture_width: int) -> PictureCame
         maps = (x, y)
     pose = np.linalg.inv(np.array(camera.camera_from_world, float))
     return PictureCamera(name, matrix, pose, scale, size, maps)
+
+
+def frame_range(recording: Recording, motions: Sequence[Motion]) -> tuple[int, int]:
+    """[first, stop) of the frames from the motions' first to their last, by the recording's own numbers.
+
+    Raises:
+        InputError: the recording does not have them all.
+    """
+    first = min(int(motion.frame[0]) for motion in motions)
+    stop = max(int(motion.frame[-1]) for motion in motions) + 1
+    end = recording.first_frame + recording.num_frames
+    if first < recording.first_frame or stop > end:
+        raise InputError(
+            f"{recording.path}: the motion has frames {first} to {stop - 1}, the recording "
+            f"{recording.first_frame} to {end - 1}; give the recording that was tracked"
+        )
+    return first, stop

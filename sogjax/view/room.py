@@ -1,4 +1,4 @@
-"""The calibration drawn into the pictures: floor grid, axes and the other cameras' frusta."""
+"""The calibration drawn into the pictures: floor grid, axes, a person's size and the other cameras' frusta."""
 
 from collections.abc import Sequence
 
@@ -9,18 +9,11 @@ from jaxtyping import Float, UInt8
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.model.rotation import world_from_upright
 from sogjax.view.projection import picture_points
-from sogjax.view.sheets import TITLE_HEIGHT, WIDTH, write
-from sogjax.view.tiles import grid_for
+from sogjax.view.tiles import TITLE_HEIGHT, titled_grid, write_label
 
-GRID, FRUSTUM, FIGURE = (235, 235, 120), (80, 170, 255), (80, 220, 60)
+FLOOR, FRUSTUM, FIGURE = (235, 235, 120), (80, 170, 255), (80, 220, 60)
 AXES = ((60, 60, 235), (60, 200, 60), (235, 110, 60))
 """BGR of the world's x, y and z axis."""
-CELLS = 8
-"""Of the floor grid, along each side; a cell is one metre wide where the set-up is of usual size."""
-PIECES = 48
-"""Points along a line: what is outside of a picture, or bent by a lens, is drawn piece by piece."""
-FRUSTUM_DEPTH = 0.12
-"""In units of the distance between cameras and what they look at."""
 
 Line = Float[np.ndarray, "2 3"]
 
@@ -45,54 +38,50 @@ def room_sheet(
         title: written above the pictures.
     """
     sizes = [rig.image_size(name) for name in rig.names]
-    grid = grid_for(sizes, WIDTH)
-    columns, rows = grid.size
-    canvas = np.zeros((TITLE_HEIGHT + rows, columns, 3), np.uint8)
-    cell = 10.0 ** round(np.log10(0.25 / metre))
-    lines, colors, owners = _drawing(rig, up, target, cell * metre, metre)
-    points = _cut(np.stack(lines))
-    pixels, _ = picture_points(rig, points)
-    names, _ = picture_points(rig, _centres(rig)[None])
+    cell = 10.0 ** round(np.log10(0.25 / metre))  # a metre where the set-up is of usual size
+    legend = f"floor cells of {cell:g} m; axes x red, y green, z blue; figure of 1.7 m"
+    grid, canvas = titled_grid(sizes, f"{title}; {legend}")
+    lines, colors, owners = zip(*_lines(rig, up, target, cell * metre, metre), strict=True)
+    # what is outside of a picture, or bent by a lens, is drawn piece by piece
+    shares = np.linspace(0.0, 1.0, 48)[None, :, None]
+    ends = np.stack(lines)
+    pixels, _ = picture_points(rig, ends[:, :1] * (1.0 - shares) + ends[:, 1:] * shares)
+    names, _ = picture_points(rig, np.linalg.inv(_poses(rig))[None, :, :3, 3])
     for k, (image, size) in enumerate(zip(images, sizes, strict=True)):
         fit = grid.fit(k, size)
-        area = fit.place(canvas[TITLE_HEIGHT:], image)
-        _dim(area)
+        area = fit.area(canvas[TITLE_HEIGHT:], image)
+        area[:] = (0.75 * area).astype(np.uint8)  # so that thin lines are visible
         for piece, color, owner in zip(fit.pixels(pixels[k]), colors, owners, strict=True):
             if owner != k:
                 _polyline(area, piece, color)
-        for other, place in enumerate(fit.pixels(names[k, 0])):
-            if other != k and np.isfinite(place).all() and _inside(place, area):
-                write(area, rig.names[other], (int(place[0]) + 4, int(place[1]) - 4))
-        write(area, rig.names[k], (6, 16))
-    write(canvas, f"{title}; floor cells of {cell:g} m; axes x red, y green, z blue; figure of 1.7 m", (6, 18))
+        for other, (x, y) in enumerate(fit.pixels(names[k, 0])):
+            if other != k and 0 <= x < area.shape[1] and 0 <= y < area.shape[0]:
+                write_label(area, rig.names[other], (int(x) + 4, int(y) - 4))
+        write_label(area, rig.names[k], (6, 16))
     return canvas
 
 
-def _drawing(
+def _poses(rig: CameraRig) -> Float[np.ndarray, "camera 4 4"]:
+    return np.asarray(rig.cameras.camera_from_world, float)
+
+
+def _lines(
     rig: CameraRig, up: str, target: np.ndarray, cell: float, metre: float
-) -> tuple[list[Line], list[tuple[int, int, int]], list[int]]:
+) -> list[tuple[Line, tuple[int, int, int], int]]:
     """Lines in the world, their colours, and the camera whose frustum they are of, -1 for none."""
-    world = world_from_upright(up)
-    middle = np.round((world.T @ target) / cell) * cell
-    floor = [line @ world.T for line in _grid(middle[:2], cell)]
-    axes = [np.stack([np.zeros(3), cell * axis]) for axis in np.eye(3)]
-    figure = [line @ world.T for line in _figure((world.T @ target)[:2], metre)]
-    drawn = [
-        (floor, GRID, -1),
-        (figure, FIGURE, -1),
-        *(([axis], color, -1) for axis, color in zip(axes, AXES, strict=True)),
-    ]
-    drawn += [(_frustum(rig, k, FRUSTUM_DEPTH), FRUSTUM, k) for k in range(len(rig))]
-    lines = [line for part, _, _ in drawn for line in part]
-    colors = [color for part, color, _ in drawn for _ in part]
-    return lines, colors, [owner for part, _, owner in drawn for _ in part]
+    upright = world_from_upright(up)
+    below = upright.T @ target
+    floor = [(line @ upright.T, FLOOR, -1) for line in _grid(np.round(below / cell)[:2] * cell, cell)]
+    figure = [(line @ upright.T, FIGURE, -1) for line in _figure(below[:2], metre)]
+    axes = [(np.stack([np.zeros(3), cell * axis]), color, -1) for axis, color in zip(np.eye(3), AXES, strict=True)]
+    frusta = [(line, FRUSTUM, camera) for camera in range(len(rig)) for line in _frustum(rig, camera)]
+    return [*floor, *figure, *axes, *frusta]
 
 
 def _grid(middle: Float[np.ndarray, "2"], cell: float) -> list[Line]:
-    """Lines on the floor of the upright frame."""
-    half = CELLS / 2 * cell
-    lines = []
-    for step in np.linspace(-half, half, CELLS + 1):
+    """Lines on the floor of the upright frame, eight cells along each side."""
+    half, lines = 4 * cell, []
+    for step in np.linspace(-half, half, 9):
         lines.append(np.array([[middle[0] + step, middle[1] - half, 0], [middle[0] + step, middle[1] + half, 0]]))
         lines.append(np.array([[middle[0] - half, middle[1] + step, 0], [middle[0] + half, middle[1] + step, 0]]))
     return lines
@@ -107,25 +96,16 @@ def _figure(place: Float[np.ndarray, "2"], metre: float) -> list[Line]:
     return [np.stack([points[a], points[b]]) for a, b in bones]
 
 
-def _frustum(rig: CameraRig, camera: int, depth: float) -> list[Line]:
-    """The edges of a camera's field of view, from its place to `depth` metres."""
+def _frustum(rig: CameraRig, camera: int) -> list[Line]:
+    """The edges of a camera's field of view, up to 0.12 of the distance to what it looks at."""
     matrix = np.asarray(rig.cameras.intrinsics, float)[camera]
     width, height = rig.image_size(rig.names[camera])
-    pose = np.linalg.inv(np.asarray(rig.cameras.camera_from_world, float)[camera])
+    pose = np.linalg.inv(_poses(rig)[camera])
     corners = np.array([[-0.5, -0.5], [width - 0.5, -0.5], [width - 0.5, height - 0.5], [-0.5, height - 0.5]])
     plane = (corners - matrix[:2, 2]) / np.array([matrix[0, 0], matrix[1, 1]])
-    far = depth * np.concatenate([plane, np.ones((4, 1))], axis=1) @ pose[:3, :3].T + pose[:3, 3]
+    far = 0.12 * np.concatenate([plane, np.ones((4, 1))], axis=1) @ pose[:3, :3].T + pose[:3, 3]
     edges = [np.stack([pose[:3, 3], corner]) for corner in far]
     return edges + [np.stack([far[k], far[(k + 1) % 4]]) for k in range(4)]
-
-
-def _centres(rig: CameraRig) -> Float[np.ndarray, "camera 3"]:
-    return np.linalg.inv(np.asarray(rig.cameras.camera_from_world, float))[:, :3, 3]
-
-
-def _cut(lines: Float[np.ndarray, "line 2 3"]) -> Float[np.ndarray, "line point 3"]:
-    shares = np.linspace(0.0, 1.0, PIECES)[None, :, None]
-    return lines[:, :1] * (1.0 - shares) + lines[:, 1:] * shares
 
 
 def _polyline(area: np.ndarray, pixels: Float[np.ndarray, "point 2"], color: tuple[int, int, int]) -> None:
@@ -133,12 +113,3 @@ def _polyline(area: np.ndarray, pixels: Float[np.ndarray, "point 2"], color: tup
     seen = ~np.isnan(pixels.sum(axis=1))
     for k in np.flatnonzero(seen[:-1] & seen[1:]):
         cv2.line(area, tuple(places[k]), tuple(places[k + 1]), color, 1, cv2.LINE_AA)
-
-
-def _dim(area: np.ndarray) -> None:
-    """A little darker, so that thin lines are visible."""
-    area[:] = (0.75 * area).astype(np.uint8)
-
-
-def _inside(place: np.ndarray, area: np.ndarray) -> bool:
-    return bool(0 <= place[0] < area.shape[1] and 0 <= place[1] < area.shape[0])

@@ -1,9 +1,4 @@
-"""Contact sheets: the pictures of all cameras with their masks, side by side.
-
-A sheet of one camera's background: what it is, how far it varies, where it is unknown, and what stands before it.
-
-Silhouettes of a body over the masks of all cameras, cut to the subject.
-"""
+"""Sheets of pictures: the background of a camera, the silhouettes of an estimated body, and the body itself."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,81 +7,25 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from sogjax.view.tiles import grid_for
+from sogjax.view.tiles import RED, Tile, contact_sheet
 
-WIDTH = 1600
-"""Pixels; the sheet's largest width."""
-TITLE_HEIGHT = 26
-TINT = 0.45
-"""Part of a tinted pixel that is the tint."""
-GREEN, RED, WHITE = (80, 220, 60), (60, 60, 235), (255, 255, 255)
+Picture = UInt8[np.ndarray, "_h _w 3"]
 """BGR."""
-
-
-@dataclass(frozen=True)
-class Tile:
-    """One camera's picture with regions painted over it."""
-
-    image: UInt8[np.ndarray, "_h _w 3"]
-    """BGR."""
-    regions: Sequence[tuple[Bool[np.ndarray, "_h _w"], tuple[int, int, int]]]
-    """What to paint, with its colour (BGR); later ones over earlier ones."""
-    text: str
-    outlined: bool = True
-
-
-def contact_sheet(tiles: Sequence[Tile], title: str, width: int = WIDTH) -> UInt8[np.ndarray, "h w 3"]:
-    """All tiles in a grid (BGR), each with its text, below a title."""
-    sizes = [(tile.image.shape[1], tile.image.shape[0]) for tile in tiles]
-    grid = grid_for(sizes, width)
-    columns, rows = grid.size
-    canvas = np.zeros((TITLE_HEIGHT + rows, columns, 3), np.uint8)
-    for k, (tile, size) in enumerate(zip(tiles, sizes, strict=True)):
-        area = grid.fit(k, size).place(canvas[TITLE_HEIGHT:], tile.image)
-        for region, color in tile.regions:
-            _paint(area, region, color, tile.outlined)
-        write(area, tile.text, (6, 16))
-    write(canvas, title, (6, 18))
-    return canvas
-
-
-def write(area: np.ndarray, text: str, corner: tuple[int, int]) -> None:
-    """Small white text on a dark rim, readable on any picture."""
-    for color, thick in (((0, 0, 0), 3), (WHITE, 1)):
-        cv2.putText(area, text, corner, cv2.FONT_HERSHEY_SIMPLEX, 0.45, color, thick, cv2.LINE_AA)
-
-
-def _paint(
-    area: UInt8[np.ndarray, "y x 3"], region: Bool[np.ndarray, "_h _w"], color: tuple[int, int, int], outlined: bool
-) -> None:
-    size = (area.shape[1], area.shape[0])
-    inside = cv2.resize(region.astype(np.float32), size, interpolation=cv2.INTER_AREA) > 0.5
-    tinted = (1.0 - TINT) * area[inside] + TINT * np.array(color, np.float32)
-    area[inside] = np.rint(tinted).astype(np.uint8)
-    if outlined:
-        outlines, _ = cv2.findContours(inside.astype(np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
-        cv2.drawContours(area, outlines, -1, color, 1)
-
-
-WIDEST = 20.0
-"""Grey levels of spread that are shown white."""
-
-Frame = tuple[UInt8[np.ndarray, "_h _w 3"], Float[np.ndarray, "_rows _columns"]]
-"""A picture (BGR) and the probability of foreground."""
 
 
 def background_sheet(
     title: str,
-    picture: UInt8[np.ndarray, "_h _w 3"],
+    picture: Picture,
     spread: Float[np.ndarray, "_h _w"],
     known: Bool[np.ndarray, "_h _w"],
-    frames: Mapping[int, Frame],
+    frames: Mapping[int, tuple[Picture, Float[np.ndarray, "_rows _columns"]]],
 ) -> UInt8[np.ndarray, "h w 3"]:
-    """The sheet (BGR): background with what is unknown in red, spread, then each frame beside its foreground."""
+    """A camera's background, red where it is unknown, its spread, and frames beside their probability of foreground."""
+    white = 20.0
     share = f"{float(1.0 - known.mean()):.1%} unknown"
     tiles = [
         Tile(picture, [(~known, RED)], f"background, {share}"),
-        Tile(_grey(spread / WIDEST), [], f"spread, white: {WIDEST:g} grey levels or more"),
+        Tile(_grey(spread / white), [], f"spread, white: {white:g} grey levels or more"),
     ]
     for number, (image, probability) in frames.items():
         tiles.append(Tile(image, [], f"frame {number}"))
@@ -94,7 +33,7 @@ def background_sheet(
     return contact_sheet(tiles, title)
 
 
-def _grey(values: Float[np.ndarray, "_h _w"]) -> UInt8[np.ndarray, "_h _w 3"]:
+def _grey(values: Float[np.ndarray, "_h _w"]) -> Picture:
     levels = np.rint(255.0 * np.clip(values, 0.0, 1.0)).astype(np.uint8)
     return cv2.cvtColor(levels, cv2.COLOR_GRAY2BGR)
 
@@ -102,10 +41,8 @@ def _grey(values: Float[np.ndarray, "_h _w"]) -> UInt8[np.ndarray, "_h _w 3"]:
 BOTH, ONLY_MASK, ONLY_BODY = (70, 200, 70), (230, 120, 40), (50, 50, 240)
 """BGR: green, blue, red."""
 LEGEND = "green: both, blue: only the mask, red: only the body"
-BORDER = 0.08
-"""Border around the subject, as a part of its size."""
 TILE = 320
-"""Pixels; the side of one camera's tile."""
+"""Side of one camera's tile in pixels."""
 
 
 @dataclass(frozen=True)
@@ -114,43 +51,75 @@ class SilhouetteView:
 
     camera: str
     iou: float
-    image: UInt8[np.ndarray, "_h _w 3"]
-    """BGR."""
+    image: Picture
     mask: Bool[np.ndarray, "rows columns"]
     silhouette: Bool[np.ndarray, "rows columns"]
 
 
 def silhouette_sheet(views: Sequence[SilhouetteView], title: str) -> UInt8[np.ndarray, "h w 3"]:
-    """One tile per camera (BGR), with its IoU, below a title and a legend."""
-    tiles = [_tile(view) for view in views]
-    return contact_sheet(tiles, f"{title} ({LEGEND})")
+    """Silhouettes of a body over the masks of all cameras (BGR), cut to the subject, each with its IoU."""
+    return contact_sheet([_silhouette_tile(view) for view in views], f"{title} ({LEGEND})")
 
 
-def _tile(view: SilhouetteView) -> Tile:
+def _silhouette_tile(view: SilhouetteView) -> Tile:
+    """The subject with a border of 8 % of its size."""
     both = view.mask | view.silhouette
     rows, columns = np.nonzero(both) if both.any() else np.nonzero(np.ones_like(both))
-    side = int((1.0 + 2.0 * BORDER) * (1 + max(np.ptp(rows), np.ptp(columns))))
+    side = int(1.16 * (1 + max(np.ptp(rows), np.ptp(columns))))
     corner = ((rows.min() + rows.max() - side) / 2, (columns.min() + columns.max() - side) / 2)
     cut = lambda picture: _square(picture, both.shape, corner, side)
     mask, silhouette = (cut(part.astype(np.float32)) > 0.5 for part in (view.mask, view.silhouette))
     regions = [(mask & silhouette, BOTH), (mask & ~silhouette, ONLY_MASK), (silhouette & ~mask, ONLY_BODY)]
-    return Tile(_faded(cut(view.image)), regions, f"{view.camera}: {view.iou:.2f}", outlined=False)
-
-
-def _faded(image: UInt8[np.ndarray, "y x 3"]) -> UInt8[np.ndarray, "y x 3"]:
-    """Grey and dim, so that the regions' colours stand out."""
-    return cv2.cvtColor(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) // 2, cv2.COLOR_GRAY2BGR)
+    dim = cv2.cvtColor(cv2.cvtColor(cut(view.image), cv2.COLOR_BGR2GRAY) // 2, cv2.COLOR_GRAY2BGR)
+    return Tile(dim, regions, f"{view.camera}: {view.iou:.2f}", outlined=False)
 
 
 def _square(picture: np.ndarray, shape: tuple[int, ...], corner: tuple[float, float], side: int) -> np.ndarray:
     """A square of a picture, at the size of a tile; `corner` and `side` count pixels of pictures of `shape`."""
-    down, across = picture.shape[0] / shape[0], picture.shape[1] / shape[1]
+    scale = np.array([picture.shape[1] / shape[1], picture.shape[0] / shape[0]])
     step = side / TILE
     # a tile's pixel centres in the picture; (0, 0) is the centre of the first pixel in both
-    matrix = np.array(
-        [
-            [across * step, 0.0, across * (corner[1] + 0.5 * step) - 0.5],
-            [0.0, down * step, down * (corner[0] + 0.5 * step) - 0.5],
-        ]
-    )
+    matrix = np.column_stack([np.diag(scale * step), scale * (np.array(corner[::-1]) + 0.5 * step) - 0.5])
     return cv2.warpAffine(picture, matrix, (TILE, TILE), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
+
+
+HEIGHT, BORDER = 640, 24
+"""Height and border of a body's picture in pixels."""
+BACKGROUND = (120, 120, 120)
+"""BGR."""
+DISC = 1.1774
+"""Radius of a disc in units of sigma: where a Gaussian has fallen to a half."""
+
+
+def body_picture(
+    means: Float[np.ndarray, "blob 3"], sigmas: Float[np.ndarray, "blob"], colors: Float[np.ndarray, "blob 3"]
+) -> UInt8[np.ndarray, "h w 3"]:
+    """A body as coloured discs (BGR), from the front and from its left side.
+
+    Args:
+        means: of the blobs in the body's own frame, x forward, y left, z up; metres.
+        sigmas: metres.
+        colors: sRGB in 0..1.
+    """
+    low, high = (means - DISC * sigmas[:, None]).min(axis=0), (means + DISC * sigmas[:, None]).max(axis=0)
+    scale = (HEIGHT - 2 * BORDER) / max(float(high[2] - low[2]), 1e-3)
+    below = scale * (high[2] - means[:, 2])
+    # right and towards the viewer: seen from the front, the body's left is on the right
+    sides = [(means[:, 1], means[:, 0]), (-means[:, 0], means[:, 1])]
+    return np.hstack([_discs(scale * right, below, scale * DISC * sigmas, colors, towards) for right, towards in sides])
+
+
+def _discs(
+    right: np.ndarray, below: np.ndarray, radii: np.ndarray, colors: np.ndarray, towards: np.ndarray
+) -> UInt8[np.ndarray, "h w 3"]:
+    """Discs with dark rims, places and radii in pixels, those nearer to the viewer over the others."""
+    left = (right - radii).min()
+    canvas = np.full((HEIGHT, round(float((right + radii).max() - left)) + 2 * BORDER, 3), BACKGROUND, np.uint8)
+    bits = 4  # OpenCV's fixed-point numbers
+    fixed = lambda value: round(float(value) * 2**bits)
+    for k in np.argsort(towards):
+        centre = (fixed(BORDER + right[k] - left), fixed(BORDER + below[k]))
+        blue, green, red = (round(float(255 * np.clip(value, 0.0, 1.0))) for value in colors[k, ::-1])
+        cv2.circle(canvas, centre, fixed(radii[k]), (blue, green, red), -1, cv2.LINE_AA, bits)
+        cv2.circle(canvas, centre, fixed(radii[k]), (40, 40, 40), 1, cv2.LINE_AA, bits)
+    return canvas

@@ -13,14 +13,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import UInt8
 
 from sogjax.errors import InputError
 from sogjax.io.files import atomic_path
 from sogjax.io.motion import Motion, load_motion
 from sogjax.run.run_numbers import COLUMNS, OBJECTIVE
 from sogjax.run.terminal import say
-from sogjax.view.plots import plot_per_point, write_png
+from sogjax.view.charts import Bars, bar_chart
 
 MM = 1000.0
 
@@ -150,7 +149,8 @@ def finish_sweep(sweep: Path, members: Sequence[Member]) -> None:
     elif (column := _drawn(members)) is None:
         say("no sweep.png: there is no truth, and the motions have no joints or frames in common")
     else:
-        write_png(sweep / "sweep.png", _chart(members, column))
+        with atomic_path(sweep / "sweep.png") as temporary:
+            temporary.write_bytes(_chart(members, column))
         print(sweep / "sweep.png")
 
 
@@ -165,16 +165,16 @@ def _drawn(members: Sequence[Member]) -> str | None:
     return next((column for column in (OBJECTIVE, APART) if any(np.isfinite(row[column]) for row in rows)), None)
 
 
-def _chart(members: Sequence[Member], column: str) -> UInt8[np.ndarray, "h w 3"]:
-    """A number of the members in millimetres, and which failed."""
+def _chart(members: Sequence[Member], column: str) -> bytes:
+    """The chart (PNG) of a number of the members in millimetres, which also tells which failed."""
     own = _own_words([member.overrides for member in members])
     keys = dict.fromkeys(_setting(word)[0] for words in own for word in words)
     labels = [" ".join(_setting(word)[1] for word in words) or "as configured" for words in own]
     failed = [number for number, member in enumerate(members) if isinstance(member.result, str)]
     rows = [with_distance(member) for member in members]
-    errors = [np.nan if isinstance(row, str) else 1e-3 * row[column] for row in rows]
+    errors = [np.nan if isinstance(row, str) else row[column] for row in rows]
     title = f"{_TITLES[column]} over {', '.join(keys) or 'one run'}"
-    return plot_per_point(np.asarray(errors, float), labels, title, failed=failed)
+    return bar_chart([Bars(title, labels, {"": errors}, failed)], value="mm")
 
 
 def differing(members: Sequence[Sequence[str]]) -> list[str]:

@@ -5,7 +5,7 @@ from sogjax.study.document import Picture, Section
 from sogjax.study.limb_calibration import area_table, calibration_table, limb_curve
 from sogjax.study.limb_trials import PLAIN, JudgedLimb, LimbTrial, LimbTrials
 from sogjax.study.study import Study
-from sogjax.view.limb_chart import limb_chart
+from sogjax.view.charts import limb_chart
 
 
 def limbs_section(study: Study) -> Section:

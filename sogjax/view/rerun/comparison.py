@@ -1,4 +1,4 @@
-"""Several runs of one recording side by side in one Rerun file: each is an entity tree of its own."""
+"""Several runs of one recording, or a solver's iterations in one of its frames, in one Rerun file."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -11,13 +11,11 @@ from sogjax.io.ground_truth import GroundTruth
 from sogjax.io.motion import Motion
 from sogjax.io.recording import Recording
 from sogjax.view.bones import blob_palette, bones_from_motion
-from sogjax.view.projection import PictureCamera, frame_range, picture_camera
+from sogjax.view.projection import frame_range
 from sogjax.view.rerun.curves import log_body_curve_looks, log_curves, own_curves, plots_with
-from sogjax.view.rerun.layout import comparison_layout, eye
-from sogjax.view.rerun.scene import log_actor, log_cameras, log_look, log_markers
-from sogjax.view.rerun.stream import FRAME, TIME, camera_entity, rerun_stream, run_entity
-
-PICTURE_WIDTH = 480
+from sogjax.view.rerun.layout import comparison_layout, iterations_layout
+from sogjax.view.rerun.scene import Scene, log_body, log_look
+from sogjax.view.rerun.stream import ITERATION, rerun_stream, run_entity
 
 
 def write_comparison(
@@ -42,60 +40,63 @@ def write_comparison(
         frames: BGR pictures of all cameras from the first frame of all runs to the last; None: no pictures.
         truth: markers to show beside the bodies.
     """
-    with rerun_stream(Path(path), f"{recording.name}: {len(runs)} runs") as stream:
-        _write(stream, recording, runs, errors or {}, frames, truth)
-
-
-def _write(
-    stream: rr.RecordingStream,
-    recording: Recording,
-    runs: Mapping[str, Sequence[Motion]],
-    errors: Mapping[str, np.ndarray],
-    frames: Iterable[Sequence[np.ndarray]] | None,
-    truth: GroundTruth | None,
-) -> None:
     motions = [motion for actors in runs.values() for motion in actors]
     first, stop = frame_range(recording, motions)
-    cameras = [picture_camera(recording.rig, name, PICTURE_WIDTH) for name in recording.rig.names]
-    lowest = np.min([motion.blob_means.min(axis=(0, 1)) for motion in motions], axis=0)
-    highest = np.max([motion.blob_means.max(axis=(0, 1)) for motion in motions], axis=0)
-    middle = 0.5 * (lowest + highest)
-    log_cameras(stream, recording, cameras, middle)
-    for k, (name, actors) in enumerate(runs.items()):
-        _log_run(stream, name, actors, k, errors.get(name))
-    if frames is not None:
-        _log_pictures(stream, recording, cameras, frames, first)
-    if truth is not None and truth.markers is not None:
-        log_markers(stream, truth, (first, stop))
-    curves = [*own_curves(motions[0]), *(["error_mm"] if errors else [])]
-    view = eye(recording, middle, float(np.linalg.norm(highest - lowest)))
-    stream.send_blueprint(comparison_layout(recording, list(runs), plots_with(curves), view, frames is not None))
+    plots = plots_with([*own_curves(motions[0]), *(["error_mm"] if errors else [])])
+    with rerun_stream(path, f"{recording.name}: {len(runs)} runs") as stream:
+        scene = Scene(stream, recording, picture_width=480)
+        for number, (name, actors) in enumerate(runs.items()):
+            _log_run(scene, name, actors, number, (errors or {}).get(name))
+        scene.log_cameras()
+        for frame, pictures in enumerate(frames or (), first):
+            scene.set_frame(frame)
+            scene.log_pictures([camera.jpeg(image) for camera, image in zip(scene.cameras, pictures, strict=True)])
+        stream.reset_time()
+        scene.log_markers(truth, first, stop)
+        stream.send_blueprint(comparison_layout(recording, list(runs), plots, scene.eye(), frames is not None))
 
 
-def _log_run(
-    stream: rr.RecordingStream, name: str, actors: Sequence[Motion], number: int, errors: np.ndarray | None
-) -> None:
-    """The bodies and curves of one run."""
+def _log_run(scene: Scene, name: str, actors: Sequence[Motion], number: int, errors: np.ndarray | None) -> None:
+    """Log the bodies and curves of one run."""
     for k, motion in enumerate(actors):
         entity, bones = f"{run_entity(name)}/actor_{k + 1}", bones_from_motion(motion)
-        log_look(stream, entity, motion, bones, number, blob_palette(motion, number))
-        log_actor(stream, entity, motion, bones)
+        log_look(scene.stream, entity, motion, bones, number, blob_palette(motion, number))
+        log_body(scene.stream, entity, motion, bones)
+        scene.extend(motion.blob_means)
     curves = own_curves(actors[0]) | ({} if errors is None else {"error_mm": 1000.0 * errors})
-    log_body_curve_looks(stream, name, curves, number)
-    log_curves(stream, actors[0], name, curves)
+    log_body_curve_looks(scene.stream, name, curves, number)
+    log_curves(scene.stream, actors[0], name, curves)
 
 
-def _log_pictures(
-    stream: rr.RecordingStream,
+def write_iterations(
+    path: Path,
     recording: Recording,
-    cameras: Sequence[PictureCamera],
-    frames: Iterable[Sequence[np.ndarray]],
-    first: int,
+    steps: Motion,
+    energies: Float[np.ndarray, "iteration"],
+    pictures: list[np.ndarray] | None = None,
 ) -> None:
-    for number, pictures in enumerate(frames, first):
-        stream.set_time(FRAME, sequence=number)
-        stream.set_time(TIME, duration=number / recording.fps)
-        for camera, picture in zip(cameras, pictures, strict=True):
-            jpeg = rr.EncodedImage(contents=camera.jpeg(picture, 75), media_type="image/jpeg")
-            stream.log(f"{camera_entity(camera.name)}/picture", jpeg)
-    stream.reset_time()
+    """Write the poses that a solver went through in one frame; the path of every joint is drawn as a line.
+
+    Args:
+        path: the `.rrd` file, replaced as a whole.
+        recording: what was tracked.
+        steps: a motion whose frames are the iterations, the first of them the start.
+        energies: after each iteration.
+        pictures: BGR, of all cameras in that frame; None: without pictures.
+    """
+    with rerun_stream(path, f"{recording.name}: iterations of one frame") as stream:
+        scene = Scene(stream, recording, picture_width=640)
+        scene.extend(steps.blob_means[-1])
+        scene.log_cameras()
+        scene.log_pictures(
+            [camera.jpeg(image) for camera, image in zip(scene.cameras, pictures or [], strict=False)], static=True
+        )
+        bones = bones_from_motion(steps)
+        times = [rr.TimeColumn(ITERATION, sequence=np.arange(steps.num_frames))]
+        log_look(stream, "/world/iterations", steps, bones, 0, blob_palette(steps, 0), static=True)
+        log_body(stream, "/world/iterations", steps, bones, times)
+        ways = np.swapaxes(steps.world_from_joint[:, bones.joints][..., :3, 3], 0, 1)
+        stream.log("/world/iterations/ways", rr.LineStrips3D(ways, colors=[[255, 220, 90]], radii=[0.002]), static=True)
+        stream.log("/curves/energy/energy", rr.SeriesLines(names="energy"), static=True)
+        stream.send_columns("/curves/energy/energy", times, rr.Scalars.columns(scalars=np.asarray(energies, float)))
+        stream.send_blueprint(iterations_layout(recording, scene.eye(), bool(pictures)))

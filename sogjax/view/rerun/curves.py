@@ -1,7 +1,7 @@
-"""Curves of a Rerun file: what was found in each frame, and in each iteration."""
+"""Curves of a Rerun file: what was found in each frame."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -9,18 +9,11 @@ import rerun as rr
 
 from sogjax.io.motion import Motion
 from sogjax.view.bones import LEFT, MIDDLE, RIGHT, actor_palette
-from sogjax.view.rerun.stream import FRAME, ITERATION, entity_part, time_columns
+from sogjax.view.rerun.stream import entity_part, time_columns
 
-_CURVE_COLORS = ((90, 170, 255), (255, 170, 60), (120, 220, 120), (255, 110, 120), (190, 140, 255), (240, 220, 90))
-_PLOT_OF = {
-    "similarity": "energy",
-    "energy": "energy",
-    "iterations": "iterations",
-    "error_mm": "errors",
-}
-DOUBT = "doubt_"
-"""Before a limb, in the name of its curve."""
-_SIDES = (LEFT, RIGHT, MIDDLE)
+_COLORS = ((90, 170, 255), (255, 170, 60), (120, 220, 120), (255, 110, 120), (190, 140, 255), (240, 220, 90))
+_DOUBT = "doubt_"
+"""What the name of a limb's curve begins with."""
 _PLOTS = {
     "errors": "Error, mm",
     "energy": "Similarity and energy",
@@ -36,25 +29,25 @@ def own_curves(motion: Motion) -> dict[str, np.ndarray]:
     curves = {"similarity": motion.similarity, "energy": motion.energy, "iterations": motion.iterations}
     if motion.limb_doubt is not None and motion.limb_names is not None:
         for name, doubt in zip(motion.limb_names, motion.limb_doubt.T, strict=True):
-            curves[DOUBT + str(name).replace(" ", "_")] = doubt
+            curves[_DOUBT + str(name).replace(" ", "_")] = doubt
     return {name: values for name, values in curves.items() if np.isfinite(values).any()}
 
 
 def log_curve_looks(
     stream: rr.RecordingStream, actor: str | None, curves: Mapping[str, np.ndarray], first_color: int
 ) -> None:
-    """Titles and colours of curves."""
+    """Log titles and colours of curves."""
     for k, name in enumerate(curves):
-        _log_look(stream, name, actor, _CURVE_COLORS[(first_color + k) % len(_CURVE_COLORS)])
+        _log_look(stream, name, actor, _COLORS[(first_color + k) % len(_COLORS)])
 
 
 def log_body_curve_looks(stream: rr.RecordingStream, run: str, curves: Mapping[str, np.ndarray], body: int) -> None:
-    """Titles of a run's curves, and its body's colours: a plot's first curve has that of the left, then the others."""
+    """Log titles of a run's curves in its body's colours: in each plot those of left, right and middle in turn."""
     in_plot: Counter[str] = Counter()
     for name in curves:
-        number = in_plot[_plot(name)]
+        side = (LEFT, RIGHT, MIDDLE)[in_plot[_plot(name)] % 3]
         in_plot[_plot(name)] += 1
-        _log_look(stream, name, run, actor_palette(body)[_SIDES[number % len(_SIDES)]])
+        _log_look(stream, name, run, actor_palette(body)[side])
 
 
 def _log_look(stream: rr.RecordingStream, name: str, actor: str | None, color: Any) -> None:
@@ -63,24 +56,10 @@ def _log_look(stream: rr.RecordingStream, name: str, actor: str | None, color: A
 
 
 def log_curves(stream: rr.RecordingStream, motion: Motion, actor: str | None, curves: Mapping[str, np.ndarray]) -> None:
-    """The values of curves over a motion's frames."""
+    """Log the values of curves over a motion's frames."""
     for name, values in curves.items():
         scalars = rr.Scalars.columns(scalars=np.asarray(values, float))
         stream.send_columns(_curve(name, actor), time_columns(motion), scalars)
-
-
-def log_traces(stream: rr.RecordingStream, motion: Motion, traces: Mapping[str, Sequence[np.ndarray]]) -> None:
-    """Curves over the iterations, one array for each of a motion's frames."""
-    for name, by_frame in traces.items():
-        counts = [len(values) for values in by_frame]
-        values = np.concatenate([np.asarray(values, float) for values in by_frame])
-        times = [
-            rr.TimeColumn(ITERATION, sequence=np.arange(len(values))),
-            rr.TimeColumn(FRAME, sequence=np.repeat(motion.frame, counts)),
-        ]
-        entity = f"/curves/trace/{name}"
-        stream.log(entity, rr.SeriesLines(names=name), static=True)
-        stream.send_columns(entity, times, rr.Scalars.columns(scalars=values))
 
 
 def plots_with(curves: Iterable[str]) -> dict[str, str]:
@@ -95,6 +74,9 @@ def _curve(name: str, actor: str | None) -> str:
 
 def _plot(curve: str) -> str:
     """Which plot a curve belongs in; what is not known is a term that a user added."""
-    if curve.startswith(DOUBT):
+    if curve.startswith(_DOUBT):
         return "doubts"
-    return "penalties" if "penalty" in curve else _PLOT_OF.get(curve, "terms")
+    if "penalty" in curve:
+        return "penalties"
+    known = {"similarity": "energy", "energy": "energy", "iterations": "iterations", "error_mm": "errors"}
+    return known.get(curve, "terms")

@@ -1,9 +1,7 @@
 """A tracked recording, with all that is known of it, in one Rerun file."""
 
-import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from itertools import repeat
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple
@@ -15,15 +13,12 @@ from jaxtyping import Float
 from sogjax.io.ground_truth import GroundTruth
 from sogjax.io.motion import Motion
 from sogjax.io.recording import Recording
-from sogjax.view.bones import Bones, blob_palette, bones_from_motion
-from sogjax.view.projection import frame_range, picture_camera
-from sogjax.view.rerun.curves import log_curve_looks, log_curves, log_traces, own_curves, plots_with
-from sogjax.view.rerun.layout import eye, tracking_layout
-from sogjax.view.rerun.scene import log_actor, log_cameras, log_doubts, log_look, log_markers, log_path
-from sogjax.view.rerun.stream import FRAME, TIME, actor_entity, camera_entity, color_bytes, rerun_stream
-
-QUALITY = 80
-"""Of the JPEG pictures, 0 to 100."""
+from sogjax.view.bones import Bones, actor_palette, blob_palette, bones_from_motion
+from sogjax.view.projection import frame_range
+from sogjax.view.rerun.curves import log_curve_looks, log_curves, own_curves, plots_with
+from sogjax.view.rerun.layout import tracking_layout
+from sogjax.view.rerun.scene import Scene, log_body, log_doubts, log_look
+from sogjax.view.rerun.stream import actor_entity, camera_entity, rerun_stream
 
 
 class ImageBlobs(NamedTuple):
@@ -41,13 +36,7 @@ def write_rerun(
     *,
     names: Sequence[str] | None = None,
     frames: Iterable[Sequence[np.ndarray | None]] | None = None,
-    image_blobs: Iterable[Sequence[ImageBlobs | None]] | None = None,
-    blob_colors: Sequence[Float[np.ndarray, "_ 3"]] | None = None,
-    terms: Mapping[str, Float[np.ndarray, "frame"]] | None = None,
-    traces: Mapping[str, Sequence[np.ndarray]] | None = None,
     truth: GroundTruth | None = None,
-    picture_width: int = 640,
-    quality: int = QUALITY,
     progress: Callable[[Iterable[int], int, str], Iterable[int]] = lambda items, count, title: items,
 ) -> None:
     """Write cameras, pictures, bodies, markers and curves, with a layout that opens well.
@@ -60,24 +49,16 @@ def write_rerun(
         motions: one for each actor.
         names: the actors' names; default `actor`, `actor_2`, ...
         frames: BGR pictures of all cameras, from the motions' first frame to their last; None: no pictures.
-        image_blobs: the pictures' blobs, in the same order.
-        blob_colors: sRGB in 0..1 of each actor's blobs; default by the side of the body.
-        terms: further curves by name over the first motion's frames, such as `limit_penalty`.
-        traces: curves by name over the iterations, one array for each of the first motion's frames.
         truth: markers to show beside the bodies.
-        picture_width: largest width of the stored pictures in pixels.
-        quality: of the JPEG pictures, 0 to 100.
         progress: wraps the frames' numbers to show progress: (numbers, count, title).
     """
     names = list(names) if names else ["actor", *(f"actor_{k + 2}" for k in range(len(motions) - 1))][: len(motions)]
     first, stop = frame_range(recording, motions)
-    with RerunFile(path, recording, names, blob_colors=blob_colors, picture_width=picture_width) as file:
-        file.write(motions, terms or {})
-        if frames is not None or image_blobs is not None:
-            numbers = progress(range(first, stop), stop - first, "Rerun file")
-            for frame, pictures, blobs in zip(numbers, frames or repeat(()), image_blobs or repeat(()), strict=False):
-                file.write_pictures(frame, [file.jpeg(k, image, quality) for k, image in enumerate(pictures)], blobs)
-        file.write_traces(motions[0], traces or {})
+    with RerunFile(path, recording, names) as file:
+        file.write(motions, {})
+        if frames is not None:
+            for frame, pictures in zip(progress(range(first, stop), stop - first, "Rerun file"), frames, strict=False):
+                file.write_pictures(frame, [file.jpeg(k, image) for k, image in enumerate(pictures)], ())
         file.write_markers(truth)
 
 
@@ -101,27 +82,26 @@ class RerunFile:
         blob_colors: Sequence[Float[np.ndarray, "_ 3"]] | None = None,
         picture_width: int = 640,
     ) -> None:
-        self._path, self._recording, self._names = Path(path), recording, list(names)
-        self._cameras = [picture_camera(recording.rig, name, picture_width) for name in recording.rig.names]
-        self._colors = None if blob_colors is None else [color_bytes(colors) for colors in blob_colors]
+        self._path, self._recording, self._names = path, recording, list(names)
+        self._picture_width, self._colors = picture_width, blob_colors
         self._bones: list[Bones] = []
         self._paths: list[list[np.ndarray]] = [[] for _ in names]
-        self._lowest, self._highest = np.full(3, np.inf), np.full(3, -np.inf)
-        self._frames = (0, 0)
+        self._frames: tuple[int, int] | None = None
         self._with_blobs = False
         self._plots: dict[str, str] = {}
 
     def __enter__(self) -> "RerunFile":
         self._files = ExitStack()
         self._stream = self._files.enter_context(rerun_stream(self._path, self._recording.name))
+        self._scene = Scene(self._stream, self._recording, self._picture_width)
         return self
 
-    def jpeg(self, camera: int, image: np.ndarray | None, quality: int = QUALITY) -> bytes | None:
+    def jpeg(self, camera: int, image: np.ndarray | None) -> bytes | None:
         """A camera's picture (BGR) as it is stored; thread-safe."""
-        return None if image is None else self._cameras[camera].jpeg(image, quality)
+        return None if image is None else self._scene.cameras[camera].jpeg(image)
 
     def write(self, motions: Sequence[Motion], terms: Mapping[str, Float[np.ndarray, "frame"]]) -> None:
-        """The bodies and curves of the frames that follow.
+        """Write the bodies and curves of the frames that follow.
 
         Args:
             motions: one for each actor.
@@ -130,42 +110,34 @@ class RerunFile:
         if not self._bones:
             self._begin(motions, terms)
         for k, (name, motion) in enumerate(zip(self._names, motions, strict=True)):
-            self._paths[k].append(log_actor(self._stream, actor_entity(name), motion, self._bones[k]))
-            log_doubts(self._stream, actor_entity(name), motion, self._bones[k])
+            bones, entity = self._bones[k], actor_entity(name)
+            log_body(self._stream, entity, motion, bones)
+            log_doubts(self._stream, entity, motion, bones)
             log_curves(self._stream, motion, self._curve_actor(name), own_curves(motion))
-            self._lowest = np.minimum(self._lowest, motion.blob_means.min(axis=(0, 1)))
-            self._highest = np.maximum(self._highest, motion.blob_means.max(axis=(0, 1)))
+            self._paths[k].append(bones.points(motion)[:, 0] if bones.num_joints else motion.blob_means.mean(axis=1))
+            self._scene.extend(motion.blob_means)
         log_curves(self._stream, motions[0], None, terms)
         first, stop = frame_range(self._recording, motions)
-        self._frames = (min(first, self._frames[0]) if self._frames[1] else first, stop)
+        self._frames = (first if self._frames is None else min(first, self._frames[0]), stop)
 
     def write_pictures(
         self, frame: int, jpegs: Sequence[bytes | None], image_blobs: Sequence[ImageBlobs | None]
     ) -> None:
-        """The pictures of all cameras, as `jpeg` makes them, and their blobs; either may be empty."""
+        """Write the pictures of all cameras, as `jpeg` makes them, and their blobs; either may be empty."""
         self._with_blobs |= len(image_blobs) > 0
-        self._stream.set_time(FRAME, sequence=frame)
-        self._stream.set_time(TIME, duration=frame / self._recording.fps)
-        for camera, jpeg in zip(self._cameras, jpegs, strict=False):
-            if jpeg is not None:
-                encoded = rr.EncodedImage(contents=jpeg, media_type="image/jpeg")
-                self._stream.log(f"{camera_entity(camera.name)}/picture", encoded)
-        for camera, sog in zip(self._cameras, image_blobs, strict=False):
+        self._scene.set_frame(frame)
+        self._scene.log_pictures(jpegs)
+        for camera, sog in zip(self._scene.cameras, image_blobs, strict=False):
             if sog is not None:
                 radii = np.asarray(sog.sigmas) * float(np.sqrt(camera.scale.prod()))
-                points = rr.Points2D(camera.pixels(np.asarray(sog.means)), radii=radii, colors=color_bytes(sog.colors))
+                pixels = camera.pixels(np.asarray(sog.means))
+                points = rr.Points2D(pixels, radii=radii, colors=_color_bytes(sog.colors))
                 self._stream.log(f"{camera_entity(camera.name)}/blobs", points)
         self._stream.reset_time()
 
-    def write_traces(self, motion: Motion, traces: Mapping[str, Sequence[np.ndarray]]) -> None:
-        """Curves by name over the iterations, one array for each of the motion's frames."""
-        log_traces(self._stream, motion, traces)
-        self._plots |= {"trace": "Within frames (timeline: iteration)"} if traces else {}
-
     def write_markers(self, truth: GroundTruth | None) -> None:
-        """True markers beside the bodies, over the frames that were written."""
-        if truth is not None and truth.markers is not None:
-            log_markers(self._stream, truth, self._frames)
+        """Write true markers beside the bodies, over the frames that were written."""
+        self._scene.log_markers(truth, *(self._frames or (0, 0)))
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
@@ -182,33 +154,29 @@ class RerunFile:
             if self._bones:
                 self._end()
 
-    def _end(self) -> None:
-        """What needs the whole motion: how cameras are shown, the roots' paths, the layout."""
-        middle, size = 0.5 * (self._lowest + self._highest), float(np.linalg.norm(self._highest - self._lowest))
-        log_cameras(self._stream, self._recording, self._cameras, middle)
-        for k, name in enumerate(self._names):
-            log_path(self._stream, actor_entity(name), np.concatenate(self._paths[k]), k)
-        view = eye(self._recording, middle, size)
-        self._stream.send_blueprint(tracking_layout(self._recording, self._names, self._with_blobs, self._plots, view))
-
     def _begin(self, motions: Sequence[Motion], terms: Mapping[str, np.ndarray]) -> None:
-        """What is written once per file: the looks of bodies and curves."""
+        """Write what is written once per file: the looks of bodies and curves."""
         self._bones = [bones_from_motion(motion) for motion in motions]
         self._plots = plots_with([*own_curves(motions[0]), *terms])
         for k, (name, motion) in enumerate(zip(self._names, motions, strict=True)):
-            colors = blob_palette(motion, k) if self._colors is None else self._colors[k]
+            colors = blob_palette(motion, k) if self._colors is None else _color_bytes(self._colors[k])
             log_look(self._stream, actor_entity(name), motion, self._bones[k], k, colors)
             log_curve_looks(self._stream, self._curve_actor(name), own_curves(motion), 3 * k)
         log_curve_looks(self._stream, None, terms, 3 * len(motions))
+
+    def _end(self) -> None:
+        """Write what needs the whole motion: how cameras are shown, the roots' paths, the layout."""
+        self._scene.log_cameras()
+        for k, name in enumerate(self._names):
+            path = rr.LineStrips3D([np.concatenate(self._paths[k])], colors=[actor_palette(k)[1]], radii=[0.004])
+            self._stream.log(f"{actor_entity(name)}/path", path, static=True)
+        layout = tracking_layout(self._recording, self._names, self._with_blobs, self._plots, self._scene.eye())
+        self._stream.send_blueprint(layout)
 
     def _curve_actor(self, name: str) -> str | None:
         return name if len(self._names) > 1 else None
 
 
-def view_command(path: Path, web: bool = False) -> list[str]:
-    """The command that opens a Rerun file in a window, or serves it to a browser; reached from this machine only.
-
-    The window listens for further data too, on all of the machine's addresses unless told otherwise.
-    """
-    command = [sys.executable, "-m", "rerun", str(path), "--bind", "127.0.0.1"]
-    return [*command, "--serve-web"] if web else command
+def _color_bytes(colors: np.ndarray) -> np.ndarray:
+    """Colours in 0..1 as bytes."""
+    return np.rint(255.0 * np.clip(np.asarray(colors), 0.0, 1.0)).astype(np.uint8)

@@ -1,7 +1,4 @@
-"""Names in a Rerun file: its timelines, and the entities of cameras, actors and runs.
-
-A stream into a Rerun file that is either complete or absent.
-"""
+"""A stream into a Rerun file that is either complete or absent, and the names in it: timelines and entities."""
 
 import os
 from collections.abc import Iterator
@@ -10,7 +7,6 @@ from io import FileIO
 from pathlib import Path
 from threading import Thread
 
-import numpy as np
 import rerun as rr
 
 from sogjax.io.files import atomic_path
@@ -45,15 +41,6 @@ def time_columns(motion: Motion) -> list[rr.TimeColumn]:
     return [rr.TimeColumn(FRAME, sequence=motion.frame), rr.TimeColumn(TIME, duration=motion.time)]
 
 
-def color_bytes(colors: np.ndarray) -> np.ndarray:
-    """Colours in 0..1 as bytes."""
-    return np.rint(255.0 * np.clip(np.asarray(colors), 0.0, 1.0)).astype(np.uint8)
-
-
-_AT_ONCE = 2**20
-_OPEN_FILES = Path("/dev/fd")
-
-
 @contextmanager
 def rerun_stream(path: Path, name: str) -> Iterator[rr.RecordingStream]:
     """What is logged within the block is in the file at its end, under a recording of that name.
@@ -61,7 +48,7 @@ def rerun_stream(path: Path, name: str) -> Iterator[rr.RecordingStream]:
     Raises:
         InputError: the file could not be written.
     """
-    with atomic_path(path) as temporary, _written_by_ourselves(temporary) as target:
+    with atomic_path(Path(path)) as temporary, _written_by_ourselves(temporary) as target:
         stream = rr.RecordingStream("sogjax")
         stream.set_log_time_enabled(False)
         stream.set_log_tick_enabled(False)
@@ -80,7 +67,8 @@ def _written_by_ourselves(path: Path) -> Iterator[Path]:
 
     On a full disk Rerun prints a message, leaves part of the file, and may hang (0.41); a pipe takes everything.
     """
-    if not _OPEN_FILES.is_dir():  # Windows
+    open_files = Path("/dev/fd")
+    if not open_files.is_dir():  # Windows
         yield path
         return
     errors: list[OSError] = []
@@ -89,7 +77,7 @@ def _written_by_ourselves(path: Path) -> Iterator[Path]:
         thread = Thread(target=_copy, args=(end, file, errors), name="rerun file", daemon=True)
         thread.start()
         try:
-            yield _OPEN_FILES / str(begin)
+            yield open_files / str(begin)
         finally:
             os.close(begin)
             thread.join()
@@ -100,7 +88,7 @@ def _written_by_ourselves(path: Path) -> Iterator[Path]:
 
 def _copy(end: int, file: FileIO, errors: list[OSError]) -> None:
     """Copy everything to a file; if that fails, keep reading and discard the rest."""
-    while content := os.read(end, _AT_ONCE):
+    while content := os.read(end, 2**20):
         left = memoryview(content)
         try:
             while left and not errors:

@@ -1,6 +1,7 @@
-"""A picture of a motion without a display: what Rerun's viewer shows, or the overlay where it cannot draw."""
+"""Rerun's viewer: the command that opens a file, and the picture that it draws of one without a display."""
 
 import subprocess
+import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,25 +13,23 @@ from jaxtyping import UInt8
 
 from sogjax.io.motion import Motion
 from sogjax.io.motion_log import PER_FRAME, SOMETIMES_PER_FRAME
-from sogjax.view.rerun.file import view_command
 
-SIZE = "1600x1000"
 ATTEMPTS, LONGEST = 3, 120
 """A viewer on a busy machine may take its picture before the file is loaded; seconds that it may take."""
 FEWEST_COLORS = 2000
-"""Of a picture in which the file was loaded; the empty window has fewer."""
+"""A picture in which the file was loaded has as many; the empty window has fewer."""
 
 
-def at_frame(motion: Motion, frame: int) -> Motion | None:
-    """A motion of one frame (the recording's number); None: it has no such frame."""
-    row = motion.frame == frame
-    if not row.any():
-        return None
-    names = [name for name in (*PER_FRAME, *SOMETIMES_PER_FRAME) if getattr(motion, name) is not None]
-    return replace(motion, **{name: getattr(motion, name)[row] for name in names})
+def view_command(path: Path, web: bool = False) -> list[str]:
+    """The command that opens a Rerun file in a window, or serves it to a browser; reached from this machine only.
+
+    The window listens for further data too, on all of the machine's addresses unless told otherwise.
+    """
+    command = [sys.executable, "-m", "rerun", str(path), "--bind", "127.0.0.1"]
+    return [*command, "--serve-web"] if web else command
 
 
-def rerun_screenshot(path: Path, size: str = SIZE) -> UInt8[np.ndarray, "h w 3"] | None:
+def rerun_screenshot(path: Path, size: str = "1600x1000") -> UInt8[np.ndarray, "h w 3"] | None:
     """What Rerun's viewer shows of a file (BGR), drawn without a window; None: it cannot draw here."""
     with tempfile.TemporaryDirectory() as folder:
         picture = Path(folder) / "picture.png"
@@ -49,11 +48,15 @@ def rerun_screenshot(path: Path, size: str = SIZE) -> UInt8[np.ndarray, "h w 3"]
     return None
 
 
-def drawn_frames(motions: Sequence[Motion], frame: int) -> list[Motion]:
-    """The motions that have a frame, of that frame only."""
-    return [shown for motion in motions if (shown := at_frame(motion, frame)) is not None]
-
-
 def _num_colors(picture: UInt8[np.ndarray, "h w 3"]) -> int:
-    packed = picture.astype(np.uint32) @ np.array([1, 256, 65536], np.uint32)
-    return len(np.unique(packed))
+    return len(np.unique(picture.astype(np.uint32) @ np.array([1, 256, 65536], np.uint32)))
+
+
+def drawn_frames(motions: Sequence[Motion], frame: int) -> list[Motion]:
+    """The motions that have a frame (the recording's number), of that frame only."""
+    return [_only(motion, motion.frame == frame) for motion in motions if frame in motion.frame]
+
+
+def _only(motion: Motion, rows: np.ndarray) -> Motion:
+    names = [name for name in (*PER_FRAME, *SOMETIMES_PER_FRAME) if getattr(motion, name) is not None]
+    return replace(motion, **{name: getattr(motion, name)[rows] for name in names})

@@ -1,0 +1,170 @@
+"""The pictures that the checks look at, each read once: a stretch of the videos, the empty scene, example poses."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Any
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, UInt8
+
+from sogjax.io.example_poses import ExamplePose
+from sogjax.io.image_file import read_mask
+from sogjax.io.recording import Recording
+from sogjax.io.video import read_prepared, read_still
+from sogjax.scene.plate_difference import plate_difference, reduced_mask, working_size
+from sogjax.scene.segmentation import first_guess, is_subject
+
+Mask = Bool[np.ndarray, "_h _w"]
+Picture = UInt8[np.ndarray, "_h _w 3"]
+"""BGR, at the working size of masks."""
+Progress = Callable[[Iterable[Any], int, str], Iterator[Any]]
+"""Wraps an iterable, given its length and a label, and yields the same."""
+
+
+@dataclass(frozen=True)
+class Clip:
+    """Consecutive frames of all cameras, in the order of the rig."""
+
+    recording: Recording
+    first: int
+    """The recording's frame that is the first one here, counted from the recording's first."""
+    grey: tuple[UInt8[np.ndarray, "frame _h _w"], ...]
+    """Small pictures by camera, black where it is missing."""
+    present: Bool[np.ndarray, "camera frame"]
+    """Where a camera is not missing, so that there is something to check."""
+    stills: dict[int, dict[int, Picture]]
+    """A few pictures by frame of this clip and by camera that is present."""
+
+    @property
+    def num_frames(self) -> int:
+        """Frames that were read."""
+        return len(self.grey[0])
+
+    def frame_number(self, index: int) -> int:
+        """The recording's number of a frame of this clip."""
+        return self.recording.first_frame + self.first + index
+
+
+@dataclass(frozen=True)
+class Moment:
+    """One moment as all cameras show it."""
+
+    pictures: dict[int, Picture]
+    """By camera (its index in the rig) that is present."""
+    masks: dict[int, Mask]
+    """By camera; absent where no subject was found."""
+
+
+def read_clip(recording: Recording, start: int, frames: int, progress: Progress) -> Clip:
+    """At most `frames` frames from `start` on, which counts from the recording's first frame.
+
+    Raises:
+        InputError: a video that ends early or changes its size.
+    """
+    stop = min(start + frames, recording.num_frames)
+    count = stop - start
+    wanted = {int(k) for k in np.linspace(0, count - 1, 4)[1:-1]}
+    sizes = [_small_size(*recording.rig.image_size(name)) for name in recording.rig.names]
+    grey = tuple(np.zeros((count, height, width), np.uint8) for width, height in sizes)
+    present = np.zeros((len(sizes), count), bool)
+    stills: dict[int, dict[int, Picture]] = {}
+    for index, pictures in enumerate(progress(read_prepared(recording, _reduced, start, stop), count, "reading")):
+        found = {camera: both for camera, both in enumerate(pictures) if both is not None}
+        for camera, (small, _) in found.items():
+            grey[camera][index], present[camera, index] = small, True
+        if index in wanted:
+            stills[index] = {camera: still for camera, (_, still) in found.items()}
+    return Clip(recording, start, grey, present, stills)
+
+
+def _small_size(width: int, height: int) -> tuple[int, int]:
+    """Width and height of the grey pictures, the longer side 320 pixels."""
+    factor = min(1.0, 320 / max(width, height))
+    return max(1, round(factor * width)), max(1, round(factor * height))
+
+
+def _reduced(camera: int, image: UInt8[np.ndarray, "_h _w 3"] | None) -> tuple[np.ndarray, Picture] | None:
+    """A picture small and grey, and in colour at the working size; None where the camera is missing."""
+    if image is None:
+        return None
+    still = working_picture(image)
+    small = cv2.resize(still, _small_size(image.shape[1], image.shape[0]), interpolation=cv2.INTER_AREA)
+    return cv2.cvtColor(small, cv2.COLOR_BGR2GRAY), still
+
+
+def working_picture(image: UInt8[np.ndarray, "_h _w 3"]) -> Picture:
+    """A picture at the working size of masks."""
+    return cv2.resize(image, working_size(image.shape[1], image.shape[0]), interpolation=cv2.INTER_AREA)
+
+
+def stills_in_step(clip: Clip, offsets: Sequence[int]) -> list[dict[int, Picture]]:
+    """The stills with each camera `offsets` frames later; which frames these are is known too late to keep them.
+
+    Raises:
+        InputError: a video that ends early.
+    """
+    if not any(offsets):
+        return [*clip.stills.values()]
+    names = clip.recording.rig.names
+    moved = {name: clip.recording.frame_offset[name] + int(more) for name, more in zip(names, offsets, strict=True)}
+    recording = replace(clip.recording, frame_offset=moved)
+    border = int(np.abs(offsets).max())
+    as_still = lambda camera, image: None if image is None else working_picture(image)
+    stills = []
+    for index in sorted({int(np.clip(k, border, max(clip.num_frames - 1 - border, border))) for k in clip.stills}):
+        frame = clip.first + index
+        shown = next(read_prepared(recording, as_still, frame, frame + 1))
+        stills.append({camera: picture for camera, picture in enumerate(shown) if picture is not None})
+    return stills
+
+
+def read_plates(recording: Recording) -> dict[int, Picture]:
+    """The pictures of the empty scene by camera (its index in the rig)."""
+    return {
+        camera: working_picture(read_still(recording, name, recording.background[name]))
+        for camera, name in enumerate(recording.rig.names)
+        if name in recording.background
+    }
+
+
+def video_moment(pictures: dict[int, Picture], plates: Mapping[int, Picture]) -> Moment:
+    """One moment of the videos, with masks where there are plates."""
+    with ThreadPoolExecutor() as pool:
+        masks = pool.map(lambda camera: _from_plate(pictures[camera], plates.get(camera)), pictures)
+        return Moment(
+            pictures, {camera: mask for camera, mask in zip(pictures, masks, strict=True) if mask is not None}
+        )
+
+
+def example_moments(recording: Recording, plates: Mapping[int, Picture]) -> list[Moment]:
+    """The first two example poses, with their masks, or masks made from plates."""
+    pictured = [example for example in recording.example_poses if example.frame is None]
+    return [_example_moment(recording, example, plates) for example in pictured[:2]]
+
+
+def _example_moment(recording: Recording, example: ExamplePose, plates: Mapping[int, Picture]) -> Moment:
+    names = recording.rig.names
+    shown = [camera for camera, name in enumerate(names) if name in example.images]
+
+    def look(camera: int) -> tuple[Picture, Mask | None]:
+        name = names[camera]
+        picture = working_picture(read_still(recording, name, example.images[name]))
+        if name not in example.masks:
+            return picture, _from_plate(picture, plates.get(camera))
+        mask = reduced_mask(read_mask(example.masks[name]))
+        return picture, mask if mask.any() and not mask.all() else None
+
+    with ThreadPoolExecutor() as pool:
+        found = dict(zip(shown, pool.map(look, shown), strict=True))
+    masks = {camera: mask for camera, (_, mask) in found.items() if mask is not None}
+    return Moment({camera: picture for camera, (picture, _) in found.items()}, masks)
+
+
+def _from_plate(picture: Picture, plate: Picture | None) -> Mask | None:
+    """What differs from the empty scene; None where there is no plate or no subject."""
+    if plate is None:
+        return None
+    guess = first_guess(plate_difference(picture, plate))
+    return guess if is_subject(guess) else None
