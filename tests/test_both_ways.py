@@ -13,18 +13,20 @@ from walking_dog import DEPTH, FRAMES, HEIGHT, judging_tracker
 
 from sogjax.model.body import concatenate
 from sogjax.model.limbs import limb_names, limbs
+from sogjax.quality.fitted import fitted_numbers
 from sogjax.search import merge_passes as both_ways
 from sogjax.search.backward_pass import Compared, Pass, part_gains
 from sogjax.search.body_parts import PartArrays, body_parts, merged_pose
 from sogjax.search.merge_passes import merge_passes
 from sogjax.search.mirrored import means_of
-from sogjax.search.select_parts import APART, BIAS, CHANGE, best_choice, select_parts, stretches
+from sogjax.search.select_parts import best_choice, select_parts, stretches
 from sogjax.tracking.capacity import with_room
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import FrameInput
 from sogjax.tracking.frame_by_frame import track
 
 LOST = slice(4, 7)
+COSTS = fitted_numbers().merge_passes
 
 
 def backwards(cells, asked=None):
@@ -115,7 +117,7 @@ def test_a_frame_that_two_passes_revise_counts_once(walking_dog, monkeypatch):
         begin = last + 1
         column = lambda value: list(np.tile(np.where(np.arange(len(parts)) == 0, value, 0.0), (begin, 1)))
         poses = [passed.poses[row] + 1e-3 for row in reversed(range(begin))]
-        return Compared(cells[:begin][::-1], poses, column(10.0 * right.energy), column(2.0 * APART)), begin
+        return Compared(cells[:begin][::-1], poses, column(10.0 * right.energy), column(2.0 * COSTS.apart)), begin
 
     monkeypatch.setattr(both_ways, "compared_backwards", compared)
     found = merge_passes(tracker, replace(right, doubts=doubts), backwards(cells))
@@ -217,10 +219,10 @@ def test_limbs_are_left_where_the_trunk_is_elsewhere_and_slight_gains_are_none()
     parts = body_parts(shipped("dog"))
     limb = next(k for k, part in enumerate(parts) if part.whole is not None)
     apart, gains = np.full((6, len(parts)), 0.01), np.full((6, len(parts)), -0.1)
-    apart[2:4, limb], gains[2:4, limb] = 2.0 * APART, 10.0 * CHANGE * APART
+    apart[2:4, limb], gains[2:4, limb] = 2.0 * COSTS.apart, 10.0 * COSTS.change * COSTS.apart
     assert select_parts(parts, apart, gains, 1.0)[:, limb].tolist() == [False, False, True, True, False, False]
-    assert not select_parts(parts, apart, np.where(gains > 0.0, 0.5 * BIAS, 0.0), 1.0).any()
-    apart[:, 0] = 2.0 * APART
+    assert not select_parts(parts, apart, np.where(gains > 0.0, 0.5 * COSTS.bias, 0.0), 1.0).any()
+    apart[:, 0] = 2.0 * COSTS.apart
     assert not select_parts(parts, apart, gains, 1.0).any()
 
 

@@ -1,18 +1,23 @@
 """The figures about limbs in doubt: areas, shares and weights against cases that are known."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
+import yaml
 from scipy.special import expit
 
-from sogjax.quality.limb_confidence import WITH_BACKGROUND, WITHOUT
+from sogjax.quality.fitted import PATH, PoseEvidenceBounds, fitted_numbers, read_fitted
+from sogjax.search.pose_confidence import Evidence
 from sogjax.study.limb_calibration import (
     area_table,
     area_under_roc,
     calibration_table,
-    fitted,
+    fitted_weights,
     limb_curve,
     regained_table,
     said_of,
+    write_weights,
 )
 from sogjax.study.limb_trials import PLAIN, JudgedLimb, LimbTrial
 
@@ -36,7 +41,7 @@ def test_the_area_is_the_share_of_pairs_in_order():
 
 
 def test_weights_that_limbs_were_drawn_with_are_found():
-    weights = fitted([drawn(40_000)])
+    weights = fitted_weights([drawn(40_000)])
     assert weights.constant == pytest.approx(-4.0, abs=0.2)
     assert weights.worse == pytest.approx(2.0, abs=0.1)
     assert weights.contradicted == pytest.approx(3.0, abs=0.2)
@@ -45,12 +50,13 @@ def test_weights_that_limbs_were_drawn_with_are_found():
 def test_a_measure_that_would_reassure_gets_no_weight():
     limb = drawn(4000)
     turned = JudgedLimb(TRIAL, PLAIN, "left arm", limb.worse, 1.0 - limb.contradicted, limb.error)
-    assert fitted([turned]).contradicted == pytest.approx(0.0, abs=1e-9)
+    assert fitted_weights([turned]).contradicted == pytest.approx(0.0, abs=1e-9)
 
 
 def test_other_weights_count_without_a_background():
     values = np.array([0.1, 1.5]), np.array([0.2, 0.6]), np.array([0.01, 0.5])
-    for background, weights in (("clip", WITH_BACKGROUND), ("none", WITHOUT)):
+    kept = fitted_numbers().limb_weights
+    for background, weights in (("clip", kept.with_background), ("none", kept.without_background)):
         limb = JudgedLimb(LimbTrial("walk", "walk:0", 4, background), PLAIN, "left arm", *values)
         said, lost = said_of([limb])
         score = weights.constant + weights.worse * values[0] + weights.contradicted * values[1]
@@ -78,3 +84,36 @@ def test_displaced_limbs_are_counted_once_by_their_last_frame():
         for name, end in ends.items()
     ]
     assert "| all | 2 | 50.0 % | 100 % |" in regained_table(limbs, {"all": lambda _: True})
+
+
+def test_the_file_holds_what_the_records_need():
+    """Every number is there, and no other; the file says of each part what it rests on."""
+    text = PATH.read_text()
+    assert read_fitted(text) == fitted_numbers()
+    for part in yaml.safe_load(text).values():
+        assert part == 1 or all(part[key] for key in ("how", "by", "recordings"))
+    for wrong in (text.replace("unseen:", "unseeing:"), text.replace("version: 1", "version: 2"), "version: 1\n"):
+        with pytest.raises(ValueError, match=r"fitted\.yaml"):
+            read_fitted(wrong)
+
+
+def test_the_names_of_bounds_are_those_of_what_is_bounded():
+    assert {bound.name for bound in fields(PoseEvidenceBounds)} < {value.name for value in fields(Evidence)}
+
+
+def test_weights_are_written_into_the_file_and_nothing_else_changes(tmp_path):
+    path = tmp_path / "fitted.yaml"
+    path.write_text(PATH.read_text())
+    write_weights(path, {"with_background": [drawn(4000)]}, "drawn limbs")
+    before, after = (yaml.safe_load(each.read_text()) for each in (PATH, path))
+    found = read_fitted(path.read_text()).limb_weights.with_background
+    assert found.worse == round(fitted_weights([drawn(4000)]).worse, 1)
+    assert after["limb_weights"]["recordings"].startswith("drawn limbs; with_background: 4000 limbs, ")
+    assert after["limb_weights"]["values"].pop("with_background") != before["limb_weights"]["values"].pop(
+        "with_background"
+    )
+    after["limb_weights"]["recordings"] = before["limb_weights"]["recordings"]
+    assert after == before
+    others = lambda text: text[text.index("limb_baseline:") :]
+    assert others(path.read_text()) == others(PATH.read_text())
+    assert path.read_text().startswith("# Numbers that rest on recordings")

@@ -14,7 +14,8 @@ from rig_cases import ring_rig
 from sogjax.energy.posed import Posed
 from sogjax.model.body import concatenate
 from sogjax.model.limbs import joint_limbs, limb_names, limb_slices
-from sogjax.quality.limb_confidence import WITH_BACKGROUND, WITHOUT, LimbMeasures, error_probability, limb_confidence
+from sogjax.quality.fitted import fitted_numbers
+from sogjax.quality.limb_confidence import LimbMeasures, error_probability, limb_confidence
 from sogjax.quality.limb_evidence import BlobEvidence, LimbBlobs, blob_evidence
 from sogjax.quality.limb_warnings import doubtful_limbs
 from sogjax.scene.background import BackgroundCells
@@ -141,7 +142,8 @@ def test_densities_of_colours_are_those_of_the_subjects_table():
 
 
 def test_doubt_grows_with_every_measure():
-    for weights in (WITH_BACKGROUND, WITHOUT):
+    kept = fitted_numbers().limb_weights
+    for weights in (kept.with_background, kept.without_background):
         values = jnp.linspace(0.0, 1.0, 5)
         worse = error_probability(LimbMeasures(values, jnp.full(5, 0.2)), weights)
         against = error_probability(LimbMeasures(jnp.full(5, 0.2), values), weights)

@@ -15,32 +15,11 @@ from sogjax.energy.foreground import cover
 from sogjax.energy.posed import Posed
 from sogjax.energy.views import Windows
 from sogjax.model.camera import Camera, project
+from sogjax.quality.fitted import Weights, fitted_numbers
 from sogjax.quality.limb_evidence import DENSITY, BlobEvidence, LimbBlobs
 
 FAR = 0.1
 """Metres, mean over the limb's joints: farther off is lost."""
-LEAST_BASELINE, MOST_BASELINE = 0.0, 0.7
-"""A blob whose colours fit less than the one, or that is more often background than the other, from the beginning, is
-measured against these: it may never have been right."""
-ADAPTATION, LARGEST_STEPS = 0.1, (0.15, 0.1)
-"""How what is usual follows what is seen: a part of the difference, of which no more counts than the steps."""
-UNSEEN = 0.02
-"""Part of a blob's area in the pictures below which what is seen of it says little."""
-
-
-class Weights(NamedTuple):
-    """Of a logistic regression."""
-
-    constant: float
-    worse: float
-    """By how much the colours fit worse than usual, log likelihood."""
-    contradicted: float
-    """By how much more often than usual the background is seen in the limb's place."""
-
-
-WITH_BACKGROUND = Weights(-5.9, 4.0, 5.9)
-WITHOUT = Weights(-3.2, 3.7, 0.0)
-"""Both from `experiments/limb_doubt.py`, which judges each half of the sequences by weights from the other."""
 
 
 class LimbMeasures(NamedTuple):
@@ -68,20 +47,22 @@ def limb_confidence(
 ) -> LimbConfidence:
     """Of the limbs, from the evidence for their blobs and what was usual before (NaN in the first frame)."""
     measures = limb_measures(limbs, evidence, baseline)
-    probability = error_probability(measures, WITH_BACKGROUND if has_background else WITHOUT)
+    numbers, weights = fitted_numbers().limb_baseline, fitted_numbers().limb_weights
+    probability = error_probability(measures, weights.with_background if has_background else weights.without_background)
     trust = 1.0 - jnp.max(jnp.where(limbs.members, probability[:, None], 0.0), axis=0, initial=0.0)
-    rate = ADAPTATION * trust * _certainty(evidence)
+    rate = numbers.adaptation * trust * _certainty(evidence)
     seen, known = _seen(evidence), _known(evidence, baseline)
-    largest = jnp.asarray(LARGEST_STEPS, known.dtype)[:, None]
+    largest = jnp.asarray(numbers.largest_steps, known.dtype)[:, None]
     return LimbConfidence(probability, known + rate[None] * jnp.clip(seen - known, -largest, largest))
 
 
 def limb_measures(limbs: LimbBlobs, evidence: BlobEvidence, baseline: Float[Array, "2 blob"]) -> LimbMeasures:
     """Of the limbs in one frame."""
+    numbers = fitted_numbers().limb_baseline
     certainty, (own, contradicted) = _certainty(evidence), _known(evidence, baseline)
-    more = evidence.contradicted - jnp.minimum(contradicted, MOST_BASELINE)
+    more = evidence.contradicted - jnp.minimum(contradicted, numbers.most_contradicted)
     return LimbMeasures(
-        worse=-limbs.mean_of_worst(certainty * (evidence.own - jnp.maximum(own, LEAST_BASELINE))),
+        worse=-limbs.mean_of_worst(certainty * (evidence.own - jnp.maximum(own, numbers.least_own))),
         contradicted=-limbs.mean_of_worst(-certainty * more),
     )
 
@@ -103,7 +84,7 @@ def _known(evidence: BlobEvidence, baseline: Float[Array, "2 blob"]) -> Float[Ar
 
 
 def _certainty(evidence: BlobEvidence) -> Float[Array, "blob"]:
-    return evidence.seen / (evidence.seen + UNSEEN)
+    return evidence.seen / (evidence.seen + fitted_numbers().limb_baseline.unseen)
 
 
 CLEARLY = 0.3

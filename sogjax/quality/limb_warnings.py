@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float
 from sogjax.io.motion import Motion
 from sogjax.model.body import Body
 
-DOUBTFUL = 0.5
+LIKELY_LOST = 0.5
 """A limb is in doubt where it is more likely lost than not."""
 AT_LEAST = 3
 """Frames: shorter stretches are not reported, and shorter gaps between them do not count."""
@@ -38,7 +38,7 @@ def in_doubt(motion: Motion) -> Bool[np.ndarray, "frame limb"]:
     """Which limbs are in doubt in which frames; none where they were not judged."""
     if motion.limb_doubt is None:
         return np.zeros((motion.num_frames, 0), bool)
-    return motion.limb_doubt > DOUBTFUL
+    return motion.limb_doubt > LIKELY_LOST
 
 
 def doubtful_limbs(motion: Motion) -> tuple[DoubtfulLimb, ...]:
@@ -55,7 +55,7 @@ def doubtful_limbs(motion: Motion) -> tuple[DoubtfulLimb, ...]:
 
 def _stretches(doubt: Float[np.ndarray, "frame"]) -> list[tuple[int, int]]:
     """[first, end) of the stretches of one limb."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], doubt > DOUBTFUL, [False]]).astype(int)))
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], doubt > LIKELY_LOST, [False]]).astype(int)))
     joined: list[list[int]] = []
     for first, stop in edges.reshape(-1, 2).tolist():
         if joined and first - joined[-1][1] < AT_LEAST:

@@ -8,22 +8,12 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from sogjax.io.motion import Motion
+from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.limb_warnings import DoubtfulLimb, Limits, doubtful_limbs, joints_at_limits
 from sogjax.quality.metrics import stretches
 
-OTHER_SUBJECT = 0.6
-"""Of what an actor explains in its example poses: less, and it is another subject, or none."""
-LEAST_EXPLAINED = 0.25
-"""The same for actors of which that is not known, as a part of all."""
-LEAST_OVERLAP, GOOD_OVERLAP = 0.45, 0.57
-"""Of silhouettes with the foreground, the median over frames and cameras: bodies that are followed have 0.6 to 0.75.
-Less than the one is nobody; less than the other must be looked at."""
-WORSE = 0.7
-"""Of what is explained, or overlaps, in most frames: frames below it must be looked at."""
 AT_LEAST = 3
 """Frames: shorter stretches are not reported."""
-INSIDE = 0.2
-"""Metres between the middles of two actors: nearer, they are inside each other."""
 NUM_WORST = 5
 SHOWN = 4
 """Findings of each kind that the sentence names."""
@@ -127,15 +117,15 @@ def _overlaps(motion: Motion) -> dict[str, float]:
 
 def _wrong(explained: float | None, expected: float | None, overlap: Mapping[str, float]) -> list[str]:
     """What says that nothing can be relied on."""
-    found = []
-    if explained is not None and expected is not None and explained < OTHER_SUBJECT * expected:
+    bounds, found = fitted_numbers().verdict, []
+    if explained is not None and expected is not None and explained < bounds.other_subject * expected:
         found.append(
             f"this is not the subject: {explained:.1%} explained against {expected:.1%} in the example poses "
             "(another person, other clothes, or pictures whose red and blue are exchanged)"
         )
-    elif explained is not None and expected is None and explained < LEAST_EXPLAINED:
+    elif explained is not None and expected is None and explained < bounds.least_explained:
         found.append(f"this is not the subject: only {explained:.1%} of the actor is explained by what is seen")
-    if overlap and np.median(list(overlap.values())) < LEAST_OVERLAP:
+    if overlap and np.median(list(overlap.values())) < bounds.least_overlap:
         found.append(
             f"the body is not where somebody is seen: silhouettes overlap to {np.median(list(overlap.values())):.0%} "
             "(65 % is usual)"
@@ -147,10 +137,10 @@ def _bad_overlaps(overlap: Mapping[str, float]) -> list[str]:
     """Silhouettes that overlap little in all cameras, or in some."""
     if not overlap:
         return []
-    usual = float(np.median(list(overlap.values())))
-    if usual < GOOD_OVERLAP:
+    bounds, usual = fitted_numbers().verdict, float(np.median(list(overlap.values())))
+    if usual < bounds.good_overlap:
         return [f"look at all of it: silhouettes overlap to {usual:.0%} (65 % is usual)"]
-    worse = [name for name, value in overlap.items() if value < WORSE * usual]
+    worse = [name for name, value in overlap.items() if value < bounds.worse_than_most * usual]
     return _shortened([f"look at {name}: overlaps to {overlap[name]:.0%}, others to {usual:.0%}" for name in worse])
 
 
@@ -160,7 +150,7 @@ def _inside(name: str, motions: Mapping[str, Motion]) -> list[str]:
     for other, motion in motions.items():
         if other != name:
             apart = np.linalg.norm(_middles(motions[name]) - _middles(motion), axis=-1)
-            share = float(np.mean(apart < INSIDE))
+            share = float(np.mean(apart < fitted_numbers().verdict.inside))
             if share > 0.5:
                 found.append(f"{name} and {other} are inside each other in {share:.0%} of the frames")
     return found
@@ -173,7 +163,7 @@ def _middles(motion: Motion) -> Float[np.ndarray, "frame 3"]:
 
 def _bad_stretches(motion: Motion) -> list[str]:
     """Frames in which much less of the whole body is explained, or covers foreground, than in most."""
-    bad = _share_of_usual(motion).min(axis=1) < WORSE
+    bad = _share_of_usual(motion).min(axis=1) < fitted_numbers().verdict.worse_than_most
     found = [(int(motion.frame[a]), int(motion.frame[b - 1])) for a, b in stretches(bad, AT_LEAST)]
     return _shortened([f"look at {_frames(*pair)}: the body fits badly" for pair in found])
 

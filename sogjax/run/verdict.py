@@ -13,9 +13,10 @@ from sogjax.errors import InputError
 from sogjax.io.files import atomic_path
 from sogjax.io.video import read_frames
 from sogjax.model.body import Body
+from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.limb_warnings import limits_of
 from sogjax.quality.numbers import write_json
-from sogjax.quality.verdict import NUM_WORST, OTHER_SUBJECT, Verdict, verdicts
+from sogjax.quality.verdict import NUM_WORST, Verdict, verdicts
 from sogjax.run.run import Run
 from sogjax.run.terminal import say
 from sogjax.view.closeups import closeups
@@ -44,7 +45,7 @@ def say_if_other_subject(bodies: Sequence[Body], explained: Float[np.ndarray, "a
     """Warn at the first frame, so that nobody waits for a whole clip of somebody else."""
     expected = expected_of(bodies)
     for body, share in zip(bodies, explained.tolist(), strict=True):
-        if share < OTHER_SUBJECT * expected.get(body.name, 0.0):
+        if share < fitted_numbers().verdict.other_subject * expected.get(body.name, 0.0):
             say(
                 f"WARNING: this seems not to be {body.name}: {share:.1%} explained in the first frame, against "
                 f"{expected[body.name]:.1%} in the example poses; Ctrl-C stops, and what is wrong is told at the end"

@@ -12,6 +12,7 @@ from jaxtyping import Array, Bool, Float
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History
 from sogjax.model.body import Body
+from sogjax.quality.fitted import fitted_numbers
 from sogjax.search.body_parts import Part, PartArrays
 from sogjax.tracking.capacity import Needed, with_room
 from sogjax.tracking.culling import Capacities
@@ -19,9 +20,6 @@ from sogjax.tracking.frame import AnyFrame, FrameInput, TrackedFrame, TrackState
 from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.tracker import Tracker
 
-COMPARED, TOGETHER = 0.03, 0.04
-"""Metres, mean over the blobs of a part: above the one it is asked which pass is better, below the other they agree.
-Passes of fast motions lag behind from both sides."""
 MOST_BEFORE = 45
 """Frames before a stretch in doubt that are tracked backwards, at most."""
 SURE_FRAMES = 3
@@ -92,17 +90,17 @@ def compared_backwards(
             seen.append(frame)
             yield frame
 
-    agree, choices = 0, PartArrays.of(tracker.body, parts)
+    agree, choices, numbers = 0, PartArrays.of(tracker.body, parts), fitted_numbers().merge_passes
     for k, tracked in enumerate(track(tracker, start, coming(), passed.capacities)):
         row, both = begin - 1 - k, (jnp.asarray(passed.poses[begin - 1 - k]), jnp.asarray(tracked.result.pose))
         apart, gains = np.asarray(_apart(tracker.body, choices.blobs, *both)), np.zeros(len(parts))
-        if apart.max(initial=0.0) > COMPARED:
+        if apart.max(initial=0.0) > numbers.compared:
             gains = np.asarray(part_gains(tracker, seen[k], tracked.capacities, choices, *both))
         found.cells.append(seen[k])
         found.poses.append(np.asarray(both[1]))
         found.gains.append(gains)
         found.apart.append(apart)
-        agree = agree + 1 if apart.max(initial=0.0) <= TOGETHER else 0
+        agree = agree + 1 if apart.max(initial=0.0) <= numbers.together else 0
         if row <= first and agree >= SURE_FRAMES:
             break
     return found, begin

@@ -14,6 +14,7 @@ from jaxtyping import Array, Bool, Float
 
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History
+from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.search.backward_pass import SURE_FRAMES, FramesBackwards, Pass, compared_backwards
 from sogjax.search.body_parts import body_parts, merged_pose
@@ -23,8 +24,6 @@ from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import AnyFrame, FrameInput, TrackState, on_device
 from sogjax.tracking.tracker import Tracker
 
-DOUBTFUL = 0.3
-"""A limb that is doubted more makes its frame one that is tracked backwards."""
 MOST_LOOKS = 2
 """Frames that are tracked backwards, at most, in lengths of the clip."""
 
@@ -49,7 +48,7 @@ class Revision:
 
 def in_doubt(passed: Pass) -> Bool[np.ndarray, "frame"]:
     """The frames around which a clip is tracked backwards."""
-    return passed.doubts.max(axis=1, initial=0.0) > DOUBTFUL
+    return passed.doubts.max(axis=1, initial=0.0) > fitted_numbers().merge_passes.doubtful
 
 
 def merge_passes(tracker: Tracker, passed: Pass, frames: FramesBackwards) -> Revision:

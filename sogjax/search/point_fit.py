@@ -6,8 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from sogjax.model.body import Body
-from sogjax.solve.gauss_newton import GaussNewton
-from sogjax.solve.solution import QuadraticModel
+from sogjax.solve.gauss_newton import GaussNewton, LeastSquares
 from sogjax.tracking.solving import pose_scales
 
 ANYWHERE = 1e6
@@ -35,7 +34,7 @@ class Points(eqx.Module):
     """1 or 0."""
 
 
-class PointFit(eqx.Module):
+class PointFit(LeastSquares):
     """Minus the squared distances from points, in units of their noise, by Cauchy's loss; within the joints' limits.
 
     A point `far` times its noise away counts half as much as by its square, and less beyond.
@@ -48,26 +47,15 @@ class PointFit(eqx.Module):
     spread: Float[Array, "dof"]
     """How far each degree of freedom is expected to lie from the start."""
 
-    def __call__(self, pose: Float[Array, "dof"]) -> Float[Array, ""]:
-        """Minus the sum of squares."""
-        return -jnp.sum(self._residuals(pose) ** 2)
-
-    def quadratic(self, pose: Float[Array, "dof"]) -> QuadraticModel:
-        """Value, gradient, and the curvature by Gauss and Newton."""
-        residuals, jacobian = self._residuals(pose), jax.jacfwd(self._residuals)(pose)
-        product = lambda a, b: jnp.matmul(a, b, precision="highest")
-        return QuadraticModel(
-            -jnp.sum(residuals**2), -2.0 * product(jacobian.T, residuals), 2.0 * product(jacobian.T, jacobian)
-        )
-
-    def _residuals(self, pose: Float[Array, "dof"]) -> Float[Array, "residual"]:
-        points, skeleton = self.points, self.body.skeleton
+    def residuals(self, params: Float[Array, "dof"]) -> Float[Array, "residual"]:
+        """Those of the points, of the start, and of joints beyond their limits, at a pose."""
+        pose, points, skeleton = params, self.points, self.body.skeleton
         misses = (self.body.posed_landmarks(pose)[points.landmarks] - points.places) / points.noise[:, None]
         squared = jnp.sum(misses**2, axis=-1) / self.far**2
         loss = jnp.where(squared > 1e-6, jnp.log1p(squared) / jnp.maximum(squared, 1e-6), 1.0)
         of_points = misses * (jnp.sqrt(loss) * points.known)[:, None]
-        params, (lower, upper) = skeleton.joint_params(pose), skeleton.joint_limits()
-        beyond = jnp.maximum(lower - params, 0.0) + jnp.maximum(params - upper, 0.0)
+        angles, (lower, upper) = skeleton.joint_params(pose), skeleton.joint_limits()
+        beyond = jnp.maximum(lower - angles, 0.0) + jnp.maximum(angles - upper, 0.0)
         return jnp.concatenate([of_points.reshape(-1), (pose - self.start) / self.spread, LIMITS * beyond])
 
 

@@ -6,7 +6,7 @@ Is a pose that was found right? What tells, and how likely it is, calibrated on 
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import equinox as eqx
 import jax
@@ -17,8 +17,9 @@ from jaxtyping import Array, Bool, Float
 from sogjax.energy.appearance import ColorWindows
 from sogjax.energy.posed import Posed
 from sogjax.model.limbs import limb_blobs
+from sogjax.quality.fitted import Bound, fitted_numbers
 from sogjax.search.mirrored import means_of
-from sogjax.search.pose_search import Hypotheses, Optimum, PlacedSearch, PoseSearch, centres_of
+from sogjax.search.pose_search import DIFFERENT, Hypotheses, Optimum, PlacedSearch, PoseSearch, centres_of
 from sogjax.search.search_energy import SearchEnergy
 from sogjax.search.seen_frame import SeenFrame
 
@@ -118,39 +119,8 @@ def _explained(energy: SearchEnergy, windows: ColorWindows, limbs: Bool[Array, "
 
 SURE = 0.99
 """A pose of at least this confidence is called sure."""
-DIFFERENT = 0.1
-"""Metres, mean distance of the blobs: hypotheses nearer to each other are one."""
 STEEPNESS = 4.6
 """A pose that just meets every condition has a confidence of 0.99."""
-
-
-@dataclass(frozen=True)
-class Condition:
-    """A value that a pose must reach to be called sure: where the background is known, and where it is not."""
-
-    name: str
-    with_background: float
-    without: float
-    scale: float
-    """By how much it must miss that to be no more likely right than wrong."""
-
-    def shortfall(self, value: float, known: float) -> float:
-        """How far the value is from what it must be, in units of the scale; negative where it is missed."""
-        wanted = known * self.with_background + (1.0 - known) * self.without
-        return (value - wanted) / self.scale
-
-
-CONDITIONS = (
-    Condition("energy", 1.4, 0.3, 0.1),
-    Condition("margin", 0.006, 0.014, 0.01),
-    Condition("later_margin", 0.006, 0.014, 0.01),
-    Condition("foreground", 0.75, 0.45, 0.05),
-    Condition("worst_foreground", 0.65, 0.28, 0.1),
-    Condition("gain", 1.2, 0.28, 0.1),
-    Condition("not_background", 0.825, 0.78, 0.05),
-)
-"""Found on searches in walks, exercises and cartwheels of rendered people: with a background 29 with 4 and 12 cameras,
-without one 50 with 3 to 12. None of those that meet all conditions is wrong; that is too few for a promise."""
 
 
 @dataclass(frozen=True)
@@ -167,18 +137,6 @@ class Agreement:
     """As in `Evidence`, the least of both frames."""
     num_actors: int = 1
     """That were searched for together."""
-
-
-MOST_APART, APART_SCALE = 0.05, 0.03
-"""Metres: two searches that agree so well are right, and by how much more they are no more likely right than wrong."""
-MOST_APART_AMONG_OTHERS = 0.03
-"""The same where several actors are searched for: one of them taken for the other is seen in both frames, too."""
-LEAST_MOVED, MOVED_SCALE = 0.03, 0.03
-"""Metres: who moves less gives two searches the same reasons to be wrong."""
-LEAST_SIDES, SIDES_SCALE = 0.8, 0.2
-"""Limbs of a pair that cross are as near to each other as they never are in a pose with a name: they are exchanged."""
-LEAST_LIMB, LIMB_SCALE = 0.0, 0.2
-"""A limb that explains less than nothing is elsewhere."""
 
 
 @dataclass(frozen=True)
@@ -222,23 +180,32 @@ class Evidence:
 
 
 def pose_confidence(evidence: Evidence) -> float:
-    """How likely the pose is right, from one search, as the condition has it that is met least."""
-    return _likely(each.shortfall(getattr(evidence, each.name), evidence.known) for each in CONDITIONS)
+    """How likely the pose is right, from one search: as the measure says that falls behind its bound most."""
+    bounds = fitted_numbers().pose_evidence
+
+    def excess(name: str) -> float:
+        bound: Bound = getattr(bounds, name)
+        least = evidence.known * bound.with_background + (1.0 - evidence.known) * bound.without_background
+        return (getattr(evidence, name) - least) / bound.scale
+
+    return _likely([excess(bound.name) for bound in fields(bounds)])
 
 
 def agreed_confidence(agreement: Agreement) -> float:
-    """The same from two searches in frames some time apart."""
-    conditions = (
-        ((MOST_APART if agreement.num_actors == 1 else MOST_APART_AMONG_OTHERS) - agreement.apart) / APART_SCALE,
-        (agreement.moved - LEAST_MOVED) / MOVED_SCALE,
-        (agreement.sides - LEAST_SIDES) / SIDES_SCALE,
-        (agreement.worst_limb - LEAST_LIMB) / LIMB_SCALE,
+    """How likely a pose is right, from two searches in frames some time apart."""
+    bounds = fitted_numbers().pose_agreement
+    most_apart = bounds.most_apart if agreement.num_actors == 1 else bounds.most_apart_among_others
+    excesses = (
+        (most_apart - agreement.apart) / bounds.apart_scale,
+        (agreement.moved - bounds.least_moved) / bounds.moved_scale,
+        (agreement.sides - bounds.least_sides) / bounds.sides_scale,
+        (agreement.worst_limb - bounds.least_limb) / bounds.limb_scale,
     )
-    return _likely(conditions)
+    return _likely(excesses)
 
 
-def _likely(shortfalls: Iterable[float]) -> float:
-    return float(1.0 / (1.0 + np.exp(-STEEPNESS * (1.0 + min(*shortfalls, 10.0)))))
+def _likely(excesses: Iterable[float]) -> float:
+    return float(1.0 / (1.0 + np.exp(-STEEPNESS * (1.0 + min(*excesses, 10.0)))))
 
 
 def _margin(energies: Float[np.ndarray, "hypothesis"], best: int, others: list[int]) -> float:

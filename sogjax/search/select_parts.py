@@ -5,14 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
+from sogjax.quality.fitted import fitted_numbers
 from sogjax.search.body_parts import Part
-
-APART = 0.05
-"""Metres, mean over the blobs of a part: from where on two passes differ."""
-CHANGE = 0.2
-"""Part of a frame's energy that a change from one pass to the other costs, for each metre between them."""
-BIAS = 5e-4
-"""The same that a frame must gain at least."""
 
 
 def stretches(marked: Bool[np.ndarray, "frame"], gap: int = 1) -> list[tuple[int, int]]:
@@ -42,14 +36,14 @@ def select_parts(
         energy: of a frame, for scale.
         open_ends: whether the clip ends before the first and behind the last of the frames.
     """
-    taken = np.zeros(apart.shape, bool)
+    costs, taken = fitted_numbers().merge_passes, np.zeros(apart.shape, bool)
     for k, part in enumerate(parts):
         whole = 0.0 if part.whole is None else apart[:, part.whole]
-        worth = np.where(whole > APART, 0.0, gains[:, k] / energy) - BIAS
-        found = best_choice(worth, CHANGE * apart[:, k], open_ends)
+        worth = np.where(whole > costs.apart, 0.0, gains[:, k] / energy) - costs.bias
+        found = best_choice(worth, costs.change * apart[:, k], open_ends)
         for first, last in stretches(found):
             stretch = slice(first, last + 1)
-            taken[stretch, k] = apart[stretch, k].max() > APART
+            taken[stretch, k] = apart[stretch, k].max() > costs.apart
     return taken
 
 

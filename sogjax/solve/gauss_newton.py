@@ -1,4 +1,6 @@
-"""Damped Gauss-Newton (Levenberg-Marquardt) ascent in one `lax.while_loop`."""
+"""Damped Gauss-Newton (Levenberg-Marquardt) ascent in one `lax.while_loop`, and sums of squares to be climbed."""
+
+import abc
 
 import equinox as eqx
 import jax
@@ -6,6 +8,26 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.solve.solution import CurvedObjective, Objective, Params, QuadraticModel, Scales, Solution
+
+
+class LeastSquares(eqx.Module):
+    """Minus a sum of squared residuals, with the curvature by Gauss and Newton; a `CurvedObjective`."""
+
+    @abc.abstractmethod
+    def residuals(self, params: Params) -> Float[Array, "residual"]:
+        """What is squared and summed."""
+
+    def __call__(self, params: Params) -> Float[Array, ""]:
+        """Minus the sum of squares."""
+        return -jnp.sum(self.residuals(params) ** 2)
+
+    def quadratic(self, params: Params) -> QuadraticModel:
+        """The value with its gradient, and the curvature as if the residuals were linear."""
+        residuals, jacobian = self.residuals(params), jax.jacfwd(self.residuals)(params)
+        product = lambda a, b: jnp.matmul(a, b, precision="highest")
+        return QuadraticModel(
+            -jnp.sum(residuals**2), -2.0 * product(jacobian.T, residuals), 2.0 * product(jacobian.T, jacobian)
+        )
 
 
 class GaussNewtonState(eqx.Module):

@@ -1,15 +1,20 @@
 """How well limbs that are lost are told from others: logistic regression, ROC, shares found against those said."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
+import yaml
 from jaxtyping import Bool, Float
 from scipy.optimize import minimize
 from scipy.special import expit
 from scipy.stats import rankdata
 
-from sogjax.quality.limb_confidence import FAR, WITH_BACKGROUND, WITHOUT, Weights
+from sogjax.io.files import atomic_path
+from sogjax.quality.fitted import Weights, fitted_numbers
+from sogjax.quality.limb_confidence import FAR
 from sogjax.study.limb_trials import FOLLOWED, JudgedLimb
 from sogjax.study.table import ruled_table
 from sogjax.view.charts import LimbCurve
@@ -23,7 +28,8 @@ WeightsOf = Callable[[JudgedLimb], Weights]
 
 def committed(limb: JudgedLimb) -> Weights:
     """The weights that the tracker uses."""
-    return WITHOUT if limb.trial.background == "none" else WITH_BACKGROUND
+    weights = fitted_numbers().limb_weights
+    return weights.without_background if limb.trial.background == "none" else weights.with_background
 
 
 def said_of(
@@ -43,7 +49,7 @@ def lost(limbs: Sequence[JudgedLimb]) -> Bool[np.ndarray, "value"]:
     return np.concatenate([limb.error for limb in limbs]) > FAR
 
 
-def fitted(limbs: Sequence[JudgedLimb]) -> Weights:
+def fitted_weights(limbs: Sequence[JudgedLimb]) -> Weights:
     """The weights that suit some limbs best (maximum likelihood, with a little of a ridge); no measure may reassure."""
     rows = np.concatenate([np.stack([np.ones_like(limb.worse), limb.worse, limb.contradicted]) for limb in limbs], 1)
     sign = np.where(lost(limbs), 1.0, -1.0)
@@ -57,6 +63,27 @@ def fitted(limbs: Sequence[JudgedLimb]) -> Weights:
 
     bounds = [(None, None), (0.0, None), (0.0, None)]
     return Weights(*minimize(loss, np.zeros(3), jac=True, bounds=bounds).x.tolist())
+
+
+def write_weights(path: Path, found: Mapping[str, Sequence[JudgedLimb]], trials: str) -> None:
+    """Write weights that were fitted to limbs into the file of fitted numbers, rounded to one decimal.
+
+    Args:
+        path: the file.
+        found: the limbs to fit to, by `with_background` and `without_background`; what is absent keeps its weights.
+        trials: what was tracked, which the file will say.
+    """
+    text = path.read_text(encoding="utf-8")
+    content = yaml.safe_load(text)
+    part = content["limb_weights"]
+    for name, limbs in found.items():
+        part["values"][name] = {key: round(value, 1) + 0.0 for key, value in asdict(fitted_weights(limbs)).items()}
+    counts = [f"{name}: {len(lost(limbs))} limbs, {int(lost(limbs).sum())} lost" for name, limbs in found.items()]
+    part["recordings"] = "; ".join([trials, *counts])
+    header = "".join(line for line in text.splitlines(keepends=True) if line.startswith("#"))
+    with atomic_path(path) as temporary:
+        written = yaml.safe_dump(content, sort_keys=False, width=120, allow_unicode=True, default_flow_style=None)
+        temporary.write_text(header + written, encoding="utf-8")
 
 
 def area_under_roc(said: Float[np.ndarray, "value"], lost: Bool[np.ndarray, "value"]) -> float:

@@ -117,10 +117,11 @@ class RunRecord:
 
 @cache
 def program_digest(further: str = "") -> str:
-    """Of the files of the program that decide how a run comes out, and `further` ones (a pattern)."""
+    """The digest of those files of the program that decide how a run comes out, and of `further` ones (a pattern)."""
     package = Path(sogjax.__file__).parent
     more = package.glob(further) if further else []
-    files = sorted({*more, *(path for name in _DECIDE for path in (package / name).rglob("*.py"))})
+    kinds = ("*.py", "*.yaml")  # numbers that were fitted, and bodies, decide as the code does
+    files = sorted({*more, *(path for name in _DECIDE for kind in kinds for path in (package / name).rglob(kind))})
     content = hashlib.sha256()
     for path in files:
         content.update(f"{path.relative_to(package)}\n".encode() + path.read_bytes())
