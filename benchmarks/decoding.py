@@ -14,8 +14,8 @@ from quantities import Quantity
 from sogjax.io.plane_video import pyav_version
 from sogjax.io.recording import Recording, open_recording
 from sogjax.io.video import read_prepared
-from sogjax.run.build import cell_grids
-from sogjax.run.pipeline import Preparation
+from sogjax.run.clip import cell_grids
+from sogjax.scene.cells import padded_cells, stack_shape
 
 DEPTH = 8
 """Of the quad-tree: that of the default settings."""
@@ -24,14 +24,15 @@ REPEATS = 4
 
 def decoding_quantities(recording: Recording, frames: int) -> Iterator[Quantity]:
     """Processor time for one picture of every camera, by OpenCV and as the tracker takes it; in turns."""
-    cells = Preparation(cell_grids(recording, DEPTH))
-    ways: dict[str, tuple[Callable[[int, Any], Any], bool]] = {
-        "pictures by OpenCV": (lambda camera, image: None, False),
+    grids = cell_grids(recording, DEPTH)
+    cells = lambda camera, frame, image: padded_cells(image, grids[camera], stack_shape(grids))
+    ways: dict[str, tuple[Callable[[int, int, Any], Any], bool]] = {
+        "pictures by OpenCV": (lambda camera, frame, image: None, False),
         "cells from pictures by OpenCV": (cells, False),
     }
     if pyav_version() is not None:
         ways |= {
-            "a video's own colours by PyAV": (lambda camera, image: None, True),
+            "a video's own colours by PyAV": (lambda camera, frame, image: None, True),
             "cells from a video's own colours by PyAV": (cells, True),
         }
     times: dict[str, list[float]] = {way: [] for way in ways}
@@ -43,10 +44,11 @@ def decoding_quantities(recording: Recording, frames: int) -> Iterator[Quantity]
 
 
 def processor_milliseconds(
-    recording: Recording, frames: int, prepare: Callable[[int, Any], Any], planes: bool
+    recording: Recording, frames: int, prepare: Callable[[int, int, Any], Any], planes: bool
 ) -> float:
     """Of one frame of all cameras, without opening the files."""
-    pictures = read_prepared(recording, prepare, 0, frames, planes=planes)
+    start = recording.first_frame
+    pictures = read_prepared(recording, prepare, start, start + frames, planes=planes)
     next(pictures)
     begin = time.process_time()
     count = sum(1 for _ in pictures)

@@ -13,14 +13,13 @@ from pathlib import Path
 
 from track_speed import demo_recording
 
-from sogjax.cli.config.overrides import quoted_value
+from sogjax.cli.words import quoted_value
 from sogjax.io.recording import Recording, open_recording
 from sogjax.io.threads import prefetch
 from sogjax.io.video import read_prepared
-from sogjax.run.pipeline import FRAMES_AHEAD
-from sogjax.run.run_numbers import row_numbers
-from sogjax.study.machine import machine_line
-from sogjax.study.script import run_script, settings_from
+from sogjax.run.clip import FRAMES_AHEAD
+from sogjax.run.result import row_numbers
+from sogjax.study.script import machine_line, run_script, settings_from
 from sogjax.study.tracked import track_folder
 
 HEAD = f"{'settings':<48}{'decoding alone':>16}{'to pose':>10}{'ratio':>8}{'step':>8}{'mean mm':>10}{'lost':>6}"
@@ -67,7 +66,10 @@ def main() -> None:
 
 def decoding_rate(recording: Recording, frames: int) -> float:
     """Multi-view frames per second when nothing is done with the pictures, without opening the files."""
-    pictures = prefetch(read_prepared(recording, lambda camera, image: None, 0, frames, planes=True), FRAMES_AHEAD)
+    start = recording.first_frame
+    pictures = prefetch(
+        read_prepared(recording, lambda camera, frame, image: None, start, start + frames, planes=True), FRAMES_AHEAD
+    )
     next(pictures)
     begin = time.perf_counter()
     count = sum(1 for _ in pictures)

@@ -24,8 +24,7 @@ from sogjax.io.actor_file import load_body, named_body
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, project
 from sogjax.model.sog import Sog
-from sogjax.study.machine import machine_line
-from sogjax.study.script import settings_from
+from sogjax.study.script import machine_line, settings_from
 
 ROW = "{:<34}{:>12}{:>12}{:>24}"
 

@@ -18,11 +18,13 @@ from quantities import Quantity
 from sogjax.io.recording import Recording
 from sogjax.io.source import open_source
 from sogjax.io.video import VideoWriter
-from sogjax.run.recordings import actors_of, opened
-from sogjax.run.run_job import tracking
+from sogjax.run.actors import ActorRequest, make_actors
+from sogjax.run.recordings import opened
+from sogjax.run.run import Run
+from sogjax.run.runner import run_passes
+from sogjax.run.track import opened_clip
 from sogjax.settings.compose import track_config
-from sogjax.study.machine import machine_line
-from sogjax.study.script import run_script, settings_from
+from sogjax.study.script import machine_line, run_script, settings_from
 
 MIB = 1024
 """Kibibytes, in which the system counts."""
@@ -79,11 +81,13 @@ def track_repeatedly(settings: Settings, repeats: int) -> None:
     """The first frames of the recording forwards and backwards, so many times, into a folder that is removed."""
     config = track_config(settings.overrides, recording=settings.recording, actor=settings.actor)
     recording = opened(config.recording, config.cameras)
-    bodies, _ = actors_of(recording, config.actor, config.body, config.color, actors=config.actors)
+    config.outputs = config.outputs.asked()
+    actors = make_actors(ActorRequest.of_track(opened_clip(recording, config), config))
     with TemporaryDirectory() as folder:
         longer = longer_recording(recording, settings.frames, repeats, Path(folder))
-        with tracking(longer, bodies, config, config.outputs, Path(folder)) as result:
-            assert len(result.converged) == longer.num_frames
+        clip = opened_clip(longer, config).kept_in(Path(folder) / "kept", None)
+        run = run_passes(Run(clip, config, Path(folder) / "out", Path(folder) / "kept", records={"actors": actors}))
+        assert len(run.result.converged) == longer.num_frames
 
 
 def most_resident_mib() -> float:

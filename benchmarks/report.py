@@ -27,7 +27,7 @@ from sweep_speed import sweep_quantities
 from sogjax.io.actor_file import save_body
 from sogjax.io.files import atomic_path
 from sogjax.run.compilation_cache import use_compiler_options
-from sogjax.study.machine import machine_line
+from sogjax.study.script import machine_line
 
 REFERENCE = "reference ms"
 FORMAT = 1

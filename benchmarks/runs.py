@@ -18,11 +18,13 @@ from sogjax.io.ground_truth import load_ground_truth
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.quality.evaluation import evaluate_motions
-from sogjax.run.cells import cells_of_clip
-from sogjax.run.job import Job
-from sogjax.run.recordings import actors_of, opened
-from sogjax.run.run import Run
-from sogjax.run.track import track_recording
+from sogjax.run.actors import ActorRequest, Actors, make_actors
+from sogjax.run.background import learn_background
+from sogjax.run.initial_pose import SOURCES, PoseRequest, find_initial_pose
+from sogjax.run.recordings import opened
+from sogjax.run.result import RunResult
+from sogjax.run.setup import tracking_setup
+from sogjax.run.track import opened_clip, track_recording
 from sogjax.settings.compose import track_config
 from sogjax.settings.run import TrackConfig
 from sogjax.tracking.capacity import first_capacities
@@ -46,14 +48,14 @@ class Scene:
         folder = demo_recording()
         recording = opened(str(folder))
         config: TrackConfig = track_config(recording=folder)
-        bodies, _ = actors_of(recording, config.actor, config.body, config.color, actors=config.actors)
-        return cls(folder, recording, bodies, min(frames, recording.num_frames))
+        actors = make_actors(ActorRequest.of_track(opened_clip(recording, config), config))
+        return cls(folder, recording, list(actors.bodies), min(frames, recording.num_frames))
 
     def config(self, *overrides: str, frames: int | None = None) -> TrackConfig:
         """The config of a run."""
         return track_config(overrides, recording=self.folder, stop=frames or self.frames)
 
-    def tracked(self, *overrides: str) -> Run:
+    def tracked(self, *overrides: str) -> RunResult:
         """A run without files, evaluated."""
         result = track_recording(self.recording, self.bodies, self.config(*overrides))
         assert self.recording.ground_truth is not None
@@ -85,11 +87,13 @@ def solver_quantities(scene: Scene) -> Iterator[Quantity]:
 
 def stage_quantities(scene: Scene) -> Iterator[Quantity]:
     """The stages of one step before the solver."""
-    job = Job.from_config(scene.recording, scene.bodies, scene.config())
-    grids, frames = job.grids, (0, 1)
-    cells = jnp.asarray(cells_of_clip(scene.recording, grids, scene.config().images, frames)[0])
-    state = TrackState.from_pose(job.start)
-    capacities = first_capacities(job.tracker, state, FrameInput(cells))
+    clip = opened_clip(scene.recording, scene.config())
+    background, actors = learn_background(clip, scene.config().images.background), Actors(tuple(scene.bodies))
+    tracker = tracking_setup(clip, background, actors.bodies, scene.config()).tracker
+    start = jnp.asarray(find_initial_pose(PoseRequest(clip, background, actors, scene.config()), SOURCES).pose)
+    cells = jnp.asarray(next(clip.frames()).cells)
+    state = TrackState.from_pose(start)
+    capacities = first_capacities(tracker, state, FrameInput(cells))
     leaves = eqx.filter_jit(lambda reader, cells: reader.leaves(cells.astype(jnp.float32) / 255.0))
     views = eqx.filter_jit(lambda tracker, state, cells: tracker.views(FrameInput(cells), state, capacities)[0])
     near = eqx.filter_jit(
@@ -97,20 +101,20 @@ def stage_quantities(scene: Scene) -> Iterator[Quantity]:
             tracker.body.posed_blobs(state.previous), similarity_among(tracker.terms).exponent, capacities.blocks
         )
     )
-    seen = views(job.tracker, state, cells)
+    seen = views(tracker, state, cells)
     quadratic = eqx.filter_jit(lambda objective, pose: objective.quadratic(pose))
     judged = eqx.filter_jit(
         lambda tracker, state, views: tracker.judged(state.previous, state.baseline, views.windows, FrameInput(cells))
     )
-    objective = FrameEnergy(job.tracker.body, seen, History.unknown(job.start), job.tracker.terms)
-    objective = eqx.filter_jit(lambda energy, pose: energy.near(pose, capacities.blocks)[0])(objective, job.start)
-    yield Quantity("stage", "quad-trees of 12 cameras", milliseconds(leaves, job.tracker.reader, cells), "ms")
-    yield Quantity("stage", "with choice of blobs and colours", milliseconds(views, job.tracker, state, cells), "ms")
-    yield Quantity("stage", "lists of near pairs", milliseconds(near, job.tracker, state, seen), "ms")
-    yield Quantity("stage", "value, gradient and curvature", milliseconds(quadratic, objective, job.start), "ms")
-    if job.tracker.limbs is not None and job.tracker.reader.subject is not None:
-        known = job.tracker.with_memory(state)
-        yield Quantity("stage", "evidence for the limbs", milliseconds(judged, job.tracker, known, seen), "ms")
+    objective = FrameEnergy(tracker.body, seen, History.unknown(start), tracker.terms)
+    objective = eqx.filter_jit(lambda energy, pose: energy.near(pose, capacities.blocks)[0])(objective, start)
+    yield Quantity("stage", "quad-trees of 12 cameras", milliseconds(leaves, tracker.reader, cells), "ms")
+    yield Quantity("stage", "with choice of blobs and colours", milliseconds(views, tracker, state, cells), "ms")
+    yield Quantity("stage", "lists of near pairs", milliseconds(near, tracker, state, seen), "ms")
+    yield Quantity("stage", "value, gradient and curvature", milliseconds(quadratic, objective, start), "ms")
+    if tracker.limbs is not None and tracker.reader.subject is not None:
+        known = tracker.with_memory(state)
+        yield Quantity("stage", "evidence for the limbs", milliseconds(judged, tracker, known, seen), "ms")
 
 
 def end_to_end_quantities(scene: Scene) -> Iterator[Quantity]:

@@ -19,8 +19,7 @@ from tempfile import TemporaryDirectory
 from quantities import Quantity
 from track_speed import demo_recording
 
-from sogjax.study.machine import machine_line
-from sogjax.study.script import run_script, settings_from
+from sogjax.study.script import machine_line, run_script, settings_from
 
 OURS = Path(__file__).resolve().parents[1]
 FRAMES = "stop=3"

@@ -23,8 +23,7 @@ from start_up import OURS, made_actor
 from track_speed import demo_recording
 
 from sogjax.run.clock import TOTAL, TRACKING
-from sogjax.study.machine import machine_line
-from sogjax.study.script import run_script, settings_from
+from sogjax.study.script import machine_line, run_script, settings_from
 
 AIM = 4.0
 """Single runs that a sweep of 15 settings may take."""

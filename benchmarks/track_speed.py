@@ -10,13 +10,12 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from sogjax.cli.config.schemas import DemoConfig
+from sogjax.cli.schemas import DemoConfig
 from sogjax.io.recording import open_recording
 from sogjax.io.video import read_frames
-from sogjax.run.run_numbers import row_numbers
+from sogjax.run.result import row_numbers
 from sogjax.run.terminal import progress
-from sogjax.study.machine import machine_line
-from sogjax.study.script import run_script, settings_from
+from sogjax.study.script import machine_line, run_script, settings_from
 from sogjax.study.tracked import track_folder
 from sogjax.synth.cache import cached_recording
 from sogjax.synth.settings import SynthSettings

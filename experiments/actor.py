@@ -14,11 +14,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from sogjax.actor.colors import camera_of
 from sogjax.actor.coverage import silhouette_iou
 from sogjax.actor.make import MadeActor, make_actor, subjects_of
 from sogjax.io.ground_truth import load_ground_truth
 from sogjax.io.recording import Recording, open_recording
+from sogjax.model.camera import camera_of
 from sogjax.quality.evaluation import evaluate_motions
 from sogjax.quality.metrics import bone_errors
 from sogjax.run.build import energy_terms
@@ -27,8 +27,7 @@ from sogjax.run.terminal import say
 from sogjax.run.track import track_recording
 from sogjax.settings.compose import track_config
 from sogjax.settings.method import EnergyConfig
-from sogjax.study.machine import machine_line
-from sogjax.study.script import run_script, settings_from
+from sogjax.study.script import machine_line, run_script, settings_from
 from sogjax.synth.cache import cached_recording
 from sogjax.synth.settings import SynthSettings
 

@@ -17,10 +17,8 @@ from sogjax.errors import InputError
 from sogjax.io.files import atomic_path
 from sogjax.run.terminal import say
 from sogjax.study.experiment import synth_settings, yardsticks
-from sogjax.study.few_cameras import CASES, Result, Trial, Trials
-from sogjax.study.machine import command_line, machine_line
-from sogjax.study.script import run_script, settings_from
-from sogjax.study.sections.few_cameras import each_table, together_table
+from sogjax.study.few_cameras import CASES, Result, Trial, Trials, each_table, together_table
+from sogjax.study.script import command_line, machine_line, run_script, settings_from
 from sogjax.study.source import MOST_FRAMES
 
 ROBUSTNESS = ["twice the noise", "20 % outliers", "10 % exchanges", "a third missing"]

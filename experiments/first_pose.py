@@ -16,8 +16,7 @@ from sogjax.errors import InputError
 from sogjax.io.files import atomic_path
 from sogjax.run.terminal import say
 from sogjax.study.experiment import yardsticks
-from sogjax.study.machine import machine_line
-from sogjax.study.script import run_script, settings_from
+from sogjax.study.script import machine_line, run_script, settings_from
 from sogjax.study.search_tables import kinds_line, reliability, sure_table, write_searches, wrong_table
 from sogjax.study.searches import Search, Searches, drawn_trials
 from sogjax.study.study import Study

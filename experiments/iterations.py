@@ -13,8 +13,7 @@ import numpy as np
 
 from sogjax.io.video import read_frames
 from sogjax.study.iterations import check_showable, watched
-from sogjax.study.machine import machine_line
-from sogjax.study.script import run_script, settings_from
+from sogjax.study.script import machine_line, run_script, settings_from
 from sogjax.study.settings import ReportConfig
 from sogjax.study.source import source_named
 from sogjax.view.rerun.comparison import write_iterations

@@ -27,8 +27,7 @@ from sogjax.study.limb_calibration import (
     write_weights,
 )
 from sogjax.study.limb_trials import PLAIN, JudgedLimb, LimbTrial, LimbTrials
-from sogjax.study.machine import machine_line
-from sogjax.study.script import run_script, settings_from
+from sogjax.study.script import machine_line, run_script, settings_from
 from sogjax.study.study import Study
 from sogjax.view.charts import limb_chart
 

@@ -25,10 +25,8 @@ from sogjax.io.motion import load_motion
 from sogjax.model.body import Body
 from sogjax.run.recordings import file_list, opened
 from sogjax.run.terminal import say
-from sogjax.study.machine import machine_line
-from sogjax.study.ranking import RankedTrack, ranking_of
-from sogjax.study.ranking_tables import curves_of, limbs_table, terms_table, verdicts_table, write_csv
-from sogjax.study.script import HELP, run_script, settings_from
+from sogjax.study.ranking import RankedTrack, curves_of, limbs_table, ranking_of, terms_table, verdicts_table, write_csv
+from sogjax.study.script import HELP, machine_line, run_script, settings_from
 from sogjax.view.charts import ranking_chart
 
 

@@ -13,14 +13,15 @@ from pathlib import Path
 
 import numpy as np
 
-from sogjax.cli.sweep.results import differing, kept_results
+from sogjax.cli.sweep.results import kept_results
+from sogjax.cli.sweep.tables import differing
 from sogjax.errors import InputError
 from sogjax.io.motion import Motion, load_motion
 from sogjax.io.video import read_frames
 from sogjax.study.experiment import Experiment
+from sogjax.study.iterations import of_experiment
 from sogjax.study.script import run_script, settings_from
 from sogjax.study.settings import USUAL_FRAMES, ReportConfig
-from sogjax.study.side_by_side import of_experiment
 from sogjax.study.study import Study
 from sogjax.view.rerun.comparison import write_comparison
 

@@ -7,8 +7,8 @@ tracks the rendered walk of the demo; `recording=FOLDER` tracks another recordin
 
 import sys
 
-from sogjax.cli.config.overrides import quoted_value
 from sogjax.cli.main import main
+from sogjax.cli.words import quoted_value
 from sogjax.run.terminal import progress
 from sogjax.synth.cache import cached_recording
 from sogjax.synth.settings import SynthSettings

@@ -17,8 +17,7 @@ from sogjax.run.recordings import opened
 from sogjax.run.terminal import progress, say
 from sogjax.study.experiment import Experiment, synth_settings
 from sogjax.study.few_cameras import evenly
-from sogjax.study.machine import machine_line
-from sogjax.study.script import run_script, settings_from
+from sogjax.study.script import machine_line, run_script, settings_from
 from sogjax.study.triangulation_trials import JointErrors, together, triangulation_errors
 from sogjax.synth.cache import cached_keypoints, cached_recording
 from sogjax.synth.detector import DetectorSettings

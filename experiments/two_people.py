@@ -8,10 +8,9 @@ Both people are rendered into one recording and are one energy (Eq. 8 caps the s
 import sys
 from dataclasses import dataclass, field
 
-from sogjax.cli.sweep.results import table
-from sogjax.run.run_numbers import row_numbers
-from sogjax.study.machine import machine_line
-from sogjax.study.script import run_script, settings_from
+from sogjax.cli.sweep.tables import table
+from sogjax.run.result import row_numbers
+from sogjax.study.script import machine_line, run_script, settings_from
 from sogjax.study.tracked import track_rendered
 from sogjax.synth.settings import SynthSettings
 

@@ -17,8 +17,7 @@ from sogjax.io.files import atomic_path
 from sogjax.run.memory import forget_programs_if_many
 from sogjax.run.terminal import say
 from sogjax.study.experiment import synth_settings, yardsticks
-from sogjax.study.machine import command_line, machine_line
-from sogjax.study.script import run_script, settings_from
+from sogjax.study.script import command_line, machine_line, run_script, settings_from
 from sogjax.study.source import MOST_FRAMES
 from sogjax.study.verdict_trials import CASES, JudgedRun, VerdictTrial, VerdictTrials, share
 

@@ -2,12 +2,14 @@
 
 import logging
 import os
+from pathlib import Path
 
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
-# Most of the tests' time is compilation, a third of it LLVM's optimisation; `.ci/run` keeps that in the slow tests.
+# Most of the tests' time is compilation, a third of it optimisation, which the demo of `.ci/run` has.
 os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "true")
-os.environ.setdefault("XLA_FLAGS", "--xla_backend_optimization_level=1")  # in the slow tests, as the commands
-os.environ.setdefault("SOGJAX_COMPILATION_CACHE", "off")
+os.environ.setdefault("XLA_FLAGS", "--xla_backend_optimization_level=1")
+# Both workers use what either compiled, and so does the next run.
+os.environ.setdefault("SOGJAX_COMPILATION_CACHE", str(Path(__file__).parent.parent / ".pytest_cache" / "programs"))
 os.environ.setdefault("SOGJAX_BACKGROUND_CACHE", "off")
 
 import jax
@@ -17,6 +19,10 @@ from jaxtyping import install_import_hook
 install_import_hook("sogjax", "beartype.beartype")
 jax.config.update("jax_numpy_rank_promotion", "raise")
 jax.config.update("jax_numpy_dtype_promotion", "strict")
+
+from sogjax.run.compilation_cache import use_compilation_cache  # noqa: E402  (after the hook)
+
+use_compilation_cache()
 
 
 @pytest.fixture(scope="session")

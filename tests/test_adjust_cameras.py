@@ -19,7 +19,8 @@ from sogjax.energy.posed import History
 from sogjax.errors import InputError
 from sogjax.io.actor_file import load_body
 from sogjax.io.calibration.rig import CameraRig
-from sogjax.io.motion import motion_from_poses, save_motion
+from sogjax.io.motion import motion_from_poses
+from sogjax.io.motion_data import save_motion
 from sogjax.io.recording import open_recording
 from sogjax.refine.adjustment import adjusted
 from sogjax.refine.camera_choice import CamerasModel, Part, free_moves

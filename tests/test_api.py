@@ -19,7 +19,7 @@ from rendered_person import rendered_person
 
 import sogjax
 from sogjax.api import tracking
-from sogjax.cli.config.composition import composed
+from sogjax.cli.words import composed
 from sogjax.run.recordings import upright
 from sogjax.search.found_pose import FoundPose
 from sogjax.tracking.culling import Capacities
@@ -142,8 +142,9 @@ def test_actors_are_refused_that_are_none_or_the_same(recording, actor):
 def test_a_first_pose_is_searched_for_in_the_first_frame_to_track(recording, actor, monkeypatch):
     asked = []
 
-    def searched(recording, bodies, config, frame, terms):
-        asked.append((recording.rig.names, [body.name for body in bodies], frame))
+    def searched(request):
+        bodies, clip = request.actors.bodies, request.clip
+        asked.append((clip.recording.rig.names, [body.name for body in bodies], clip.numbers[0]))
         return [FoundPose(body.poses["rest"], 1.0, 0.1, True, 1.0) for body in bodies]
 
     monkeypatch.setattr(tracking, "searched_poses", searched)

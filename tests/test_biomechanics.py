@@ -10,7 +10,8 @@ from motion_cases import walking_motion
 from sogjax.errors import InputError
 from sogjax.io.export.angles import joint_angles
 from sogjax.io.export.points import marker_points
-from sogjax.io.motion import motion_from_poses, save_motion
+from sogjax.io.motion import motion_from_poses
+from sogjax.io.motion_data import save_motion
 from sogjax.model.rotation import world_from_upright
 
 DEGREES = 0.01

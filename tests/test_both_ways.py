@@ -14,12 +14,12 @@ from walking_dog import DEPTH, FRAMES, HEIGHT, judging_tracker
 from sogjax.model.body import concatenate
 from sogjax.model.limbs import limb_names, limbs
 from sogjax.quality.fitted import fitted_numbers
+from sogjax.quality.metrics import stretches
 from sogjax.search import merge_passes as both_ways
 from sogjax.search.backward_pass import Compared, Pass, part_gains
-from sogjax.search.body_parts import PartArrays, body_parts, merged_pose
+from sogjax.search.body_parts import PartArrays, best_choice, body_parts, merged_pose, select_parts
 from sogjax.search.merge_passes import merge_passes
-from sogjax.search.mirrored import means_of
-from sogjax.search.select_parts import best_choice, select_parts, stretches
+from sogjax.search.placed_body import means_of
 from sogjax.tracking.capacity import with_room
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import FrameInput
@@ -193,8 +193,9 @@ def test_a_limb_of_one_of_two_actors_comes_back(walking_dog):
 
 def test_stretches_join_over_short_gaps():
     marked = np.array([0, 1, 1, 0, 1, 0, 0, 0, 1], bool)
-    assert stretches(marked) == [(1, 2), (4, 4), (8, 8)]
-    assert stretches(marked, gap=3) == [(1, 4), (8, 8)]
+    assert stretches(marked) == [(1, 3), (4, 5), (8, 9)]
+    assert stretches(marked, gap=3) == [(1, 5), (8, 9)]
+    assert stretches(marked, at_least=2) == [(1, 3)]
     assert stretches(np.zeros(3, bool)) == []
 
 

@@ -70,17 +70,6 @@ def test_all_joints_are_where_they_were_in_every_frame(motion, tmp_path, up):
     np.testing.assert_allclose(container.FrameTime, 2 / 25.0)
 
 
-def test_centimetres(motion, tmp_path):
-    write_bvh(tmp_path / "m.bvh", motion, unit="m")
-    write_bvh(tmp_path / "cm.bvh", motion, unit="cm")
-    metres, _ = joints_read(tmp_path / "m.bvh")
-    centimetres, _ = joints_read(tmp_path / "cm.bvh")
-    for name, positions in metres.items():
-        np.testing.assert_allclose(centimetres[name], 100.0 * positions, atol=100.0 * METRES)
-    with pytest.raises(ValueError, match="inch"):
-        write_bvh(tmp_path / "inch.bvh", motion, unit="inch")
-
-
 def test_the_rest_pose_stands_upright_and_looks_along_z(tmp_path):
     """With all channels zero, BVH shows the offsets: the left shoulder to +x, the head to +y."""
     motion = motion_from_poses(BODY, np.zeros((1, BODY.skeleton.num_dofs)), 25.0)

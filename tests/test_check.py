@@ -15,15 +15,15 @@ from small_recording import make_recording, shared_recording, toml_camera, write
 
 from sogjax.check.agreement import smallest_shift
 from sogjax.check.appearance import exposure, exposure_findings
-from sogjax.check.cameras import camera_findings, nearest_point, rig_geometry
+from sogjax.check.cameras import camera_findings, rig_geometry
 from sogjax.check.examination import examined
 from sogjax.check.motion import CameraMotion, barcodes, correlation, lag_curve
 from sogjax.check.pictures import Moment
 from sogjax.check.synchronisation import synchrony
 from sogjax.errors import InputError
-from sogjax.io.offsets_file import write_frame_offsets
 from sogjax.io.recording import open_recording
-from sogjax.io.recording_settings import read_recording_settings
+from sogjax.io.recording_settings import read_recording_settings, write_frame_offsets
+from sogjax.scene.visual_hull import nearest_point
 
 
 def looked_at(folder, change=None):

@@ -14,8 +14,9 @@ from sogjax.check.calibration import unit_rig
 from sogjax.check.cameras import rig_geometry
 from sogjax.check.opening import opening_problems
 from sogjax.check.scale import implausible_distance, scale_findings
-from sogjax.cli.config.composition import SCHEMAS, composed
 from sogjax.cli.main import main
+from sogjax.cli.schemas import SCHEMAS
+from sogjax.cli.words import composed
 from sogjax.errors import InputError
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.io.recording import open_recording

@@ -13,8 +13,9 @@ from command_line import actor_file, done, refused, trackable
 from rendered_person import rendered_person
 from small_recording import write_video
 
-from sogjax.cli.config.composition import SCHEMAS, composed
 from sogjax.cli.main import main
+from sogjax.cli.schemas import SCHEMAS
+from sogjax.cli.words import composed
 from sogjax.io.motion import load_motion
 from sogjax.settings.option import help_lines
 

@@ -9,14 +9,14 @@ import pytest
 from rig_cases import recording_of, ring_rig
 
 from sogjax.errors import InputError
-from sogjax.run.background import backgrounds
+from sogjax.run.background import learn_background, said_if_none
+from sogjax.run.clip import Clip
+from sogjax.run.shared import SHARED
 from sogjax.scene.background import CameraBackground, background_cells_of, stack_background
 from sogjax.scene.cells import CellGrid
-from sogjax.scene.clip_background import SampledCamera, learnt_background
-from sogjax.scene.clip_light import even_samples
+from sogjax.scene.clip_background import SampledCamera, even_samples, learnt_background
 from sogjax.scene.foreground import foreground_probability
 from sogjax.scene.moving_zone import filled
-from sogjax.settings.method import ImagesConfig
 
 SIZE = (128, 96)
 RNG = np.random.default_rng(0)
@@ -159,6 +159,13 @@ def filmed(folder, cameras=2, still=(), **film_settings):
     return replace(recording_of(rig, len(images)), path=folder, sources=sources, frame_offset=offsets)
 
 
+def of(recording, choice, cache=None):
+    """What is learnt, and said where there is nothing; earlier runs of the process are forgotten."""
+    SHARED.forget()
+    clip = Clip(recording, recording.frames, 8)
+    return said_if_none(clip, choice, learn_background(clip, choice, cache)).cameras
+
+
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
@@ -170,14 +177,14 @@ def filmed(folder, cameras=2, still=(), **film_settings):
 def test_unsuitable_clips_are_refused_or_said(tmp_path, capsys, settings, words):
     recording = filmed(tmp_path, **settings)
     with pytest.raises(InputError, match=words):
-        backgrounds(recording, ImagesConfig(background="clip"))
-    assert backgrounds(recording, ImagesConfig(background="auto")) is None
+        of(recording, "clip")
+    assert of(recording, "auto") is None
     assert "no background is used" in capsys.readouterr().err
 
 
 def test_one_moving_camera_is_said_and_only_its_background_stays_unknown(tmp_path, capsys):
     recording = filmed(tmp_path, cameras=3, still=(0, 2), num_frames=20, shift=lambda k: 4 * (k > 10), empty=PATTERNED)
-    found = backgrounds(recording, ImagesConfig(background="auto"))
+    found = of(recording, "auto")
     assert [background.known.mean() > 0.5 for background in found] == [True, False, True]
     assert not found[1].known.any()
     said = re.search(f"\\({recording.rig.names[1]} by up to ([0-9.]+) px\\)", capsys.readouterr().err)
@@ -186,12 +193,12 @@ def test_one_moving_camera_is_said_and_only_its_background_stays_unknown(tmp_pat
 
 def test_a_background_is_kept_in_the_cache_and_made_anew_for_other_frames(tmp_path, capsys):
     recording = filmed(tmp_path / "clip", num_frames=30)
-    images = ImagesConfig(background="clip", cache=str(tmp_path / "cache"))
-    first = backgrounds(recording, images)
+    cache = str(tmp_path / "cache")
+    first = of(recording, "clip", cache)
     assert [path.name for path in (tmp_path / "cache").iterdir()] != []
-    again = backgrounds(recording, images)
+    again = of(recording, "clip", cache)
     for one, other in zip(first, again, strict=True):
         np.testing.assert_array_equal(one.picture, other.picture)
         np.testing.assert_array_equal(one.known, other.known)
-    backgrounds(replace(recording, num_frames=29), images)
+    of(replace(recording, num_frames=29), "clip", cache)
     assert "made again" in capsys.readouterr().err

@@ -19,16 +19,8 @@ from sogjax.model.sog import Sog
 from sogjax.scene.background import BackgroundCells
 from sogjax.scene.foreground import BackgroundModel
 from sogjax.scene.quadtree import keep_blobs
-from sogjax.tracking.culling import (
-    BLOB_RADIUS,
-    CAPACITIES,
-    Capacities,
-    actor_of_blobs,
-    body_boxes,
-    capacity_for,
-    union_boxes,
-)
-from sogjax.tracking.frame import TrackState
+from sogjax.tracking.culling import BLOB_RADIUS, CAPACITIES, Capacities, body_boxes, capacity_for, union_boxes
+from sogjax.tracking.frame import FrameInput, TrackState
 
 CULLED = 2e-3
 """Part of the similarity that may be lost with the image blobs left out (tails of Gaussians beyond the box)."""
@@ -68,7 +60,7 @@ def unculled(tracker, cells):
 def test_culling_does_not_change_the_energy(scene):
     """At the last pose and at others that a step may lead to."""
     tracker, cells, state = scene
-    views, num_near, num_matching = eqx.filter_jit(tracker.views)(cells, state, Capacities(2048, 2048))
+    views, num_near, num_matching = eqx.filter_jit(tracker.views)(FrameInput(cells), state, Capacities(2048, 2048))
     everything = unculled(tracker, cells)
     leaves = int(everything.images.mask.sum())
     assert 0 < int(num_matching.sum()) < int(num_near.sum()) < leaves
@@ -84,9 +76,9 @@ def test_culling_does_not_change_the_energy(scene):
 def test_counts_are_true_ones_whatever_the_capacity(scene):
     tracker, cells, state = scene
     views = eqx.filter_jit(tracker.views)
-    _, near, matching = views(cells, state, Capacities(2048, 2048))
-    _, near_small, _ = views(cells, state, Capacities(8, 8))
-    _, _, matching_small = views(cells, state, Capacities(2048, 8))
+    _, near, matching = views(FrameInput(cells), state, Capacities(2048, 2048))
+    _, near_small, _ = views(FrameInput(cells), state, Capacities(8, 8))
+    _, _, matching_small = views(FrameInput(cells), state, Capacities(2048, 8))
     assert near_small.tolist() == near.tolist()
     assert matching_small.tolist() == matching.tolist()
     assert int(near.min()) > 8
@@ -131,7 +123,7 @@ def test_a_box_holds_the_discs_of_its_actor_and_nothing_more():
     """Three sigmas around every blob, then a border; empty for an actor behind the camera."""
     bodies = [random_body(4, "first"), random_body(5, "second")]
     both = concatenate(bodies)
-    actors = actor_of_blobs(both.skeleton, both.blobs.joints)
+    actors = both.blob_actors
     roots = [_root(both.skeleton.parents, joint) for joint in both.blobs.joints]
     assert [roots.index(r) for r in roots] == [list(actors).index(a) for a in actors]
     camera = ring_rig(1, distortion=(0.0,) * 5).camera("cam0")

@@ -9,8 +9,7 @@ from sogjax.io.keypoints.load import load_keypoints
 from sogjax.io.keypoints.scheme import named_scheme
 from sogjax.io.recording import open_recording
 from sogjax.synth.detector import DetectorSettings, Sight, detected
-from sogjax.synth.keypoint_sight import sights
-from sogjax.synth.keypoints import biases, files_there, scheme_of
+from sogjax.synth.keypoints import biases, files_there, scheme_of, sights
 from sogjax.synth.landmarks import KEYPOINTS
 from sogjax.synth.settings import SynthSettings
 from sogjax.synth.stage import stage_of

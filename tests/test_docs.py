@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from sogjax.cli.config.composition import composed
+from sogjax.cli.words import composed
 from sogjax.io.actor_file import load_body
 from sogjax.io.keypoints.scheme import load_scheme, shipped_schemes
 

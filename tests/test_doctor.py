@@ -1,6 +1,5 @@
 """`sogjax doctor`: everything is said, the laws of its self-test can fail, and trouble is an exit status."""
 
-import jax
 import pytest
 from command_line import done, refused
 
@@ -28,11 +27,10 @@ def test_a_folder_that_cannot_be_written_is_trouble(capsys, tmp_path, monkeypatc
 def test_why_programs_are_not_kept_is_told_with_the_file_that_says_so(capsys, tmp_path, monkeypatch):
     monkeypatch.setattr(doctor, "LAWS", {})
     monkeypatch.setenv(VARIABLE, str(tmp_path))
-    monkeypatch.setitem(jax.config.values, "jax_compilation_cache_dir", None)
     folder = programs_folder()
     folder.mkdir()
     (folder / REFUSED).write_text("Loading XLA:CPU AOT result. A feature is missing.\nand so on")
-    doctor.run(doctor.DoctorConfig(folder=str(tmp_path)))
+    doctor.say_programs(None)
     (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("compiled programs"))
     assert str(folder / REFUSED) in line
     assert "A feature is missing. and so on" in line

@@ -4,11 +4,14 @@ import subprocess
 import sys
 
 import pytest
+import yaml
 from command_line import refused
 
-from sogjax.cli.config.composition import CALIBRATIONS, FORMATS, MOTIONS, check_endings, composed
+from sogjax.cli.schemas import CALIBRATIONS, FORMATS, MOTIONS
+from sogjax.cli.words import check_endings, composed
 from sogjax.errors import InputError
 from sogjax.io.export.write import WRITERS
+from sogjax.run.tracked_motion import _config
 from sogjax.settings.compose import track_config
 from sogjax.settings.run import OutputsConfig
 from sogjax.settings.wrong_values import REMOVED
@@ -66,6 +69,12 @@ def test_a_setting_that_there_was_once_is_refused_with_the_reason(capsys, key):
     assert refused(capsys, *words, "recording=r", f"{key}{value}").startswith(
         f"sogjax: {key}: is not a setting any more: "
     )
+
+
+def test_the_configuration_of_an_older_run_is_read_without_what_is_no_setting_any_more(tmp_path):
+    old = {"solver": {"method": "lbfgs", "grow": 1.2}, "tracking": {"repair": False}, "outputs": {"worst": True}}
+    (tmp_path / "config.yaml").write_text(yaml.safe_dump({"recording": "r", "stop": 9} | old))
+    assert _config(tmp_path / "config.yaml") == track_config(recording="r", stop=9, solver={"method": "lbfgs"})
 
 
 def test_one_switch_for_the_motion_only():

@@ -12,8 +12,11 @@ from sogjax.actor.frame_choice import SHAPE_VOXELS, SeenShape, spread_choice, un
 from sogjax.actor.make import MadeActor
 from sogjax.errors import InputError
 from sogjax.io.example_poses import ExamplePose
+from sogjax.run.actors import Actors, known_frames
+from sogjax.run.background import Background
+from sogjax.run.clip import Clip
 from sogjax.run.example_frames import check_actors, most_helpful, several_people, unsuitable
-from sogjax.run.first_pose import known_opening
+from sogjax.run.initial_pose import PoseRequest, from_example_frames
 from sogjax.settings.run import TrackConfig
 
 
@@ -93,14 +96,15 @@ def test_several_actors_begin_where_all_poses_are_known_and_the_worst_fits_best(
     recording, config = recording_of(ring_rig(2), 99), TrackConfig(recording="walk")
     anna = Made({3: 0.9, 8: 0.8, 20: 0.99}, {3: [3.0], 8: [8.0], 20: [20.0]})
     ben = Made({3: 0.6, 8: 0.7}, {3: [30.0, 31.0], 8: [80.0, 81.0]})
-    opening = known_opening(recording, [anna, ben], config)
-    assert opening is not None
-    assert opening[1] == 8
-    np.testing.assert_array_equal(opening[0], [8.0, 80.0, 81.0])
-    assert known_opening(recording, [anna, ben], replace(config, start=9)) is None
-    alone = known_opening(recording, [anna], config)
-    assert alone is not None
-    assert alone[1] == 20
+
+    def found(made, start=0):
+        clip, actors = Clip(recording, recording.frames[start:], 4), Actors((), known_frames(made))
+        return from_example_frames(PoseRequest(clip, Background(None), actors, config))
+
+    assert found([anna, ben]).frame == 8
+    np.testing.assert_array_equal(found([anna, ben]).pose, [8.0, 80.0, 81.0])
+    assert found([anna, ben], start=9) is None
+    assert found([anna]).frame == 20
 
 
 def test_what_would_help_most():

@@ -18,8 +18,8 @@ from sogjax.errors import InputError
 from sogjax.io.export.bones import bones_of
 from sogjax.io.export.points import OPENSIM_NAMES
 from sogjax.io.export.write import export_motion
-from sogjax.io.motion import load_motion, motion_from_poses, save_motion
-from sogjax.io.motion_log import PER_FRAME, MotionLog
+from sogjax.io.motion import load_motion, motion_from_poses
+from sogjax.io.motion_data import per_frame_fields, save_motion
 
 BODY = make_body()
 METRES = 1e-4
@@ -132,7 +132,7 @@ def test_c3d_without_ezc3d(motion, tmp_path, monkeypatch):
 
 
 def test_more_frames_than_c3d_can_count(motion, tmp_path):
-    rows = {name: getattr(motion, name) for name in PER_FRAME}
+    rows = {name: rows for name in per_frame_fields() if (rows := getattr(motion, name)) is not None}
     rows = {name: np.resize(values, (65_536, *values.shape[1:])) for name, values in rows.items()}
     long = dataclasses.replace(motion, **rows | {"frame": np.arange(65_536)})
     with pytest.raises(InputError, match=r"65535 frames.*65536.*\.trc"):
@@ -224,10 +224,6 @@ def test_the_vertical_is_the_motions_unless_given(motion, tmp_path):
 def test_the_vertical_survives_files_and_is_z_in_older_ones(motion, tmp_path):
     save_motion(tmp_path / "motion.npz", motion)
     assert load_motion(tmp_path / "motion.npz").up == "y"
-    log = MotionLog(tmp_path / "motion.partial")
-    log.append(motion)
-    log.close()
-    assert load_motion(tmp_path / "motion.partial").up == log.motion(mapped=True).up == "y"
     with np.load(tmp_path / "motion.npz") as file:
         arrays = dict(file)
     del arrays["up"]

@@ -7,7 +7,8 @@ from body_cases import shipped
 from command_line import done, refused
 
 from sogjax.io.initial_pose import load_initial_poses
-from sogjax.io.motion import motion_from_poses, save_motion
+from sogjax.io.motion import motion_from_poses
+from sogjax.io.motion_data import save_motion
 from sogjax.search.rough_pose import rough_pose
 
 TOLERANCE = 1e-4

@@ -6,8 +6,7 @@ import pytest
 
 from sogjax.errors import InputError
 from sogjax.study import few_cameras
-from sogjax.study.few_cameras import Result, Trial, Trials
-from sogjax.study.sections.few_cameras import few_cameras_section
+from sogjax.study.few_cameras import Result, Trial, Trials, few_cameras_section
 from sogjax.study.study import Study
 from sogjax.synth.settings import SynthSettings
 

@@ -12,8 +12,7 @@ from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.solve.optimistix import OptimistixSolver
 from sogjax.tracking.capacity import first_capacities
 from sogjax.tracking.frame import FrameInput, TrackState
-from sogjax.tracking.frame_by_frame import track
-from sogjax.tracking.iterations import best_after
+from sogjax.tracking.frame_by_frame import best_after, track
 
 SOLVERS = {
     "ascent": ConditionedAscent(),

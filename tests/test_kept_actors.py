@@ -6,7 +6,8 @@ import pytest
 from command_line import actor_file, trackable
 
 from sogjax.io.actor_file import load_body, save_body
-from sogjax.study import kept_actors
+from sogjax.run.actors import Actors
+from sogjax.study import tracked
 from sogjax.study.few_cameras import Trials
 from sogjax.study.verdict_trials import VerdictTrials
 from sogjax.synth.settings import SynthSettings
@@ -19,7 +20,7 @@ def source(tmp_path, monkeypatch):
     """A recording of two people, made to actors without looking at it."""
     body = load_body(actor_file(tmp_path / "actor.yaml"))
     made = [replace(body, name=name) for name in NAMES]
-    monkeypatch.setattr(kept_actors, "actors_of", lambda *_: (made, []))
+    monkeypatch.setattr(tracked, "make_actors", lambda request: Actors(tuple(made)))
     folder = trackable(tmp_path / "two")
     for module in ("few_cameras", "verdict_trials"):
         monkeypatch.setattr(f"sogjax.study.{module}.cached_recording", lambda _: folder)
@@ -35,11 +36,11 @@ def test_half_of_them_are_not_taken_for_all(source, tmp_path, monkeypatch, kind)
 
     trials = kind(tmp_path / "out", {"walk": SynthSettings()}, 60)
     with monkeypatch.context() as changed:
-        changed.setattr(kept_actors, "save_body", stopped_after_one)
+        changed.setattr(tracked, "save_body", stopped_after_one)
         with pytest.raises(KeyboardInterrupt):
             trials._actors("walk")
     assert [body.name for body in trials._actors("walk")] == NAMES
-    monkeypatch.setattr(kept_actors, "actors_of", None)
+    monkeypatch.setattr(tracked, "make_actors", None)
     assert [body.name for body in trials._actors("walk")] == NAMES
 
 
@@ -48,5 +49,5 @@ def test_another_process_may_be_faster(source, tmp_path, monkeypatch):
         save_body(path, body)
         save_body(tmp_path / "kept" / path.name, body)
 
-    monkeypatch.setattr(kept_actors, "save_body", beaten)
-    assert [body.name for body in kept_actors.kept_actors(tmp_path / "kept", source)] == NAMES
+    monkeypatch.setattr(tracked, "save_body", beaten)
+    assert [body.name for body in tracked.kept_actors(tmp_path / "kept", source)] == NAMES

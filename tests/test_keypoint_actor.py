@@ -11,10 +11,13 @@ from sogjax.errors import InputError
 from sogjax.io.example_poses import ExamplePose
 from sogjax.io.ground_truth import load_ground_truth
 from sogjax.io.recording import open_recording
-from sogjax.run.adjust_colors import measured_colors
+from sogjax.run.actors import ActorRequest, new_actors
+from sogjax.run.background import Background
+from sogjax.run.clip import Clip
 from sogjax.run.keypoint_actor import keypoint_actor, with_rough_poses
 from sogjax.run.keypoint_start import keypoint_starts
-from sogjax.run.recordings import keypoint_actor_or, upright
+from sogjax.run.measured_colors import measured_colors
+from sogjax.run.recordings import upright
 from sogjax.settings.compose import track_config
 from sogjax.synth.detector import DetectorSettings
 from sogjax.synth.render import render_recording
@@ -34,6 +37,10 @@ def rendered(path, motion, actors, frames, **values):
     render_recording(settings, path, workers=1, detector=DetectorSettings(keypoints="pose2sim", **values))
     (path / "initial_pose.yaml").unlink(missing_ok=True)
     return open_recording(path)
+
+
+def clip_of(recording):
+    return Clip(recording, recording.frames, 8)
 
 
 @pytest.fixture(scope="module")
@@ -72,11 +79,14 @@ def test_example_frames_get_rough_poses(walk):
 
 
 def test_without_keypoints_the_reason_stands(walk, tmp_path):
-    error = InputError("no pictures")
-    with pytest.raises(InputError, match="no pictures"):
-        keypoint_actor_or(error, replace(walk, path=tmp_path), HUMAN, SPACE, None)
-    with pytest.raises(InputError, match="no pictures"):
-        keypoint_actor_or(error, walk, HUMAN, SPACE, 2)
+    def made(recording, number=None):
+        nothing = Background(None, "nobody moves")
+        return new_actors(ActorRequest(clip_of(recording), lambda: nothing, number=number))
+
+    with pytest.raises(InputError, match="none can be taken from the videos: nobody moves"):
+        made(replace(walk, path=tmp_path))
+    with pytest.raises(InputError, match="none can be taken from the videos: nobody moves"):
+        made(walk, 2)
 
 
 @pytest.mark.slow
@@ -85,13 +95,13 @@ def test_who_is_who_is_told_by_colours(tmp_path, monkeypatch):
     recording = rendered(tmp_path / "two", "pass", 2, 1)
     truth = load_ground_truth(recording.ground_truth)
     config = track_config(recording=recording.path, images={"background": "none"})
-    body = upright(HUMAN, recording)
+    body, nothing = upright(HUMAN, recording), Background(None)
     monkeypatch.setattr("sogjax.run.keypoint_start.CLEARLY", 0.0)  # nobody has colours yet
-    poses = keypoint_starts(recording, [body, replace(body, name="other")], config, 0)
+    poses = keypoint_starts(clip_of(recording), nothing, [body, replace(body, name="other")], config, 0)
     people = [measured_colors(recording, body, [0], np.asarray(pose)[None], SPACE) for pose in poses]
     monkeypatch.undo()
     named = [replace(person, name=name) for person, name in zip(people, ("a", "b"), strict=True)]
-    places = lambda bodies: [np.asarray(p)[:3] for p in keypoint_starts(recording, bodies, config, 0)]
+    places = lambda bodies: [np.asarray(p)[:3] for p in keypoint_starts(clip_of(recording), nothing, bodies, config, 0)]
     one, two = places(named), places(named[::-1])
     np.testing.assert_allclose(one, two[::-1], atol=1e-3)
     assert len(truth.subjects) == 2

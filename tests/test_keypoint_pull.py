@@ -54,7 +54,7 @@ def views_of(cameras, body, pose, pixels, sure, exchanged=0.0):
     """Of keypoints (camera, person, keypoint, 2)."""
     seen = SeenKeypoints(jnp.asarray(pixels, jnp.float64), jnp.asarray(sure, jnp.float64))
     blobs = body.posed_blobs(pose)
-    scale, areas = body_sizes(cameras, blobs, jnp.full(2, 1e4), (0,) * body.num_blobs)
+    scale, areas = body_sizes(cameras, blobs, jnp.full(2, 1e4), np.zeros(body.num_blobs, int))
     belongs = jnp.ones((*seen.confidence.shape[:2], scale.shape[1]))
     return KeypointViews(seen, jnp.full(seen.confidence.shape, exchanged), scale, areas, belongs)
 

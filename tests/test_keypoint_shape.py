@@ -5,8 +5,8 @@ import numpy as np
 from body_cases import shipped
 from test_keypoint_pose import INDICES, SCHEME, pose
 
-from sogjax.actor.keypoint_shape import shape_of_keypoints
 from sogjax.model.shape import ShapeModel
+from sogjax.search.keypoint_pose import shape_of_keypoints
 
 HUMAN = shipped("human")
 MODEL = ShapeModel.from_body(HUMAN)

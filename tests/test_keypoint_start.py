@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from body_cases import shipped
@@ -10,8 +11,11 @@ from keypoint_cases import write_keypoints
 from sogjax.io.ground_truth import load_ground_truth
 from sogjax.io.keypoints.load import load_keypoints
 from sogjax.io.recording import open_recording
-from sogjax.run import first_pose
-from sogjax.run.keypoint_start import keypoint_start
+from sogjax.run.actors import Actors
+from sogjax.run.background import Background
+from sogjax.run.clip import Clip
+from sogjax.run.initial_pose import PoseRequest, find_initial_pose, from_example_frames, from_file, from_keypoints
+from sogjax.run.keypoint_start import keypoint_starts
 from sogjax.run.recordings import upright
 from sogjax.settings.compose import track_config
 from sogjax.synth.detector import DetectorSettings
@@ -34,10 +38,15 @@ def folder(tmp_path_factory):
     return path
 
 
+def starts(recording, bodies, frame=0):
+    config = track_config(recording=recording.path)
+    return keypoint_starts(Clip(recording, recording.frames, 8), Background(None), bodies, config, frame)
+
+
 def error(recording, pose, frame):
     """Mean distance of the landmarks from the truth, metres."""
     truth = load_ground_truth(recording.ground_truth)
-    points = np.asarray(upright(HUMAN, recording).posed_landmarks(pose))
+    points = np.asarray(upright(HUMAN, recording).posed_landmarks(jnp.asarray(pose)))
     pairs = [(k, truth.joint_names.index(n)) for k, n in enumerate(HUMAN.landmarks.names) if n in truth.joint_names]
     return np.mean([np.linalg.norm(points[k] - truth.joints[frame, j]) for k, j in pairs])
 
@@ -45,31 +54,39 @@ def error(recording, pose, frame):
 @pytest.mark.parametrize("frame", [0, 2])
 def test_the_pose_is_that_of_the_frame(folder, frame):
     recording = open_recording(folder)
-    pose = keypoint_start(recording, upright(HUMAN, recording), frame)
+    (pose,) = starts(recording, [upright(HUMAN, recording)], frame)
     assert error(recording, pose, frame) < 0.08  # a body of another size
 
 
-def test_it_is_used_where_nothing_else_is_given(folder, monkeypatch):
-    def forbidden(*_):
-        raise AssertionError("searched")
+class SearchedError(Exception):
+    """Raised where a pose is searched for."""
 
-    monkeypatch.setattr(first_pose, "ClipSearch", forbidden)
+
+def search(request):
+    raise SearchedError
+
+
+def test_it_is_used_where_nothing_else_is_given(folder):
     recording = open_recording(folder)
-    body, config = upright(HUMAN, recording), track_config(recording=folder)
-    (pose,) = first_pose.first_poses(recording, [body], config, 1)
-    assert error(recording, pose, 1) < 0.08
-    for searched in ({"initial_pose": "auto"}, {}):
-        bodies = [body] if searched else [body, replace(body, name="other")]
-        with pytest.raises(AssertionError, match="searched"):
-            first_pose.first_poses(recording, bodies, replace(config, **searched), 1)
+    sources = (from_file, from_example_frames, from_keypoints, search)
+    clip, config = Clip(recording, recording.frames[1:], 8), track_config(recording=folder)
+    request = PoseRequest(clip, Background(None), Actors((HUMAN,)), config)
+    found = find_initial_pose(request, sources)
+    assert (found.frame, found.source) == (1, "keypoints")
+    assert error(recording, found.pose, 1) < 0.08
+    asked = replace(request, config=replace(config, initial_pose="auto"))
+    several = replace(request, actors=Actors((HUMAN, replace(HUMAN, name="other"))))
+    for searched in (asked, several):
+        with pytest.raises(SearchedError):
+            find_initial_pose(searched, sources)
 
 
 def test_without_keypoints_or_with_wrong_ones_there_is_no_pose(folder, tmp_path, capsys):
     recording = open_recording(folder)
     body = upright(HUMAN, recording)
-    assert keypoint_start(replace(recording, path=tmp_path), body, 0) is None
-    assert keypoint_start(replace(recording, rig=recording.rig.select(recording.rig.names[:1])), body, 0) is None
+    assert starts(replace(recording, path=tmp_path), [body]) is None
+    assert starts(replace(recording, rig=recording.rig.select(recording.rig.names[:1])), [body]) is None
     write_keypoints(tmp_path / "keypoints", cameras=recording.rig.names, frames=FRAMES)
-    assert keypoint_start(replace(recording, path=tmp_path), body, 0) is None
+    assert starts(replace(recording, path=tmp_path), [body]) is None
     found = load_keypoints(replace(recording, path=tmp_path))
     assert found is not None

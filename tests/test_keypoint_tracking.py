@@ -17,7 +17,7 @@ from sogjax.cli.main import main
 from sogjax.energy.keypoint_views import SeenKeypoints
 from sogjax.io.keypoints.scheme import named_scheme
 from sogjax.model.camera import project_points
-from sogjax.run import run_job
+from sogjax.run import forward
 from sogjax.run.clip_keypoints import keypoint_pull
 from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.tracking.frame import FrameInput
@@ -98,22 +98,22 @@ def test_a_run_is_resumed_only_with_the_keypoints_that_began_it(capsys, tmp_path
     write_keypoints(folder / "keypoints", frames=20)
     command = ["track", f"recording={folder}", f"actor={actor_file(tmp_path / 'a.yaml')}", *LIGHT]
     done(capsys, *command, f"out={tmp_path / 'whole'}")
-    out, whole = f"out={tmp_path / 'run'}", run_job.tracked_frames
+    out, whole = f"out={tmp_path / 'run'}", forward.frames_done
 
-    def stopped(*arguments):
-        for count, frame in enumerate(whole(*arguments)):
+    def stopped(*arguments, **named):
+        for count, frame in enumerate(whole(*arguments, **named)):
             if count == 17:
                 raise KeyboardInterrupt
             yield frame
 
     with monkeypatch.context() as context:
-        context.setattr(run_job, "tracked_frames", stopped)
+        context.setattr(forward, "frames_done", stopped)
         main([*command, out])
     done(capsys, *command, out, "resume=true")
     one, two = (np.load(tmp_path / name / "motion.npz")["pose"] for name in ("whole", "run"))
     np.testing.assert_array_equal(one, two)
     with monkeypatch.context() as context:
-        context.setattr(run_job, "tracked_frames", stopped)
+        context.setattr(forward, "frames_done", stopped)
         main([*command, out, "overwrite=true"])
     file = sorted((folder / "keypoints" / "left").glob("*.json"))[0]
     content = json.loads(file.read_text())

@@ -9,7 +9,7 @@ from body_cases import random_body, random_skeleton
 from sog_cases import in_float64
 
 from sogjax.model.compiled import chosen_indices
-from sogjax.model.kinematics import _composed
+from sogjax.model.skeleton import _composed
 
 FLOAT64 = 1e-10
 

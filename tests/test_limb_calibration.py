@@ -8,7 +8,7 @@ import yaml
 from scipy.special import expit
 
 from sogjax.quality.fitted import PATH, PoseEvidenceBounds, fitted_numbers, read_fitted
-from sogjax.search.pose_confidence import Evidence
+from sogjax.search.pose_confidence import PoseEvidence
 from sogjax.study.limb_calibration import (
     area_table,
     area_under_roc,
@@ -98,7 +98,7 @@ def test_the_file_holds_what_the_records_need():
 
 
 def test_the_names_of_bounds_are_those_of_what_is_bounded():
-    assert {bound.name for bound in fields(PoseEvidenceBounds)} < {value.name for value in fields(Evidence)}
+    assert {bound.name for bound in fields(PoseEvidenceBounds)} < {value.name for value in fields(PoseEvidence)}
 
 
 def test_weights_are_written_into_the_file_and_nothing_else_changes(tmp_path):

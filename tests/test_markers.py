@@ -1,13 +1,16 @@
 """Virtual markers (Section 6) and joint errors, against motions made by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from motion_cases import JOINTS, points_on, walking_motion
 
 from sogjax.errors import InputError
 from sogjax.io.ground_truth import GroundTruth
+from sogjax.io.motion_data import per_frame_fields
 from sogjax.quality.evaluation import evaluate_motion, evaluate_motions
-from sogjax.quality.markers import attach_markers, joint_errors, marker_errors
+from sogjax.quality.markers import attach_markers, common_frames, joint_errors, marker_errors
 from sogjax.quality.swaps import identity_swaps
 
 ON = (3, 6, 8)
@@ -110,6 +113,15 @@ def test_motion_and_truth_meet_at_the_recordings_frames():
     result = evaluate_motion(late, truth)
     np.testing.assert_array_equal(result.frames, np.arange(5, 17))
     np.testing.assert_allclose(result.markers.errors, 0.0, atol=1e-12)
+
+
+def test_a_motion_of_every_second_frame_is_held_against_these():
+    motion = walking_motion(num_frames=12)
+    half = replace(motion.of_rows(slice(0, 12, 2)), fps=motion.fps / 2.0)
+    rows, frames = common_frames(half, truth_of(motion))
+    assert (rows.tolist(), frames.tolist()) == ([*range(6)], [*range(0, 12, 2)])
+    for name in per_frame_fields():
+        assert (values := getattr(half, name)) is None or len(values) == 6, name
 
 
 def test_joints_are_found_by_name_and_by_prefix_of_one_axis_joints():

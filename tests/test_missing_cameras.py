@@ -21,7 +21,7 @@ from sogjax.io.motion import load_motion
 from sogjax.io.recording import open_recording
 from sogjax.io.source import look_at_source
 from sogjax.io.video import read_frames
-from sogjax.run import pipeline
+from sogjax.run import clip
 from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.tracking.frame import FrameInput
 from sogjax.tracking.frame_by_frame import track
@@ -150,7 +150,7 @@ def test_a_run_with_missing_cameras_goes_on(capsys, tmp_path, monkeypatch, light
     words = [f"recording={recording}", f"actor={actor_file(tmp_path / 'a.yaml')}", "images.depth=4", *light]
     words += ["outputs.overlay_width=128", "solver.max_iterations=3", "solver.min_iterations=1"]
     done(capsys, "track", *words, "out=whole")
-    whole, calls = pipeline.padded_cells, []
+    whole, calls = clip.padded_cells, []
 
     def padded_cells(*arguments):
         calls.append(1)
@@ -159,7 +159,7 @@ def test_a_run_with_missing_cameras_goes_on(capsys, tmp_path, monkeypatch, light
         return whole(*arguments)
 
     with monkeypatch.context() as context:
-        context.setattr(pipeline, "padded_cells", padded_cells)
+        context.setattr(clip, "padded_cells", padded_cells)
         assert main(["track", *words, "out=run"]) == 2
     for _ in range(2):  # at last the run has ended already
         _, err = done(capsys, "track", *words, "out=run", "resume=true")

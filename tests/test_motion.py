@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 from tiny_body import make_body, random_poses
 
 from sogjax.errors import InputError
-from sogjax.io.motion import Motion, load_motion, motion_from_poses, save_motion
+from sogjax.io.motion import Motion, load_motion, motion_from_poses
+from sogjax.io.motion_data import save_motion
 
 BODY = make_body()
 METRES = 1e-5

@@ -9,8 +9,7 @@ from rig_cases import opencv_pixels, recording_of, ring_rig
 
 from sogjax.actor.frame_choice import subject_cubes
 from sogjax.actor.people import PersonSeen, matched, people_apart, runs_by_place, told_apart, unlike
-from sogjax.run import example_people
-from sogjax.run.example_people import people_examples
+from sogjax.run.example_people import examples_of_masks
 from sogjax.run.sampled_masks import SampledMasks
 from sogjax.scene.cells import CellGrid
 
@@ -108,11 +107,11 @@ def test_the_margin_is_what_exchanging_two_would_cost():
     assert margin == pytest.approx(0.9 + 0.9 - 0.3 - 0.2)
 
 
-def sampled(clip):
+def sampled(clip, first=0):
     """What would be sampled of a clip of boxes, a list of them for each frame."""
     seen = [seen_boxes(boxes) for boxes in clip]
     return SampledMasks(
-        frames=list(range(len(clip))),
+        frames=[first + frame for frame in range(len(clip))],
         masks=[masks for masks, _ in seen],
         pictures=[pictures for _, pictures in seen],
         unknown=NOTHING,
@@ -127,15 +126,14 @@ def passing(count):
     return [[(box(-0.7 * ACROSS + a * ALONG), RED), (box(0.7 * ACROSS - a * ALONG), BLUE)] for a in away]
 
 
-def test_each_person_has_example_poses_in_the_same_frames(monkeypatch):
-    monkeypatch.setattr(example_people, "sampled_masks", lambda *_: sampled(passing(4)))
+def test_each_person_has_example_poses_in_the_same_frames():
     recording = recording_of(RIG, 4, first_frame=10)
-    examples = people_examples(recording, (), 2, 3)
+    examples = examples_of_masks(recording, sampled(passing(4), first=10), 2, 3)
     assert not isinstance(examples, str)
     assert [example.actor for example in examples] == ["person_1"] * 3 + ["person_2"] * 3
     frames = [example.frame for example in examples]
     assert frames[:3] == frames[3:] == sorted(frames[:3])
-    assert examples[0].name == f"frame_{frames[0] + 10}"
+    assert examples[0].name == f"frame_{frames[0]}"
     for one, other in zip(examples[:3], examples[3:], strict=True):
         assert one.within is not None
         assert other.within is not None
@@ -152,19 +150,17 @@ def test_each_person_has_example_poses_in_the_same_frames(monkeypatch):
         ([[(corners, RED) for corners, _ in passing(5)[2]]], 2, ("in 1 of 1 frame",)),
     ],
 )
-def test_clips_that_show_other_numbers_of_people_are_refused(monkeypatch, clip, actors, words):
-    monkeypatch.setattr(example_people, "sampled_masks", lambda *_: sampled(clip))
-    problem = people_examples(recording_of(RIG, len(clip)), (), actors, 3)
+def test_clips_that_show_other_numbers_of_people_are_refused(clip, actors, words):
+    problem = examples_of_masks(recording_of(RIG, len(clip)), sampled(clip), actors, 3)
     assert isinstance(problem, str)
     for word in words:
         assert word in problem
 
 
-def test_people_in_the_same_clothes_are_refused_where_places_do_not_tell(monkeypatch):
+def test_people_in_the_same_clothes_are_refused_where_places_do_not_tell():
     clip = [[(corners, RED) for corners, _ in boxes] for boxes in passing(4)]
-    monkeypatch.setattr(example_people, "sampled_masks", lambda *_: sampled(clip))
-    recording = recording_of(RIG, 4)
-    assert not isinstance(people_examples(recording, (), 2, 3), str)
-    problem = people_examples(replace(recording, fps=0.5), (), 2, 3)
+    recording, seen = recording_of(RIG, 4), sampled(clip)
+    assert not isinstance(examples_of_masks(recording, seen, 2, 3), str)
+    problem = examples_of_masks(replace(recording, fps=0.5), seen, 2, 3)
     assert isinstance(problem, str)
     assert "who is who" in problem

@@ -17,8 +17,7 @@ from sogjax.io.source import open_with_least_work
 from sogjax.io.video import read_frames, read_prepared
 from sogjax.io.video_file import VideoFile
 from sogjax.model.yuv_picture import YuvPicture
-from sogjax.run.build import cell_grids
-from sogjax.run.pipeline import Preparation, read_pictures
+from sogjax.run.clip import Clip
 from sogjax.scene.cells import CellGrid, padded_cells
 
 av = pytest.importorskip("av")
@@ -263,27 +262,27 @@ def test_without_pyav_opencv_reads(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "av", None)
     assert module.pyav_version() is None
     recording = open_recording(folder)
-    images = next(iter(read_prepared(recording, lambda camera, image: image, planes=True)))
+    images = next(iter(read_prepared(recording, lambda camera, frame, image: image, planes=True)))
     assert all(isinstance(image, np.ndarray) for image in images)
 
 
 def test_pictures_are_made_for_what_shows_them(tmp_path):
     """And the cells are the same then."""
     recording = open_recording(make_recording(tmp_path / "r"))
-    grids = cell_grids(recording, 4)
-    plain = list(read_pictures(recording, Preparation(grids), 0, 4))
-    shown = list(read_pictures(recording, Preparation(grids, tile=lambda camera, image: image), 0, 4))
+    clip = Clip(recording, recording.frames, 4)
+    plain = list(clip.read(clip.numbers))
+    shown = list(clip.read(clip.numbers, lambda camera, frame, image: image))
     for few, more, images in zip(plain, shown, read_frames(recording), strict=True):
-        for camera, image in enumerate(images):
-            assert few[camera].tile is None
-            np.testing.assert_array_equal(few[camera].cells, more[camera].cells)
-            np.testing.assert_allclose(more[camera].tile.astype(int), image.astype(int), atol=2)
+        assert few.pictures == [None] * len(images)
+        np.testing.assert_array_equal(few.input.cells, more.input.cells)
+        for picture, image in zip(more.pictures, images, strict=True):
+            np.testing.assert_allclose(picture.astype(int), image.astype(int), atol=2)
 
 
 def test_evened_colours_are_those_of_pictures(tmp_path):
     settings = "up: z\ncolor_gains:\n  left: [1.2, 1.0, 0.9]\n"
     recording = open_recording(make_recording(tmp_path / "r", settings=settings))
-    left, right = next(iter(read_prepared(recording, lambda camera, image: image, planes=True)))
+    left, right = next(iter(read_prepared(recording, lambda camera, frame, image: image, planes=True)))
     assert isinstance(left, np.ndarray)
     assert isinstance(right, YuvPicture)
     np.testing.assert_array_equal(left, next(iter(read_frames(recording)))[0])

@@ -14,10 +14,11 @@ from sogjax.energy.frame_energy import standard_terms
 from sogjax.model.limbs import limbs, with_other_limb
 from sogjax.scene.cells import CellGrid, stack_cells
 from sogjax.scene.quadtree import Candidates
+from sogjax.scene.visual_hull import nearest_point
 from sogjax.search.found_pose import FoundPose, search_pose, search_poses
-from sogjax.search.mirrored import look_alikes, other_side, sides_apart, turns_with_vertical
-from sogjax.search.places import nearest_point
-from sogjax.search.pose_confidence import SURE, Agreement, Evidence, agreed_confidence, pose_confidence
+from sogjax.search.mirrored import look_alikes, other_side, sides_apart
+from sogjax.search.placed_body import turns_with_vertical
+from sogjax.search.pose_confidence import SURE, Agreement, PoseEvidence, agreed_confidence, pose_confidence
 from sogjax.search.pose_search import PoseSearch
 from sogjax.search.seen_frame import SeenFrame
 from sogjax.tracking.culling import ImageReader
@@ -88,6 +89,7 @@ def test_two_dogs_of_other_colours_are_both_found(dog):
 def test_lines_through_one_point_meet_there():
     point = np.array([0.3, -0.2, 1.0])
     directions = np.array([[1.0, 0.2, 0.1], [0.0, 1.0, 0.3], [0.5, -0.4, 1.0]])
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     np.testing.assert_allclose(nearest_point(point - 2.0 * directions, directions), point, atol=1e-9)
 
 
@@ -114,7 +116,7 @@ def test_variants_differ_in_one_limb_only_and_are_all_different():
 
 
 def test_a_pose_is_sure_only_if_every_condition_is_met():
-    good = Evidence(1.5, 0.03, 0.03, 0.9, 0.87, 0.85, 1.3, 0.7, known=1.0)
+    good = PoseEvidence(1.5, 0.03, 0.03, 0.9, 0.87, 0.85, 1.3, 0.7, known=1.0)
     assert pose_confidence(good) > SURE
     for name in ("energy", "margin", "later_margin", "foreground", "worst_foreground", "not_background", "gain"):
         assert pose_confidence(replace(good, **{name: 0.0})) < 0.99 * SURE

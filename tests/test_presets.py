@@ -6,16 +6,20 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from command_line import actor_file, trackable
+from hydra import compose, initialize_config_dir
 from small_recording import frame_image, write_image
 
-from sogjax.cli.config.composition import composed
+from sogjax.cli.sweep.run import register_schema
+from sogjax.cli.words import composed
 from sogjax.energy.priors import RestPenalty
 from sogjax.io.actor_file import load_body
 from sogjax.run import build
+from sogjax.run.background import learn_background
+from sogjax.run.clip import Clip
 from sogjax.run.recordings import opened, upright
 from sogjax.scene.cells import CellGrid
-from sogjax.settings.compose import track_config
-from sogjax.settings.files import choices_of
+from sogjax.settings.compose import as_object, track_config
+from sogjax.settings.files import choices_of, conf_dir
 from sogjax.settings.run import TrackConfig
 from sogjax.solve.ascent import ConditionedAscent
 from sogjax.tracking.frame import TrackState
@@ -32,7 +36,8 @@ def tracker_of(recording, tmp_path, *words):
     config = track_config(["recording=x", *words])
     build.check(config)
     body = upright(load_body(actor_file(tmp_path / "actor.yaml")), recording)
-    return build.tracker(recording, body, build.cell_grids(recording, config.images.depth), config)
+    clip = Clip(recording, recording.frames, config.images.depth)
+    return build.tracker(clip, learn_background(clip, config.images.background), body, config)
 
 
 def numbers(**named):
@@ -101,7 +106,14 @@ def test_the_default_preset_is_the_defaults():
 def test_settings_are_the_same_with_hydra_and_without(preset, group):
     for choice in choices_of(group):
         words = ["recording=x", f"preset={preset}", f"{group}={choice}"]
-        assert composed("track", words) == track_config(words)
+        assert composed("track", words) == track_config(words) == by_hydra(words)
+
+
+def by_hydra(words):
+    """The settings as Hydra composes them, which checks the members of a sweep so."""
+    register_schema()
+    with initialize_config_dir(str(conf_dir()), version_base="1.3"):
+        return as_object(compose("track", overrides=words), "track")
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from sogjax.io.ground_truth import GroundTruth
 from sogjax.io.motion import motion_from_poses
 from sogjax.model.body import Attachments
 from sogjax.study.climbs import Climbed, Pair
-from sogjax.study.ranking_tables import limbs_table, verdicts_table, write_csv
+from sogjax.study.ranking import limbs_table, verdicts_table, write_csv
 from sogjax.study.true_poses import true_poses
 from sogjax.study.verdicts import LimbErrors, Ranking, limb_of
 

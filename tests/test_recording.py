@@ -150,8 +150,8 @@ def test_frames_of_the_videos_are_example_poses(folder):
     settings(folder, "up: z\nfirst_frame: 1\nexample_poses: [1, {frame: 3, actor: Ann}]\n")
     recording = open_recording(folder)
     assert [(pose.name, pose.frame, pose.actor) for pose in recording.example_poses] == [
-        ("frame_1", 0, None),
-        ("frame_3", 2, "Ann"),
+        ("frame_1", 1, None),
+        ("frame_3", 3, "Ann"),
     ]
     assert load_images(recording, recording.example_poses[1]).keys() == {0, 1}
 

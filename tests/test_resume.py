@@ -17,11 +17,12 @@ from slow_values import fast_and_slow
 from small_recording import write_video
 
 from sogjax.cli.main import main
-from sogjax.io import array_log
+from sogjax.io import array_log, video
+from sogjax.io.actor_file import load_body
+from sogjax.io.frame_motions import load_one_motion
 from sogjax.io.motion import Motion, load_motion
-from sogjax.run import job, kept_run, run_job, streams
-from sogjax.run import track as track_command
-from sogjax.settings.method import ColorConfig
+from sogjax.run import forward, initial_pose, passes
+from sogjax.run.actors import Actors
 from sogjax.tracking import frame_by_frame
 from sogjax.tracking.culling import Capacities
 
@@ -43,16 +44,16 @@ def command(recording, tmp_path):
 
 def stop_after(monkeypatch, frames):
     """As Ctrl-C while a frame is tracked."""
-    whole, seen = run_job.tracked_frames, []
+    whole, seen = forward.frames_done, []
 
-    def tracked_frames(*arguments):
-        for found in whole(*arguments):
+    def frames_done(*arguments, **named):
+        for found in whole(*arguments, **named):
             if len(seen) == frames:
                 raise KeyboardInterrupt
             seen.append(found)
             yield found
 
-    monkeypatch.setattr(run_job, "tracked_frames", tracked_frames)
+    monkeypatch.setattr(forward, "frames_done", frames_done)
 
 
 def names(folder):
@@ -121,18 +122,17 @@ def test_the_tracker_goes_on_with_the_capacities_that_it_stopped_with(capsys, tm
 @pytest.mark.slow
 def test_a_searched_pose_and_a_made_actor_are_kept(capsys, tmp_path, monkeypatch, recording):
     """Exactly, not as rounded in an actor's file; neither is looked for again."""
-    opened = track_command.opened(str(recording))
-    actor = track_command.actors_of(opened, actor_file(tmp_path / "a.yaml"), "", ColorConfig())[0]
-    actor = [body.rotated(jnp.asarray(turn(0.3))) for body in actor]
-    monkeypatch.setattr(track_command, "actors_of", lambda *_: (actor, []))
+    body = load_body(actor_file(tmp_path / "a.yaml")).rotated(jnp.asarray(turn(0.3)))
+    monkeypatch.setattr(passes, "make_actors", lambda *_: Actors((body,)))
     words = ["track", f"recording={recording}", *SMALL, *LIGHT]
     done(capsys, *words, "out=whole")
     with monkeypatch.context() as context:
         stop_after(context, 10)
         main([*words, "out=run"])
     never = lambda *_: pytest.fail("looked for again")
-    monkeypatch.setattr(track_command, "actors_of", never)
-    monkeypatch.setattr(job, "first_poses", never)
+    monkeypatch.setattr(passes, "make_actors", never)
+    monkeypatch.setattr(initial_pose, "from_file", never)
+    monkeypatch.setattr(passes, "find_initial_pose", never)
     done(capsys, *words, "out=run", "resume=true")
     assert_same(tmp_path / "run", tmp_path / "whole")
     assert (tmp_path / "run" / "actor.yaml").read_bytes() == (tmp_path / "whole" / "actor.yaml").read_bytes()
@@ -179,9 +179,9 @@ def test_a_run_that_was_begun_with_something_else_is_not_gone_on_with(
     words, expected = change(recording, tmp_path)
     capsys.readouterr()
     assert expected in refused(capsys, *command, *words, "out=run", "resume=true")
-    assert load_motion(tmp_path / "run" / "motion.partial").num_frames >= 8
+    assert load_one_motion(tmp_path / "run" / "run.partial").num_frames >= 8
     done(capsys, *command, *words, "out=run", "overwrite=true")
-    assert not (tmp_path / "run" / "motion.partial").exists()
+    assert not (tmp_path / "run" / "run.partial").exists()
 
 
 def full_disk(monkeypatch, module, name, after):
@@ -198,41 +198,43 @@ def full_disk(monkeypatch, module, name, after):
     monkeypatch.setattr(module, name, write)
 
 
-@pytest.mark.parametrize("after", fast_and_slow(5, 2, 7, 9, 11))
+@pytest.mark.parametrize("after", fast_and_slow(5, 2, 3, 6, 7))
 def test_a_full_disk_leaves_what_can_be_read_and_gone_on_with(capsys, tmp_path, monkeypatch, command, after):
     done(capsys, *command, "out=whole")
     with monkeypatch.context() as context:
         full_disk(context, array_log.ArrayLog, "_write", after)
         assert main([*command, "out=run"]) == 2
     assert "No space left on device" in capsys.readouterr().err
-    partial = tmp_path / "run" / "motion.partial"
-    if partial.exists():
-        so_far, complete = load_motion(partial), load_motion(tmp_path / "whole" / "motion.npz")
+    partial = tmp_path / "run" / "run.partial"
+    if (partial / "frames").exists():
+        so_far, complete = load_one_motion(partial), load_motion(tmp_path / "whole" / "motion.npz")
         np.testing.assert_array_equal(so_far.pose, complete.pose[: so_far.num_frames])
     done(capsys, *command, "out=run", "resume=true")
     assert_same(tmp_path / "run", tmp_path / "whole")
 
 
-def test_a_video_that_breaks_off_and_is_there_again(capsys, tmp_path, recording, command):
-    """As on a disk that went away: the file itself has not changed."""
-    done(capsys, *command, "out=whole")
-    video = recording / "videos" / "right.mp4"
-    content, state = video.read_bytes(), video.stat()
-    whole = kept_run.KeptRun.append
+class BreaksOff:
+    """A video on a disk that goes away after a few images."""
 
-    def lose(self, frames):
-        whole(self, frames)
-        video.write_bytes(b"")
+    def __init__(self, stream):
+        self.stream, self.count = stream, 0
+        self.skip, self.close = stream.skip, stream.close
 
-    with pytest.MonkeyPatch.context() as context:
-        context.setattr(kept_run.KeptRun, "append", lose)
-        context.setattr(streams, "FRAMES_AT_ONCE", 4)
-        status = main([*command, "out=run"])
-    capsys.readouterr()
-    video.write_bytes(content)
-    os.utime(video, ns=(state.st_atime_ns, state.st_mtime_ns))
-    assert status in (0, 2)  # a decoder may have read the whole file before
-    done(capsys, *command, "out=run", "resume=true")
+    def read(self):
+        self.count += 1
+        return None if self.count > FRAMES - 6 else self.stream.read()
+
+
+def test_a_video_that_breaks_off_and_is_there_again(capsys, tmp_path, monkeypatch, command):
+    """The file itself has not changed."""
+    words = [*command, "images.background=none"]
+    done(capsys, *words, "out=whole")
+    whole = video.open_with_least_work
+    with monkeypatch.context() as context:
+        context.setattr(video, "open_with_least_work", lambda *arguments: BreaksOff(whole(*arguments)))
+        assert main([*words, "out=run"]) == 2
+    assert "ends before frame 14" in capsys.readouterr().err
+    done(capsys, *words, "out=run", "resume=true")
     assert_same(tmp_path / "run", tmp_path / "whole")
 
 

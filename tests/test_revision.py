@@ -9,13 +9,10 @@ from sogjax.errors import InputError
 from sogjax.io.motion import load_motion
 from sogjax.io.recording import open_recording
 from sogjax.quality.limb_confidence import LimbConfidence
-from sogjax.run import revision, track
-from sogjax.run.build import cell_grids
-from sogjax.run.cells import cells_of_clip
-from sogjax.run.job import Job
+from sogjax.run import merge, passes
+from sogjax.run.clip import Clip
+from sogjax.run.initial_pose import InitialPose
 from sogjax.search.merge_passes import Revised, Revision
-from sogjax.settings.method import ColorConfig, ImagesConfig
-from sogjax.settings.run import TrackConfig
 
 FRAMES, ROW, FARTHER = 12, 5, 0.25
 SMALL = ("images.depth=4", "solver.max_iterations=3", "solver.min_iterations=1", "outputs.bvh=false")
@@ -46,7 +43,7 @@ def farther(monkeypatch):
         assert len(list(frames(2, 6))) == 4
         return moved_farther(tracker, passed)
 
-    monkeypatch.setattr(revision, "merge_passes", merge_passes)
+    monkeypatch.setattr(merge, "merge_passes", merge_passes)
 
 
 @pytest.mark.parametrize(("overlay", "rerun"), SHOWN.values(), ids=SHOWN)
@@ -79,22 +76,18 @@ def test_frames_read_backwards_are_those_of_the_part_that_is_tracked(capsys, tmp
     """Rows count from where tracking starts, also if it begins in the middle and goes both ways from there."""
     recording, start, seen = open_recording(tmp_path / "walk"), 3, []
     if begin is not None:
-        actors = track.actors_of(recording, tmp_path / "a.yaml", "", ColorConfig())[0]
-        opening = jnp.asarray(Job.from_config(recording, actors, TrackConfig()).start), begin
-        monkeypatch.setattr(track, "actors_of", lambda *_: (actors, []))
-        monkeypatch.setattr(track, "known_opening", lambda *_: opening)
-        command = [word for word in command if not word.startswith("actor=")]
+        known = InitialPose(begin, np.array([0.0, 0.0, 1.0, 0.0, 0.0], np.float32), "middle")
+        monkeypatch.setattr(passes, "find_initial_pose", lambda *_: known)
 
     def merge_passes(tracker, passed, frames):
         assert len(passed.poses) == FRAMES - start
         seen.extend(frames(2, 6))
         return moved_farther(tracker, passed)
 
-    monkeypatch.setattr(revision, "merge_passes", merge_passes)
+    monkeypatch.setattr(merge, "merge_passes", merge_passes)
     done(capsys, *command, "outputs.overlay=false", "outputs.rerun=false", f"start={start}", "out=run")
-    grids = cell_grids(recording, 4)
-    expected = cells_of_clip(recording, grids, ImagesConfig(depth=4), (start + 2, start + 6))
-    np.testing.assert_array_equal(seen, expected[::-1])
+    expected = [frame.cells for frame in Clip(recording, recording.frames, 4).frames(start + 2, start + 6)]
+    np.testing.assert_array_equal([frame.cells for frame in seen], expected[::-1])
     motion = load_motion(tmp_path / "run" / "motion.npz")
     assert motion.frame.tolist() == [*range(start, FRAMES)]
     assert np.flatnonzero(motion.energy == 7.0).tolist() == [ROW]
@@ -104,7 +97,7 @@ def test_a_pass_backwards_that_fails_is_said_and_the_motion_stays(capsys, tmp_pa
     def merge_passes(tracker, passed, frames):
         raise InputError("a frame has too many image blobs")
 
-    monkeypatch.setattr(revision, "merge_passes", merge_passes)
+    monkeypatch.setattr(merge, "merge_passes", merge_passes)
     shown = ["outputs.overlay=false", "outputs.rerun=false"]
     _, err = done(capsys, *command, *shown, "out=run")
     assert "warning: not told both ways, the first pass stays as it is: a frame has too many image blobs" in err

@@ -9,8 +9,9 @@ from command_line import actor_file, done, refused, trackable
 from motion_cases import walking_motion
 
 from sogjax.errors import InputError
-from sogjax.io.motion import load_motion, save_motion
-from sogjax.run.kept_run import NOTE
+from sogjax.io.motion import load_motion
+from sogjax.io.motion_data import save_motion
+from sogjax.run.run_files import NOTE
 from sogjax.run.run_folder import LOCK, run_folder
 
 SMALL = (
@@ -55,7 +56,10 @@ def test_a_recording_is_no_place_for_results(capsys, tmp_path, command):
 def test_nothing_of_an_older_run_is_left_but_what_is_not_its_own(capsys, tmp_path, command):
     done(capsys, *command)
     run = tmp_path / "run"
-    for name in ("notes.txt", "overlay.mp4", "metrics.json", "motion_anna.npz", ".motion.0123abcd.tmp.npz"):
+    of_adjusting = ("unadjusted.npz", "unadjusted_actor.yaml", "adjustment.json", "calibration_adjusted.toml")
+    half_written = (".motion.0123abcd.tmp.npz", ".unadjusted_actor.0123abcd.tmp.yaml", ".adjustment.89abcdef.tmp.json")
+    older = ("notes.txt", "overlay.mp4", "metrics.json", "motion_anna.npz", *of_adjusting, *half_written)
+    for name in older:
         (run / name).write_text("older")
     note = json.loads((run / "run.json").read_text())
     (run / "run.json").write_text(json.dumps(note | {"files": [*note["files"], "motion_anna.npz"]}))
@@ -133,7 +137,6 @@ def test_a_command_replaces_its_own_results_only(tmp_path):
     with run_folder(tmp_path / "run") as folder:
         folder.begin("demo", {})
         folder.finish("demo", {}, [])
-        folder.kept.remove()
     with run_folder(tmp_path / "run", command="demo") as folder:
         folder.begin("demo", {})
     with pytest.raises(InputError, match="resume=true to resume it"), run_folder(tmp_path / "run", command="track"):
@@ -186,7 +189,7 @@ def test_a_note_that_names_what_is_no_result_removes_nothing(tmp_path, name):
     (out / "clips").mkdir(parents=True)
     (out / "clips" / "left.mp4").write_text("a video")
     (tmp_path / "work" / "precious.txt").write_text("keep")
-    (out / NOTE).write_text(json.dumps({"command": "track", "files": [name]}))
+    NOTE.of(out).write_text(json.dumps({"command": "track", "files": [name]}))
     with run_folder(out, overwrite=True) as folder:
         folder.begin("track", {})
     assert (tmp_path / "work" / "precious.txt").read_text() == "keep"
@@ -194,11 +197,14 @@ def test_a_note_that_names_what_is_no_result_removes_nothing(tmp_path, name):
 
 
 def test_folders_of_the_user_inside_of_an_unfinished_run_stay(tmp_path):
-    (tmp_path / "motion.partial" / "mine").mkdir(parents=True)
-    (tmp_path / "motion.partial" / "mine" / "notes.txt").write_text("keep")
+    mine = [tmp_path / name / "mine" / "notes.txt" for name in ("run.partial", "motion.partial")]
+    for notes in mine:
+        notes.parent.mkdir(parents=True)
+        notes.write_text("keep")
     with run_folder(tmp_path, overwrite=True) as folder:
         folder.begin("track", {})
-    assert (tmp_path / "motion.partial" / "mine" / "notes.txt").is_file()
+        folder.clear()
+        assert all(notes.is_file() for notes in mine)
 
 
 def test_one_person_under_two_names_is_refused(capsys, tmp_path, command):

@@ -7,11 +7,12 @@ from test_resume import SMALL, assert_same, stop_after
 from test_revision import ROW, moved_farther
 
 from sogjax.cli.main import main
+from sogjax.cli.words import composed
 from sogjax.io.actor_file import load_body
 from sogjax.io.motion import load_motion
 from sogjax.io.recording import open_recording
 from sogjax.refine.adjustment import Adjusted
-from sogjax.run import adjust_clip, revision, track
+from sogjax.run import adjust_clip, merge, passes, track
 from sogjax.settings.compose import track_config
 from sogjax.tracking import frame_by_frame
 
@@ -29,7 +30,7 @@ def command(tmp_path, monkeypatch):
 @pytest.fixture
 def farther(monkeypatch):
     """One frame is found to be farther along the first axis."""
-    monkeypatch.setattr(revision, "merge_passes", lambda tracker, passed, frames: moved_farther(tracker, passed))
+    monkeypatch.setattr(merge, "merge_passes", lambda tracker, passed, frames: moved_farther(tracker, passed))
 
 
 @pytest.fixture
@@ -45,12 +46,12 @@ def higher(monkeypatch):
         )
 
     monkeypatch.setattr(adjust_clip, "adjusted", adjusted)
-    monkeypatch.setattr(adjust_clip, "_recolored", lambda job, source, found, after, config: (found.body, 1.0))
+    monkeypatch.setattr(adjust_clip, "_recolored", lambda setup, source, found, table, color: (found.body, 1.0))
 
 
 def tracks_nothing(context):
     context.setattr(frame_by_frame, "_step", lambda *_: pytest.fail("a frame was tracked again"))
-    context.setattr(revision, "merge_passes", lambda *_: pytest.fail("told both ways again"))
+    context.setattr(passes, "merge_backward", lambda *_: pytest.fail("tracked both ways again"))
 
 
 def test_a_run_stopped_while_its_revised_files_are_written(capsys, tmp_path, monkeypatch, command, farther):
@@ -107,10 +108,9 @@ def test_a_run_stopped_while_it_is_adjusted(capsys, tmp_path, monkeypatch, comma
         done(capsys, *words, "out=run", "resume=true")
     before, after = (load_motion(tmp_path / "run" / name) for name in ("unadjusted.npz", "motion.npz"))
     np.testing.assert_allclose(after.pose[:, 2] - before.pose[:, 2], HIGHER, atol=1e-5)
-    told = []
-    monkeypatch.setattr(track, "evaluate", lambda run, _: told.extend(run.motions.values()))
-    done(capsys, *words, "out=run", "resume=true")  # has ended: what is told is the adjusted motion
-    assert [motion.pose[0, 2] for motion in told] == [after.pose[0, 2]]
+    config = composed("track", [*words[1:], "out=run", "resume=true"])
+    told = track.track_to_folder(config).motions  # has ended: what is told is the adjusted motion
+    assert [motion.pose[0, 2] for motion in told.values()] == [after.pose[0, 2]]
 
 
 def test_a_run_without_a_folder_that_is_stopped_does_not_advise_to_resume(capsys, tmp_path, monkeypatch, command):

@@ -7,7 +7,7 @@ import pytest
 from tiny_body import make_body
 
 from sogjax.errors import InputError
-from sogjax.study import side_by_side
+from sogjax.study import iterations as side_by_side
 from sogjax.study.experiment import Experiment, ExperimentConfig, RowConfig
 from sogjax.study.record import RunRecord
 from sogjax.study.source import Source

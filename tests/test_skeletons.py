@@ -18,7 +18,7 @@ from sogjax.errors import InputError
 from sogjax.io.actor_file import load_body, save_body
 from sogjax.io.motion import load_motion
 from sogjax.io.skeletons.load import read_skeleton
-from sogjax.io.skeletons.skeletool_motion import read_skeletool_motion
+from sogjax.io.skeletons.skeletool import read_skeletool_motion
 from sogjax.model.rotation import world_from_upright
 from sogjax.model.shape import ShapeModel
 

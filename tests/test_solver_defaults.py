@@ -5,7 +5,7 @@ import jax
 import numpy as np
 import pytest
 
-from sogjax.cli.config.composition import composed
+from sogjax.cli.words import composed
 from sogjax.energy.frame_energy import standard_terms
 from sogjax.run import build
 from sogjax.solve.ascent import ConditionedAscent, gradient_ascent

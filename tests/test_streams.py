@@ -9,10 +9,11 @@ from command_line import actor_file, trackable
 
 from sogjax.cli.main import main
 from sogjax.errors import InputError
+from sogjax.io.frame_motions import load_one_motion
 from sogjax.io.motion import Motion, load_motion
 from sogjax.io.source import look_at_source
-from sogjax.run import pipeline, run_job
-from sogjax.view.overlay_video import OverlayVideo
+from sogjax.run import clip, forward
+from sogjax.view.overlay import OverlayVideo
 
 FRAMES, LAST_GOOD = 14, 10
 
@@ -27,21 +28,21 @@ def command(tmp_path, monkeypatch):
 
 def interrupt_the_step(monkeypatch):
     """Ctrl-C reaches the main thread, where the step runs."""
-    whole = run_job.tracked_frames
+    whole = forward.frames_done
 
-    def tracked_frames(*arguments):
-        for done in whole(*arguments):
+    def frames_done(*arguments, **named):
+        for done in whole(*arguments, **named):
             if done.tracked.index == LAST_GOOD:
                 raise KeyboardInterrupt
             yield done
 
-    monkeypatch.setattr(run_job, "tracked_frames", tracked_frames)
+    monkeypatch.setattr(forward, "frames_done", frames_done)
     return 130
 
 
 def break_a_video(monkeypatch):
     """An error in a decoding thread."""
-    whole, calls = pipeline.padded_cells, []
+    whole, calls = clip.padded_cells, []
 
     def padded_cells(*arguments):
         calls.append(1)
@@ -49,7 +50,7 @@ def break_a_video(monkeypatch):
             raise InputError("right.mp4: ends early")
         return whole(*arguments)
 
-    monkeypatch.setattr(pipeline, "padded_cells", padded_cells)
+    monkeypatch.setattr(clip, "padded_cells", padded_cells)
     return 2
 
 
@@ -75,12 +76,12 @@ def test_an_early_end_leaves_the_motion_so_far(capsys, tmp_path, monkeypatch, co
     status = trouble(monkeypatch)
     assert main([*command, "out=run"]) == status
     assert set(threading.enumerate()) == threads
-    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["motion.partial", "run.partial"]
-    so_far, complete = load_motion(tmp_path / "run" / "motion.partial"), load_motion(tmp_path / "whole" / "motion.npz")
+    assert [path.name for path in (tmp_path / "run").iterdir()] == ["run.partial"]
+    so_far, complete = load_one_motion(tmp_path / "run" / "run.partial"), load_motion(tmp_path / "whole" / "motion.npz")
     assert so_far.num_frames >= 10
     np.testing.assert_array_equal(so_far.pose, complete.pose[: so_far.num_frames])
     err = capsys.readouterr().err
-    assert f"stopped after {so_far.num_frames} frames; their motion is in run/motion.partial" in err
+    assert f"stopped after {so_far.num_frames} frames; their motion is in run/run.partial" in err
     assert "Traceback" not in err
 
     monkeypatch.undo()
@@ -104,7 +105,7 @@ def test_an_error_in_the_first_frame_leaves_nothing(capsys, tmp_path, monkeypatc
     def padded_cells(*arguments):
         raise InputError("right.mp4: ends early")
 
-    monkeypatch.setattr(pipeline, "padded_cells", padded_cells)
+    monkeypatch.setattr(clip, "padded_cells", padded_cells)
     assert main([*command, "out=run", "images.background=none"]) == 2
     assert capsys.readouterr().err == "sogjax: right.mp4: ends early\n"
     assert not (tmp_path / "run").exists()

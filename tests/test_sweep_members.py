@@ -4,11 +4,11 @@ import pytest
 from command_line import refused
 from hydra.core.override_parser.overrides_parser import OverridesParser
 
-from sogjax.cli.sweep.run import _members
+from sogjax.cli.sweep.run import members_of
 
 
 def members(*words):
-    return list(_members(OverridesParser.create().parse_overrides(list(words))))
+    return list(members_of(OverridesParser.create().parse_overrides(list(words))))
 
 
 def test_the_last_override_varies_fastest():

@@ -6,9 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
-from sogjax.cli.sweep import results as sweep_results
-from sogjax.cli.sweep.results import Failure, Member, finish_sweep
-from sogjax.run.run_numbers import COLUMNS, Numbers
+from sogjax.cli.sweep import tables
+from sogjax.cli.sweep.results import Failure, Member
+from sogjax.cli.sweep.tables import finish_sweep
+from sogjax.run.result import COLUMNS, Numbers
 from sogjax.view.charts import bar_chart
 
 
@@ -25,7 +26,7 @@ def labels(monkeypatch):
         seen.extend((list(panel.rows), panel.title, list(panel.failed)) for panel in panels)
         return bar_chart(panels, value=value)
 
-    monkeypatch.setattr(sweep_results, "bar_chart", drawn)
+    monkeypatch.setattr(tables, "bar_chart", drawn)
     return seen
 
 

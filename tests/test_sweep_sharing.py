@@ -3,25 +3,31 @@
 import csv
 import runpy
 import sys
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
 import cv2
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from command_line import refused, trackable
 from motion_cases import walking_motion
 
 from sogjax.cli.sweep import run as sweep_run
-from sogjax.cli.sweep.results import APART, Failure, Member, distances_to_first, finish_sweep, keep_result, kept_results
-from sogjax.io.motion import save_motion
+from sogjax.cli.sweep.results import APART, Failure, Member, distances_to_first, keep_result, kept_results
+from sogjax.cli.sweep.tables import finish_sweep
+from sogjax.io.motion_data import save_motion
 from sogjax.io.recording import open_recording
-from sogjax.run import background, build, shared_start
-from sogjax.run.run_numbers import COLUMNS, Numbers
-from sogjax.run.shared_start import forget_shared_openings, shared_opening
+from sogjax.run import shared_pose
+from sogjax.run.actors import Actors
+from sogjax.run.background import Background, learn_background
+from sogjax.run.clip import Clip
+from sogjax.run.initial_pose import InitialPose, PoseRequest
+from sogjax.run.result import COLUMNS, Numbers
+from sogjax.run.shared import SHARED, SharedRecords
 from sogjax.settings.compose import track_config
-from sogjax.settings.method import ImagesConfig
 
 UNKNOWN = float("nan")
 
@@ -34,11 +40,12 @@ class Searches(list):
     """The configs of the searches of a recording that were done."""
 
     def __init__(self, recording):
-        self.recording = recording
+        self.clip = Clip(recording, recording.frames, 4)
 
-    def opening(self, *words):
+    def initial_pose(self, *words):
         """What a member begins with."""
-        return shared_opening(self.recording, [], track_config(words, recording="r"))
+        config = track_config(words, recording="r")
+        return shared_pose.shared_pose(PoseRequest(self.clip, Background(None), Actors(()), config))
 
 
 @pytest.fixture
@@ -46,29 +53,27 @@ def searches(monkeypatch, tmp_path):
     """The configs of the searches that are done, each for another pose."""
     seen = Searches(open_recording(trackable(tmp_path / "two")))
 
-    def search(recording, bodies, config, frame):
-        seen.append(config)
-        return [jnp.full(3, float(len(seen)))]
+    def search(request):
+        seen.append(request.config)
+        return InitialPose(4, np.full(3, float(len(seen))), "search")
 
-    monkeypatch.setattr(shared_start, "first_poses", search)
-    monkeypatch.setattr(shared_start, "initial_pose_file", lambda *_: None)
-    monkeypatch.setattr(shared_start, "frame_range", lambda *_: (4, 9))
-    forget_shared_openings()
+    monkeypatch.setattr(shared_pose, "from_keypoints", lambda request: None)
+    monkeypatch.setattr(shared_pose, "from_search", search)
+    SHARED.forget()
     yield seen
-    forget_shared_openings()
+    SHARED.forget()
 
 
 def test_a_setting_of_energy_or_solver_leaves_the_first_pose(searches):
-    found = [searches.opening(word) for word in ("energy.limit_weight=0", "energy.limit_weight=1", "solver=lbfgs")]
-    assert [pose.tolist() for pose, _ in found] == [[1.0] * 3] * 3
-    assert found[0][1] == 4
+    words = ("energy.limit_weight=0", "energy.limit_weight=1", "solver=lbfgs")
+    assert [searches.initial_pose(word).pose.tolist() for word in words] == [[1.0] * 3] * 3
     usual = track_config(recording="r").energy
     assert searches[0].energy == usual  # and not the first member's
 
 
 @pytest.mark.parametrize("word", ["start=4", "cameras=[a,b]", "color.space=rgb", "images.background=none", "body=dog"])
 def test_what_changes_what_is_seen_changes_the_first_pose(searches, word):
-    assert searches.opening()[0].tolist() != searches.opening(word)[0].tolist()
+    assert searches.initial_pose().pose.tolist() != searches.initial_pose(word).pose.tolist()
 
 
 @pytest.mark.parametrize(
@@ -76,7 +81,7 @@ def test_what_changes_what_is_seen_changes_the_first_pose(searches, word):
     [("energy.limit_weight=0,1", "one first pose and one actor for all 2 members"), ("start=0,1", "start: changes")],
 )
 def test_it_is_said_whether_members_share(monkeypatch, capsys, word, said):
-    monkeypatch.setattr(sweep_run, "run_hydra", lambda task: 0)
+    monkeypatch.setattr(sweep_run, "run_hydra", lambda words: 0)
     sweep_run.run_sweep("track", ["recording=r", word])
     assert said in capsys.readouterr().err
 
@@ -134,21 +139,21 @@ def test_a_report_looks_for_the_truth_before_anything_else(capsys, tmp_path):
 )
 def test_members_write_pictures_of_every_frame_only_where_these_are_named(monkeypatch, capsys, word, added):
     seen = []
-    monkeypatch.setattr(sweep_run, "run_hydra", lambda task: seen.append(sweep_run.sys.argv) or 0)
+    monkeypatch.setattr(sweep_run, "run_hydra", lambda words: seen.append(words) or 0)
     sweep_run.run_sweep("track", ["recording=r", word])
-    assert seen[0][4:] == added
+    assert seen[0][2:] == added
     assert ("no overlay" in capsys.readouterr().err) == bool(added)
 
 
 def test_the_script_of_a_sweep_leaves_them_out_too(monkeypatch, capsys):
     script, seen = Path(__file__).parents[1] / "experiments" / "track.py", []
-    monkeypatch.setattr(sweep_run, "run_hydra", lambda task: seen.append(sweep_run.sys.argv) or 0)
+    monkeypatch.setattr(sweep_run, "run_hydra", lambda words: seen.append(words) or 0)
     monkeypatch.setattr(sys, "argv", [str(script), "-m", "recording=r", "start=0,1"])
     with pytest.raises(SystemExit) as end:
         runpy.run_path(str(script), run_name="__main__")
     assert end.value.code == 0
     assert "no overlay" in capsys.readouterr().err
-    assert seen[0][4:] == ["outputs.overlay=false", "outputs.rerun=false"]
+    assert seen[0][2:] == ["outputs.overlay=false", "outputs.rerun=false"]
 
 
 def black_scene(folder):
@@ -160,32 +165,27 @@ def black_scene(folder):
     return replace(recording, background=plates), plates
 
 
-def test_the_background_is_cut_into_cells_once_until_its_files_change(tmp_path):
-    (recording, plates), images = black_scene(tmp_path), ImagesConfig()
-    grids = build.cell_grids(recording, images.depth)
-    first = background.background_cells(recording, grids, images)
-    assert background.background_cells(recording, grids, images) is first
-    assert background.background_cells(recording, build.cell_grids(recording, 4), images).colors.shape != (
-        first.colors.shape
-    )
+def test_photographs_of_the_empty_scene_are_read_once_until_they_change(tmp_path):
+    recording, plates = black_scene(tmp_path)
+    clip = Clip(recording, recording.frames, 4)
+    first = learn_background(clip, "auto")
+    assert learn_background(clip, "auto") is first
+    assert [float(plane.max()) for plane in first.model(clip.grids).planes] == [0.0] * 3
     cv2.imwrite(str(plates["left"]), np.full((48, 64, 3), 200, np.uint8))
-    changed = background.background_cells(recording, grids, images)
-    assert int(changed.colors[0].max()) == 200
-    assert int(changed.colors[1].max()) == 0
+    red, *_ = learn_background(clip, "auto").model(clip.grids).planes
+    assert [round(255.0 * float(of_camera.max())) for of_camera in red] == [200, 0]
 
 
-class Shared(dict):
-    """What other threads throw out as soon as it is there: they are named still, and gone already."""
+def test_records_are_made_once_by_whatever_thread_and_few_are_held():
+    shared, made = SharedRecords(most=2), []
 
-    def __setitem__(self, key, value):
-        pass
+    def make():
+        made.append(threading.current_thread())
+        time.sleep(0.01)
+        return len(made)
 
-    def __iter__(self):
-        return iter(["first", "second", "third"])
-
-
-def test_members_that_share_a_background_do_not_throw_out_what_another_uses(monkeypatch, tmp_path):
-    monkeypatch.setattr(background, "_cut", Shared())
-    (recording, _), images = black_scene(tmp_path), ImagesConfig()
-    found = background.background_cells(recording, build.cell_grids(recording, images.depth), images)
-    assert int(found.colors.max()) == 0
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(lambda _: shared.get("a", make), range(8))) == [1] * 8
+    assert [shared.get(key, make) for key in ("b", "a", "c")] == [2, 1, 3]
+    assert shared.get("a", make) == 1  # asked for more recently than b
+    assert shared.get("b", make) == 4

@@ -7,8 +7,8 @@ from scipy.spatial import cKDTree
 from synth_people import depth_of_hands_in_trunk, depth_of_others, human_angles, motions, people, person
 
 from sogjax.synth.anatomy import INDEX
-from sogjax.synth.furniture import EDGE, SEAT_HEIGHT, TABLE_HEIGHT, TABLE_SIZE
 from sogjax.synth.motions import furniture_sites, motions_of
+from sogjax.synth.rooms import EDGE, SEAT_HEIGHT, TABLE_HEIGHT, TABLE_SIZE
 
 PEOPLE = {"walk": 1, "arms": 1, "run": 1, "sit": 1, "throw": 1, "dance": 1, "pass": 2, "hug": 2, "fight": 2}
 TIMES = {"sit": 6.0, "dance": 6.3, "hug": 4.4, "fight": 6.2}

@@ -22,12 +22,11 @@ from sogjax.synth import render as render_module
 from sogjax.synth.cache import cache_name, cached_recording
 from sogjax.synth.figure import Mesh
 from sogjax.synth.light import ShadowMap
-from sogjax.synth.plate import plate_of
+from sogjax.synth.picture import plate_of
 from sogjax.synth.render import render_recording
-from sogjax.synth.scene import Scene
+from sogjax.synth.scene import Scene, Texture
 from sogjax.synth.settings import SynthSettings
 from sogjax.synth.stage import stage_of
-from sogjax.synth.textures import Texture
 from sogjax.synth.views import ring_of_views
 
 SMALL = SynthSettings(cameras=3, width=160, height=120, frames=3, seed=2)
@@ -82,7 +81,7 @@ def test_a_point_is_drawn_where_the_calibration_projects_it(point, distortion):
     view, camera = camera_of(SynthSettings(cameras=4, distortion=distortion), index=1)
     pixels, _ = project_points(camera, jnp.array([point]))
     expected = np.asarray(distort(camera, pixels))[0]
-    light = plate_of(patch_scene(np.array(point), view.centre), view).total.sum(-1)
+    light = plate_of(patch_scene(np.array(point), np.linalg.inv(view.camera_from_world)[:3, 3]), view).total.sum(-1)
     rows, columns = np.indices(light.shape)
     seen = np.array([(columns * light).sum(), (rows * light).sum()]) / light.sum()
     np.testing.assert_allclose(seen, expected, atol=0.1)
@@ -115,7 +114,7 @@ def test_the_video_shows_the_person_in_front_of_the_plate_where_the_markers_are(
 def test_masks_have_the_outline_of_the_figure(folder, stage):
     recording = open_recording(folder)
     for pose in recording.example_poses:
-        vertices = stage.people[0].figure.posed(stage.example_pose(0, pose.name)).vertices
+        vertices = stage.people[0].posed(stage.example_pose(0, pose.name)).vertices
         for name in recording.rig.names:
             mask = read_mask(pose.masks[name])
             pixels, _ = project_points(recording.rig.camera(name), jnp.asarray(vertices))
@@ -163,7 +162,7 @@ def test_the_same_settings_make_the_same_files_with_any_number_of_processes(fold
 
 def test_another_seed_makes_other_people_and_cameras(stage):
     other = stage_of(dataclasses.replace(SMALL, seed=3))
-    assert stage.people[0].figure.anatomy.stature != other.people[0].figure.anatomy.stature
+    assert stage.people[0].anatomy.stature != other.people[0].anatomy.stature
     assert not np.array_equal(stage.views[0].matrix, other.views[0].matrix)
 
 

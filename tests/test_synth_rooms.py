@@ -17,8 +17,7 @@ from sogjax.synth.cache import cache_name
 from sogjax.synth.clothes import outfits_from_seed
 from sogjax.synth.filming import film
 from sogjax.synth.flesh import PARTS
-from sogjax.synth.picture import Shadows, mask_of, shot_of
-from sogjax.synth.plate import plate_of
+from sogjax.synth.picture import Shadows, plate_of, shot_of
 from sogjax.synth.render import render_recording
 from sogjax.synth.settings import SynthSettings
 from sogjax.synth.stage import stage_of
@@ -39,9 +38,9 @@ def plates(**changes):
 
 def masks(made, empty, frame):
     """What is seen of the people by each camera."""
-    meshes = [person.figure.posed(pose) for person, pose in zip(made.people, made.poses(frame), strict=True)]
+    meshes = [person.posed(pose) for person, pose in zip(made.people, made.poses(frame), strict=True)]
     shadows = Shadows.of(meshes, made.scene.shadow)
-    return [mask_of(shot_of(view, p, made.people, meshes, shadows)) for view, p in zip(made.views, empty, strict=True)]
+    return [shot_of(view, p, made.people, meshes, shadows).mask for view, p in zip(made.views, empty, strict=True)]
 
 
 def test_a_table_hides_legs_from_some_cameras_and_stands_in_the_plates():
@@ -62,7 +61,7 @@ def test_a_table_hides_legs_from_some_cameras_and_stands_in_the_plates():
 def test_a_person_before_the_table_is_not_hidden_by_it():
     """A camera sees either the person or the table, whichever is nearer: checked against the table's depth."""
     made, empty = stage(motion="arms", props="table"), plates(motion="arms", props="table")
-    mesh = made.people[0].figure.posed(made.poses(0)[0])
+    mesh = made.people[0].posed(made.poses(0)[0])
     for view, plate, mask in zip(made.views, empty, masks(made, empty, 0), strict=True):
         pixels, depths = view.project(mesh.vertices)
         column, row = np.clip(np.round(pixels).astype(int), 0, [view.width - 1, view.height - 1]).T
@@ -77,7 +76,7 @@ def test_a_person_before_the_table_is_not_hidden_by_it():
 
 def test_furniture_throws_shadows_on_legs():
     made = stage(motion="sit")
-    mesh = made.people[0].figure.posed(made.motions[0](1.5))
+    mesh = made.people[0].posed(made.motions[0](1.5))
     low = mesh.vertices[mesh.vertices[:, 2] < 0.3].astype(np.float32)
     alone, among = Shadows.of([mesh]), Shadows.of([mesh], made.scene.shadow)
     assert among.lit(low).mean() < 0.8 * alone.lit(low).mean()
@@ -99,13 +98,13 @@ def test_rooms(kind):
     assert (greenish > 0.6) == (kind == "green")
     edges = np.mean(np.abs(np.diff(picture, axis=1)).max(-1) > 0.1)
     assert (edges > 0.02) == (kind in ("cluttered", "camouflage"))
-    red, green, blue = stage(room=kind).people[0].figure.outfit.shirt[0]
+    red, green, blue = stage(room=kind).people[0].outfit.shirt[0]
     assert kind != "green" or green <= max(red, blue)
 
 
 def test_camouflage_has_the_colors_of_the_people():
     """Most of what is seen of a camouflage room is as near to skin or clothes as their patterns are; another is not."""
-    outfit = stage(room="camouflage").people[0].figure.outfit
+    outfit = stage(room="camouflage").people[0].outfit
     worn = np.array([outfit.skin, *outfit.shirt, outfit.trousers, outfit.shoes, outfit.hair])
     textures = {k: [c for t in stage(room=k).scene.textures for c in t.colors] for k in ("camouflage", "cluttered")}
     near = {k: np.mean([np.abs(worn - c).max(1).min() < 1e-9 for c in cs]) for k, cs in textures.items()}
@@ -116,10 +115,9 @@ def test_camouflage_has_the_colors_of_the_people():
 @pytest.mark.parametrize("kind", ["random", "patterned", "striped", "plain", "black_suit", "long_sleeves"])
 def test_outfits(kind):
     made = stage_of(replace(SMALL, outfit=kind, actors=2, motion="pass", cameras=1))
-    for person in made.people:
-        figure = person.figure
+    for figure in made.people:
         centres = figure.rest[figure.faces].mean(1)
-        colors = person.wardrobe.colors(figure.face_part, centres)
+        colors = figure.wardrobe.colors(figure.face_part, centres)
         leg, arm = (figure.face_part == PARTS.index(f"left_{name}") for name in ("leg", "arm"))
         thigh = colors[leg & (centres[:, 2] > 0.28 * figure.anatomy.stature)]
         assert (thigh.std(0).max() > 0.05) == (kind in ("patterned", "striped"))

@@ -15,6 +15,7 @@ from sogjax.errors import InputError
 from sogjax.io.actor_file import load_body
 from sogjax.io.recording_files import posed_subjects
 from sogjax.model.body import Body
+from sogjax.run.actors import Actors
 from sogjax.settings.run import ActorConfig, TrackConfig
 
 
@@ -103,7 +104,8 @@ def command(tmp_path, monkeypatch):
     body = load_body(actor_file(tmp_path / "body.yaml"))
     recording = named_recording(tmp_path / "walk")
     report = SimpleNamespace(mean_iou=0.9, warnings=[], notes=[])
-    monkeypatch.setattr(actor_command, "_made", lambda opened, *_: (opened, Made(body, body)))
+    made = lambda request, report: report([Made(body, body)]) or Actors((body,))
+    monkeypatch.setattr(actor_command, "new_actors", made)
     monkeypatch.setattr(actor_command, "write_actor_report", lambda *_: report)
     monkeypatch.setattr(actor_command, "say_gains", lambda *_: None)
     return ActorConfig(recording=str(recording), out=str(tmp_path / "actors" / "anna.yaml"))

@@ -7,7 +7,7 @@ import pytest
 from command_line import refused
 from small_recording import named_recording
 
-from sogjax.cli.sweep.folders import places_of, recordings_in, root_of, with_folders
+from sogjax.cli.sweep.folders import places_of, recordings_in, with_folders
 from sogjax.cli.sweep.takes import is_of_takes
 from sogjax.errors import InputError
 
@@ -24,7 +24,11 @@ def lab(tmp_path):
 
 
 def expanded(pattern):
-    return recordings_in(with_folders([f"recording=glob({pattern})"]))
+    return recordings_in(with_folders([f"recording=glob({pattern})"])[0])
+
+
+def root_of(word):
+    return with_folders([word])[1]
 
 
 def test_a_pattern_of_folders_is_the_list_of_the_recordings_in_them(lab, capsys):
@@ -95,7 +99,7 @@ def test_a_recording_spelled_with_dots_keeps_its_results_in_the_folder_of_all(la
 
 def test_a_recording_that_is_added_moves_no_results_of_a_pattern(lab, tmp_path):
     def places(pattern):
-        return places_of(list(map(Path, expanded(pattern))), root_of([f"recording=glob({pattern})"]))
+        return places_of(list(map(Path, expanded(pattern))), root_of(f"recording=glob({pattern})"))
 
     shutil.rmtree(lab / "ben")
     before = places(f"{lab}/*/*")
@@ -105,7 +109,7 @@ def test_a_recording_that_is_added_moves_no_results_of_a_pattern(lab, tmp_path):
     assert places(f"{lab}/anna/*") == ["run fast", "walk"]
     assert places(f"'{lab}/*/[r]*'") == ["anna/run fast"]
     assert places(f"['{lab}/anna/walk','{lab}/ben/*']") == ["anna/walk", "ben/walk"]
-    assert root_of([f"recording={lab}/anna/walk,{lab}/anna/run"]) is None
+    assert root_of(f"recording={lab}/anna/walk,{lab}/anna/run") is None
 
 
 @pytest.mark.parametrize("pattern", [".", "..", "/", "''", "'**/x'", "[]"])
@@ -118,7 +122,7 @@ def test_patterns_without_a_name_are_refused_in_a_sentence(capsys, tmp_path, mon
 
 def test_a_pattern_may_be_the_folder_itself_or_begin_at_home(lab, monkeypatch, capsys):
     monkeypatch.chdir(lab / "anna" / "walk")
-    assert places_of(list(map(Path, expanded("."))), root_of(["recording=glob(.)"])) == ["walk"]
+    assert places_of(list(map(Path, expanded("."))), root_of("recording=glob(.)")) == ["walk"]
     monkeypatch.setenv("HOME", str(lab))
     assert expanded("'~/ben/*'") == [f"{lab}/ben/walk"]
     monkeypatch.chdir(lab / "anna")

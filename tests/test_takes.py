@@ -10,9 +10,8 @@ from rendered_person import rendered_person
 
 from sogjax.cli.main import main
 from sogjax.cli.sweep import takes
-from sogjax.cli.sweep.results import Member
-from sogjax.cli.sweep.take_table import NO_RESULT, keep_row, row_of
-from sogjax.run.kept_run import write_note
+from sogjax.cli.sweep.results import NO_RESULT, Member, keep_row, row_of
+from sogjax.run.run_folder import write_note
 
 FAST = (
     *("solver.max_iterations=20", "images.depth=6", "outputs.motion_only=true"),

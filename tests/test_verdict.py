@@ -15,7 +15,8 @@ from sogjax.cli.actor import actor_verdict
 from sogjax.quality.limb_warnings import Limits
 from sogjax.quality.numbers import write_json
 from sogjax.quality.verdict import verdicts, worst_frames
-from sogjax.run.verdict import kept_verdicts, say_if_other_subject
+from sogjax.run.forward import say_if_other_subject
+from sogjax.run.judge import kept_verdicts
 from sogjax.view.closeups import HEIGHT, closeups
 
 CAMERAS = ("left", "right")

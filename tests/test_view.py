@@ -11,7 +11,7 @@ from small_recording import make_recording
 
 from sogjax.cli import view
 from sogjax.cli.main import main
-from sogjax.io.motion import save_motion
+from sogjax.io.motion_data import save_motion
 
 
 @pytest.fixture

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, UInt8
@@ -16,7 +15,7 @@ from sogjax.model.body import Body
 from sogjax.model.camera import Camera, distort, project, project_points
 from sogjax.model.color import averaging_space, from_rgb, linear_light, to_rgb
 from sogjax.model.sog import Sog
-from sogjax.search.mirrored import means_of
+from sogjax.search.placed_body import means_of
 
 SAMPLE_RADIUS = 0.8
 """Samples are taken within this many sigmas of a blob's centre."""
@@ -123,11 +122,6 @@ def _filled(
 def colored(body: Body, colors: Float[np.ndarray, "blob 3"]) -> Body:
     """The body with other blob colours (sRGB, 0..1)."""
     return eqx.tree_at(lambda b: b.blob_colors, body, jnp.asarray(colors, body.blob_colors.dtype))
-
-
-def camera_of(rig: Camera, index: int) -> Camera:
-    """One camera of a stack."""
-    return jax.tree.map(lambda leaf: jnp.asarray(np.asarray(leaf)[index]), rig)
 
 
 FEWEST_SAMPLES = 8

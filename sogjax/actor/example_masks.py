@@ -44,11 +44,8 @@ def example_masks(
 ) -> ExampleMasks:
     """Find the masks of one example pose.
 
-    Args:
-        recording: that has the example.
-        example: the example pose.
-        images: the pictures of all its cameras.
-        learnt: the background of all cameras of the recording, for those without a picture of the empty scene.
+    `images` are those of all its cameras, `learnt` is the background of every camera of the recording. A camera with
+    neither a mask nor a picture of the empty scene is given the background that was learnt from the clip.
 
     A camera with neither a mask nor a picture of the empty scene is given the background that was learnt from the clip.
 

@@ -19,7 +19,7 @@ from sogjax.energy.term import Terms
 from sogjax.energy.views import Views
 from sogjax.model.body import Body
 from sogjax.model.rotation import world_from_upright
-from sogjax.search.rough_pose import centred, root_rotation, turned
+from sogjax.search.placed_body import centred, headings, root_rotation, turned
 from sogjax.solve.ascent import ConditionedAscent
 from sogjax.solve.solution import Scales
 from sogjax.tracking.solving import pose_scales
@@ -35,13 +35,8 @@ def starts_at(
     body: Body, centre: Float[np.ndarray, "3"], up: str, named: Sequence[str]
 ) -> Float[Array, "heading named dof"]:
     """The named poses at every heading, with the body's centre at a point (metres, world)."""
-    headings = np.arange(NUM_HEADINGS) * 2.0 * np.pi / NUM_HEADINGS - np.pi
-    return jnp.stack(
-        [
-            jnp.stack([centred(body, turned(body, body.poses[name], float(h), up), centre) for name in named])
-            for h in headings
-        ]
-    )
+    turns = np.stack([turned(body, body.poses[name], float(h), up) for h in headings(NUM_HEADINGS) for name in named])
+    return jnp.asarray(centred(body, turns, centre)).reshape(NUM_HEADINGS, len(named), -1)
 
 
 class Candidate(NamedTuple):
@@ -157,9 +152,8 @@ def _frames_and_means(
 def consistent_ways(fits: Sequence[Sequence[float]], colors: Sequence[Sequence[SideColors]]) -> tuple[int, ...]:
     """Which of the ways to see each moment to believe: those that fit, and show the same colours on the same sides.
 
-    Args:
-        fits: by moment and way how well it fits; only its ratio to the best counts.
-        colors: by moment and way what is then seen of the sides of the body.
+    Both `fits` and `colors` (what is then seen of the sides of the body) are by moment and way; of a fit only its ratio
+    to the best one of its moment counts.
     """
     best = [max(ways) for ways in fits]
 

@@ -10,8 +10,8 @@ from jaxtyping import Bool, Float, Int
 from scipy.ndimage import center_of_mass, label
 
 from sogjax.model.camera import Camera
-from sogjax.scene.segmentation import MANY, is_subject, largest_parts
-from sogjax.scene.visual_hull import VOXELS, Cube, cube_around, voxel_pixels
+from sogjax.scene.segmentation import is_subject, largest_parts
+from sogjax.scene.visual_hull import MANY, VOXELS, Cube, cube_around, voxel_pixels
 
 SMALLEST_BODY = 0.1
 """Volume of a separate part of a hull, as a share of the largest, from which on it may be somebody else."""
@@ -73,13 +73,8 @@ def seen_shape(
 ) -> SeenShape | None:
     """What the silhouettes of one frame tell; None if they do not meet anywhere.
 
-    Args:
-        frame: its number.
-        masks: what is not the background, by camera.
-        unknown: where nothing is known of the background.
-        cameras: for pictures of the masks' size.
-        cube: in which the subject is.
-        up: the world's vertical.
+    By camera, `masks` say what is not the background and `unknown` where nothing is known of it; the cameras are those
+    of pictures of the masks' size. The subject is in the cube.
     """
     pixels = {k: voxel_pixels(cube, cameras[k], mask.shape) for k, mask in masks.items()}
     hits = {k: pixels[k].hits(widened(masks[k] | unknown[k])) for k in masks}

@@ -9,8 +9,15 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from sogjax.actor.colors import back_projected_colors, colored
-from sogjax.actor.explained_examples import explained_examples
-from sogjax.actor.posed_examples import Progress, Report, agreement, colored_views, found_best, rough_poses
+from sogjax.actor.posed_examples import (
+    Progress,
+    Report,
+    agreement,
+    colored_views,
+    explained_examples,
+    found_best,
+    rough_poses,
+)
 from sogjax.actor.silhouette_fit import Estimate, estimate_shape, silhouettes_of
 from sogjax.actor.silhouettes import FINE_DEPTH, PosedPictures, load_pictures, silhouette_views, stack_views
 from sogjax.energy.term import Terms
@@ -43,7 +50,7 @@ class MadeActor:
     """The actor as it stands in the recording's world; what the example poses are poses of."""
     example_poses: dict[str, Float[Array, "dof"]]
     frames: dict[str, int]
-    """Of the example poses that are frames of the videos, counted from the recording's first."""
+    """The recording's number of each example pose that is a frame of the videos."""
     pictures: tuple[PosedPictures, ...]
     """Of the example poses, in their order."""
     rig: Camera

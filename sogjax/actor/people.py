@@ -15,8 +15,7 @@ from scipy.optimize import linear_sum_assignment
 
 from sogjax.actor.frame_choice import SMALLEST_BODY, Mask, widened
 from sogjax.model.camera import Camera
-from sogjax.scene.segmentation import MANY
-from sogjax.scene.visual_hull import VOXELS, Cube, VoxelPixels, voxel_pixels, without_floor
+from sogjax.scene.visual_hull import MANY, VOXELS, Cube, VoxelPixels, voxel_pixels, without_floor
 
 GAP = 0.25
 """Vertical gap between the parts of one body that is closed, metres: a belt in the background's colours."""
@@ -55,14 +54,8 @@ def people_apart(
 ) -> list[PersonSeen]:
     """The people who stand apart from each other in one frame, in no particular order.
 
-    Args:
-        frame: its number.
-        masks: what is not the background, shadows or not, by camera.
-        unknown: where nothing is known of the background.
-        pictures: the cells' colours.
-        cameras: for pictures of the masks' size.
-        cube: in which all of them are.
-        up: the world's vertical.
+    By camera, `masks` say what is not the background, shadows or not, `unknown` where nothing is known of it, and
+    `pictures` are the cells' colours; the cameras are those of pictures of that size. All people are in the cube.
     """
     pixels = {k: voxel_pixels(cube, cameras[k], mask.shape) for k, mask in masks.items()}
     misses = np.sum([~pixels[k].hits(widened(masks[k] | unknown[k])) for k in masks], axis=0)

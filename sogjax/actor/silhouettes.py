@@ -17,11 +17,12 @@ from sogjax.errors import InputError
 from sogjax.io.example_poses import ExamplePose
 from sogjax.io.recording import Recording
 from sogjax.io.video import read_frames, read_still
-from sogjax.model.camera import Camera
+from sogjax.model.camera import Camera, camera_of
 from sogjax.model.sog import Sog
 from sogjax.scene.background import CameraBackground
 from sogjax.scene.cells import CellGrid, stack_cells
 from sogjax.scene.quadtree import Candidates, keep_blobs, quadtree
+from sogjax.scene.visual_hull import central_ray, nearest_point
 from sogjax.tracking.culling import capacity_for
 
 BACKGROUND_SIMILARITY = -0.15
@@ -149,18 +150,9 @@ def _silhouette_sogs(
 
 def subject_centre(pictures: PosedPictures, rig: Camera) -> Float[np.ndarray, "3"]:
     """The point nearest to the rays through the centres of all masks: about the subject's centre (metres, world)."""
-    normal = np.zeros((3, 3))
-    target = np.zeros(3)
-    for camera, mask in pictures.masks.items():
-        pixel = np.argwhere(mask)[:, ::-1].mean(axis=0)
-        matrix = np.asarray(rig.intrinsics[camera], float)
-        world = np.asarray(rig.camera_from_world[camera], float)
-        direction = world[:3, :3].T @ np.linalg.solve(matrix, [*pixel, 1.0])
-        direction /= np.linalg.norm(direction)
-        across = np.eye(3) - np.outer(direction, direction)
-        normal += across
-        target += across @ (-world[:3, :3].T @ world[:3, 3])
-    return np.linalg.solve(normal, target)
+    rays = [central_ray(mask, camera_of(rig, camera)) for camera, mask in pictures.masks.items()]
+    eyes, directions, _ = (np.array(part) for part in zip(*rays, strict=True))
+    return nearest_point(eyes, directions)
 
 
 def stack_views(views: Sequence[Views]) -> Views:

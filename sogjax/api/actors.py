@@ -3,18 +3,14 @@
 from pathlib import Path
 from typing import Any
 
-from sogjax.actor import make
+from sogjax.actor.make import MadeActor
 from sogjax.errors import InputError
 from sogjax.io.actor_file import save_body
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
-from sogjax.run.build import color_space_and_radius, energy_terms
-from sogjax.run.example_frames import with_examples
-from sogjax.run.keypoint_actor import with_rough_poses
-from sogjax.run.recordings import body_named, keypoint_actor_or, with_cameras
-from sogjax.run.terminal import progress, say
-from sogjax.settings.compose import composed_without_hydra
-from sogjax.settings.method import EnergyConfig, ImagesConfig
+from sogjax.run.actors import ActorRequest, actors_of_pictures, make_actors
+from sogjax.run.recordings import body_named, with_cameras
+from sogjax.settings.compose import composed_config
 from sogjax.settings.run import ActorConfig
 
 Actor = Body
@@ -59,16 +55,10 @@ def make_actor(recording: Recording, subject: str | None = None, **settings: Any
         InputError: no example poses of the subject, no frames that can be used, pictures without masks, a pose that was
             not found; an unknown setting (with the nearest known one) or a wrong value.
     """
-    try:
-        return fit_actor(recording, subject, **settings).body
-    except InputError as error:
-        config = _config(recording, subject, settings)
-        space, _ = color_space_and_radius(config.color)
-        chosen, start = with_cameras(recording, config.cameras), body_named(config.body)
-        return keypoint_actor_or(error, chosen, start, space, config.actors, config.symmetric)
+    return make_actors(_request(recording, subject, settings)).bodies[0]
 
 
-def fit_actor(recording: Recording, subject: str | None = None, **settings: Any) -> make.MadeActor:
+def fit_actor(recording: Recording, subject: str | None = None, **settings: Any) -> MadeActor:
     """What `make_actor` gives, with all that was found on the way: example poses, silhouettes, standard deviations.
 
     Args:
@@ -79,24 +69,14 @@ def fit_actor(recording: Recording, subject: str | None = None, **settings: Any)
     Raises:
         InputError: as there.
     """
+    made: list[MadeActor] = []
+    actors_of_pictures(_request(recording, subject, settings), made.extend)
+    return made[0]
+
+
+def _request(recording: Recording, subject: str | None, settings: dict[str, Any]) -> ActorRequest:
     config = _config(recording, subject, settings)
-    space, _ = color_space_and_radius(config.color)
-    body = body_named(config.body)
-    chosen = with_cameras(recording, config.cameras)
-    recording, learnt, best = with_examples(chosen, ImagesConfig(), config.actors)
-    recording = with_rough_poses(recording, body)
-    return make.make_actor(
-        recording,
-        body,
-        config.subject,
-        space,
-        energy_terms(EnergyConfig()),
-        say,
-        progress,
-        config.symmetric,
-        learnt,
-        best,
-    )
+    return ActorRequest.from_config(with_cameras(recording, config.cameras), config)
 
 
 def _config(recording: Recording, subject: str | None, settings: dict[str, Any]) -> ActorConfig:
@@ -104,4 +84,4 @@ def _config(recording: Recording, subject: str | None, settings: dict[str, Any])
         if key in settings:
             raise InputError(f"{key}: make_actor writes no file; use sogjax.save_actor(path, actor)")
     given = settings | {"recording": recording.path, "out": "", "subject": subject}
-    return composed_without_hydra(ActorConfig, "actor", keywords=given)
+    return composed_config(ActorConfig, "actor", given.items())

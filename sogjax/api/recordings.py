@@ -1,16 +1,11 @@
-"""Recordings to work on: one's own, or a rendered one whose truth is known.
-
-Motions from files, and to look at.
-
-Motions held against the truth.
-"""
+"""What is worked on and looked at: recordings, rendered or one's own, their truth, and motions held against it."""
 
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, overload
 
 from sogjax.errors import InputError
-from sogjax.io import motion as motions
+from sogjax.io import frame_motions
 from sogjax.io.ground_truth import GroundTruth, load_ground_truth
 from sogjax.io.motion import Motion
 from sogjax.io.recording import Recording
@@ -21,7 +16,7 @@ from sogjax.quality.markers import MarkerRule
 from sogjax.run.build import marker_rule
 from sogjax.run.recordings import opened
 from sogjax.run.terminal import progress
-from sogjax.settings.compose import composed_without_hydra
+from sogjax.settings.compose import composed_config
 from sogjax.synth.cache import cached_recording
 from sogjax.synth.settings import SynthSettings
 from sogjax.view.projection import frame_range
@@ -56,7 +51,7 @@ def render_recording(**settings: Any) -> Recording:
         InputError: an unknown setting (with the nearest known one), a value out of range, or a folder that cannot be
             written.
     """
-    wanted: SynthSettings = composed_without_hydra(SynthSettings, "synth", keywords=settings)
+    wanted: SynthSettings = composed_config(SynthSettings, "synth", settings.items())
     return opened(str(cached_recording(wanted, progress=progress)))
 
 
@@ -88,7 +83,7 @@ def load_motion(path: str | Path) -> Motion:
     Raises:
         InputError: no such file, another version, or an array that is missing, misshapen or not finite.
     """
-    return motions.load_motion(Path(path))
+    return frame_motions.load_one_motion(Path(path))
 
 
 def write_rerun(path: str | Path, recording: Recording, motion: Motion | Sequence[Motion], images: bool = True) -> None:
@@ -106,7 +101,7 @@ def write_rerun(path: str | Path, recording: Recording, motion: Motion | Sequenc
     from sogjax.view.rerun import file as rerun
 
     shown = [motion] if isinstance(motion, Motion) else list(motion)
-    first, stop = (number - recording.first_frame for number in frame_range(recording, shown))
+    first, stop = frame_range(recording, shown)
     rerun.write_rerun(
         Path(path),
         recording,

@@ -4,23 +4,29 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
+import jax.numpy as jnp
+
 from sogjax.api.tracking import actor_list, track_settings
 from sogjax.energy.keypoints import keypoint_term_among
 from sogjax.energy.term import Term
 from sogjax.errors import InputError
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
-from sogjax.run.cells import picture_reader
-from sogjax.run.clip_keypoints import ClipKeypoints, with_keypoints
-from sogjax.run.job import Job
-from sogjax.run.keypoint_offsets import told_offsets
-from sogjax.run.pipeline import Preparation, frame_input, read_pictures
+from sogjax.run.actors import Actors
+from sogjax.run.clip import Clip
+from sogjax.run.clip_keypoints import ClipKeypoints
+from sogjax.run.passes import PASSES
 from sogjax.run.recordings import with_cameras
+from sogjax.run.run import Run
+from sogjax.run.runner import run_passes
+from sogjax.run.track import opened_clip
 from sogjax.tracking.capacity import first_capacities
 from sogjax.tracking.culling import Capacities, capacity_for
 from sogjax.tracking.frame import AnyFrame, on_device
 from sogjax.tracking.tracker import Tracker
 
+BEFORE_TRACKING = ("background", "initial_pose", "keypoint_bias")
+"""The passes that say how the first frame is tracked."""
 ROOM = 2
 """Times the room that suits the first frame: nobody makes more while a pure step runs."""
 
@@ -52,10 +58,11 @@ def make_tracker(
         InputError: as `track`.
     """
     config, actors = track_settings(**settings), actor_list(actor)
-    recording = with_cameras(recording, config.cameras)
-    job = Job.from_config(recording, actors, config, terms=terms)
-    tracker = replace(told_offsets(job, picture_reader(config.images)), first_pose=job.start)
-    frame = on_device(next(read_cells(recording, tracker, job.frames[0], job.frames[0] + 1)))
+    clip = opened_clip(with_cameras(recording, config.cameras), config)
+    run = Run(clip, config, terms=terms, records={"actors": Actors(tuple(actors))})
+    run_passes(run, [each for each in PASSES if each.name in BEFORE_TRACKING])
+    tracker = replace(run.setup.tracker, first_pose=jnp.asarray(run.initial_pose.pose))
+    frame = on_device(next(clip.frames(run.initial_pose.frame, run.initial_pose.frame + 1)))
     return replace(tracker, capacities=_with_more_room(first_capacities(tracker, tracker.start(), frame)))
 
 
@@ -87,12 +94,11 @@ def read_cells(recording: Recording, tracker: Tracker, start: int = 0, stop: int
             f"start={start} stop={stop}: {recording.path} has the frames 0 to {recording.num_frames - 1}; choose "
             f"0 <= start < stop <= {recording.num_frames}"
         )
-    pictures = read_pictures(recording, Preparation(grids), start, last)
-    frames = (on_device(frame_input([picture.cells for picture in shown])) for shown in pictures)
     pulled = keypoint_term_among(tracker.terms) is not None
     keypoints = ClipKeypoints.of_recording(recording) if pulled else None
-    known = with_keypoints(keypoints, frames, range(start, last))
-    return (frame.cells if frame[1:] == (None, None) else frame for frame in known)
+    numbers = recording.frames[start:last]
+    clip = Clip(recording, numbers, grids[0].depth, keypoints)
+    return (frame.cells if frame[1:] == (None, None) else frame for frame in map(on_device, clip.frames()))
 
 
 def _with_more_room(first: Capacities) -> Capacities:

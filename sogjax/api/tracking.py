@@ -1,7 +1,4 @@
-"""The settings of a track, as keywords.
-
-From a recording and its actors to their motion.
-"""
+"""From a recording and its actors to their motion, with the settings of a track as keywords."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
@@ -13,10 +10,11 @@ from sogjax.io.motion import Motion
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.run import build
-from sogjax.run.first_pose import searched_poses
-from sogjax.run.job import frame_range
-from sogjax.run.recordings import upright, with_cameras
-from sogjax.run.track import track_recording
+from sogjax.run.actors import Actors
+from sogjax.run.background import learn_background
+from sogjax.run.initial_pose import PoseRequest, searched_poses
+from sogjax.run.recordings import with_cameras
+from sogjax.run.track import opened_clip, track_recording
 from sogjax.search.found_pose import FoundPose
 from sogjax.settings.compose import track_config
 from sogjax.settings.run import OutputsConfig, TrackConfig
@@ -127,9 +125,9 @@ def find_first_pose(
         InputError: nothing like an actor is seen in the frame; no such frame; a wrong setting.
     """
     config, actors = track_settings(**settings), actor_list(actor)
-    recording = with_cameras(recording, config.cameras)
-    first, _ = frame_range(recording, config)
-    found = searched_poses(recording, [upright(each, recording) for each in actors], config, first, terms)
+    clip = opened_clip(with_cameras(recording, config.cameras), config)
+    background = learn_background(clip, config.images.background, config.images.cache)
+    found = searched_poses(PoseRequest(clip, background, Actors(tuple(actors)), config, terms))
     return found[0] if isinstance(actor, Body) else found
 
 

@@ -10,15 +10,8 @@ from jaxtyping import Bool
 
 from sogjax.check.pictures import Mask, Moment
 from sogjax.io.calibration.rig import CameraRig
-from sogjax.scene.visual_hull import (
-    AGREEING,
-    OWN_COVERAGE,
-    Cube,
-    cube_around,
-    resized,
-    voxel_pixels,
-    widened_by_half_a_voxel,
-)
+from sogjax.scene.plate_difference import widened
+from sogjax.scene.visual_hull import AGREEING, OWN_COVERAGE, Cube, cube_around, resized, voxel_pixels
 
 FEWEST_VIEWS = 3
 """With two silhouettes that disagree, nothing tells which is wrong."""
@@ -49,21 +42,21 @@ class MomentHull:
         self.cameras = {k: resized(rig.camera(rig.names[k]), mask.shape[1::-1]) for k, mask in masks.items()}
         self.cube: Cube = cube_around([*masks.values()], [*self.cameras.values()])
         self._pixels = {k: voxel_pixels(self.cube, self.cameras[k], mask.shape) for k, mask in masks.items()}
-        self._outside = {k: ~p.hits(widened_by_half_a_voxel(masks[k], p)) for k, p in self._pixels.items()}
+        self._outside = {k: ~p.hits(widened(masks[k], p.footprint // 2)) for k, p in self._pixels.items()}
 
     def _hull(self, cameras: Sequence[int]) -> Bool[np.ndarray, "voxel"]:
         """The voxels that the silhouettes of some of the cameras hold."""
         return ~np.any([self._outside[k] for k in cameras], axis=0)
 
     def coverages(self, cameras: Sequence[int]) -> dict[int, float]:
-        """By camera the share of its silhouette that the hull of all of these cameras covers."""
+        """The share of each camera's silhouette that the hull of all of these cameras covers."""
         hull = self._hull(cameras)
         shown = {k: (self._pixels[k].silhouette_of(hull) & self.masks[k]).sum() for k in cameras}
         return {k: float(pixels / max(self.masks[k].sum(), 1)) for k, pixels in shown.items()}
 
     @cached_property
     def misfits(self) -> dict[int, Misfit]:
-        """By camera how its silhouette differs from the others; wrong ones do not count as others.
+        """How each camera's silhouette differs from the others; wrong ones do not count as others.
 
         While a silhouette contradicts the rest, the camera is taken out without which the rest agrees best.
         """
@@ -79,7 +72,7 @@ class MomentHull:
         return {**current, **out}
 
     def _misfits(self, cameras: Sequence[int]) -> dict[int, Misfit]:
-        """By camera how its silhouette differs from the others of these, none of which is left out."""
+        """How the silhouette of each of these cameras differs from the others, none of which is left out."""
         found = {}
         for camera, coverage in self.coverages(cameras).items():
             mask = self.masks[camera]
@@ -94,7 +87,7 @@ class MomentHull:
 
 
 def smallest_shift(mask: Mask, region: Mask) -> float:
-    """By how many pixels a mask must be moved to lie in a region as well as it can.
+    """The number of pixels by which a mask must be moved to lie in a region as well as it can.
 
     The region may be larger: the visual hull of few cameras is, and its middle says little. Errors of the outline may
     take 3 % of the mask from an overlap. The search steps by two pixels.
@@ -133,7 +126,7 @@ def mean_coverage(hulls: Sequence[MomentHull]) -> float:
 
 
 def camera_misfits(hulls: Sequence[MomentHull]) -> dict[int, Misfit]:
-    """By camera the median misfit over all moments."""
+    """The median misfit of each camera over all moments."""
     by_camera: dict[int, list[Misfit]] = {}
     for hull in hulls:
         for camera, misfit in hull.misfits.items():

@@ -18,11 +18,11 @@ FEWEST = 3
 """With two cameras that differ, nothing tells which is wrong."""
 
 References = Mapping[int, tuple[str, Picture]]
-"""By camera a still picture of what it sees, and what kind of picture it is."""
+"""A still picture of what each camera sees, and what kind of picture it is."""
 
 
 def references_of(plates: Mapping[int, Picture], photographed: Sequence[Moment]) -> dict[int, tuple[str, Picture]]:
-    """By camera the empty scene, else an example pose."""
+    """The empty scene of each camera, else its example pose."""
     found = {
         camera: ("example pose", picture) for moment in photographed[:1] for camera, picture in moment.pictures.items()
     }
@@ -56,7 +56,7 @@ def place_findings(names: tuple[str, ...], references: References, filmed: Mappi
 
 
 def _place_likeness(references: References, filmed: Mapping[int, Picture]) -> dict[int, dict[int, float]]:
-    """For each camera with a reference how alike its video's picture is with the reference of every camera."""
+    """How alike the video's picture of each camera with a reference is with the reference of every camera."""
     structures = {camera: _structure(picture) for camera, (_, picture) in references.items()}
     rows = {}
     for camera in references.keys() & filmed.keys():

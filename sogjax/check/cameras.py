@@ -10,6 +10,7 @@ from sogjax.check.findings import Finding, listed
 from sogjax.errors import counted
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.model.rotation import UP_AXES, axis_vector
+from sogjax.scene.visual_hull import nearest_point
 
 
 @dataclass(frozen=True)
@@ -79,14 +80,6 @@ def _rays_of(
 ) -> tuple[Float[np.ndarray, "camera 3"], Float[np.ndarray, "camera 3"]]:
     """Centres and viewing directions of cameras with such poses (camera from world)."""
     return -np.einsum("nji,nj->ni", poses[:, :3, :3], poses[:, :3, 3]), poses[:, 2, :3]
-
-
-def nearest_point(
-    centres: Float[np.ndarray, "ray 3"], directions: Float[np.ndarray, "ray 3"]
-) -> Float[np.ndarray, "3"]:
-    """The point with the least sum of squared distances to rays; for parallel rays the least far from the origin."""
-    across = np.eye(3) - directions[:, :, None] * directions[:, None, :]
-    return np.linalg.lstsq(across.sum(axis=0), np.einsum("nij,nj->i", across, centres), rcond=1e-9)[0]
 
 
 def camera_findings(rig: CameraRig, geometry: RigGeometry, up: str) -> list[Finding]:

@@ -7,13 +7,7 @@ from typing import Any
 import numpy as np
 
 from sogjax.check.agreement import Misfit, hulls_of
-from sogjax.check.appearance import (
-    change_findings,
-    exposure,
-    exposure_findings,
-    place_findings,
-    references_of,
-)
+from sogjax.check.appearance import change_findings, exposure, exposure_findings, place_findings, references_of
 from sogjax.check.calibration import calibration_findings, unit_rig
 from sogjax.check.cameras import RigGeometry, camera_findings, rig_geometry
 from sogjax.check.findings import Finding, worst_first
@@ -59,7 +53,7 @@ class Examination:
     pictures: tuple[np.ndarray, ...]
     """One of each camera (BGR), to draw on."""
     offsets: dict[str, float]
-    """By camera the whole `frame_offset` to be written, where any was found; else empty."""
+    """The whole `frame_offset` of each camera to be written, where any was found; else empty."""
 
 
 def examined(recording: Recording, start: int, frames: int, largest_offset: int, progress: Progress) -> Examination:
@@ -67,7 +61,7 @@ def examined(recording: Recording, start: int, frames: int, largest_offset: int,
 
     Args:
         recording: what to check.
-        start: the first frame of the stretch that is read, counted from the recording's first.
+        start: the first frame of the stretch that is read.
         frames: its length at most.
         largest_offset: offsets between cameras are looked for up to so many frames.
         progress: wraps the frames while they are read.
@@ -136,7 +130,7 @@ class _Looks:
 
     findings: list[Finding]
     fits: dict[int, Misfit]
-    """By camera how its silhouette differs from the others'."""
+    """How each camera's silhouette differs from the others'."""
     size: SubjectSize | None
     gains: dict[str, list[float | None]]
     """Blue, green and red in units of the median camera's."""
@@ -168,7 +162,7 @@ def _looks(
 
 
 def _first_pictures(stills: Sequence[dict[int, Picture]]) -> dict[int, Picture]:
-    """By camera the first of its stills."""
+    """The first still of each camera."""
     return {camera: picture for pictures in reversed(stills) for camera, picture in pictures.items()}
 
 

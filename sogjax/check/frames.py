@@ -28,7 +28,7 @@ class SourceFrames:
 
 
 def source_frames(recording: Recording) -> dict[str, SourceFrames]:
-    """By camera what its file says about its frames."""
+    """What the file of each camera says about its frames."""
     with ThreadPoolExecutor() as pool:
         found = pool.map(lambda name: _source_frames(recording, name), recording.rig.names)
         return dict(zip(recording.rig.names, found, strict=True))
@@ -73,7 +73,7 @@ def source_findings(recording: Recording, sources: dict[str, SourceFrames]) -> l
 
 
 def repeated_frames(clip: Clip) -> dict[int, list[int]]:
-    """By camera the frames of the clip that repeat the one before, while those of most other cameras do not.
+    """The frames of each camera that repeat the one before, while those of most other cameras do not.
 
     They count as the same below 5 % of the difference that is usual in that video, and as others above 30 %.
     """
@@ -100,7 +100,7 @@ def _shares(grey: np.ndarray, present: Bool[np.ndarray, "frame"]) -> Float[np.nd
 
 
 def _median(shares: Float[np.ndarray, "camera step"]) -> Float[np.ndarray, "step"]:
-    """Over the cameras that are not missing; 0 where all are."""
+    """The median over the cameras that are not missing; 0 where all are."""
     seen = ~np.isnan(shares)
     return np.nanmedian(np.where(seen.any(axis=0), shares, 0.0), axis=0)
 

@@ -18,7 +18,7 @@ def keypoint_findings(recording: Recording, start: int, frames: int) -> list[Fin
 
     Args:
         recording: whose files are looked at.
-        start: the first frame that is compared, counted from the recording's first.
+        start: the first frame that is compared.
         frames: how many there are, of which 30 are compared at most.
     """
     try:
@@ -47,12 +47,14 @@ def keypoint_findings(recording: Recording, start: int, frames: int) -> list[Fin
 def agreement(
     keypoints: Keypoints, recording: Recording, frames: Sequence[int] | np.ndarray
 ) -> Float[np.ndarray, "camera"]:
-    """By camera the share of its keypoints on the person whom all see together; NaN where it has fewer than 20.
+    """The share of each camera's keypoints on the person whom all see together; NaN where it has fewer than 20.
 
     Only those with a confidence of 0.3 or more count.
     """
     rig = recording.rig
-    some = Keypoints(keypoints.scheme, keypoints.cameras, keypoints.points[:, np.asarray(frames, int)])
+    some = Keypoints(
+        keypoints.scheme, keypoints.cameras, keypoints.points[:, np.asarray(frames, int) - recording.first_frame]
+    )
     points = triangulated_people(some, rig).points[:, 0]
     cameras, count, persons, number = some.confidence.shape
     rays = rays_of(rig, some.pixels.reshape(cameras, -1, 2)).reshape(cameras, count, persons, number, 2)

@@ -106,7 +106,7 @@ def _world_rays(
 NUM_PLANES = 64
 
 PairCodes = dict[tuple[int, int], tuple[Float[np.ndarray, "step plane"], Float[np.ndarray, "step plane"]]]
-"""By pair of cameras how much moves in each plane through both, at each step, as either sees it."""
+"""How much moves in each plane through the cameras of a pair, at each step, as either sees it."""
 
 
 def barcodes(

@@ -31,8 +31,8 @@ def opening_problems(path: Path, first: InputError) -> list[Finding]:
             return None
 
     settings = tried(lambda: read_recording_settings(SETTINGS.of(path))) or RecordingSettings()
-    project = tried(lambda: project_in(path))
-    settings = project.filled_in(settings) if project else settings
+    project = tried(lambda: project_in(path)) or Project()
+    settings = project.filled_in(settings)
     sources = tried(lambda: find_sources(path)) or {}
     rig = tried(lambda: _rig(path, settings, project))
     rig = named_as_sources(rig, sources, project) if rig is not None else None
@@ -52,7 +52,7 @@ def opening_problems(path: Path, first: InputError) -> list[Finding]:
     return [_finding(sentence) for sentence in said]
 
 
-def _rig(path: Path, settings: RecordingSettings, project: Project | None) -> CameraRig | None:
+def _rig(path: Path, settings: RecordingSettings, project: Project) -> CameraRig | None:
     """The cameras, where it is clear which calibration counts; the recording's own opening complains otherwise."""
     given = settings.calibration
     named = [named_calibration(path, given, project)] if given else calibrations_of(path, project)

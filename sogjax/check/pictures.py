@@ -44,7 +44,7 @@ class Clip:
 
     def frame_number(self, index: int) -> int:
         """The recording's number of a frame of this clip."""
-        return self.recording.first_frame + self.first + index
+        return self.first + index
 
 
 @dataclass(frozen=True)
@@ -52,18 +52,18 @@ class Moment:
     """One moment as all cameras show it."""
 
     pictures: dict[int, Picture]
-    """By camera (its index in the rig) that is present."""
+    """The pictures of the cameras (index in the rig) that are present."""
     masks: dict[int, Mask]
-    """By camera; absent where no subject was found."""
+    """The subject's masks by camera; absent where none was found."""
 
 
 def read_clip(recording: Recording, start: int, frames: int, progress: Progress) -> Clip:
-    """At most `frames` frames from `start` on, which counts from the recording's first frame.
+    """At most `frames` frames from the frame `start` on.
 
     Raises:
         InputError: a video that ends early or changes its size.
     """
-    stop = min(start + frames, recording.num_frames)
+    stop = min(start + frames, recording.frames.stop)
     count = stop - start
     wanted = {int(k) for k in np.linspace(0, count - 1, 4)[1:-1]}
     sizes = [_small_size(*recording.rig.image_size(name)) for name in recording.rig.names]
@@ -85,7 +85,7 @@ def _small_size(width: int, height: int) -> tuple[int, int]:
     return max(1, round(factor * width)), max(1, round(factor * height))
 
 
-def _reduced(camera: int, image: UInt8[np.ndarray, "_h _w 3"] | None) -> tuple[np.ndarray, Picture] | None:
+def _reduced(camera: int, frame: int, image: UInt8[np.ndarray, "_h _w 3"] | None) -> tuple[np.ndarray, Picture] | None:
     """A picture small and grey, and in colour at the working size; None where the camera is missing."""
     if image is None:
         return None
@@ -111,7 +111,7 @@ def stills_in_step(clip: Clip, offsets: Sequence[int]) -> list[dict[int, Picture
     moved = {name: clip.recording.frame_offset[name] + int(more) for name, more in zip(names, offsets, strict=True)}
     recording = replace(clip.recording, frame_offset=moved)
     border = int(np.abs(offsets).max())
-    as_still = lambda camera, image: None if image is None else working_picture(image)
+    as_still = lambda camera, frame, image: None if image is None else working_picture(image)
     stills = []
     for index in sorted({int(np.clip(k, border, max(clip.num_frames - 1 - border, border))) for k in clip.stills}):
         frame = clip.first + index

@@ -40,7 +40,7 @@ class Synchrony:
         return int(self.offsets[camera]) if self.sure[camera] else 0
 
     def numbers(self) -> dict[str, dict[str, Any]]:
-        """By camera what was found, as plain numbers."""
+        """What was found of each camera, as plain numbers."""
         rows = zip(self.names, self.offsets, self.sure, self.alike, self.margins, strict=True)
         return {
             name: {"offset": int(offset), "sure": bool(sure), "alike": round(float(a), 4), "margin": round(float(m), 4)}
@@ -197,7 +197,7 @@ class Jump:
 
 
 def find_jumps(codes: PairCodes, steps: int, whole: Synchrony) -> dict[int, Jump]:
-    """By camera the difference of its offsets in the two halves of a clip, where both are certain and sharp.
+    """The difference of each camera's offsets in the two halves of a clip, where both are certain and sharp.
 
     Three frames at most are looked for beyond the offset of the whole, in halves of 16 steps or more.
     """

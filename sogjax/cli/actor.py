@@ -8,21 +8,19 @@ import jax.numpy as jnp
 import numpy as np
 import yaml
 
-from sogjax.actor.colors import ColoredView, camera_of, estimated_gains
-from sogjax.actor.make import MadeActor, make_actor
+from sogjax.actor.colors import ColoredView, estimated_gains
+from sogjax.actor.make import MadeActor
 from sogjax.errors import InputError, counted
 from sogjax.io.actor_file import save_body
 from sogjax.io.files import atomic_path
 from sogjax.io.recording import Recording
-from sogjax.model.body import Body
+from sogjax.model.camera import camera_of
 from sogjax.run.actor_report import report_folder, write_actor_report
-from sogjax.run.build import color_space_and_radius, energy_terms
-from sogjax.run.example_frames import with_examples
-from sogjax.run.keypoint_actor import with_rough_poses
-from sogjax.run.outputs import free_path, results_folder
-from sogjax.run.recordings import body_named, check_scale, keypoint_actor_or, opened
-from sogjax.run.terminal import progress, say
-from sogjax.settings.method import EnergyConfig, ImagesConfig
+from sogjax.run.actors import ActorRequest, new_actors
+from sogjax.run.build import color_space_and_radius
+from sogjax.run.recordings import opened
+from sogjax.run.run_folder import free_path, results_folder
+from sogjax.run.terminal import say
 from sogjax.settings.run import ActorConfig
 
 NOTICED = 0.15
@@ -43,25 +41,22 @@ def run(config: ActorConfig, name: str | None = None) -> Path:
     Raises:
         InputError: an invalid recording, example pose or body, or an actor file that already exists.
     """
-    space, _ = color_space_and_radius(config.color)
+    color_space_and_radius(config.color)
     recording = opened(config.recording, config.cameras)
-    body = body_named(config.body)
-    check_scale(recording, [body])
     out = Path(config.out)
     if out.is_dir():
         raise InputError(f"out={out}: is a folder; give the actor file to write, such as out={out / 'actor.yaml'}")
     free_path("out", out, config.overwrite)
     with results_folder(out.parent):
-        try:
-            recording, made = _made(recording, body, config)
-        except InputError as error:
-            actor = keypoint_actor_or(error, recording, body, space, config.actors, config.symmetric)
+        of_pictures: list[MadeActor] = []
+        (actor,) = new_actors(ActorRequest.from_config(recording, config), of_pictures.extend).bodies
+        if not of_pictures:
             save_body(out, replace(actor, name=name or actor.name))
             print(out)
             return out
+        made, folder = of_pictures[0], report_folder(out)
         if name is not None:
             made = replace(made, body=replace(made.body, name=name), upright_body=replace(made.upright_body, name=name))
-        folder = report_folder(out)
         report = write_actor_report(folder, made, recording.rig)
         say_gains(recording, made, folder)
         save_body(out, made.body)
@@ -86,16 +81,6 @@ def actor_verdict(mean_iou: float, explained: float, num_warnings: int) -> str:
     if num_warnings:
         found.append(f"{counted(num_warnings, 'warning')} in report.md")
     return "; ".join(found) or f"looks right (its example poses explain {explained:.0%} of it)"
-
-
-def _made(recording: Recording, body: Body, config: ActorConfig) -> tuple[Recording, MadeActor]:
-    """The actor of the example poses, the recording's own or frames of its videos, and the recording with these."""
-    space, _ = color_space_and_radius(config.color)
-    terms = energy_terms(EnergyConfig())
-    recording, learnt, best = with_examples(recording, ImagesConfig(), config.actors)
-    recording = with_rough_poses(recording, body)
-    made = make_actor(recording, body, config.subject, space, terms, say, progress, config.symmetric, learnt, best)
-    return recording, made
 
 
 def say_gains(recording: Recording, made: MadeActor, folder: Path) -> None:

@@ -10,14 +10,14 @@ from sogjax.check.calibration import unit_rig
 from sogjax.check.examination import Examination, examined
 from sogjax.check.findings import SEVERITIES, Finding
 from sogjax.check.opening import opening_problems
-from sogjax.cli.config.schemas import CheckConfig
+from sogjax.cli.schemas import CheckConfig
 from sogjax.errors import InputError, counted
 from sogjax.io.files import atomic_path
 from sogjax.io.image_file import write_image
-from sogjax.io.offsets_file import offsets_line, write_frame_offsets
 from sogjax.io.recording import Recording, open_recording
 from sogjax.io.recording_files import SETTINGS
-from sogjax.run.outputs import results_folder
+from sogjax.io.recording_settings import offsets_line, write_frame_offsets
+from sogjax.run.run_folder import results_folder
 from sogjax.run.terminal import alive, progress, say
 from sogjax.view.room import room_sheet
 
@@ -75,7 +75,7 @@ def _say_all(path: Path, problems: Sequence[Finding]) -> NoReturn:
 
 
 def _stretch(config: CheckConfig, recording: Recording) -> tuple[int, int]:
-    """First frame and number of frames to examine."""
+    """The number of the first frame to examine, and how many are examined."""
     if config.frames < 1:
         raise InputError(f"frames={config.frames}: must be 1 or more")
     if config.largest_offset < 0:
@@ -84,7 +84,7 @@ def _stretch(config: CheckConfig, recording: Recording) -> tuple[int, int]:
     start = (recording.num_frames - frames) // 2 if config.start is None else config.start
     if not 0 <= start < recording.num_frames:
         raise InputError(f"start={start}: must be from 0 to {recording.num_frames - 1}, the recording's last frame")
-    return start, min(frames, recording.num_frames - start)
+    return recording.frames[start], min(frames, recording.num_frames - start)
 
 
 def _picture(recording: Recording, found: Examination):

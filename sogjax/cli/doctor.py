@@ -1,14 +1,17 @@
-"""Three laws that hold in a sound installation, checked in about five seconds: overlap, gradient, tracking step.
+"""`sogjax doctor`: what is installed, what it runs on, and whether it computes correctly.
 
-`sogjax doctor`: what is installed, what it runs on, and whether it computes correctly.
+The last is told by three laws that hold in a sound installation, checked in about five seconds: an overlap is an
+integral, a gradient is a slope, and a body finds its own picture.
 """
 
+import contextlib
 import os
 import platform
+import re
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 
 import equinox as eqx
@@ -17,7 +20,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from sogjax.cli.config.schemas import DoctorConfig
+from sogjax.cli.schemas import DoctorConfig
 from sogjax.energy.overlap import overlaps
 from sogjax.energy.similarity import Similarity
 from sogjax.energy.views import Views, whole_image_overlap
@@ -28,17 +31,20 @@ from sogjax.run.compilation_cache import why_not_kept
 from sogjax.solve.optimistix import OptimistixSolver
 from sogjax.solve.solution import Scales
 
-OVERLAP_TOLERANCE = 1e-4
-"""Relative; float32."""
-GRADIENT_TOLERANCE = 0.02
-"""Relative to the central difference, whose own error is about a per cent in float32."""
+CLASHING = ("opencv-python", "opencv-contrib-python", "opencv-contrib-python-headless")
+"""Packages that overwrite opencv-python-headless's files."""
+INDIRECT = ("jaxlib", "equinox", "jaxtyping", "scipy")
+"""Packages that come with those that are named as needed, and tell most of what may be wrong."""
+PROBE_BYTES = 32 * 2**20
+SLOW = 20.0
+"""MB/s below which a folder is too slow for videos."""
+OVERLAP_TOLERANCE, GRADIENT_TOLERANCE = 1e-4, 0.02
+"""Relative errors in float32; the second is that of the central difference."""
 STEP = 0.004
-"""Metres, of the central difference."""
-DISPLACEMENT = (0.03, -0.02, 0.02)
-"""Metres by which the body is displaced; the solver must bring it back."""
+"""Metres between the middle of a central difference and its ends."""
+DISPLACEMENT, BACK = (0.03, -0.02, 0.02), 0.003
+"""Metres by which the body is displaced, and those that the solver may end from the true place."""
 NUM_BLOBS = 20
-BACK = 0.003
-"""Metres that the solver may end from the true place."""
 
 
 def overlap_is_the_integral() -> str | None:
@@ -90,32 +96,28 @@ LAWS: dict[str, Callable[[], str | None]] = {
 
 
 def _objective() -> Callable[[Float[Array, "3"]], Float[Array, ""]]:
-    """Similarity of a body with pictures of itself at the origin, as a function of its displacement."""
+    """Similarity of a body with pictures of itself at the origin, as a function of its displacement.
+
+    The body is as large as a person; each blob has its own colour, so it only fits its own picture.
+    """
+    rng = np.random.default_rng(0)
+    means = rng.uniform([-0.3, -0.3, -0.8], [0.3, 0.3, 0.8], (NUM_BLOBS, 3))
+    colors = jnp.asarray(rng.random((NUM_BLOBS, 3)))
+    blobs = Sog.from_arrays(jnp.asarray(means), jnp.full(NUM_BLOBS, 0.08), colors)
     cameras = jax.tree.map(lambda *leaves: jnp.stack(leaves), *[_camera(angle) for angle in (0.0, 1.6, 3.5)])
-    blobs = _blobs()
-    views = eqx.filter_jit(_own_views)(cameras, blobs)
-    similarity = Similarity(1.0, capped=False)
+
+    def own_views(cameras: Camera, blobs: Sog) -> Views:
+        images = jax.vmap(project, in_axes=(0, None))(cameras, blobs)
+        normalizers = whole_image_overlap(cameras.image_size)
+        return Views.from_images(cameras, images, blobs, normalizers, "rgb", jnp.asarray(0.3))
+
+    views, similarity = eqx.filter_jit(own_views)(cameras, blobs), Similarity(1.0, capped=False)
 
     def objective(shift: Float[Array, "3"]) -> Float[Array, ""]:
         moved = eqx.tree_at(lambda sog: sog.means, blobs, blobs.means + shift[None, :])
         return similarity.of_blobs(moved, views)
 
     return objective
-
-
-def _own_views(cameras: Camera, blobs: Sog) -> Views:
-    """Cameras whose pictures show the blobs themselves."""
-    images = jax.vmap(project, in_axes=(0, None))(cameras, blobs)
-    normalizers = whole_image_overlap(cameras.image_size)
-    return Views.from_images(cameras, images, blobs, normalizers, "rgb", jnp.asarray(0.3))
-
-
-def _blobs() -> Sog:
-    """A subject the size of a person; each blob has its own colour, so it only fits its own picture."""
-    rng = np.random.default_rng(0)
-    means = rng.uniform([-0.3, -0.3, -0.8], [0.3, 0.3, 0.8], (NUM_BLOBS, 3))
-    colors = rng.random((NUM_BLOBS, 3))
-    return Sog.from_arrays(jnp.asarray(means), jnp.full(NUM_BLOBS, 0.08), jnp.asarray(colors))
 
 
 def _camera(angle: float) -> Camera:
@@ -129,29 +131,6 @@ def _camera(angle: float) -> Camera:
     return Camera(jnp.asarray(matrix), jnp.asarray(pose), jnp.zeros(5), jnp.asarray([640.0, 480.0]))
 
 
-PACKAGES = (
-    *("sogjax", "jax", "jaxlib", "optimistix", "equinox", "jaxtyping", "numpy", "scipy"),
-    *("opencv-python-headless", "rerun-sdk", "hydra-core", "matplotlib"),
-)
-CLASHING = ("opencv-python", "opencv-contrib-python", "opencv-contrib-python-headless")
-"""Packages that overwrite opencv-python-headless's files."""
-EXTRAS = {
-    "export": ("ezc3d",),
-    "video": ("av",),
-    "notebook": ("ipykernel", "nbmake"),
-    "joblib": ("hydra-joblib-launcher",),
-    "submitit": ("hydra-submitit-launcher",),
-    "ray": ("hydra-ray-launcher",),
-    "optuna": ("hydra-optuna-sweeper",),
-    "test": ("pytest", "pytest-xdist", "hypothesis", "beartype", "bvhio", "pygltflib"),
-    "lint": ("ruff", "pyright", "import-linter"),
-    "docs": ("sphinx", "myst-parser", "furo"),
-}
-PROBE_BYTES = 32 * 2**20
-SLOW = 20.0
-"""MB/s below which a folder is too slow for videos."""
-
-
 def run(config: DoctorConfig) -> None:
     """Print what is installed, and test it.
 
@@ -160,7 +139,7 @@ def run(config: DoctorConfig) -> None:
     """
     troubles = [*_packages()]
     _say_machine()
-    _say_cache()
+    say_programs(jax.config.values["jax_compilation_cache_dir"])
     _say_extras()
     for folder in dict.fromkeys([Path(config.folder), Path(tempfile.gettempdir())]):
         troubles += _write_speed(folder)
@@ -176,7 +155,7 @@ def _line(what: str, value: str) -> None:
 
 def _packages() -> Iterator[str]:
     _line("python", f"{platform.python_version()} ({platform.system()} {platform.machine()})")
-    for name in PACKAGES:
+    for name in ("sogjax", *_named_packages().get("", ()), *INDIRECT):
         found = _version(name)
         _line(name, found or "missing")
         if found is None:
@@ -195,16 +174,15 @@ def _version(name: str) -> str | None:
 
 
 def _say_machine() -> None:
-    """The devices that jax computes on."""
+    """Print what jax computes on."""
     devices = jax.devices()
     _line("devices", ", ".join(f"{device.platform} {device.device_kind}" for device in devices))
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     _line("processor cores", str(cores))
 
 
-def _say_cache() -> None:
-    """Where compiled programs are kept, or why they are not."""
-    folder = jax.config.values["jax_compilation_cache_dir"]
+def say_programs(folder: str | None) -> None:
+    """Print how many compiled programs are kept in a folder, or why none are where there is none."""
     if folder is None:
         _line("compiled programs", f"are not kept ({why_not_kept()})")
         return
@@ -214,11 +192,22 @@ def _say_cache() -> None:
 
 
 def _say_extras() -> None:
-    """Extras, which tracking alone does not need."""
-    for extra, packages in EXTRAS.items():
+    """Print which extras are there; tracking alone needs none."""
+    for extra, packages in sorted(_named_packages().items()):
         missing = [name for name in packages if _version(name) is None]
         remedy = f"without {', '.join(missing)}; pip install 'sogjax[{extra}]' adds it"
-        _line(f"extra [{extra}]", remedy if missing else "there")
+        if extra:
+            _line(f"extra [{extra}]", remedy if missing else "there")
+
+
+def _named_packages() -> dict[str, list[str]]:
+    """The packages that the installation says it needs, by the extra that needs them; without a name by all."""
+    found: dict[str, list[str]] = {}
+    with contextlib.suppress(PackageNotFoundError):
+        for line in requires("sogjax") or ():
+            extra = line.partition("extra == ")[2].strip("'\"")
+            found.setdefault(extra, []).append(re.findall(r"[\w.-]+", line)[0])
+    return found
 
 
 def _write_speed(folder: Path) -> Iterator[str]:

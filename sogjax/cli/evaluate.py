@@ -2,15 +2,16 @@
 
 from pathlib import Path
 
-from sogjax.cli.config.schemas import EvaluateConfig
+from sogjax.cli.schemas import EvaluateConfig
 from sogjax.errors import InputError
+from sogjax.io.frame_motions import load_motions, load_one_motion
 from sogjax.io.ground_truth import GroundTruth, load_ground_truth
-from sogjax.io.motion import Motion, load_motion
+from sogjax.io.motion import Motion
 from sogjax.io.recording_files import GROUND_TRUTH
 from sogjax.quality.evaluation import GroupEvaluation, evaluate_motions
 from sogjax.run.build import marker_rule
-from sogjax.run.outputs import actor_name, free_path
 from sogjax.run.recordings import file_list
+from sogjax.run.run_folder import free_path
 
 
 def run(config: EvaluateConfig) -> GroupEvaluation:
@@ -52,17 +53,21 @@ def named_motions(paths: list[Path], truth: GroundTruth) -> dict[str, Motion]:
     Raises:
         InputError: a motion whose file name is that of no subject of the truth.
     """
-    if len(paths) == 1 and len(truth.subjects) < 2:
-        motion = load_motion(paths[0])
-        return {next(iter(truth.subjects), actor_name(paths[0], motion)): motion}
+    found = [(path, *named) for path in paths for named in _by_name(path).items()]
+    if len(found) == 1 and len(truth.subjects) < 2:
+        return {next(iter(truth.subjects), found[0][1]): found[0][2]}
     if not truth.subjects:
         raise InputError(f"motion={','.join(map(str, paths))}: the truth is that of one subject; give one motion")
-    motions = {}
-    for path in paths:
-        name = path.stem.removeprefix("motion_")
+    for path, name, _ in found:
         if name not in truth.subjects:
             raise InputError(
                 f"{path}: the truth's subjects are {', '.join(truth.subjects)}; name the file motion_NAME.npz after one"
             )
-        motions[name] = load_motion(path)
-    return motions
+    return {name: motion for _, name, motion in found}
+
+
+def _by_name(path: Path) -> dict[str, Motion]:
+    """The motions of a run's folder by actor; that of a file by what the file's name says or, without, the file."""
+    if path.is_dir() or path.stem == "motion":
+        return load_motions(path)
+    return {path.stem.removeprefix("motion_"): load_one_motion(path)}

@@ -1,24 +1,28 @@
-"""`sogjax export`: a motion or a calibration in another format."""
+"""`sogjax export`, a motion or a calibration in another format, and `sogjax body`, a body from another program."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
 import jax.numpy as jnp
 
-from sogjax.cli.config.schemas import ExportConfig
-from sogjax.errors import InputError
+from sogjax.cli.schemas import BodyConfig, ExportConfig
+from sogjax.errors import InputError, counted
+from sogjax.io.actor_file import save_body
 from sogjax.io.calibration.load import load_calibration, save_calibration
-from sogjax.io.calibration.rig import CameraRig
+from sogjax.io.calibration.rig import METRES, CameraRig
 from sogjax.io.export.angles import write_angles_csv
 from sogjax.io.export.points import write_c3d, write_trc
 from sogjax.io.export.write import export_motion, write_initial_pose
-from sogjax.io.motion import DEFAULT_UP, Motion, load_motion
+from sogjax.io.frame_motions import load_one_motion
+from sogjax.io.motion import Motion
+from sogjax.io.motion_data import DEFAULT_UP
 from sogjax.io.recording import open_recording
-from sogjax.io.skeletons.skeletool_motion import read_skeletool_motion, write_skeletool_motion
+from sogjax.io.skeletons.load import read_skeleton
+from sogjax.io.skeletons.skeletool import read_skeletool_motion, write_skeletool_motion
 from sogjax.model.body import Body
 from sogjax.model.rotation import UP_AXES, world_from_upright
-from sogjax.run.outputs import free_path
 from sogjax.run.recordings import body_named, file_list
+from sogjax.run.run_folder import free_path
 
 
 def run(config: ExportConfig) -> Path:
@@ -34,6 +38,27 @@ def run(config: ExportConfig) -> Path:
         save_calibration(out, _rig(Path(config.calibration)))
     else:
         _export_motion(config, file_list(config.motion), out)
+    print(out)
+    return out
+
+
+def body(config: BodyConfig) -> Path:
+    """Read a skeleton, attach blobs if it has none, and write the body file.
+
+    Raises:
+        InputError: an invalid file or option, or a body file that already exists.
+    """
+    if config.up not in UP_AXES:
+        raise InputError(f"up={config.up}: must be one of {', '.join(UP_AXES)}")
+    if config.unit not in (None, *METRES):
+        raise InputError(f"unit={config.unit}: must be one of {', '.join(METRES)}")
+    out = free_path("out", config.out, config.overwrite)
+    dof = None if config.dof is None else Path(config.dof)
+    read = read_skeleton(Path(config.from_), dof, config.unit, config.up)
+    save_body(out, read)
+    skeleton = read.skeleton
+    dofs = counted(skeleton.num_dofs, "degree of freedom", "degrees of freedom")
+    print(f"{counted(skeleton.num_joints, 'joint')}, {dofs}, {counted(read.num_blobs, 'blob')}")
     print(out)
     return out
 
@@ -77,12 +102,12 @@ def _export_one(config: ExportConfig, source: Path, out: Path) -> None:
 
 def _read_motion(config: ExportConfig, path: Path) -> Motion:
     if path.suffix.lower() != ".motion":
-        return load_motion(path)
+        return load_one_motion(path)
     if config.fps is None or config.fps <= 0:
         raise InputError(f"{path}: does not say its frame rate; add fps=..., a number over 0")
     up = config.up or DEFAULT_UP
-    body = _actor(config, path)
-    turned = body.rotated(jnp.asarray(world_from_upright(up), body.blob_sigmas.dtype))
+    actor = _actor(config, path)
+    turned = actor.rotated(jnp.asarray(world_from_upright(up), actor.blob_sigmas.dtype))
     return read_skeletool_motion(path, turned, config.fps, up)
 
 

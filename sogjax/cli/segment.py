@@ -9,17 +9,18 @@ from jaxtyping import UInt8
 from sogjax.actor.example_masks import ExampleMasks, example_masks
 from sogjax.actor.make import examples_of
 from sogjax.actor.silhouettes import load_images
-from sogjax.cli.config.schemas import SegmentConfig
+from sogjax.cli.schemas import SegmentConfig
 from sogjax.errors import InputError, counted
 from sogjax.io.example_poses import ExamplePose
 from sogjax.io.image_file import write_image, write_mask
 from sogjax.io.recording import Recording
 from sogjax.io.recording_files import EXAMPLE_POSES
 from sogjax.io.video import read_prepared
-from sogjax.run.background import background_or_reason
+from sogjax.run.background import learn_background
+from sogjax.run.clip import Clip
 from sogjax.run.example_frames import with_examples
-from sogjax.run.outputs import free_path, results_folder
 from sogjax.run.recordings import opened
+from sogjax.run.run_folder import free_path, results_folder
 from sogjax.run.terminal import alive, progress, say
 from sogjax.scene.background import CameraBackground
 from sogjax.scene.foreground import foreground_probability
@@ -49,11 +50,12 @@ def run(config: SegmentConfig) -> list[Path]:
     if frames:
         free_path("out", out / BACKGROUND, config.overwrite)
     with results_folder(out), alive("segmenting"):
-        learnt = with_examples(recording, ImagesConfig())[1] if examples else None
+        clip = Clip(recording, recording.frames, ImagesConfig().depth)
+        learnt = with_examples(clip, lambda: learn_background(clip, "auto"))[1] if examples else None
         shown = progress(examples, len(examples), "example poses")
         sheets = [_masks(recording, example, out, learnt) for example in shown]
         if frames:
-            sheets += _background_sheets(recording, config.background, frames, out / BACKGROUND)
+            sheets += _background_sheets(clip, config.background, frames, out / BACKGROUND)
     for path in sheets:
         print(path)
     return sheets
@@ -74,28 +76,28 @@ def _masks(recording: Recording, example: ExamplePose, out: Path, learnt: Sequen
 
 
 def _frames(recording: Recording, wanted: list[int] | None, has_examples: bool) -> list[int]:
-    """The frames to show, counted from the recording's first."""
+    """The numbers of the frames to show; `wanted` count from the recording's first."""
     last = recording.num_frames - 1
     if wanted is None:
-        return [] if has_examples else sorted({0, last // 2, last})
+        return [] if has_examples else sorted({recording.frames[k] for k in (0, last // 2, last)})
     for frame in wanted:
         if not 0 <= frame <= last:
             raise InputError(f"frames: {frame} is no frame of {recording.path}; choose from 0 to {last}")
-    return list(wanted)
+    return [recording.frames[k] for k in wanted]
 
 
-def _background_sheets(recording: Recording, choice: str, frames: list[int], folder: Path) -> list[Path]:
+def _background_sheets(clip: Clip, choice: str, frames: list[int], folder: Path) -> list[Path]:
     """Write a sheet of each camera's background, and what stands before it in some frames."""
-    found = background_or_reason(recording, ImagesConfig(background=choice))
-    if isinstance(found, str):
-        raise InputError(f"{recording.path}: there is no background to show, since {found}")
+    recording, learnt = clip.recording, learn_background(clip, choice)
+    if learnt.cameras is None:
+        raise InputError(f"{recording.path}: there is no background to show, since {learnt.reason}")
     folder.mkdir(parents=True, exist_ok=True)
-    as_is = lambda camera, image: image
+    as_is = lambda camera, frame, image: image
     shown = {frame: next(read_prepared(recording, as_is, frame, frame + 1)) for frame in frames}
     paths = []
     names = recording.rig.names
     for camera, name in enumerate(progress(names, len(names), "backgrounds")):
-        background = found[camera]
+        background = learnt.cameras[camera]
         pictures = {
             frame: (images[camera], foreground_probability(images[camera], background))
             for frame, images in shown.items()

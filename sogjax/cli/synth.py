@@ -1,19 +1,29 @@
-"""`sogjax synth`: render a recording with ground truth."""
+"""`sogjax synth`, which renders a recording with ground truth, and `sogjax demo`, which tracks one, too."""
 
 from dataclasses import asdict, fields
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TypeVar
 
-from sogjax.cli.config.schemas import SynthConfig
+from sogjax.cli import track
+from sogjax.cli.schemas import DemoConfig, SynthConfig
 from sogjax.errors import InputError
+from sogjax.io.cache_folder import default_cache_dir
 from sogjax.io.recording_files import RECORDING_FILES
-from sogjax.run.terminal import progress
+from sogjax.run.clock import RENDERING, clocked, stage
+from sogjax.run.result import RunResult
+from sogjax.run.run_folder import results_folder, run_folder
+from sogjax.run.terminal import progress, say
+from sogjax.settings.compose import track_config
+from sogjax.synth.cache import cached_recording
 from sogjax.synth.detector import DetectorSettings
 from sogjax.synth.render import render_recording
 from sogjax.synth.settings import SynthSettings
 
 Part = TypeVar("Part", SynthSettings, DetectorSettings)
+
+DEMO = "demo"
+"""The command of a run of the demo, as its folder notes it."""
 
 
 def run(config: SynthConfig) -> Path:
@@ -34,8 +44,26 @@ def run(config: SynthConfig) -> Path:
     return out
 
 
-def _part(schema: type[Part], config: SynthConfig) -> Part:
-    """The settings of one of the schemas that the command's are put together from."""
+def demo(config: DemoConfig) -> RunResult:
+    """Render the demo's recording if needed, make the actor, track, evaluate.
+
+    Raises:
+        InputError: a setting out of range, a folder that cannot be written, or one with results that are not of a demo.
+    """
+    out = Path(config.out)
+    with results_folder(out), clocked():
+        with run_folder(out, config.overwrite, config.resume, DEMO):
+            pass  # found out before anything is rendered
+        with stage(RENDERING):
+            recording = cached_recording(_part(SynthSettings, config), default_cache_dir(), progress)
+        say(f"rendered recording: {recording}")
+        of_track = track_config(recording=recording, out=out, initial_pose="auto")
+        of_track.outputs, of_track.overwrite, of_track.resume = config.outputs, config.overwrite, config.resume
+        return track.run(of_track, DEMO)
+
+
+def _part(schema: type[Part], config: SynthConfig | DemoConfig) -> Part:
+    """The settings of a schema that are among a command's; the others as they are by default."""
     names = {entry.name for entry in fields(schema)}
     return schema(**{name: value for name, value in asdict(config).items() if name in names})
 

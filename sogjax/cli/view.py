@@ -6,15 +6,16 @@ import sys
 import tempfile
 from pathlib import Path
 
-from sogjax.cli.config.schemas import ViewConfig
+from sogjax.cli.schemas import ViewConfig
 from sogjax.errors import InputError
+from sogjax.io.frame_motions import load_motions
 from sogjax.io.ground_truth import load_ground_truth
 from sogjax.io.image_file import write_image
-from sogjax.io.motion import Motion, load_motion
+from sogjax.io.motion import Motion
 from sogjax.io.recording import Recording
 from sogjax.io.video import read_frames
-from sogjax.run.outputs import free_path
 from sogjax.run.recordings import file_list, opened
+from sogjax.run.run_folder import free_path
 from sogjax.run.terminal import progress, say
 from sogjax.view.overlay import overlay_frame
 from sogjax.view.projection import frame_range
@@ -35,13 +36,13 @@ def run(config: ViewConfig) -> Path:
         _require_display()
     asked = None if config.out is None else free_path("out", config.out, config.overwrite)
     recording = opened(config.recording)
-    motions = [load_motion(path) for path in file_list(config.motion)]
+    motions = [motion for path in file_list(config.motion) for motion in load_motions(path).values()]
     if asked is not None and asked.suffix.lower() == ".png":
         return _write_picture(asked, recording, motions, config)
     if config.frame is not None:
         raise InputError(f"frame={config.frame}: only a picture shows one frame; leave it out, or give out=NAME.png")
     out = Path(tempfile.mkdtemp()) / "motion.rrd" if asked is None else asked
-    first, stop = (number - recording.first_frame for number in frame_range(recording, motions))
+    first, stop = frame_range(recording, motions)
     write_rerun(
         out,
         recording,
@@ -57,14 +58,13 @@ def run(config: ViewConfig) -> Path:
 
 
 def _write_picture(out: Path, recording: Recording, motions: list[Motion], config: ViewConfig) -> Path:
-    """One frame as Rerun draws it without a window, or over the pictures where it cannot."""
+    """Write one frame as Rerun draws it without a window, or over the pictures where it cannot."""
     first, stop = frame_range(recording, motions)
     frame = (first + stop) // 2 if config.frame is None else config.frame
     shown = drawn_frames(motions, frame)
     if not shown:
         raise InputError(f"frame={frame}: the motion has the frames {first} to {stop - 1}, not this one")
-    index = frame - recording.first_frame
-    pictures = list(read_frames(recording, index, index + 1)) if config.images else None
+    pictures = list(read_frames(recording, frame, frame + 1)) if config.images else None
     with tempfile.TemporaryDirectory() as folder:
         write_rerun(Path(folder) / "motion.rrd", recording, shown, frames=pictures)
         drawn = rerun_screenshot(Path(folder) / "motion.rrd")

@@ -4,19 +4,25 @@ For searches: grids around a place, on which a body in any pose there is compare
 products, whatever its distance from the truth.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float, Int
 
+from sogjax.energy.foreground import GridRows, grid_rows
 from sogjax.energy.image_term import ImageTerm
 from sogjax.energy.overlap import ImagePulls
 from sogjax.energy.posed import Frame, Posed
-from sogjax.model.camera import project
+from sogjax.energy.views import odds_on_grid
+from sogjax.model.camera import Camera, project
 from sogjax.model.sog import Sog
 
+SAMPLES = 2
+"""Places along each side of a window's cell at which the picture is looked at."""
 DEPTH_SCALE = 0.06
 """Metres: a blob that much nearer to a camera than another counts e times as much where both lie."""
 
@@ -42,6 +48,31 @@ class ColorWindows(eqx.Module):
         """E_ii of Eq. 8 of a cell: (pi/4) times its area."""
         return jnp.pi / 4.0 * self.step[..., 0] * self.step[..., 1]
 
+    @classmethod
+    def in_boxes(
+        cls,
+        odds: Float[Array, "camera kind rows columns"],
+        cell_sizes: Float[Array, "camera"],
+        cameras: Camera,
+        boxes: Float[Array, "camera 2 2"],
+        size: tuple[int, int],
+    ) -> "ColorWindows":
+        """Grids of `size` (columns, rows) that fill boxes, in which a body may gain and lose everywhere.
+
+        Each cell of a grid is the mean of `SAMPLES` times as many places in each direction, of which the cell of the
+        picture tells the log odds. `boxes` are the lowest and highest x, y; the scale is 1 everywhere.
+        """
+        step = (boxes[:, 1] - boxes[:, 0]) / jnp.array([size], boxes.dtype)
+
+        def along(axis: int, parts: int) -> Float[Array, "camera n"]:
+            places = (jnp.arange(size[axis] * parts, dtype=boxes.dtype) + 0.5) / parts
+            return boxes[:, 0, axis, None] + places[None] * step[:, axis, None]
+
+        seen = jax.vmap(odds_on_grid)(odds, cell_sizes, cameras, along(0, SAMPLES), along(1, SAMPLES))
+        split = seen.reshape(*seen.shape[:2], size[0], SAMPLES, size[1], SAMPLES)
+        free, scale = jnp.ones((len(boxes), *size), boxes.dtype), jnp.ones(len(boxes), boxes.dtype)
+        return cls(along(0, 1), along(1, 1), step, jnp.mean(split, axis=(3, 5)), free, scale)
+
 
 class BlobClusters(eqx.Module):
     """Which blobs are of a kind, as arrays of one shape for all actors: a large kind is several."""
@@ -52,6 +83,16 @@ class BlobClusters(eqx.Module):
     """1, and 0 for padding."""
     slots: Int[Array, "blob"]
     """Where each blob is among the members."""
+
+    @classmethod
+    def from_members(cls, members: Sequence[Sequence[int]], num_slots: int) -> "BlobClusters":
+        """From the blobs of each kind, at most `num_slots`; every blob is of one kind."""
+        table, real = np.zeros((len(members), num_slots), int), np.zeros((len(members), num_slots))
+        slots = np.zeros(sum(map(len, members)), int)
+        for k, part in enumerate(members):
+            table[k, : len(part)], real[k, : len(part)] = part, 1.0
+            slots[list(part)] = k * num_slots + np.arange(len(part))
+        return cls(jnp.asarray(table), jnp.asarray(real, jnp.result_type(float)), jnp.asarray(slots))
 
     def grouped(self, values: Float[Array, "n blob"]) -> Float[Array, "kind n slot"]:
         """Values of the blobs by kind; 0 in the padding."""
@@ -76,7 +117,7 @@ class Appearance(ImageTerm):
     """A_q in the middle of a blob, as in the foreground term."""
 
     def value(self, posed: Posed, frame: Frame) -> Float[Array, ""]:
-        """Of the posed blobs."""
+        """The value for the posed blobs."""
         cameras = frame.views.cameras
         seen = jax.vmap(project, in_axes=(0, None))(cameras, posed.blobs)
         nearness = _nearness(posed.blobs, seen, cameras.focal_length)
@@ -97,11 +138,9 @@ class Appearance(ImageTerm):
         maps = jax.vmap(lambda *each: self._maps(*each)[1])(self.windows, seen, nearness)
         return 1.0 - maps.left, jnp.log(maps.likelihood)
 
-    def _maps(
-        self, windows: ColorWindows, seen: Sog, nearness: Float[Array, "blob"]
-    ) -> tuple[tuple[Array, Array, Array, Array, Array, Array], "_Maps"]:
-        rows = _rows(windows, seen, self.density)
-        of_x, of_y = rows[0], rows[1]
+    def _maps(self, windows: ColorWindows, seen: Sog, nearness: Float[Array, "blob"]) -> tuple[GridRows, "_Maps"]:
+        rows = grid_rows(windows.x, windows.y, windows.step, seen, self.density)
+        of_x, of_y = rows.of_x, rows.of_y
         total = jnp.matmul(of_x, of_y.T)
         shares = jnp.matmul(self.kinds.grouped(of_x * nearness[None, :]), jnp.swapaxes(self.kinds.grouped(of_y), 1, 2))
         whole = jnp.sum(shares, axis=0) + 1e-6
@@ -117,7 +156,7 @@ class Appearance(ImageTerm):
         by_share = gain[None] * (1.0 - maps.left)[None] * (maps.ratios - maps.mean[None]) / maps.whole[None]
 
         def summed(slope: Array, slopes: Array) -> tuple[Array, Array]:
-            """For each blob sums along y of the slopes times its rows, and along x of its columns."""
+            """Sums for each blob, along y of the slopes times its rows and along x of its columns."""
             shared_y = self.kinds.spread(jnp.matmul(slopes, self.kinds.grouped(of_y)))
             shared_x = self.kinds.spread(jnp.matmul(jnp.swapaxes(slopes, 1, 2), self.kinds.grouped(of_x)))
             near = nearness[None, :]
@@ -141,7 +180,7 @@ class Appearance(ImageTerm):
 
 
 class _Maps(NamedTuple):
-    """In every cell: exp(-sum A), the nearness-weighted density, odds of the kinds, their mean, the likelihood."""
+    """The maps of a grid: exp(-sum A), the nearness-weighted density, odds of the kinds, their mean, the likelihood."""
 
     left: Float[Array, "*camera column row"]
     whole: Float[Array, "*camera column row"]
@@ -161,18 +200,3 @@ def _nearness(blobs: Sog, seen: Sog, focal_length: Float[Array, "camera"]) -> Fl
     nearest = jnp.where(jnp.isfinite(nearest), nearest, 0.0)
     weights = jnp.exp(-(jnp.where(seen.mask, depths, nearest) - nearest) / DEPTH_SCALE)
     return jax.lax.stop_gradient(jnp.maximum(weights, 1e-6))
-
-
-def _rows(
-    windows: ColorWindows, seen: Sog, density: Float[Array, ""]
-) -> tuple[Array, Array, Array, Array, Array, Array]:
-    """The factors of A_q along x and y, how far cells are from the blobs, and the variances."""
-    squared = (jnp.where(seen.mask, seen.sigmas, 1.0) ** 2)[None, :]
-    variance_x = squared + windows.step[0] ** 2 / 12.0
-    variance_y = squared + windows.step[1] ** 2 / 12.0
-    dx = windows.x[:, None] - seen.means[None, :, 0]
-    dy = windows.y[:, None] - seen.means[None, :, 1]
-    height = jnp.where(seen.mask, density, 0.0)[None, :]
-    of_x = height * jnp.sqrt(squared / variance_x) * jnp.exp(-0.5 * dx * dx / variance_x)
-    of_y = jnp.sqrt(squared / variance_y) * jnp.exp(-0.5 * dy * dy / variance_y)
-    return of_x, of_y, dx, dy, variance_x, variance_y

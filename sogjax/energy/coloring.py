@@ -25,7 +25,7 @@ class Coloring(eqx.Module):
     radius: Float[Array, ""] = eqx.field(converter=jnp.asarray)
     """eps_sim."""
     space: str = eqx.field(static=True)
-    """Of the images' colours; a body's are sRGB."""
+    """The colour space of the images; a body's colours are sRGB."""
     weights: Float[Array, "camera image"] | None = None
     """What similarities are multiplied by, the same for all body blobs; None: 1."""
 

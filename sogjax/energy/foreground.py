@@ -26,7 +26,7 @@ class Foreground(ImageTerm):
     """A_q in the middle of a blob: 2 makes a silhouette end where the Gaussians sum to about a half."""
 
     def value(self, posed: Posed, frame: Frame) -> Float[Array, ""]:
-        """Of the posed blobs in all windows; 0 where no background is known."""
+        """The value for the posed blobs in all windows; 0 where no background is known."""
         views = frame.views
         if views.windows is None:
             return jnp.zeros((), posed.pose.dtype)
@@ -79,9 +79,9 @@ def cover(windows: Windows, seen: Sog, density: Float[Array, ""]) -> Float[Array
 def _moments(
     weights: Float[Array, "window cell blob"], places: Float[Array, "window cell"], means: Float[Array, "blob"]
 ) -> tuple[Float[Array, "window blob"], Float[Array, "window blob"], Float[Array, "window blob"]]:
-    """For each blob the sums over cells of weights, and times how far the cells are from it, and times its square.
+    """The moments of weights about each blob: their sums over cells, times the distance from it, times its square.
 
-    As one product with powers of the places, counted from the window's middle: sums along an axis are slow.
+    They are one product with powers of the places, counted from the window's middle: sums along an axis are slow.
     """
     middle = jnp.mean(places, axis=1, keepdims=True)
     at, mean = places - middle, means[None, :] - middle
@@ -91,23 +91,31 @@ def _moments(
     return sums[:, 0], away, sums[:, 2] - mean * (2.0 * sums[:, 1] - mean * sums[:, 0])
 
 
-class _Rows(NamedTuple):
-    """The factors of A_q along x and y, and its variances."""
+class GridRows(NamedTuple):
+    """The factors of A_q along x and y, how far cells are from the blobs, and the variances."""
 
-    of_x: Float[Array, "window column blob"]
-    of_y: Float[Array, "window row blob"]
-    variance_x: Float[Array, "window 1 blob"]
-    variance_y: Float[Array, "window 1 blob"]
+    of_x: Float[Array, "*window column blob"]
+    of_y: Float[Array, "*window row blob"]
+    dx: Float[Array, "*window column blob"]
+    dy: Float[Array, "*window row blob"]
+    variance_x: Float[Array, "*window 1 blob"]
+    variance_y: Float[Array, "*window 1 blob"]
 
 
-def _rows(windows: Windows, seen: Sog, density: Float[Array, ""]) -> _Rows:
-    squared = (jnp.where(seen.mask, seen.sigmas, 1.0) ** 2)[None, None, :]
+def grid_rows(
+    x: Float[Array, "column"], y: Float[Array, "row"], step: Float[Array, "2"], seen: Sog, density: Float[Array, ""]
+) -> GridRows:
+    """Densities A_q of projected blobs on a grid with cells at x and y, of sizes `step`, as products of rows."""
+    squared = (jnp.where(seen.mask, seen.sigmas, 1.0) ** 2)[None, :]
     # The mean of a Gaussian over a cell, about: a cell has the variance of its width.
-    variance = lambda axis: squared + windows.step[:, axis, None, None] ** 2 / 12.0
-    variance_x, variance_y = variance(0), variance(1)
-    dx = windows.x[..., None] - seen.means[None, None, :, 0]
-    dy = windows.y[..., None] - seen.means[None, None, :, 1]
-    height = jnp.where(seen.mask, density, 0.0)[None, None, :]
+    variance_x, variance_y = squared + step[0] ** 2 / 12.0, squared + step[1] ** 2 / 12.0
+    dx, dy = x[:, None] - seen.means[None, :, 0], y[:, None] - seen.means[None, :, 1]
+    height = jnp.where(seen.mask, density, 0.0)[None, :]
     of_x = height * jnp.sqrt(squared / variance_x) * jnp.exp(-0.5 * dx * dx / variance_x)
     of_y = jnp.sqrt(squared / variance_y) * jnp.exp(-0.5 * dy * dy / variance_y)
-    return _Rows(of_x, of_y, variance_x, variance_y)
+    return GridRows(of_x, of_y, dx, dy, variance_x, variance_y)
+
+
+def _rows(windows: Windows, seen: Sog, density: Float[Array, ""]) -> GridRows:
+    of_window = jax.vmap(grid_rows, in_axes=(0, 0, 0, None, None))
+    return of_window(windows.x, windows.y, windows.step, seen, density)

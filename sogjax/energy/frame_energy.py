@@ -58,7 +58,7 @@ class FrameEnergy(eqx.Module):
         return {term.name: term.value(posed, self.frame) for term in self.terms}
 
     def values_given(self, pose: Float[Array, "dof"], energy: Float[Array, ""]) -> dict[str, Float[Array, ""]]:
-        """The same at a pose whose energy is known: the similarity is what the other terms leave of it.
+        """The values at a pose whose energy is known: the similarity is what the other terms leave of it.
 
         So the pictures are not looked at again; 0 for a similarity without weight.
         """
@@ -73,7 +73,7 @@ class FrameEnergy(eqx.Module):
         return {seen.name: left / weight} | values
 
     def near(self, pose: Float[Array, "dof"], capacity: int) -> tuple["FrameEnergy", Int[Array, ""]]:
-        """The same energy with only the pairs of blobs that matter near a pose, and how many blocks those are.
+        """This energy with only the pairs of blobs that matter near a pose, and how many blocks those are.
 
         Raises:
             ValueError: the energy has no similarity.

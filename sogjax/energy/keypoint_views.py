@@ -4,7 +4,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.model.camera import Camera, project
 from sogjax.model.sog import Sog
@@ -32,30 +32,31 @@ class SeenKeypoints(eqx.Module):
     pixels: Float[Array | np.ndarray, "*camera person keypoint 2"]
     """Undistorted."""
     confidence: Float[Array | np.ndarray, "*camera person keypoint"]
-    """From 0 to 1; 0 where there is none."""
+    """The detector's confidence, 0 to 1; 0 where there is no keypoint."""
 
 
 class KeypointViews(eqx.Module):
-    """The same near a pose: how large the body is in each picture, and in which the sides seem exchanged."""
+    """Keypoints near a pose: how large the body is in each picture, and in which the sides seem exchanged."""
 
     seen: SeenKeypoints
     exchanged: Float[Array, "*camera person keypoint"]
     """How likely it is that the keypoint is the other side's."""
     pixels_per_metre: Float[Array, "*camera actor"]
-    """At the actor's distance."""
+    """Pixels for each metre at the actor's distance."""
     areas: Float[Array, "*camera"]
-    """Of the body's blobs, as a share of the picture, in units of Eq. 9: what the similarity could be at most."""
+    """The area of the body's blobs as a share of the picture, in units of Eq. 9: what the similarity could be at
+    most."""
     belongs: Float[Array, "*camera person actor"]
     """How far somebody in the picture is thought to be an actor: by all keypoints together, from `LEAST` to 1."""
 
 
 def body_sizes(
-    cameras: Camera, blobs: Sog, normalizers: Float[Array, "camera"], actors: tuple[int, ...]
+    cameras: Camera, blobs: Sog, normalizers: Float[Array, "camera"], actors: Int[np.ndarray, "blob"]
 ) -> tuple[Float[Array, "camera actor"], Float[Array, "camera"]]:
     """Pixels per metre and areas, as in `KeypointViews`, of blobs in the world, each of the actor with a number."""
     shown = jax.vmap(project, in_axes=(0, None))(cameras, blobs)
     squared = jnp.where(shown.mask, shown.sigmas, 0.0) ** 2
-    member = np.array(actors)[:, None] == np.arange(max(actors) + 1)[None]
+    member = actors[:, None] == np.arange(actors.max() + 1)[None]
     own = jnp.asarray(member, blobs.sigmas.dtype)
     sizes = jnp.matmul(squared, own) / jnp.maximum(jnp.matmul(blobs.sigmas**2, own)[None, :], 1e-12)
     return jnp.maximum(jnp.sqrt(sizes), 1e-3), jnp.pi * jnp.sum(squared, axis=1) / normalizers
@@ -88,8 +89,7 @@ def exchange_odds(
     member = jnp.asarray(np.array(groups)[:, None] == np.arange(count)[None], pixels.dtype)
 
     def told(pixels: Float[Array, "camera actor keypoint 2"], known: Bool[Array, "camera actor keypoint"]) -> Array:
-        away = (seen.pixels[:, :, None] - pixels[:, None]) / pixels_per_metre[:, None, :, None, None]
-        cost = jnp.minimum(jnp.sum(away**2, axis=-1) / (2.0 * NEAR_SIDE**2), MOST)
+        cost = _costs(seen, pixels, pixels_per_metre, NEAR_SIDE)
         of_keypoint = jnp.where(known[:, None], seen.confidence[:, :, None] * (MOST - cost), 0.0)
         return jnp.max(jnp.einsum("cpak,kg->cpag", of_keypoint, member, precision="highest"), axis=2)
 
@@ -113,11 +113,21 @@ def belonging(
     actor. Where nobody lies nearer than others, all count alike; arguments as of `exchange_odds`.
     """
     confidence = jnp.asarray(seen.confidence)
-    away = (seen.pixels[:, :, None] - pixels[:, None]) / pixels_per_metre[:, None, :, None, None]
-    cost = jnp.minimum(jnp.sum(away**2, axis=-1) / (2.0 * NEAR_BODY**2), MOST)
+    cost = _costs(seen, pixels, pixels_per_metre, NEAR_BODY)
     sure = jnp.where(known[:, None], confidence[:, :, None], 0.0)
     near = TOLD_APART * jnp.sum(sure * (MOST - cost), axis=-1) / jnp.maximum(jnp.sum(sure, axis=-1), 1.0)
     there = jnp.any(confidence > 0.0, axis=2)[..., None]  # room for people whom nobody fills is nearer than nobody
     nearest = jnp.max(jnp.where(there, near, 0.0), axis=1, keepdims=True)
     logs = (near - nearest) + (near - jnp.max(near, axis=2, keepdims=True))
     return jnp.maximum(jnp.exp(jnp.minimum(logs, 0.0)), LEAST)
+
+
+def _costs(
+    seen: SeenKeypoints,
+    pixels: Float[Array, "camera actor keypoint 2"],
+    pixels_per_metre: Float[Array, "camera actor"],
+    near: float,
+) -> Float[Array, "camera person actor keypoint"]:
+    """What the distances of keypoints from landmarks cost, in logarithms, where they are usually `near` (metres)."""
+    away = (seen.pixels[:, :, None] - pixels[:, None]) / pixels_per_metre[:, None, :, None, None]
+    return jnp.minimum(jnp.sum(away**2, axis=-1) / (2.0 * near**2), MOST)

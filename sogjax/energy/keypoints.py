@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from sogjax.energy.image_term import springs_model
 from sogjax.energy.keypoint_views import KeypointViews, SeenKeypoints, belonging, body_sizes, exchange_odds
 from sogjax.energy.posed import Frame, Posed
 from sogjax.energy.term import Term, Terms
@@ -40,13 +41,14 @@ class KeypointTerm(Term):
     """
 
     landmarks: tuple[tuple[int, ...], ...] = eqx.field(static=True, kw_only=True)
-    """By actor and keypoint the number of its landmark in the body; -1: it has none."""
+    """The number in the body of each actor's landmark for each keypoint; -1: it has none."""
     mirrored: tuple[int, ...] = eqx.field(static=True, kw_only=True)
     """The keypoint of the other side; its own number at the midline."""
     groups: tuple[int, ...] = eqx.field(static=True, kw_only=True)
     """Keypoints of one number are exchanged with the other side's together; -1: never."""
     offsets: Float[Array, "actor keypoint 3"] = eqx.field(kw_only=True)
-    """From the landmark to where the detector puts the keypoint, in the frame of the landmark's joint, metres."""
+    """The way from the landmark to where the detector puts the keypoint, in the frame of the landmark's joint,
+    metres."""
     spread: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=0.05)
     """S, metres."""
     tolerance: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=0.0)
@@ -55,7 +57,7 @@ class KeypointTerm(Term):
     """Confidence of a keypoint that is of nobody."""
 
     def value(self, posed: Posed, frame: Frame) -> Float[Array, ""]:
-        """Of the posed landmarks; 0 where no keypoints are known."""
+        """The value for the posed landmarks; 0 where no keypoints are known."""
         views = frame.views
         if views.keypoints is None:
             return jnp.zeros((), posed.pose.dtype)
@@ -70,17 +72,11 @@ class KeypointTerm(Term):
         return self.model(posed, frame.views.cameras, frame.views.keypoints)
 
     def model(self, posed: Posed, cameras: Camera, views: KeypointViews) -> QuadraticModel:
-        """The same, of keypoints that are given."""
+        """The quadratic model for keypoints that are given."""
         points = self.points(posed)
         pulls = self.pulls(points, cameras, views)
         jacobian = posed.body.skeleton.point_jacobian(posed.world_from_joint, self._joints(posed.body), points)
-        flat = lambda array: array.reshape(-1, array.shape[-1])
-        held = jnp.einsum("nij,njd->nid", pulls.stiffness, jacobian, precision="highest")
-        return QuadraticModel(
-            value=pulls.value,
-            gradient=jnp.matmul(pulls.by_point.reshape(-1), flat(jacobian), precision="highest"),
-            curvature=jnp.matmul(flat(jacobian).T, flat(held), precision="highest"),
-        )
+        return springs_model(pulls.value, pulls.by_point, pulls.stiffness, jacobian)
 
     def pulls(self, points: Float[Array, "point 3"], cameras: Camera, views: KeypointViews) -> PointPulls:
         """What keypoints say of points in the world, in the order of `points`, with the weight."""
@@ -98,8 +94,7 @@ class KeypointTerm(Term):
         self, seen: SeenKeypoints, cameras: Camera, posed: Posed, normalizers: Float[Array, "camera"]
     ) -> KeypointViews:
         """Keypoints near a pose; normalizers as in `Views`."""
-        joints, trees = posed.body.blobs.joints, posed.body.skeleton.trees
-        sizes, areas = body_sizes(cameras, posed.blobs, normalizers, tuple(trees[joint] for joint in joints))
+        sizes, areas = body_sizes(cameras, posed.blobs, normalizers, posed.body.blob_actors)
         pixels, depths = jax.vmap(project_points, in_axes=(0, None))(cameras, self.points(posed))
         shape = (len(pixels), len(self.landmarks), len(self.mirrored))
         known = (depths > NEAR).reshape(shape) & jnp.asarray(np.array(self.landmarks, int) >= 0)[None]
@@ -114,7 +109,7 @@ class KeypointTerm(Term):
         return transform_points(posed.world_from_joint[np.array(self._joints(posed.body))], offsets)
 
     def rotations(self, posed: Posed) -> Float[Array, "point 3 3"]:
-        """Of the frames in which the offsets are given."""
+        """The rotations of the frames in which the offsets are given."""
         return posed.world_from_joint[np.array(self._joints(posed.body)), :3, :3]
 
     def _joints(self, body: Body) -> tuple[int, ...]:
@@ -128,7 +123,7 @@ class KeypointTerm(Term):
     def _mixtures(
         self, points: Float[Array, "point 3"], cameras: Camera, views: KeypointViews
     ) -> tuple[Float[Array, "camera point"], Float[Array, "camera point 2"], Float[Array, "camera point"]]:
-        """By camera and point the logarithm of its mixture, its derivative by the pixel, and the springs' stiffness."""
+        """The logarithm of each camera and point's mixture, its derivative by the pixel, and the springs' stiffness."""
         used = jnp.asarray(np.array(self.landmarks, int).reshape(-1) >= 0)
         other, count, actors = np.array(self.mirrored, int), len(self.mirrored), len(self.landmarks)
         seen = views.seen

@@ -18,7 +18,7 @@ from sogjax.model.sog import Sog
 NEGLIGIBLE = 1e-4
 """Pairs are left out where the exponential of Eq. 6 is below this, even after a motion by the margin."""
 MARGIN = 0.015
-"""Of the image's width: how far a blob may move before the lists are rebuilt. Predictions of a walk are 1 to 15
+"""Share of the image's width that a blob may move before the lists are rebuilt. Predictions of a walk are 1 to 15
 pixels off where a picture is 1296 wide; 0.02 takes 13 % more blocks than 0.01."""
 
 
@@ -37,7 +37,7 @@ def displacement(cameras: Camera, before: Sog, after: Sog) -> Float[Array, ""]:
 
 
 def displaced(before: Sog, after: Sog, margin: Float[Array, "camera"]) -> Float[Array, ""]:
-    """The same of what the cameras saw (projected) and see."""
+    """How far projected blobs have moved in any image between what the cameras saw and see, in units of its margin."""
     moved = jnp.linalg.norm(after.means - before.means, axis=-1) / margin[:, None]
     return jnp.max(jnp.where(before.mask == after.mask, jnp.where(before.mask, moved, 0.0), jnp.inf))
 
@@ -75,7 +75,7 @@ def near_pairs(
 def _blocks_of(
     chosen: Int[Array, "n"], count: Int[Array, ""], tiles: int, members: int, num_bodies: int
 ) -> tuple[Int[Array, "block"], Int[Array, "member block"], Int[Array, "member block"], Bool[Array, "member block"]]:
-    """For every block its tile and its body blobs, both counted over all cameras, where each pair's colours begin.
+    """The tile of every block and its body blobs, both counted over all cameras, and where each pair's colours begin.
 
     Last, which members are no padding.
     """
@@ -125,7 +125,7 @@ def _near(
 
 
 def _whole_blocks(near: Bool[Array, "camera tile body"]) -> Bool[Array, "camera tile member"]:
-    """With as many members of padding behind the body blobs of each tile as fill its last block."""
+    """The flags with as many members of padding behind the body blobs of each tile as fill its last block."""
     missing = -jnp.sum(near, axis=-1, dtype=jnp.int32)[..., None] % MEMBERS
     padding = jnp.arange(MEMBERS - 1, dtype=jnp.int32)[None, None, :] < missing
     return jnp.concatenate([near, padding], axis=-1)
@@ -138,7 +138,7 @@ def _taken(values: Array, index: Int[Array, "*slots block"]) -> Float[Array, "*s
 def _whole_tiles(
     images: Sog, color_similarities: Float[Array, "camera body image"]
 ) -> tuple[Sog, Float[Array, "camera body image2"]]:
-    """Padded so that the image blobs fill whole tiles."""
+    """Images and similarities padded so that the image blobs fill whole tiles."""
     extra = -images.capacity % TILE
     if extra == 0:
         return images, color_similarities

@@ -1,6 +1,4 @@
-"""What pictures say about where projected blobs should be.
-
-Overlap of a projected body with images, both Sums of Gaussians (Eq. 5, 6, 8), over any layout of their pairs.
+"""Overlap of a projected body with images, both Sums of Gaussians (Eq. 5, 6, 8), over any layout of their pairs.
 
 The derivative of `capped_overlap` is computed together with its value from the closed form, which costs little more
 than the value: its exponentials are the expensive part and are shared. Forward mode, reverse mode and second
@@ -146,7 +144,7 @@ def _forward_overlap(
 
 
 def _value_and_rate(capped, primals, tangents):
-    """By the body's means and sigmas in closed form; by anything else, where that changes, by the plain formula."""
+    """The rate comes in closed form by the body's means and sigmas, from the plain formula by anything else."""
     pulls = overlap_pulls(*primals, capped=capped)
     pairs, caps, body, exponent = tangents
     rate = jnp.zeros_like(pulls.value)

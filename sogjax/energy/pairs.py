@@ -31,7 +31,7 @@ class Disks(NamedTuple):
 
 
 class Separations(NamedTuple):
-    """For each pair mu_i - mu_j, its squared length, and sigma_i^2 + sigma_j^2."""
+    """The way mu_i - mu_j between the blobs of each pair, its squared length, and sigma_i^2 + sigma_j^2."""
 
     dx: Array
     dy: Array
@@ -40,9 +40,9 @@ class Separations(NamedTuple):
 
 
 class Moments(NamedTuple):
-    """For each body blob the sums over its pairs of w (mu_i - mu_j), of w, of w sigma_i^2, and `spread`.
+    """Sums for each body blob over its pairs: of w (mu_i - mu_j), of w, of w sigma_i^2, and `spread`.
 
-    That is the sum of `w |mu_i - mu_j|^2 / (sigma_i^2 + sigma_j^2)`.
+    The spread is the sum of `w |mu_i - mu_j|^2 / (sigma_i^2 + sigma_j^2)`.
     """
 
     away: Float[Array, "*camera body 2"]
@@ -73,7 +73,7 @@ class DensePairs(eqx.Module):
         return values[:, None]
 
     def sum_over_body(self, values: Float[Array, "body image"]) -> Float[Array, "image"]:
-        """For each image blob the sum over its pairs."""
+        """The sum for each image blob over its pairs."""
         return jnp.sum(values, axis=0)
 
     def staged(self, function: Callable[..., Results], *arguments: Any) -> Results:
@@ -104,9 +104,9 @@ class SparsePairs(eqx.Module):
     variances: Float[Array, "1 slot block"]
     amplitudes: Slots
     tile_index: Int[Array, "block"]
-    """Into the tiles of all cameras."""
+    """The number of each block's tile among those of all cameras."""
     body_index: Int[Array, "member block"]
-    """Into the projected body blobs of all cameras."""
+    """The numbers of each block's body blobs among those of all cameras."""
     image_shape: tuple[int, int] = eqx.field(static=True)
     body_shape: tuple[int, int] = eqx.field(static=True)
 
@@ -119,7 +119,7 @@ class SparsePairs(eqx.Module):
         return stage_barrier(self.variances[0, 0, 0] > 0.0, function, *arguments)
 
     def sum_over_body(self, values: Slots) -> Float[Array, "camera image"]:
-        """For each image blob the sum over its pairs."""
+        """The sum for each image blob over its pairs."""
         zeros = jnp.zeros((TILE, self.image_shape[0] * self.image_shape[1] // TILE), values.dtype)
         added = self.staged(lambda values: _added(list(values)), values)
         sums = zeros.at[:, self.tile_index].add(added, mode="promise_in_bounds")
@@ -133,7 +133,7 @@ class SparsePairs(eqx.Module):
         return Moments(jnp.stack([away_x, away_y], axis=-1), weight, variance, spread)
 
     def _sum_over_blocks(self, values: Float[Array, "member block"]) -> Float[Array, "camera body"]:
-        """For each projected body blob the sum over its members of blocks."""
+        """Sums for each projected body blob over its members of blocks."""
         zeros = jnp.zeros(self.body_shape[0] * self.body_shape[1], values.dtype)
         return zeros.at[self.body_index].add(values, mode="promise_in_bounds").reshape(self.body_shape)
 

@@ -21,7 +21,7 @@ class History(eqx.Module):
 
     @classmethod
     def unknown(cls, pose: Float[Array, "dof"]) -> "History":
-        """Of a frame that has none; `pose` only says how long a pose is."""
+        """The history of a frame that has none; `pose` only says how long a pose is."""
         return cls(pose, pose, jnp.asarray(False))
 
 
@@ -67,7 +67,7 @@ class Posed(eqx.Module):
         return Moving(self.pose, self.joint_params, self.world_from_joint, self.blobs.means)
 
     def moved_to(self, moving: Moving) -> "Posed":
-        """The same body with what changes with the pose put elsewhere."""
+        """This body with what changes with the pose put elsewhere."""
         return eqx.tree_at(lambda p: (p.pose, p.joint_params, p.world_from_joint, p.blobs.means), self, moving)
 
     def rates(self) -> Moving:

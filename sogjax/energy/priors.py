@@ -1,9 +1,4 @@
-"""Joint limits: how far a pose is beyond them (E_lim of Eq. 10).
-
-Smooth motion: how suddenly a pose departs from the two before (E_acc of Eq. 10).
-
-Poses near rest: joints that hardly move in anybody, such as collar bones, stay about where they are at rest.
-"""
+"""Penalties of poses: joints beyond their limits (E_lim of Eq. 10), sudden motion (E_acc), joints far from rest."""
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -23,11 +18,11 @@ class LimitPenalty(Penalty):
         return limit_penalty(posed.joint_params, *posed.body.skeleton.joint_limits())
 
     def quadratic(self, posed: Posed, frame: Frame) -> QuadraticModel:
-        """Exact: the penalty is quadratic beyond a limit, and 0 within."""
+        """The exact model: the penalty is quadratic beyond a limit, and 0 within."""
         return self.model(posed)
 
     def model(self, posed: Posed) -> QuadraticModel:
-        """The same, whatever the frame."""
+        """The exact model, which no frame changes."""
         lower, upper = posed.body.skeleton.joint_limits()
         beyond = posed.joint_params - jnp.clip(posed.joint_params, lower, upper)
         transform = posed.body.skeleton.parameter_transform
@@ -58,7 +53,7 @@ class AccelerationPenalty(Penalty):
         return jnp.where(history.known, bend, 0.0)
 
     def quadratic(self, posed: Posed, frame: Frame) -> QuadraticModel:
-        """Exact: the penalty is quadratic."""
+        """The exact model: the penalty is quadratic."""
         history = frame.history
         weight = jnp.where(history.known, self.weight, 0.0)
         middle = 0.5 * (history.before_previous + posed.pose)
@@ -95,7 +90,7 @@ class RestPenalty(Penalty):
         return jnp.sum(_inverse(posed.body) * _away(posed) ** 2)
 
     def quadratic(self, posed: Posed, frame: Frame) -> QuadraticModel:
-        """Exact."""
+        """The exact model: the penalty is quadratic."""
         slope = 2.0 * self.weight * _inverse(posed.body)
         return QuadraticModel(self.part(posed, frame), -slope * _away(posed), jnp.diag(slope))
 

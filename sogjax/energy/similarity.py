@@ -38,11 +38,11 @@ class Similarity(ImageTerm):
     gradient: GradientMode = eqx.field(static=True, default="forward")
 
     def value(self, posed: Posed, frame: Frame) -> Float[Array, ""]:
-        """Of the posed blobs with all pictures."""
+        """The similarity of the posed blobs with all pictures."""
         return self.of_blobs(posed.blobs, frame.views)
 
     def of_blobs(self, blobs: Sog, views: Views) -> Float[Array, ""]:
-        """Of blobs in the world, which need not be a body's."""
+        """The similarity of blobs in the world, which need not be a body's."""
         seen = jax.vmap(project, in_axes=(0, None))(views.cameras, blobs)
         modes = {"capped": self.capped, "gradient": self.gradient}
         if views.pairs is not None:
@@ -70,7 +70,7 @@ class Similarity(ImageTerm):
 
 
 def _colored(views: Views, body_colors: Float[Array, "blob 3"]) -> Views:
-    """The same views, whose similarities have derivatives by the colours."""
+    """The views with similarities that have derivatives by the colours."""
     if views.pairs is not None:
         pairs = colored_pairs(views.pairs, views.coloring, body_colors, views.images)
         return eqx.tree_at(lambda v: v.pairs, views, pairs)

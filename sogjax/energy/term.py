@@ -1,7 +1,4 @@
-"""A term of the energy: a small module with a weight and a value.
-
-Terms of the energy that a user names: imported, looked at, and made.
-"""
+"""Terms of the energy: small modules with a weight and a value, those that a user names in the settings too."""
 
 import abc
 import importlib
@@ -34,7 +31,7 @@ class Term(eqx.Module):
 
     weight: Float[Array, ""] = eqx.field(converter=lambda weight: jnp.asarray(weight, jnp.result_type(float)))
     name: str = eqx.field(static=True, kw_only=True, default="")
-    """Under which its value is reported; default: the name of the class, as in `free_space` of `FreeSpace`."""
+    """The name under which its value is reported; default: that of the class, as in `free_space` of `FreeSpace`."""
 
     sign: ClassVar[float] = 1.0
 

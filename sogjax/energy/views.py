@@ -1,9 +1,8 @@
-"""Foreground against background around a body: small regular grids, which Gaussians cover as products of rows.
+"""What the cameras see at one time, as the energy takes it: image blobs, foreground around the body, keypoints.
 
-An axis-aligned Gaussian is a product of one of x and one of y, so what all blobs cover of a grid is a product of two
-small matrices: a few thousand exponentials a frame, and no lists of pairs that hold only near a pose.
-
-What the cameras see at one time, as the energy takes it.
+Foreground is seen on small regular grids. An axis-aligned Gaussian is a product of one of x and one of y, so what all
+blobs cover of a grid is a product of two small matrices: a few thousand exponentials a frame, and no lists of pairs
+that hold only near a pose.
 """
 
 from dataclasses import replace
@@ -18,13 +17,11 @@ from sogjax.energy.keypoint_views import KeypointViews
 from sogjax.energy.neighbours import margins, near_pairs
 from sogjax.energy.overlap import pair_color_similarities, self_overlaps
 from sogjax.energy.pairs import SparsePairs
-from sogjax.model.camera import Camera, distort, near_picture, project
+from sogjax.model.camera import Camera, cells_at, project
 from sogjax.model.sog import Sog
 
 COLUMNS, ROWS = 32, 48
 """Cells of a window. A standing person is about three times as tall as wide, and the box has a border."""
-_BEYOND = 0.2
-"""Of the picture's size, outside it, where the lens model still means something."""
 
 
 class Windows(eqx.Module):
@@ -44,7 +41,7 @@ class Windows(eqx.Module):
         return jnp.pi / 4.0 * self.step[..., 0] * self.step[..., 1]
 
     def of_present(self, present: Bool[Array, "camera"]) -> "Windows":
-        """The same, of which the cameras that have no picture say nothing."""
+        """These windows, of which the cameras that have no picture say nothing."""
         return eqx.tree_at(lambda w: w.odds, self, jnp.where(present[:, None, None, None], self.odds, 0.0))
 
 
@@ -56,11 +53,7 @@ def windows_around(
 ) -> Windows:
     """The log odds in boxes (undistorted pixels), from those of the cells of the pictures as recorded.
 
-    Args:
-        odds: of every cell.
-        cell_sizes: their sides, pixels.
-        cameras: that recorded them.
-        boxes: lowest and highest x, y; an empty one says nothing.
+    A box is its lowest and highest x, y; an empty one says nothing. Sides of cells are in pixels.
     """
     real = jnp.all(boxes[..., 1, :] > boxes[..., 0, :], axis=-1) & jnp.all(jnp.isfinite(boxes), axis=(-2, -1))
     boxes = jnp.where(real[..., None, None], boxes, jnp.array([[[[0.0, 0.0], [1.0, 1.0]]]], boxes.dtype))
@@ -68,27 +61,24 @@ def windows_around(
     along = lambda axis, places: boxes[..., 0, axis, None] + places[None, None, :] * step[..., axis, None]
     centres = lambda count, axis: along(axis, jnp.arange(count, dtype=boxes.dtype) + 0.5)
     x, y = centres(COLUMNS, 0), centres(ROWS, 1)
-    looked_at = jax.vmap(_looked_at)(odds, cell_sizes, cameras, x, y)
+    of_window = jax.vmap(odds_on_grid, in_axes=(None, None, None, 0, 0))
+    looked_at = jax.vmap(of_window)(odds, cell_sizes, cameras, x, y)
     return Windows(x, y, step, jnp.where(real[..., None, None], looked_at, 0.0))
 
 
-def _looked_at(
-    odds: Float[Array, "rows columns"],
+def odds_on_grid(
+    odds: Float[Array, "*kind rows columns"],
     cell_size: Float[Array, ""],
     camera: Camera,
-    x: Float[Array, "window n"],
-    y: Float[Array, "window m"],
-) -> Float[Array, "window n m"]:
-    """The log odds at the places of a grid in one camera; 0 outside its picture."""
-    shape = (*x.shape, y.shape[-1])
-    pixels = jnp.stack(
-        [jnp.broadcast_to(x[:, :, None], shape), jnp.broadcast_to(y[:, None, :], shape)], axis=-1
-    ).reshape(-1, 2)
-    recorded = distort(camera, pixels)
-    inside = jnp.all((recorded > -0.5) & (recorded < camera.image_size[None, :] - 0.5), axis=1)
-    inside &= near_picture(camera, pixels, _BEYOND)
-    cell = jnp.floor((jnp.where(inside[:, None], recorded, 0.0) + 0.5) / cell_size).astype(jnp.int32)
-    return jnp.where(inside, odds[cell[:, 1], cell[:, 0]], 0.0).reshape(shape)
+    x: Float[Array, "n"],
+    y: Float[Array, "m"],
+) -> Float[Array, "*kind n m"]:
+    """The log odds of cells of one camera at the places of a grid (undistorted pixels); 0 outside its picture."""
+    shape = (x.shape[0], y.shape[0])
+    pixels = jnp.stack([jnp.broadcast_to(x[:, None], shape), jnp.broadcast_to(y[None], shape)], axis=-1)
+    cell, inside = cells_at(camera, cell_size, pixels.reshape(-1, 2))
+    values = jnp.where(inside.reshape(*[1] * (odds.ndim - 2), -1), odds[..., cell[:, 1], cell[:, 0]], 0.0)
+    return values.reshape(*odds.shape[:-2], *shape)
 
 
 class Views(eqx.Module):
@@ -124,7 +114,7 @@ class Views(eqx.Module):
         return cls(cameras, images, jax.vmap(compare)(images), normalizers, coloring=Coloring(color_radius, space))
 
     def near(self, blobs: Sog, exponent: Float[Array, ""], capacity: int) -> tuple["Views", Int[Array, ""]]:
-        """The same views with only the pairs that matter near `blobs` (world), and how many blocks those are."""
+        """These views with only the pairs that matter near `blobs` (world), and how many blocks those are."""
         seen = jax.vmap(project, in_axes=(0, None))(self.cameras, blobs)
         pairs, count = near_pairs(self.images, self.color_similarities, seen, margins(self.cameras), exponent, capacity)
         return replace(self, pairs=pairs), count

@@ -12,20 +12,16 @@ from numpy.typing import ArrayLike
 from sogjax.errors import InputError
 from sogjax.io import actor_rows
 from sogjax.io.actor_rows import WORLD, Row, filled_table, names, table
-from sogjax.io.files import atomic_path
+from sogjax.io.calibration.rig import METRES_PER_UNIT
+from sogjax.io.files import write_file
 from sogjax.io.yaml_entry import Entry, read_yaml
 from sogjax.model.body import Attachments, Body
 from sogjax.model.color import COLOR_RADIUS, to_rgb
 from sogjax.model.rotation import UP_AXES, axis_vector
 from sogjax.model.skeleton import Skeleton
 
-METRES = {"m": 1.0, "mm": 0.001}
-"""The units that the lengths of a body file may have."""
-
-COLOR_DECIMALS = 4
-"""Of the colours that `save_body` writes."""
-
-_BODIES = Path(__file__).parent / "bodies"
+_SHAPE_FIELDS = ("joint_offsets", "blob_offsets", "blob_sigmas", "landmark_offsets")
+"""The lists of names in a row of `shape`."""
 
 
 def named_body(name: str) -> Path:
@@ -34,7 +30,7 @@ def named_body(name: str) -> Path:
     Raises:
         InputError: there is no such body.
     """
-    shipped = {path.stem: path for path in sorted(_BODIES.glob("*.yaml"))}
+    shipped = {path.stem: path for path in sorted((Path(__file__).parent / "bodies").glob("*.yaml"))}
     if name not in shipped:
         raise InputError(f"no body {name!r} comes with sogjax; choose one of {', '.join(shipped)} or give a file")
     return shipped[name]
@@ -52,18 +48,14 @@ def load_body(path: Path) -> Body:
 
 
 def body_from(content: Entry, metres: float | None = None) -> Body:
-    """The body that the content of a body file describes; `metres` is its unit of length, where it names none.
-
-    Raises:
-        InputError: it describes none; the message names the key, its value and what was expected.
-    """
+    """The body that the content of a body file describes; `metres` is its unit of length, where it names none."""
     document = content.fields(
         ("name", "joints", "dofs", "blobs", "poses"), ("unit", "color_space", "landmarks", "shape", "explained")
     )
     name = document["name"].file_name()
     metres = metres or 1.0
     if "unit" in document:
-        metres = METRES[document["unit"].choice(METRES, "a unit of length")]
+        metres = METRES_PER_UNIT[document["unit"].choice(METRES_PER_UNIT, "a unit of length")]
     space = document["color_space"].choice(COLOR_RADIUS, "a colour space") if "color_space" in document else "rgb"
     joint_rows = actor_rows.sorted_by_parent(
         filled_table(document["joints"], ("name", "parent", "offset", "axis", "kind"))
@@ -105,11 +97,7 @@ def save_body(path: Path, body: Body) -> None:
         ValueError: the body holds a number that is not finite.
     """
     text = "\n".join(_lines(body)) + "\n"
-    with atomic_path(Path(path)) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-
-
-_SHAPE_FIELDS = ("joint_offsets", "blob_offsets", "blob_sigmas", "landmark_offsets")
+    write_file(path, text)
 
 
 def _skeleton(joint_rows: list[Row], dof_rows: list[Row], metres: float) -> tuple[Skeleton, Float[np.ndarray, "dof"]]:
@@ -176,7 +164,7 @@ def _lines(body: Body) -> Iterator[str]:
         limits = [_number(bound[k]) if np.isfinite(bound[k]) else None for bound in bounds]
         yield _row(name=name, limits="none" if limits == [None, None] else limits, joints=moved)
     yield from ("", "blobs:")
-    sigmas, colors = np.asarray(body.blob_sigmas), np.round(np.asarray(body.blob_colors), COLOR_DECIMALS)
+    sigmas, colors = np.asarray(body.blob_sigmas), np.round(np.asarray(body.blob_colors), 4)
     for row, size, rgb in zip(_points(body.blobs, skeleton.names), sigmas, colors, strict=True):
         yield _row(**row, sigma=_number(size), color=_numbers(rgb))
     yield from ("", "landmarks:" if body.landmarks.names else "landmarks: []")

@@ -16,13 +16,7 @@ WORLD = "world"
 """The parent of a root joint."""
 
 MAX_ROWS = 2000
-"""Of a table: the transform of as many joints and degrees of freedom takes 32 MB."""
-
-MIN_SIGMA = 1e-6
-"""Metres."""
-
-UNIT_TOLERANCE = 1e-6
-"""An axis whose length is 1 to within this is left as it is: what `save_body` wrote loads as it was."""
+"""The rows that a table may have: the transform of as many joints and degrees of freedom takes 32 MB."""
 
 
 def table(entry: Entry, required: Sequence[str], optional: Sequence[str] = ()) -> list[Row]:
@@ -54,7 +48,7 @@ def names(rows: list[Row]) -> tuple[str, ...]:
 
 
 def parent_name(entry: Entry) -> str | None:
-    """The name of the parent joint; None for a root."""
+    """The name of the parent joint; None: it is a root."""
     return None if entry.value in (None, WORLD, "none") else entry.text()
 
 
@@ -85,10 +79,10 @@ def axis(entry: Entry) -> Float[np.ndarray, "3"]:
             raise entry.error(expected)
         return axis_vector(entry.value)
     vector = np.array(entry.numbers(expected))
-    length = float(np.linalg.norm(vector))
-    if length < UNIT_TOLERANCE:
+    length, tolerance = float(np.linalg.norm(vector)), 1e-6
+    if length < tolerance:
         raise entry.error(expected)
-    return vector if abs(length - 1.0) < UNIT_TOLERANCE else vector / length
+    return vector if abs(length - 1.0) < tolerance else vector / length  # what `save_body` wrote loads as it was
 
 
 def weights(entry: Entry, joints: Collection[str]) -> dict[str, float]:
@@ -122,7 +116,7 @@ def limits(entry: Entry | None) -> tuple[float, float]:
 def sigma(entry: Entry, metres: float) -> float:
     """The size of a blob, in metres."""
     size = metres * entry.number("a length over 0")
-    if size < MIN_SIGMA:
+    if size < 1e-6:
         raise entry.error("a length over 0")
     return size
 
@@ -147,7 +141,7 @@ def pose(entry: Entry, dof_names: Sequence[str]) -> Float[np.ndarray, "dof"]:
 
 
 def shape_group(row: Row, known: dict[str, Sequence[str]]) -> ShapeGroup:
-    """One shape parameter; `known` gives for each of its lists the names that may stand there."""
+    """A shape parameter; `known` gives for each of its lists the names that may stand there."""
     scaled = {
         field: tuple(item.choice(options, f"the name of a {field.split('_')[0]}") for item in row[field].items())
         for field, options in known.items()

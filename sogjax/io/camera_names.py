@@ -8,7 +8,7 @@ from sogjax.errors import InputError
 
 
 def matched_names(wanted: Iterable[str], found: Iterable[str]) -> dict[str, str]:
-    """By name of `wanted` the one of `found` that is the same, or holds it or is held by it as whole words.
+    """For each name of `wanted` the one of `found` that is the same, or holds it or is held by it as whole words.
 
     Words are runs of letters and numbers without leading zeros: `cam_01` is `Cam1` and a part of `int_cam01_img`, but
     no part of `cam_010`. A name that could mean two others means none.
@@ -44,13 +44,6 @@ def chosen_cameras(
 ) -> tuple[str, ...]:
     """The cameras to use: those that are `listed` in recording.yaml, else all, which then must all be whole.
 
-    Args:
-        path: the recording.
-        calibration: its file.
-        listed: None where recording.yaml lists none.
-        calibrated: the cameras of the calibration.
-        sources: by camera its video or folder of images.
-
     Raises:
         InputError: a camera without calibration or without video.
     """
@@ -77,7 +70,7 @@ def _refuse_other_name(
     sources: Mapping[str, Path],
     otherwise: str,
 ) -> None:
-    """One video and one camera left over are probably the same under two names."""
+    """Complain that one video and one camera left over are probably the same under two names."""
     videos = [source for camera, source in sources.items() if camera not in calibrated]
     cameras = [camera for camera in calibrated if camera in wanted and camera not in sources]
     if len(videos) != 1 or len(cameras) != 1:

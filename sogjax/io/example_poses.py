@@ -24,15 +24,11 @@ class ExampleSettings:
     actor: str | None = None
     initial_pose: InitialPose | None = None
     frame: int | None = None
-    """Of the videos, in the recording's own numbering; None: the pictures lie in the folder `name`."""
+    """The frame of the videos, in the recording's own numbering; None: the pictures lie in the folder `name`."""
 
 
 def read_examples(entry: Entry) -> tuple[ExampleSettings, ...]:
-    """The list `example_poses`: frame numbers, and mappings with the `name` of a folder or a `frame`.
-
-    Raises:
-        InputError: an entry of another kind, or a folder or a frame that is listed twice.
-    """
+    """The list `example_poses`: frame numbers, and mappings with the `name` of a folder or a `frame`."""
     examples: list[ExampleSettings] = []
     for item in entry.items():
         example = _example(item)
@@ -75,19 +71,19 @@ class ExamplePose:
     name: str
     actor: str | None
     images: dict[str, Path]
-    """By camera."""
+    """The picture of each camera."""
     masks: dict[str, Path]
-    """By camera; white = subject. A camera may have none."""
+    """The mask of each camera that has one; white = subject."""
     initial_pose: InitialPose | None
     frame: int | None = None
-    """Of the videos, counted from the recording's first, where the images are of one; None: they are files."""
+    """The recording's number, where the images are a frame of the videos; None: they are files."""
     within: dict[str, Bool[np.ndarray, "_rows _columns"]] | None = None
-    """By camera, at any size: where the subject is, if others are seen too; a camera without an entry is not used.
+    """Where each camera sees the subject, at any size, if others are seen too; a camera without an entry is not used.
     None: nobody else is seen."""
 
 
 def find_background(folder: Path, rig: CameraRig, calibrated: Iterable[str]) -> dict[str, Path]:
-    """By camera of `rig` the image of the empty scene in `folder`, where there is one.
+    """The images of the empty scene in `folder`, by camera of `rig` that has one.
 
     Raises:
         InputError: an image of no calibrated camera, of another size, or one that does not open.
@@ -105,14 +101,10 @@ def find_example_poses(
     settings: tuple[ExampleSettings, ...] | None,
     frames: range | None,
 ) -> tuple[ExamplePose, ...]:
-    """The example poses: those that `settings` list, else one for every folder in `folder`.
+    """The example poses: those that `settings` of recording.yaml list, else one for every folder in `folder`.
 
-    Args:
-        folder: where their images are.
-        rig: the cameras that are used.
-        calibrated: names of all cameras of the calibration.
-        settings: what recording.yaml lists.
-        frames: the numbers of the frames of the videos; None: not known.
+    `rig` has the cameras that are used, of all that are `calibrated`; `frames` are the numbers of the frames of the
+    videos, None where they are not known.
 
     Raises:
         InputError: a listed one is missing or empty, an image or mask does not fit its camera, or there is no such
@@ -134,7 +126,7 @@ def _from_videos(folder: Path, entry: ExampleSettings, frame: int, frames: range
             f"{folder.parent / 'recording.yaml'}: example_poses: there is no frame {frame}; "
             f"the frames are {frames[0]} to {frames[-1]}"
         )
-    return ExamplePose(entry.name, entry.actor, {}, {}, entry.initial_pose, frame - frames[0])
+    return ExamplePose(entry.name, entry.actor, {}, {}, entry.initial_pose, frame)
 
 
 def _from_images(folder: Path, rig: CameraRig, calibrated: Iterable[str], entry: ExampleSettings) -> ExamplePose:

@@ -1,7 +1,4 @@
-"""Reading and writing single images and masks.
-
-Exposure and white balance evened out between cameras: factors of red, green and blue light.
-"""
+"""Single images and masks, and exposure and white balance evened out between cameras."""
 
 from functools import lru_cache
 from pathlib import Path
@@ -12,14 +9,14 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 
 from sogjax.errors import InputError
-from sogjax.io.files import atomic_path
+from sogjax.io.files import write_file
 from sogjax.model.color import from_linear_light, linear_light
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 MAX_PIXELS = 2**27
-"""Of one picture. The size in its header is checked against this before memory is allocated."""
-MAX_BYTES = 2**29
-"""Of its file."""
+"""The most that a picture may have; its header is checked against this before memory is allocated."""
+ColorGains = tuple[float, float, float]
+"""Factors of red, green and blue, in linear light."""
 
 
 def read_image(path: Path) -> UInt8[np.ndarray, "height width 3"]:
@@ -55,9 +52,7 @@ def write_image(path: Path, image: UInt8[np.ndarray, "height width *channel"]) -
     Raises:
         InputError: the folder cannot be written.
     """
-    encoded = cv2.imencode(".jpg" if path.suffix == ".jpg" else ".png", image)[1]
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(encoded.tobytes())
+    write_file(path, cv2.imencode(".jpg" if path.suffix == ".jpg" else ".png", image)[1].tobytes())
 
 
 def _decode(path: Path, flags: int) -> np.ndarray:
@@ -76,8 +71,9 @@ def _decode(path: Path, flags: int) -> np.ndarray:
 
 
 def _content(path: Path) -> bytes:
-    if path.stat().st_size > MAX_BYTES:
-        raise InputError(f"{path}: has more than {MAX_BYTES} bytes, too many for a picture; make it smaller")
+    most = 2**29
+    if path.stat().st_size > most:
+        raise InputError(f"{path}: has more than {most} bytes, too many for a picture; make it smaller")
     return path.read_bytes()
 
 
@@ -108,10 +104,6 @@ def _jpeg_size(content: bytes) -> tuple[int, int]:
     return largest
 
 
-ColorGains = tuple[float, float, float]
-"""Factors of red, green and blue, in linear light."""
-
-
 def evened(image: UInt8[np.ndarray, "height width 3"], gains: ColorGains | None) -> UInt8[np.ndarray, "height width 3"]:
     """A picture (BGR) as it were with other exposure and white balance; None: as it is."""
     return image if gains is None else cv2.LUT(image, _table(gains))
@@ -119,7 +111,7 @@ def evened(image: UInt8[np.ndarray, "height width 3"], gains: ColorGains | None)
 
 @lru_cache
 def _table(gains: ColorGains) -> UInt8[np.ndarray, "1 256 3"]:
-    """For every byte of blue, green and red the byte that it becomes."""
+    """The byte that every byte of blue, green and red becomes."""
     grey = jnp.repeat(jnp.arange(256, dtype=jnp.float32)[:, None] / 255.0, 3, axis=1)
     light = linear_light(grey) * jnp.asarray(gains[::-1], jnp.float32)[None]
     return np.rint(255.0 * np.asarray(from_linear_light(jnp.clip(light, 0.0, 1.0)))).astype(np.uint8)[None]

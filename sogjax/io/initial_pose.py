@@ -45,11 +45,7 @@ def load_initial_poses(path: Path, actors: Sequence[str]) -> dict[str, InitialPo
 
 
 def read_initial_poses(path: Path) -> InitialPose | dict[str, InitialPose]:
-    """What the file holds: one pose, or a mapping of actor names to poses.
-
-    Raises:
-        InputError: no such file, or a value is wrong.
-    """
+    """What the file holds: one pose, or a mapping of actor names to poses."""
     entry = read_yaml(path)
     actors = entry.mapping()
     several = actors and all(name not in _KEYS and isinstance(actor.value, dict) for name, actor in actors.items())
@@ -59,11 +55,7 @@ def read_initial_poses(path: Path) -> InitialPose | dict[str, InitialPose]:
 
 
 def parse_initial_pose(entry: Entry) -> InitialPose:
-    """The pose that is written in an entry of a YAML file.
-
-    Raises:
-        InputError: an unknown key or a wrong value.
-    """
+    """The pose that is written in an entry of a YAML file."""
     given = entry.given(_KEYS)
     if not given.keys() & {"pose", "position", "landmarks"}:
         raise entry.error("'pose' and 'position', or 'landmarks'")

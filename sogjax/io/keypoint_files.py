@@ -23,7 +23,7 @@ class KeypointFiles:
 
     @property
     def files(self) -> list[Path]:
-        """All of them, sorted."""
+        """All the files, sorted."""
         found = [self.of_all] if self.of_all is not None else []
         for path in self.by_name.values():
             found += json_files(path) if path.is_dir() else [path]

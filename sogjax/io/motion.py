@@ -1,6 +1,7 @@
 """Motion: what tracking finds, one pose per frame and all that follows from it."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,8 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.errors import InputError
-from sogjax.io.array_log import read_log
 from sogjax.io.export.write import export_motion
-from sogjax.io.motion_data import DEFAULT_UP, FORMAT_VERSION, MotionData
-from sogjax.io.motion_data import arrays_of as arrays_of
-from sogjax.io.motion_data import save_motion as save_motion
+from sogjax.io.motion_data import DEFAULT_UP, FORMAT_VERSION, MotionData, per_frame_fields
 from sogjax.io.npz_file import bool_array, finite_array, float_array, int_array, number, read_npz, text_array
 from sogjax.model.body import Body
 from sogjax.model.rotation import UP_AXES
@@ -36,6 +34,11 @@ class Motion(MotionData):
             InputError: another ending, or a file that cannot be written.
         """
         export_motion(self, Path(path))
+
+    def of_rows(self, rows: slice | Int[np.ndarray, "_row"] | Bool[np.ndarray, "_frame"]) -> "Motion":
+        """The motion in some of its frames."""
+        known = {name: getattr(self, name) for name in per_frame_fields()}
+        return replace(self, **{name: values[rows] for name, values in known.items() if values is not None})
 
 
 def motion_from_poses(
@@ -100,13 +103,13 @@ def motion_from_poses(
 
 
 def load_motion(path: Path) -> Motion:
-    """Read `motion.npz`, the folder of a run that wrote one, or that of a motion being written (`MotionLog`).
+    """Read `motion.npz`, or the folder of a run that wrote one.
 
     Raises:
         InputError: no such file, no npz, another version, or an array missing, misshapen or not finite.
     """
     path = path / "motion.npz" if (path / "motion.npz").is_file() else path
-    return checked_motion(path, read_log(path) if path.is_dir() else read_npz(path))
+    return checked_motion(path, read_npz(path))
 
 
 def checked_motion(path: Path, arrays: dict[str, np.ndarray]) -> Motion:

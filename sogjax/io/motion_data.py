@@ -2,7 +2,9 @@
 
 import difflib
 from dataclasses import dataclass, fields
+from functools import cache
 from pathlib import Path
+from typing import get_args, get_type_hints
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
@@ -48,7 +50,7 @@ class MotionData:
     actor: str = ""
     """Whose motion it is; empty if the file does not say."""
     limb_names: Shaped[np.ndarray, "limb"] | None = None
-    """None where limbs were not judged, as in the other two."""
+    """The limbs that were judged; None where none were, as in the other two."""
     joint_limb: Int[np.ndarray, "joint"] | None = None
     """The limb that each joint belongs to; -1 for the trunk's."""
     limb_doubt: Float[np.ndarray, "frame limb"] | None = None
@@ -56,15 +58,16 @@ class MotionData:
     explained: Float[np.ndarray, "frame"] | None = None
     """Part of the actor's visible area that shows its own colours and no background; None where it was not judged."""
     overlap: Float[np.ndarray, "frame camera"] | None = None
-    """Of its silhouette with the foreground around it (intersection over union); NaN where no background is known."""
+    """Overlap of the actor's silhouette with the foreground around it, intersection over union; NaN where that is not
+    known."""
     camera_names: Shaped[np.ndarray, "camera"] | None = None
-    """Of the columns of `overlap`."""
+    """The cameras of the columns of `overlap`."""
 
     landmark_names: Shaped[np.ndarray, "landmark"] | None = None
-    """Of points fixed to joints; None where the file does not have them, as in the other two."""
+    """Points fixed to joints; None where the file does not have them, as in the other two."""
     landmark_joint: Int[np.ndarray, "landmark"] | None = None
     landmark_offset: Float[np.ndarray, "landmark 3"] | None = None
-    """In the frame of the landmark's joint."""
+    """Where each landmark is in the frame of its joint."""
 
     def __repr__(self) -> str:
         whose = f" of {self.actor}" if self.actor else ""
@@ -94,6 +97,14 @@ class MotionData:
         near = difflib.get_close_matches(name, known, 1)
         hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(known)}"
         raise InputError(f"the motion has no joint or landmark {name!r}; {hint}")
+
+
+@cache
+def per_frame_fields() -> tuple[str, ...]:
+    """The fields of a motion that have a row for each frame, as their shapes say."""
+    shapes = lambda kind: [getattr(each, "dim_str", "") for each in (kind, *get_args(kind))]
+    hints = get_type_hints(MotionData)
+    return tuple(name for name, kind in hints.items() if any(shape.startswith("frame") for shape in shapes(kind)))
 
 
 def save_motion(path: Path, motion: MotionData) -> None:

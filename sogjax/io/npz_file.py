@@ -15,6 +15,10 @@ from jaxtyping import Bool, Float, Int, Shaped
 from sogjax.errors import InputError
 from sogjax.io.files import atomic_path
 
+Arrays = dict[str, np.ndarray]
+Shape = tuple[int | None, ...]
+"""The lengths of an array's axes; None: any."""
+
 MAX_BYTES = 4 * 2**30
 """Bytes that the arrays of one file may take in memory."""
 
@@ -23,7 +27,7 @@ _DAMAGED_HEADER = (TokenError, SyntaxError, TypeError, LookupError, RecursionErr
 _UNREADABLE = (OSError, ValueError, zipfile.BadZipFile, zlib.error, EOFError, KeyError, MemoryError, RuntimeError)
 
 
-def read_npz(path: Path) -> dict[str, np.ndarray]:
+def read_npz(path: Path) -> Arrays:
     """All arrays of an npz file.
 
     Raises:
@@ -47,7 +51,7 @@ def read_npz(path: Path) -> dict[str, np.ndarray]:
         raise InputError(f"{path}: is not readable as npz without pickles ({error}); write it again") from error
 
 
-def save_npz(path: Path, arrays: dict[str, np.ndarray]) -> None:
+def save_npz(path: Path, arrays: Arrays) -> None:
     """Write arrays, compressed, as a whole file or not at all.
 
     Raises:
@@ -58,11 +62,7 @@ def save_npz(path: Path, arrays: dict[str, np.ndarray]) -> None:
 
 
 def check_npy(path: Path) -> None:
-    """Check the size in an npy header against the file's size before memory is allocated.
-
-    Raises:
-        InputError: no npy, pickled objects inside, or fewer bytes than claimed.
-    """
+    """Check the size in an npy header against the file's size before memory is allocated."""
     try:
         with path.open("rb") as file:
             _check_claim(path, file, path.stat().st_size)
@@ -77,12 +77,10 @@ def npy_header(file: IO[bytes] | io.BufferedIOBase) -> tuple[tuple[int, ...], np
         ValueError: no npy, a header that is damaged, or pickled objects inside.
     """
     version = np.lib.format.read_magic(file)  # pyright: ignore[reportArgumentType]
-    read_header = {
-        (1, 0): np.lib.format.read_array_header_1_0,
-        (2, 0): np.lib.format.read_array_header_2_0,
-    }.get(version)
-    if read_header is None:
+    if version not in ((1, 0), (2, 0)):
         raise ValueError(f"npy version {version} is unknown")
+    form = np.lib.format
+    read_header = form.read_array_header_1_0 if version == (1, 0) else form.read_array_header_2_0
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # numpy tries damaged headers again, as if Python 2 had written them
@@ -103,17 +101,13 @@ def _check_claim(path: Path, file: IO[bytes] | io.BufferedIOBase, size: int) -> 
         raise InputError(f"{path}: claims {claimed} bytes of {dtype}, but holds {size}; write it again")
 
 
-def float_array(
-    path: Path, arrays: dict[str, np.ndarray], key: str, shape: tuple[int | None, ...]
-) -> Float[np.ndarray, "..."]:
-    """The numbers `key`, of `shape` (None: any length), as floats; NaN and infinity pass."""
+def float_array(path: Path, arrays: Arrays, key: str, shape: Shape) -> Float[np.ndarray, "..."]:
+    """The numbers `key`, of `shape`, as floats; NaN and infinity pass."""
     values = _array(path, arrays, key, shape, "iuf", "numbers")
     return values if values.dtype.kind == "f" else values.astype(float)
 
 
-def finite_array(
-    path: Path, arrays: dict[str, np.ndarray], key: str, shape: tuple[int | None, ...]
-) -> Float[np.ndarray, "..."]:
+def finite_array(path: Path, arrays: Arrays, key: str, shape: Shape) -> Float[np.ndarray, "..."]:
     """The finite numbers `key`, of `shape`, as floats."""
     values = float_array(path, arrays, key, shape)
     if not np.isfinite(values).all():
@@ -122,42 +116,29 @@ def finite_array(
     return values
 
 
-def int_array(
-    path: Path, arrays: dict[str, np.ndarray], key: str, shape: tuple[int | None, ...]
-) -> Int[np.ndarray, "..."]:
+def int_array(path: Path, arrays: Arrays, key: str, shape: Shape) -> Int[np.ndarray, "..."]:
     """The whole numbers `key`, of `shape`."""
     return _array(path, arrays, key, shape, "iu", "whole numbers").astype(np.int64)
 
 
-def bool_array(
-    path: Path, arrays: dict[str, np.ndarray], key: str, shape: tuple[int | None, ...]
-) -> Bool[np.ndarray, "..."]:
+def bool_array(path: Path, arrays: Arrays, key: str, shape: Shape) -> Bool[np.ndarray, "..."]:
     """The truth values `key`, of `shape`."""
     return _array(path, arrays, key, shape, "b", "true or false")
 
 
-def text_array(
-    path: Path, arrays: dict[str, np.ndarray], key: str, shape: tuple[int | None, ...]
-) -> Shaped[np.ndarray, "..."]:
+def text_array(path: Path, arrays: Arrays, key: str, shape: Shape) -> Shaped[np.ndarray, "..."]:
     """The texts `key`, of `shape`."""
     if arrays.get(key, np.zeros(0)).size == 0 and 0 in shape:
         return np.empty(0, "U1")
     return _array(path, arrays, key, shape, "U", "text")
 
 
-def number(path: Path, arrays: dict[str, np.ndarray], key: str) -> float:
+def number(path: Path, arrays: Arrays, key: str) -> float:
     """The single number `key`."""
     return float(_array(path, arrays, key, (), "iuf", "a number"))
 
 
-def _array(
-    path: Path,
-    arrays: dict[str, np.ndarray],
-    key: str,
-    shape: tuple[int | None, ...],
-    kinds: str,
-    what: str,
-) -> np.ndarray:
+def _array(path: Path, arrays: Arrays, key: str, shape: Shape, kinds: str, what: str) -> np.ndarray:
     if key not in arrays:
         raise InputError(f"{path}: has no array {key!r}; add it (there are: {', '.join(sorted(arrays))})")
     values = arrays[key]

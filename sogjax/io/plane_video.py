@@ -24,11 +24,6 @@ FORMATS = {"yuv420p": False, "yuvj420p": True}
 """The pixel formats that are read, and whether black and white are 0 and 255; cameras write hardly any other."""
 STANDARDS: dict[int, ColorStandard] = {1: "709", 2: "601", 5: "601", 6: "601"}
 """Colours by their number in the file (ITU-T H.273), as FFmpeg converts them; 2 is "not said"."""
-FULL_RANGE = 2
-"""The number of the range in which black and white are 0 and 255."""
-OPTIONS = {"skip_loop_filter": "noref"}
-"""Images that no other one is made of need no smoothing of block edges: the mean of a cell does not see them. Pictures
-made beside the cells, as for the overlay, show them."""
 
 
 def pyav_version() -> str | None:
@@ -115,7 +110,9 @@ class PlaneVideo:
             return
         stream = container.streams.video[0]
         codec = stream.codec_context
-        codec.options = OPTIONS
+        # Images that no other one is made of need no smoothing of block edges: the mean of a cell does not see them.
+        # Pictures made beside the cells, as for the overlay, show them.
+        codec.options = {"skip_loop_filter": "noref"}
         codec.thread_count = threads
         codec.thread_type = "AUTO" if threads > 1 else "NONE"
         if 0 < codec.width * codec.height <= MAX_PIXELS:
@@ -196,7 +193,8 @@ def yuv_picture(image: VideoFrame) -> YuvPicture:
 def _known(image: VideoFrame) -> bool:
     even = image.width % 2 == 0 and image.height % 2 == 0
     kind = image.format.name
-    as_named = kind in FORMATS and (FORMATS[kind] or int(image.color_range) != FULL_RANGE)  # OpenCV knows some of these
+    full_range = 2  # the number of the range in which black and white are 0 and 255
+    as_named = kind in FORMATS and (FORMATS[kind] or int(image.color_range) != full_range)  # OpenCV knows some of these
     return even and as_named and int(image.colorspace) in STANDARDS and image.rotation == 0
 
 

@@ -14,7 +14,7 @@ from sogjax.io.camera_names import matched_names
 from sogjax.io.files import read_parsed
 from sogjax.io.keypoint_files import files_in, json_files, number_in
 from sogjax.io.recording_files import POSE, POSE_SYNC, PROJECT, SYNCHRONIZED
-from sogjax.io.recording_settings import FASTEST, RecordingSettings
+from sogjax.io.recording_settings import DEFAULT_UP, FASTEST, RecordingSettings
 
 CONFIG = PROJECT.name
 """A trial's stands in its folder, those of participant and session in the folders around it."""
@@ -22,38 +22,38 @@ CONFIG = PROJECT.name
 
 @dataclass(frozen=True)
 class Project:
-    """What another program's folder says by its form, where recording.yaml does not."""
+    """What a folder says by the form that another program gave it, where recording.yaml does not; usually nothing."""
 
-    program: str
-    calibrations: tuple[Path, ...]
-    unit: str
-    """Of the calibration's lengths."""
-    up: str
+    calibrations: tuple[Path, ...] = ()
+    unit: str | None = None
+    """The unit of the calibration's lengths."""
+    up: str | None = None
     fps: float | None = None
     doubt: str = ""
     """A sentence on what may be wrong."""
     frame_range: tuple[int, int] | None = None
     """First frame to use and the one after the last; None: all."""
 
+    @property
+    def found(self) -> bool:
+        """Whether another program made the folder."""
+        return self.up is not None
+
     def filled_in(self, settings: RecordingSettings) -> RecordingSettings:
         """The settings of recording.yaml with the project's where a key is absent."""
-        return replace(
-            settings,
-            unit=settings.unit or self.unit,
-            up=settings.up or self.up,
-            fps=settings.fps or self.fps,
-        )
+        unit, up, fps = settings.unit or self.unit, settings.up or self.up, settings.fps or self.fps
+        return replace(settings, unit=unit, up=up, fps=fps)
 
     def within(self, settings: RecordingSettings, num_frames: int) -> RecordingSettings:
-        """The same with the project's frames, as far as there are so many, where recording.yaml names none."""
+        """The settings with the project's frames, as far as there are so many, where recording.yaml names none."""
         if self.frame_range is None or settings.first_frame is not None or settings.last_frame is not None:
             return settings
         first, stop = self.frame_range[0], min(self.frame_range[1], num_frames)
         return replace(settings, first_frame=first, last_frame=stop - 1) if first < stop else settings
 
 
-def project_in(path: Path) -> Project | None:
-    """The project of another program in a folder; None where it is none.
+def project_in(path: Path) -> Project:
+    """What another program's project in a folder says.
 
     Raises:
         InputError: its configuration cannot be read.
@@ -62,23 +62,23 @@ def project_in(path: Path) -> Project | None:
         return _pose2sim(path)
     if SYNCHRONIZED.of(path).is_dir():
         return _freemocap(path)
-    return None
+    return Project(doubt=f"{path}: does not give the vertical; {DEFAULT_UP} is assumed (`up:` in recording.yaml)")
 
 
-def calibrations_of(path: Path, project: Project | None) -> list[Path]:
+def calibrations_of(path: Path, project: Project) -> list[Path]:
     """The calibrations of a recording: in its folder, else where the project has them."""
-    return find_calibrations(path) or [*(project.calibrations if project else ())]
+    return find_calibrations(path) or [*project.calibrations]
 
 
-def named_calibration(path: Path, name: str, project: Project | None) -> Path:
+def named_calibration(path: Path, name: str, project: Project) -> Path:
     """The calibration that recording.yaml names: in the recording's folder, or where the project has it."""
-    others = project.calibrations if project else ()
-    return next((file for file in others if file.name == name and not (path / name).is_file()), path / name)
+    others = () if (path / name).is_file() else project.calibrations
+    return next((file for file in others if file.name == name), path / name)
 
 
-def named_as_sources(rig: CameraRig, sources: dict[str, Path], project: Project | None) -> CameraRig:
+def named_as_sources(rig: CameraRig, sources: dict[str, Path], project: Project) -> CameraRig:
     """The rig of a project with cameras named as their videos are: `cam01` where the calibration has int_cam01_img."""
-    if project is None:
+    if not project.found:
         return rig
     names = {calibrated: video for video, calibrated in matched_names(sources, rig.names).items()}
     return CameraRig(tuple(names.get(name, name) for name in rig.names), rig.cameras)
@@ -91,7 +91,7 @@ def _pose2sim(path: Path) -> Project:
     if rate is not None and not 0.0 < rate <= FASTEST:
         raise InputError(f"{path / CONFIG}: frame_rate = {rate} is no frame rate; write 'auto' or frames per second")
     frames = _frame_range(path / CONFIG, settings.get("frame_range") if isinstance(settings, dict) else None)
-    return Project("Pose2Sim", _pose2sim_calibrations(path), "m", "z", rate, frame_range=frames)
+    return Project(_pose2sim_calibrations(path), "m", DEFAULT_UP, rate, frame_range=frames)
 
 
 def _frame_range(path: Path, value: Any) -> tuple[int, int] | None:
@@ -105,7 +105,7 @@ def _frame_range(path: Path, value: Any) -> tuple[int, int] | None:
 
 
 def _pose2sim_calibrations(path: Path) -> tuple[Path, ...]:
-    """In a folder with `calib` in its name, of the project or of the session around it."""
+    """The calibrations in a folder with `calib` in its name, of the project or of the session around it."""
     here = path.resolve()
     around = [folder for folder in here.parents[:2] if (folder / CONFIG).is_file()]
     for folder in (path, *around):
@@ -120,12 +120,12 @@ def _freemocap(path: Path) -> Project:
     """Millimetres; the world is the board's on the floor, or the first camera's."""
     tables = [_toml(file).get("metadata") for file in find_calibrations(path) if file.suffix.lower() == ".toml"]
     if any(isinstance(table, dict) and table.get("groundplane_calibration") is True for table in tables):
-        return Project("FreeMoCap", (), "mm", "z")
+        return Project((), "mm", "z")
     doubt = (
         f"{path}: was calibrated without a ground plane, so its first camera is taken to be level; write the vertical "
         "as `up:` into recording.yaml if it is not -y"
     )
-    return Project("FreeMoCap", (), "mm", "-y", doubt=doubt)
+    return Project((), "mm", "-y", doubt=doubt)
 
 
 def _toml(path: Path) -> dict[str, Any]:
@@ -136,12 +136,12 @@ class Shifts(NamedTuple):
     """What Pose2Sim's files tell of the cameras' offsets."""
 
     offsets: dict[str, int]
-    """By camera its `frame_offset`: by how much more its pictures are numbered in `pose/`."""
+    """The `frame_offset` of each camera: by how much more its pictures are numbered in `pose/`."""
     untold: tuple[str, ...]
     """Cameras of which that cannot be told."""
 
     def without(self, cameras: Collection[str]) -> "Shifts":
-        """Of the other cameras."""
+        """What is told of the other cameras."""
         offsets = {camera: offset for camera, offset in self.offsets.items() if camera not in cameras}
         return Shifts(offsets, tuple(camera for camera in self.untold if camera not in cameras))
 
@@ -162,8 +162,10 @@ class Shifts(NamedTuple):
         return tuple(found)
 
 
-def pose2sims_shifts(path: Path, cameras: Iterable[str]) -> Shifts:
+def pose2sims_shifts(path: Path, project: Project, cameras: Iterable[str]) -> Shifts:
     """What the files of a project say of these cameras; nothing where Pose2Sim has not synchronised it."""
+    if not project.found:
+        return Shifts({}, ())
     before, after = (files_in(part.of(path)) for part in (POSE, POSE_SYNC))
     if before is None or after is None:
         return Shifts({}, ())

@@ -15,7 +15,6 @@ from sogjax.io.example_poses import ExamplePose, check_size, find_background, fi
 from sogjax.io.image_file import ColorGains
 from sogjax.io.projects import (
     Project,
-    Shifts,
     calibrations_of,
     named_as_sources,
     named_calibration,
@@ -24,10 +23,8 @@ from sogjax.io.projects import (
 )
 from sogjax.io.recording_files import BACKGROUND, EXAMPLE_POSES, GROUND_TRUTH, INITIAL_POSE, SETTINGS, folder_around
 from sogjax.io.recording_frames import TimedImages, clip_frames, uneven
-from sogjax.io.recording_settings import RecordingSettings, read_recording_settings
+from sogjax.io.recording_settings import DEFAULT_UP, RecordingSettings, read_recording_settings
 from sogjax.io.source import SourceInfo, find_sources, look_at_source
-
-DEFAULT_UP = "z"
 
 
 @dataclass(frozen=True)
@@ -44,32 +41,36 @@ class Recording:
     """Frame t of a camera is frame t + frame_offset of its file."""
     num_frames: int
     sources: dict[str, Path]
-    """By camera: a video, or a folder of images."""
+    """The video or the folder of images of each camera."""
     frame_offset: dict[str, int]
-    """By camera, 0 where the recording names none; the nearest whole number."""
+    """What a camera's numbers of frames are higher by: the nearest whole number, 0 where the recording names none."""
     background: dict[str, Path]
-    """By camera: the empty scene, where there is such an image."""
+    """The image of the empty scene of each camera that has one."""
     example_poses: tuple[ExamplePose, ...]
     initial_poses: Path | None
     ground_truth: Path | None
     warnings: tuple[str, ...]
-    """One sentence each."""
+    """Sentences on what may be wrong."""
     frame_part: dict[str, float] = field(default_factory=dict)
-    """By camera what its offset is beyond `frame_offset`, -0.5 to 0.5: it shows what was so much earlier; without
-    an entry 0."""
+    """What a camera's offset is beyond `frame_offset`, -0.5 to 0.5: it shows what was so much earlier; 0 without an
+    entry."""
     num_images: dict[str, int] = field(default_factory=dict)
-    """By camera the number of its images; a camera without an entry has one for every frame."""
+    """How many images a camera has; one without an entry has one for every frame."""
     picked: dict[str, tuple[int, ...]] = field(default_factory=dict)
-    """By camera the image of its file that each of its frames is, where time stamps were asked for; else frame k is
-    image k."""
+    """The images of a camera's file that its frames are, where time stamps were asked for; else frame k is image k."""
     missing: dict[str, tuple[tuple[int, int], ...]] = field(default_factory=dict)
-    """By camera the first and last frame (its own numbers) of each while in which its pictures are not to be used."""
+    """First and last frame (the recording's numbers) of each while in which a camera's pictures are not to be used."""
     color_gains: dict[str, ColorGains] = field(default_factory=dict)
-    """By camera the factors of its pictures; without an entry they stay as recorded."""
+    """The factors of a camera's pictures; without an entry they stay as recorded."""
     keypoint_scheme: str | None = None
     """Name or file of the scheme that keypoint files beside it follow; None: told by their content."""
     fewest_cameras: int | None = None
-    """Frames that so many cameras have are used; None: only those that all have."""
+    """How many cameras must have a frame that is used; None: all."""
+
+    @property
+    def frames(self) -> range:
+        """The numbers of its frames."""
+        return range(self.first_frame, self.first_frame + self.num_frames)
 
     @property
     def complete(self) -> bool:
@@ -77,17 +78,16 @@ class Recording:
         return self.fewest_cameras is None and not any(self.missing.get(name) for name in self.rig.names)
 
     def has_image(self, camera: str, frame: int) -> bool:
-        """Whether a camera's file holds a frame, counted from the recording's first."""
-        number = self.first_frame + frame + self.frame_offset[camera]
+        """Whether a camera's file holds a frame."""
+        number = frame + self.frame_offset[camera]
         return 0 <= number < self.num_images.get(camera, number + 1)
 
     def is_missing(self, camera: str, frame: int) -> bool:
-        """Whether a camera's picture of a frame, counted from the recording's first, is not to be used."""
-        number = self.first_frame + frame
-        return any(first <= number <= last for first, last in self.missing.get(camera, ()))
+        """Whether a camera's picture of a frame is not to be used."""
+        return any(first <= frame <= last for first, last in self.missing.get(camera, ()))
 
     def num_missing(self, frames: Iterable[int]) -> dict[str, int]:
-        """By camera how many of the frames (as in `has_image`) it has no picture of; none where it has all."""
+        """How many of the frames a camera has no picture of, without cameras that have all."""
         shown = lambda camera, frame: self.has_image(camera, frame) and not self.is_missing(camera, frame)
         frames = [] if self.complete else list(frames)
         counts = {camera: sum(not shown(camera, frame) for frame in frames) for camera in self.rig.names}
@@ -104,10 +104,10 @@ def open_recording(path: Path) -> Recording:
         what = "this is a file" if path.is_file() else "there is no such folder"
         raise InputError(f"{path}: {what}; {folder_around(path) or 'give the folder of a recording'}")
     given, project = read_recording_settings(SETTINGS.of(path)), project_in(path)
-    settings = project.filled_in(given) if project else given
+    settings = project.filled_in(given)
     calibrated, sources = _calibrated(path, settings, project)
     _check_by_camera(path, settings, calibrated)
-    shifts = (pose2sims_shifts(path, sources) if project else Shifts({}, ())).without(settings.frame_offset)
+    shifts = pose2sims_shifts(path, project, sources).without(settings.frame_offset)
     exact = {camera: settings.frame_offset.get(camera, shifts.offsets.get(camera, 0)) for camera in sources}
     offsets = {camera: round(offset) for camera, offset in exact.items()}
     rig, infos = _sized(calibrated.select(tuple(sources)), sources)
@@ -144,7 +144,7 @@ def open_recording(path: Path) -> Recording:
     )
 
 
-def _calibrated(path: Path, settings: RecordingSettings, project: Project | None) -> tuple[CameraRig, dict[str, Path]]:
+def _calibrated(path: Path, settings: RecordingSettings, project: Project) -> tuple[CameraRig, dict[str, Path]]:
     """All calibrated cameras, and the videos or folders of images of those that are used."""
     calibration = _calibration(path, settings, project)
     sources = find_sources(path)
@@ -153,7 +153,7 @@ def _calibrated(path: Path, settings: RecordingSettings, project: Project | None
     return rig, {camera: sources[camera] for camera in cameras}
 
 
-def _calibration(path: Path, settings: RecordingSettings, project: Project | None) -> Path:
+def _calibration(path: Path, settings: RecordingSettings, project: Project) -> Path:
     """The calibration that recording.yaml names, else the only one that there is."""
     if settings.calibration is not None:
         named = named_calibration(path, settings.calibration, project)
@@ -207,13 +207,9 @@ def _scheme(path: Path, named: str | None) -> str | None:
     return str(path / named) if named is not None and (path / named).is_file() else named
 
 
-def _doubts(path: Path, given: RecordingSettings, rig: CameraRig, project: Project | None) -> list[str]:
+def _doubts(path: Path, given: RecordingSettings, rig: CameraRig, project: Project) -> list[str]:
     """Sentences on what may be wrong with the world; `given` are the settings of recording.yaml alone."""
-    doubts = []
-    if given.up is None and project is None:
-        doubts.append(f"{path}: does not give the vertical; {DEFAULT_UP} is assumed (`up:` in recording.yaml)")
-    elif given.up is None and project is not None and project.doubt:
-        doubts.append(project.doubt)
+    doubts = [project.doubt] if given.up is None and project.doubt else []
     distances = np.linalg.norm(np.asarray(rig.cameras.camera_from_world)[:, :3, 3], axis=-1)
     if distances.max() > 100.0:  # metres, at which a camera's place is suspected to be in other units
         doubts.append(

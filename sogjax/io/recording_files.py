@@ -18,6 +18,7 @@ class RecordingFile:
 
     name: str
     holds: str
+    """What is in it."""
     check: Callable[[Path], object] | None = None
     """Reads it and complains of what is wrong; None where that takes the cameras, and `open_recording` does it."""
     is_folder: bool = False
@@ -96,7 +97,7 @@ def named_subjects(recording: Path) -> tuple[str, ...]:
 
 
 def posed_subjects(recording: Path) -> tuple[str | None, ...]:
-    """Of whom a recording has example poses; None stands for a subject without a name.
+    """The subjects of whom a recording has example poses; None stands for a subject without a name.
 
     Raises:
         InputError: recording.yaml cannot be read.

@@ -19,9 +19,9 @@ class TimedImages:
     """The images of a camera's frames, taken by their time stamps."""
 
     picked: tuple[int, ...]
-    """Of the file, for each frame."""
+    """The image of the file that each frame is."""
     lost: tuple[int, ...]
-    """Frames whose own image is not in the file."""
+    """The frames whose own image is not in the file."""
 
 
 @dataclass(frozen=True)
@@ -31,16 +31,16 @@ class ClipFrames:
     fps: float
     numbers: range
     num_images: dict[str, int]
-    """By camera, after its images were taken by their time stamps."""
+    """How many frames each camera has, after its images were taken by their time stamps."""
     timed: dict[str, TimedImages]
-    """By camera whose images are taken by their time stamps."""
+    """The images of the cameras of which they are taken by their time stamps."""
     warnings: tuple[str, ...]
 
 
 def clip_frames(
     path: Path,
     settings: RecordingSettings,
-    project: Project | None,
+    project: Project,
     sources: dict[str, Path],
     infos: dict[str, SourceInfo],
     offsets: dict[str, int],
@@ -53,14 +53,13 @@ def clip_frames(
     fps = _frame_rate(path, settings, infos)
     timed = _images_by_time(sources, infos, fps) if settings.time_stamps else {}
     counts = {name: len(timed[name].picked) if name in timed else info.num_frames for name, info in infos.items()}
-    if project is not None:
-        settings = project.within(settings, min(counts[camera] - offsets[camera] for camera in counts))
+    settings = project.within(settings, min(counts[camera] - offsets[camera] for camera in counts))
     first, last, warnings = _frames_in_common(path, settings, counts, offsets)
     return ClipFrames(fps, range(first, last + 1), counts, timed, warnings)
 
 
 def _frame_rate(path: Path, settings: RecordingSettings, infos: dict[str, SourceInfo]) -> float:
-    """Frames per second: from recording.yaml, else from the videos' headers."""
+    """The frames per second: those of recording.yaml, else of the videos' headers."""
     tolerance = 5e-4  # relative difference that is taken for rounding (29.97 and 30 differ by 1e-3)
     if settings.fps is not None:
         return settings.fps
@@ -81,7 +80,7 @@ def _frame_rate(path: Path, settings: RecordingSettings, infos: dict[str, Source
 
 
 def _images_by_time(sources: dict[str, Path], infos: dict[str, SourceInfo], fps: float) -> dict[str, TimedImages]:
-    """By camera that has a video: folders of images have no times."""
+    """The images of the cameras that have a video: folders of images have no times."""
     found = {}
     for camera, info in infos.items():
         if not sources[camera].is_dir():
@@ -98,7 +97,7 @@ def _images_by_time(sources: dict[str, Path], infos: dict[str, SourceInfo], fps:
 
 
 def timed_images(times: Float[np.ndarray, "image"], fps: float) -> TimedImages:
-    """For each frame of a fixed rate, counted from the first image, the image nearest in time.
+    """The images of the frames of a fixed rate: for each, counted from the first image, the image nearest in time.
 
     `times` of the images are in seconds and ascend. Phones and cameras that drop images write videos of varying rate:
     if counted, their images drift away from the others'.

@@ -1,16 +1,24 @@
-"""The content of `recording.yaml`; every key is optional."""
+"""`recording.yaml`: its keys, all of them optional, and writing some without changing anything else in it."""
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
 from typing import Any
 
+import yaml
+
+from sogjax.errors import InputError
 from sogjax.io.calibration.rig import METRES_PER_UNIT
 from sogjax.io.example_poses import ExampleSettings, read_examples
+from sogjax.io.files import write_file
 from sogjax.io.image_file import ColorGains
 from sogjax.io.yaml_entry import Entry, read_yaml
 from sogjax.model.rotation import UP_AXES
 
+DEFAULT_UP = "z"
+"""The vertical of a recording that does not give it."""
 FASTEST = 10_000.0
 """Frames per second; a faster camera is taken for a mistake."""
 
@@ -31,9 +39,8 @@ class RecordingSettings:
     """Whether images are selected by their times in the video files instead of counted."""
     fewest_cameras: int | None = None
     missing: dict[str, tuple[tuple[int, int], ...]] = field(default_factory=dict)
-    """By camera the first and last frame of each while in which its pictures are not to be used."""
+    """First and last frame of each while in which a camera's pictures are not to be used."""
     color_gains: dict[str, ColorGains] = field(default_factory=dict)
-    """By camera."""
     example_poses: tuple[ExampleSettings, ...] | None = None
     keypoint_scheme: str | None = None
     subject: tuple[str, ...] = ()
@@ -79,7 +86,7 @@ def _camera_names(entry: Entry) -> tuple[str, ...]:
 
 
 def _subjects(entry: Entry) -> tuple[str, ...]:
-    """One name or several, which become names of files."""
+    """The names, one or several, which become names of files."""
     names = [item.file_name() for item in (entry.items() if isinstance(entry.value, list) else [entry])]
     return _each_once(entry, names, "the name of whom the recording shows, or a list of names, each once")
 
@@ -134,4 +141,56 @@ _READERS: dict[str, Callable[[Entry], Any]] = {
     "keypoint_scheme": Entry.file_name,
     "subject": _subjects,
 }
-"""By key of the file, which is also the field's name: what reads its value."""
+"""What reads the value of each key of the file; the keys are also the fields' names."""
+
+
+def offsets_line(offsets: Mapping[str, float | int]) -> str:
+    """What recording.yaml says of offsets: whole numbers where they are whole, else with two decimals."""
+    shown = {name: int(offset) if float(offset).is_integer() else round(offset, 2) for name, offset in offsets.items()}
+    return f"frame_offset: {{{', '.join(f'{json.dumps(name)}: {offset}' for name, offset in shown.items())}}}"
+
+
+def write_frame_offsets(path: Path, offsets: Mapping[str, float | int]) -> Path | None:
+    """Write `frame_offset` to `path`, replacing an older one; comments and other keys stay.
+
+    Returns:
+        The path of the kept old file, None if there was none.
+
+    Raises:
+        InputError: a file that is no recording.yaml, or a folder that cannot be written.
+    """
+    line = offsets_line(offsets)
+    if not path.exists():
+        write_file(path, line + "\n")
+        return None
+    read_recording_settings(path)
+    before = path.read_text(encoding="utf-8-sig")
+    names = (path.with_name(f"{path.name}.{number}.old") for number in count(1))
+    kept = next(name for name in names if not name.exists())
+    write_file(kept, before)
+    write_file(path, with_entries(path, before, {"frame_offset": line}))
+    return kept
+
+
+def with_entries(path: Path, text: str, lines: Mapping[str, str]) -> str:
+    """The text of the recording.yaml at `path` with lines in place of what it said of their keys, or at its end.
+
+    Raises:
+        InputError: a file whose entries cannot be replaced line by line.
+    """
+    for key, line in lines.items():
+        text = _with_entry(path, text, key, line)
+    return text
+
+
+def _with_entry(path: Path, text: str, wanted: str, line: str) -> str:
+    root = yaml.compose(text, Loader=yaml.SafeLoader)
+    if root is None:
+        return text + ("" if text.endswith("\n") or not text else "\n") + line + "\n"
+    if root.flow_style:
+        raise InputError(f"{path}: is written in braces; write `{line}` into it by hand")
+    for key, value in root.value:
+        if key.value == wanted:
+            block = isinstance(value, yaml.MappingNode) and not value.flow_style  # it ends where the next key begins
+            return text[: key.start_mark.index] + line + ("\n" if block else "") + text[value.end_mark.index :]
+    return text[: root.end_mark.index].rstrip("\n") + "\n" + line + "\n" + text[root.end_mark.index :]

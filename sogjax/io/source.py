@@ -43,7 +43,7 @@ class ImageStream(Protocol[Image]):
 
 
 def find_sources(folder: Path) -> dict[str, Path]:
-    """By camera the video in `videos/` (of a FreeMoCap recording `synchronized_videos/`) or the folder in `images/`.
+    """The cameras' videos in `videos/` (in FreeMoCap's recordings `synchronized_videos/`) or folders in `images/`.
 
     Raises:
         InputError: there are none, or a camera has two.
@@ -85,11 +85,7 @@ def open_source(path: Path, start: int = 0, threads: int = 1, picked: Sequence[i
 def open_with_least_work(
     path: Path, start: int = 0, threads: int = 1, picked: Sequence[int] | None = None
 ) -> ImageStream[Bgr | YuvPicture]:
-    """What `open_source` gives, but the images of a video stay in its own colours where they can be read so.
-
-    Raises:
-        InputError: the video or folder cannot be opened.
-    """
+    """What `open_source` gives, but the images of a video stay in its own colours where they can be read so."""
     video = None if path.is_dir() else plane_video(path, 0 if picked is not None else start, threads)
     if video is None:
         return open_source(path, start, threads, picked)
@@ -130,8 +126,8 @@ def look_at_source(path: Path) -> SourceInfo:
     size = (image.shape[1], image.shape[0])
     if path.is_dir():
         return SourceInfo(None, len(numbered_images(path)), size)
-    facts = look_at_video(path)
-    return SourceInfo(facts.fps, facts.num_frames, size, facts.times)
+    fps, num_frames, times = look_at_video(path)
+    return SourceInfo(fps, num_frames, size, times)
 
 
 def numbered_images(folder: Path) -> list[Path]:

@@ -11,13 +11,9 @@ LARGEST = 1e9
 
 
 class Lines:
-    """The lines of a file that are not empty, as words.
+    """The lines of a file that are not empty, as words, up to a line that begins with `until`.
 
-    Args:
-        path: of the file.
-        max_bytes: a larger file is refused.
-        own_line: characters that stand on lines of their own, wherever they are.
-        until: the beginning of the line before which reading ends.
+    The characters of `own_line` stand on lines of their own, wherever they are.
 
     Raises:
         InputError: the file cannot be read, has more than `max_bytes` or is no text.

@@ -1,4 +1,4 @@
-"""The images of a recording, time step by time step, and writing videos."""
+"""The images of a recording, time step by time step, and the writer of videos."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -23,47 +23,47 @@ from sogjax.model.yuv_picture import YuvPicture
 Item = TypeVar("Item")
 
 
-def read_frames(recording: Recording, start: int = 0, stop: int | None = None) -> Iterator[list[Any]]:
+def read_frames(recording: Recording, start: int | None = None, stop: int | None = None) -> Iterator[list[Any]]:
     """The images of each time step, BGR, in the order of the rig's cameras; None where a camera is missing.
 
-    `start` and `stop` count from the recording's first frame. Threads decode the cameras, one time step
-    ahead of the consumer; when the consumer stops, all files are closed.
+    `start` and `stop` are the recording's numbers of the first frame and of the one after the last. Threads decode the
+    cameras, one time step ahead of the consumer; when the consumer stops, all files are closed.
 
     Raises:
         InputError: a video ends early or changes its size.
     """
-    return read_prepared(recording, lambda camera, image: image, start, stop)
+    return read_prepared(recording, lambda camera, frame, image: image, start, stop)
 
 
 def read_prepared(
     recording: Recording,
-    prepare: Callable[[int, Any], Item],
-    start: int = 0,
+    prepare: Callable[[int, int, Any], Item],
+    start: int | None = None,
     stop: int | None = None,
-    workers: int | None = None,
     planes: bool = False,
 ) -> Iterator[list[Item]]:
-    """The same, but what `prepare` makes of each image (None where a camera is missing) and the number of its camera.
+    """What `prepare` makes of each camera, frame and image (None where it is missing), time step by time step.
 
-    The decoding threads do that, so a large image need not outlive the moment in which it was decoded. There are
-    `workers` of them, by default one for each core. With `planes`, an image may come in its video's own colours
-    (`YuvPicture`), which spares the conversion of every pixel, unless the colours of its camera are to be evened out.
+    The decoding threads do that, so a large image need not outlive the moment in which it was decoded. Frames count as
+    in `read_frames`. With `planes`, an image may come in its video's own colours (`YuvPicture`), which spares the
+    conversion of every pixel, unless the colours of its camera are to be evened out.
 
     Raises:
         InputError: a video ends early or changes its size.
     """
-    stop = recording.num_frames if stop is None else min(stop, recording.num_frames)
-    if not 0 <= start <= stop:
-        raise ValueError(f"frames {start} to {stop} are not in a recording of {recording.num_frames} frames")
-    return _decoded_ahead(recording, prepare, start, stop, workers or os.cpu_count() or 1, planes)
+    known = recording.frames
+    start, stop = known.start if start is None else start, known.stop if stop is None else min(stop, known.stop)
+    if not known.start <= start <= stop:
+        raise ValueError(f"frames {start} to {stop} are not in a recording of the frames {known.start} to {known[-1]}")
+    return _decoded_ahead(recording, prepare, start, stop, planes)
 
 
 def _decoded_ahead(
-    recording: Recording, prepare: Callable[[int, Any], Item], start: int, stop: int, workers: int, planes: bool
+    recording: Recording, prepare: Callable[[int, int, Any], Item], start: int, stop: int, planes: bool
 ) -> Iterator[list[Item]]:
     if start == stop:
         return
-    cameras = recording.rig.names
+    cameras, workers = recording.rig.names, os.cpu_count() or 1
     threads = max(1, workers // len(cameras))
     with ExitStack() as stack:
         pool = stack.enter_context(ThreadPoolExecutor(min(len(cameras), workers)))
@@ -71,7 +71,7 @@ def _decoded_ahead(
             pool.submit(
                 open_with_least_work if planes and camera not in recording.color_gains else open_source,
                 recording.sources[camera],
-                max(recording.first_frame + start + recording.frame_offset[camera], 0),
+                max(start + recording.frame_offset[camera], 0),
                 threads,
                 recording.picked.get(camera),
             )
@@ -85,11 +85,11 @@ def _decoded_ahead(
         def decoded(camera: int, frame: int) -> Item:
             name = cameras[camera]
             if camera in ended or not recording.has_image(name, frame):
-                return prepare(camera, None)
+                return prepare(camera, frame, None)
             image = _checked(recording, name, sources[camera].read(), frame)
             if image is None:
                 ended.add(camera)  # what might still come would be images of other frames
-            return prepare(camera, None if recording.is_missing(name, frame) else image)
+            return prepare(camera, frame, None if recording.is_missing(name, frame) else image)
 
         decode = lambda frame: [pool.submit(decoded, camera, frame) for camera in range(len(cameras))]
         upcoming = decode(start)
@@ -110,17 +110,17 @@ def _close_all(opened: list[Future[ImageStream[Any]]]) -> None:
 def _checked(
     recording: Recording, camera: str, image: np.ndarray | YuvPicture | None, frame: int
 ) -> np.ndarray | YuvPicture | None:
-    source, number = recording.sources[camera], recording.first_frame + frame
+    source = recording.sources[camera]
     if image is None and recording.fewest_cameras is not None:
         return None
     if image is None:
         raise InputError(
-            f"{source}: ends before frame {number}, though its header promises more; "
-            f"set `last_frame: {number - 1}` in recording.yaml, or convert the video again"
+            f"{source}: ends before frame {frame}, though its header promises more; "
+            f"set `last_frame: {frame - 1}` in recording.yaml, or convert the video again"
         )
     size = (image.shape[1], image.shape[0])
     if size != recording.rig.image_size(camera):
-        raise InputError(f"{source}: its frame {number} is {size[0]}x{size[1]}, unlike the first; convert it again")
+        raise InputError(f"{source}: its frame {frame} is {size[0]}x{size[1]}, unlike the first; convert it again")
     return image if isinstance(image, YuvPicture) else evened(image, recording.color_gains.get(camera))
 
 

@@ -3,7 +3,6 @@
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -18,10 +17,8 @@ from sogjax.io.image_file import MAX_PIXELS
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 
-UNSTEADY = 0.25
-"""Part of a frame by which an image comes too early or too late to be found by its time."""
 _COUNT_PACKETS_BELOW = 256 * 2**20
-"""Bytes. The packets of larger videos are not counted, which would mean reading the whole file."""
+"""The bytes of a file from which on its packets are not counted, which would mean reading all of it."""
 
 
 class VideoFile:
@@ -58,26 +55,12 @@ class VideoFile:
             self._capture.grab()
 
 
-@dataclass(frozen=True)
-class VideoFacts:
-    """What a video's file says about it, checked where that is cheap."""
-
-    fps: float
-    num_frames: int
-    times: Float[np.ndarray, "frame"] | None
-    """When each frame is to be shown, in seconds and ascending; None for files too large to read."""
-
-
-def look_at_video(path: Path) -> VideoFacts:
-    """Rate, length and times of a video, decoding hardly anything of it.
-
-    Raises:
-        InputError: it cannot be opened.
-    """
+def look_at_video(path: Path) -> tuple[float, int, Float[np.ndarray, "frame"] | None]:
+    """Rate, number and times of a video's images, decoding hardly any; None: it is too large to read the times."""
     with _captured(path) as capture:
         fps, claimed = capture.get(cv2.CAP_PROP_FPS), int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
     times = frame_times(path) if path.stat().st_size < _COUNT_PACKETS_BELOW else None
-    return VideoFacts(fps, _num_frames(path, claimed, times), times)
+    return fps, _num_frames(path, claimed, times), times
 
 
 def frame_times(path: Path) -> Float[np.ndarray, "frame"]:
@@ -106,7 +89,8 @@ def _steady(path: Path, fps: float) -> bool:
 def _is_steady(path: Path, fps: float, state: tuple[int, int]) -> bool:
     times = frame_times(path)
     expected = np.arange(len(times)) / max(fps, 1e-6)
-    return len(times) > 0 and bool(np.all(np.abs(times - times[0] - expected) * fps < UNSTEADY))
+    # An image that comes a quarter of a frame too early or too late is not found by its time.
+    return len(times) > 0 and bool(np.all(np.abs(times - times[0] - expected) * fps < 0.25))
 
 
 def _capture(path: Path, parameters: Sequence[int] = ()) -> cv2.VideoCapture:

@@ -130,11 +130,7 @@ class Entry:
 
 
 def read_yaml(path: Path) -> Entry:
-    """The content of a YAML file of at most `MAX_BYTES`, without aliases and without repeated keys.
-
-    Raises:
-        InputError: the file cannot be read, is too large or is no such YAML.
-    """
+    """The content of a YAML file of at most `MAX_BYTES`, without aliases and without repeated keys."""
     content = read_bounded(path, MAX_BYTES)
     try:
         return Entry(path, "", yaml.load(content, Loader=_StrictLoader))

@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jax.scipy.linalg import block_diag
+from jaxtyping import Array, Float, Int
 
 from sogjax.model.rotation import transform_points
 from sogjax.model.skeleton import Skeleton
@@ -57,12 +59,17 @@ class Body(eqx.Module):
     poses: dict[str, Float[Array, "dof"]]
     shape_groups: tuple[ShapeGroup, ...] = eqx.field(static=True, default=())
     explained: Float[Array, ""] = eqx.field(default_factory=lambda: jnp.zeros((), jnp.float32))
-    """Of an actor: how much of it its example poses explain (0 to 1); 0: not known."""
+    """The part of an actor that its example poses explain (0 to 1); 0 where that is not known."""
 
     @property
     def num_blobs(self) -> int:
         """Number of blobs; none of them is padding."""
         return len(self.blobs.names)
+
+    @property
+    def blob_actors(self) -> Int[np.ndarray, "blob"]:
+        """The number of the actor (tree of the skeleton) that each blob belongs to."""
+        return np.array(self.skeleton.trees, int)[np.array(self.blobs.joints, int)]
 
     def posed_blobs(self, pose: Float[Array, "dof"]) -> Sog:
         """The blobs in the world in `pose` (sRGB colours)."""
@@ -120,7 +127,7 @@ def concatenate(bodies: Sequence[Body]) -> Body:
         offsets=join(lambda body: body.skeleton.offsets),
         axes=join(lambda body: body.skeleton.axes),
         revolute=join(lambda body: body.skeleton.revolute),
-        parameter_transform=_block_diagonal([s.parameter_transform for s in skeletons]),
+        parameter_transform=block_diag(*(skeleton.parameter_transform for skeleton in skeletons)),
         dof_lower=join(lambda body: body.skeleton.dof_lower),
         dof_upper=join(lambda body: body.skeleton.dof_upper),
     )
@@ -136,19 +143,6 @@ def concatenate(bodies: Sequence[Body]) -> Body:
 
 
 def dof_slices(bodies: Sequence[Body]) -> list[slice]:
-    """Where each body's degrees of freedom lie in the concatenated pose."""
-    return _slices([body.skeleton.num_dofs for body in bodies])
-
-
-def _slices(counts: Sequence[int]) -> list[slice]:
-    ends = np.cumsum(counts)
-    return [slice(int(end) - count, int(end)) for end, count in zip(ends, counts, strict=True)]
-
-
-def _block_diagonal(blocks: Sequence[Float[Array, "_ _"]]) -> Float[Array, "joints dofs"]:
-    rows = []
-    for k, block in enumerate(blocks):
-        left = sum(b.shape[1] for b in blocks[:k])
-        right = sum(b.shape[1] for b in blocks[k + 1 :])
-        rows.append(jnp.pad(block, ((0, 0), (left, right))))
-    return jnp.concatenate(rows)
+    """The slices of the concatenated pose that hold each body's degrees of freedom."""
+    ends = np.cumsum([0, *(body.skeleton.num_dofs for body in bodies)])
+    return [slice(int(first), int(stop)) for first, stop in pairwise(ends)]

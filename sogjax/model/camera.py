@@ -3,7 +3,8 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.model.compiled import applied
 from sogjax.model.rotation import transform_points
@@ -19,6 +20,9 @@ MAX_FISHEYE_ANGLE = 1.45
 pinhole picture ends at 90 degrees."""
 
 MAX_MAGNIFICATION = 4.0
+
+CELL_MARGIN = 0.2
+"""Picture sizes outside the picture within which the lens model is asked for a cell."""
 
 
 class Camera(eqx.Module):
@@ -41,6 +45,11 @@ class Camera(eqx.Module):
     def focal_length(self) -> Float[Array, "*camera"]:
         """One focal length in pixels: the geometric mean of fx and fy."""
         return jnp.sqrt(self.intrinsics[..., 0, 0] * self.intrinsics[..., 1, 1])
+
+
+def camera_of(cameras: Camera, index: int) -> Camera:
+    """One camera of a stack."""
+    return jax.tree.map(lambda leaf: jnp.asarray(np.asarray(leaf)[index]), cameras)
 
 
 def project_points(camera: Camera, points_world: Float[Array, "n 3"]) -> tuple[Float[Array, "n 2"], Float[Array, "n"]]:
@@ -99,6 +108,19 @@ def near_picture(camera: Camera, pixels: Float[Array, "n 2"], margin: float) -> 
     size = camera.image_size[None, :]
     near = jnp.all((pixels > -margin * size) & (pixels < (1.0 + margin) * size), axis=1)
     return near if camera.fisheye is None else near | camera.fisheye
+
+
+def cells_at(
+    camera: Camera, cell_size: Float[Array, ""], pixels: Float[Array, "n 2"]
+) -> tuple[Int[Array, "n 2"], Bool[Array, "n"]]:
+    """The cell (column, row) of the picture as recorded that shows undistorted `pixels`, and which of them are in it.
+
+    Cells are squares with sides of `cell_size` pixels; for what is outside the picture, a cell of it all the same.
+    """
+    recorded = distort(camera, pixels)
+    inside = jnp.all((recorded > -0.5) & (recorded < camera.image_size[None, :] - 0.5), axis=1)
+    inside &= near_picture(camera, pixels, CELL_MARGIN)
+    return jnp.floor((jnp.where(inside[:, None], recorded, 0.0) + 0.5) / cell_size).astype(jnp.int32), inside
 
 
 def undistort(camera: Camera, pixels: Float[Array, "n 2"]) -> Float[Array, "n 2"]:

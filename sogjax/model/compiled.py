@@ -1,12 +1,4 @@
-"""Keeping the stages of a computation apart where the compiler would compute one of them again and again.
-
-Numbers of the entries that are chosen, in a fixed number of slots.
-
-Products of many small matrices, written as sums.
-
-XLA on a CPU calls a matrix routine for every pair of a batch, which costs more than the numbers of a 4x4 matrix: the
-frames of 61 joints took 124 microseconds so, and take 6 as sums, which become one loop.
-"""
+"""What XLA on a CPU compiles badly, written as it compiles well: stages, choices, products of many small matrices."""
 
 from collections.abc import Callable
 from functools import reduce
@@ -67,10 +59,14 @@ def chosen_indices(chosen: Bool[Array, "n"], capacity: int) -> tuple[Int[Array, 
 
 
 def product(a: Float[Array, "*#batch i k"], b: Float[Array, "*#batch k j"]) -> Float[Array, "*batch i j"]:
-    """Matrix products of a batch; `k` is small."""
+    """Matrix products of a batch; `k` is small.
+
+    As sums, since XLA on a CPU calls a matrix routine for every pair of a batch, which costs more than the numbers of a
+    4x4 matrix: the frames of 61 joints took 124 microseconds so, and take 6 as sums, which become one loop.
+    """
     return reduce(add, [a[..., :, k, None] * b[..., k, None, :] for k in range(a.shape[-1])])
 
 
 def applied(matrix: Float[Array, "*#batch i k"], vector: Float[Array, "*#batch k"]) -> Float[Array, "*batch i"]:
-    """Matrices times vectors; `k` is small."""
+    """Matrices times vectors as sums (see `product`); `k` is small."""
     return reduce(add, [matrix[..., :, k] * vector[..., k, None] for k in range(matrix.shape[-1])])

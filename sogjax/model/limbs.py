@@ -62,16 +62,15 @@ def joint_limbs(skeleton: Skeleton) -> Int[np.ndarray, "joint"]:
 
 
 def limb_slices(bodies: Sequence[Body]) -> list[slice]:
-    """Where each body's limbs lie among those of the concatenated model."""
+    """The slices of the concatenated model's limbs that are each body's."""
     ends = np.cumsum([0, *(len(limbs(body.skeleton)) for body in bodies)])
     return [slice(int(first), int(stop)) for first, stop in pairwise(ends)]
 
 
 def limb_blobs(body: Body) -> Bool[np.ndarray, "limb blob"]:
     """Which blobs belong to each limb."""
-    used = np.asarray(body.skeleton.parameter_transform) != 0.0
-    moved = [used[:, limb].any(axis=1) for limb in limbs(body.skeleton)]
-    return np.array([joints[np.asarray(body.blobs.joints)] for joints in moved], bool).reshape(-1, body.num_blobs)
+    of_blob = joint_limbs(body.skeleton)[np.array(body.blobs.joints, int)]
+    return np.arange(len(limbs(body.skeleton)))[:, None] == of_blob[None, :]
 
 
 def _chain(joint: int, children: list[list[int]]) -> list[int] | None:

@@ -1,7 +1,4 @@
-"""Rotations about fixed axes, and the few conversions that the file formats need.
-
-Which way is up: from the upright frame of bodies to a recording's world.
-"""
+"""Rotations about fixed axes, rigid transforms, and the vertical of bodies and of a recording's world."""
 
 import jax.numpy as jnp
 import numpy as np

@@ -13,9 +13,9 @@ from sogjax.model.body import Body, ShapeGroup
 LENGTH_SPREAD = 0.05
 """Expected deviation of a bone's scale factor from the whole body's (logarithm): people's proportions are alike."""
 SIZE_SPREAD = 0.2
-"""The same for places across a bone and for sizes, which clothes change."""
+"""Expected deviation of the scale factors (logarithm) of places across a bone and of sizes, which clothes change."""
 WHOLE_SPREAD = 1.0
-"""The same for the whole body: next to nothing is known."""
+"""Expected deviation of the whole body's scale factor (logarithm): next to nothing is known."""
 
 
 class ShapeModel(eqx.Module):
@@ -31,7 +31,7 @@ class ShapeModel(eqx.Module):
     sigma_groups: Float[Array, "blob shape"]
     landmark_groups: Float[Array, "landmark shape"]
     names: tuple[str, ...] = eqx.field(static=True)
-    """Of the shape parameters."""
+    """The names of the shape parameters."""
     spread: Float[Array, "shape"]
     """Expected deviation of each shape parameter from 0."""
 

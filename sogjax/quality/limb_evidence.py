@@ -14,7 +14,7 @@ from jaxtyping import Array, Bool, Float, UInt8
 from sogjax.energy.posed import Posed
 from sogjax.energy.views import Windows
 from sogjax.model.body import Body
-from sogjax.model.camera import Camera, distort, near_picture, project
+from sogjax.model.camera import Camera, cells_at, project
 from sogjax.model.limbs import limb_blobs
 from sogjax.model.sog import Sog
 from sogjax.scene.foreground import SubjectColors, own_color, own_density, subject_density
@@ -44,7 +44,7 @@ class LimbBlobs(eqx.Module):
             members=jnp.asarray(members),
             worst=jnp.asarray(worst, body.blob_sigmas.dtype),
             of_other_parts=jnp.asarray(parts[:, None] != parts[None, :], body.blob_sigmas.dtype),
-            actor_of_blob=tuple(body.skeleton.trees[joint] for joint in body.blobs.joints),
+            actor_of_blob=tuple(body.blob_actors.tolist()),
         )
 
     def mean_of_worst(self, values: Float[Array, "blob"]) -> Float[Array, "limb"]:
@@ -61,8 +61,6 @@ DENSITY = 2.0
 """Of a blob's middle along a ray, as in the foreground term."""
 BACKGROUND = -0.3
 """Log odds below which a sample speaks for the background."""
-BEYOND = 0.2
-"""Of the picture's size, outside it, where the lens model still means something."""
 
 
 class BlobEvidence(NamedTuple):
@@ -90,15 +88,7 @@ def blob_evidence(
 ) -> BlobEvidence:
     """The evidence for a posed body.
 
-    Args:
-        limbs: of the body.
-        posed: where it is.
-        cameras: that see it.
-        windows: foreground around each actor; None: no background is known.
-        cells: the pictures (sRGB bytes).
-        cell_sizes: their sides, pixels.
-        subject: the colours that the actors have.
-        present: cameras that have a picture; None: all.
+    `windows` is None where no background is known; `present` are the cameras that have a picture (None: all).
     """
     seen = jax.vmap(project, in_axes=(0, None))(cameras, posed.blobs)
     sigmas = jnp.where(seen.mask, seen.sigmas, 1.0)
@@ -126,11 +116,7 @@ def _colors_at(
     camera: Camera, cell_size: Float[Array, ""], places: Float[Array, "blob sample 2"], cells: UInt8[Array, "_ _ 3"]
 ) -> tuple[Float[Array, "blob sample 3"], Bool[Array, "blob sample"]]:
     """The colours (sRGB, 0 to 1) at undistorted pixels of one camera, and which of these are in its picture."""
-    pixels = places.reshape(-1, 2)
-    recorded = distort(camera, pixels)
-    inside = jnp.all((recorded > -0.5) & (recorded < camera.image_size[None, :] - 0.5), axis=1)
-    inside &= near_picture(camera, pixels, BEYOND)
-    cell = jnp.floor((jnp.where(inside[:, None], recorded, 0.0) + 0.5) / cell_size).astype(jnp.int32)
+    cell, inside = cells_at(camera, cell_size, places.reshape(-1, 2))
     colors = cells[cell[:, 1], cell[:, 0]].astype(places.dtype) / 255.0
     return colors.reshape(*places.shape[:2], 3), inside.reshape(places.shape[:2])
 

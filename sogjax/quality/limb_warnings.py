@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool
 
 from sogjax.io.motion import Motion
 from sogjax.model.body import Body
+from sogjax.quality.metrics import stretches
 
 LIKELY_LOST = 0.5
 """A limb is in doubt where it is more likely lost than not."""
@@ -48,21 +49,9 @@ def doubtful_limbs(motion: Motion) -> tuple[DoubtfulLimb, ...]:
     found = [
         DoubtfulLimb(str(name), int(motion.frame[first]), int(motion.frame[stop - 1]), float(doubt[first:stop].mean()))
         for name, doubt in zip(motion.limb_names, motion.limb_doubt.T, strict=True)
-        for first, stop in _stretches(doubt)
+        for first, stop in stretches(doubt > LIKELY_LOST, AT_LEAST, gap=AT_LEAST)
     ]
     return tuple(sorted(found, key=lambda limb: (limb.first_frame, limb.name)))
-
-
-def _stretches(doubt: Float[np.ndarray, "frame"]) -> list[tuple[int, int]]:
-    """[first, end) of the stretches of one limb."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], doubt > LIKELY_LOST, [False]]).astype(int)))
-    joined: list[list[int]] = []
-    for first, stop in edges.reshape(-1, 2).tolist():
-        if joined and first - joined[-1][1] < AT_LEAST:
-            joined[-1][1] = stop
-        else:
-            joined.append([first, stop])
-    return [(first, stop) for first, stop in joined if stop - first >= AT_LEAST]
 
 
 AT_LIMIT = 0.03

@@ -1,7 +1,7 @@
 """Virtual markers on a tracked body (Section 6), and distances of markers and joints to the truth."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -17,8 +17,6 @@ SAME_ORIGIN = 1e-4
 MarkerRule = Literal["scaled", "closest"]
 """Which blob of a body is closest to a marker: in the blob's own sigmas, or by plain distance (Section 6)."""
 MARKER_RULES: tuple[MarkerRule, ...] = ("scaled", "closest")
-
-_BY_FRAME = "frame time pose joint_params world_from_joint blob_means similarity energy iterations converged"
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,9 @@ def common_frames(motion: Motion, truth: GroundTruth) -> tuple[Int[np.ndarray, "
     Raises:
         InputError: different frame rates, a motion that is not finite, or no common frame.
     """
-    if not np.isclose(float(motion.fps), float(truth.fps), rtol=1e-3):
+    steps = np.diff(np.asarray(motion.frame))
+    every = int(steps.min()) if len(steps) else 1  # of how many frames of the recording one was tracked
+    if not np.isclose([float(motion.fps), every * float(motion.fps)], float(truth.fps), rtol=1e-3).any():
         raise InputError(
             f"the motion has {float(motion.fps):g} frames per second and the truth {float(truth.fps):g}; "
             "resample the truth to the motion's rate"
@@ -83,10 +83,7 @@ def attach_markers(
     By plain distance (`closest`, Section 6), a marker on a thigh may go with the hand that hangs in front of it: the
     hand's blob is small and its centre near. In the blob's own sigmas (`scaled`) it goes with the thigh.
 
-    Args:
-        motion: the tracked motion.
-        markers: where the markers are, one row for each row of `motion`.
-        rule: what closest means.
+    `markers` has one row for each row of `motion`.
     """
     present = ~np.isnan(markers.sum(axis=2))
     first = present.argmax(axis=0)
@@ -109,7 +106,7 @@ def marker_errors(motion: Motion, truth: GroundTruth, rule: MarkerRule = "scaled
     if truth.markers is None:
         return None
     rows, truth_rows = common_frames(motion, truth)
-    part = _rows_of(motion, rows)
+    part = motion.of_rows(rows)
     markers = np.asarray(truth.markers, float)[truth_rows]
     virtual = attach_markers(part, markers, rule)
     names = np.append(np.asarray(motion.joint_names, str), "")
@@ -127,10 +124,7 @@ def joint_errors(motion: Motion, truth: GroundTruth, mapping: Mapping[str, str] 
     (`left_shoulder` is `left_shoulder_flexion`) if those share one place; `l_` and `r_` read as `left_` and
     `right_`.
 
-    Args:
-        motion: the tracked motion.
-        truth: the truth.
-        mapping: truth's name to motion's name, for what the names do not say themselves.
+    `mapping` is from the truth's names to the motion's, for what the names do not say themselves.
 
     Raises:
         InputError: the mapping names a joint that one of the two does not have.
@@ -176,8 +170,3 @@ def _joint_named(motion: Motion, names: list[str], truth_name: str) -> int | Non
         return None
     origins = motion.world_from_joint[:, joints][..., :3, 3]
     return joints[0] if np.abs(origins - origins[:, :1]).max() < SAME_ORIGIN else None
-
-
-def _rows_of(motion: Motion, rows: Int[np.ndarray, "common"]) -> Motion:
-    """The motion in `rows` only."""
-    return replace(motion, **{name: getattr(motion, name)[rows] for name in _BY_FRAME.split()})

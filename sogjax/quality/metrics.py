@@ -6,7 +6,7 @@ Bone lengths of an actor against the truth's.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from sogjax.io.ground_truth import GroundTruth
 from sogjax.model.body import Body
@@ -99,10 +99,13 @@ def lost_points(
     return tuple(lost)
 
 
-def stretches(flags: np.ndarray, at_least: int) -> list[tuple[int, int]]:
-    """[first, end) of every run of true `flags` that is `at_least` long."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2) if b - a >= at_least]
+def stretches(flags: Bool[np.ndarray, "frame"], at_least: int = 1, gap: int = 1) -> list[tuple[int, int]]:
+    """[first, end) of every run of true `flags`, over gaps of fewer than `gap` frames, that is `at_least` long."""
+    joined: list[tuple[int, int]] = []
+    for first, end in np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int))).reshape(-1, 2):
+        before = joined.pop() if joined and first - joined[-1][1] < gap else (first, end)
+        joined.append((int(before[0]), int(end)))
+    return [(first, end) for first, end in joined if end - first >= at_least]
 
 
 def _mean_of_present(values: np.ndarray, axis: int) -> np.ndarray:

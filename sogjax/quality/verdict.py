@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from sogjax.io.motion import Motion
+from sogjax.model.body import Body
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.limb_warnings import DoubtfulLimb, Limits, doubtful_limbs, joints_at_limits
 from sogjax.quality.metrics import stretches
@@ -68,6 +69,11 @@ class Verdict:
         return cls(**own)
 
 
+def expected_of(bodies: Sequence[Body]) -> dict[str, float]:
+    """How much of each actor its example poses explain, where that is known."""
+    return {body.name: float(body.explained) for body in bodies if float(body.explained) > 0.0}
+
+
 def verdicts(
     motions: Mapping[str, Motion],
     expected: Mapping[str, float],
@@ -75,10 +81,8 @@ def verdicts(
 ) -> dict[str, Verdict]:
     """Of the actors of a run.
 
-    Args:
-        motions: by actor.
-        expected: what actors explain in their example poses, where that is known.
-        limits: by actor and degree of freedom.
+    `expected` is what actors explain in their example poses, where that is known; `limits` are those of their bodies
+    (`limits_of`).
     """
     limits = limits or {}
     return {

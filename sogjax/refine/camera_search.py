@@ -36,13 +36,8 @@ def found_cameras(
 ) -> FoundCameras | None:
     """Moves of cameras that explain the clip clearly better; None: there are none.
 
-    Args:
-        energy: of the clip, with velocities.
-        poses: of highest energy with the cameras as they are.
-        params: the same: shape parameters, then moves.
-        with_shape: whether the shape may change.
-        names: of the parts of a move that are in question: turn, place, time.
-        report: is told what is free after each round.
+    `poses` and `params` (shape, then moves) are those of highest energy with the cameras as they are; `names` are the
+    parts of a move that are in question (turn, place, time). After each round `report` is told what is free.
     """
     shape = energy.shape.num_params
     cameras = (energy.num_shared - shape) // MOVE

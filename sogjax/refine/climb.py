@@ -52,13 +52,8 @@ def climbed(
 ) -> Climbed:
     """The poses and the shape of highest energy near a start; only steps that raise it are taken.
 
-    Args:
-        energy: of the clip.
-        poses: to begin with.
-        params: of the shape, to begin with.
-        free: which shared parameters may change.
-        held: frames whose poses stay.
-        tracked: the poses and the shape whose energy is that before; None: those to begin with.
+    `free` marks the shared parameters that may change, `held` the frames whose poses stay; `tracked` are the poses and
+    parameters whose energy is that before (None: those at the start).
     """
     held = np.zeros(len(poses), bool) if held is None else held
     poses, params, iterations = np.array(poses, float), np.array(params, float), 0
@@ -94,15 +89,7 @@ class _State:
 
 
 class _Climb:
-    """A round: steps for which one list of pairs holds.
-
-    Args:
-        energy: with its pairs.
-        poses: to begin with.
-        params: of the shape, to begin with.
-        free: which shared parameters may change.
-        held: frames whose poses stay.
-    """
+    """A round: steps for which one list of pairs holds."""
 
     def __init__(
         self,

@@ -67,11 +67,8 @@ def standing(
 ) -> Bool[np.ndarray, "frame blob"]:
     """Which blobs stand from each frame to the next one, whatever body it is; the last row is false.
 
-    Args:
-        means: of the blobs, metres.
-        heights: of their undersides over the floor; NaN: there is none.
-        frames: their numbers; what is missing in between joins nothing.
-        fps: frames per second.
+    Heights are those of undersides over the floor (NaN: there is none); frames that are missing in between join
+    nothing.
     """
     pairs = np.zeros(heights.shape, bool)
     if len(frames) > 2 * SPAN:
@@ -89,12 +86,8 @@ def contact_model(
 ) -> ContactModel:
     """Minus half the weighted squares of how far standing blobs move from frame to frame, and of depths in the floor.
 
-    Args:
-        blobs: of the motion.
-        floor: its height, metres; NaN: there is none.
-        vertical: unit vector upwards.
-        pairs: which blobs stand from each frame to the next.
-        weight: 1/m^2.
+    `pairs` marks blobs that stand from each frame to the next; the floor's height is NaN where there is none; the
+    weight is in 1/m^2.
     """
     frames, shape = len(blobs.means), blobs.by_shape.shape[-1]
     depths, sinking, sinking_by_shape = _below_floor(blobs, floor, vertical)
@@ -166,11 +159,8 @@ def smooth_model(
 ) -> SmoothModel:
     """Minus Huber's penalty of the second differences of three frames that follow each other.
 
-    Args:
-        poses: radians and metres.
-        frames: their numbers; where some are missing in between, nothing is penalised.
-        weight: of half a squared second difference.
-        sudden: second difference from which on the penalty grows only linearly.
+    Where frames are missing in between, nothing is penalised. From the second difference `sudden` on (radians and
+    metres) the penalty grows only linearly; `weight` is that of half a squared one.
     """
     triples = _following(frames)[:, None]
     bend = poses[2:] - 2.0 * poses[1:-1] + poses[:-2]

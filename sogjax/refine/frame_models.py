@@ -1,24 +1,22 @@
 """Quadratic models of the energy of frames by pose, shape and cameras: what each camera pulls, times Jacobians."""
 
 from collections.abc import Sequence
-from functools import reduce
-from operator import add
 from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
-from sogjax.energy.image_term import ImageTerm
+from sogjax.energy.image_term import ImageTerm, springs_model, weighted_pulls
 from sogjax.energy.overlap import ImagePulls
 from sogjax.energy.posed import Frame, History, Posed
 from sogjax.energy.term import Terms
 from sogjax.energy.views import Views
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, project, projection_jacobian
-from sogjax.model.skeleton import Skeleton
+from sogjax.model.skeleton import ancestor_table
 from sogjax.model.sog import Sog
 from sogjax.refine.camera_moves import MOVE, Sights, sight_rates
 from sogjax.refine.clip_shape import ClipShape
@@ -85,30 +83,25 @@ def frame_model(
     posed, frame = Posed.from_pose(body, pose), Frame(views, History.unknown(pose))
     seen = _seen_by([term for term in terms if isinstance(term, ImageTerm)], posed, frame, sights)
     jacobian = jnp.concatenate([posed.point_jacobian(), blobs_by_shape(body, rates, posed.world_from_joint)], axis=2)
-    flat = lambda array: array.reshape(-1, array.shape[-1])
-    stretched = jnp.einsum("bij,bjp->bip", seen.stiffness, jacobian, precision="highest")
-    gradient = jnp.matmul(seen.by_mean.reshape(-1), flat(jacobian), precision="highest")
-    curvature = jnp.matmul(flat(jacobian).T, flat(stretched), precision="highest")
+    springs = springs_model(seen.value, seen.by_mean, seen.stiffness, jacobian)
     dofs = pose.shape[0]
     by_size = rates.blob_sigmas
-    gradient = gradient.at[dofs:].add(jnp.matmul(seen.by_sigma, by_size, precision="highest"))
+    gradient = springs.gradient.at[dofs:].add(jnp.matmul(seen.by_sigma, by_size, precision="highest"))
     sizes = jnp.matmul((by_size * seen.sigma_stiffness[:, None]).T, by_size, precision="highest")
-    curvature = curvature.at[dofs:, dofs:].add(sizes)
+    curvature = springs.curvature.at[dofs:, dofs:].add(sizes)
     others = [term.quadratic(posed, frame) for term in terms if not isinstance(term, ImageTerm)]
     model = FrameModels(
         seen.value + sum(model.value for model in others),
         gradient.at[:dofs].add(sum(model.gradient for model in others)),
         curvature.at[:dofs, :dofs].add(sum(model.curvature for model in others)),
     )
-    return model if seen.cameras is None else _with_cameras(model, flat(jacobian), seen.cameras)
+    return model if seen.cameras is None else _with_cameras(model, jacobian, seen.cameras)
 
 
-def _with_cameras(
-    model: FrameModels, jacobian: Float[Array, "coordinate param"], cameras: SeenByCameras
-) -> FrameModels:
-    """The moves as further parameters."""
-    mixed = cameras.mixed.reshape(jacobian.shape[0], -1)
-    across = jnp.matmul(jacobian.T, mixed, precision="highest")
+def _with_cameras(model: FrameModels, jacobian: Float[Array, "blob 3 param"], cameras: SeenByCameras) -> FrameModels:
+    """The model with the moves of the cameras as further parameters."""
+    flat = jacobian.reshape(-1, jacobian.shape[-1])
+    across = jnp.matmul(flat.T, cameras.mixed.reshape(len(flat), -1), precision="highest")
     count = len(cameras.curvature)
     apart = jnp.eye(count, dtype=across.dtype)[:, None, :, None] * cameras.curvature[:, :, None, :]
     own = apart.reshape(count * MOVE, count * MOVE)
@@ -127,12 +120,15 @@ def _seen_by(terms: Sequence[ImageTerm], posed: Posed, frame: Frame, sights: Sig
         return (seen.means, seen.sigmas), seen
 
     _, pull_back, seen = jax.vjp(projected, posed.blobs.means, posed.blobs.sigmas, has_aux=True)
-    pulls = reduce(lambda a, b: jax.tree.map(add, a, b), [_weighted(term, posed, seen, frame) for term in terms])
+    pulls = weighted_pulls(terms, posed, seen, frame)
     scale = 1.0 / (normalizers * normalizers.shape[0])
     scaled = jax.tree.map(lambda leaf: leaf * scale.reshape(-1, *[1] * (leaf.ndim - 1)), pulls)
     by_mean, by_sigma = pull_back((scaled.by_mean, scaled.by_sigma))
     springs = jnp.where(seen.mask, scaled.stiffness, 0.0)
-    across = _across(cameras, posed.blobs.means) if sights is None else sights.across(cameras, posed.blobs.means)
+    if sights is None:
+        across = jax.vmap(projection_jacobian, in_axes=(0, None))(cameras, posed.blobs.means)
+    else:
+        across = sights.across(cameras, posed.blobs.means)
     stiffness = jnp.einsum("cbki,cbkj->bij", across, across * springs[:, :, None, None], precision="highest")
     # A size is held as a place is: by springs in both directions, as far as it is seen enlarged.
     enlarged = seen.sigmas / posed.blobs.sigmas[None, :]
@@ -165,14 +161,6 @@ def _most(pulls: ImagePulls, springs: Float[Array, "camera blob"]) -> Float[Arra
     return 0.5 * jnp.sum(jnp.sum(pulls.by_mean**2, axis=-1) / held, axis=1)
 
 
-def _weighted(term: ImageTerm, posed: Posed, seen: Sog, frame: Frame) -> ImagePulls:
-    return jax.tree.map(lambda leaf: term.signed_weight * leaf, term.pulls(posed, seen, frame))
-
-
-def _across(cameras: Camera, means: Float[Array, "blob 3"]) -> Float[Array, "camera blob 2 3"]:
-    return jax.vmap(projection_jacobian, in_axes=(0, None))(cameras, means)
-
-
 def blobs_by_shape(
     body: Body, rates: ShapeRates, world_from_joint: Float[Array, "joint 4 4"]
 ) -> Float[Array, "blob 3 shape"]:
@@ -183,15 +171,6 @@ def blobs_by_shape(
     unturned = jnp.eye(3, dtype=rotations.dtype)[None]
     of_parents = jnp.where((parents >= 0)[:, None, None], rotations[np.maximum(parents, 0)], unturned)
     moved = jnp.einsum("jab,jbs->jas", of_parents, rates.joint_offsets, precision="highest")
-    above = jnp.asarray(_above(body.skeleton)[joints], rotations.dtype)
+    above = jnp.asarray(ancestor_table(body.skeleton.parents)[joints], rotations.dtype)
     carried = jnp.einsum("nj,jas->nas", above, moved, precision="highest")
     return carried + jnp.einsum("nab,nbs->nas", rotations[joints], rates.blob_offsets, precision="highest")
-
-
-def _above(skeleton: Skeleton) -> Bool[np.ndarray, "joint joint"]:
-    """Row j marks joint j and its ancestors."""
-    table = np.eye(skeleton.num_joints, dtype=bool)
-    for joint, parent in enumerate(skeleton.parents):
-        if parent >= 0:
-            table[joint] |= table[parent]
-    return table

@@ -1,6 +1,7 @@
 """What the pictures of a clip say near the poses that were tracked: read once, kept while they are adjusted."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import equinox as eqx
 import jax
@@ -14,20 +15,17 @@ from sogjax.energy.pairs import SparsePairs
 from sogjax.energy.similarity import similarity_among
 from sogjax.energy.views import Views
 from sogjax.model.body import Body
-from sogjax.model.camera import Camera, project
+from sogjax.model.camera import project
 from sogjax.refine.camera_moves import Sights
-from sogjax.scene.color_clusters import SLOTS, SPARE, ColorClusters, color_clusters, odds_where_told
-from sogjax.search.search_energy import blob_clusters
-from sogjax.search.seen_frame import cells_at
+from sogjax.scene.cells import inside_pictures
+from sogjax.scene.color_clusters import SLOTS, SPARE, ColorClusters, odds_where_told
 from sogjax.tracking.capacity import first_capacities, larger_capacities
-from sogjax.tracking.culling import BLOCK_STEP, Capacities, actor_of_blobs, block_capacity, body_boxes
+from sogjax.tracking.culling import BLOCK_STEP, Capacities, block_capacity, body_boxes
 from sogjax.tracking.frame import AnyFrame, FrameInput, TrackState, on_device
 from sogjax.tracking.tracker import Tracker
 
 COLUMNS, ROWS = 40, 64
 """Cells of a window; those of a standing person are 3 cm wide."""
-SAMPLES = 2
-"""Places along each side of a cell at which the picture is looked at."""
 BORDER = 0.08
 """Around a body's box, as a part of its size: adjusted poses stay near those that were tracked."""
 BLOCK_HEADROOM = 1.1
@@ -60,12 +58,8 @@ class Reader(eqx.Module):
     @classmethod
     def from_tracker(cls, tracker: Tracker, shape: tuple[int, int]) -> "Reader":
         """For cells of so many rows and columns."""
-        grids = tracker.reader.candidates.grids
-        inside = np.zeros((len(grids), *shape), np.float32)
-        for k, grid in enumerate(grids):
-            inside[k, : grid.rows, : grid.columns] = 1.0
-        body = tracker.body
-        return cls(tracker, color_clusters(np.asarray(body.blob_colors), np.asarray(body.blob_sigmas) ** 2), inside)
+        inside = inside_pictures(tracker.reader.candidates.grids, shape)
+        return cls(tracker, ColorClusters.from_body(tracker.body), inside)
 
     def pictures(self, cells: Sequence[AnyFrame], poses: Float[np.ndarray, "frame dof"]) -> ClipPictures:
         """Of frames, near the poses in them.
@@ -73,7 +67,7 @@ class Reader(eqx.Module):
         Raises:
             InputError: more image blobs than the largest capacity.
         """
-        tables = jnp.asarray(np.concatenate([self.kinds.tables, self.kinds.whole[None]]), jnp.float32)
+        tables = jnp.asarray(self.kinds.tables, jnp.float32)
         states = [TrackState.from_pose(jnp.asarray(pose, jnp.float32)) for pose in poses]
         capacities = first_capacities(self.tracker, states[0], on_device(cells[0]))
         found: list[Views] = []
@@ -92,7 +86,7 @@ class Reader(eqx.Module):
             shown = jnp.where(present[:, None, None], self.inside, 0.0)
             windows.append(_windows(self.tracker, jnp.asarray(frame.cells), shown, tables, state.previous))
         stack = lambda *leaves: jnp.stack(leaves)
-        kinds = blob_clusters(self.kinds, self.tracker.body.num_blobs)
+        kinds = BlobClusters.from_members(self.kinds.members, SLOTS)
         return ClipPictures(jax.tree.map(stack, *found), jax.tree.map(stack, *windows), kinds)
 
 
@@ -170,35 +164,11 @@ def _windows(
 ) -> ColorWindows:
     """Grids around a body: what each kind of blob would explain there."""
     cameras, body = tracker.cameras, tracker.body
-    odds = odds_where_told(cells.astype(tables.dtype) / 255.0, inside, tracker.reader.background, tables[:-1])
-    actors = actor_of_blobs(body.skeleton, body.blobs.joints)
+    odds = odds_where_told(cells.astype(tables.dtype) / 255.0, inside, tracker.reader.background, tables)
     around = jax.vmap(body_boxes, in_axes=(None, 0, None, None))
-    boxes = around(body.posed_blobs(pose), cameras, actors, jnp.asarray(BORDER, pose.dtype))[:, 0]
+    boxes = around(body.posed_blobs(pose), cameras, body.blob_actors, jnp.asarray(BORDER, pose.dtype))[:, 0]
     real = jnp.all(jnp.isfinite(boxes), axis=(1, 2))
     boxes = jnp.where(real[:, None, None], boxes, jnp.array([[[0.0, 0.0], [1.0, 1.0]]], boxes.dtype))
-    step = (boxes[:, 1] - boxes[:, 0]) / jnp.array([[COLUMNS, ROWS]], boxes.dtype)
-    along = lambda axis, count, parts: (
-        boxes[:, 0, axis, None]
-        + (jnp.arange(count * parts, dtype=boxes.dtype) + 0.5)[None] / parts * step[:, axis, None]
-    )
-    sizes = jnp.asarray([grid.cell_size for grid in tracker.reader.candidates.grids], boxes.dtype)
-    looked_at = jax.vmap(_looked_at)(odds, sizes, cameras, along(0, COLUMNS, SAMPLES), along(1, ROWS, SAMPLES))
-    split = looked_at.reshape(*looked_at.shape[:2], COLUMNS, SAMPLES, ROWS, SAMPLES)
-    free = jnp.broadcast_to(real[:, None, None], (len(sizes), COLUMNS, ROWS)).astype(boxes.dtype)
-    scale = jnp.ones(len(sizes), boxes.dtype)
-    return ColorWindows(along(0, COLUMNS, 1), along(1, ROWS, 1), step, jnp.mean(split, axis=(3, 5)), free, scale)
-
-
-def _looked_at(
-    odds: Float[Array, "kind rows columns"],
-    cell_size: Float[Array, ""],
-    camera: Camera,
-    x: Float[Array, "n"],
-    y: Float[Array, "m"],
-) -> Float[Array, "kind n m"]:
-    """The log odds at the places of a grid in one camera; 0 outside its picture."""
-    shape = (x.shape[0], y.shape[0])
-    pixels = jnp.stack([jnp.broadcast_to(x[:, None], shape), jnp.broadcast_to(y[None], shape)], axis=-1)
-    cell, inside = cells_at(camera, cell_size, pixels.reshape(-1, 2))
-    values = odds[:, cell[:, 1], cell[:, 0]]
-    return jnp.where(inside[None], values, 0.0).reshape(-1, *shape)
+    sizes = tracker.reader.cell_sizes
+    windows = ColorWindows.in_boxes(odds, sizes, cameras, boxes, (COLUMNS, ROWS))
+    return replace(windows, free=jnp.where(real[:, None, None], windows.free, 0.0))

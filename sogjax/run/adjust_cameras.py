@@ -14,12 +14,13 @@ from sogjax.io.calibration.load import save_calibration
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.io.files import atomic_path
 from sogjax.io.motion import Motion
-from sogjax.io.offsets_file import offsets_line, with_entries
 from sogjax.io.recording import Recording
+from sogjax.io.recording_files import SETTINGS
+from sogjax.io.recording_settings import offsets_line, with_entries
 from sogjax.refine.adjustment import Adjusted
 from sogjax.refine.camera_moves import PLACE, TIME, TURN, moved_cameras, velocities_of
+from sogjax.run.run_files import CALIBRATION, DESCRIPTION
 
-CALIBRATION, DESCRIPTION = "calibration_adjusted.toml", "recording.yaml"
 FEWEST_CAMERAS = {"cameras": 4, "offsets": 3}
 """One in doubt, and others that agree."""
 FEWEST_FRAMES = 20
@@ -139,19 +140,19 @@ def write_cameras(
     """
     all_moves = np.zeros((len(whole.rig), moves.shape[1]))
     all_moves[[whole.rig.names.index(name) for name in recording.rig.names]] = moves
-    save_calibration(out / CALIBRATION, moved_rig(whole.rig, all_moves))
-    own = whole.path / DESCRIPTION
+    save_calibration(CALIBRATION.of(out), moved_rig(whole.rig, all_moves))
+    own = SETTINGS.of(whole.path)
     text = own.read_text(encoding="utf-8-sig") if own.is_file() else ""
-    lines = {"calibration": f"calibration: {CALIBRATION}", "unit": "unit: m"}
+    lines = {"calibration": f"calibration: {CALIBRATION.name}", "unit": "unit: m"}
     parts = {name: move[TIME.start] for name, move in zip(recording.rig.names, moves, strict=True)}
     offsets = {
         name: whole.frame_offset[name] - parts.get(name, -whole.frame_part.get(name, 0.0)) for name in whole.rig.names
     }
     if any(offsets.values()):
         lines["frame_offset"] = offsets_line({name: offset for name, offset in offsets.items() if offset})
-    with atomic_path(out / DESCRIPTION) as temporary:
+    with atomic_path(DESCRIPTION.of(out)) as temporary:
         temporary.write_text(with_entries(own, text, lines), encoding="utf-8")
-    return [out / CALIBRATION, out / DESCRIPTION]
+    return [CALIBRATION.of(out), DESCRIPTION.of(out)]
 
 
 def _in_a_line(rig: CameraRig) -> bool:

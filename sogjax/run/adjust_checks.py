@@ -1,7 +1,6 @@
 """Whether a clip can be adjusted: long enough, and its pictures within memory."""
 
 from sogjax.errors import InputError, counted
-from sogjax.io.motion import Motion
 from sogjax.refine.pictures import bytes_of_frame
 from sogjax.run import build
 from sogjax.run.memory import available_memory
@@ -24,13 +23,13 @@ def too_short(num_frames: int) -> str | None:
     )
 
 
-def check_length(motion: Motion) -> None:
+def check_length(num_frames: int) -> None:
     """Check that there is something to adjust.
 
     Raises:
         InputError: there is not.
     """
-    if (reason := too_short(motion.num_frames)) is not None:
+    if (reason := too_short(num_frames)) is not None:
         raise InputError(reason)
 
 

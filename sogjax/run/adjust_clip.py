@@ -1,234 +1,234 @@
 """Adjusting a tracked clip as a whole: its pictures read again, poses and shape climbed together, what came of it."""
 
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
-from sogjax.energy.keypoints import keypoint_term_among
+from sogjax.io.frame_motions import ClipFacts, motions_of
+from sogjax.io.frame_table import FramesRecord, FrameTable
 from sogjax.io.ground_truth import load_ground_truth
-from sogjax.io.motion import Motion, motion_from_poses
+from sogjax.io.motion import Motion
+from sogjax.io.npz_file import read_npz, save_npz
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.model.bones import bone_lengths
 from sogjax.model.rotation import axis_vector, world_from_upright
 from sogjax.quality.markers import joint_errors
-from sogjax.refine.adjustment import Adjusted, adjusted
+from sogjax.quality.numbers import write_json
+from sogjax.refine.adjustment import Adjusted as Found
+from sogjax.refine.adjustment import adjusted
 from sogjax.refine.clip_priors import floor_height, standing, undersides
 from sogjax.refine.pictures import ClipPictures, Reader
 from sogjax.run import build
+from sogjax.run.actors import Actors
 from sogjax.run.adjust_cameras import camera_numbers, moved_rig, moves_of
 from sogjax.run.adjust_checks import WINDOW, check_length
-from sogjax.run.adjust_colors import color_rows, mean_similarity, measured_colors
-from sogjax.run.adjust_judged import judged_with_colors
-from sogjax.run.cells import picture_reader
-from sogjax.run.clip_keypoints import clip_keypoints, keypoint_terms
-from sogjax.run.job import Job
-from sogjax.run.keypoint_offsets import FRAMES, knowing_offsets
-from sogjax.run.pipeline import PictureReader, Preparation, frame_input
-from sogjax.run.prefix import Prefix
+from sogjax.run.adjust_colors import color_rows, judged_with_colors, mean_similarity
+from sogjax.run.background import Background
+from sogjax.run.initial_pose import InitialPose
+from sogjax.run.keypoint_bias import FRAMES, bias_of_poses
+from sogjax.run.measured_colors import measured_colors
 from sogjax.run.recordings import upright
-from sogjax.run.second_background import learnt_again
+from sogjax.run.relearn_background import relearn_background
+from sogjax.run.setup import Setup
 from sogjax.run.terminal import progress, say
 from sogjax.scene.cells import stack_shape
-from sogjax.settings.run import TrackConfig
+from sogjax.settings.method import ColorConfig
 from sogjax.tracking.frame import FrameInput
 
 CLEARLY = 1.01
 """By which factor new colours must explain more to be taken: those of example poses were measured within masks."""
+FOLDER = "adjusted"
 
 
 @dataclass(frozen=True)
-class AdjustedClip:
-    """An adjusted clip, ready to be written as a run is."""
+class Adjusted(FramesRecord):
+    """An adjusted clip of one actor; its frames are as if they had been tracked."""
 
-    job: Job
-    """Of the adjusted body."""
-    prefix: Prefix
-    """Its frames, as if they had been tracked."""
     actor: Body
-    """Adjusted, in its own upright frame."""
-    motion: Motion
+    """In its own upright frame."""
     numbers: dict[str, Any]
     """Before and after, for JSON."""
     moves: Float[np.ndarray, "camera 7"]
-    """Of the job's cameras, which stand there already."""
+    """Of the cameras, as they were found."""
+
+    def setup(self, before: Setup) -> Setup:
+        """What the adjusted frames would be tracked with."""
+        body = upright(self.actor, before.clip.recording)
+        return _found_setup(before, body, self.moves if self.numbers.get("cameras") else None)
+
+    def save(self, folder: Path) -> None:
+        """Keep it in a run's folder; the numbers come last."""
+        Actors((self.actor,)).save(folder / FOLDER)
+        save_npz(folder / FOLDER / "frames.npz", self.table.arrays())
+        save_npz(folder / FOLDER / "moves.npz", {"moves": self.moves})
+        write_json(folder / FOLDER / "numbers.json", self.numbers)
+
+    @classmethod
+    def load(cls, folder: Path) -> "Adjusted | None":
+        """What was kept, if all of it was."""
+        if not (folder / FOLDER / "numbers.json").is_file():
+            return None
+        actors = Actors.load(folder / FOLDER)
+        assert actors is not None
+        numbers = json.loads((folder / FOLDER / "numbers.json").read_text(encoding="utf-8"))
+        table = FrameTable.from_arrays(read_npz(folder / FOLDER / "frames.npz"))
+        return cls(table, actors.bodies[0], numbers, read_npz(folder / FOLDER / "moves.npz")["moves"])
 
 
-def adjusted_clip(
-    recording: Recording,
-    actor: Body,
-    motion: Motion,
-    config: TrackConfig,
-    window: int = WINDOW,
-    with_shape: bool = True,
-    in_question: tuple[str, ...] = (),
-) -> AdjustedClip:
+@dataclass(frozen=True)
+class AdjustRequest:
+    """What is adjusted."""
+
+    window: int = WINDOW
+    """Frames that are adjusted together."""
+    with_shape: bool = True
+    """Whether the shape of the actor is, too."""
+    in_question: tuple[str, ...] = ()
+    """Parts of the cameras' moves (`parts_in_question`) that are looked for, too."""
+
+
+def adjust_clip(
+    setup: Setup, background: Background, table: FrameTable, color: ColorConfig, request: AdjustRequest
+) -> Adjusted:
     """Poses of all frames and the shape of the actor, adjusted together; then cameras, where they are in question.
 
     Args:
-        recording: in which was tracked.
-        actor: that was tracked, in its own upright frame.
-        motion: as it was tracked.
-        config: with which it was.
-        window: frames that are adjusted together.
-        with_shape: whether the shape is adjusted.
-        in_question: parts of the cameras' moves (`parts_in_question`).
+        setup: what was tracked with, as it was before anything was learnt from the poses.
+        background: of the clip.
+        table: the frames as they were tracked.
+        color: the space in which colours are measured.
+        request: what is adjusted.
 
     Raises:
         InputError: the clip is too short, or a video cannot be read.
     """
-    check_length(motion)
-    read = picture_reader(config.images)
-    job = _job(recording, actor, motion, config, read)
-    source = _Source(job, read, motion)
+    recording, (body,) = setup.clip.recording, setup.bodies
+    before = _motion(setup, table)
+    check_length(len(table))
+    setup = _informed(setup, background, table)
+    source = _Source(setup, table.frame)
     found = adjusted(
-        job.tracker,
+        setup.tracker,
         source.pictures,
-        motion.pose,
-        motion.frame,
-        motion.similarity,
-        motion.fps,
-        motion.up,
-        window,
-        with_shape=with_shape,
+        table.pose,
+        table.frame,
+        np.asarray(table.terms["similarity"], float),
+        setup.clip.fps,
+        recording.up,
+        request.window,
+        with_shape=request.with_shape,
         report=lambda stage: say(f"adjusting: {stage}"),
         moves=moves_of(recording),
-        in_question=in_question,
+        in_question=request.in_question,
     )
-    job = _found_job(job, found)
-    after = _motion(found, job, motion)
-    numbers, prefix = _numbers(job, motion, after, found, actor), _prefix(found, job, motion)
-    if in_question:
+    moved = _found_setup(setup, found.body, found.moves if found.told else None)
+    after_table = _table(found, moved, table)
+    numbers = _numbers(body, before, _motion(moved, after_table), found, recording)
+    if request.in_question:
         numbers["cameras"] = camera_numbers(recording, found)
-    body, numbers["similarity_of_new_colors"] = _recolored(job, source, found, after, config)
+    colored, numbers["similarity_of_new_colors"] = _recolored(moved, source, found, after_table, color)
     say("adjusting: what the cameras say of it")
-    cells = source.coming(np.arange(after.num_frames))
-    job, prefix, after = judged_with_colors(job, body, cells, prefix, after)
-    numbers["new_colors"] = job.bodies[0] is not found.body
-    turn = jnp.asarray(world_from_upright(recording.up).T, actor.blob_sigmas.dtype)
-    return AdjustedClip(job, prefix, job.bodies[0].rotated(turn), after, numbers, found.moves)
+    final, after_table = judged_with_colors(moved, colored, source.coming(np.arange(len(table))), after_table)
+    numbers["new_colors"] = final.bodies[0] is not found.body
+    turn = jnp.asarray(world_from_upright(recording.up).T, body.blob_sigmas.dtype)
+    return Adjusted(after_table, final.bodies[0].rotated(turn), numbers, found.moves)
 
 
-def _job(recording: Recording, actor: Body, motion: Motion, config: TrackConfig, read: PictureReader) -> Job:
-    """What tracking would have been with, from the poses that are known."""
-    body = upright(actor, recording)
-    grids = build.cell_grids(recording, config.images.depth)
-    first = int(motion.frame[0]) - recording.first_frame
-    frames = (first, int(motion.frame[-1]) - recording.first_frame + 1)
-    keypoints = clip_keypoints(recording, config)
-    tracker = build.tracker(recording, body, grids, config, keypoint_terms(keypoints, body, config))
-    if keypoints is not None and keypoint_term_among(tracker.terms) is not None:
-        rows = np.unique(np.linspace(0, motion.num_frames - 1, FRAMES).astype(int))
-        told = motion.frame[rows] - recording.first_frame
-        tracker = knowing_offsets(tracker, keypoints, told, motion.pose[rows])
-    job = Job(recording, [body], frames, grids, tracker, jnp.asarray(motion.pose[0]), first, keypoints)
-    poses = {
-        int(frame) - recording.first_frame: jnp.asarray(pose)
-        for frame, pose in zip(motion.frame, motion.pose, strict=True)
-    }
-    return replace(job, tracker=learnt_again(job, config.images, read, poses))
+def _informed(setup: Setup, background: Background, table: FrameTable) -> Setup:
+    """The setup that knows what the poses tell of keypoints and background."""
+    rows = np.unique(np.linspace(0, len(table) - 1, FRAMES).astype(int))
+    bias = bias_of_poses(setup, table.frame[rows], table.pose[rows])
+    setup = replace(setup, tracker=bias.in_tracker(setup.tracker))
+    poses = {int(frame): jnp.asarray(pose) for frame, pose in zip(table.frame, table.pose, strict=True)}
+    start = InitialPose(int(table.frame[0]), table.pose[0], "tracked")
+    return replace(setup, tracker=relearn_background(setup, background, start, poses).in_tracker(setup))
 
 
-def _found_job(job: Job, found: Adjusted) -> Job:
-    """With the body and the cameras that were found."""
-    tracker = replace(job.tracker, body=found.body)
-    if found.told:
-        rig = moved_rig(job.recording.rig, found.moves)
-        job = replace(job, recording=replace(job.recording, rig=rig))
+def _found_setup(setup: Setup, body: Body, moves: Float[np.ndarray, "camera 7"] | None) -> Setup:
+    """With the body that was found, and the cameras where they were."""
+    tracker, clip = replace(setup.tracker, body=body), setup.clip
+    if moves is not None:
+        rig = moved_rig(clip.recording.rig, moves)
+        clip = replace(clip, recording=replace(clip.recording, rig=rig))
         cameras = replace(tracker.cameras, camera_from_world=rig.cameras.camera_from_world)
         tracker = replace(tracker, cameras=cameras)
-    return replace(job, bodies=[found.body], tracker=tracker)
+    return Setup(clip, (body,), tracker)
 
 
 @dataclass(frozen=True)
 class _Source:
-    """Reads the pictures of rows of a motion."""
+    """Reads the pictures of rows of a table."""
 
-    job: Job
-    read: PictureReader
-    motion: Motion
+    setup: Setup
+    frames: Int[np.ndarray, "frame"]
 
     def pictures(self, rows: Int[np.ndarray, "row"], poses: Float[np.ndarray, "row dof"]) -> ClipPictures:
-        """Near given poses."""
-        reader = Reader.from_tracker(self.job.tracker, stack_shape(self.job.grids))
-        return reader.pictures(self.cells(rows), poses)
-
-    def cells(self, rows: Int[np.ndarray, "row"]) -> list[FrameInput]:
-        """Of the rows."""
-        return list(self.coming(rows))
+        """The pictures of some rows, near given poses."""
+        reader = Reader.from_tracker(self.setup.tracker, stack_shape(self.setup.clip.grids))
+        return reader.pictures(list(self.coming(rows)), poses)
 
     def coming(self, rows: Int[np.ndarray, "row"]) -> Iterator[FrameInput]:
-        """Of the rows, one after the other."""
-        frames = (self.motion.frame[rows] - self.job.recording.first_frame).tolist()
-        wanted, first, last = set(frames), min(frames), max(frames) + 1
-        coming = self.read(self.job.recording, Preparation(self.job.grids), first, last)
-        shown = progress(coming, last - first, "reading")
-        cells = (frame_input([picture.cells for picture in pictures]) for pictures in shown)
-        known = self.job.with_keypoints(cells, range(first, last))
-        yield from (frame for number, frame in enumerate(known, first) if number in wanted)
+        """The frames of some rows, one after the other."""
+        wanted = self.frames[rows].tolist()
+        numbers = range(min(wanted), max(wanted) + 1, self.setup.clip.numbers.step)
+        shown = progress(self.setup.clip.frames(numbers.start, numbers.stop, numbers.step), len(numbers), "reading")
+        chosen = set(wanted)
+        yield from (frame for number, frame in zip(numbers, shown, strict=True) if number in chosen)
 
 
-def _recolored(job: Job, source: _Source, found: Adjusted, motion: Motion, config: TrackConfig) -> tuple[Body, float]:
+def _motion(setup: Setup, table: FrameTable) -> Motion:
+    facts = ClipFacts.of(setup.clip.recording, setup.clip.numbers.step)
+    return next(iter(motions_of(table, setup.bodies, facts).values()))
+
+
+def _recolored(
+    setup: Setup, source: _Source, found: Found, table: FrameTable, color: ColorConfig
+) -> tuple[Body, float]:
     """The adjusted body with the colours that the clip shows, if it is more similar so; and by which factor it is."""
     say("adjusting: colours")
-    rows = color_rows(found.body, found.poses, motion.similarity)
-    poses, cells = found.poses[rows], source.cells(rows)
-    frames = (motion.frame[rows] - job.recording.first_frame).tolist()
-    space, _ = build.color_space_and_radius(config.color)
-    body = measured_colors(job.recording, found.body, frames, poses, space)
-    before, after = (mean_similarity(replace(job.tracker, body=each), cells, poses) for each in (found.body, body))
+    rows = color_rows(found.body, found.poses, np.asarray(table.terms["similarity"], float))
+    poses, cells = found.poses[rows], list(source.coming(rows))
+    space, _ = build.color_space_and_radius(color)
+    body = measured_colors(setup.clip.recording, found.body, table.frame[rows].tolist(), poses, space)
+    before, after = (mean_similarity(replace(setup.tracker, body=each), cells, poses) for each in (found.body, body))
     return (body if after > CLEARLY * before else found.body), after / before
 
 
-def _energies(found: Adjusted, job: Job) -> Float[np.ndarray, "frame"]:
-    """Of Eq. 10 without a history."""
-    parts = [float(term.signed_weight) * found.values[term.name] for term in job.tracker.terms]
+def _energies(found: Found, setup: Setup) -> Float[np.ndarray, "frame"]:
+    """Eq. 10 of each frame, without a history."""
+    parts = [float(term.signed_weight) * found.values[term.name] for term in setup.tracker.terms]
     return np.sum(parts, axis=0)
 
 
-def _motion(found: Adjusted, job: Job, before: Motion) -> Motion:
-    return motion_from_poses(
-        found.body,
-        found.poses,
-        before.fps,
-        frame=before.frame,
-        similarity=found.values["similarity"],
-        energy=_energies(found, job),
-        iterations=before.iterations,
-        converged=before.converged,
-        up=before.up,
-    )
-
-
-def _prefix(found: Adjusted, job: Job, before: Motion) -> Prefix:
+def _table(found: Found, setup: Setup, before: FrameTable) -> FrameTable:
     """The adjusted frames as a run keeps them."""
-    count, cameras = len(found.poses), len(job.grids)
+    count, cameras = len(found.poses), len(setup.clip.grids)
     none = np.zeros((count, cameras), int)
-    return Prefix(
-        {
-            "pose": np.asarray(found.poses, np.float32),
-            "energy": _energies(found, job).astype(np.float32),
-            "iterations": before.iterations,
-            "evaluations": before.iterations,
-            "converged": before.converged,
-            "num_near": none,
-            "num_matching": none,
-            "num_blocks": np.zeros(count, int),
-            **{f"term_{name}": value.astype(np.float32) for name, value in found.values.items()},
-            "capacity_near": np.full(count, found.room),
-            "capacity_matching": np.full(count, found.room),
-            "capacity_blocks": np.zeros(count, int),
-        }
+    return FrameTable(
+        frame=before.frame,
+        pose=np.asarray(found.poses, np.float32),
+        energy=_energies(found, setup).astype(np.float32),
+        iterations=before.iterations,
+        evaluations=before.iterations,
+        converged=before.converged,
+        num_near=none,
+        num_matching=none,
+        num_blocks=np.zeros(count, int),
+        capacities=np.tile([found.room, found.room, 0], (count, 1)),
+        terms={name: value.astype(np.float32) for name, value in found.values.items()},
     )
 
 
-def _numbers(job: Job, before: Motion, after: Motion, found: Adjusted, actor: Body) -> dict[str, Any]:
+def _numbers(body: Body, before: Motion, after: Motion, found: Found, recording: Recording) -> dict[str, Any]:
     """What was changed, and what it was good for."""
-    was, now = bone_lengths(upright(actor, job.recording)), bone_lengths(found.body)
+    was, now = bone_lengths(body), bone_lengths(found.body)
     numbers: dict[str, Any] = {
         "frames": before.num_frames,
         "frames_for_shape": len(found.shape_frames),
@@ -238,9 +238,9 @@ def _numbers(job: Job, before: Motion, after: Motion, found: Adjusted, actor: Bo
         "bone_lengths_changed": {name: now[name] / was[name] - 1.0 for name in was if was[name] > 0.0},
     }
     numbers |= _feet(before, after)
-    if job.recording.ground_truth is not None:
-        truth = load_ground_truth(job.recording.ground_truth)
-        truth = truth.subject(actor.name) if actor.name in truth.subjects else truth
+    if recording.ground_truth is not None:
+        truth = load_ground_truth(recording.ground_truth)
+        truth = truth.subject(body.name) if body.name in truth.subjects else truth
         for key, motion in (("joints_before_mm", before), ("joints_after_mm", after)):
             errors = joint_errors(motion, truth)
             numbers[key] = None if errors is None else 1e3 * float(np.nanmean(errors.errors))

@@ -1,137 +1,151 @@
-"""Which background a run uses: photographs of the empty scene, else what the clip itself shows, else none."""
+"""The pass that learns the background: photographs of the empty scene, else what the clip itself shows, else none."""
 
 import json
 from collections.abc import Sequence
-from threading import Lock
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
 
 from sogjax.errors import InputError
 from sogjax.io.background_cache import Arrays, background_origin, kept_background
-from sogjax.io.recording import Recording
+from sogjax.io.npz_file import read_npz, save_npz
 from sogjax.io.source import fingerprint
 from sogjax.io.video import read_still
-from sogjax.run.clip_learning import PARTS, LeftOut, UnsuitableError, learn
+from sogjax.run.clip import Clip, SampleKind
+from sogjax.run.clip_learning import UnsuitableError, learnt_from
+from sogjax.run.shared import SHARED
 from sogjax.run.terminal import say
-from sogjax.scene.background import BackgroundCells, CameraBackground, stack_background
+from sogjax.scene.background import CameraBackground, Origin, stack_background
 from sogjax.scene.cells import CellGrid
-from sogjax.settings.method import ImagesConfig
+from sogjax.scene.foreground import BackgroundModel
 
 CHOICES = ("auto", "pictures", "clip", "none")
-MOST_MADE = 4
-"""Backgrounds that a process remembers: those of twelve cameras take 30 MB."""
-_made: dict[str, Arrays | str] = {}
-MOST_CUT = 2
-"""Backgrounds whose cells a process remembers, for the members of a sweep: those of twelve cameras take 3 MB."""
-_cut: dict[str, BackgroundCells] = {}
-_making, _cutting = Lock(), Lock()
-_said: set[str] = set()
+FILE = "background.npz"
+_ORIGINS: tuple[Origin, ...] = ("picture", "clip")
 
 
-def background_cells(recording: Recording, grids: Sequence[CellGrid], images: ImagesConfig) -> BackgroundCells | None:
-    """The background of all cameras as cells; None: without one. Made once for the members of a sweep.
+@dataclass(frozen=True)
+class Background:
+    """What is known of the empty scene."""
 
-    Raises:
-        InputError: as `backgrounds`.
-    """
-    path = str(recording.path.resolve())
-    key = json.dumps([path, images.background, str(grids), _photographs(recording), background_origin(recording)])
-    known = _cut.get(key) if images.cache is None else None
-    if known is not None:
-        return known
-    found = backgrounds(recording, images)
-    if found is None:
-        return None
-    cells = stack_background(found, grids)
-    with _cutting:
-        _cut[key] = cells
-        for oldest in list(_cut)[:-MOST_CUT]:
-            _cut.pop(oldest, None)
-    return cells
+    cameras: tuple[CameraBackground, ...] | None
+    """Of every camera; None: nothing is known."""
+    reason: str = ""
+    """Why nothing is known, with the remedy."""
+
+    @property
+    def is_learnt(self) -> bool:
+        """Whether it was learnt from the clip."""
+        return self.cameras is not None and any(camera.origin == "clip" for camera in self.cameras)
+
+    def model(self, grids: Sequence[CellGrid]) -> BackgroundModel | None:
+        """What the cells of frames are compared with; None: nothing is known."""
+        if self.cameras is None:
+            return None
+        return BackgroundModel.from_background(stack_background(self.cameras, grids))
+
+    def required(self) -> tuple[CameraBackground, ...]:
+        """The background of every camera.
+
+        Raises:
+            InputError: nothing is known; the message says why.
+        """
+        if self.cameras is None:
+            raise InputError(self.reason)
+        return self.cameras
+
+    def save(self, folder: Path) -> None:
+        """Keep it in a run's folder."""
+        arrays = {"reason": np.array(self.reason)}
+        for k, camera in enumerate(self.cameras or ()):
+            arrays |= {f"{k}.picture": camera.picture, f"{k}.spread": camera.spread, f"{k}.known": camera.known}
+            arrays[f"{k}.learnt"] = np.array(camera.origin == "clip")
+        save_npz(folder / FILE, arrays)
+
+    @classmethod
+    def load(cls, folder: Path) -> "Background | None":
+        """What was kept, if it was."""
+        if not (folder / FILE).is_file():
+            return None
+        arrays, cameras = read_npz(folder / FILE), []
+        while f"{len(cameras)}.picture" in arrays:
+            picture, spread, known = (arrays[f"{len(cameras)}.{part}"] for part in ("picture", "spread", "known"))
+            learnt = bool(arrays[f"{len(cameras)}.learnt"])
+            cameras.append(CameraBackground(picture, spread, known, _ORIGINS[learnt]))
+        return cls(tuple(cameras) or None, str(arrays["reason"]))
 
 
-def _photographs(recording: Recording) -> dict[str, str]:
-    """The pictures of the empty scene as they are on the disk, by camera."""
-    return {name: fingerprint(recording.background[name]) for name in recording.background}
-
-
-def backgrounds(recording: Recording, images: ImagesConfig) -> tuple[CameraBackground, ...] | None:
-    """The background of every camera, as `images.background` asks for; None: without one, which `auto` says.
-
-    Raises:
-        InputError: as `background_or_reason`.
-    """
-    found = background_or_reason(recording, images)
-    if not isinstance(found, str):
-        return found
-    sentence = f"{recording.path}: no background is used, since {found}"
-    if images.background == "auto" and sentence not in _said:
-        _said.add(sentence)
-        say(sentence)
-    return None
-
-
-def background_or_reason(recording: Recording, images: ImagesConfig) -> tuple[CameraBackground, ...] | str:
-    """The same, or why there is none, with the remedy.
+def learn_background(clip: Clip, choice: str, cache: str | None = None, more: Sequence[SampleKind] = ()) -> Background:
+    """The background of every camera, as `images.background` asks for.
 
     With `auto`, photographs count if every camera has one, else the clip, if it is suitable.
+
+    Args:
+        clip: its recording has the photographs, or is learnt from.
+        choice: one of `CHOICES`.
+        cache: the folder of `images.cache`, where learnt backgrounds are kept then.
+        more: samples that will be needed too, and are taken on the way.
 
     Raises:
         InputError: pictures are asked for and missing, the clip is asked for and unsuitable, a video cannot be read,
             or the cache's folder cannot be written.
     """
-    if images.background not in CHOICES:
-        raise InputError(f"images.background={images.background}: no such choice; use one of {', '.join(CHOICES)}")
+    recording = clip.recording
+    if choice not in CHOICES:
+        raise InputError(f"images.background={choice}: no such choice; use one of {', '.join(CHOICES)}")
     missing = [name for name in recording.rig.names if name not in recording.background]
-    if images.background == "pictures" and missing:
+    if choice == "pictures" and missing:
         raise InputError(
             f"{recording.path}: images.background=pictures, but background/ has no picture of "
             f"{', '.join(missing)}; add it, or set images.background=auto to learn it from the clip"
         )
-    if images.background == "none":
-        return "images.background=none"
-    if images.background == "pictures" or (images.background == "auto" and not missing):
-        return tuple(
-            CameraBackground.from_plate(read_still(recording, name, recording.background[name]))
-            for name in recording.rig.names
+    if choice == "none":
+        return Background(None, "images.background=none")
+    if choice == "pictures" or (choice == "auto" and not missing):
+        plates = [(name, recording.background[name]) for name in recording.rig.names]
+        return SHARED.get(
+            json.dumps(["plates", *((name, str(path), fingerprint(path)) for name, path in plates)]),
+            lambda: Background(
+                tuple(CameraBackground.from_plate(read_still(recording, name, path)) for name, path in plates)
+            ),
         )
-    learnt = clip_backgrounds(recording, images.cache)
-    if images.background == "clip" and isinstance(learnt, str):
-        raise InputError(f"{recording.path}: images.background=clip, but {learnt}, or set images.background=none")
+    learnt = _of_clip(clip, cache, more)
+    if choice == "clip" and learnt.cameras is None:
+        raise InputError(
+            f"{recording.path}: images.background=clip, but {learnt.reason}, or set images.background=none"
+        )
     return learnt
 
 
-def clip_backgrounds(recording: Recording, cache: str | None) -> tuple[CameraBackground, ...] | str:
-    """The backgrounds learnt from the clip, or why it is unsuitable (with the remedy); made once for each process."""
-    key = json.dumps([str(recording.path.resolve()), background_origin(recording)])
-    with _making:
-        found = _made.pop(key, None)
-        if found is None or (cache is not None and not isinstance(found, str)):
-            found = _kept_or_learnt(recording, cache, found)
-        _made[key] = found
-        for oldest in list(_made)[:-MOST_MADE]:
-            del _made[oldest]
-    return found if isinstance(found, str) else _from_arrays(recording, found)
+def said_if_none(clip: Clip, choice: str, background: Background) -> Background:
+    """The background; where the user left the choice and there is none, that is said."""
+    if choice == "auto" and background.cameras is None:
+        say(f"{clip.recording.path}: no background is used, since {background.reason}")
+    return background
 
 
-def _kept_or_learnt(recording: Recording, cache: str | None, known: Arrays | None) -> Arrays | str:
-    """From the cache's folder, else what is known already, else learnt now; or why it cannot be."""
-    try:
-        return kept_background(cache, recording, lambda: learn(recording, None) if known is None else known, say)
-    except UnsuitableError as reason:
-        return str(reason)
+def _of_clip(clip: Clip, cache: str | None, more: Sequence[SampleKind]) -> Background:
+    """From the folder where backgrounds are kept, or else learnt now; the runs of a process share it."""
+    recording = clip.recording
+
+    def kept_or_learnt() -> Background:
+        try:
+            arrays = kept_background(cache, recording, lambda: _arrays(clip, learnt_from(clip, more=more)), say)
+        except UnsuitableError as unsuitable:
+            return Background(None, str(unsuitable))
+        return Background(tuple(_of_arrays(arrays, name) for name in recording.rig.names))
+
+    key = json.dumps(["clip", str(recording.path.resolve()), cache, background_origin(recording)])
+    return SHARED.get(key, kept_or_learnt)
 
 
-def clip_backgrounds_without(recording: Recording, left_out: LeftOut) -> tuple[CameraBackground, ...]:
-    """The same once the subject was tracked: where it is, widened, no sample counts. `sampled_frames` says which.
-
-    Raises:
-        InputError: a video cannot be read, or the clip is unsuitable.
-    """
-    try:
-        return _from_arrays(recording, learn(recording, left_out))
-    except UnsuitableError as reason:
-        raise InputError(f"{recording.path}: no background can be learnt, since {reason}") from reason
+def _arrays(clip: Clip, cameras: Sequence[CameraBackground]) -> Arrays:
+    parts = ("picture", "spread", "known")
+    named = zip(clip.recording.rig.names, cameras, strict=True)
+    return {f"{name}.{part}": getattr(camera, part) for name, camera in named for part in parts}
 
 
-def _from_arrays(recording: Recording, arrays: Arrays) -> tuple[CameraBackground, ...]:
-    parts = [[arrays[f"{name}.{part}"] for part in PARTS] for name in recording.rig.names]
-    return tuple(CameraBackground(picture, spread, known, "clip") for picture, spread, known in parts)
+def _of_arrays(arrays: Arrays, name: str) -> CameraBackground:
+    picture, spread, known = (arrays[f"{name}.{part}"] for part in ("picture", "spread", "known"))
+    return CameraBackground(picture, spread, known, "clip")

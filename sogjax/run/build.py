@@ -20,9 +20,9 @@ from sogjax.model.camera import Camera
 from sogjax.model.color import COLOR_RADIUS
 from sogjax.quality.limb_evidence import LimbBlobs
 from sogjax.quality.markers import MARKER_RULES, MarkerRule
-from sogjax.run.background import CHOICES, background_cells
-from sogjax.scene.cells import CellGrid
-from sogjax.scene.foreground import BackgroundModel, SubjectColors, subject_colors
+from sogjax.run.background import CHOICES, Background
+from sogjax.run.clip import Clip
+from sogjax.scene.foreground import SubjectColors, subject_colors
 from sogjax.scene.quadtree import Candidates
 from sogjax.settings.method import ColorConfig, EnergyConfig, ImagesConfig, SolverConfig
 from sogjax.settings.run import TrackConfig
@@ -162,43 +162,28 @@ def device_cameras(recording: Recording) -> Camera:
     return jax.tree.map(jnp.asarray, recording.rig.cameras)
 
 
-def cell_grids(recording: Recording, depth: int) -> tuple[CellGrid, ...]:
-    """How the pictures of each camera are cut into cells."""
-    sizes = np.asarray(recording.rig.cameras.image_size).astype(int)
-    return tuple(CellGrid.from_depth(int(w), int(h), depth) for w, h in sizes)
-
-
-def image_reader(
-    recording: Recording, grids: tuple[CellGrid, ...], config: TrackConfig, bodies: Sequence[Body] = ()
-) -> ImageReader:
-    """What turns the cells of a frame into image blobs, with the colours of the actors, if there are any.
-
-    Raises:
-        InputError: the background that the settings ask for cannot be had.
-    """
+def image_reader(clip: Clip, background: Background, config: TrackConfig, bodies: Sequence[Body] = ()) -> ImageReader:
+    """What turns the cells of a frame into image blobs, with the colours of the actors, if there are any."""
     space, radius = color_space_and_radius(config.color)
-    candidates = Candidates.from_grids(grids, device_cameras(recording))
     return ImageReader(
-        candidates=candidates,
+        candidates=Candidates.from_grids(clip.grids, device_cameras(clip.recording)),
         color_radius=radius,
         color_tolerance=config.images.color_tolerance,
         color_space=space,
         box_around=box_around(config.images),
-        background=_background_model(recording, grids, config.images),
+        background=background.model(clip.grids),
         subject=_subject(bodies) if bodies else None,
     )
 
 
-def tracker(
-    recording: Recording, body: Body, grids: tuple[CellGrid, ...], config: TrackConfig, terms: Sequence[Term] = ()
-) -> Tracker:
-    """The tracker of a recording for a body that stands upright in its world, with further terms of the energy."""
-    cameras = device_cameras(recording)
+def tracker(clip: Clip, background: Background, body: Body, config: TrackConfig, terms: Sequence[Term] = ()) -> Tracker:
+    """The tracker of a clip for a body that stands upright in its world, with further terms of the energy."""
+    cameras = device_cameras(clip.recording)
     return Tracker(
         body=body,
         cameras=cameras,
         normalizers=whole_image_overlap(cameras.image_size),
-        reader=image_reader(recording, grids, config, [body]),
+        reader=image_reader(clip, background, config, [body]),
         terms=_tracking_terms(config.energy, terms),
         solver=solver(config.solver),
         scales=pose_scales(body.skeleton),
@@ -239,15 +224,3 @@ def _subject(bodies: Sequence[Body]) -> SubjectColors:
     colors = np.concatenate([np.asarray(body.blob_colors) for body in bodies])
     areas = np.concatenate([np.asarray(body.blob_sigmas) ** 2 for body in bodies])
     return jnp.asarray(subject_colors(colors, areas), jnp.result_type(float))
-
-
-def _background_model(
-    recording: Recording, grids: tuple[CellGrid, ...], config: ImagesConfig
-) -> BackgroundModel | None:
-    """What frames are compared with; None: nothing is known of the background.
-
-    Raises:
-        InputError: the background that the settings ask for cannot be had.
-    """
-    found = background_cells(recording, grids, config)
-    return None if found is None else BackgroundModel.from_background(found)

@@ -1,10 +1,10 @@
 """The keypoints of a clip as its frames are tracked with them."""
 
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Int
 
 from sogjax.energy.keypoint_views import SeenKeypoints
 from sogjax.energy.keypoints import KeypointTerm
@@ -16,7 +16,6 @@ from sogjax.model.limbs import joint_limbs
 from sogjax.run.terminal import say
 from sogjax.search.triangulation import undistorted
 from sogjax.settings.run import TrackConfig
-from sogjax.tracking.frame import FrameInput
 
 
 @dataclass(frozen=True)
@@ -25,7 +24,9 @@ class ClipKeypoints:
 
     found: Keypoints
     seen: SeenKeypoints
-    """By frame and camera."""
+    """By frame of the recording and camera."""
+    first: int
+    """The recording's number of its first frame."""
 
     @classmethod
     def of_recording(cls, recording: Recording) -> "ClipKeypoints | None":
@@ -42,19 +43,17 @@ class ClipKeypoints:
         cameras = len(found.cameras)
         straight = undistorted(recording.rig, found.pixels.reshape(cameras, -1, 2)).reshape(found.pixels.shape)
         by_frame = lambda values: np.ascontiguousarray(np.moveaxis(values, 1, 0), np.float32)
-        return cls(found, SeenKeypoints(by_frame(straight), by_frame(found.confidence)))
+        seen = SeenKeypoints(by_frame(straight), by_frame(found.confidence))
+        return cls(found, seen, recording.first_frame)
 
-    def beside(self, frames: Iterable[FrameInput], numbers: Iterable[int]) -> Iterator[FrameInput]:
-        """Frames with their keypoints; `numbers` counts them from the recording's first."""
-        for frame, number in zip(frames, numbers, strict=False):
-            yield frame._replace(keypoints=SeenKeypoints(self.seen.pixels[number], self.seen.confidence[number]))
+    def of_frame(self, number: int) -> SeenKeypoints:
+        """What was seen in a frame, by camera."""
+        row = number - self.first
+        return SeenKeypoints(self.seen.pixels[row], self.seen.confidence[row])
 
-
-def with_keypoints(
-    keypoints: ClipKeypoints | None, frames: Iterable[FrameInput], numbers: Iterable[int]
-) -> Iterable[FrameInput]:
-    """Frames with their keypoints, if there are any; `numbers` counts them from the recording's first."""
-    return frames if keypoints is None else keypoints.beside(frames, numbers)
+    def of_frames(self, numbers: Int[np.ndarray, "frame"]) -> SeenKeypoints:
+        """What was seen in several frames, by frame and camera."""
+        return SeenKeypoints(self.seen.pixels[numbers - self.first], self.seen.confidence[numbers - self.first])
 
 
 def clip_keypoints(recording: Recording, config: TrackConfig) -> ClipKeypoints | None:

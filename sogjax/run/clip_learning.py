@@ -8,10 +8,9 @@ import cv2
 import numpy as np
 from jaxtyping import Bool
 
-from sogjax.io.background_cache import Arrays
 from sogjax.io.recording import Recording
-from sogjax.io.sampled_frames import camera_samples, spread_frames
 from sogjax.model.rotation import axis_vector
+from sogjax.run.clip import Clip, SampleKind, spread_frames
 from sogjax.run.terminal import say
 from sogjax.scene.background import CameraBackground
 from sogjax.scene.clip_background import MOST_SAMPLES, SampledCamera, learnt_background
@@ -23,31 +22,47 @@ MOST_BYTES = 2**30
 """Of samples in memory; beyond, fewer frames are looked at."""
 MUCH_UNKNOWN = 0.15
 """Share of the pictures from which on an unknown background is said."""
-PARTS = ("picture", "spread", "known")
-"""Of a `CameraBackground`."""
-
-
 LeftOut = Mapping[str, Mapping[int, Bool[np.ndarray, "rows columns"]]]
-"""By camera and frame (counted from the recording's first), where the tracked bodies are."""
+"""By camera and frame, where the tracked bodies are."""
 
 
 class UnsuitableError(Exception):
     """Why nothing can be learnt from a clip, and the remedy."""
 
 
-def sampled_frames(recording: Recording) -> list[int]:
-    """The frames that a background is learnt from, counted from the recording's first."""
+def background_samples(recording: Recording) -> SampleKind:
+    """The pictures that a background is learnt from, at the size at which it is learnt."""
     sizes = [working_size(*recording.rig.image_size(name)) for name in recording.rig.names]
     room = MOST_BYTES // (3 * sum(width * height for width, height in sizes))
-    return spread_frames(recording.num_frames, int(np.clip(room, MOST_SAMPLES // 2, MOST_SAMPLES)))
+    frames = spread_frames(recording.frames, int(np.clip(room, MOST_SAMPLES // 2, MOST_SAMPLES)))
+    small = lambda camera, picture: cv2.resize(picture, sizes[camera], interpolation=cv2.INTER_AREA)
+    return SampleKind("background", tuple(frames), small)
 
 
-def learn(recording: Recording, left_out: LeftOut | None) -> Arrays:
-    """Picture, spread and `known` of every camera, by names."""
-    names = recording.rig.names
-    workers = min(len(names), os.cpu_count() or 1)
-    with ThreadPoolExecutor(workers) as pool:
-        sampled = dict(enumerate(pool.map(lambda name: _sampled(recording, name), names)))
+def learnt_from(
+    clip: Clip, left_out: LeftOut | None = None, more: Sequence[SampleKind] = ()
+) -> tuple[CameraBackground, ...]:
+    """The background of every camera, from a clip in which somebody moves about.
+
+    Args:
+        clip: to learn from, as a whole.
+        left_out: where samples do not count.
+        more: samples of other kinds to take on the way.
+
+    Raises:
+        UnsuitableError: nothing can be learnt.
+        InputError: a video cannot be read.
+    """
+    recording = clip.recording
+    names, kind = recording.rig.names, background_samples(recording)
+    if len(kind.frames) < FEWEST_SAMPLES:
+        raise _too_few(f"{len(kind.frames)} frames")
+    samples = clip.sampled([kind, *more])[0]
+    few = next((k for k, of_camera in enumerate(samples) if len(of_camera) < FEWEST_SAMPLES), None)
+    if few is not None:
+        raise _too_few(f"{len(samples[few]) or len(kind.frames)} frames of {names[few]}")
+    with ThreadPoolExecutor(min(len(names), os.cpu_count() or 1)) as pool:
+        sampled = dict(enumerate(pool.map(SampledCamera.from_images, samples)))
         if not moves(sampled):
             raise UnsuitableError(
                 "nobody moves in the clip, and who stands still cannot be told from the room; give pictures of the "
@@ -61,24 +76,16 @@ def learn(recording: Recording, left_out: LeftOut | None) -> Arrays:
         zones = moving_zones(movements, cameras, axis_vector(recording.up))
         of_one = lambda k: learnt_background(sampled[k], zones[k], (left_out or {}).get(names[k]))
         learnt = dict(zip(sampled, pool.map(of_one, sampled), strict=True))
-    sizes = [working_size(*recording.rig.image_size(name)) for name in names]
-    found = {name: learnt.get(k, CameraBackground.nothing(*sizes[k])) for k, name in enumerate(names)}
     _say_unknown(recording, 1.0 - float(np.mean([background.known.mean() for background in learnt.values()])))
-    return {f"{name}.{part}": getattr(background, part) for name, background in found.items() for part in PARTS}
+    nothing = lambda name: CameraBackground.nothing(*working_size(*recording.rig.image_size(name)))
+    return tuple(learnt.get(k) or nothing(name) for k, name in enumerate(names))
 
 
-def _sampled(recording: Recording, name: str) -> SampledCamera:
-    size = working_size(*recording.rig.image_size(name))
-    small = lambda image: cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-    frames = sampled_frames(recording)
-    images = camera_samples(recording, name, frames, small) if len(frames) >= FEWEST_SAMPLES else {}
-    if len(images) < FEWEST_SAMPLES:
-        few = f"{len(images) or len(frames)} frames" + ("" if len(frames) < FEWEST_SAMPLES else f" of {name}")
-        raise UnsuitableError(
-            f"{few} are too few to tell the subject from the room (at least {FEWEST_SAMPLES} are needed); give a "
-            "longer clip, or pictures of the empty scene as background/CAMERA.jpg"
-        )
-    return SampledCamera.from_images(images)
+def _too_few(frames: str) -> UnsuitableError:
+    return UnsuitableError(
+        f"{frames} are too few to tell the subject from the room (at least {FEWEST_SAMPLES} are needed); give a "
+        "longer clip, or pictures of the empty scene as background/CAMERA.jpg"
+    )
 
 
 def _shaken(recording: Recording, shifts: Sequence[float]) -> set[str]:

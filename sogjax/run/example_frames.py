@@ -11,12 +11,12 @@ from sogjax.errors import InputError, counted
 from sogjax.io.example_poses import ExamplePose, frame_name
 from sogjax.io.recording import Recording
 from sogjax.model.rotation import axis_vector
-from sogjax.run.background import background_or_reason
+from sogjax.run.background import Background
+from sogjax.run.clip import Clip
 from sogjax.run.example_people import AGREEING, OTHERWISE, num_people_seen, people_examples
-from sogjax.run.sampled_masks import sampled_masks
+from sogjax.run.sampled_masks import masks_of_samples
 from sogjax.run.terminal import say
 from sogjax.scene.background import CameraBackground
-from sogjax.settings.method import ImagesConfig
 
 NUM_TRIED, NUM_EXAMPLES = 8, 5
 """Frames in which the pose is looked for, and those of them that the actor is made of."""
@@ -35,7 +35,7 @@ FEW_CAMERAS = 4
 
 
 def with_examples(
-    recording: Recording, images: ImagesConfig, actors: int | None = None
+    clip: Clip, background: Callable[[], Background], actors: int | None = None
 ) -> tuple[Recording, tuple[CameraBackground, ...] | None, int | None]:
     """The recording with example poses, its own or frames of its videos, and the background that their masks need.
 
@@ -43,13 +43,22 @@ def with_examples(
     `actors` is how many people the example poses show; None: as many as they name, or one.
 
     Raises:
-        InputError: as `with_example_frames` and `check_actors`.
+        InputError: as `check_actors`; no background is known where masks need one, or no frames show so many people
+            whole and apart from it and each other.
     """
+    recording = clip.recording
     check_actors(recording, actors)
-    if not recording.example_poses:
-        return (*with_example_frames(recording, images, 1 if actors is None else actors), NUM_EXAMPLES)
-    found = background_or_reason(recording, images) if _need_background(recording) else None
-    return recording, None if isinstance(found, str) else found, None
+    if recording.example_poses:
+        return recording, background().cameras if _need_background(recording) else None, None
+    known = background()
+    if known.cameras is None:
+        raise InputError(
+            f"{recording.path}: there is no actor=FILE, there are no example poses, and none can be taken from the "
+            f"videos: {known.reason}. {WAYS}"
+        )
+    count = 1 if actors is None else actors
+    examples = _person_examples(clip, known.cameras) if count == 1 else _people_examples(clip, known.cameras, count)
+    return replace(recording, example_poses=examples), known.cameras, NUM_EXAMPLES
 
 
 def check_actors(recording: Recording, actors: int | None, num_files: int | None = None) -> None:
@@ -87,37 +96,22 @@ def _need_background(recording: Recording) -> bool:
     return any(example.frame is not None or without(example) for example in recording.example_poses)
 
 
-def with_example_frames(
-    recording: Recording, images: ImagesConfig, actors: int = 1
-) -> tuple[Recording, tuple[CameraBackground, ...]]:
-    """The recording with frames of its videos as example poses, and the background that their masks need.
-
-    Raises:
-        InputError: no background can be learnt, or no frames show `actors` people whole and apart from it and each
-            other.
-    """
-    learnt = _background(recording, images)
-    examples = _person_examples(recording, learnt) if actors == 1 else _people_examples(recording, learnt, actors)
-    return replace(recording, example_poses=examples), learnt
-
-
-def _person_examples(recording: Recording, learnt: Sequence[CameraBackground]) -> tuple[ExamplePose, ...]:
-    shapes = seen_shapes(recording, learnt)
-    if (problem := unsuitable(shapes, lambda: num_people_seen(recording, learnt))) is not None:
+def _person_examples(clip: Clip, learnt: Sequence[CameraBackground]) -> tuple[ExamplePose, ...]:
+    recording, shapes = clip.recording, seen_shapes(clip, learnt)
+    if (problem := unsuitable(shapes, lambda: num_people_seen(clip, learnt))) is not None:
         raise _no_examples(recording, problem)
     chosen = spread_choice([shape for shape in shapes if shape.agreement > AGREEING], NUM_TRIED)
-    _say_chosen(recording, [shape.frame for shape in chosen], len(shapes))
+    _say_chosen([shape.frame for shape in chosen], len(shapes))
     say(f"the actor would gain most from {most_helpful(chosen, len(recording.rig.names))}")
-    name = lambda shape: frame_name(shape.frame + recording.first_frame)
-    return tuple(ExamplePose(name(shape), None, {}, {}, None, shape.frame) for shape in chosen)
+    return tuple(ExamplePose(frame_name(shape.frame), None, {}, {}, None, shape.frame) for shape in chosen)
 
 
-def _people_examples(recording: Recording, learnt: Sequence[CameraBackground], actors: int) -> tuple[ExamplePose, ...]:
-    examples = people_examples(recording, learnt, actors, NUM_TRIED)
+def _people_examples(clip: Clip, learnt: Sequence[CameraBackground], actors: int) -> tuple[ExamplePose, ...]:
+    examples = people_examples(clip, learnt, actors, NUM_TRIED)
     if isinstance(examples, str):
-        raise _no_examples(recording, examples)
+        raise _no_examples(clip.recording, examples)
     frames = dict.fromkeys(example.frame for example in examples if example.frame is not None)
-    _say_chosen(recording, list(frames), None)
+    _say_chosen(list(frames), None)
     return examples
 
 
@@ -125,20 +119,10 @@ def _no_examples(recording: Recording, problem: str) -> InputError:
     return InputError(f"{recording.path}: no example poses can be taken from the videos, since {problem}. {WAYS}")
 
 
-def _say_chosen(recording: Recording, frames: Sequence[int], num_seen: int | None) -> None:
-    shown = ", ".join(str(frame + recording.first_frame) for frame in frames)
+def _say_chosen(frames: Sequence[int], num_seen: int | None) -> None:
+    shown = ", ".join(str(frame) for frame in frames)
     looked_at = "" if num_seen is None else f" ({counted(num_seen, 'frame')} looked at)"
     say(f"example poses: frames {shown} of the videos{looked_at}")
-
-
-def _background(recording: Recording, images: ImagesConfig) -> tuple[CameraBackground, ...]:
-    found = background_or_reason(recording, images)
-    if isinstance(found, str):
-        raise InputError(
-            f"{recording.path}: there is no actor=FILE, there are no example poses, and none can be taken from the "
-            f"videos: {found}. {WAYS}"
-        )
-    return found
 
 
 def unsuitable(shapes: Sequence[SeenShape], num_people: Callable[[], int]) -> str | None:
@@ -181,9 +165,9 @@ def most_helpful(chosen: Sequence[SeenShape], num_cameras: int) -> str:
     return "pictures of a T-pose, of bent elbows and of a squat (example_poses/POSE/CAMERA.jpg)"
 
 
-def seen_shapes(recording: Recording, learnt: Sequence[CameraBackground]) -> list[SeenShape]:
+def seen_shapes(clip: Clip, learnt: Sequence[CameraBackground]) -> list[SeenShape]:
     """What frames spread over the videos show, where somebody is seen."""
-    seen, up = sampled_masks(recording, learnt), axis_vector(recording.up)
+    seen, up = masks_of_samples(clip, learnt), axis_vector(clip.recording.up)
     cubes = subject_cubes(seen.masks, seen.cameras)
     shapes = [
         seen_shape(frame, masks, seen.unknown, seen.cameras, cube, up)

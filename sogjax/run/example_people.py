@@ -13,7 +13,8 @@ from sogjax.errors import counted
 from sogjax.io.example_poses import ExamplePose, frame_name
 from sogjax.io.recording import Recording
 from sogjax.model.rotation import axis_vector
-from sogjax.run.sampled_masks import SampledMasks, sampled_masks
+from sogjax.run.clip import Clip
+from sogjax.run.sampled_masks import SampledMasks, masks_of_samples
 from sogjax.scene.background import CameraBackground
 from sogjax.scene.cells import CellGrid
 from sogjax.scene.plate_difference import reduced_mask
@@ -38,10 +39,10 @@ def person_name(number: int) -> str:
     return f"person_{number + 1}"
 
 
-def num_people_seen(recording: Recording, learnt: Sequence[CameraBackground]) -> int:
+def num_people_seen(clip: Clip, learnt: Sequence[CameraBackground]) -> int:
     """How many people most frames show that show any; 0: none does."""
-    seen = sampled_masks(recording, learnt, LIGHT)
-    return most_seen([len(people) for people in everybody(seen, recording.up)])
+    seen = masks_of_samples(clip, learnt, LIGHT)
+    return most_seen([len(people) for people in everybody(seen, clip.recording.up)])
 
 
 def most_seen(counts: Sequence[int]) -> int:
@@ -51,10 +52,16 @@ def most_seen(counts: Sequence[int]) -> int:
 
 
 def people_examples(
-    recording: Recording, learnt: Sequence[CameraBackground], actors: int, count: int
+    clip: Clip, learnt: Sequence[CameraBackground], actors: int, count: int
 ) -> tuple[ExamplePose, ...] | str:
     """At most `count` frames as example poses of each of several people, or why there are none, with the remedy."""
-    seen = sampled_masks(recording, learnt, LIGHT)
+    return examples_of_masks(clip.recording, masks_of_samples(clip, learnt, LIGHT), actors, count)
+
+
+def examples_of_masks(
+    recording: Recording, seen: SampledMasks, actors: int, count: int
+) -> tuple[ExamplePose, ...] | str:
+    """What `people_examples` gives, from what is not the background in some frames."""
     moments = everybody(seen, recording.up)
     apart = [people for people in moments if len(people) == actors]
     if len(apart) < FEWEST_APART:
@@ -124,7 +131,7 @@ def _shapes(person: Sequence[PersonSeen], seen: SampledMasks, up: str) -> dict[i
 
 
 def _example(recording: Recording, actor: str, person: PersonSeen, grids: Sequence[CellGrid]) -> ExamplePose:
-    name = frame_name(person.frame + recording.first_frame)
+    name = frame_name(person.frame)
     within = {recording.rig.names[k]: reduced_mask(in_pixels(mask, grids[k])) for k, mask in person.regions.items()}
     return ExamplePose(name, actor, {}, {}, None, person.frame, within)
 

@@ -6,7 +6,6 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from sogjax.actor.keypoint_shape import shape_of_keypoints
 from sogjax.errors import counted
 from sogjax.io.initial_pose import InitialPose
 from sogjax.io.keypoints.load import Keypoints, load_keypoints
@@ -15,10 +14,10 @@ from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.model.rotation import world_from_upright
 from sogjax.model.shape import ShapeModel
-from sogjax.run.adjust_colors import measured_colors
+from sogjax.run.measured_colors import measured_colors
 from sogjax.run.terminal import say
 from sogjax.search.keypoint_people import triangulated_people
-from sogjax.search.keypoint_pose import KeypointPose, pose_of_keypoints
+from sogjax.search.keypoint_pose import KeypointPose, pose_of_keypoints, shape_of_keypoints
 
 LOOKED_AT = 120
 """Frames spread over the clip in which bones are measured."""
@@ -34,7 +33,7 @@ class SeenPoints:
 
     scheme: KeypointScheme
     frames: tuple[int, ...]
-    """Counted from the recording's first."""
+    """The recording's numbers."""
     points: Float[np.ndarray, "frame keypoint 3"]
     """Metres; NaN where unknown."""
 
@@ -56,8 +55,9 @@ def seen_points(recording: Recording, frames: tuple[int, ...] | None = None) -> 
         return None
     if frames is None:
         spread = np.linspace(0, recording.num_frames - 1, min(LOOKED_AT, recording.num_frames))
-        frames = tuple(np.unique(spread.astype(int)).tolist())
-    chosen = Keypoints(keypoints.scheme, keypoints.cameras, keypoints.points[:, list(frames)])
+        frames = tuple(recording.frames[row] for row in np.unique(spread.astype(int)).tolist())
+    rows = np.array(frames, int) - recording.first_frame
+    chosen = Keypoints(keypoints.scheme, keypoints.cameras, keypoints.points[:, rows])
     points = triangulated_people(chosen, recording.rig).points[:, 0]
     return SeenPoints(keypoints.scheme, frames, np.asarray(points, float))
 

@@ -12,10 +12,10 @@ from jaxtyping import Array, Float
 from sogjax.energy.frame_energy import still_energy
 from sogjax.energy.similarity import similarity_among
 from sogjax.io.keypoints.load import Keypoints, load_keypoints
-from sogjax.io.recording import Recording
 from sogjax.model.body import Body, concatenate
 from sogjax.run import build
-from sogjax.run.pipeline import Preparation, frame_input, read_pictures
+from sogjax.run.background import Background
+from sogjax.run.clip import Clip
 from sogjax.run.terminal import say
 from sogjax.search.keypoint_people import triangulated_people
 from sogjax.search.keypoint_pose import KeypointPose, pose_of_keypoints
@@ -38,58 +38,43 @@ CLEARLY = 1.05
 
 
 def keypoint_starts(
-    recording: Recording, bodies: Sequence[Body], config: TrackConfig, frame: int, keypoints: Keypoints | None = None
+    clip: Clip, background: Background, bodies: Sequence[Body], config: TrackConfig, frame: int
 ) -> list[Float[Array, "dof"]] | None:
-    """The poses of bodies, upright in the recording's world, in a frame counted from the recording's first.
+    """The poses of bodies, upright in the recording's world, in a frame.
 
     Who of several is who, the colours in the pictures tell. None where the recording has no keypoints, they give no
     poses that most of them agree with, or it is not clear who is who.
 
-    Args:
-        recording: with the cameras.
-        bodies: the actors.
-        config: with which they are tracked.
-        frame: counted from the recording's first.
-        keypoints: those of the recording, if they were read already.
-
     Raises:
         InputError: none of the keypoint files can be used, or the frame cannot be read.
     """
-    points = frame_points(recording, frame, len(bodies), keypoints)
-    if points is None or len(bodies) > MOST_ACTORS or (len(bodies) > 1 and len(recording.rig) < CAMERAS):
+    recording = clip.recording
+    keypoints = _keypoints_of(clip, frame)
+    if keypoints is None or len(recording.rig) < 2:
         return None
-    scheme, people = points
+    if len(bodies) > MOST_ACTORS or (len(bodies) > 1 and len(recording.rig) < CAMERAS):
+        return None
+    people = np.asarray(triangulated_people(keypoints, recording.rig, len(bodies)).points[0], float)
     # Of each body in the place of each person.
-    found = [[pose_of_keypoints(body, recording.up, scheme, person) for person in people] for body in bodies]
-    order = _who_is_who(recording, bodies, config, frame, found)
+    found = [[pose_of_keypoints(body, recording.up, keypoints.scheme, person) for person in people] for body in bodies]
+    order = _who_is_who(clip, background, bodies, config, frame, found)
     if order is None:
         return None
     poses = [found[k][person] for k, person in enumerate(order)]
-    if not all(_good(body, pose, frame + recording.first_frame) for body, pose in zip(bodies, poses, strict=True)):
+    if not all(_good(body, pose, frame) for body, pose in zip(bodies, poses, strict=True)):
         return None
     return [jnp.asarray(p.pose, b.poses["rest"].dtype) for b, p in zip(bodies, poses, strict=True) if p is not None]
 
 
-def keypoint_start(
-    recording: Recording, body: Body, frame: int, keypoints: Keypoints | None = None
-) -> Float[Array, "dof"] | None:
-    """The same of a single body."""
-    found = keypoint_starts(recording, [body], TrackConfig(), frame, keypoints)
-    return None if found is None else found[0]
-
-
-def frame_points(recording: Recording, frame: int, num_people: int, keypoints: Keypoints | None = None):
-    """The scheme and, by person, the triangulated keypoints of a frame; None where there are none."""
-    if keypoints is not None:
-        keypoints = keypoints.between(frame, frame + 1)
-    else:
-        keypoints = load_keypoints(replace(recording, first_frame=recording.first_frame + frame, num_frames=1))
-        for warning in () if keypoints is None else keypoints.warnings:
-            say(f"warning: {warning}")
-    if keypoints is None or len(recording.rig) < 2:
-        return None
-    points = triangulated_people(keypoints, recording.rig, num_people).points[0]
-    return keypoints.scheme, np.asarray(points, float)
+def _keypoints_of(clip: Clip, frame: int) -> Keypoints | None:
+    """The keypoints of a frame; None: there are no files."""
+    if clip.keypoints is not None:
+        row = frame - clip.keypoints.first
+        return clip.keypoints.found.between(row, row + 1)
+    keypoints = load_keypoints(replace(clip.recording, first_frame=frame, num_frames=1))
+    for warning in () if keypoints is None else keypoints.warnings:
+        say(f"warning: {warning}")
+    return keypoints
 
 
 def _good(body: Body, found: KeypointPose | None, shown: int) -> bool:
@@ -103,7 +88,8 @@ def _good(body: Body, found: KeypointPose | None, shown: int) -> bool:
 
 
 def _who_is_who(
-    recording: Recording,
+    clip: Clip,
+    background: Background,
     bodies: Sequence[Body],
     config: TrackConfig,
     frame: int,
@@ -115,17 +101,15 @@ def _who_is_who(
     if any(pose is None for of_body in found for pose in of_body):
         return None
     orders = [*permutations(range(len(bodies)))]
-    grids = build.cell_grids(recording, config.images.depth)
-    tracker = build.tracker(recording, concatenate(bodies), grids, config)
-    pictures = next(iter(read_pictures(recording, Preparation(grids), frame, frame + 1)))
-    known = on_device(frame_input([picture.cells for picture in pictures]))
+    tracker = build.tracker(clip, background, concatenate(list(bodies)), config)
+    known = on_device(next(clip.frames(frame, frame + 1)))
     poses = [np.concatenate([_pose(found[k][person]) for k, person in enumerate(order)]) for order in orders]
     states = [TrackState.from_pose(jnp.asarray(pose, tracker.normalizers.dtype)) for pose in poses]
     capacities = first_capacities(tracker, states[0], known)
     values = np.array([float(_similarity(tracker, state, known, capacities)) for state in states])
     best, second = np.sort(values)[::-1][:2]
     if not best > CLEARLY * max(second, 0.0):
-        say(f"who is who in frame {frame + recording.first_frame} is not clear, so poses are searched for")
+        say(f"who is who in frame {frame} is not clear, so poses are searched for")
         return None
     return orders[int(values.argmax())]
 

@@ -50,9 +50,9 @@ def _memory_share() -> float:
 
 
 def return_freed_memory() -> None:
-    """Give it back to the system, where the C library can (glibc's malloc_trim, some 40 ms); elsewhere nothing happens.
+    """Give freed memory back to the system, where the C library can (glibc's malloc_trim takes some 40 ms).
 
-    Of a process that compiles several programs, each needs its memory beside what the earlier ones left, otherwise.
+    Otherwise each program of a process that compiles several needs its memory beside what the earlier ones left.
     """
     if not sys.platform.startswith("linux"):
         return
@@ -67,7 +67,7 @@ _MEMORY = Path("/proc/meminfo")
 
 
 def available_memory(report: Path = _MEMORY) -> int | None:
-    """Bytes that can be taken without swapping; None where the system does not say.
+    """The bytes that can be taken without swapping; None where the system does not say.
 
     What the system holds of files, to be given up when asked for, counts as available where `report` tells it.
     """

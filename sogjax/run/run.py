@@ -1,43 +1,189 @@
-"""The result of tracking a recording."""
+"""A run while its passes go on: what it is asked for, and the record of each pass that has ended."""
 
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
+from threading import Lock
+from typing import Any
 
-import numpy as np
-from jaxtyping import Bool, Int
-
-from sogjax.io.motion import Motion
-from sogjax.io.recording import Recording
+from sogjax.actor.make import MadeActor
+from sogjax.energy.term import Term
+from sogjax.errors import InputError
+from sogjax.io.frame_motions import ClipFacts, motions_of
+from sogjax.io.frame_table import FramesRecord, FrameTable
 from sogjax.model.body import Body
-from sogjax.quality.evaluation import GroupEvaluation
-from sogjax.quality.verdict import Verdict
+from sogjax.run.actors import ActorRequest, Actors
+from sogjax.run.adjust_checks import check_window, too_short
+from sogjax.run.adjust_clip import Adjusted, AdjustRequest
+from sogjax.run.background import Background
+from sogjax.run.clip import Clip, SampleKind
 from sogjax.run.clock import StageTimes
+from sogjax.run.initial_pose import SOURCES, InitialPose, PoseRequest, PoseSource
+from sogjax.run.keypoint_bias import KeypointBias
+from sogjax.run.relearn_background import RelearntBackground
+from sogjax.run.result import RunResult
+from sogjax.run.run_files import GUESS
+from sogjax.run.sampled_masks import mask_samples
+from sogjax.run.setup import Setup, tracking_setup
+from sogjax.run.terminal import say
+from sogjax.settings.run import OutputsConfig, TrackConfig
+
+NO_OUTPUTS = OutputsConfig(motion_only=True).asked()
 
 
 @dataclass
 class Run:
-    """A tracked recording and its motions."""
+    """What a run is asked for, and what its passes have found so far."""
 
-    recording: Recording
-    bodies: list[Body]
-    """The actors, upright in the recording's world; none if the run had ended before."""
-    motions: dict[str, Motion]
-    times: StageTimes
-    image_blobs: float
-    """Used per frame and camera, on average."""
-    evaluation: GroupEvaluation | None = None
-    verdicts: dict[str, Verdict] = field(default_factory=dict)
-    """What the run thinks of each actor's motion."""
-    missing: dict[str, int] = field(default_factory=dict)
-    """Frames of the motion in which a camera had no picture, by camera."""
-    files: list[Path] = field(default_factory=list)
+    clip: Clip
+    config: TrackConfig
+    out: Path | None = None
+    """The folder of the results; None: no files are written."""
+    kept: Path | None = None
+    """The folder where records lie until the run has ended; None: they are not kept."""
+    pose_sources: Sequence[PoseSource] = SOURCES
+    terms: Sequence[Term] = ()
+    """Of the energy, beside those of the settings."""
+    adjust: AdjustRequest = field(default_factory=AdjustRequest)
+    frames_given: bool = False
+    """Whether the frames were tracked before, and their table is given."""
+    report_actors: Callable[[Sequence[MadeActor]], object] = lambda _: None
+    """Takes how the actors were made."""
+    before_results: Callable[[], object] = lambda: None
+    """Called before the first file of the results is written: those of an earlier run go then."""
+    times: StageTimes = field(default_factory=StageTimes)
+
+    shown: tuple[FrameTable, list[Path]] | None = None
+    """What the files show that grew while frames were tracked, and these files."""
+    records: dict[str, Any] = field(default_factory=dict)
+    """What each pass left, by the name of the pass."""
+
+    def __post_init__(self) -> None:
+        self._lock = Lock()
 
     @property
-    def iterations(self) -> Int[np.ndarray, "frame"]:
-        """Of the solver, for all actors together."""
-        return next(iter(self.motions.values())).iterations
+    def makes_actors(self) -> bool:
+        """Whether the actors are made, and not read from files."""
+        return self.config.actor is None
 
     @property
-    def converged(self) -> Bool[np.ndarray, "frame"]:
-        """Whether the solver did, for all actors together."""
-        return next(iter(self.motions.values())).converged
+    def samples_to_come(self) -> tuple[SampleKind, ...]:
+        """Pictures that the making of actors will look at, taken while the videos are read for the background."""
+        frames_of_videos = self.makes_actors and not self.clip.recording.example_poses
+        return (mask_samples(self.clip.recording),) if frames_of_videos else ()
+
+    @property
+    def background(self) -> Background:
+        """What is known of the empty scene."""
+        return self.records["background"]
+
+    @property
+    def actors(self) -> Actors:
+        """The actors, in their own upright frames."""
+        return self.records["actors"]
+
+    @property
+    def initial_pose(self) -> InitialPose:
+        """Where tracking begins."""
+        return self.records["initial_pose"]
+
+    @property
+    def adjusted(self) -> Adjusted | None:
+        """The adjusted clip; None where it was not, or not yet, adjusted."""
+        return self.records.get("adjusted")
+
+    @property
+    def actor_request(self) -> ActorRequest:
+        """The actors that are wanted."""
+        return replace(ActorRequest.of_track(self.clip, self.config), background=lambda: self.background)
+
+    @property
+    def pose_request(self) -> PoseRequest:
+        """The initial pose that is wanted."""
+        picture = None if self.out is None else GUESS.of(self.out)
+        return PoseRequest(self.clip, self.background, self.actors, self.config, self.terms, picture)
+
+    @cached_property
+    def first_setup(self) -> Setup:
+        """What is tracked with before anything was learnt by tracking."""
+        return tracking_setup(self.clip, self.background, self.actors.bodies, self.config, self.terms)
+
+    @property
+    def setup(self) -> Setup:
+        """What is tracked with, knowing what was learnt so far."""
+        with self._lock:  # a thread makes it while the initial pose is searched for
+            found = self.first_setup
+        relearnt: RelearntBackground | None = self.records.get("relearnt")
+        bias: KeypointBias | None = self.records.get("keypoint_bias")
+        if relearnt is not None:
+            found = replace(found, tracker=relearnt.in_tracker(found))
+        return found if bias is None else replace(found, tracker=bias.in_tracker(found.tracker))
+
+    @cached_property
+    def adjusts(self) -> bool:
+        """Whether the clip is adjusted: it was asked for, and the clip is long enough; if not, that is said.
+
+        Raises:
+            InputError: there are several actors, or its pictures do not fit into memory.
+        """
+        if not self.config.adjust or not self.tracks:
+            return self.config.adjust
+        body, *others = self.actors.bodies
+        if others:
+            raise InputError("adjust=true: only a clip of one actor can be adjusted; leave adjust=true out")
+        if (reason := too_short(len(self.clip.numbers))) is not None:
+            say(f"adjust=true: {reason}")
+            return False
+        check_window(len(self.clip.recording.rig), body.num_blobs, len(self.clip.numbers))
+        return True
+
+    @property
+    def frames(self) -> FrameTable:
+        """The frames as they hold by now: those of the last pass that left any."""
+        return _last_table(self.records.values())
+
+    @property
+    def unadjusted(self) -> FrameTable:
+        """The frames as they held before they were adjusted."""
+        return _last_table(record for record in self.records.values() if record is not self.adjusted)
+
+    @property
+    def final_setup(self) -> Setup:
+        """The clip and the actors that the final frames are of."""
+        return self.setup if self.adjusted is None else self.adjusted.setup(self.first_setup)
+
+    @property
+    def tracks(self) -> bool:
+        """Whether this run tracks the frames."""
+        return not self.frames_given
+
+    @property
+    def result(self) -> RunResult:
+        """The result, once it was judged."""
+        return self.records["result"]
+
+    @property
+    def files(self) -> list[Path]:
+        """The files that were written."""
+        return self.records["files"]
+
+    @property
+    def result_so_far(self) -> RunResult:
+        """The motions, without anything that was thought of them."""
+        setup, table, recording = self.final_setup, self.frames, self.clip.recording
+        motions = motions_of(table, setup.bodies, ClipFacts.of(recording, self.clip.numbers.step))
+        image_blobs = float(self.unadjusted.num_matching.mean())
+        missing = recording.num_missing(self.clip.numbers)
+        return RunResult(setup.clip.recording, setup.bodies, motions, self.times, image_blobs, missing=missing)
+
+    @property
+    def made_bodies(self) -> list[Body]:
+        """Actors whose files are among the results, since the run made or adjusted them."""
+        if self.adjusted is not None:
+            return [self.adjusted.actor]
+        return [*self.actors.bodies] if self.makes_actors else []
+
+
+def _last_table(records: Iterable[Any]) -> FrameTable:
+    return [record.table for record in records if isinstance(record, FramesRecord)][-1]

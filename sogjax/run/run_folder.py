@@ -1,19 +1,21 @@
 """The folder of a run: one run at a time, nothing overwritten unasked, nothing left of an older run."""
 
+import json
 import os
-import re
+import shutil
+import uuid
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from sogjax.errors import InputError
-from sogjax.io.export.write import WRITERS
-from sogjax.io.files import objection
+from sogjax.io.files import write_file
+from sogjax.io.frame_motions import FRAMES
 from sogjax.io.source import find_sources
 from sogjax.run.clock import seconds_so_far
-from sogjax.run.kept_run import FOLDER, NOTE, KeptRun, read_note, write_note
-from sogjax.run.origin import Origin, difference
-from sogjax.run.outputs import results_folder
+from sogjax.run.fingerprint import RunFingerprint, difference
+from sogjax.run.run_files import KEPT, NOTE, half_written, in_the_way, left_in
 from sogjax.run.terminal import say
 
 try:
@@ -24,18 +26,6 @@ except ImportError:  # Windows: two runs in one folder are not noticed there
 LOCK = ".lock"
 REPLACING_THEIR_OWN = ("demo",)
 """Commands whose own earlier runs are replaced unasked, since they can be repeated."""
-PARTIAL = ("motion.partial", "motion_*.partial", FOLDER)
-"""Folders of a run that has not ended."""
-RESULTS = (
-    *(f"motion{ending}" for ending in WRITERS),
-    *("config.yaml", "metrics.json", "overlay.mp4", "motion.rrd", "worst.png", NOTE),
-)
-"""Names of files that every run leaves."""
-OF_ACTORS = tuple(f"motion_*{ending}" for ending in WRITERS)
-"""Names of several actors' files. A user's own files may match: only those listed in a run's note are removed."""
-_HALF_WRITTEN = re.compile(
-    r"\.(motion|overlay|config|metrics|worst|run|actor)(_.*)?\.[0-9a-f]{8}\.tmp(\..*)?|\.probe-[0-9a-f]*"
-)
 
 
 class RunFolder:
@@ -49,20 +39,20 @@ class RunFolder:
         self.path = path
         if overwrite and resume:
             raise InputError("overwrite=true resume=true: exclude each other; leave one of them out")
-        self.note = read_note(path / NOTE)
+        self.note = read_note(NOTE.of(path))
         """Note of a run that has ended."""
-        self.kept = KeptRun(path)
-        """State of a run that was stopped."""
-        begun_by = (self.note or self.kept.note).get("command")
+        self.kept = KEPT.of(path)
+        """Where the records of a run lie that has not ended, each written as soon as it is known."""
+        begun_by = (self.note or self._begun).get("command")
         self._resume = resume
-        self.began = False
-        """Whether this process began a run here."""
+        self.began = self._cleared = False
+        """Whether this process began a run here; whether the results of an earlier one are gone."""
         overwrite = overwrite or (command in REPLACING_THEIR_OWN and begun_by == command)
-        found = earlier_results(path, self.note) or sorted(_named(path, OF_ACTORS))
+        found = in_the_way(path, self.note.get("files", []))
         if not found or overwrite:
             return
         names = ", ".join(file.name for file in found[:3]) + (", ..." if len(found) > 3 else "")
-        unfinished = (path / FOLDER).is_dir()
+        unfinished = self.kept.is_dir()
         if resume and not (unfinished or self.note):
             raise InputError(
                 f"{path}: holds results ({names}) but not the state needed to resume; choose another folder with "
@@ -76,11 +66,16 @@ class RunFolder:
             )
 
     @property
+    def _begun(self) -> dict[str, Any]:
+        """Note of a run that was stopped."""
+        return read_note(NOTE.of(self.kept))
+
+    @property
     def ended(self) -> bool:
         """Whether the run to resume has already ended."""
         return self._resume and bool(self.note)
 
-    def goes_on(self, origin: Origin) -> bool:
+    def goes_on(self, fingerprint: RunFingerprint) -> bool:
         """Whether this run resumes one that was begun here with the same settings and files.
 
         Raises:
@@ -88,30 +83,25 @@ class RunFolder:
         """
         if not self._resume:
             return False
-        before = (self.note or self.kept.note).get("origin")
+        before = (self.note or self._begun).get("origin")
         if before is None:
             say(f"{self.path}: nothing to resume; starting with the first frame")
             return False
-        self._check_same(before, origin)
+        self._check_same(before, fingerprint)
         for path in half_written(self.path):
             path.unlink(missing_ok=True)
-        for path in _named(self.path, PARTIAL) if self.note else ():
-            _remove_partial(path)
+        if self.note and self.kept.is_dir():
+            _remove_kept(self.kept)
         return True
 
-    def begin(self, command: str, origin: Origin, needed: Sequence[Path] = ()) -> None:
-        """Begin a run.
-
-        Args:
-            command: that begins it.
-            origin: what the run depends on.
-            needed: files that it reads; nothing else of an earlier run is left.
-        """
-        self._clear(needed)
+    def begin(self, command: str, fingerprint: RunFingerprint) -> None:
+        """Begin a run; the results of an earlier one stay until `clear`."""
         self.began = True
-        self.kept.begin(command, origin)
+        if self.kept.is_dir():
+            _remove_kept(self.kept)
+        write_note(NOTE.of(self.kept), {"command": command, "origin": fingerprint})
 
-    def _check_same(self, before: Origin, now: Origin) -> None:
+    def _check_same(self, before: RunFingerprint, now: RunFingerprint) -> None:
         what = difference(before, now)
         if what is not None:
             raise InputError(
@@ -119,26 +109,33 @@ class RunFolder:
                 "and files, choose another folder with out=DIR, or start over with overwrite=true"
             )
 
-    def _clear(self, needed: Sequence[Path]) -> None:
-        """Remove the files of an earlier run, except those that this one reads."""
-        kept = {path.resolve() for path in needed}
-        (self.path / NOTE).unlink(missing_ok=True)  # first: without it nothing is taken for whole
-        for path in [*earlier_results(self.path, self.note), *half_written(self.path)]:
+    def clear(self, needed: Sequence[Path] = ()) -> None:
+        """Remove the results of an earlier run, except files that this one reads."""
+        if self._cleared:
+            return
+        self._cleared = True
+        kept = {path.resolve() for path in (*needed, self.kept)}
+        NOTE.of(self.path).unlink(missing_ok=True)  # first: without it nothing is taken for whole
+        for path in [*left_in(self.path, self.note.get("files", [])), *half_written(self.path)]:
             if path.resolve() in kept:
                 continue
             if path.is_dir() and not path.is_symlink():
-                _remove_partial(path)
+                _remove_kept(path)
             else:
                 path.unlink(missing_ok=True)
 
-    def finish(self, command: str, origin: Origin, files: Sequence[Path]) -> None:
+    def finish(self, command: str, fingerprint: RunFingerprint, files: Sequence[Path]) -> None:
         """Write down that the run has ended, its files, and the seconds of its stages on the clock that runs."""
         for path in half_written(self.path):
             path.unlink(missing_ok=True)
-        names = [path.name for path in files]
-        note = {"command": command, "files": names, "origin": origin}
+        note = {"command": command, "files": [path.name for path in files], "origin": fingerprint}
         seconds = seconds_so_far()
-        write_note(self.path / NOTE, note | ({"seconds": seconds} if seconds else {}))
+        write_note(NOTE.of(self.path), note | ({"seconds": seconds} if seconds else {}))
+        self.forget()
+
+    def forget(self) -> None:
+        """Remove what was kept of a run that has not ended."""
+        shutil.rmtree(self.kept, ignore_errors=True)
 
 
 @contextmanager
@@ -163,8 +160,8 @@ def run_folder(
         try:
             yield folder
         except BaseException:
-            if folder.began and not any(path.glob("motion*.partial")):
-                folder.kept.remove()  # it did not come to its first frame
+            if folder.began and not (folder.kept / FRAMES).is_dir():
+                folder.forget()  # it did not come to its first frame
             raise
 
 
@@ -181,36 +178,73 @@ def _check_no_recording(path: Path) -> None:
     raise InputError(f"out={path}: is the folder of a recording; give results one of their own, as out={path}/results")
 
 
-def earlier_results(folder: Path, note: dict) -> list[Path]:
-    """What an earlier run left in a folder: its unfinished state, and files known by name or from its note.
-
-    Anybody may have written the note, so only files in this very folder count.
-    """
-    if not folder.is_dir():
-        return []
-    listed = note.get("files", [])
-    names = [name for name in listed if isinstance(name, str) and objection(name) is None] if listed else []
-    files = _named(folder, RESULTS) | {folder / name for name in names}
-    partial = {path for path in _named(folder, PARTIAL) if path.is_dir()}
-    return sorted(partial | {path for path in files if path.is_file() or path.is_symlink()})
-
-
-def _named(folder: Path, patterns: Sequence[str]) -> set[Path]:
-    return {path for pattern in patterns for path in folder.glob(pattern)}
-
-
-def half_written(folder: Path) -> list[Path]:
-    """Files under temporary names, left by a run that was killed."""
-    return [path for path in folder.iterdir() if _HALF_WRITTEN.fullmatch(path.name) and not path.is_dir()]
-
-
-def _remove_partial(path: Path) -> None:
-    """Remove the folder of an unfinished run; it stays if it holds subfolders of somebody else's."""
+def _remove_kept(path: Path) -> None:
+    """Remove what a run kept; a folder stays if it holds subfolders that are somebody else's."""
+    for known in (FRAMES, "cells", "relearnt"):
+        if (path / known).is_dir() and not (path / known).is_symlink():
+            shutil.rmtree(path / known, ignore_errors=True)
     for file in path.iterdir():
         if not file.is_dir() or file.is_symlink():
             file.unlink()
     with suppress(OSError):
         path.rmdir()
+
+
+def read_note(path: Path) -> dict[str, Any]:
+    """What `write_note` wrote; empty if there is no such file."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
+def write_note(path: Path, note: dict[str, Any]) -> None:
+    """Write a note on a run, as JSON."""
+    write_file(path, json.dumps(note, indent=1) + "\n")
+
+
+@contextmanager
+def results_folder(path: Path) -> Iterator[Path]:
+    """The folder for results, created if missing; problems show before the work begins.
+
+    If the work ends with an error, folders created for it are removed unless they hold something.
+
+    Raises:
+        InputError: it cannot be created or written.
+    """
+    made = [folder for folder in (path, *path.parents) if not folder.exists()]
+    try:
+        _make_writable(path)
+        yield path
+    except BaseException:
+        for folder in made:
+            with suppress(OSError):
+                folder.rmdir()
+        raise
+
+
+def _make_writable(path: Path) -> None:
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        probe = path / f".probe-{uuid.uuid4().hex}"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputError(f"{path}: cannot write there ({reason}); choose another folder with out=DIR") from error
+
+
+def free_path(key: str, value: str | Path, overwrite: bool) -> Path:
+    """The path of an output, if it is free or may be replaced.
+
+    Raises:
+        InputError: a file exists there.
+    """
+    path = Path(value)
+    if path.exists() and not overwrite:
+        raise InputError(f"{key}={path}: already exists; choose another name, or give overwrite=true to replace it")
+    return path
 
 
 @contextmanager

@@ -1,8 +1,6 @@
 """What is not the background in frames spread over a whole clip, in cells."""
 
-import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import cv2
@@ -12,9 +10,8 @@ from jaxtyping import Float, UInt8
 
 from sogjax.actor.frame_choice import Mask
 from sogjax.io.recording import Recording
-from sogjax.io.sampled_frames import camera_samples, spread_frames
 from sogjax.model.camera import Camera
-from sogjax.run.build import cell_grids
+from sogjax.run.clip import Clip, SampleKind, cell_grids, spread_frames
 from sogjax.scene.background import CameraBackground, stack_background
 from sogjax.scene.cells import CellGrid
 from sogjax.scene.foreground import SHADOW, BackgroundModel, log_odds
@@ -35,7 +32,7 @@ class SampledMasks:
     """Frames of a clip; everything by camera (its index in the rig)."""
 
     frames: list[int]
-    """Counted from the recording's first, ascending."""
+    """The recording's numbers, ascending."""
     masks: list[dict[int, Mask]]
     """Of each of them: what is not the background."""
     pictures: list[dict[int, Picture]]
@@ -47,15 +44,22 @@ class SampledMasks:
     grids: tuple[CellGrid, ...]
 
 
-def sampled_masks(recording: Recording, learnt: Sequence[CameraBackground], shadow: float = SHADOW) -> SampledMasks:
+def mask_samples(recording: Recording) -> SampleKind:
+    """The pictures, in cells (BGR), that are looked at for people."""
+    grids = cell_grids(recording, DEPTH)
+    frames = spread_frames(recording.frames, MOST_LOOKED_AT)
+    return SampleKind("masks", tuple(frames), lambda camera, picture: grids[camera].averages(picture))
+
+
+def masks_of_samples(clip: Clip, learnt: Sequence[CameraBackground], shadow: float = SHADOW) -> SampledMasks:
     """Of at most `MOST_LOOKED_AT` frames that all cameras have.
 
     `shadow` is the standard deviation of the light that a shadow takes, as a part of the background's: what is darker
     by more is not the background.
     """
-    grids = cell_grids(recording, DEPTH)
+    recording, grids = clip.recording, cell_grids(clip.recording, DEPTH)
     empty = BackgroundModel.from_background(stack_background(learnt, grids), shadow)
-    sampled = _samples(recording, grids)
+    sampled = clip.sampled([mask_samples(recording)])[0]
     frames = sorted(set.intersection(*(set(of_camera) for of_camera in sampled)))
     pictures = [{k: of_camera[frame] for k, of_camera in enumerate(sampled)} for frame in frames]
     known = np.asarray(empty.known)
@@ -68,15 +72,6 @@ def sampled_masks(recording: Recording, learnt: Sequence[CameraBackground], shad
         cameras={k: resized(recording.rig.camera(name), sides[k]) for k, name in enumerate(recording.rig.names)},
         grids=grids,
     )
-
-
-def _samples(recording: Recording, grids: Sequence[CellGrid]) -> list[dict[int, Picture]]:
-    """The cells (BGR) of frames spread over the videos, camera by camera."""
-    names = recording.rig.names
-    frames = spread_frames(recording.num_frames, MOST_LOOKED_AT)
-    with ThreadPoolExecutor(min(len(names), os.cpu_count() or 1)) as pool:
-        read = lambda k: camera_samples(recording, names[k], frames, grids[k].averages)
-        return list(pool.map(read, range(len(names))))
 
 
 def _odds(

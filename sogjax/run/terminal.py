@@ -77,7 +77,7 @@ class Work:
 
 @contextmanager
 def alive(label: str, stream: TextIOBase | None = None) -> Iterator[Work]:
-    """For work without a count: while nothing else was said for ten seconds, a line like `first pose: 20 s so far`.
+    """Say that work without a count goes on: a line like `first pose: 20 s so far`, whenever nothing came for ten.
 
     The line tells the time that is left, too, if whoever works sets the `share` of what is yielded.
     """

@@ -1,58 +1,46 @@
-"""From the videos of a recording to the motion of its actors, with or without files."""
+"""Runs of the passes: into a folder, as the commands do, or without files, as a program does."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-
-import numpy as np
-from jaxtyping import Array, Float
-from omegaconf import OmegaConf
 
 from sogjax.actor.make import MadeActor
 from sogjax.energy.term import Term
 from sogjax.errors import InputError
-from sogjax.io.actor_file import save_body
-from sogjax.io.motion import arrays_of, load_motion, save_motion
-from sogjax.io.motion_log import PER_FRAME, SOMETIMES_PER_FRAME
+from sogjax.io.frame_motions import load_motions
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.run import build
 from sogjax.run.actor_report import report_folder, write_actor_report
-from sogjax.run.adjust import write_numbers, written
-from sogjax.run.adjust_checks import check_window, too_short
-from sogjax.run.adjust_clip import adjusted_clip
-from sogjax.run.clock import ACTORS, ADJUSTING, StageTimes, stage
+from sogjax.run.actors import ActorRequest, Actors, make_actors
+from sogjax.run.background import Background
+from sogjax.run.clip import Clip
+from sogjax.run.clip_keypoints import clip_keypoints
+from sogjax.run.clock import ACTORS, StageTimes, stage
 from sogjax.run.example_frames import check_actors
-from sogjax.run.first_pose import initial_pose_file, known_opening
-from sogjax.run.job import frame_range
-from sogjax.run.kept_run import KeptRun
+from sogjax.run.fingerprint import run_fingerprint
+from sogjax.run.initial_pose import SOURCES, PoseSource, described_poses, pose_file
+from sogjax.run.judge import compared, kept_verdicts
 from sogjax.run.memory import forget_programs_if_many
-from sogjax.run.origin import origin_of
-from sogjax.run.outputs import actor_name, check_pose2sim, evaluate, export_endings, write_results
-from sogjax.run.recordings import actors_of, file_list, opened
-from sogjax.run.run import Run
+from sogjax.run.passes import PASSES
+from sogjax.run.recordings import file_list, opened, upright
+from sogjax.run.result import RunResult
+from sogjax.run.run import NO_OUTPUTS, Run
+from sogjax.run.run_files import ACTOR, METRICS, MOTION
 from sogjax.run.run_folder import RunFolder, run_folder
-from sogjax.run.run_job import tracking
-from sogjax.run.streams import file_name
+from sogjax.run.runner import run_passes
 from sogjax.run.terminal import say
-from sogjax.run.verdict import METRICS, kept_verdicts
-from sogjax.settings.run import OutputsConfig, TrackConfig
+from sogjax.run.write import check_pose2sim, export_endings
+from sogjax.settings.run import TrackConfig
 
-Opening = Callable[[Recording, Sequence[Body], TrackConfig], tuple[Float[Array, "dof"], int] | None]
-"""Tells the first pose and its frame, counted from the recording's first; None: they are searched for."""
-NOTHING = OutputsConfig(motion_only=True).asked()
-UNADJUSTED = "unadjusted.npz"
-UNADJUSTED_ACTOR = "unadjusted_actor.yaml"
-"""The motion as it was tracked, and its actor, beside the adjusted ones."""
-_ROWS = (*PER_FRAME, *SOMETIMES_PER_FRAME)
+WITHOUT_FILES = tuple(each for each in PASSES if each.name not in ("result", "files"))
 
 
-def track_to_folder(config: TrackConfig, command: str = "track", opening: Opening | None = None) -> Run:
-    """Track, evaluate if there is ground truth, and write the results; or resume a run that was stopped.
-
-    `opening` is asked for the first pose where the making of the actors does not tell it.
+def track_to_folder(
+    config: TrackConfig, command: str = "track", pose_sources: Sequence[PoseSource] = SOURCES
+) -> RunResult:
+    """Track, compare with the ground truth if there is one, and write the results; or resume a run that was stopped.
 
     Raises:
         InputError: an invalid recording, actor or setting; a folder that another run uses, or whose results must stay.
@@ -61,121 +49,132 @@ def track_to_folder(config: TrackConfig, command: str = "track", opening: Openin
     build.check(config)
     export_endings(config.outputs)
     recording = opened(config.recording, config.cameras)
-    check_actors(recording, config.actors, None if config.actor is None else len(file_list(config.actor)))
+    files = None if config.actor is None else file_list(config.actor)
+    check_actors(recording, config.actors, None if files is None else len(files))
     frame_range(recording, config)
-    initial_pose_file(recording, config)
+    poses = pose_file(recording, config)
     path = Path(config.out or f"outputs/{recording.name}")
     with run_folder(path, config.overwrite, config.resume, command) as folder:
-        return _run_in(folder, recording, config, command, opening)
-
-
-def _run_in(folder: RunFolder, recording: Recording, config: TrackConfig, command: str, opening: Opening | None) -> Run:
-    """Track into this run's own folder, or resume there."""
-    actors = partial(actors_of, recording, config.actor, config.body, config.color, config.images, config.actors)
-    made = config.actor is None
-    with stage(ACTORS):
-        bodies = None if made else actors()[0]
-    origin = origin_of(recording, config, bodies)
-    going_on, kept = folder.goes_on(origin), folder.kept
-    if folder.ended:
-        return _ended(folder, recording)
-    if bodies is None and going_on:
-        bodies = kept.actors()
-    anew, found = bodies is None, []
-    if bodies is None:
         with stage(ACTORS):
-            bodies, found = actors()
-    if not going_on:
-        folder.begin(command, origin, [] if made else file_list(config.actor))
-    if config.outputs.pose2sim:
-        first, last = (frame + recording.first_frame for frame in frame_range(recording, config))
-        check_pose2sim(recording, (first, last - 1), bodies, config.overwrite)
-    if anew:
-        kept.keep_actors(bodies)
-        with stage(ACTORS):
-            _report_actors(recording, found, folder.path)
-        if (known := known_opening(recording, found, config)) is not None:
-            kept.keep_start(*known)
-    if opening is not None and kept.start() is None and (shared := opening(recording, bodies, config)) is not None:
-        kept.keep_start(*shared)
-    adjust = config.adjust and _adjustable(recording, bodies, config)
-    shown = NOTHING if adjust else config.outputs
-    with tracking(recording, bodies, config, shown, folder.path, kept=kept, stays=adjust) as result:
-        if not adjust:
-            write_results(result, folder.path, config.outputs, OmegaConf.structured(config), bodies if made else [])
-            folder.finish(command, origin, result.files)
-            return result
-        unadjusted = [folder.path / UNADJUSTED, folder.path / UNADJUSTED_ACTOR]
-        save_motion(unadjusted[0], next(iter(result.motions.values())))
-        save_body(unadjusted[1], bodies[0])
-        with stage(ADJUSTING):
-            clip = adjusted_clip(recording, bodies[0], load_motion(unadjusted[0]), config)
-    times = result.times
-    # The pictures are read once more, for the files that show the adjusted poses in them.
-    with written(clip, folder.path, config.outputs, config.images, kept) as result:
-        write_results(result, folder.path, config.outputs, OmegaConf.structured(config), [clip.actor])
-        result.files += unadjusted
-        result.times = times
-        write_numbers(clip, result, folder.path)
-        folder.finish(command, origin, result.files)
-    return result
+            given = None if files is None else _given_actors(recording, config, files)
+        fingerprint = run_fingerprint(recording, config, None if given is None else given.bodies, poses)
+        going_on = folder.goes_on(fingerprint)
+        if folder.ended:
+            return _ended(folder, recording)
+        if not going_on:
+            folder.begin(command, fingerprint)
+            if given is not None:
+                given.save(folder.kept)
+        run = Run(
+            clip=opened_clip(recording, config).kept_in(folder.kept, config.images.cache),
+            config=config,
+            out=path,
+            kept=folder.kept,
+            pose_sources=pose_sources,
+            report_actors=lambda made: _report_actors(made, recording, path),
+            before_results=lambda: None if going_on else folder.clear(files or []),
+            records={} if given is None else {"actors": given},
+        )
+        if given is not None:
+            _ = run.adjusts  # refused before any work, where it cannot be
+        run_passes(run)
+        folder.finish(command, fingerprint, run.files)
+    return replace(run.result, files=run.files)
 
 
-def _adjustable(recording: Recording, bodies: Sequence[Body], config: TrackConfig) -> bool:
-    """Whether the clip is long enough to be adjusted; if not, that is said.
+def track_recording(
+    recording: Recording,
+    bodies: Sequence[Body],
+    config: TrackConfig,
+    terms: Sequence[Term] = (),
+    pose_sources: Sequence[PoseSource] = SOURCES,
+    every: int = 1,
+) -> RunResult:
+    """Track actors (in their own upright frames) without writing files.
+
+    Args:
+        recording: that is tracked.
+        bodies: the actors.
+        config: the settings.
+        terms: of the energy, beside those of the settings.
+        pose_sources: of the initial pose.
+        every: of how many frames one is tracked.
+    """
+    return run_without_files(recording, bodies, config, terms, pose_sources, every).result_so_far
+
+
+def run_without_files(
+    recording: Recording,
+    bodies: Sequence[Body],
+    config: TrackConfig,
+    terms: Sequence[Term] = (),
+    pose_sources: Sequence[PoseSource] = SOURCES,
+    every: int = 1,
+) -> Run:
+    """The run of `track_recording`, with the records of its passes."""
+    forget_programs_if_many()
+    config = replace(config, outputs=replace(NO_OUTPUTS, confidence=config.outputs.confidence))
+    with TemporaryDirectory() as folder:
+        run = Run(
+            clip=opened_clip(recording, config, every).kept_in(Path(folder), config.images.cache),
+            config=config,
+            terms=terms,
+            pose_sources=pose_sources,
+            records={"actors": Actors(tuple(bodies))},
+        )
+        return run_passes(run, WITHOUT_FILES)
+
+
+def opened_clip(recording: Recording, config: TrackConfig, every: int = 1) -> Clip:
+    """The frames of a recording that the settings name, with keypoints if these count; of `every` few frames one."""
+    numbers = frame_range(recording, config)
+    return Clip(recording, numbers[::every], config.images.depth, clip_keypoints(recording, config))
+
+
+def frame_range(recording: Recording, config: TrackConfig) -> range:
+    """The numbers of the frames to track.
 
     Raises:
-        InputError: there are several actors, or its pictures do not fit into memory.
+        InputError: there is none.
     """
-    if len(bodies) > 1:
-        raise InputError("adjust=true: only a clip of one actor can be adjusted; leave adjust=true out")
-    first, last = frame_range(recording, config)
-    reason = too_short(last - first)
-    if reason is not None:
-        say(f"adjust=true: {reason}")
-        return False
-    check_window(len(recording.rig), bodies[0].num_blobs, last - first)
-    return True
+    last = recording.num_frames if config.stop is None else config.stop
+    if not 0 <= config.start < last <= recording.num_frames:
+        raise InputError(
+            f"start={config.start} stop={'null' if config.stop is None else config.stop}: {recording.path} has the "
+            f"frames 0 to {recording.num_frames - 1}; choose 0 <= start < stop <= {recording.num_frames}"
+        )
+    return recording.frames[config.start : last]
 
 
-def _report_actors(recording: Recording, made: Sequence[MadeActor], out: Path) -> None:
+def _given_actors(recording: Recording, config: TrackConfig, files: Sequence[Path]) -> Actors:
+    """The actors of files; what is wrong with them, or with a rough pose of theirs, shows before any work."""
+    clip = Clip(recording, recording.frames, config.images.depth)
+    request = ActorRequest(clip, lambda: Background(None), files, number=config.actors)
+    actors, numbers = make_actors(request), frame_range(recording, config)
+    if config.outputs.pose2sim:
+        check_pose2sim(recording, (numbers[0], numbers[-1]), actors.bodies, config.overwrite)
+    described_poses(recording, [upright(body, recording) for body in actors.bodies], config)
+    return actors
+
+
+def _report_actors(made: Sequence[MadeActor], recording: Recording, out: Path) -> None:
     """Write how actors fit the frames of the videos that they were made of, for the user to judge."""
     for actor in (actor for actor in made if actor.frames):
-        folder = report_folder(out / file_name("actor", ".yaml", actor.body.name, len(made)))
+        folder = report_folder(ACTOR.of(out, actor.body.name, len(made)))
         for older in folder.glob("silhouettes_*.png"):
             older.unlink()
         report = write_actor_report(folder, actor, recording.rig)
         say(f"{actor.body.name}: silhouettes and masks agree to {report.mean_iou:.2f}; see {folder / 'report.md'}")
 
 
-def _ended(folder: RunFolder, recording: Recording) -> Run:
-    """A run that ended before."""
+def _ended(folder: RunFolder, recording: Recording) -> RunResult:
+    """The result of a run that ended before."""
     say(f"{folder.path}: the run has already ended; nothing to do")
     files = [folder.path / name for name in folder.note["files"]]
-    loaded = {path: load_motion(path) for path in files if path.suffix == ".npz" and path.name != UNADJUSTED}
-    motions = {actor_name(path, motion): motion for path, motion in loaded.items()}
-    frames = next(iter(motions.values())).frame - recording.first_frame
-    missing = recording.num_missing(frames.tolist())
-    result = Run(recording, [], motions, StageTimes(), float("nan"), files=files, missing=missing)
-    result.verdicts = kept_verdicts(folder.path / METRICS)
-    evaluate(result)
-    return result
-
-
-def track_recording(recording: Recording, bodies: list[Body], config: TrackConfig, terms: Sequence[Term] = ()) -> Run:
-    """Track actors (in their own upright frames) without writing files; `terms` are added to those of the settings."""
-    forget_programs_if_many()
-    with (
-        TemporaryDirectory() as folder,
-        tracking(recording, bodies, config, NOTHING, Path(folder), KeptRun(Path(folder), lasts=False), terms) as result,
-    ):
-        motions = {
-            name: replace(motion, **{key: np.array(rows) for key, rows in arrays_of(motion).items() if key in _ROWS})
-            for name, motion in result.motions.items()
-        }
-    result = replace(result, motions=motions)
-    if config.adjust and _adjustable(recording, bodies, config):
-        with stage(ADJUSTING):
-            clip = adjusted_clip(recording, bodies[0], next(iter(motions.values())), config)
-        result = replace(result, bodies=clip.job.bodies, motions={bodies[0].name: clip.motion})
+    written = [path for path in files if path.suffix == ".npz" and path.name.startswith(MOTION.name[:6])]
+    motions = {name: motion for path in written for name, motion in load_motions(path).items()}
+    missing = recording.num_missing(next(iter(motions.values())).frame.tolist())
+    result = RunResult(recording, (), motions, StageTimes(), float("nan"), files=files, missing=missing)
+    result.verdicts = kept_verdicts(METRICS.of(folder.path))
+    result.evaluation = compared(recording, motions)
     return result

@@ -14,7 +14,7 @@ from sogjax.io.motion import Motion, load_motion, motion_from_poses
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.run.recordings import upright
-from sogjax.settings.compose import as_object
+from sogjax.settings.compose import as_object, without_removed
 from sogjax.settings.run import TrackConfig
 
 MOTION, ACTOR, CONFIG = "motion.npz", "actor.yaml", "config.yaml"
@@ -67,7 +67,8 @@ def _config(path: Path) -> TrackConfig:
     if not path.is_file():
         return TrackConfig()
     try:
-        return as_object(OmegaConf.merge(OmegaConf.structured(TrackConfig), OmegaConf.load(path)), "track")
+        kept = without_removed(OmegaConf.load(path))
+        return as_object(OmegaConf.merge(OmegaConf.structured(TrackConfig), kept), "track")
     except (OmegaConfBaseException, yaml.YAMLError, ValueError, OSError) as error:
         reason = str(error).splitlines()[0]
         raise InputError(f"{path}: is no configuration of a track ({reason}); move it away to use defaults") from error

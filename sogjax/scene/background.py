@@ -1,7 +1,4 @@
-"""The background of all cameras as cells, for the tracker.
-
-What a camera shows when nobody stands before it: a picture, how far it varies, and where it is known.
-"""
+"""What cameras show when nobody stands before them: pictures, how far they vary, where they are known; as cells too."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,7 +17,7 @@ class BackgroundCells(eqx.Module):
     """What every cell shows when nobody stands before it; padded to the largest camera, where nothing is known."""
 
     colors: UInt8[Array | np.ndarray, "camera rows columns 3"]
-    """RGB."""
+    """The background's RGB, 0 to 255."""
     spread: Float[Array | np.ndarray, "camera rows columns"]
     """Standard deviation of a channel, in units of the full range (0..1)."""
     known: Bool[Array | np.ndarray, "camera rows columns"]
@@ -40,7 +37,7 @@ class CameraBackground:
     """The background of one camera, at any size."""
 
     picture: UInt8[np.ndarray, "_h _w 3"]
-    """BGR."""
+    """The background's BGR, 0 to 255."""
     spread: Float[np.ndarray, "_h _w"]
     """Standard deviation of a grey level: noise, what flickers, and edges that are not quite in place."""
     known: Bool[np.ndarray, "_h _w"]

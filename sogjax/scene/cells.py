@@ -1,12 +1,6 @@
-"""Red, green and blue of a mean, from the means of brightness and differences of colour.
+"""From a decoded frame to the grid of its smallest quad-tree cells, in one pass over the full-size pixels."""
 
-The conversion is linear, so that the mean of the converted pixels is the converted mean: except where pixels of a cell
-are brighter or more colourful than red, green and blue can be, which are cut off one by one in a picture.
-
-From a decoded frame to the grid of its smallest quad-tree cells, in one pass over the full-size pixels.
-"""
-
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -17,7 +11,7 @@ from jaxtyping import Float, UInt8
 from sogjax.model.yuv_picture import ColorStandard, YuvPicture
 
 WEIGHTS: dict[ColorStandard, tuple[float, float]] = {"601": (0.299, 0.114), "709": (0.2126, 0.0722)}
-"""Of red and blue in the brightness; the rest is green's."""
+"""The weights of red and blue in the brightness; the rest is green's."""
 DROPPED = 0.5
 """Grey levels that FFmpeg's converter loses on average with every product, whose fractions it drops. They are taken off
 here too, so that cells do not depend on how a video was read."""
@@ -30,7 +24,11 @@ def rgb_of_means(
     standard: ColorStandard,
     full_range: bool,
 ) -> UInt8[np.ndarray, "rows columns 3"]:
-    """RGB of cells from the means of a video's own channels."""
+    """RGB of cells from the means of a video's own channels.
+
+    The conversion is linear, so that the mean of the converted pixels is the converted mean: except where pixels of a
+    cell are brighter or more colourful than red, green and blue can be, which are cut off one by one in a picture.
+    """
     channels = cv2.merge([luma, blue_difference, red_difference])
     rgb = cv2.transform(channels, _conversion(standard, full_range))
     return np.rint(np.clip(rgb, 0.0, 255.0)).astype(np.uint8)
@@ -38,7 +36,7 @@ def rgb_of_means(
 
 @lru_cache
 def _conversion(standard: ColorStandard, full_range: bool) -> Float[np.ndarray, "3 4"]:
-    """To red, green and blue, with an offset in the last column (ITU-T H.273, Section 8.3)."""
+    """The matrix to red, green and blue, with an offset in the last column (ITU-T H.273, Section 8.3)."""
     red, blue = WEIGHTS[standard]
     green = 1.0 - red - blue
     bright, colorful, black = (1.0, 1.0, 0.0) if full_range else (255.0 / 219.0, 255.0 / 224.0, 16.0)
@@ -79,6 +77,11 @@ class CellGrid:
         return cls(width, height, max(root >> depth, 1))
 
     @property
+    def depth(self) -> int:
+        """Levels of the quad-tree below the root."""
+        return (max(self.width, self.height) - 1).bit_length() - self.cell_size.bit_length() + 1
+
+    @property
     def columns(self) -> int:
         """Number of cells across, the last one perhaps in part outside the image."""
         return -(-self.width // self.cell_size)
@@ -98,13 +101,13 @@ class CellGrid:
         return averages
 
     def fine_averages(self, plane: UInt8[np.ndarray, "height width"]) -> Float[np.ndarray, "rows columns"]:
-        """The same of one channel, without rounding in the end."""
+        """Mean of one channel over every cell, as `averages`, but without rounding in the end."""
         averages = np.empty((self.rows, self.columns), np.float32)
         self._fill(averages, plane, fine_block_means)
         return averages
 
     def halved(self) -> "CellGrid":
-        """The same cells of an image of half the width and height, both of which are even."""
+        """The grid of these cells in an image of half the width and height, both of which are even."""
         return CellGrid(self.width // 2, self.height // 2, self.cell_size // 2)
 
     def _fill(self, averages: np.ndarray, image: np.ndarray, means: Callable[[np.ndarray, int], np.ndarray]) -> None:
@@ -137,7 +140,7 @@ def block_means(image: UInt8[np.ndarray, "_h _w *channel"], size: int) -> UInt8[
 
 
 def fine_block_means(plane: UInt8[np.ndarray, "_h _w"], size: int) -> Float[np.ndarray, "_rows _columns"]:
-    """The same without rounding where few numbers are left."""
+    """Means over squares of `size` pixels, as `block_means`, but without rounding where few numbers are left."""
     coarse = max(size // FINE, 1)
     fine = block_means(plane, coarse).astype(np.float32)
     for _ in range((size // coarse).bit_length() - 1):
@@ -168,6 +171,14 @@ def stack_cells(
 def stack_shape(grids: tuple[CellGrid, ...]) -> tuple[int, int]:
     """Rows and columns of the largest grid."""
     return max(grid.rows for grid in grids), max(grid.columns for grid in grids)
+
+
+def inside_pictures(grids: Sequence[CellGrid], shape: tuple[int, ...]) -> Float[np.ndarray, "camera rows columns"]:
+    """1 for the cells of each picture, 0 for the padding to `shape` (rows, columns)."""
+    inside = np.zeros((len(grids), *shape), np.float32)
+    for k, grid in enumerate(grids):
+        inside[k, : grid.rows, : grid.columns] = 1.0
+    return inside
 
 
 def padded_cells(

@@ -1,4 +1,7 @@
-"""Learning the background of a camera from frames spread over a clip (see docs/guide/background.md)."""
+"""Learning the background of a camera from frames spread over a clip (see docs/guide/background.md).
+
+The samples are brought into one light first; then each pixel's background is a colour that it showed often enough.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,9 +11,70 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from sogjax.scene.background import NOISE_FLOOR, CameraBackground, local_contrast
-from sogjax.scene.clip_light import EvenSamples, even_samples
 from sogjax.scene.neighbour_growth import grown, modes_of
-from sogjax.scene.plate_difference import EDGE_NOISE, disc
+from sogjax.scene.plate_difference import EDGE_NOISE, disc, same_exposure
+
+MEDIAN_OF = 15
+"""Samples that the reference is the median of."""
+LOOKED_AT = 4000
+"""About so many pixels tell the light."""
+NOTICED = 1.0
+"""Grey levels: smaller changes of light are left alone."""
+
+Picture = UInt8[np.ndarray, "rows columns 3"]
+Mask = Bool[np.ndarray, "rows columns"]
+Samples = UInt8[np.ndarray, "sample rows columns 3"]
+
+
+@dataclass(frozen=True)
+class EvenSamples:
+    """Samples in the light of their median, and how far the light moved."""
+
+    images: Samples
+    reference: UInt8[np.ndarray, "rows columns 3"]
+    """Median over time: mostly background, where the subject does not stand for long."""
+    drift: Float[np.ndarray, "rows columns"]
+    """Standard deviation over time of what the light alone did to a grey level."""
+
+
+def even_samples(images: Samples) -> EvenSamples:
+    """Bring every sample into the light of the median by a gain and an offset for each channel."""
+    reference = _median(images)
+    every = max(round(np.sqrt(reference[..., 0].size / LOOKED_AT)), 1)
+    fits = [same_exposure(image, reference, every=every) for image in images]
+    evened = np.stack([_without(image, *fit) for image, fit in zip(images, fits, strict=True)])
+    again = reference if np.array_equal(evened, images) else _median(evened)
+    gains, offsets = (np.array(part) for part in zip(*fits, strict=True))
+    return EvenSamples(evened, again, _drift(again, gains - 1.0, offsets))
+
+
+def _drift(
+    light: UInt8[np.ndarray, "rows columns 3"],
+    slopes: Float[np.ndarray, "sample 3"],
+    offsets: Float[np.ndarray, "sample 3"],
+) -> Float[np.ndarray, "rows columns"]:
+    """Root mean square over time and channels of `slope * light + offset`, the change of each level."""
+    square, mixed, constant = (slopes**2).mean(axis=0), (slopes * offsets).mean(axis=0), (offsets**2).mean(axis=0)
+    levels = np.arange(256.0)[:, None]
+    table = (square * levels**2 + 2.0 * mixed * levels + constant).astype(np.float32)
+    return np.sqrt(cv2.LUT(light, table[None]).mean(axis=-1))
+
+
+def _without(
+    image: UInt8[np.ndarray, "rows columns 3"], gain: Float[np.ndarray, "3"], offset: Float[np.ndarray, "3"]
+) -> UInt8[np.ndarray, "rows columns 3"]:
+    levels = np.arange(256.0)[:, None]
+    table = (levels - offset) / gain
+    if np.abs(table - levels).max() < NOTICED:
+        return image
+    return cv2.LUT(image, np.rint(table).clip(0, 255).astype(np.uint8)[None])
+
+
+def _median(images: Samples) -> UInt8[np.ndarray, "rows columns 3"]:
+    chosen = images[np.unique(np.linspace(0, len(images) - 1, min(MEDIAN_OF, len(images))).round().astype(int))]
+    flat = np.ascontiguousarray(chosen.reshape(len(chosen), -1).T)
+    return np.partition(flat, len(chosen) // 2, axis=-1)[:, len(chosen) // 2].reshape(images.shape[1:])
+
 
 MOST_SAMPLES = 60
 """Frames of a clip that are looked at."""
@@ -21,16 +85,13 @@ SPANS = 8
 MOVING_WIDTH = 0.008
 """Width of what moves, in units of the picture's longer side; anything narrower is an edge, or flickers."""
 
-Picture = UInt8[np.ndarray, "rows columns 3"]
-Mask = Bool[np.ndarray, "rows columns"]
-
 
 @dataclass(frozen=True)
 class SampledCamera:
     """The samples of one camera, in one light, and what can be told of each pixel alone."""
 
     frames: tuple[int, ...]
-    """Counted from the recording's first."""
+    """The frames of the samples, counted from the recording's first."""
     even: EvenSamples
     noise: float
     """Standard deviation of a channel where nothing happens, grey levels."""
@@ -41,7 +102,7 @@ class SampledCamera:
 
     @classmethod
     def from_images(cls, images: Mapping[int, Picture]) -> "SampledCamera":
-        """From pictures by frame."""
+        """What the pictures of some frames tell."""
         even = even_samples(np.stack(list(images.values())))
         noise = _noise(even)
         contrast = local_contrast(even.reference)
@@ -91,13 +152,13 @@ def learnt_background(
 
 
 def _noise(even: EvenSamples) -> float:
-    """By the middle of all differences to the median, in the calmer half of the samples' pixels."""
+    """The noise of a channel, by the median of the differences from the reference: that is where nothing happens."""
     chosen = even.images[:: max(len(even.images) // 12, 1), ::2, ::2]
     apart = cv2.absdiff(chosen, np.broadcast_to(even.reference[::2, ::2], chosen.shape).copy())
     return float(1.48 * np.median(apart.mean(axis=0)))
 
 
-def _moving(images: UInt8[np.ndarray, "sample rows columns 3"], tolerance: UInt8[np.ndarray, "rows columns"]) -> Mask:
+def _moving(images: Samples, tolerance: UInt8[np.ndarray, "rows columns"]) -> Mask:
     """Where the samples differ by more than noise, over more than an edge's width."""
     low, high = images[0].copy(), images[0].copy()
     for image in images[1:]:
@@ -109,7 +170,7 @@ def _moving(images: UInt8[np.ndarray, "sample rows columns 3"], tolerance: UInt8
 
 
 def _means(
-    images: UInt8[np.ndarray, "sample rows columns 3"],
+    images: Samples,
 ) -> tuple[Float[np.ndarray, "rows columns 3"], Float[np.ndarray, "rows columns"]]:
     """Mean and standard deviation over time."""
     total = np.zeros(images.shape[1:], np.float32)

@@ -1,7 +1,4 @@
-"""Whether a camera stood still: how far the picture as a whole moved between samples of a clip.
-
-What keeps a background from being learnt from a clip, in sentences.
-"""
+"""What keeps a background from being learnt from a clip: a camera that did not stand still, or nothing that moves."""
 
 from collections.abc import Mapping
 

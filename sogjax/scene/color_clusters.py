@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.cluster.vq import kmeans2
 
+from sogjax.model.body import Body
 from sogjax.scene.foreground import (
     COLOR_BINS,
     LARGEST,
@@ -27,7 +28,7 @@ SPARE = 4
 PICTURE_SMOOTHING = 0.05
 """Share of any colour in the colours of a picture whose background is not known."""
 ALIKE = 0.1
-"""Of a channel: colours this near to each other are taken for the same, in what speaks against a body."""
+"""Difference of a channel up to which colours are taken for the same, in what speaks against a body."""
 UNKNOWN_BACKGROUND = 0.6
 """What colours count where the background is not known, as a part of what they count where it is."""
 
@@ -37,18 +38,20 @@ class ColorClusters:
     """The blobs of a body by colour, and the log density of the colours of each kind."""
 
     members: tuple[tuple[int, ...], ...]
-    """At most `SLOTS` each; empty for kinds that a body does not need."""
+    """The blobs of each kind, at most `SLOTS`; none for kinds that a body does not need."""
     tables: Float[np.ndarray, "kind bin bin bin"]
     whole: Float[np.ndarray, "bin bin bin"]
-    """Of the whole body."""
+    """The log density of the colours of the whole body."""
 
-
-def color_clusters(colors: Float[np.ndarray, "blob 3"], areas: Float[np.ndarray, "blob"]) -> ColorClusters:
-    """The kinds of a body's blobs, from their colours (sRGB) and how much of the body each is."""
-    colors, areas = np.asarray(colors, float), np.asarray(areas, float)
-    members = _by_color(colors)
-    tables = [subject_colors(colors[np.array(part)], areas[np.array(part)]) for part in members]
-    return _padded(members, tables, subject_colors(colors, areas), len(colors))
+    @classmethod
+    def from_body(cls, body: Body) -> "ColorClusters":
+        """The kinds of a body's blobs, from their colours (sRGB) and how much of the body each is."""
+        colors, areas = np.asarray(body.blob_colors, float), np.asarray(np.asarray(body.blob_sigmas) ** 2, float)
+        members, whole = _by_color(colors), subject_colors(colors, areas)
+        tables = [subject_colors(colors[np.array(part)], areas[np.array(part)]) for part in members]
+        missing = _num_kinds(len(colors)) - len(members)
+        every = tuple(tuple(part) for part in [*members, *[[]] * missing])
+        return cls(every, np.stack([*tables, *[np.zeros_like(whole)] * missing]), whole)
 
 
 def _by_color(colors: Float[np.ndarray, "blob 3"]) -> list[list[int]]:
@@ -69,14 +72,6 @@ def _by_color(colors: Float[np.ndarray, "blob 3"]) -> list[list[int]]:
 
 def _num_kinds(num_blobs: int) -> int:
     return -(-num_blobs // SLOTS) + SPARE
-
-
-def _padded(
-    members: list[list[int]], tables: list[np.ndarray], whole: Float[np.ndarray, "bin bin bin"], num_blobs: int
-) -> ColorClusters:
-    missing = _num_kinds(num_blobs) - len(members)
-    every = tuple(tuple(part) for part in [*members, *[[]] * missing])
-    return ColorClusters(every, np.stack([*tables, *[np.zeros_like(whole)] * missing]), whole)
 
 
 def kind_odds(

@@ -1,7 +1,4 @@
-"""Foreground against background: what the colour of a cell says about whether somebody is seen there.
-
-How likely each pixel of a picture shows something before the background, to look at.
-"""
+"""Foreground against background: what the colour of a cell says about whether somebody is seen there."""
 
 from typing import Any
 
@@ -18,17 +15,17 @@ from sogjax.scene.plate_difference import working_size
 LARGEST = 2.0
 """No cell says more than this: what disturbs one (a reflection, a wrong plate) disturbs its neighbours too."""
 SMALLEST_SPREAD = 0.015
-"""Of a channel: even the same place under the same light differs by so much (compression, a lens that breathes)."""
+"""Standard deviation of a channel at one place in one light, at least (compression, a lens that breathes)."""
 SHADOW = 0.25
 """Standard deviation of the light that a shadow or a reflection takes or adds, as a part of the background's."""
 SUBJECT_SPREAD = 0.07
-"""Of a channel: how far what is seen of a subject lies from the colours of its blobs."""
+"""Standard deviation of a channel of what is seen of a subject, about the colours of its blobs."""
 SUBJECT_SHADING = 0.25
-"""The same in brightness, as a part of it: folds, and limbs that turn away from the light."""
+"""Standard deviation of a subject's brightness, as a part of it: folds, and limbs that turn away from the light."""
 SUBJECT_UNKNOWN = 0.3
 """Share of a subject whose colours are none of its blobs': any colour."""
 COLOR_BINS = 32
-"""Of each channel, in the table of a subject's colours."""
+"""Bins of each channel in the table of a subject's colours."""
 TEMPER = 0.5
 """Part of the logarithm that counts: neighbouring cells err together."""
 _LIGHT_STEPS = (0.15, 0.08, 0.05)
@@ -80,7 +77,7 @@ def own_color(colors: Float[Array, "*#place 3"], color: Float[Array, "*#place 3"
 
 
 def subject_density(colors: Float[Array, "*place 3"], subject: SubjectColors) -> Float[Array, "*place"]:
-    """The same where some blob of a subject is seen."""
+    """Logarithm of the density of colours (sRGB) where some blob of a subject is seen; 0 is that of any colour."""
     red, green, blue = color_bins(colors)
     place = (red * COLOR_BINS + green) * COLOR_BINS + blue
     return subject.reshape(-1).at[place].get(mode="promise_in_bounds")
@@ -100,7 +97,7 @@ class BackgroundModel(eqx.Module):
     known: Bool[Array, "camera rows columns"]
 
     def filled_by(self, other: "BackgroundModel") -> "BackgroundModel":
-        """The same, with what another background of the same cells knows where this one knows nothing."""
+        """This background, with what another one of the same cells knows where this one knows nothing."""
         return jax.tree.map(lambda own, others: jnp.where(self.known, own, others), self, other)
 
     @classmethod
@@ -123,7 +120,7 @@ class BackgroundModel(eqx.Module):
         return cls(planes, 1.0 / variance, 1.0 / (variance / shadow**2 + length), volume, known)
 
     def blurred(self, spread: float) -> "BackgroundModel":
-        """The same background, each channel of which is known no better than to a standard deviation."""
+        """This background, each channel of which is known no better than to a standard deviation."""
         return self._of(self.planes, jnp.maximum(1.0 / self.precision, spread**2), SHADOW, self.known)
 
 
@@ -182,7 +179,7 @@ def _light(seen: list[Cells], empty: BackgroundModel) -> list[Float[Array, "came
 
 
 def _gain(weight: Cells, seen: Cells, plane: Cells) -> Float[Array, "camera"]:
-    """By least squares; 1 where nothing tells."""
+    """The gain that fits best by least squares; 1 where nothing tells."""
     total = jnp.sum(weight * plane * plane, axis=(1, 2))
     found = jnp.sum(weight * plane * seen, axis=(1, 2)) / jnp.maximum(total, 1e-6)
     return jnp.where(total > 1e-2, found, 1.0)
@@ -194,7 +191,7 @@ _log_odds = jax.jit(log_odds)
 def foreground_probability(
     image: UInt8[np.ndarray, "height width 3"], background: CameraBackground
 ) -> Float[np.ndarray, "rows columns"]:
-    """For each pixel (BGR) at the working size, as the tracker has it for cells; a half where nothing is known."""
+    """The probability of each pixel (BGR, working size), as the tracker has it for cells; a half where unknown."""
     size = working_size(image.shape[1], image.shape[0])
     small = lambda part: cv2.resize(part, size, interpolation=cv2.INTER_AREA)
     known = small(background.known.astype(np.float32)) > 0.999

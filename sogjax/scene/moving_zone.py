@@ -14,8 +14,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from sogjax.model.camera import Camera
-from sogjax.scene.plate_difference import closed, disc
-from sogjax.scene.visual_hull import VOXELS, Cube, cube_around, resized, voxel_pixels
+from sogjax.scene.plate_difference import closed, disc, without_holes
+from sogjax.scene.visual_hull import MANY, Cube, cube_around, from_upright, resized, upright, voxel_pixels
 
 SMALLEST_ROOM = 2.6
 """Metres: the cube of space that is looked at is at least so large."""
@@ -27,8 +27,6 @@ TALLEST = 2.1
 """Metres from the highest moving place down to the floor, or up from the lowest, in that case."""
 SEEING = 0.7
 """Share of the cameras that must have a place in their pictures."""
-MANY = 5
-"""From so many cameras on, one of them may fail to see a movement."""
 
 Mask = Bool[np.ndarray, "_h _w"]
 
@@ -38,10 +36,7 @@ def moving_zones(
 ) -> dict[int, Mask]:
     """The zone in each camera's picture, from where things move in it during a few spans of the clip.
 
-    Args:
-        movements: for every span by camera.
-        cameras: of the recording.
-        up: the world's vertical.
+    `movements` are masks by camera for every span; `up` is the world's vertical.
     """
     anywhere = {camera: np.any([span[camera] for span in movements], axis=0) for camera in movements[0]}
     zones = {camera: filled(mask) for camera, mask in anywhere.items()}
@@ -58,10 +53,10 @@ def moving_zones(
         c: anywhere[c] | pixels[c].silhouette_of(seen & unseen)
         for c, unseen in zip(seeing, _by_others(spans), strict=True)
     }
-    moving = [_upright(span.hull & seen, up) for span in spans]
-    upright = [block for block in moving if block.any()]
-    if upright and moving_height(np.any(upright, axis=0)) * cube.spacing < WHOLE_BODY:
-        standing = _from_upright(np.all(_standing(upright, cube.spacing), axis=0), up)
+    moving = [upright(span.hull & seen, up) for span in spans]
+    blocks = [block for block in moving if block.any()]
+    if blocks and moving_height(np.any(blocks, axis=0)) * cube.spacing < WHOLE_BODY:
+        standing = from_upright(np.all(_standing(blocks, cube.spacing), axis=0), up)
         hidden = {c: mask | pixels[c].silhouette_of(standing) for c, mask in hidden.items()}
     return zones | {c: filled(mask) for c, mask in hidden.items()}
 
@@ -73,7 +68,7 @@ class _Carved:
     hull: Bool[np.ndarray, "voxel"]
     """All cameras together, of many all but one."""
     without: tuple[Bool[np.ndarray, "voxel"], ...]
-    """Of many cameras, the same without each of them in turn; nothing where they are few."""
+    """The hull of many cameras without each of them in turn; nothing where they are few."""
 
 
 def _carved(hits: Sequence[Bool[np.ndarray, "voxel"]]) -> _Carved:
@@ -84,16 +79,14 @@ def _carved(hits: Sequence[Bool[np.ndarray, "voxel"]]) -> _Carved:
 
 
 def _by_others(spans: Sequence[_Carved]) -> list[Bool[np.ndarray, "voxel"]]:
-    """By camera, where the others see something move during some span: it may come straight towards the camera."""
+    """Where all cameras but one see something move during some span: it may come straight towards that one."""
     return [np.any(of_one, axis=0) for of_one in zip(*(span.without for span in spans), strict=True)]
 
 
 def filled(mask: Mask) -> Mask:
     """The mask without small gaps, and with what it encloses."""
     joined = closed(mask, 2 * max(round(0.012 * max(mask.shape)), 1) + 1) | mask
-    framed = np.pad(joined, 1).astype(np.uint8)
-    labels = cv2.connectedComponents(1 - framed, connectivity=4)[1]
-    return (labels != labels[0, 0])[1:-1, 1:-1]
+    return without_holes(joined)
 
 
 def _widened(mask: Mask, footprint: int) -> Mask:
@@ -110,7 +103,7 @@ def moving_height(moving: Bool[np.ndarray, "x y z"]) -> int:
 
 
 def _standing(spans: Sequence[Bool[np.ndarray, "x y z"]], spacing: float) -> list[Bool[np.ndarray, "x y z"]]:
-    """For each span, upright pillars as high as a body around the convex outline of what moves, seen from above."""
+    """Upright pillars as high as a body in each span, around the convex outline of what moves, seen from above."""
     low, high = np.percentile(np.nonzero(np.any(spans, axis=0))[2], [2, 99])
     height = slice(max(round(high - TALLEST / spacing), 0), round(low + TALLEST / spacing))
     rooms = []
@@ -128,15 +121,3 @@ def _convex(plan: Bool[np.ndarray, "x y"], border: float) -> Bool[np.ndarray, "x
     for outline in outlines:
         cv2.fillConvexPoly(canvas, cv2.convexHull(outline), 1)
     return cv2.dilate(canvas, disc(2 * round(border) + 1)) > 0
-
-
-def _upright(voxels: Bool[np.ndarray, "voxel"], up: Float[np.ndarray, "3"]) -> Bool[np.ndarray, "x y z"]:
-    """Voxels as a block whose last axis points up."""
-    axis = int(np.argmax(np.abs(up)))
-    block = np.moveaxis(voxels.reshape(VOXELS, VOXELS, VOXELS), axis, 2)
-    return block if up[axis] > 0 else np.flip(block, 2)
-
-
-def _from_upright(block: Bool[np.ndarray, "x y z"], up: Float[np.ndarray, "3"]) -> Bool[np.ndarray, "voxel"]:
-    axis = int(np.argmax(np.abs(up)))
-    return np.moveaxis(block if up[axis] > 0 else np.flip(block, 2), 2, axis).reshape(-1)

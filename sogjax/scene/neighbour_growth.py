@@ -1,6 +1,4 @@
-"""The colours that a pixel shows again and again: the densest groups of its samples.
-
-Choosing among the colours that a pixel showed: the background continues the background beside it.
+"""Which of the colours that a pixel shows again and again is the background: the one that continues what is beside it.
 
 A pixel that was covered for a long time shows the subject's colour more often than the background's. What tells them
 apart is the outline: the background goes on beyond it, the subject ends there. So the known background grows inwards,
@@ -94,7 +92,7 @@ MOST_APART = 60.0
 FEWEST_NEIGHBOURS = 3
 """Known neighbours that a pixel must suit."""
 SHARE = 0.25
-"""Of the tolerance, within which a colour clearly continues the background: with all of it, the subject is entered
+"""Share of the tolerance within which a colour clearly continues the background: with all of it, the subject is entered
 through the one place where it looks like what is beside it, and then taken as a whole."""
 _STEPS = [(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)]
 

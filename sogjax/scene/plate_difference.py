@@ -13,7 +13,8 @@ CHANGED = 8.0
 UNDECIDED = 0.5 * CHANGED
 """What is said of a pixel whose plate is unknown: neither a change nor none."""
 DIFFERENT = 4.5
-"""The same for what is left when the plate may be darker or a little brighter."""
+"""Squared differences, in units of the noise, that are left when the plate may be darker or a little brighter: above
+this, the colour is another one."""
 SHADOW_RANGE = (0.4, 1.1)
 """Share of the plate's light that a shadow or reflected light leaves."""
 EDGE_NOISE = 0.08
@@ -102,6 +103,18 @@ def opened(mask: Bool[np.ndarray, "rows columns"], width: int) -> Bool[np.ndarra
 def closed(mask: Bool[np.ndarray, "rows columns"], width: int) -> Bool[np.ndarray, "rows columns"]:
     """The mask without gaps narrower than `width` pixels."""
     return cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, disc(width)) > 0
+
+
+def widened(mask: Bool[np.ndarray, "rows columns"], pixels: int) -> Bool[np.ndarray, "rows columns"]:
+    """The mask and what is at most so many pixels beside it."""
+    return cv2.dilate(mask.astype(np.uint8), disc(2 * pixels + 1)) > 0
+
+
+def without_holes(mask: Bool[np.ndarray, "rows columns"]) -> Bool[np.ndarray, "rows columns"]:
+    """The mask with what it encloses."""
+    framed = np.pad(mask, 1).astype(np.uint8)
+    labels = cv2.connectedComponents(1 - framed, connectivity=4)[1]
+    return (labels != labels[0, 0])[1:-1, 1:-1]
 
 
 def disc(width: int) -> np.ndarray:

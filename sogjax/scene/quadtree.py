@@ -93,7 +93,7 @@ def quadtree(
 def quadtree_of_planes(
     cells: Planes, candidates: Candidates, color_tolerance: Float[Array, ""]
 ) -> tuple[list[Float[Array, "candidate"]], Bool[Array, "candidate"]]:
-    """The same, of colours that lie channel by channel, which is quicker; any number of channels."""
+    """The quad-tree of colours that lie channel by channel, which is quicker; any number of channels."""
     running = ~jnp.isnan(color_tolerance)
     levels = stage_barrier(running, partial(_levels, shape=candidates.shape, num_levels=candidates.num_levels), cells)
     inside = jnp.split(candidates.inside, np.cumsum([planes[0].size for planes in levels])[:-1])
@@ -166,7 +166,7 @@ def keep_blobs_of_planes(
     keep: Bool[Array, "n"],
     capacity: int,
 ) -> tuple[Sog, Int[Array, "capacity"], Int[Array, ""]]:
-    """The same, of colours that lie channel by channel."""
+    """The chosen blobs as in `keep_blobs`, of colours that lie channel by channel."""
     chosen, count = chosen_indices(keep, capacity)
     mask = jnp.arange(capacity, dtype=count.dtype) < count
     image = Sog(

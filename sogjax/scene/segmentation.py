@@ -8,18 +8,24 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from sogjax.model.camera import Camera
-from sogjax.scene.plate_difference import Difference, closed, disc, plate_difference, reduced_mask
-from sogjax.scene.visual_hull import LOW_VOXELS, VoxelPixels, cube_around, resized, voxel_pixels, without_floor
+from sogjax.scene.plate_difference import (
+    Difference,
+    closed,
+    disc,
+    plate_difference,
+    reduced_mask,
+    widened,
+    without_holes,
+)
+from sogjax.scene.visual_hull import LOW_VOXELS, MANY, VoxelPixels, cube_around, resized, voxel_pixels, without_floor
 
 LARGEST_SHARE = 0.5
 """Where more of a picture than this differs, the camera was moved or the light changed, and no subject can be found."""
 SMALLEST_SHARE = 1e-3
-"""Share of the picture: less is not a subject."""
+"""Share of the picture below which a region is not a subject."""
 SMALLEST_PART = 0.1
 """Parts of a mask smaller than this share of the largest one are dropped."""
 GRAB_CUT_ITERATIONS = 2
-MANY = 5
-"""From so many cameras on, one of them may miss a part of the subject."""
 UNCHANGED = 3.0
 """Squared differences, in units of the noise, below which a pixel is certainly background."""
 
@@ -66,7 +72,7 @@ def masks_from_plates(
 def first_guess(difference: Difference) -> Bool[np.ndarray, "rows columns"]:
     """The subject as one camera alone shows it: what differs in colour, and changed places enclosed by it."""
     different = closed(difference.different, 5)
-    return largest_parts(different | (_without_holes(different) & difference.changed))
+    return largest_parts(different | (without_holes(different) & difference.changed))
 
 
 def cut_out(difference: Difference, guess: Bool[np.ndarray, "rows columns"]) -> Bool[np.ndarray, "rows columns"]:
@@ -124,7 +130,7 @@ def _seen_together(
     seen = {c: differences[c].changed | guesses[c] if c in guesses else small_known[c] for c in subjects}
     cube = cube_around([largest_parts(seen[c]) for c in subjects], [small[c] for c in subjects])
     pixels = {c: voxel_pixels(cube, small[c], mask.shape) for c, mask in subjects.items()}
-    misses = np.sum([~pixels[c].hits(_widened(region, 1)) for c, region in regions.items()], axis=0)
+    misses = np.sum([~pixels[c].hits(widened(region, 1)) for c, region in regions.items()], axis=0)
     hull = misses <= (1 if len(subjects) >= MANY else 0)
     above_floor = without_floor(hull, up)
     better = {c: _confirmed(differences[c], pixels[c], hull, above_floor) for c in guesses}
@@ -135,24 +141,14 @@ def _confirmed(difference: Difference, pixels: VoxelPixels, hull: np.ndarray, ab
     """Different colours near the hull, and all changes where it stands above the floor."""
     stands = pixels.silhouette_of(above_floor)
     low = pixels.footprint * LOW_VOXELS  # feet are as near as this to what stands, the rim of a shadow seldom is
-    near = _widened(pixels.silhouette_of(hull), pixels.footprint) & _widened(stands, low)
+    near = widened(pixels.silhouette_of(hull), pixels.footprint) & widened(stands, low)
     different = closed(difference.different & near, 5) & difference.changed
     return largest_parts(different | (difference.open & stands))
-
-
-def _widened(mask: Mask, pixels: int) -> Mask:
-    return cv2.dilate(mask.astype(np.uint8), disc(2 * pixels + 1)) > 0
 
 
 def is_subject(mask: Mask) -> bool:
     """Whether a region is neither almost nothing nor most of the picture."""
     return SMALLEST_SHARE < float(mask.mean()) < LARGEST_SHARE
-
-
-def _without_holes(mask: Bool[np.ndarray, "rows columns"]) -> Bool[np.ndarray, "rows columns"]:
-    framed = np.pad(mask, 1).astype(np.uint8)
-    labels = cv2.connectedComponents(1 - framed, connectivity=4)[1]
-    return (labels != labels[0, 0])[1:-1, 1:-1]
 
 
 def _enlarged(mask: Mask, image: UInt8[np.ndarray, "_h _w 3"]) -> Mask:

@@ -1,7 +1,4 @@
-"""A coarse visual hull: the part of space that no camera's region leaves out.
-
-Whether the masks of several cameras show one thing: each is compared with the visual hull of the others.
-"""
+"""A coarse visual hull: the part of space that no camera's region leaves out, and whether masks agree with it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,7 +11,7 @@ from jaxtyping import Array, Bool, Float
 from scipy.ndimage import binary_opening
 
 from sogjax.model.camera import NEAR, Camera, distort, near_picture, project_points
-from sogjax.scene.plate_difference import disc, reduced_mask
+from sogjax.scene.plate_difference import reduced_mask, widened
 
 VOXELS = 64
 """Voxels along each side of the cube."""
@@ -23,7 +20,9 @@ SIDE = 1.3
 LOW = 0.2
 """Height above the floor, in units of the subject's size, below which something may be a shadow."""
 LOW_VOXELS = round(LOW / SIDE * VOXELS)
-"""The same in voxels."""
+"""`LOW` in voxels."""
+MANY = 5
+"""From so many cameras on, one of them may miss a part of the subject, or a movement."""
 
 
 @dataclass(frozen=True)
@@ -86,20 +85,31 @@ def cube_around(masks: Sequence[Bool[np.ndarray, "_h _w"]], cameras: Sequence[Ca
     Its centre is the point with the least sum of distances to the rays through the masks' centres, so that a camera
     whose mask is wrong does not move it far.
     """
-    rays = [_central_ray(mask, camera) for mask, camera in zip(masks, cameras, strict=True)]
+    rays = [central_ray(mask, camera) for mask, camera in zip(masks, cameras, strict=True)]
     eyes, directions, angles = (np.array(part) for part in zip(*rays, strict=True))
-    across = np.eye(3) - directions[:, :, None] * directions[:, None, :]
-    weights = np.ones(len(rays))
-    centre = np.zeros(3)
+    centre, weights = np.zeros(3), np.ones(len(rays))
     for _ in range(10):
-        weighted = weights[:, None, None] * across
-        centre = np.linalg.solve(weighted.sum(axis=0), np.einsum("nij,nj->i", weighted, eyes))
-        distances = np.linalg.norm(np.einsum("nij,nj->ni", across, centre - eyes), axis=1)
+        centre = nearest_point(eyes, directions, weights)
+        distances = np.linalg.norm(np.cross(directions, centre - eyes), axis=1)
         weights = 1.0 / np.maximum(distances, 0.05)
     return Cube(centre, float(np.median(np.linalg.norm(centre - eyes, axis=1) * angles)))
 
 
-def _central_ray(mask: Bool[np.ndarray, "_h _w"], camera: Camera) -> tuple[np.ndarray, np.ndarray, float]:
+def nearest_point(
+    points: Float[np.ndarray, "line 3"],
+    directions: Float[np.ndarray, "line 3"],
+    weights: Float[np.ndarray, "line"] | None = None,
+) -> Float[np.ndarray, "3"]:
+    """The point with the least sum of (weighted) squared distances to lines through points, along unit directions.
+
+    Where all lines are parallel, it is the one of their nearest points that is least far from the origin.
+    """
+    across = np.eye(3)[None] - directions[:, :, None] * directions[:, None, :]
+    across = across if weights is None else weights[:, None, None] * across
+    return np.linalg.lstsq(across.sum(axis=0), np.einsum("lij,lj->i", across, points), rcond=1e-9)[0]
+
+
+def central_ray(mask: Bool[np.ndarray, "_h _w"], camera: Camera) -> tuple[np.ndarray, np.ndarray, float]:
     """Eye, direction of the mask's centre, and the mask's larger side as a tangent."""
     rows, columns = np.nonzero(mask)
     matrix, pose = np.asarray(camera.intrinsics, float), np.asarray(camera.camera_from_world, float)
@@ -127,19 +137,27 @@ def _picture_pixels(camera: Camera, points: Float[Array, "n 3"]) -> tuple[Float[
     return jnp.where(near[:, None], distort(camera, pixels), -1.0), jnp.where(near, depths, 0.0)
 
 
+def upright(voxels: Bool[np.ndarray, "voxel"], up: Float[np.ndarray, "3"]) -> Bool[np.ndarray, "x y z"]:
+    """Voxels as a block whose last axis points up."""
+    axis = int(np.argmax(np.abs(up)))
+    block = np.moveaxis(voxels.reshape(3 * (VOXELS,)), axis, 2)
+    return block if up[axis] > 0 else np.flip(block, 2)
+
+
+def from_upright(block: Bool[np.ndarray, "x y z"], up: Float[np.ndarray, "3"]) -> Bool[np.ndarray, "voxel"]:
+    """The voxels of a block whose last axis points up."""
+    axis = int(np.argmax(np.abs(up)))
+    return np.moveaxis(block if up[axis] > 0 else np.flip(block, 2), 2, axis).reshape(-1)
+
+
 def without_floor(occupied: Bool[np.ndarray, "voxel"], up: Float[np.ndarray, "3"]) -> Bool[np.ndarray, "voxel"]:
     """The voxels without those that lie low on the floor with nothing above them, as a shadow does."""
-    block = occupied.reshape(VOXELS, VOXELS, VOXELS)
-    axis = int(np.argmax(np.abs(up)))
-    upright = np.moveaxis(block if up[axis] > 0 else np.flip(block, axis), axis, 2)
-    heights = np.nonzero(upright)[2]
-    if not len(heights):
+    if not occupied.any():
         return occupied
-    top = int(np.percentile(heights, 2)) + LOW_VOXELS
-    kept = upright.copy()
-    kept[:, :, :top] &= binary_opening(upright, np.ones((1, 1, LOW_VOXELS)))[:, :, :top]
-    kept = np.moveaxis(kept, 2, axis)
-    return (kept if up[axis] > 0 else np.flip(kept, axis)).reshape(-1)
+    kept = upright(occupied, up).copy()
+    top = int(np.percentile(np.nonzero(kept)[2], 2)) + LOW_VOXELS
+    kept[:, :, :top] &= binary_opening(kept, np.ones((1, 1, LOW_VOXELS)))[:, :, :top]
+    return from_upright(kept, up)
 
 
 AGREEING = 0.75
@@ -177,15 +195,10 @@ def hull_coverage(masks: Mapping[int, Mask], cameras: Mapping[int, Camera]) -> d
     shrunk = {camera: resized(cameras[camera], (mask.shape[1], mask.shape[0])) for camera, mask in small.items()}
     cube = cube_around([*small.values()], [shrunk[camera] for camera in small])
     pixels = {camera: voxel_pixels(cube, shrunk[camera], mask.shape) for camera, mask in small.items()}
-    hull = np.all(
-        [pixels[camera].hits(widened_by_half_a_voxel(mask, pixels[camera])) for camera, mask in small.items()], axis=0
-    )
+    # A thin limb may lie between the centres of voxels, so masks are widened by half of one.
+    near = {camera: widened(mask, pixels[camera].footprint // 2) for camera, mask in small.items()}
+    hull = np.all([pixels[camera].hits(mask) for camera, mask in near.items()], axis=0)
     return {
         camera: float((pixels[camera].silhouette_of(hull) & mask).sum() / max(mask.sum(), 1))
         for camera, mask in small.items()
     }
-
-
-def widened_by_half_a_voxel(mask: Mask, pixels: VoxelPixels) -> Mask:
-    """A thin limb may lie between the centres of voxels."""
-    return cv2.dilate(mask.astype(np.uint8), disc(2 * (pixels.footprint // 2) + 1)) > 0

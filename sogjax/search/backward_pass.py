@@ -26,7 +26,7 @@ SURE_FRAMES = 3
 """Frames without doubt that lie between two stretches, at least."""
 
 MOST_FRAMES = 240
-"""Tracked backwards from one frame, at most: so many frames' cells are held in memory."""
+"""Frames that are tracked backwards from one, at most: the cells of so many are held in memory."""
 
 FramesBackwards = Callable[[int, int], Iterable[AnyFrame]]
 """The cells of the frames from the first to before the second, the last one first."""
@@ -39,15 +39,15 @@ class Pass:
     poses: Float[np.ndarray, "frame dof"]
     doubts: Float[np.ndarray, "frame limb"]
     baseline: Float[np.ndarray, "frame 2 blob"]
-    """As in `LimbConfidence`."""
+    """The limbs' baseline in every frame, as in `LimbConfidence`."""
     energy: float
-    """Of a frame, the mean of its magnitude."""
+    """The magnitude of a frame's energy, the mean over the frames."""
     capacities: Capacities
-    """Of the last frame."""
+    """The capacities of the last frame."""
 
     @classmethod
     def from_frames(cls, frames: Sequence[TrackedFrame]) -> "Pass":
-        """Of frames whose limbs were judged."""
+        """The pass of some frames, whose limbs were judged."""
         judged = [frame.result.limbs for frame in frames]
         column = lambda values: np.stack([np.asarray(value) for value in values])
         energy = np.abs([float(frame.result.energy) for frame in frames]).mean()
@@ -67,7 +67,7 @@ class Compared:
     cells: list[AnyFrame]
     poses: list[Float[np.ndarray, "dof"]]
     gains: list[Float[np.ndarray, "part"]]
-    """By how much the energy rises if a part is taken from the backward pass."""
+    """The rise of the energy if a part is taken from the backward pass."""
     apart: list[Float[np.ndarray, "part"]]
     """Metres."""
 
@@ -138,7 +138,7 @@ def _gains(
     first: Float[Array, "dof"],
     second: Float[Array, "dof"],
 ) -> tuple[Float[Array, "part"], Needed]:
-    """By how much the energy rises with each part of the second pose instead of that of the first; and room needed.
+    """The rise of the energy with each part of the second pose instead of the first one's, and the room needed.
 
     The mean over what holds around it: the rest of the first pose and that of the second, in what is seen near either.
     """

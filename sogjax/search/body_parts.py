@@ -1,4 +1,4 @@
-"""The parts of a model of several actors that can be taken from another pose: whole actors, and their limbs."""
+"""The parts of a body that can be taken from another pose (whole actors, and their limbs), and which ones are."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,11 +10,12 @@ from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.model.body import Body
 from sogjax.model.limbs import limb_blobs, limb_names, limbs
+from sogjax.quality.fitted import fitted_numbers
+from sogjax.quality.metrics import stretches
 from sogjax.search.mirrored import fitted_to_blobs
-from sogjax.tracking.culling import actor_of_blobs
 
 ITERATIONS = 8
-"""Of putting a limb in its place: the two poses are near each other."""
+"""Steps to put a limb in its place: the two poses are near each other."""
 
 
 @dataclass(frozen=True)
@@ -24,14 +25,14 @@ class Part:
     name: str
     dofs: Int[np.ndarray, "of_part"]
     blobs: Bool[np.ndarray, "blob"]
-    """That tell where it is: of an actor those of the trunk."""
+    """The blobs that tell where it is: of an actor those of the trunk."""
     whole: int | None
     """Which part the limb's actor is; None for actors."""
 
 
 def body_parts(body: Body) -> tuple[Part, ...]:
     """The actors of a body, then their limbs."""
-    trees, of_blob = np.asarray(body.skeleton.trees), actor_of_blobs(body.skeleton, body.blobs.joints)
+    trees, of_blob = np.asarray(body.skeleton.trees), body.blob_actors
     in_limbs = limb_blobs(body)
     moves = np.asarray(body.skeleton.parameter_transform) != 0.0
     parts = []
@@ -55,7 +56,7 @@ class PartArrays(eqx.Module):
 
     @classmethod
     def of(cls, body: Body, parts: Sequence[Part]) -> "PartArrays":
-        """Of the parts of a body, which are in that order."""
+        """The arrays of a body's parts, which are in that order."""
         whole = [part for part in parts if part.whole is None]
         dofs = np.zeros((len(whole), body.skeleton.num_dofs), bool)
         for k, part in enumerate(whole):
@@ -98,3 +99,55 @@ def with_blobs(
     means, others = (body.posed_blobs(each).means for each in (pose, other))
     targets = jnp.where(blobs[..., None], others, means)
     return fitted_to_blobs(body, jnp.broadcast_to(pose, (len(blobs), len(pose))), targets, ITERATIONS)[0]
+
+
+def select_parts(
+    parts: Sequence[Part],
+    apart: Float[np.ndarray, "frame part"],
+    gains: Float[np.ndarray, "frame part"],
+    energy: float,
+    open_ends: tuple[bool, bool] = (False, False),
+) -> Bool[np.ndarray, "frame part"]:
+    """Which parts are taken from the other pass, in frames that follow each other; the pass itself holds around them.
+
+    The choice that gains the most energy in sum, less what it costs to change from one pass to the other: the more,
+    the farther apart they are there. A limb is looked at only where the trunk that it hangs on is in the same place in
+    both passes; else the whole actor is taken, or left.
+
+    Args:
+        parts: of the body.
+        apart: metres between the passes.
+        gains: of taking each part.
+        energy: of a frame, for scale.
+        open_ends: whether the clip ends before the first and behind the last of the frames.
+    """
+    costs, taken = fitted_numbers().merge_passes, np.zeros(apart.shape, bool)
+    for k, part in enumerate(parts):
+        whole = 0.0 if part.whole is None else apart[:, part.whole]
+        worth = np.where(whole > costs.apart, 0.0, gains[:, k] / energy) - costs.bias
+        found = best_choice(worth, costs.change * apart[:, k], open_ends)
+        for stretch in (slice(*ends) for ends in stretches(found)):
+            taken[stretch, k] = apart[stretch, k].max() > costs.apart
+    return taken
+
+
+def best_choice(
+    worth: Float[np.ndarray, "frame"], change: Float[np.ndarray, "frame"], open_ends: tuple[bool, bool] = (False, False)
+) -> Bool[np.ndarray, "frame"]:
+    """Where to take the other pass, by dynamic programming: `worth` for each frame, less `change` at both ends.
+
+    At an open end of the frames there is no frame beside, so that no change is made there.
+    """
+    at_ends = {0: 0.0 if open_ends[0] else change[0], len(worth): 0.0 if open_ends[1] else change[-1]}
+    count = len(worth)
+    best, chosen = np.array([0.0, -np.inf]), np.zeros((count + 1, 2), int)
+    for t in range(count + 1):
+        cost = at_ends[t] if t in at_ends else 0.5 * (change[t - 1] + change[t])
+        ways = best[:, None] - cost * (1.0 - np.eye(2))
+        chosen[t], best = ways.argmax(axis=0), ways.max(axis=0)
+        best = best + np.array([0.0, worth[t] if t < count else -np.inf])
+    taken, at = np.zeros(count, bool), 0
+    for t in range(count, 0, -1):
+        at = chosen[t, at]
+        taken[t - 1] = at == 1
+    return taken

@@ -20,7 +20,7 @@ from sogjax.search.triangulation import (
 SAME_PERSON = 0.15
 """Metres from a camera's rays within which its person is the same, on average over the keypoints."""
 LEAST_SHARE = 0.3
-"""Of a person's confidence that must speak for it."""
+"""Share of a person's confidence that must speak for it."""
 MOST_PAIRS = 300
 """Pairs of people that are tried in a frame; of more, so many are drawn."""
 LEAST_POINTS = 4
@@ -66,7 +66,7 @@ def associated(
     num_people: int,
     rng: np.random.Generator,
 ) -> list[Int[np.ndarray, "camera"]]:
-    """Of each person in a frame the number of its keypoints in each camera; -1 where it was not seen."""
+    """The number of each person's keypoints in each camera of a frame; -1 where it was not seen."""
     left = weights.copy()
     return [_next_person(poses, rays, left, rng) for _ in range(num_people)]
 
@@ -106,7 +106,7 @@ def _next_person(
 
 
 def _followed(points: Float[np.ndarray, "frame person keypoint 3"]) -> Int[np.ndarray, "frame person"]:
-    """In each frame the order in which people are nearest to where they were last seen."""
+    """The order of each frame in which people are nearest to where they were last seen."""
     frames, people = points.shape[:2]
     order = np.tile(np.arange(people), (frames, 1))
     if people == 1:

@@ -16,9 +16,9 @@ from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.limb_confidence import LimbConfidence
+from sogjax.quality.metrics import stretches
 from sogjax.search.backward_pass import SURE_FRAMES, FramesBackwards, Pass, compared_backwards
-from sogjax.search.body_parts import body_parts, merged_pose
-from sogjax.search.select_parts import select_parts, stretches
+from sogjax.search.body_parts import body_parts, merged_pose, select_parts
 from sogjax.tracking.capacity import Needed, with_room
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import AnyFrame, FrameInput, TrackState, on_device
@@ -54,10 +54,7 @@ def in_doubt(passed: Pass) -> Bool[np.ndarray, "frame"]:
 def merge_passes(tracker: Tracker, passed: Pass, frames: FramesBackwards) -> Revision:
     """Where another pass explains parts of the body better, among the frames around those that are in doubt.
 
-    Args:
-        tracker: that judges limbs.
-        passed: what it found.
-        frames: reads cells backwards, by rows of `passed`.
+    `frames` reads cells backwards, by rows of `passed`; the tracker must judge limbs.
     """
     revising = _Revising(tracker, replace(passed, poses=passed.poses.copy(), doubts=passed.doubts.copy()), frames)
     while (stretch := revising.next_stretch()) is not None:
@@ -78,7 +75,8 @@ class _Revising:
         """First and last frame of the last stretch in doubt from behind which no pass has begun."""
         if self._looked_at > MOST_LOOKS * len(self.passed.poses):
             return None
-        left = [stretch for stretch in stretches(in_doubt(self.passed), SURE_FRAMES) if stretch[1] not in self._tried]
+        found = [(first, stop - 1) for first, stop in stretches(in_doubt(self.passed), gap=SURE_FRAMES)]
+        left = [stretch for stretch in found if stretch[1] not in self._tried]
         return left[-1] if left else None
 
     def look_at(self, first: int, last: int) -> None:

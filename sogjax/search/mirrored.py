@@ -1,10 +1,5 @@
-"""Poses that look alike: back to front, or with limbs exchanged.
+"""Poses that look alike: back to front, or with limbs exchanged; and poses whose blobs lie near some points."""
 
-Poses turned as a whole: about the vertical, and to lie or stand on the head.
-"""
-
-import itertools
-from collections.abc import Sequence
 from functools import partial
 
 import equinox as eqx
@@ -15,18 +10,17 @@ from jaxtyping import Array, Float, Int
 
 from sogjax.model.body import Body
 from sogjax.model.limbs import limb_blobs, limbs
-from sogjax.search.rough_pose import heading_dof, root_turns
+from sogjax.search.placed_body import means_of
 
 SIDES = (("left", "right"), ("Left", "Right"), ("l_", "r_"), ("L_", "R_"))
 """Beginnings or parts of names that tell the two sides."""
 ITERATIONS = 30
-POSED_AT_ONCE = 64
 POSE_SPREAD = 0.05
 """Metres that a radian from the start counts as, in a fit to points."""
 
 
 def other_side(names: tuple[str, ...]) -> Int[np.ndarray, "name"]:
-    """For each name the index of its counterpart on the other side; itself, where it has none."""
+    """The index of each name's counterpart on the other side; its own, where there is none."""
     index = {name: k for k, name in enumerate(names)}
     return np.array([index.get(_exchanged(name), k) for k, name in enumerate(names)], int)
 
@@ -92,19 +86,6 @@ def _limb_pairs(body: Body) -> list[Int[np.ndarray, "blob"]]:
     return found
 
 
-def means_of(body: Body, poses: Float[np.ndarray, "start dof"]) -> Float[np.ndarray, "start blob 3"]:
-    """The blobs of a body in poses (metres, world)."""
-    size = POSED_AT_ONCE
-    padded = np.concatenate([poses, np.repeat(poses[-1:], -len(poses) % size, axis=0)])
-    parts = [np.asarray(_means(body, jnp.asarray(padded[k : k + size]))) for k in range(0, len(poses), size)]
-    return np.concatenate(parts)[: len(poses)]
-
-
-@eqx.filter_jit
-def _means(body: Body, poses: Array) -> Float[Array, "start blob 3"]:
-    return jax.vmap(lambda pose: body.posed_blobs(pose).means)(poses)
-
-
 @eqx.filter_jit
 def fitted_to_blobs(
     body: Body, starts: Float[Array, "start dof"], targets: Float[Array, "start blob 3"], iterations: int = ITERATIONS
@@ -131,67 +112,3 @@ def _fit(body: Body, iterations: int, start: Array, target: Array) -> tuple[Arra
     pose = jax.lax.fori_loop(0, iterations, step, start)
     off = body.blobs.points_world(body.skeleton.world_from_joint(pose)) - target
     return pose, jnp.sqrt(jnp.mean(jnp.sum(off * off, axis=-1)))
-
-
-STEP = np.pi / 6.0
-"""Radians between the values of each turning degree of freedom that are tried."""
-TILTED = 0.4
-"""Radians: how far from the wanted direction a body's vertical may be."""
-DIFFERENT = 0.45
-"""Radians between turns that count as different."""
-
-
-def turned_to(
-    body: Body, poses: Sequence[Float[np.ndarray, "dof"]], headings: Float[np.ndarray, "heading"], up: str
-) -> Float[np.ndarray, "start dof"]:
-    """Every pose at every heading (radians about the vertical)."""
-    turn = heading_dof(body, up)
-    if turn is None:
-        return np.stack(poses)
-    starts = np.repeat(np.stack(poses), len(headings), axis=0)
-    starts[:, turn[0]] = np.tile(headings / turn[1], len(poses))
-    return starts
-
-
-def turns_with_vertical(
-    body: Body,
-    poses: Sequence[Float[np.ndarray, "dof"]],
-    vertical: Float[np.ndarray, "3"],
-    wanted: Float[np.ndarray, "3"],
-) -> Float[np.ndarray, "start dof"]:
-    """Poses turned about the root so that what is its vertical in the rest pose points in a wanted direction.
-
-    All headings of it, about half a radian apart.
-    """
-    turns = root_turns(body)
-    values = np.arange(-np.pi, np.pi - 1e-6, STEP)
-    tables = [np.array([about(axis, value) for value in values]) for axis, _, _ in turns]
-    tried = []
-    for combination in itertools.product(range(len(values)), repeat=len(turns)):
-        rotation = np.eye(3)
-        for table, index in zip(tables, combination, strict=True):
-            rotation = rotation @ table[index]
-        off = float(np.arccos(np.clip(rotation @ vertical @ wanted, -1.0, 1.0)))
-        if off < TILTED:
-            tried.append((off, rotation, values[list(combination)]))
-    found: list[tuple[np.ndarray, np.ndarray]] = []
-    for _, rotation, angles in sorted(tried, key=lambda each: each[0]):
-        if all(_angle(rotation, other) > DIFFERENT for other, _ in found):
-            found.append((rotation, angles))
-    turned_poses = [pose.copy() for _ in found for pose in poses]
-    for k, (_, angles) in enumerate(found):
-        for pose in turned_poses[k * len(poses) : (k + 1) * len(poses)]:
-            for (_, dof, weight), value in zip(turns, angles, strict=True):
-                pose[dof] = value / weight
-    return np.stack(turned_poses)
-
-
-def about(axis: Float[np.ndarray, "3"], angle: float) -> Float[np.ndarray, "3 3"]:
-    """The rotation about an axis (Rodrigues)."""
-    x, y, z = axis / np.linalg.norm(axis)
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
-
-
-def _angle(a: np.ndarray, b: np.ndarray) -> float:
-    return float(np.arccos(np.clip(0.5 * (np.trace(a.T @ b) - 1.0), -1.0, 1.0)))

@@ -1,4 +1,4 @@
-"""Where a body may be in one frame: the parts of space that look like it in all cameras, and how they lie."""
+"""Places where a body may be in one frame: the parts of space that look like it in all cameras, and how they lie."""
 
 from dataclasses import dataclass
 
@@ -9,9 +9,10 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.ndimage import gaussian_filter, maximum_filter
 
-from sogjax.model.camera import NEAR, Camera, project_points
+from sogjax.model.camera import NEAR, Camera, cells_at, project_points
 from sogjax.model.rotation import axis_vector
-from sogjax.search.seen_frame import SeenFrame, cells_at
+from sogjax.scene.visual_hull import nearest_point
+from sogjax.search.seen_frame import SeenFrame
 
 MOST_VOXELS = 150_000
 FINEST = 0.08
@@ -95,15 +96,6 @@ def _voxels(cameras: Camera, up: str) -> tuple[Float[np.ndarray, "a b c 3"], flo
     spacing = max(FINEST, float(np.prod(2.0 * extent) / MOST_VOXELS) ** (1.0 / 3.0))
     axes = [np.arange(-n, n + 1) * spacing for n in np.ceil(extent / spacing).astype(int)]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1) + middle, spacing
-
-
-def nearest_point(
-    points: Float[np.ndarray, "line 3"], directions: Float[np.ndarray, "line 3"]
-) -> Float[np.ndarray, "3"]:
-    """The point nearest to lines; where all are parallel, the one of them nearest to the lines' points."""
-    directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-    across = np.eye(3)[None] - directions[:, :, None] * directions[:, None, :]
-    return np.linalg.lstsq(across.sum(axis=0), np.einsum("lij,lj->i", across, points), rcond=1e-9)[0]
 
 
 @eqx.filter_jit

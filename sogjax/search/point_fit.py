@@ -48,7 +48,7 @@ class PointFit(LeastSquares):
     """How far each degree of freedom is expected to lie from the start."""
 
     def residuals(self, params: Float[Array, "dof"]) -> Float[Array, "residual"]:
-        """Those of the points, of the start, and of joints beyond their limits, at a pose."""
+        """The misses of the points, the way from the start, and how far joints are beyond their limits, at a pose."""
         pose, points, skeleton = params, self.points, self.body.skeleton
         misses = (self.body.posed_landmarks(pose)[points.landmarks] - points.places) / points.noise[:, None]
         squared = jnp.sum(misses**2, axis=-1) / self.far**2

@@ -14,10 +14,10 @@ from sogjax.energy.term import Term
 from sogjax.model.body import Body
 from sogjax.model.limbs import limbs, with_other_limb
 from sogjax.model.rotation import axis_vector
-from sogjax.scene.color_clusters import ColorClusters, color_clusters
-from sogjax.search.mirrored import look_alikes, means_of, turned_to, turns_with_vertical
+from sogjax.scene.color_clusters import ColorClusters
+from sogjax.search.mirrored import look_alikes
+from sogjax.search.placed_body import centred, headings, means_of, turned_to, turns_with_vertical
 from sogjax.search.places import Place, places
-from sogjax.search.rough_pose import shifts
 from sogjax.search.search_energy import LARGEST_ANGLE, LARGEST_TRANSLATION, SearchEnergy, climbed, scores
 from sogjax.search.seen_frame import SeenFrame
 from sogjax.solve.solution import Scales
@@ -70,8 +70,8 @@ class PoseSearch:
 
     @classmethod
     def of_body(cls, body: Body, terms: Sequence[Term], up: str) -> "PoseSearch":
-        """For a body in its colours."""
-        return cls(body, color_clusters(np.asarray(body.blob_colors), np.asarray(body.blob_sigmas) ** 2), terms, up)
+        """The search for a body in its colours."""
+        return cls(body, ColorClusters.from_body(body), terms, up)
 
     @property
     def scales(self) -> Scales:
@@ -79,7 +79,7 @@ class PoseSearch:
         return pose_scales(self.body.skeleton, largest_angle=LARGEST_ANGLE, largest_translation=LARGEST_TRANSLATION)
 
     def energy(self, frame: SeenFrame) -> SearchEnergy:
-        """Of poses in a frame."""
+        """The energy of poses in a frame."""
         return SearchEnergy.from_terms(self.body, frame.cameras, self.terms, self.kinds)
 
 
@@ -96,15 +96,15 @@ def search(searcher: PoseSearch, frame: SeenFrame, count: int = NUM_LAST, report
     if not found:
         return []
     found = [place for place in found if place.score >= POOR * found[0].score] or found[:1]
-    hunt = PlacedSearch.of_places(searcher, frame, np.stack([place.centre for place in found]))
+    placed = PlacedSearch.of_places(searcher, frame, np.stack([place.centre for place in found]))
     tried = _starts(searcher, found)
-    tried = hunt.climbed(_spread_best(searcher.body, hunt.scored(tried)), FIRST_ITERATIONS)
+    tried = placed.climbed(_spread_best(searcher.body, placed.scored(tried)), FIRST_ITERATIONS)
     tried = _best(searcher.body, tried, NUM_SECOND)
     report(0.3)
     for share in (0.6, 0.85):
-        tried = _best(searcher.body, _with_better_limbs(hunt, tried), NUM_LAST)
+        tried = _best(searcher.body, _with_better_limbs(placed, tried), NUM_LAST)
         report(share)
-    tried = hunt.climbed(_with_look_alikes(hunt, tried), LAST_ITERATIONS)
+    tried = placed.climbed(_with_look_alikes(placed, tried), LAST_ITERATIONS)
     report(1.0)
     best = _best(searcher.body, tried, count)
     return [Optimum(pose, float(value)) for pose, value in zip(best.poses, best.values, strict=True)]
@@ -120,12 +120,12 @@ class Hypotheses:
     values: Float[np.ndarray, "start"]
 
     def __getitem__(self, chosen: np.ndarray) -> "Hypotheses":
-        """Some of them."""
+        """The chosen ones."""
         return Hypotheses(self.poses[chosen], self.where[chosen], self.values[chosen])
 
     @classmethod
     def of(cls, parts: Sequence["Hypotheses"]) -> "Hypotheses":
-        """All of several."""
+        """The hypotheses of several sets together."""
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("poses", "where", "values")))
 
 
@@ -139,12 +139,12 @@ class PlacedSearch:
 
     @classmethod
     def of_places(cls, searcher: PoseSearch, frame: SeenFrame, centres: Float[np.ndarray, "place 3"]) -> "PlacedSearch":
-        """Always the same number of places, so that one program serves all."""
+        """The search at places, padded to always the same number, so that one program serves all."""
         padded = np.pad(centres, ((0, NUM_PLACES - len(centres)), (0, 0)), mode="edge")
         return cls(searcher, searcher.energy(frame), _windows(frame, jnp.asarray(padded, frame.odds.dtype)))
 
     def scored(self, tried: Hypotheses) -> Hypotheses:
-        """With their energies."""
+        """The hypotheses with their energies."""
         return Hypotheses(tried.poses, tried.where, scores(self.energy, self.windows, tried.where, tried.poses))
 
     def climbed(self, tried: Hypotheses, iterations: int) -> Hypotheses:
@@ -158,13 +158,12 @@ def _starts(searcher: PoseSearch, found: Sequence[Place]) -> Hypotheses:
     """Every named pose in every direction at every place."""
     body, up = searcher.body, axis_vector(searcher.up)
     named = [np.asarray(pose) for pose in body.poses.values()]
-    headings = np.arange(NUM_HEADINGS) * 2.0 * np.pi / NUM_HEADINGS - np.pi
-    upright = turned_to(body, named, headings, searcher.up)
+    upright = turned_to(body, named, headings(NUM_HEADINGS), searcher.up)
     parts = []
     for k, place in enumerate(found):
         directions = _other_verticals(place, up)
         lying = [turns_with_vertical(body, named, up, direction) for direction in directions]
-        poses = _centred(body, np.concatenate([upright, *lying]), place.centre)
+        poses = centred(body, np.concatenate([upright, *lying]), place.centre)
         parts.append(Hypotheses(poses, np.full(len(poses), k), np.zeros(len(poses))))
     return Hypotheses.of(parts)
 
@@ -176,26 +175,15 @@ def _other_verticals(place: Place, up: Float[np.ndarray, "3"]) -> list[Float[np.
     return [along, -along] if lying else [-up]
 
 
-def _centred(body: Body, poses: np.ndarray, centre: Float[np.ndarray, "3"]) -> Float[np.ndarray, "start dof"]:
-    """Poses moved so that their centre is at a point."""
-    return (poses + (centre[None] - centres_of(body, poses)) @ np.asarray(shifts(body)).T).astype(poses.dtype)
-
-
-def centres_of(body: Body, poses: Float[np.ndarray, "start dof"]) -> Float[np.ndarray, "start 3"]:
-    """The middle of a body in poses, weighted by area."""
-    areas = np.asarray(body.blob_sigmas) ** 2
-    return np.einsum("sbi,b->si", means_of(body, poses), areas / areas.sum())
-
-
 @eqx.filter_jit
 def _windows(frame: SeenFrame, centres: Float[Array, "place 3"]) -> ColorWindows:
     radius = jnp.asarray(BODY_RADIUS, centres.dtype)
     return jax.lax.map(lambda centre: frame.windows(centre, radius), centres)
 
 
-def _with_better_limbs(hunt: PlacedSearch, tried: Hypotheses) -> Hypotheses:
+def _with_better_limbs(placed: PlacedSearch, tried: Hypotheses) -> Hypotheses:
     """The poses, and each with one limb held in other ways, climbed if that looks promising."""
-    body, variants, source = hunt.searcher.body, [], []
+    body, variants, source = placed.searcher.body, [], []
     every_limb = limbs(body.skeleton)
     for k, pose in enumerate(tried.poses):
         for j, limb in enumerate(every_limb):
@@ -203,7 +191,7 @@ def _with_better_limbs(hunt: PlacedSearch, tried: Hypotheses) -> Hypotheses:
             variants.append(with_other_limb(body, pose, limb, others)[1:])
             source += [(k, j)] * len(variants[-1])
     of_pose, of_limb = np.array(source).T
-    scored = hunt.scored(Hypotheses(np.concatenate(variants), tried.where[of_pose], np.zeros(len(of_pose))))
+    scored = placed.scored(Hypotheses(np.concatenate(variants), tried.where[of_pose], np.zeros(len(of_pose))))
     chosen = []
     for k, j in sorted(set(source)):
         here = np.flatnonzero((of_pose == k) & (of_limb == j))
@@ -211,7 +199,7 @@ def _with_better_limbs(hunt: PlacedSearch, tried: Hypotheses) -> Hypotheses:
         chosen.extend(
             here[different(body, scored.poses[here], scored.values[here], LIMBS_TRIED[min(k, 1)], LIMB_APART)]
         )
-    return hunt.climbed(Hypotheses.of([tried, scored[np.array(chosen)]]), SECOND_ITERATIONS)
+    return placed.climbed(Hypotheses.of([tried, scored[np.array(chosen)]]), SECOND_ITERATIONS)
 
 
 def _drawn(body: Body, limb: Int[np.ndarray, "limb"], count: int) -> Float[np.ndarray, "start dof"]:
@@ -222,9 +210,9 @@ def _drawn(body: Body, limb: Int[np.ndarray, "limb"], count: int) -> Float[np.nd
     return poses
 
 
-def _with_look_alikes(hunt: PlacedSearch, tried: Hypotheses) -> Hypotheses:
+def _with_look_alikes(placed: PlacedSearch, tried: Hypotheses) -> Hypotheses:
     """The poses, and what looks like the best of them."""
-    others = look_alikes(hunt.searcher.body, tried.poses[0])
+    others = look_alikes(placed.searcher.body, tried.poses[0])
     return Hypotheses.of([tried, Hypotheses(others, np.full(len(others), tried.where[0]), np.zeros(len(others)))])
 
 

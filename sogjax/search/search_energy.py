@@ -29,7 +29,7 @@ from sogjax.solve.solution import QuadraticModel, Scales
 REST_WEIGHT = 0.002
 """Weight of `RestPrior`, where a body that explains all that it covers gains about 1."""
 LIMITS = 5.0
-"""By what the weights of the other terms are multiplied in this energy."""
+"""Factor of the weights of the other terms in this energy."""
 SILHOUETTE = 0.5
 """The area of a body in a picture, as a part of that of the discs of its blobs (which overlap)."""
 NARROWEST = 0.5
@@ -53,7 +53,7 @@ class RestPrior(Penalty):
         return jnp.sum((posed.pose / _ranges(posed.body.skeleton, posed.pose)) ** 2)
 
     def quadratic(self, posed: Posed, frame: Frame) -> QuadraticModel:
-        """Exact."""
+        """The exact model: the prior is quadratic."""
         inverse = 2.0 * self.weight / _ranges(posed.body.skeleton, posed.pose) ** 2
         return QuadraticModel(self.part(posed, frame), -inverse * posed.pose, jnp.diag(inverse))
 
@@ -75,13 +75,13 @@ class SearchEnergy(eqx.Module):
 
     @classmethod
     def from_terms(cls, body: Body, cameras: Camera, terms: Sequence[Term], kinds: ColorClusters) -> "SearchEnergy":
-        """With the terms of tracking that need no windows, lists or history."""
+        """The energy with the terms of tracking that need no windows, lists or history."""
         others = [term for term in terms if not isinstance(term, (Similarity, Foreground, AccelerationPenalty))]
         others = [eqx.tree_at(lambda term: term.weight, term, LIMITS * term.weight) for term in others]
-        return cls(body, cameras, (*others, RestPrior(REST_WEIGHT)), blob_clusters(kinds, body.num_blobs))
+        return cls(body, cameras, (*others, RestPrior(REST_WEIGHT)), BlobClusters.from_members(kinds.members, SLOTS))
 
     def appearance(self, windows: ColorWindows) -> Appearance:
-        """In units of the body's own area in the pictures, so that it does not matter how large it is seen."""
+        """The appearance, in units of the body's own area in the pictures: it does not matter how large it is seen."""
         whole = jnp.mean(windows.scale**2 / whole_image_overlap(self.cameras.image_size))
         size = SILHOUETTE * jnp.pi * jnp.sum((DISC * self.body.blob_sigmas) ** 2)
         return Appearance(1.0 / (size * whole), windows, self.kinds)
@@ -114,16 +114,6 @@ def scores(
 ) -> Float[np.ndarray, "start"]:
     """The energies of poses, each in the windows of its place."""
     return _in_parts(partial(_scores, energy, windows), SCORED_AT_ONCE, place, poses)[0]
-
-
-def blob_clusters(kinds: ColorClusters, num_blobs: int) -> BlobClusters:
-    """The kinds of the blobs as arrays."""
-    members, real = np.zeros((len(kinds.members), SLOTS), int), np.zeros((len(kinds.members), SLOTS))
-    slots = np.zeros(num_blobs, int)
-    for k, part in enumerate(kinds.members):
-        members[k, : len(part)], real[k, : len(part)] = part, 1.0
-        slots[list(part)] = k * SLOTS + np.arange(len(part))
-    return BlobClusters(jnp.asarray(members), jnp.asarray(real, jnp.result_type(float)), jnp.asarray(slots))
 
 
 @eqx.filter_jit

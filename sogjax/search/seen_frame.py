@@ -1,6 +1,7 @@
 """What the cameras see in one frame, as searches take it: how much each kind of blob would explain, cell by cell."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import equinox as eqx
 import jax
@@ -10,16 +11,15 @@ from jaxtyping import Array, Float, UInt8
 
 from sogjax.energy.appearance import ColorWindows
 from sogjax.model.body import Body
-from sogjax.model.camera import Camera, distort, near_picture, project, project_points
+from sogjax.model.camera import Camera, project, project_points
 from sogjax.model.sog import Sog
+from sogjax.scene.cells import inside_pictures
 from sogjax.scene.color_clusters import ColorClusters, kind_odds
 from sogjax.scene.foreground import BackgroundModel
 from sogjax.tracking.culling import ImageReader
 
 SIDE = 40
 """Cells of a window in each direction."""
-SAMPLES = 2
-"""Places along each side of a cell at which the picture is looked at."""
 FREE_SPACE = 0.4
 """What the odds of a cell count that is rather background: a limb that is a little beside its place must not lose more
 than one that hides in the trunk."""
@@ -55,39 +55,21 @@ class SeenFrame(eqx.Module):
         dtype = cameras.intrinsics.dtype
         tables = jnp.asarray(np.concatenate([kinds.tables, kinds.whole[None]]), dtype)
         grids = reader.candidates.grids
-        inside = np.zeros((len(grids), *cells.shape[1:3]), np.float32)
-        for k, grid in enumerate(grids):
-            inside[k, : grid.rows, : grid.columns] = 1.0 if present is None or present[k] else 0.0
+        inside = inside_pictures(grids, cells.shape[1:3])
+        if present is not None:
+            inside[~np.array(present, bool)] = 0.0
         odds = _odds(jnp.asarray(cells), jnp.asarray(inside), reader.background, tables)
-        known = (
-            0.0
-            if reader.background is None
-            else np.sum(np.asarray(reader.background.known) * inside) / max(inside.sum(), 1.0)
-        )
+        known = 0.0 if reader.background is None else np.sum(np.asarray(reader.background.known) * inside)
         sizes = jnp.asarray([grid.cell_size for grid in grids], dtype)
-        return cls(cameras, odds, sizes, jnp.asarray(known, dtype))
+        return cls(cameras, odds, sizes, jnp.asarray(known / max(inside.sum(), 1.0), dtype))
 
     def windows(self, centre: Float[Array, "3"], radius: Float[Array, ""]) -> ColorWindows:
         """Grids around a ball (metres, world)."""
         boxes = self._around(centre, radius)
-        step = (boxes[:, 1] - boxes[:, 0]) / SIDE
-        centres = boxes[:, 0, :, None] + (jnp.arange(SIDE, dtype=step.dtype) + 0.5)[None, None] * step[:, :, None]
-        samples = (
-            boxes[:, 0, :, None]
-            + (jnp.arange(SAMPLES * SIDE, dtype=step.dtype) + 0.5)[None, None] / SAMPLES * step[:, :, None]
-        )
-        looked_at = jax.vmap(_looked_at)(self.odds[:, :-1], self.cell_sizes, self.cameras, samples)
-        split = looked_at.reshape(*looked_at.shape[:2], SIDE, SAMPLES, SIDE, SAMPLES)
-        odds = jnp.mean(split, axis=(3, 5))
-        windows = ColorWindows(
-            centres[:, 0],
-            centres[:, 1],
-            step,
-            jnp.where(odds < 0.0, FREE_SPACE * odds, odds),
-            jnp.ones((boxes.shape[0], SIDE, SIDE), step.dtype),
-            0.5 * (boxes[:, 1, 0] - boxes[:, 0, 0]) / radius,
-        )
-        return eqx.tree_at(lambda w: w.free, windows, self._free(windows))
+        windows = ColorWindows.in_boxes(self.odds[:, :-1], self.cell_sizes, self.cameras, boxes, (SIDE, SIDE))
+        odds = jnp.where(windows.odds < 0.0, FREE_SPACE * windows.odds, windows.odds)
+        windows = replace(windows, odds=odds, scale=0.5 * (boxes[:, 1, 0] - boxes[:, 0, 0]) / radius)
+        return replace(windows, free=self._free(windows))
 
     def _around(self, centre: Float[Array, "3"], radius: Float[Array, ""]) -> Float[Array, "camera 2 2"]:
         """Boxes (lowest and highest x, y in undistorted pixels) around a ball."""
@@ -112,7 +94,7 @@ class SeenFrame(eqx.Module):
         return free
 
     def with_found(self, body: Body, pose: Float[np.ndarray | Array, "dof"]) -> "SeenFrame":
-        """The same frame, with one more actor found."""
+        """This frame, with one more actor found."""
         blobs = _posed(body, jnp.asarray(pose))
         return eqx.tree_at(lambda f: f.found, self, (*self.found, blobs), is_leaf=_is_tuple)
 
@@ -132,23 +114,3 @@ def _is_tuple(value: object) -> bool:
 @eqx.filter_jit
 def _odds(cells: Array, inside: Array, background: BackgroundModel | None, tables: Array) -> Array:
     return kind_odds(cells.astype(tables.dtype) / 255.0, inside.astype(tables.dtype), background, tables)
-
-
-def _looked_at(
-    odds: Float[Array, "kind rows columns"], cell_size: Array, camera: Camera, samples: Float[Array, "2 n"]
-) -> Float[Array, "kind n n"]:
-    """The log odds at the places of a grid in one camera; 0 outside its picture."""
-    count = samples.shape[1]
-    x, y = jnp.broadcast_to(samples[0][:, None], (count, count)), jnp.broadcast_to(samples[1][None], (count, count))
-    pixels = jnp.stack([x, y], axis=-1).reshape(-1, 2)
-    cell, inside = cells_at(camera, cell_size, pixels)
-    values = odds[:, cell[:, 1], cell[:, 0]]
-    return jnp.where(inside[None], values, 0.0).reshape(-1, count, count)
-
-
-def cells_at(camera: Camera, cell_size: Array, pixels: Float[Array, "n 2"]) -> tuple[Array, Array]:
-    """The cell (column, row) of undistorted pixels of one camera, and which of them are in its picture."""
-    recorded = distort(camera, pixels)
-    inside = jnp.all((recorded > -0.5) & (recorded < camera.image_size[None, :] - 0.5), axis=1)
-    inside &= near_picture(camera, pixels, 0.2)
-    return jnp.floor((jnp.where(inside[:, None], recorded, 0.0) + 0.5) / cell_size).astype(jnp.int32), inside

@@ -20,7 +20,7 @@ TOLERANCE = 0.06
 """Metres at the point's distance by which a camera's pixel may miss it."""
 
 _AT_ONCE = 1000
-"""Points."""
+"""Points that are triangulated together."""
 _DAMPING = 1e-9
 """Keeps parallel rays from dividing by zero; their point is far off and agrees with nobody."""
 
@@ -33,10 +33,10 @@ class Rays:
     """Camera from world, metres."""
     rays: Float[np.ndarray, "view point 2"]
     weights: Float[np.ndarray, "view point"]
-    """Of the views, 0 where a point is not seen."""
+    """The weights of the views, 0 where a point is not seen."""
 
     def of_points(self, chosen: slice) -> "Rays":
-        """Those of some of the points."""
+        """The rays of some of the points."""
         return Rays(self.poses, self.rays[:, chosen], self.weights[:, chosen])
 
 
@@ -47,7 +47,7 @@ class Triangulated:
     points: Float[np.ndarray, "*group point 3"]
     """Metres; NaN where fewer than two cameras agree."""
     num_cameras: Int[np.ndarray, "*group point"]
-    """That agree."""
+    """How many cameras agree."""
     errors: Float[np.ndarray, "*group point"]
     """Weighted mean distance of the point from those cameras' rays, metres; NaN where there is no point."""
 
@@ -132,7 +132,7 @@ def _summed(
 def _normal_equations(
     seen: Rays, weights: Float[np.ndarray, "view point"]
 ) -> tuple[Float[np.ndarray, "view point 3 3"], Float[np.ndarray, "view point 3"]]:
-    """Of each view, that the point lies on its ray: (R_x - x R_z) X = x t_z - t_x, and the same for y."""
+    """The equations of each view, that the point lies on its ray: (R_x - x R_z) X = x t_z - t_x, and so for y."""
     rotation, translation = seen.poses[:, :, :3], seen.poses[:, :, 3]
     rows = rotation[:, None, :2] - seen.rays[..., None] * rotation[:, None, 2:]
     right = seen.rays * translation[:, None, 2:] - translation[:, None, :2]

@@ -1,7 +1,7 @@
-"""Settings from a preset, sets of options and single values, as the commands compose them, but without Hydra."""
+"""Settings composed from a preset, sets of options and single values, for commands, scripts and functions alike."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -9,19 +9,20 @@ from typing import Any, TypeVar
 import numpy as np
 import yaml
 from omegaconf import OmegaConf
-from omegaconf.errors import ConfigKeyError, OmegaConfBaseException
+from omegaconf.errors import ConfigAttributeError, ConfigKeyError, OmegaConfBaseException
 
 from sogjax.errors import InputError
 from sogjax.settings.files import choices_of, default_choices, option_set
 from sogjax.settings.option import option_key
 from sogjax.settings.run import TrackConfig
-from sogjax.settings.wrong_values import no_such_choice, unfit_value, unknown_key
+from sogjax.settings.wrong_values import REMOVED, no_such_choice, unfit_value, unknown_key
 
 Schema = TypeVar("Schema")
+Pair = tuple[str, Any]
+"""A key, `a.b` for the setting b of the group a, and its value."""
 
 PRESET = "preset"
 """The config group whose options belong to all groups."""
-SEE = "see sogjax {} --help"
 
 
 def track_config(words: Sequence[str] = (), /, **keywords: Any) -> TrackConfig:
@@ -35,90 +36,94 @@ def track_config(words: Sequence[str] = (), /, **keywords: Any) -> TrackConfig:
     Raises:
         InputError: an unknown key (with the nearest known one), or an invalid value.
     """
-    return composed_without_hydra(TrackConfig, "track", words, keywords)
+    return composed_config(TrackConfig, "track", [*map(pair_of, words), *keywords.items()])
 
 
-def composed_without_hydra(
-    schema: type[Schema], command: str, words: Sequence[str] = (), keywords: Mapping[str, Any] | None = None
-) -> Schema:
-    """The config object of a command from words and keywords, as `track_config` takes them.
+def pair_of(word: str) -> Pair:
+    """The key and the value, in YAML, of `key=value`.
 
     Raises:
-        InputError: as there.
+        InputError: it is not of this form.
     """
-    values = [*map(_of_word, words), *(_nested(key, _plain(value)) for key, value in (keywords or {}).items())]
-    choices = default_choices(command)
-    named = {
-        key: value for entry in values for key, value in entry.items() if key in choices and isinstance(value, str)
-    }
-    for entry in values:
-        for key, value in entry.items():
-            if key in choices and not isinstance(value, str | Mapping):
+    key, equals, text = word.partition("=")
+    if not equals or not key:
+        raise InputError(f"{word}: is not an option; write key=value")
+    try:
+        return key, yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise InputError(f"{word}: cannot be read; put a value with special characters in quotes") from error
+
+
+def composed_config(schema: type[Schema], command: str, pairs: Iterable[Pair]) -> Schema:
+    """The config object of a command from what is chosen; the rest is as its sets of options and defaults say.
+
+    Args:
+        schema: a dataclass with all settings and their defaults.
+        command: whose file in `conf/` lists the sets of options; an empty text for a script, which has none.
+        pairs: what is chosen, later pairs count more. A group's value is a mapping, or the name of a set of options,
+            which counts less than any single value.
+
+    Raises:
+        InputError: an unknown key (with the nearest known one), an invalid value, or a required one that is missing.
+    """
+    pairs, choices = list(pairs), default_choices(command)
+    named: dict[str, str] = {}
+    for key, value in pairs:
+        if key in choices and not isinstance(value, Mapping):
+            if value not in choices_of(key):
                 raise InputError(no_such_choice(key, value, choices_of(key)))
+            named[key] = value
     tree = OmegaConf.structured(schema)
-    for options in _option_sets(command, named):
-        tree = OmegaConf.merge(tree, options)
-    for entry in values:
-        rest = {key: value for key, value in entry.items() if key not in named or not isinstance(value, str)}
-        tree = _merged(tree, rest, schema, command)
+    for group, choice in (default_choices(command, named) | named).items():
+        options = option_set(group, choice)[0]
+        tree = OmegaConf.merge(tree, options if group == PRESET else {group: options})
+    for key, value in pairs:
+        if key not in choices or isinstance(value, Mapping):
+            _update(tree, key, _plain(value), schema, command)
     return as_object(tree, command)  # pyright: ignore[reportReturnType]
+
+
+def _update(tree: Any, key: str, value: Any, schema: type, command: str) -> None:
+    try:
+        OmegaConf.update(tree, key, value)
+    except (ConfigKeyError, ConfigAttributeError) as error:
+        raise InputError(unknown_key(str(error.full_key or key), schema, _see(command))) from error
+    except (OmegaConfBaseException, ValueError) as error:
+        inner = str(getattr(error, "full_key", None) or key)
+        wrong = (inner, getattr(error, "value", value)) if inner.startswith(f"{key}.") else (key, value)
+        raise InputError(unfit_value(*wrong, str(error), _see(command))) from error
 
 
 def as_object(tree: Any, command: str) -> Any:
     """The schema object of a composed config.
 
     Raises:
-        InputError: a missing required key, or a number that is not finite.
+        InputError: a missing required key, a reference to none, or a number that is not finite.
     """
-    missing = sorted(option_key(key) for key in OmegaConf.missing_keys(tree))
-    if missing:
-        examples = " ".join(f"{key}=..." for key in missing)
-        raise InputError(f"{command} needs {', '.join(missing)}; add {examples} ({SEE.format(command)})")
-    config = OmegaConf.to_object(tree)
+    try:
+        missing = sorted(option_key(key) for key in OmegaConf.missing_keys(tree))
+        if missing:
+            examples = " ".join(f"{key}=..." for key in missing)
+            raise InputError(f"{command or 'the script'} needs {', '.join(missing)}; add {examples} ({_see(command)})")
+        config = OmegaConf.to_object(tree)
+    except OmegaConfBaseException as error:
+        raise InputError(f"{str(error).splitlines()[0]} ({_see(command)})") from error
     for key, value in _numbers(config):
         if not math.isfinite(value):
             raise InputError(f"{key}={value}: must be a finite number")
     return config
 
 
-def _option_sets(command: str, named: dict[str, str]) -> Iterator[dict[str, Any]]:
-    """The sets of options that are chosen, by default, by the preset or by name, in the order in which they count."""
-    for group, choice in named.items():
-        if choice not in choices_of(group):
-            raise InputError(no_such_choice(group, choice, choices_of(group)))
-    for group, choice in (default_choices(command, named) | named).items():
-        options = option_set(group, choice)[0]
-        yield options if group == PRESET else {group: options}
+def without_removed(tree: Any) -> Any:
+    """The settings of a file that an older program wrote, without those that are none any more."""
+    for group, _, name in (key.rpartition(".") for key in REMOVED if "." in key):
+        if OmegaConf.is_dict(part := tree.get(group)):
+            part.pop(name, None)
+    return tree
 
 
-def _merged(tree: Any, values: Mapping[str, Any], schema: type, command: str) -> Any:
-    see = SEE.format(command)
-    try:
-        return OmegaConf.merge(tree, OmegaConf.create(dict(values)))
-    except ConfigKeyError as error:
-        raise InputError(unknown_key(str(error.full_key or error.key), schema, see)) from error
-    except (OmegaConfBaseException, ValueError) as error:
-        key = str(getattr(error, "full_key", None) or next(iter(values)))
-        raise InputError(unfit_value(key, _value_at(values, key), str(error), see)) from error
-
-
-def _of_word(word: str) -> dict[str, Any]:
-    """A nested mapping of one `key=value`."""
-    key, equals, text = word.partition("=")
-    if not equals or not key:
-        raise InputError(f"{word}: is not an option; write key=value")
-    try:
-        value = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise InputError(f"{word}: cannot be read; put a value with special characters in quotes") from error
-    return _nested(key, value)
-
-
-def _nested(key: str, value: Any) -> dict[str, Any]:
-    """`a.b` and a value as {a: {b: value}}."""
-    for part in reversed(key.split(".")):
-        value = {part: value}
-    return value
+def _see(command: str) -> str:
+    return f"see sogjax {command} --help" if command else "see --help"
 
 
 def _plain(value: Any) -> Any:
@@ -130,13 +135,6 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Path):
         return str(value)
     return value.item() if isinstance(value, np.generic) else value
-
-
-def _value_at(values: Mapping[str, Any], key: str) -> Any:
-    found: Any = values
-    for part in key.split("."):
-        found = found.get(part) if isinstance(found, Mapping) else found
-    return found
 
 
 def _numbers(config: Any, prefix: str = "") -> Iterator[tuple[str, float]]:

@@ -17,10 +17,12 @@ def conf_dir() -> Path:
 def default_choices(command: str, named: Mapping[str, str] | None = None) -> dict[str, str]:
     """The config groups of a command, in the order in which they count, and the choice of each by default.
 
-    A group may bring others, as a preset does: those of the choice that is named, where one is.
+    A group may bring others, as a preset does: those of the choice that is named, where one is. A command without a
+    file has none.
     """
     choices: dict[str, str] = {}
-    for group, choice in _choices(_read(conf_dir() / f"{command}.yaml")["defaults"]).items():
+    path = conf_dir() / f"{command}.yaml"
+    for group, choice in _choices(_read(path)["defaults"]).items() if path.is_file() else ():
         choices |= {group: choice, **option_set(group, (named or {}).get(group, choice))[1]}
     return choices
 

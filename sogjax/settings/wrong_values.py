@@ -2,6 +2,7 @@
 
 import difflib
 import re
+from collections.abc import Mapping
 
 from sogjax.settings.option import help_lines
 
@@ -26,9 +27,9 @@ _EXPECTED = (
     (r"could not be converted to Integer", "must be a whole number"),
     (r"could not be converted to Float", "must be a number"),
     (r"is not a valid bool", "must be true or false"),
-    (r"is not Optional", "cannot be null"),
-    (r"is not a ListConfig", "must be a list; write key=[a,b]"),
-    (r"Cannot convert '(?:list|dict)' to string", "must be one value, no list"),
+    (r"is not Optional|Incompatible value 'None'", "cannot be null"),
+    (r"is not a ListConfig|with ListConfig", "must be a list; write key=[a,b]"),
+    (r"Cannot convert '(?:list|dict|ListConfig|DictConfig)' to string", "must be one value, no list"),
 )
 
 
@@ -47,10 +48,19 @@ def unknown_key(key: str, schema: type, see: str) -> str:
 
 def no_such_choice(key: str, value: object, choices: list[str]) -> str:
     """An unknown choice, with the known ones."""
-    return f"{key}={value}: no such choice; use one of {', '.join(choices)}"
+    return f"{key}={_written(value)}: no such choice; use one of {', '.join(choices)}"
 
 
 def unfit_value(key: str, value: object, complaint: str, see: str) -> str:
     """A value of the wrong kind, from the error of OmegaConf."""
     expected = next((words for pattern, words in _EXPECTED if re.search(pattern, complaint)), "does not fit")
-    return f"{key}={value}: {expected.replace('key', key)} ({see})"
+    return f"{key}={_written(value)}: {expected.replace('key', key)} ({see})"
+
+
+def _written(value: object) -> str:
+    """A value as on a command line."""
+    if isinstance(value, Mapping):
+        return "{" + ",".join(f"{key}:{_written(inner)}" for key, inner in value.items()) + "}"
+    if isinstance(value, list):
+        return f"[{','.join(map(_written, value))}]"
+    return "null" if value is None else str(value).lower() if isinstance(value, bool) else str(value)

@@ -18,7 +18,7 @@ from jaxtyping import Array, Bool, Float, PyTree
 from sogjax.solve.solution import Objective, Params, Scales
 
 LEAST = 1e-6
-"""Of the largest curvature (in units of the parameters' steps): a direction that bends less is not determined."""
+"""Share of the largest curvature (in units of the parameters' steps); a direction that bends less is not determined."""
 
 
 class Optimum(eqx.Module):
@@ -27,7 +27,7 @@ class Optimum(eqx.Module):
     slope: Float[Array, ""]
     """What the objective would still gain by a step of the largest size, to first order; 0 at an optimum."""
     curvatures: Params
-    """Of the objective along the principal directions, in units of the largest steps; rising."""
+    """How the objective bends along the principal directions, in units of the largest steps; rising."""
     directions: Float[Array, "param direction"]
     """Columns: the principal directions, in units of the largest steps."""
     determined: Bool[Array, "direction"]

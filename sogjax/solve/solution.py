@@ -1,7 +1,4 @@
-"""The quadratic model of an objective near some parameters.
-
-What every solver takes and returns.
-"""
+"""What every solver takes and returns: objectives, their quadratic models, scales of steps, solutions."""
 
 from collections.abc import Callable
 from typing import Protocol, runtime_checkable

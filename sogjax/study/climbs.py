@@ -13,8 +13,9 @@ from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
-from sogjax.run.cells import cells_of_clip
-from sogjax.run.job import Job
+from sogjax.run.background import learn_background
+from sogjax.run.setup import tracking_setup
+from sogjax.run.track import opened_clip
 from sogjax.settings.run import TrackConfig
 from sogjax.tracking.capacity import first_capacities, larger_capacities
 from sogjax.tracking.culling import Capacities
@@ -64,17 +65,18 @@ def ranked(
         starts: the tracked and the true poses of all actors beside each other; NaN where not known.
     """
     tracked, true = starts
-    job = Job.from_config(recording, bodies, config, start=jnp.asarray(tracked[0]))
-    first, last = int(frames[0]), int(frames[-1]) + 1
-    cells = cells_of_clip(recording, job.grids, config.images, (first, last))
-    climber = _Climber(job.tracker)
+    clip = opened_clip(recording, config)
+    background = learn_background(clip, config.images.background, config.images.cache)
+    tracker = tracking_setup(clip, background, bodies, config).tracker
+    first = recording.first_frame + int(frames[0])
+    climber = _Climber(tracker)
     paths: list[list[_Optimum | None]] = [[], []]
-    for k, frame in enumerate(frames):
+    for k, seen in enumerate(clip.frames(first, first + len(frames))):
         for path, poses in zip(paths, starts, strict=True):
             known = np.isfinite(poses[k]).all() and np.isfinite(true[k]).all()
             around = (tracked[k], true[k])
-            path.append(climber.climb(cells[frame - first], around, poses[k], path) if known else None)
-    return Pair(*(_joined(path, job.tracker) for path in paths))
+            path.append(climber.climb(np.asarray(seen.cells), around, poses[k], path) if known else None)
+    return Pair(*(_joined(path, tracker) for path in paths))
 
 
 @dataclass(frozen=True)

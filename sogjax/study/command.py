@@ -6,9 +6,8 @@ from pathlib import Path
 
 from sogjax.errors import InputError
 from sogjax.study.experiment import Experiment, experiment_names
-from sogjax.study.machine import machine_line
 from sogjax.study.methods import comparison_table
-from sogjax.study.script import run_script, settings_from
+from sogjax.study.script import machine_line, run_script, settings_from
 from sogjax.study.settings import ReportConfig
 from sogjax.study.study import Study
 from sogjax.study.table import findings, markdown_table, recordings_table

@@ -3,11 +3,13 @@
 import base64
 import html
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from sogjax.io.files import atomic_path
+import markdown
+
+from sogjax.io.files import write_file
 
 
 @dataclass(frozen=True)
@@ -42,12 +44,10 @@ def write_markdown(path: Path, title: str, sections: Sequence[Section]) -> list[
         lines += [f"## {section.title}", *section.parts]
         for picture in section.pictures:
             files.append(folder / picture.name)
-            with atomic_path(files[-1]) as temporary:
-                temporary.write_bytes(picture.content)
+            write_file(files[-1], picture.content)
             lines.append(f"![{picture.caption}]({folder.name}/{picture.name})")
             lines.append(picture.caption)
-    with atomic_path(path) as temporary:
-        temporary.write_text("\n\n".join(lines) + "\n", encoding="utf-8")
+    write_file(path, "\n\n".join(lines) + "\n")
     return files
 
 
@@ -57,14 +57,15 @@ def write_html(path: Path, title: str, sections: Sequence[Section]) -> None:
     Raises:
         InputError: the folder cannot be written.
     """
-    body = [f"<h1>{html.escape(title)}</h1>", _contents(sections)]
-    for number, section in enumerate(sections):
-        body.append(f'<h2 id="s{number}">{html.escape(section.title)}</h2>')
-        body += [_block(part) for part in section.parts]
-        body += [_figure(picture) for picture in section.pictures]
-    page = _PAGE.format(title=html.escape(title), body="\n".join(body))
-    with atomic_path(path) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+    converter = markdown.Markdown(extensions=["tables", "fenced_code", "toc"])
+    converter.preprocessors.deregister("html_block")  # tags in sentences are letters
+    converter.inlinePatterns.deregister("html")
+    contents = "\n\n".join(f"## {section.title}\n\n" + "\n\n".join(section.parts) for section in sections)
+    text = converter.convert(f"# {title}\n\n[TOC]\n\n{contents}")
+    headings = re.split(r"(?=<h2)", text)
+    for number, section in enumerate(sections, 1):
+        headings[number] += "\n".join(map(_figure, section.pictures))
+    write_file(path, _PAGE.format(title=html.escape(title), body="".join(headings)))
 
 
 _PAGE = """<!doctype html>
@@ -78,40 +79,6 @@ pre {{ background: #f5f5f5; padding: .7em; overflow-x: auto; font-size: 12px }}
 {body}
 </body></html>
 """
-
-
-def _contents(sections: Sequence[Section]) -> str:
-    links = (f'<li><a href="#s{k}">{html.escape(section.title)}</a></li>' for k, section in enumerate(sections))
-    return "<ul>" + "".join(links) + "</ul>"
-
-
-def _block(part: str) -> str:
-    """A paragraph, list, table or piece of code as HTML."""
-    lines = part.strip().splitlines()
-    if part.startswith("```"):
-        return "<pre>" + html.escape("\n".join(lines[1:-1])) + "</pre>"
-    if part.startswith("|"):
-        return "\n".join(_table(lines))
-    if part.startswith("- "):
-        return "<ul>" + "".join(f"<li>{_inline(line.removeprefix('- '))}</li>" for line in lines) + "</ul>"
-    return f"<p>{_inline(part)}</p>"
-
-
-def _table(lines: Sequence[str]) -> Iterator[str]:
-    """Rows of a table, the second of which only rules it; lines after it are paragraphs."""
-    rows = [line for line in lines if line.startswith("|")]
-    yield "<table>"
-    for number, line in enumerate(rows):
-        if number != 1:
-            tag = "th" if number == 0 else "td"
-            cells = (cell.strip() for cell in line.strip("|").split("|"))
-            yield "<tr>" + "".join(f"<{tag}>{_inline(cell)}</{tag}>" for cell in cells) + "</tr>"
-    yield "</table>"
-    yield from (f"<p>{_inline(line)}</p>" for line in lines if line and not line.startswith("|"))
-
-
-def _inline(text: str) -> str:
-    return re.sub(r"`([^`]*)`", r"<code>\1</code>", html.escape(text))
 
 
 def _figure(picture: Picture) -> str:

@@ -10,7 +10,7 @@ from omegaconf import MISSING, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from sogjax.errors import InputError
-from sogjax.settings.compose import composed_without_hydra
+from sogjax.settings.compose import composed_config
 from sogjax.settings.files import conf_dir
 from sogjax.synth.settings import SynthSettings
 
@@ -151,7 +151,7 @@ def synth_settings(chosen: Mapping[str, Any]) -> SynthSettings:
     Raises:
         InputError: an unknown setting (with the nearest known one), or a value of the wrong type.
     """
-    return composed_without_hydra(SynthSettings, "synth", keywords=chosen)
+    return composed_config(SynthSettings, "synth", chosen.items())
 
 
 def experiment_names() -> list[str]:

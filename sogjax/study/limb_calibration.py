@@ -12,12 +12,15 @@ from scipy.optimize import minimize
 from scipy.special import expit
 from scipy.stats import rankdata
 
+from sogjax.errors import InputError
 from sogjax.io.files import atomic_path
 from sogjax.quality.fitted import Weights, fitted_numbers
 from sogjax.quality.limb_confidence import FAR
-from sogjax.study.limb_trials import FOLLOWED, JudgedLimb
+from sogjax.study.document import Picture, Section
+from sogjax.study.limb_trials import FOLLOWED, PLAIN, JudgedLimb, LimbTrial, LimbTrials
+from sogjax.study.study import Study
 from sogjax.study.table import ruled_table
-from sogjax.view.charts import LimbCurve
+from sogjax.view.charts import LimbCurve, limb_chart
 
 BINS = (0.0, 0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0)
 RIDGE = 1e-4
@@ -144,3 +147,40 @@ def regained_table(
             back = f"{100.0 * (1.0 - len(left) / len(group)):.1f} %"
             lines.append([name, str(len(group)), back, f"{100.0 * np.mean(noticed):.0f} %" if left else ""])
     return ruled_table(lines)
+
+
+def limbs_section(study: Study) -> Section:
+    """Whether limbs that are in doubt are lost, and others in their places.
+
+    Raises:
+        InputError: a recording that is not there.
+    """
+    trials = LimbTrials(study, study.overrides)
+    found: list[JudgedLimb] = []
+    without = []
+    for name in study.recordings:
+        try:
+            found += trials.of(LimbTrial(name, name, None, "auto"), study.do)
+        except InputError as error:
+            without.append(str(error))
+    if not found:
+        return Section("Limbs in doubt", without or ["No recording was tracked for this."])
+    names = dict.fromkeys(limb.trial.sequence for limb in found)
+    groups = {
+        "all": lambda limb: True,
+        "as recorded": lambda limb: limb.kind == PLAIN,
+        **{name: lambda limb, n=name: limb.trial.sequence == n for name in names},
+    }
+    return Section(
+        "Limbs in doubt",
+        [
+            "Is a limb that is in doubt lost, and one that is not in its place? (`python experiments/limb_doubt.py`) "
+            "The recordings are tracked as they are, with two of three frames left out, and with each limb displaced "
+            "by 20 to 30 cm on purpose. A limb is lost if its joints are more than 10 cm off on average; it is in "
+            "doubt where it is more likely lost than not.",
+            area_table(found, groups),
+            calibration_table(found),
+            *without,
+        ],
+        [Picture("limbs.png", limb_chart({"all": limb_curve(found)}), "ROC curve, and what was found against said")],
+    )

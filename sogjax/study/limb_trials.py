@@ -11,28 +11,50 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.energy.posed import Posed
 from sogjax.errors import InputError
-from sogjax.io.cell_cache import CellsOfClip
 from sogjax.io.files import atomic_path
 from sogjax.model.body import Body
 from sogjax.model.limbs import limb_blobs, limb_names, limbs
 from sogjax.quality.limb_confidence import LimbMeasures, limb_confidence, limb_measures
 from sogjax.quality.limb_evidence import blob_evidence
 from sogjax.run.terminal import say
+from sogjax.search.placed_body import means_of
 from sogjax.settings.compose import track_config
-from sogjax.study.displaced import displaced
 from sogjax.study.record import program_digest
 from sogjax.study.source import Source
 from sogjax.study.study import Study
 from sogjax.study.true_poses import true_poses
 from sogjax.study.verdicts import limb_errors
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import TrackState
+from sogjax.tracking.frame import FrameInput, TrackState
 from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.tracker import Tracker
+
+NEAREST, FARTHEST = 0.2, 0.3
+"""Metres, mean over the limb's blobs."""
+DRAWS = 512
+
+
+def displaced(
+    body: Body,
+    pose: Float[np.ndarray, "dof"],
+    limb: Int[np.ndarray, "limb"],
+    blobs: Bool[np.ndarray, "blob"],
+    random: np.random.Generator,
+) -> Float[np.ndarray, "dof"] | None:
+    """The pose with a limb turned within its limits until it is 20 to 30 cm elsewhere; None: it cannot be so far."""
+    lower, upper = np.asarray(body.skeleton.dof_lower)[limb], np.asarray(body.skeleton.dof_upper)[limb]
+    poses = np.tile(pose, (DRAWS, 1)).astype(np.float32)
+    far = random.uniform(0.2, 1.0, (DRAWS, 1))
+    poses[:, limb] = (1.0 - far) * poses[:, limb] + far * random.uniform(lower, upper, (DRAWS, len(limb)))
+    means = means_of(body, np.concatenate([pose[None].astype(np.float32), poses]))
+    moved = np.linalg.norm(means[1:, blobs] - means[:1, blobs], axis=-1).mean(axis=1)
+    right = np.flatnonzero((moved > NEAREST) & (moved < FARTHEST))
+    return poses[right[0]] if len(right) else None
+
 
 PLAIN, SKIPPING = "as recorded", "every third frame"
 SKIPPED = 3
@@ -117,7 +139,7 @@ class LimbTrials:
 
         first = np.concatenate([_true_start(body, source) for body in source.bodies])
         if not np.isfinite(first).all():
-            first = np.asarray(source.start)
+            first = source.initial_pose.pose
         frames = np.arange(len(cells))
         plain = follow(jnp.asarray(first), frames)
         yield Tracked(PLAIN, frames, plain, np.concatenate([first[None], plain[:-1]]), 0)
@@ -175,12 +197,12 @@ class LimbTrials:
         key = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
         return self.study.folder / "limbs" / f"{key}.npz"
 
-    def _tracker(self, trial: LimbTrial) -> tuple[Source, Tracker, CellsOfClip]:
+    def _tracker(self, trial: LimbTrial) -> tuple[Source, Tracker, list[FrameInput]]:
         source = self.study.source(trial.recording)
         cache = {"background": trial.background, "cache": str(self.study.folder / "cells")}
         config = track_config(self.overrides, recording=source.path, images=cache)
-        cameras = source.cameras(trial.cameras)
-        return source, source.tracker(config, cameras), source.cells(config.images.depth, cameras, 1)
+        setup = source.setup(config, source.cameras(trial.cameras))
+        return source, setup.tracker, [*setup.clip.frames()]
 
 
 def _true_start(body: Body, source: Source) -> Float[np.ndarray, "dof"]:
@@ -189,13 +211,13 @@ def _true_start(body: Body, source: Source) -> Float[np.ndarray, "dof"]:
 
 
 def measured(
-    tracker: Tracker, cells: CellsOfClip, run: Tracked, baseline: Float[np.ndarray, "2 blob"]
+    tracker: Tracker, cells: Sequence[FrameInput], run: Tracked, baseline: Float[np.ndarray, "2 blob"]
 ) -> tuple[LimbMeasures, Float[np.ndarray, "frame 2 blob"]]:
     """What tells of the limbs in every frame of a run, and what was usual before it."""
     found, history, now = [], [], jnp.asarray(baseline)
     for frame, pose, before in zip(run.frames, run.poses, run.before, strict=True):
         history.append(np.asarray(now))
-        measures, now = _measured(tracker, jnp.asarray(cells[frame]), jnp.asarray(before), jnp.asarray(pose), now)
+        measures, now = _measured(tracker, jnp.asarray(cells[frame].cells), jnp.asarray(before), jnp.asarray(pose), now)
         found.append(jax.device_get(measures))
     return LimbMeasures(*(jnp.stack(part) for part in zip(*found, strict=True))), np.stack(history)
 

@@ -1,4 +1,4 @@
-"""The pictures of a report: charts of experiments, and the worst frames with the tracked skeleton."""
+"""The pictures of a report: charts of experiments, and a section of the worst frames with the tracked skeleton."""
 
 from collections.abc import Mapping, Sequence
 
@@ -9,9 +9,9 @@ from jaxtyping import Float
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.io.motion import Motion
 from sogjax.io.video import read_frames
-from sogjax.study.document import Picture
+from sogjax.study.document import Picture, Section
 from sogjax.study.experiment import Experiment
-from sogjax.study.record import RunRecord
+from sogjax.study.record import Done, RunRecord
 from sogjax.study.runner import motions_of
 from sogjax.study.source import Source
 from sogjax.study.summary import RowSummary
@@ -78,7 +78,7 @@ def worst_frame(label: str, source: Source, record: RunRecord) -> Picture:
     frame = record.frame[row]
     recording = source.recording
     motions = list(motions_of(record, source.bodies, recording.fps).values())
-    images = next(iter(read_frames(recording, frame - recording.first_frame, frame - recording.first_frame + 1)))
+    images = next(iter(read_frames(recording, frame, frame + 1)))
     points = np.concatenate([motion.blob_means[row] for motion in motions] + _true_points(source, frame))
     cameras = source.cameras(min(CAMERAS_SHOWN, len(recording.rig.names)))
     cut = [_cut_out(images, recording.rig, motions, frame, camera, points) for camera in cameras]
@@ -115,3 +115,16 @@ def _cut_out(
     tile = cv2.resize(drawn[y : y + side, x : x + side], (TILE, TILE), interpolation=cv2.INTER_AREA)
     write_label(tile, camera, (6, 14))
     return tile
+
+
+def worst_section(done: Sequence[Done], count: int) -> Section:
+    """The frames with the largest errors, at most one per experiment and method."""
+    usable = [one for one in done if one.experiment.config.measure == "accuracy" and np.isfinite(one.record.mean_mm)]
+    pictures: list[Picture] = []
+    seen: set[tuple[str, str]] = set()
+    for one in sorted(usable, key=lambda one: -np.nanmax(one.record.errors)):
+        if (one.experiment.name, one.method) not in seen and len(pictures) < count:
+            seen.add((one.experiment.name, one.method))
+            parts = (one.experiment.config.title, one.method, one.row)
+            pictures.append(worst_frame(", ".join(filter(None, parts)), one.source, one.record))
+    return Section("Worst frames", ["The frame with the largest mean error of an experiment's runs."], pictures)

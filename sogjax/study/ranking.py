@@ -1,13 +1,17 @@
-"""A track held against its truth, and its ranking by a set of terms."""
+"""A track held against its truth, ranked by a set of terms; the rankings as tables and files."""
 
+import csv
+import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from sogjax.errors import InputError
 from sogjax.io.cache_folder import default_cache_dir
+from sogjax.io.files import atomic_path
 from sogjax.io.ground_truth import GroundTruth, load_ground_truth
 from sogjax.io.motion import Motion
 from sogjax.io.recording import Recording
@@ -15,8 +19,10 @@ from sogjax.model.body import Body
 from sogjax.run.recordings import upright
 from sogjax.settings.compose import track_config
 from sogjax.study.climbs import ranked
+from sogjax.study.table import ruled_table
 from sogjax.study.true_poses import true_poses
-from sogjax.study.verdicts import Ranking, limb_errors
+from sogjax.study.verdicts import EQUAL, UNKNOWN, VERDICTS, Ranking, limb_errors
+from sogjax.view.charts import RankedCurves
 
 DEFAULT = "default"
 """The set without any word."""
@@ -72,3 +78,105 @@ def ranking_of(track: RankedTrack, words: str, far: float) -> Ranking:
     poses = (track.tracked, pair.tracked.poses, pair.true.poses, track.true)
     errors = [limb_errors(bodies, track.truth, track.frames, each) for each in poses]
     return Ranking(words, track.frames, pair, *errors, far=far)
+
+
+MM = 1000.0
+
+
+def verdicts_table(rankings: Sequence[Ranking]) -> str:
+    """A line for each set: how many frames have which verdict, the smallest gain, and the mean joint errors."""
+    titles = ["set", *VERDICTS, "wrong worth more", "least gain", "tracked, mm", "reached", "optimum", "fit"]
+    lines = [titles]
+    for ranking in rankings:
+        counts = [str(ranking.verdicts.count(verdict)) for verdict in VERDICTS]
+        known = ranking.gain[np.isfinite(ranking.gain)]
+        least = f"{100.0 * known.min():+.2f} %" if known.size else "no truth"
+        wrong = f"{np.sum(known < -EQUAL)} of {known.size}"
+        errors = (ranking.tracked, ranking.reached, ranking.optimum, ranking.fitted)
+        lines.append([ranking.name, *counts, wrong, least, *(_millimetres(each.mean) for each in errors)])
+    meanings = "\n".join(f"{verdict}: {meaning}" for verdict, meaning in VERDICTS.items())
+    return f"{ruled_table(lines)}\n\n{meanings}"
+
+
+def limbs_table(rankings: Sequence[Ranking]) -> str:
+    """A line for each set and lost limb: where it was lost, and the verdicts of those frames."""
+    lines = [["set", "limb", "frames", "lost in", *list(VERDICTS)[1:], "tracked, mm", "reached", "optimum"]]
+    for ranking in rankings:
+        for limb in np.flatnonzero(ranking.lost.any(axis=0)):
+            of_limb = ranking.of_limb(int(limb))
+            rows = np.flatnonzero(of_limb.lost[:, 0])
+            counts = [str(of_limb.verdicts.count(verdict)) for verdict in list(VERDICTS)[1:]]
+            span = f"{ranking.frames[rows[0]]} to {ranking.frames[rows[-1]]}"
+            errors = [each.limbs[rows, 0] for each in (of_limb.tracked, of_limb.reached, of_limb.optimum)]
+            name = of_limb.tracked.names[0]
+            lines.append([ranking.name, name, span, str(len(rows)), *counts, *(_millimetres(each) for each in errors)])
+    return ruled_table(lines) if len(lines) > 1 else "No limb is lost."
+
+
+def terms_table(rankings: Sequence[Ranking]) -> str:
+    """A line for each set: by what share of the energy the truth is worth more in frames with a loss, term by term."""
+    names = list(dict.fromkeys(name for ranking in rankings for name in ranking.pair.true.parts))
+    lines = [["gain of the true pose where a limb is lost, %", "energy", *names]]
+    for ranking in rankings:
+        rows = ranking.lost.any(axis=1) & np.isfinite(ranking.gain)
+        if rows.any():
+            by_term = curves_of(ranking).gain_by_term
+            gains = [f"{100.0 * by_term[name][rows].mean():+.3f}" if name in by_term else "" for name in names]
+            lines.append([ranking.name, f"{100.0 * ranking.gain[rows].mean():+.3f}", *gains])
+    return ruled_table(lines) if len(lines) > 1 else "No frame has a loss."
+
+
+def curves_of(ranking: Ranking) -> RankedCurves:
+    """A ranking's column of the chart; limbs that are lost by the tracked poses or the optima at the truth."""
+    true, tracked = ranking.pair.true, ranking.pair.tracked
+    gains = {name: (true.parts[name] - tracked.parts[name]) / np.abs(true.energy) for name in true.parts}
+    differ = np.flatnonzero((ranking.lost | (ranking.optimum.limbs > ranking.far)).any(axis=0))
+    return RankedCurves(
+        title=ranking.name,
+        frames=ranking.frames,
+        gain=ranking.gain,
+        gain_by_term=gains,
+        errors={
+            "tracked": ranking.tracked.mean,
+            "optimum above the tracked pose": ranking.reached.mean,
+            "optimum above the true pose": ranking.optimum.mean,
+            "true pose of this skeleton": ranking.fitted.mean,
+        },
+        limbs={ranking.tracked.names[k]: (ranking.tracked.limbs[:, k], ranking.optimum.limbs[:, k]) for k in differ},
+    )
+
+
+def write_csv(path: Path, rankings: Sequence[Ranking]) -> None:
+    """A row for each set and frame: verdict, energies, what each term adds to either, errors in millimetres."""
+    terms = list(dict.fromkeys(name for ranking in rankings for name in ranking.pair.true.parts))
+    limbs = rankings[0].tracked.names if rankings else ()
+    sides = ("tracked", "reached", "optimum", "fitted")
+    text = io.StringIO()
+    writer = csv.writer(text)
+    head = ["set", "frame", "verdict", "gain", "energy tracked", "energy true"]
+    head += [f"{term} {side}" for term in terms for side in ("tracked", "true")]
+    head += [f"{side} mm" for side in sides] + [f"{limb} {side} mm" for limb in limbs for side in sides[:3]]
+    writer.writerow(head)
+    for ranking in rankings:
+        for k, frame in enumerate(ranking.frames):
+            writer.writerow([ranking.name, frame, ranking.verdicts[k], *_numbers(ranking, k, terms)])
+    with atomic_path(path) as temporary:
+        temporary.write_text(text.getvalue(), encoding="utf-8")
+
+
+def _numbers(ranking: Ranking, frame: int, terms: Sequence[str]) -> list[str]:
+    true, tracked = ranking.pair.true, ranking.pair.tracked
+    if ranking.verdicts[frame] == UNKNOWN:
+        return []
+    values = [ranking.gain[frame], tracked.energy[frame], true.energy[frame]]
+    for term in terms:
+        values += [side.parts[term][frame] if term in side.parts else np.nan for side in (tracked, true)]
+    errors = (ranking.tracked, ranking.reached, ranking.optimum, ranking.fitted)
+    lengths = [MM * each.mean[frame] for each in errors]
+    lengths += [MM * each.limbs[frame, k] for k in range(len(ranking.tracked.names)) for each in errors[:3]]
+    return [f"{value:.7g}" for value in values] + [f"{value:.1f}" for value in lengths]
+
+
+def _millimetres(values: np.ndarray) -> str:
+    present = values[np.isfinite(values)]
+    return f"{MM * present.mean():.1f}" if present.size else ""

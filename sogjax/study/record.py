@@ -1,7 +1,10 @@
-"""What is kept of one run of a study: a JSON file, by which a run that was done is not done again."""
+"""What is kept of the runs of a study: a JSON file each, by which a run is not done again, and their list."""
 
+import csv
 import hashlib
+import io
 import json
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from functools import cache
 from importlib.metadata import version
@@ -14,6 +17,8 @@ from jaxtyping import Float, Int
 import sogjax
 from sogjax.io.files import atomic_path
 from sogjax.settings.run import TrackConfig
+from sogjax.study.experiment import Experiment
+from sogjax.study.source import Source
 
 RECORD_VERSION = 3
 """To be raised with every change that makes earlier runs incomparable."""
@@ -155,3 +160,47 @@ class RunFolder:
 
     def _path(self, plan: RunPlan) -> Path:
         return self.folder / "runs" / f"{plan.key}.json"
+
+
+COLUMNS = (
+    *("experiment", "method", "row", "recording", "overrides", "error mm", "closest rule mm", "lost"),
+    *("ms per step", "seconds", "machine", "failed"),
+)
+
+
+@dataclass(frozen=True)
+class Done:
+    """One run of the report."""
+
+    experiment: Experiment
+    method: str
+    row: str
+    source: Source
+    record: RunRecord
+
+
+def different(done: Sequence[Done]) -> Iterator[Done]:
+    """Each run once: several experiments may have a row in common."""
+    seen: set[str] = set()
+    for one in done:
+        plan = str(one.record.plan)
+        if plan not in seen:
+            seen.add(plan)
+            yield one
+
+
+def write_runs(path: Path, done: Sequence[Done]) -> Path:
+    """Every row on every recording, with its overrides, as CSV."""
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow(COLUMNS)
+    for one in done:
+        record = one.record
+        errors = [f"{value:.2f}" for value in (record.mean_mm, record.closest_mean_mm)]
+        times = [f"{value:.2f}" for value in (record.step_ms, record.seconds)]
+        words = " ".join(one.experiment.overrides(one.row, method=one.method))
+        named = [one.experiment.name, one.method, one.row, one.source.name, words]
+        writer.writerow([*named, *errors, record.lost, *times, record.machine, record.failed])
+    with atomic_path(path) as temporary:
+        temporary.write_text(text.getvalue(), encoding="utf-8")
+    return path

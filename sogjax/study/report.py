@@ -6,16 +6,21 @@ from pathlib import Path
 
 from sogjax.errors import InputError
 from sogjax.io.recording_files import GROUND_TRUTH
-from sogjax.run.outputs import results_folder
+from sogjax.run.run_folder import results_folder
 from sogjax.run.terminal import say
 from sogjax.study.document import Section, write_html, write_markdown
-from sogjax.study.done import Done, write_runs
 from sogjax.study.experiment import Experiment, experiment_names
-from sogjax.study.sections.about import about_section, methods_section, own_section, versions_section
-from sogjax.study.sections.experiment import experiment_section
-from sogjax.study.sections.few_cameras import few_cameras_section
-from sogjax.study.sections.limbs import limbs_section
-from sogjax.study.sections.worst import worst_section
+from sogjax.study.few_cameras import few_cameras_section
+from sogjax.study.limb_calibration import limbs_section
+from sogjax.study.pictures import worst_section
+from sogjax.study.record import Done, write_runs
+from sogjax.study.report_sections import (
+    about_section,
+    experiment_section,
+    methods_section,
+    own_section,
+    versions_section,
+)
 from sogjax.study.settings import ReportConfig
 from sogjax.study.study import Study
 

@@ -8,7 +8,6 @@ import numpy as np
 from jaxtyping import Float
 
 from sogjax.errors import InputError
-from sogjax.io.cell_cache import CellsOfClip
 from sogjax.io.motion import Motion, motion_from_poses
 from sogjax.model.body import Body, dof_slices
 from sogjax.quality.evaluation import Evaluation, GroupEvaluation, evaluate_motions
@@ -17,22 +16,15 @@ from sogjax.quality.metrics import mean_per_frame
 from sogjax.run import build
 from sogjax.run.clock import StageTimes
 from sogjax.run.memory import forget_programs_if_many
-from sogjax.run.run import Run
-from sogjax.run.second_background import MUCH_UNKNOWN, knowing_the_body, unknown_share
+from sogjax.run.result import RunResult
 from sogjax.run.terminal import say
-from sogjax.run.track import track_recording
-from sogjax.search.backward_pass import Pass
-from sogjax.search.merge_passes import merge_passes
+from sogjax.run.track import run_without_files, track_recording
 from sogjax.settings.compose import track_config
 from sogjax.settings.run import TrackConfig
 from sogjax.study.experiment import Experiment
-from sogjax.study.machine import machine_facts
 from sogjax.study.record import RunFolder, RunPlan, RunRecord
+from sogjax.study.script import machine_facts
 from sogjax.study.source import Source
-from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import FrameResult, TrackedFrame
-from sogjax.tracking.frame_by_frame import track
-from sogjax.tracking.tracker import Tracker
 
 STAGES = ("decode", "step", "whole")
 ALL = "all"
@@ -100,63 +92,23 @@ def motions_of(record: RunRecord, bodies: Sequence[Body], fps: float) -> dict[st
 def _accuracy(
     record: RunRecord, source: Source, config: TrackConfig, cameras: tuple[str, ...], every: int
 ) -> RunRecord:
-    """Track from kept cells, from the start pose that all runs share; twice where the clip's background asks for it."""
-    tracker, recording = source.tracker(config, cameras), source.seen_by(cameras)
-    cells = source.cells(config.images.depth, cameras, every)
-    kind = _program(config, cameras)
-    tracked = _tracked(tracker, source, cells, kind)
-    grids = build.cell_grids(recording, config.images.depth)
-    if unknown_share(tracker, recording, grids, config.images) >= MUCH_UNKNOWN:
-        poses = {every * k: frame.result.pose for k, frame in enumerate(tracked)}
-        tracker = knowing_the_body(tracker, recording, grids, poses)
-        tracked = _tracked(tracker, source, cells, kind)
-    results = [frame.result for frame in tracked]
-    if config.tracking.both_ways and config.outputs.confidence:
-        results = _revised(tracker, tracked, cells)
-    frames = recording.first_frame + every * np.arange(len(cells))
+    """Track from kept cells, from the initial pose that all runs share."""
+    images = replace(config.images, cache=str(source.cell_folder))
+    config = replace(config, images=images, stop=source.num_frames)
+    own = lambda request: source.initial_pose
+    run = run_without_files(source.seen_by(cameras), source.actors, config, pose_sources=(own,), every=every)
+    table = run.frames
     record = replace(
         record,
-        frame=frames.tolist(),
-        milliseconds=[round(1000.0 * frame.seconds, 3) for frame in tracked],
-        image_blobs=float(np.mean([result.num_matching for result in results])),
-        **_of_solver(results),
+        frame=table.frame.tolist(),
+        milliseconds=[round(1000.0 * seconds, 3) for seconds in run.times.seconds["step"]],
+        image_blobs=float(np.mean(table.num_matching)),
+        iterations=table.iterations.tolist(),
+        evaluations=table.evaluations.tolist(),
+        converged=table.converged.tolist(),
+        pose=np.round(np.asarray(table.pose, float), 6).tolist(),
     )
     return _evaluated(record, source)
-
-
-def _tracked(tracker: Tracker, source: Source, cells: CellsOfClip, kind: tuple[object, ...]) -> list[TrackedFrame]:
-    """All frames; beginning with the capacities that sufficed for the last run of the same kind."""
-    tracked = list(track(tracker, source.start, cells, _capacities.get(kind)))
-    _capacities[kind] = tracked[-1].capacities
-    return tracked
-
-
-def _revised(tracker: Tracker, tracked: Sequence[TrackedFrame], cells: CellsOfClip) -> list[FrameResult]:
-    """The results of the frames, told both ways as `track` does."""
-    results = [frame.result for frame in tracked]
-    passed = Pass.from_frames(tracked)
-    found = merge_passes(tracker, passed, lambda first, stop: (cells[k] for k in range(stop - 1, first - 1, -1)))
-    for row, revised in found.frames.items():
-        results[row] = replace(results[row], pose=revised.pose)
-    return results
-
-
-_capacities: dict[tuple[object, ...], Capacities] = {}
-"""What sufficed for earlier runs of the process, by what the number of image blobs depends on: one program serves
-several recordings."""
-
-
-def _program(config: TrackConfig, cameras: tuple[str, ...]) -> tuple[object, ...]:
-    return (config.energy.pairs, *asdict(config.images).values(), *asdict(config.color).values(), len(cameras))
-
-
-def _of_solver(results: Sequence[FrameResult]) -> dict[str, list]:
-    return {
-        "iterations": [int(result.iterations) for result in results],
-        "evaluations": [int(result.evaluations) for result in results],
-        "converged": [bool(result.converged) for result in results],
-        "pose": [np.round(np.asarray(result.pose, float), 6).tolist() for result in results],
-    }
 
 
 def _speed(record: RunRecord, source: Source, config: TrackConfig, cameras: tuple[str, ...], every: int) -> RunRecord:
@@ -178,7 +130,7 @@ def _speed(record: RunRecord, source: Source, config: TrackConfig, cameras: tupl
     return _evaluated(record, source)
 
 
-def _timed(source: Source, cameras: tuple[str, ...], config: TrackConfig) -> tuple[Run, float]:
+def _timed(source: Source, cameras: tuple[str, ...], config: TrackConfig) -> tuple[RunResult, float]:
     """A run, and its seconds on the clock."""
     begin = time.perf_counter()
     return track_recording(source.seen_by(cameras), source.actors, config), time.perf_counter() - begin

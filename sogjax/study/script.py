@@ -1,14 +1,19 @@
-"""What the scripts of `experiments/` and `benchmarks/` share: settings from the command line, and wrong input."""
+"""What the scripts of `experiments/` and `benchmarks/` share: settings, wrong input, the line about the machine."""
 
+import datetime
+import os
+import platform
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TypeVar
 
-from omegaconf import MISSING, OmegaConf
-from omegaconf.errors import OmegaConfBaseException
+import jax
 
-from sogjax.errors import InputError
+from sogjax.errors import InputError, counted
 from sogjax.run.compilation_cache import use_compilation_cache, use_compiler_options
+from sogjax.settings.compose import composed_config, pair_of
+from sogjax.settings.option import help_lines
 
 Settings = TypeVar("Settings")
 HELP = ("--help", "-h")
@@ -17,20 +22,14 @@ HELP = ("--help", "-h")
 def settings_from(schema: type[Settings], words: Sequence[str] | None = None) -> Settings:
     """A dataclass of settings with `key=value` from the command line; leaves the program where one is wrong."""
     given = list(sys.argv[1:] if words is None else words)
-    defaults = OmegaConf.to_container(OmegaConf.structured(schema), throw_on_missing=False)
-    assert isinstance(defaults, dict)
-    known = " ".join(f"{key}={'...' if value == MISSING else value}" for key, value in defaults.items())
+    known = " ".join(f"{key}={'...' if value == 'required' else value}" for key, value, *_ in help_lines(schema))
     if set(HELP) & set(given):
         print(f"{(sys.modules['__main__'].__doc__ or '').strip()}\n\nThe settings and their defaults: {known}")
         sys.exit(0)
     try:
-        merged = OmegaConf.merge(OmegaConf.structured(schema), OmegaConf.from_dotlist(given))
-        missing = sorted(OmegaConf.missing_keys(merged))
-        if missing:
-            raise InputError(f"add {missing[0]}=...")
-        return OmegaConf.to_object(merged)  # pyright: ignore[reportReturnType]
-    except (OmegaConfBaseException, InputError) as error:
-        print(f"{str(error).splitlines()[0]}; the settings and their defaults: {known}", file=sys.stderr)
+        return composed_config(schema, "", map(pair_of, given))
+    except InputError as error:
+        print(f"{error}; the settings and their defaults: {known}", file=sys.stderr)
         sys.exit(2)
 
 
@@ -43,3 +42,33 @@ def run_script(main: Callable[[], None]) -> None:
     except InputError as error:
         print(f"sogjax: {error}", file=sys.stderr)
         sys.exit(2)
+
+
+def machine_line() -> str:
+    """One line: processor, cores, versions, date, and the command that runs."""
+    return f"{machine_facts()}, {command_line()}"
+
+
+def machine_facts() -> str:
+    """Processor, cores, versions and date."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return (
+        f"{_processor()}, {counted(cores, 'core')}, {jax.default_backend()}, Python {platform.python_version()}, "
+        f"jax {jax.__version__}, {datetime.date.today()}"
+    )
+
+
+def command_line() -> str:
+    """The command that runs, without the folder of its program."""
+    program = Path(sys.argv[0])
+    folder = f"{program.parent.name}/" if program.suffix == ".py" else ""
+    return " ".join([f"{folder}{program.name}", *sys.argv[1:]])
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor() or platform.machine()
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.machine()

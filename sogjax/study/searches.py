@@ -14,16 +14,19 @@ import numpy as np
 from sogjax.errors import InputError
 from sogjax.io.files import atomic_path
 from sogjax.io.recording import Recording
-from sogjax.run.first_pose import searched_poses
+from sogjax.run.actors import Actors
+from sogjax.run.background import learn_background
+from sogjax.run.initial_pose import PoseRequest, searched_poses
 from sogjax.run.memory import forget_programs_if_many
 from sogjax.run.terminal import say
+from sogjax.run.track import opened_clip
 from sogjax.settings.compose import track_config
 from sogjax.study.found_pose import FoundError, found_error
 from sogjax.study.record import program_digest
 from sogjax.study.source import Source
 from sogjax.study.study import Study
 
-SEARCH_FILES = "engine/*pose*.py"
+SEARCH_FILES = "search/*.py"
 """Of the program that decide how a search ends, beside those of a run."""
 
 
@@ -115,13 +118,16 @@ class Searches:
     def _made(self, trial: Trial) -> list[Search]:
         source = self.study.source(trial.synth)
         recording = seen_in(source, trial)
-        config = track_config(self.overrides, recording=source.path)
+        config = track_config([*self.overrides, f"start={trial.frame}"], recording=source.path)
         forget_programs_if_many()
         names = [body.name for body in source.bodies]
         say(f"{trial.number}: {trial.sequence}, {trial.cameras} cameras, frame {trial.frame}, plates: {trial.plates}")
         begin, begin_processor = time.perf_counter(), time.process_time()
         try:
-            found, refused = jax.block_until_ready(searched_poses(recording, source.bodies, config, trial.frame)), ""
+            clip = opened_clip(recording, config)
+            background = learn_background(clip, config.images.background, config.images.cache)
+            request = PoseRequest(clip, background, Actors(tuple(source.actors)), config)
+            found, refused = jax.block_until_ready(searched_poses(request)), ""
         except InputError as error:
             found, refused = None, str(error).splitlines()[0]
         took = time.perf_counter() - begin, time.process_time() - begin_processor

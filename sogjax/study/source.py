@@ -7,28 +7,26 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import jax.numpy as jnp
-import numpy as np
-from jaxtyping import Array, Float
-
 from sogjax.errors import InputError
-from sogjax.io.actor_file import load_body, save_body
-from sogjax.io.cell_cache import CellsOfClip
 from sogjax.io.ground_truth import GroundTruth, load_ground_truth
 from sogjax.io.recording import Recording
 from sogjax.io.recording_files import files_of
-from sogjax.model.body import Body, concatenate
+from sogjax.model.body import Body
 from sogjax.run import build
-from sogjax.run.cells import cells_of_clip
-from sogjax.run.first_pose import first_poses
-from sogjax.run.recordings import actors_of, opened, upright
+from sogjax.run.actors import Actors
+from sogjax.run.background import learn_background
+from sogjax.run.clip import Clip
+from sogjax.run.initial_pose import SOURCES, InitialPose, PoseRequest, find_initial_pose
+from sogjax.run.recordings import opened, upright
+from sogjax.run.setup import Setup, tracking_setup
 from sogjax.run.terminal import progress
+from sogjax.run.track import opened_clip
 from sogjax.settings.compose import track_config
 from sogjax.settings.run import TrackConfig
 from sogjax.study.experiment import synth_settings
+from sogjax.study.tracked import kept_actors
 from sogjax.synth.cache import cached_recording
 from sogjax.synth.settings import MOTIONS, SynthSettings
-from sogjax.tracking.tracker import Tracker
 
 _IN_NAME = ("motion", "seed", "actors", "frames")
 MOST_FRAMES = 60
@@ -49,8 +47,7 @@ class Source:
     """The study's, where actors and cells are kept."""
     body: str = "human"
     """The body that actors are made from."""
-    _trackers: dict[tuple[object, ...], Tracker] = field(default_factory=dict)
-    _cells: dict[int, CellsOfClip] = field(default_factory=dict)
+    _setups: dict[tuple[object, ...], Setup] = field(default_factory=dict)
 
     @cached_property
     def recording(self) -> Recording:
@@ -77,13 +74,7 @@ class Source:
     @cached_property
     def actors(self) -> list[Body]:
         """The actors in their own upright frames, made from the example poses with all cameras, or read."""
-        files = sorted(self.actor_folder.glob("*.yaml"))
-        if files:
-            return [load_body(path) for path in files]
-        actors, _ = actors_of(self.recording, None, self.body, self.default_config.color)
-        for number, actor in enumerate(actors):
-            save_body(self.actor_folder / f"{number}_{actor.name}.yaml", actor)
-        return actors
+        return kept_actors(self.actor_folder, self.path, self.body)
 
     @cached_property
     def bodies(self) -> list[Body]:
@@ -96,9 +87,17 @@ class Source:
         return track_config(recording=self.path)
 
     @cached_property
-    def start(self) -> Float[Array, "dof"]:
-        """The rough pose of the first frame, the same for all runs."""
-        return jnp.concatenate(first_poses(self.recording, self.bodies, self.default_config, 0))
+    def initial_pose(self) -> InitialPose:
+        """The rough pose of the first frame, found with all cameras and the usual settings: the same for all runs."""
+        config = replace(self.default_config, stop=1)
+        clip = opened_clip(self.recording, config)
+        background = learn_background(clip, config.images.background, str(self.cell_folder))
+        return find_initial_pose(PoseRequest(clip, background, Actors(tuple(self.actors)), config), SOURCES)
+
+    @property
+    def cell_folder(self) -> Path:
+        """Where cells and learnt backgrounds are kept, for all recordings of the study."""
+        return self.folder / "cells"
 
     def cameras(self, count: int | None) -> tuple[str, ...]:
         """So many of the cameras, evenly taken.
@@ -116,23 +115,17 @@ class Source:
         """The recording with some of its cameras."""
         return replace(self.recording, rig=self.recording.rig.select(tuple(cameras)))
 
-    def cells(self, depth: int, cameras: Sequence[str], every: int) -> CellsOfClip:
-        """The cells of some cameras in every so many frames; read once for each depth."""
-        if depth not in self._cells:
-            grids = build.cell_grids(self.recording, depth)
-            images = replace(self.default_config.images, depth=depth, cache=str(self.folder / "cells"))
-            self._cells[depth] = cells_of_clip(self.recording, grids, images, (0, self.num_frames))
-        rows = [self.recording.rig.names.index(camera) for camera in cameras]
-        return np.asarray(self._cells[depth][::every])[:, rows]
-
-    def tracker(self, config: TrackConfig, cameras: tuple[str, ...]) -> Tracker:
-        """The tracker of a config; what does not depend on its numbers is made once."""
+    def setup(self, config: TrackConfig, cameras: tuple[str, ...]) -> Setup:
+        """What some cameras are tracked with in all frames; what does not depend on a config's numbers is made once."""
         key = (cameras, config.images.depth, config.color.space, config.images.background)
-        if key not in self._trackers:
-            seen = self.seen_by(cameras)
-            grids = build.cell_grids(seen, config.images.depth)
-            self._trackers[key] = build.tracker(seen, concatenate(self.bodies), grids, config)
-        return build.varied(self._trackers[key], config)
+        if key not in self._setups:
+            seen = replace(self.seen_by(cameras), num_frames=self.num_frames)
+            clip = Clip(seen, seen.frames, config.images.depth)
+            background = learn_background(clip, config.images.background, str(self.cell_folder))
+            clip = clip.kept_in(self.folder, str(self.cell_folder))
+            self._setups[key] = tracking_setup(clip, background, self.actors, config)
+        found = self._setups[key]
+        return replace(found, tracker=build.varied(found.tracker, config))
 
 
 def source_named(name: str, num_frames: int, folder: Path, body: str = "human") -> Source:

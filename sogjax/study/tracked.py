@@ -1,22 +1,28 @@
-"""A recording tracked and evaluated, without results on disk."""
+"""Recordings tracked and evaluated without results on disk, and actors that are made once and kept."""
 
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
+from sogjax.io.actor_file import load_body, save_body
 from sogjax.io.cache_folder import default_cache_dir
-from sogjax.io.ground_truth import load_ground_truth
-from sogjax.quality.evaluation import evaluate_motions
-from sogjax.run.recordings import actors_of, opened
-from sogjax.run.run import Run
+from sogjax.model.body import Body
+from sogjax.run.actors import ActorRequest, make_actors
+from sogjax.run.background import learn_background
+from sogjax.run.clip import Clip
+from sogjax.run.judge import compared
+from sogjax.run.recordings import opened
+from sogjax.run.result import RunResult
 from sogjax.run.terminal import progress
-from sogjax.run.track import track_recording
+from sogjax.run.track import opened_clip, track_recording
 from sogjax.settings.compose import track_config
+from sogjax.settings.method import ImagesConfig
 from sogjax.synth.cache import cached_recording
 from sogjax.synth.settings import SynthSettings
 
 
-def track_rendered(settings: SynthSettings, overrides: Sequence[str] = ()) -> Run:
+def track_rendered(settings: SynthSettings, overrides: Sequence[str] = ()) -> RunResult:
     """Track a rendered recording, made now if it is not there yet, and evaluate it; no results are written.
 
     Its averaged pictures are kept beside it, so that further runs do not decode them again.
@@ -25,12 +31,38 @@ def track_rendered(settings: SynthSettings, overrides: Sequence[str] = ()) -> Ru
     return track_folder(cached_recording(settings, progress=progress), [cache, *overrides])
 
 
-def track_folder(folder: Path, overrides: Sequence[str] = ()) -> Run:
+def track_folder(folder: Path, overrides: Sequence[str] = ()) -> RunResult:
     """Track a recording with overrides of the track config, and evaluate it where there is ground truth."""
     config = track_config(overrides, recording=folder)
     recording = opened(config.recording, config.cameras)
-    bodies, _ = actors_of(recording, config.actor, config.body, config.color, actors=config.actors)
-    result = track_recording(recording, bodies, config)
-    if recording.ground_truth is not None:
-        result.evaluation = evaluate_motions(result.motions, load_ground_truth(recording.ground_truth))
+    actors = make_actors(ActorRequest.of_track(opened_clip(recording, config), config))
+    result = track_recording(recording, actors.bodies, config)
+    result.evaluation = compared(recording, result.motions)
     return result
+
+
+def kept_actors(folder: Path, source: Path, body: str = "human") -> list[Body]:
+    """Those that a folder holds, else made of a recording's example poses with all cameras; kept all or none.
+
+    Raises:
+        InputError: the example poses are unsuitable, or the folder cannot be written.
+    """
+    if not folder.is_dir():
+        recording, images = opened(str(source)), ImagesConfig()
+        clip = Clip(recording, recording.frames, images.depth)
+        request = ActorRequest(clip, lambda: learn_background(clip, images.background), body=body)
+        _keep(folder, make_actors(request).bodies)
+    return [load_body(path) for path in sorted(folder.glob("*.yaml"))]
+
+
+def _keep(folder: Path, actors: Sequence[Body]) -> None:
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory(prefix=f".{folder.name[:80]}.", suffix=".tmp", dir=folder.parent) as beside:
+        whole = Path(beside) / "actors"
+        for number, actor in enumerate(actors):
+            save_body(whole / f"{number}_{actor.name}.yaml", actor)
+        try:
+            whole.rename(folder)
+        except OSError:
+            if not folder.is_dir():  # else another process was faster
+                raise

@@ -14,19 +14,19 @@ import numpy as np
 from sogjax.errors import InputError
 from sogjax.io.files import atomic_path
 from sogjax.io.ground_truth import GroundTruth, load_ground_truth
-from sogjax.io.motion import Motion, load_motion, save_motion
+from sogjax.io.motion import Motion, load_motion
+from sogjax.io.motion_data import save_motion
 from sogjax.io.recording_files import GROUND_TRUTH
 from sogjax.model.body import Body
 from sogjax.quality.limb_warnings import Limits, limits_of
 from sogjax.quality.markers import joint_errors
 from sogjax.quality.metrics import mean_per_frame, stretches
-from sogjax.quality.verdict import Verdict, verdicts
+from sogjax.quality.verdict import Verdict, expected_of, verdicts
 from sogjax.run.recordings import opened, with_cameras
 from sogjax.run.track import track_recording
-from sogjax.run.verdict import expected_of
 from sogjax.settings.compose import track_config
 from sogjax.study.few_cameras import evenly
-from sogjax.study.kept_actors import kept_actors
+from sogjax.study.tracked import kept_actors
 from sogjax.study.verdicts import limb_of
 from sogjax.synth.cache import cached_recording
 from sogjax.synth.settings import SynthSettings

@@ -5,27 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-_CENTRE = ("pelvis", "spine", "waist", "chest", "neck", "head")
-_SIDE = ("clavicle", "shoulder", "elbow", "wrist", "hip", "knee", "ankle", "toe")
-_PARENT = {
-    "pelvis": None,
-    "spine": "pelvis",
-    "waist": "spine",
-    "chest": "waist",
-    "neck": "chest",
-    "head": "neck",
-    "clavicle": "chest",
-    "shoulder": "clavicle",
-    "elbow": "shoulder",
-    "wrist": "elbow",
-    "hip": "pelvis",
-    "knee": "hip",
-    "ankle": "knee",
-    "toe": "ankle",
+_CENTRE = {"pelvis": "", "spine": "pelvis", "waist": "spine", "chest": "waist", "neck": "chest", "head": "neck"}
+_SIDE = {
+    **{"clavicle": "chest", "shoulder": "clavicle", "elbow": "shoulder", "wrist": "elbow"},
+    **{"hip": "pelvis", "knee": "hip", "ankle": "knee", "toe": "ankle"},
 }
+"""Joints and their parents."""
 
 SIDES = ("left", "right")
-JOINTS = _CENTRE + tuple(f"{side}_{name}" for side in SIDES for name in _SIDE)
+JOINTS = (*_CENTRE, *(f"{side}_{name}" for side in SIDES for name in _SIDE))
 """The 22 joints, parents first. The frames of all of them are the body's (x forward, y left, z up) when the
 figure stands upright with hanging arms."""
 
@@ -34,10 +22,8 @@ INDEX = {name: i for i, name in enumerate(JOINTS)}
 
 def _parent_index(name: str) -> int:
     side, _, base = name.rpartition("_")
-    parent = _PARENT[base]
-    if parent is None:
-        return -1
-    return INDEX[parent] if parent in INDEX else INDEX[f"{side}_{parent}"]
+    parent = (_CENTRE | _SIDE)[base]
+    return INDEX.get(parent, INDEX.get(f"{side}_{parent}", -1))
 
 
 def _levels() -> list[tuple[list[int], list[int]]]:
@@ -78,7 +64,7 @@ class Anatomy:
     girth: float
     """Thickness of the flesh, 1 = average."""
     offsets: Float[np.ndarray, "22 3"]
-    """Of the joints from their parents, in the parent's frame."""
+    """Places of the joints in their parents' frames."""
     shoulder_breadth: float
     """Relative to the average."""
 
@@ -89,8 +75,7 @@ class Anatomy:
     @property
     def hip_height(self) -> float:
         """Height of the hips over the floor, standing upright."""
-        chain = [self.offsets[INDEX[f"left_{name}"]][2] for name in ("knee", "ankle")]
-        return float(self.ankle_height - sum(chain))
+        return float(self.ankle_height - sum(self.offsets[INDEX[f"left_{name}"]][2] for name in ("knee", "ankle")))
 
     @property
     def ankle_height(self) -> float:

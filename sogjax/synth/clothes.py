@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from sogjax.synth.anatomy import INDEX, Anatomy
-from sogjax.synth.flesh import PARTS, bind_pose
+from sogjax.synth.flesh import AVERAGE_STATURE, PARTS, bind_pose
 
 Colors = Float[np.ndarray, "n 3"]
 Rgb = tuple[float, float, float]
@@ -23,9 +23,8 @@ _SHIRTS: tuple[tuple[Rgb, Rgb], ...] = (
 _TROUSERS: tuple[Rgb, ...] = ((0.20, 0.25, 0.36), (0.42, 0.38, 0.30), (0.22, 0.22, 0.23), (0.36, 0.40, 0.36))
 _SHOES: tuple[Rgb, ...] = ((0.80, 0.79, 0.77), (0.30, 0.20, 0.15), (0.15, 0.16, 0.19), (0.60, 0.25, 0.20))
 _PATTERNS = ("stripes", "plaid", "checks", "bars", "dots")
-_SLEEVES = (0.62, 0.75, 1.9)
 _LONG = 1.9
-_BLACK: Rgb = (0.10, 0.10, 0.11)
+_SLEEVES = (0.62, 0.75, _LONG)
 
 
 @dataclass(frozen=True)
@@ -58,7 +57,7 @@ def _changed(outfit: Outfit, kind: str, number: int) -> Outfit:
         lighter = tuple(float(value) for value in 0.45 * np.array(outfit.trousers) + 0.42)
         return replace(outfit, pattern=pattern, sleeve=_LONG, patterned_trousers=lighter)
     if kind in ("plain", "black_suit"):
-        color = _BLACK if kind == "black_suit" else outfit.shirt[0]
+        color = (0.10, 0.10, 0.11) if kind == "black_suit" else outfit.shirt[0]
         return replace(outfit, shirt=(color, color), trousers=color, shoes=color, sleeve=_LONG)
     return outfit
 
@@ -98,28 +97,28 @@ class Wardrobe:
         for k, name in enumerate(PARTS):
             chosen = part == k
             if chosen.any():
-                paint = getattr(self, "_" + name.rpartition("_")[2])
-                result[chosen] = paint(rest[chosen], name)
+                side, _, kind = name.rpartition("_")
+                result[chosen] = getattr(self, f"_{kind}")(rest[chosen], side)
         return result
 
     def _local(self, joint: str, rest: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
         frame = self.frames[INDEX[joint]].astype(rest.dtype)
         return (rest - frame[:3, 3]) @ frame[:3, :3]
 
-    def _shirt(self, points: Float[np.ndarray, "n 3"], radius: float) -> Colors:
-        base, other = (np.array(color) for color in self.outfit.shirt)
-        return base + _pattern(self.outfit.pattern, points, radius)[:, None] * (other - base)
+    def _cloth(self, base: Rgb, other: Rgb | None, points: Float[np.ndarray, "n 3"], radius: float) -> Colors:
+        """Cloth with the outfit's pattern in two colours, or plain."""
+        if other is None:
+            return np.tile(np.array(base), (len(points), 1))
+        share = _pattern(self.outfit.pattern, points, radius)[:, None]
+        return np.array(base) + share * (np.array(other) - np.array(base))
 
     def _trousers(self, points: Float[np.ndarray, "n 3"], radius: float) -> Colors:
-        base, other = np.array(self.outfit.trousers), self.outfit.patterned_trousers
-        if other is None:
-            return np.tile(base, (len(points), 1))
-        return base + _pattern(self.outfit.pattern, points, radius)[:, None] * (np.array(other) - base)
+        return self._cloth(self.outfit.trousers, self.outfit.patterned_trousers, points, radius)
 
     def _torso(self, rest: Float[np.ndarray, "n 3"], _: str) -> Colors:
         points = self._local("pelvis", rest)
-        colors = self._shirt(points, 0.134)
-        belt = 0.055 * self.anatomy.stature / 1.75
+        colors = self._cloth(*self.outfit.shirt, points, 0.134)
+        belt = 0.055 * self.anatomy.stature / AVERAGE_STATURE
         below = points[:, 2] < belt
         colors[below] = self._trousers(points[below], 0.134)
         colors[np.abs(points[:, 2] - belt + 0.01) < 0.016] = 0.45 * np.array(self.outfit.trousers)
@@ -130,11 +129,11 @@ class Wardrobe:
 
     def _over_collar(self, rest: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
         """Height over the rim of the collar, which is lower in front."""
-        neck = self._local("neck", rest) * (1.75 / self.anatomy.stature)
+        neck = self._local("neck", rest) * (AVERAGE_STATURE / self.anatomy.stature)
         return neck[:, 2] + 0.45 * neck[:, 0] - 0.028
 
     def _head(self, rest: Float[np.ndarray, "n 3"], _: str) -> Colors:
-        points = self._local("head", rest) * (1.75 / self.anatomy.stature)
+        points = self._local("head", rest) * (AVERAGE_STATURE / self.anatomy.stature)
         x, y, z = points.T
         colors = np.tile(np.array(self.outfit.skin), (len(points), 1))
         collar = self._over_collar(rest) < 0.0
@@ -147,19 +146,17 @@ class Wardrobe:
         colors[front & ((y / 0.024) ** 2 + ((z + 0.012) / 0.007) ** 2 < 1)] = (0.62, 0.32, 0.30)
         return colors
 
-    def _arm(self, rest: Float[np.ndarray, "n 3"], name: str) -> Colors:
-        side = name.partition("_")[0]
+    def _arm(self, rest: Float[np.ndarray, "n 3"], side: str) -> Colors:
         points = self._local(f"{side}_shoulder", rest)
         upper, lower = (self.anatomy.length(f"{side}_{joint}") for joint in ("elbow", "wrist"))
         sleeve = self.outfit.sleeve
         hem = sleeve * upper if sleeve < 1.0 else upper + (sleeve - 1.0) * lower
-        colors = self._shirt(points, 0.0669)
+        colors = self._cloth(*self.outfit.shirt, points, 0.0669)
         colors[-points[:, 2] > hem - 0.015] = np.array(self.outfit.shirt[0]) * 0.8
         colors[-points[:, 2] > hem + 0.01] = self.outfit.skin
         return colors
 
-    def _leg(self, rest: Float[np.ndarray, "n 3"], name: str) -> Colors:
-        side = name.partition("_")[0]
+    def _leg(self, rest: Float[np.ndarray, "n 3"], side: str) -> Colors:
         points = self._local(f"{side}_hip", rest)
         foot = self._local(f"{side}_ankle", rest)
         colors = self._trousers(points, 0.0669)

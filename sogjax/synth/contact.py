@@ -1,32 +1,98 @@
-"""Two people in contact: they embrace, or they box and kick."""
+"""People whose hands are held at places: one sits down at a table; two embrace, or box and kick."""
 
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from jaxtyping import Float
 
-from sogjax.synth.anatomy import Anatomy
-from sogjax.synth.exercises import READY, Angles, Exercise, both
-from sogjax.synth.handling import Direction, Handling, at_the_chest
-from sogjax.synth.rotations import Vector
+from sogjax.synth.anatomy import INDEX, Anatomy
+from sogjax.synth.exercises import READY, Angles, Direction, Exercise, Handling, both, of_arms
+from sogjax.synth.limbs import heading_matrix
+from sogjax.synth.rooms import EDGE, SEAT_HEIGHT, SITTER_SEAT, TABLE_HEIGHT, TABLE_SIZE
+from sogjax.synth.rotations import Vector, ahead_and_left
 
-Keys = list[tuple[float, Angles]]
+_Keys = list[tuple[float, Angles]]
 
+TABLE_AHEAD = EDGE + 0.5 * TABLE_SIZE[1]
+"""Metres from where a sitter stands to the middle of the table."""
 _MEETING, _EMBRACED = 1.50, 0.42
 """Metres between two people before an embrace and in it."""
-_ASIDE = 0.06
-"""Metres by which each stands to the left of the line between them, so that the heads pass each other."""
 _FIGHTING = 1.02
 """Metres between fighters."""
-_KICK = 0.28
-"""Metres by which a kicking ankle stays away from the middle of the other one's place."""
 _HALF = 2.7
 """Seconds after which the fighters change parts."""
 
 
+def sitting(anatomy: Anatomy, place: Vector, heading: float, delay: float = 0.0) -> Handling:
+    """A person who stands before a chair, sits down, reaches over the table, drinks, and stands up."""
+    frame = np.eye(4)
+    frame[:3, :3], frame[:3, 3] = heading_matrix(heading), place
+    return Handling(Exercise(anatomy, _sit_keys(anatomy), place, heading, delay), lambda time: frame, flat=True)
+
+
+def _sit_keys(anatomy: Anatomy) -> _Keys:
+    """Key poses for a chair behind and a table in front of the person."""
+    stature = anatomy.stature
+    hips = SEAT_HEIGHT + 0.104 * anatomy.girth * stature / 1.75  # on the flesh of a person of average stature and girth
+    down = (hips - anatomy.hip_height + 0.012) / stature
+    back = SITTER_SEAT / stature
+    half = {"pelvis_x": 0.72 * back, "pelvis_z": 0.55 * down, "tip": 34.0, "bend": 24.0, "nod": -26.0, "knees_out": 0.1}
+    going = half | of_arms(34.0, 30.0, 88.0) | _hands(1.0, 0.25, 0.06)
+    bent = {"pelvis_x": 0.34 * back, "pelvis_z": 0.2 * down, "tip": 22.0, "bend": 16.0, "nod": -16.0}
+    bent |= of_arms(28.0, 40.0, 96.0) | _hands(1.0, 0.20, 0.17)
+    seated = {"pelvis_x": back, "pelvis_z": down, "tip": 6.0, "bend": 20.0, "knees_out": 0.1} | _ON_TABLE
+    free = _hands(0.0, 0.25, 0.06)
+    standing, drawn = READY | free, of_arms(26.0, 128.0, 84.0) | free
+    raised = of_arms(22.0, 50.0, 92.0) | free | {"tip": 6.0, "bend": 6.0}
+    far = seated | _at("right", 0.42, -0.36) | {"turn": -16.0, "bend": 26.0, "nod": 8.0}
+    return [
+        (0.0, standing),
+        (0.15, standing),
+        (0.28, drawn),
+        (0.42, raised),
+        (0.6, bent),
+        (0.82, going),
+        (1.2, seated | {"nod": 4.0}),
+        (1.45, seated | {"nod": 6.0, "turn": 4.0}),
+        (1.9, far | {"look": -14.0}),
+        (2.05, far | {"look": -12.0}),
+        (2.55, seated | _DRINK | {"bend": 8.0, "turn": 4.0, "nod": -12.0}),
+        (2.85, seated | _DRINK | {"bend": 8.0, "turn": 2.0, "nod": -16.0}),
+        (3.35, seated | _at("right", 0.40, -0.30) | {"turn": 8.0, "look": 20.0}),
+        (3.75, seated | _at("left", 0.44, 0.38) | {"turn": 18.0, "bend": 28.0, "look": 16.0, "nod": 6.0}),
+        (4.2, seated | {"turn": -6.0, "lean": 5.0, "look": -18.0}),
+        (4.5, seated),
+        (5.0, going),
+        (5.2, bent),
+        (5.4, raised),
+        (5.58, drawn),
+        (5.85, standing),
+        (6.2, standing),
+    ]
+
+
+def _hands(hold: float, x: float = 0.29, above: float = 0.035) -> dict[str, float]:
+    """Both hands so far ahead and above the table."""
+    return both(hand=hold, hand_x=x, hand_z=TABLE_HEIGHT + above) | {"left_hand_y": 0.17, "right_hand_y": -0.17}
+
+
+def _at(side: str, x: float, y: float) -> dict[str, float]:
+    """One hand elsewhere on the table."""
+    return {f"{side}_hand_x": x, f"{side}_hand_y": y}
+
+
+_ON_TABLE = _hands(1.0) | of_arms(34.0, 30.0, 80.0, palm=-75.0)
+_DRINK = _ON_TABLE | {
+    **{"right_hand": 0.0, "right_raise": 62.0, "right_plane": 18.0, "right_elbow": 136.0, "right_roll": -16.0},
+    **{"right_palm": -20.0, "right_hand_x": 0.1, "right_hand_z": TABLE_HEIGHT + 0.3},
+}
+"""The right hand at the mouth."""
+
+
 def hugging(anatomies: Sequence[Anatomy], turn: float) -> tuple[Handling, Handling]:
-    """Two people who walk up to each other, embrace, and part."""
+    """Two people who walk up to each other, embrace, and part; they pass each other's heads by 6 cm on either side."""
     elbows = ((0.1, 0.85, 0.35), (0.0, 0.8, -0.6))
-    return _facing(anatomies, turn, _MEETING, _ASIDE, lambda anatomy, _: _hug_keys(anatomy.stature), elbows)
+    return _facing(anatomies, turn, _MEETING, 0.06, lambda anatomy, _: _hug_keys(anatomy.stature), elbows)
 
 
 def fighting(anatomies: Sequence[Anatomy], turn: float) -> tuple[Handling, Handling]:
@@ -40,35 +106,45 @@ def _facing(
     turn: float,
     distance: float,
     aside: float,
-    keys: Callable[[Anatomy, int], Keys],
+    keys: Callable[[Anatomy, int], _Keys],
     elbows: tuple[Direction, Direction],
 ) -> tuple[Handling, Handling]:
     """Two people who face each other; the places of each one's hands are given in the frame of the other's chest."""
-    ahead, left = np.array([np.cos(turn), np.sin(turn), 0.0]), np.array([-np.sin(turn), np.cos(turn), 0.0])
+    ahead, left = ahead_and_left(turn)
     offset: Vector = -0.5 * distance * ahead + aside * left
     one = Exercise(anatomies[0], keys(anatomies[0], 0), offset, turn)
     other = Exercise(anatomies[1], keys(anatomies[1], 1), -offset, turn + np.pi)
-    return Handling(one, at_the_chest(other), elbows), Handling(other, at_the_chest(one), elbows)
+    return Handling(one, _chest_of(other), elbows), Handling(other, _chest_of(one), elbows)
 
 
-def _hug_keys(stature: float) -> Keys:
+def _chest_of(exercise: Exercise) -> Callable[[float], Float[np.ndarray, "4 4"]]:
+    """The frame of somebody's chest, in units of 1/1.75 of that person's stature."""
+
+    def frame(time: float) -> Float[np.ndarray, "4 4"]:
+        chest = exercise.anatomy.world_from_joint(exercise(time))[INDEX["chest"]].copy()
+        chest[:3, :3] *= exercise.anatomy.stature / 1.75
+        return chest
+
+    return frame
+
+
+def _hug_keys(stature: float) -> _Keys:
     """Key poses of either one, over 4.7 s."""
     way = 0.5 * (_MEETING - _EMBRACED) / stature
-    close = {**_ROUND, "left_foot_x": way, "right_foot_x": way, "pelvis_x": way, "bend": 8.0, "tilt": 9.0, "nod": 4.0}
-    arrival = [(0.2 + time, _open(min(time / 0.9, 1.0)) | feet) for time, feet in _approach(way)]
-    departure = [(3.95 - time, _open(min(time / 0.9, 1.0)) | feet) for time, feet in reversed(_approach(way))]
+    close = _ROUND | {"left_foot_x": way, "right_foot_x": way, "pelvis_x": way, "bend": 8.0, "tilt": 9.0, "nod": 4.0}
+    approach = [(time, _opened(min(time / 0.9, 1.0)) | feet) for time, feet in _steps_ahead(way)]
     return [
-        (0.0, {**READY, **_NO_HANDS}),
-        *arrival,
-        (1.75, {**close, "lean": 2.0}),
-        (2.1, {**close, "lean": -5.0}),
-        (2.45, {**close, "lean": 4.0}),
-        *departure,
-        (4.3, {**READY, **_NO_HANDS}),
+        (0.0, READY | _NO_HANDS),
+        *((0.2 + time, angles) for time, angles in approach),
+        (1.75, close | {"lean": 2.0}),
+        (2.1, close | {"lean": -5.0}),
+        (2.45, close | {"lean": 4.0}),
+        *((3.95 - time, angles) for time, angles in reversed(approach)),
+        (4.3, READY | _NO_HANDS),
     ]
 
 
-def _approach(way: float) -> list[tuple[float, dict[str, float]]]:
+def _steps_ahead(way: float) -> list[tuple[float, dict[str, float]]]:
     """Three steps that lead so far ahead, over 1.15 s: pelvis and feet."""
     places = (
         (0.0, 0.0, 0.0, 0.0, ""),
@@ -79,13 +155,10 @@ def _approach(way: float) -> list[tuple[float, dict[str, float]]]:
         (0.96, 0.92, 1.0, 0.78, "right"),
         (1.15, 1.0, 1.0, 1.0, ""),
     )
+    raised = lambda side: {f"{side}_foot_z": 0.035, f"{side}_foot_pitch": 8.0, "pelvis_z": -0.01} if side else {}
     return [
-        (
-            time,
-            {"pelvis_x": pelvis * way, "left_foot_x": left * way, "right_foot_x": right * way}
-            | ({f"{lifted}_foot_z": 0.035, f"{lifted}_foot_pitch": 8.0, "pelvis_z": -0.01} if lifted else {}),
-        )
-        for time, pelvis, left, right, lifted in places
+        (time, {"pelvis_x": pelvis * way, "left_foot_x": left * way, "right_foot_x": right * way} | raised(side))
+        for time, pelvis, left, right, side in places
     ]
 
 
@@ -94,87 +167,77 @@ _NO_HANDS = {
     **{"right_hand": 0.0, "right_hand_x": -0.05, "right_hand_y": 0.195, "right_hand_z": -0.05},
 }
 """The left hand is meant for the other one's right shoulder, the right hand for the left side of the back."""
-_ROUND = {
-    **_NO_HANDS,
+_ROUND = _NO_HANDS | {
     **{"left_hand": 1.0, "left_raise": 96.0, "left_plane": 30.0, "left_elbow": 40.0, "left_wrist": -34.0},
     **{"right_hand": 1.0, "right_raise": 62.0, "right_plane": 48.0, "right_elbow": 45.0},
     **{"right_palm": 62.0, "right_wrist": -46.0},
 }
 
 
-def _open(share: float) -> dict[str, float]:
+def _opened(share: float) -> dict[str, float]:
     """Arms on their way from hanging to open."""
-    opened = {
-        **{"left_raise": 98.0, "left_plane": 52.0, "left_elbow": 24.0},
-        **{"right_raise": 56.0, "right_plane": 58.0, "right_elbow": 24.0},
-    }
-    return {name: READY[name] + share * (value - READY[name]) for name, value in opened.items()} | _NO_HANDS
+    wide = {"left_raise": 98.0, "left_plane": 52.0, "left_elbow": 24.0}
+    wide |= {"right_raise": 56.0, "right_plane": 58.0, "right_elbow": 24.0}
+    return {name: READY[name] + share * (value - READY[name]) for name, value in wide.items()} | _NO_HANDS
 
 
-_STANCE = {
-    **{"left_foot_x": 0.075, "right_foot_x": -0.085, "right_foot_yaw": -14.0, "yaw": -14.0},
-    **{"pelvis_z": -0.028, "knees_out": 0.1},
-}
 _AT_FACE = both(hand=0.0, hand_x=0.30, hand_y=0.0, hand_z=0.33)
-_GUARD = {
-    **_STANCE,
-    **_AT_FACE,
-    **both(**{"raise": 42.0, "plane": 22.0, "elbow": 118.0, "roll": -8.0}),
-    **{"bend": 10.0, "look": 12.0},
-}
+_GUARD = (
+    _AT_FACE
+    | of_arms(42.0, 22.0, 118.0, roll=-8.0)
+    | {"left_foot_x": 0.075, "right_foot_x": -0.085, "right_foot_yaw": -14.0, "yaw": -14.0}
+    | {"pelvis_z": -0.028, "knees_out": 0.1, "bend": 10.0, "look": 12.0}
+)
 _WIND = _GUARD | {"turn": -16.0, "right_raise": 36.0, "right_plane": 60.0}
-_STRIKE = {"turn": 38.0, "yaw": 6.0, "pelvis_x": 0.045, "bend": 12.0, "look": -22.0, "right_heel": 16.0}
-_PUNCH = _GUARD | _STRIKE | {"right_hand": 1.0, "right_raise": 84.0, "right_plane": 6.0, "right_elbow": 30.0}
+_PUNCH = _GUARD | {
+    **{"turn": 38.0, "yaw": 6.0, "pelvis_x": 0.045, "bend": 12.0, "look": -22.0, "right_heel": 16.0},
+    **{"right_hand": 1.0, "right_raise": 84.0, "right_plane": 6.0, "right_elbow": 30.0},
+}
 _JAB = _GUARD | {
     **{"turn": -16.0, "yaw": -20.0, "pelvis_x": 0.04, "look": 26.0, "left_hand": 1.0},
     **{"left_raise": 84.0, "left_plane": 6.0, "left_elbow": 30.0},
 }
-_LEFT_BLOCK = _GUARD | {
-    **{"left_raise": 66.0, "left_plane": 52.0, "left_elbow": 112.0, "left_roll": 42.0},
-    **{"pelvis_x": -0.03, "bend": -2.0, "lean": -5.0, "nod": 6.0},
-}
-_RIGHT_BLOCK = _GUARD | {
-    **{"right_raise": 66.0, "right_plane": 52.0, "right_elbow": 112.0, "right_roll": 42.0},
-    **{"pelvis_x": -0.03, "bend": -2.0, "lean": 5.0, "nod": 6.0},
-}
 _STRUCK = _GUARD | {"pelvis_x": -0.05, "pelvis_z": -0.045, "tip": 8.0, "bend": 26.0, "nod": -20.0}
 
 
-def _kicking(stature: float) -> tuple[Angles, Angles]:
-    """Both moments of a kick with the right foot: drawn up, and at the other one's body."""
-    lifted = _GUARD | {
+def _block(side: str) -> Angles:
+    """One arm before the face, the trunk away from the fist."""
+    arm = {f"{side}_raise": 66.0, f"{side}_plane": 52.0, f"{side}_elbow": 112.0, f"{side}_roll": 42.0}
+    return _GUARD | arm | {"pelvis_x": -0.03, "bend": -2.0, "lean": -5.0 if side == "left" else 5.0, "nod": 6.0}
+
+
+def _attack(stature: float) -> _Keys:
+    """A punch, a block, a kick with the right foot, whose ankle stays 28 cm away from the other one's place."""
+    drawn = _GUARD | {
         **{"pelvis_y": 0.05, "pelvis_x": 0.04, "pelvis_z": -0.012, "tip": -4.0, "yaw": 0.0, "right_foot_yaw": 0.0},
         **{"right_foot_x": 0.05, "right_foot_y": -0.03, "right_foot_z": 0.26, "right_foot_pitch": 24.0, "bend": 12.0},
         **{"knees_up": 1.2},
     }
-    ahead = (_FIGHTING - _KICK) / stature
-    return lifted, lifted | {
-        **{"right_foot_x": ahead, "right_foot_y": -0.045, "right_foot_z": 0.40, "right_foot_pitch": -40.0},
-        **{"tip": -13.0, "pelvis_x": 0.055},
+    kick = drawn | {
+        **{"right_foot_x": (_FIGHTING - 0.28) / stature, "right_foot_y": -0.045, "right_foot_z": 0.40},
+        **{"right_foot_pitch": -40.0, "tip": -13.0, "pelvis_x": 0.055},
     }
+    block = _block("right")
+    hits = [(0.28, _WIND), (0.48, _PUNCH), (0.56, _PUNCH), (0.85, _GUARD), (1.0, _GUARD), (1.18, block), (1.26, block)]
+    kicks = [(1.5, _GUARD), (1.8, drawn), (2.0, kick), (2.06, kick), (2.32, drawn), (_HALF, _GUARD)]
+    return [*hits, *kicks]
 
 
-def _attack(stature: float) -> Keys:
-    """A punch, a block, a kick."""
-    chamber, kick = _kicking(stature)
-    hits = [(0.28, _WIND), (0.48, _PUNCH), (0.56, _PUNCH), (0.85, _GUARD), (1.0, _GUARD), (1.18, _RIGHT_BLOCK)]
-    kicks = [(1.26, _RIGHT_BLOCK), (1.5, _GUARD), (1.8, chamber), (2.0, kick), (2.06, kick), (2.32, chamber)]
-    return [*hits, *kicks, (_HALF, _GUARD)]
-
-
-def _defence() -> Keys:
+def _defence() -> _Keys:
     """A block, a jab, a kick taken."""
-    first = [(0.28, _GUARD), (0.46, _LEFT_BLOCK), (0.60, _LEFT_BLOCK), (0.85, _GUARD), (1.0, _GUARD), (1.18, _JAB)]
-    return [*first, (1.26, _JAB), (1.5, _GUARD), (1.85, _GUARD), (2.12, _STRUCK), (2.35, _STRUCK), (_HALF, _GUARD)]
+    block = _block("left")
+    first = [(0.28, _GUARD), (0.46, block), (0.60, block), (0.85, _GUARD), (1.0, _GUARD), (1.18, _JAB), (1.26, _JAB)]
+    return [*first, (1.5, _GUARD), (1.85, _GUARD), (2.12, _STRUCK), (2.35, _STRUCK), (_HALF, _GUARD)]
 
 
-def _fight_keys(stature: float, number: int) -> Keys:
+def _fight_keys(stature: float, number: int) -> _Keys:
     """Key poses of the one who attacks first (0) or second (1), over 6.4 s."""
     parts = [_attack(stature), _defence()]
     first, second = parts if number == 0 else parts[::-1]
-    start = 0.45
-    ready = {**READY, **_AT_FACE}
-    keys: Keys = [(0.0, ready), (0.1, ready), (start, _GUARD)]
-    keys += [(start + time, angles) for time, angles in first]
-    keys += [(start + _HALF + time, angles) for time, angles in second]
-    return [*keys, (start + 2 * _HALF + 0.4, ready), (start + 2 * _HALF + 0.55, ready)]
+    start, ready = 0.45, READY | _AT_FACE
+    return [
+        *((0.0, ready), (0.1, ready), (start, _GUARD)),
+        *((start + time, angles) for time, angles in first),
+        *((start + _HALF + time, angles) for time, angles in second),
+        *((start + 2 * _HALF + 0.4, ready), (start + 2 * _HALF + 0.55, ready)),
+    ]

@@ -1,26 +1,19 @@
 """A rendered person: a surface in the bind pose, skinned to a skeleton by linear blending."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
 from scipy import sparse
 
 from sogjax.synth.anatomy import INDEX, JOINTS, PARENTS, SIDES, Anatomy, Pose
-from sogjax.synth.clothes import Outfit
-from sogjax.synth.flesh import PARTS, Flesh, bind_pose, flesh_of
+from sogjax.synth.clothes import Outfit, Wardrobe
+from sogjax.synth.flesh import AVERAGE_STATURE, PARTS, Flesh, bind_pose, flesh_of
 from sogjax.synth.rotations import partial_twist, unit
 from sogjax.synth.surface import gradient, surface_nets
 
-_SPACING = 0.026
-_DIFFUSION_ROUNDS = 14
-
-_SHARED_TWIST = {"shoulder": 0.35, "hip": 0.35}
-"""Share of a joint's twist that the flesh at the beginning of its bone follows."""
-_FOREARM_TWIST = 0.6
-"""Share of the wrist's twist that the far half of the forearm follows."""
-
-_NEAR = tuple(f"{side}_{joint}" for side in SIDES for joint in _SHARED_TWIST)
+_NEAR = tuple(f"{side}_{joint}" for side in SIDES for joint in ("shoulder", "hip"))
 _FAR = tuple(f"{side}_elbow" for side in SIDES)
 BONES = JOINTS + tuple(f"{name}_near" for name in _NEAR) + tuple(f"{name}_far" for name in _FAR)
 
@@ -48,35 +41,39 @@ class Figure:
     weights: Float[np.ndarray, "vertex bone"]
     bone_from_rest: Float[np.ndarray, "bone 4 4"]
 
+    @cached_property
+    def wardrobe(self) -> Wardrobe:
+        """The outfit fitted to the person."""
+        return Wardrobe.fitted(self.outfit, self.anatomy)
+
     def posed(self, pose: Pose) -> Mesh:
         """The surface in a pose (linear blend skinning)."""
-        moved = (self._world_from_bone(pose) @ self.bone_from_rest)[:, :3].reshape(len(BONES), 12)
+        moved = (bone_frames(self.anatomy, pose) @ self.bone_from_rest)[:, :3].reshape(len(BONES), 12)
         blended = (self.weights @ moved).reshape(-1, 3, 4)
         vertices = np.einsum("vij,vj->vi", blended[..., :3], self.rest) + blended[..., 3]
         normals = unit(np.einsum("vij,vj->vi", blended[..., :3], self.rest_normals))
         return Mesh(vertices, normals, self.faces)
 
-    def _world_from_bone(self, pose: Pose) -> Float[np.ndarray, "bone 4 4"]:
-        return bone_frames(self.anatomy, pose)
-
 
 def bone_frames(anatomy: Anatomy, pose: Pose) -> Float[np.ndarray, "bone 4 4"]:
-    """Frames of the joints and of the flesh that follows only a part of a joint's twist."""
+    """Frames of the joints and of the flesh that follows only a part of a joint's twist.
+
+    The beginning of a limb follows 0.35 of its own, the far half of the forearm 0.6 of the wrist's.
+    """
     frames = anatomy.world_from_joint(pose)
     extra = []
     for name in _NEAR:
         joint = INDEX[name]
         above = frames[PARENTS[joint], :3, :3]
-        share = _SHARED_TWIST[name.rpartition("_")[2]]
         bone = frames[joint].copy()
-        bone[:3, :3] = above @ partial_twist(pose.rotations[joint], share)
+        bone[:3, :3] = above @ partial_twist(pose.rotations[joint], 0.35)
         extra.append(bone)
     for name in _FAR:
         wrist = pose.rotations[INDEX[name.replace("elbow", "wrist")]]
         swing = partial_twist(wrist, 0.0)
         twist = swing.T @ wrist
         bone = frames[INDEX[name]].copy()
-        bone[:3, :3] = bone[:3, :3] @ partial_twist(twist, _FOREARM_TWIST)
+        bone[:3, :3] = bone[:3, :3] @ partial_twist(twist, 0.6)
         extra.append(bone)
     return np.concatenate([frames, np.stack(extra)])
 
@@ -85,10 +82,8 @@ def make_figure(anatomy: Anatomy, outfit: Outfit) -> Figure:
     """Model the surface of a person and tie it to the skeleton."""
     flesh = flesh_of(anatomy, outfit.sleeve)
     centres = flesh.world_from_joint[:, :3, 3]
-    margin = 0.25
-    lower = np.append(centres.min(0)[:2] - margin, -0.03)
-    upper = centres.max(0) + margin
-    vertices, faces = surface_nets(flesh.field, lower, upper, _SPACING * anatomy.stature / 1.75)
+    lower, upper = np.append(centres.min(0)[:2] - 0.25, -0.03), centres.max(0) + 0.25
+    vertices, faces = surface_nets(flesh.field, lower, upper, 0.026 * anatomy.stature / AVERAGE_STATURE)
     nearest = flesh.nearest_lump(vertices)
     part = np.array([PARTS.index(lump.part) for lump in flesh.lumps])[nearest]
     weights = _diffused(_owners(anatomy, flesh, vertices, nearest), faces)
@@ -110,16 +105,13 @@ def _owners(
 ) -> Float[np.ndarray, "vertex bone"]:
     """Each vertex wholly on the bone of the lump it lies on."""
     bone = np.array([JOINTS.index(lump.joint) for lump in flesh.lumps])[nearest]
-    bind = anatomy.world_from_joint(bind_pose(anatomy))
     for name in (*_NEAR, *_FAR):
-        end = {"shoulder": "elbow", "hip": "knee", "elbow": "wrist"}[name.rpartition("_")[2]]
-        length = anatomy.length(name.replace(name.rpartition("_")[2], end))
-        frame = bind[INDEX[name]]
-        along = -((vertices - frame[:3, 3]) @ frame[:3, 2]) / length
-        if name in _NEAR:
-            bone[(bone == INDEX[name]) & (along < 0.4)] = BONES.index(f"{name}_near")
-        else:
-            bone[(bone == INDEX[name]) & (along > 0.5)] = BONES.index(f"{name}_far")
+        side, _, joint = name.partition("_")
+        end = {"shoulder": "elbow", "hip": "knee", "elbow": "wrist"}[joint]
+        frame = flesh.world_from_joint[INDEX[name]]
+        along = -((vertices - frame[:3, 3]) @ frame[:3, 2]) / anatomy.length(f"{side}_{end}")
+        part, there = ("near", along < 0.4) if name in _NEAR else ("far", along > 0.5)
+        bone[(bone == INDEX[name]) & there] = BONES.index(f"{name}_{part}")
     return np.eye(len(BONES))[bone]
 
 
@@ -133,6 +125,6 @@ def _diffused(
     links = sparse.csr_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     links.data[:] = 1.0
     share = sparse.diags(0.5 / np.asarray(links.sum(1)).ravel()) @ links
-    for _ in range(_DIFFUSION_ROUNDS):
+    for _ in range(14):
         weights = 0.5 * weights + share @ weights
     return weights

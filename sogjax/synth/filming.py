@@ -1,26 +1,36 @@
-"""Films a stage with some of its cameras: plates, stills and videos."""
+"""Films a stage with its cameras: plates, stills and videos, shared out to several processes.
 
+They are processes of their own (`python -m sogjax.synth.filming`, the order on standard input), not those of
+`multiprocessing`: these work from notebooks, from scripts without a main guard and inside pytest alike.
+"""
+
+import json
+import os
+import queue
+import subprocess
+import sys
+import threading
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
+from dataclasses import asdict
 from pathlib import Path
 
-import cv2
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float
 
+from sogjax.errors import InputError
 from sogjax.io import recording_files
-from sogjax.io.files import atomic_path
+from sogjax.io.image_file import write_image, write_mask
 from sogjax.io.video import VideoWriter
 from sogjax.synth.anatomy import Pose
 from sogjax.synth.exercises import EXAMPLE_POSES
+from sogjax.synth.figure import Figure
 from sogjax.synth.light import drifted
-from sogjax.synth.picture import Person, Shadows, Shot, mask_of, shot_of
-from sogjax.synth.plate import Plate, plate_of
+from sogjax.synth.picture import Plate, Shadows, Shot, plate_of, shot_of
 from sogjax.synth.scene import Scene
 from sogjax.synth.settings import SynthSettings
-from sogjax.synth.stage import Stage
+from sogjax.synth.stage import Stage, stage_of
 
-_JPEG_QUALITY = 95
 _NOISE, _VIDEO, _STILL, _EMPTY = 7, 0, 1, 2
 """Streams of random numbers: pictures have the same noise whichever process renders them."""
 
@@ -43,30 +53,24 @@ def film(stage: Stage, cameras: Sequence[int], folder: Path) -> Iterator[None]:
         plates[camera] = plate_of(stage.scene, stage.views[camera])
         if stage.settings.background:
             empty = stage.sensors[camera].exposed(plates[camera].total, _rng(stage, camera, _EMPTY, 0))
-            _write_image(recording_files.BACKGROUND.of(folder) / f"{stage.views[camera].name}.jpg", empty)
+            write_image(recording_files.BACKGROUND.of(folder) / f"{stage.views[camera].name}.jpg", empty)
         yield
     if stage.settings.example_poses:
-        yield from _stills(stage, _bare(stage, plates), folder)
+        # before tables and chairs are brought in
+        bare = stage.scene is stage.bare
+        yield from _stills(stage, plates if bare else {k: plate_of(stage.bare, stage.views[k]) for k in plates}, folder)
     yield from _videos(stage, plates, folder)
-
-
-def _bare(stage: Stage, plates: dict[int, Plate]) -> dict[int, Plate]:
-    """The plates of the stills, which are taken before tables and chairs are brought in."""
-    if stage.scene is stage.bare:
-        return plates
-    return {camera: plate_of(stage.bare, stage.views[camera]) for camera in plates}
 
 
 def _stills(stage: Stage, plates: dict[int, Plate], folder: Path) -> Iterator[None]:
     for actor, person in enumerate(stage.people):
         for number, pose in enumerate(EXAMPLE_POSES):
-            shots = _shots(stage.bare, stage, plates, [person], [stage.example_pose(actor, pose)])
             place = recording_files.EXAMPLE_POSES.of(folder) / example_folder(stage, actor, pose)
-            for camera, shot in shots:
+            for camera, shot in _shots(stage.bare, stage, plates, [person], [stage.example_pose(actor, pose)]):
                 rng = _rng(stage, camera, _STILL, 10 * actor + number)
                 name = stage.views[camera].name
-                _write_image(place / f"{name}.jpg", stage.sensors[camera].exposed(shot.light, rng))
-                _write_image(place / f"{name}.mask.png", np.uint8(255) * mask_of(shot).astype(np.uint8))
+                write_image(place / f"{name}.jpg", stage.sensors[camera].exposed(shot.light, rng))
+                write_mask(place / f"{name}.mask.png", shot.mask)
                 yield
 
 
@@ -90,10 +94,10 @@ def _drifted(stage: Stage, shot: Shot, frame: int) -> Float[np.ndarray, "row col
 
 
 def _shots(
-    scene: Scene, stage: Stage, plates: dict[int, Plate], people: Sequence[Person], poses: Sequence[Pose]
+    scene: Scene, stage: Stage, plates: dict[int, Plate], people: Sequence[Figure], poses: Sequence[Pose]
 ) -> Iterator[tuple[int, Shot]]:
     """What each camera sees of people in poses; surface and shadows are made once for all cameras."""
-    meshes = [person.figure.posed(pose) for person, pose in zip(people, poses, strict=True)]
+    meshes = [person.posed(pose) for person, pose in zip(people, poses, strict=True)]
     furniture = None if scene.props is None else scene.shadow
     shadows = Shadows.of(meshes, furniture) if stage.settings.shadows else None
     for camera, plate in plates.items():
@@ -104,8 +108,87 @@ def _rng(stage: Stage, camera: int, kind: int, number: int) -> np.random.Generat
     return np.random.default_rng([stage.settings.seed, _NOISE, camera, kind, number])
 
 
-def _write_image(path: Path, image: UInt8[np.ndarray, "..."]) -> None:
-    parameters = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY] if path.suffix == ".jpg" else []
-    encoded = cv2.imencode(path.suffix, image, parameters)[1]
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(encoded.tobytes())
+def num_workers(pictures: int, cameras: int) -> int:
+    """How many processes to use: fewer than 60 pictures are made sooner than another process has started."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return max(1, min(cores, cameras, pictures // 60))
+
+
+def film_all(stage: Stage, folder: Path, workers: int) -> Iterator[None]:
+    """Film with every camera; yields after each picture. With one worker, in this process.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    cameras = range(len(stage.views))
+    if workers == 1:
+        yield from film(stage, cameras, folder)
+        return
+    done: queue.Queue[str] = queue.Queue()
+    processes = [_started(stage.settings, list(cameras[k::workers]), folder, done) for k in range(workers)]
+    try:
+        ended = 0
+        while ended < len(processes):
+            message = done.get()
+            if message == "picture":
+                yield
+            elif message == "end":
+                ended += 1
+            elif message.startswith("refused "):
+                raise InputError(message.removeprefix("refused "))
+            elif message.startswith("failed"):
+                raise RuntimeError(f"a rendering process {message}")
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+
+
+def _started(
+    settings: SynthSettings, cameras: Sequence[int], folder: Path, done: "queue.Queue[str]"
+) -> "subprocess.Popen[str]":
+    """A process that films with some cameras; a thread passes on what it tells, then `end`."""
+    paths = [str(Path(__file__).resolve().parents[2]), os.environ.get("PYTHONPATH", "")]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(path for path in paths if path)}
+    # one thread each: the processes are as many as the cores
+    environment |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "JAX_PLATFORMS": "cpu"}
+    log = (folder / f".worker_{cameras[0]}.log").open("w+", encoding="utf-8")
+    process = subprocess.Popen(
+        [sys.executable, "-m", "sogjax.synth.filming"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=log,
+        text=True,
+        env=environment,
+    )
+    assert process.stdin is not None
+    json.dump({"settings": asdict(settings), "cameras": list(cameras), "folder": str(folder)}, process.stdin)
+    process.stdin.close()
+
+    def listen() -> None:
+        assert process.stdout is not None
+        for line in process.stdout:
+            done.put(line.strip())
+        process.stdout.close()
+        code = process.wait()
+        log.seek(0)
+        done.put("end" if code == 0 else f"failed: {log.read()[-2000:]}")
+        log.close()
+
+    threading.Thread(target=listen, daemon=True).start()
+    return process
+
+
+def _work() -> None:
+    """Read the order (settings, cameras, folder) as JSON, film, and write a line for every picture."""
+    order = json.load(sys.stdin)
+    stage = stage_of(SynthSettings(**order["settings"]))
+    try:
+        for _ in film(stage, order["cameras"], Path(order["folder"])):
+            print("picture", flush=True)
+    except InputError as error:  # a full disk
+        print("refused", " ".join(str(error).split()), flush=True)
+
+
+if __name__ == "__main__":
+    _work()

@@ -1,6 +1,6 @@
 """The shape of a clothed person: tapered limbs, trunk, head, hands and shoes as one smooth implicit surface."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -10,10 +10,8 @@ from sogjax.synth.limbs import pose_from_angles
 
 PARTS = ("torso", "head", "left_arm", "right_arm", "left_leg", "right_leg")
 
-_AVERAGE_STATURE = 1.75
-_PART_BLEND = 0.022
-_WITHIN_BLEND = 0.010
-"""Metres over which two shapes melt into each other: of different parts, of the same part."""
+AVERAGE_STATURE = 1.75
+"""Metres; lumps, landmarks and clothes are measured on a person of this height."""
 
 
 @dataclass(frozen=True)
@@ -26,9 +24,9 @@ class Lump:
     end: tuple[float, float, float]
     radii: tuple[float, float]
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    """Of the cross-section along the joint's axes."""
+    """Factors along the joint's axes."""
     floor: float | None = None
-    """Cut flat at this height (soles)."""
+    """Height at which it is cut flat (soles)."""
 
     def distance(self, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
         """Signed distance (approximate where scaled) of points in the joint's frame."""
@@ -46,15 +44,14 @@ class Lump:
 
 def bind_pose(anatomy: Anatomy) -> Pose:
     """The pose the surface is modelled in: arms half raised, legs a little apart, feet flat."""
-    spread = 8.0
-    angles = {}
-    for side in SIDES:
-        angles |= {f"{side}_raise": 55.0, f"{side}_plane": 90.0, f"{side}_spread": spread}
+    angles = {f"{side}_{name}": angle for side in SIDES for name, angle in _BIND_ANGLES.items()}
     pose = pose_from_angles(angles, np.array([0.0, 0.0, anatomy.hip_height]))
     for side in SIDES:
-        hip = pose.rotations[INDEX[f"{side}_hip"]]
-        pose = pose.with_rotation(f"{side}_ankle", hip.T)
+        pose = pose.with_rotation(f"{side}_ankle", pose.rotations[INDEX[f"{side}_hip"]].T)
     return pose
+
+
+_BIND_ANGLES = {"raise": 55.0, "plane": 90.0, "spread": 8.0}
 
 
 @dataclass(frozen=True)
@@ -73,11 +70,11 @@ class Flesh:
         return np.stack(rows)
 
     def field(self, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
-        """Signed distance to the surface, the lumps melted together."""
+        """Signed distance to the surface, the lumps melted together: over 10 mm within a part, over 22 mm between."""
         rows = self.distances(points)
         owner = np.array([PARTS.index(lump.part) for lump in self.lumps])
-        parts = [_smooth_minimum(rows[owner == k], _WITHIN_BLEND) for k in range(len(PARTS))]
-        return _smooth_minimum(np.stack(parts), _PART_BLEND)
+        parts = [_smooth_minimum(rows[owner == k], 0.010) for k in range(len(PARTS))]
+        return _smooth_minimum(np.stack(parts), 0.022)
 
     def nearest_lump(self, points: Float[np.ndarray, "n 3"]) -> Int[np.ndarray, "n"]:
         """Index of the lump each point lies on."""
@@ -91,24 +88,25 @@ def _smooth_minimum(rows: Float[np.ndarray, "k n"], width: float) -> Float[np.nd
 
 def flesh_of(anatomy: Anatomy, sleeve: float) -> Flesh:
     """The shape of a person whose sleeves reach so far: 0 shoulder, 1 elbow, 2 wrist."""
-    scale = anatomy.stature / _AVERAGE_STATURE
-    lumps = [*_trunk(anatomy), *_head()]
+    lumps = [*_trunk(anatomy), *_HEAD]
     for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
         lumps += _arm(anatomy, side, sign, sleeve) + _leg(anatomy, side)
-    return Flesh(
-        tuple(_sized(lump, scale, anatomy.girth) for lump in lumps),
-        anatomy.world_from_joint(bind_pose(anatomy)),
-    )
+    return Flesh(tuple(_sized(lump, anatomy) for lump in lumps), anatomy.world_from_joint(bind_pose(anatomy)))
 
 
-def _sized(lump: Lump, scale: float, girth: float) -> Lump:
+def _sized(lump: Lump, anatomy: Anatomy) -> Lump:
     """A lump of the average person, for another stature and girth; heads, hands and shoes do not get thicker."""
-    lean = lump.joint.endswith(("head", "wrist", "ankle", "toe"))
-    thickness = scale * (1.0 if lean else girth)
-    points = [tuple(float(scale * value) for value in point) for point in (lump.start, lump.end)]
+    scale = anatomy.stature / AVERAGE_STATURE
+    thickness = scale * (1.0 if lump.joint.endswith(("head", "wrist", "ankle", "toe")) else anatomy.girth)
+    resized = lambda point: (float(scale * point[0]), float(scale * point[1]), float(scale * point[2]))
     radii = (thickness * lump.radii[0], thickness * lump.radii[1])
     floor = None if lump.floor is None else scale * lump.floor
-    return Lump(lump.joint, lump.part, points[0], points[1], radii, lump.scale, floor)  # pyright: ignore
+    return replace(lump, start=resized(lump.start), end=resized(lump.end), radii=radii, floor=floor)
+
+
+def _average(anatomy: Anatomy, joint: str) -> float:
+    """Length of the bone to a joint, were the person of average stature."""
+    return anatomy.length(joint) / anatomy.stature * AVERAGE_STATURE
 
 
 def _trunk(anatomy: Anatomy) -> list[Lump]:
@@ -129,33 +127,28 @@ def _trunk(anatomy: Anatomy) -> list[Lump]:
     for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
         breast = Lump("chest", "torso", (0.05, 0.07 * sign, 0.06), (0.05, 0.075 * sign, 0.06), (0.068, 0.068))
         buttock = Lump("pelvis", "torso", (-0.05, 0.07 * sign, -0.03), (-0.05, 0.07 * sign, 0.0), (0.082, 0.08))
-        yoke = Lump(
-            f"{side}_clavicle",
-            "torso",
-            (-0.01, 0.0, -0.02),
-            (-0.01, 0.125 * sign * wide, -0.03),
-            (0.058, 0.054),
-        )
+        end = (-0.01, 0.125 * sign * wide, -0.03)
+        yoke = Lump(f"{side}_clavicle", "torso", (-0.01, 0.0, -0.02), end, (0.058, 0.054))
         slope = Lump("neck", "torso", (0.0, 0.02 * sign, 0.03), (-0.008, 0.11 * sign * wide, -0.035), (0.042, 0.045))
         lumps += [breast, buttock, yoke, slope]
     return lumps
 
 
-def _head() -> list[Lump]:
-    return [
-        Lump("neck", "head", (-0.004, 0.0, -0.01), (0.008, 0.0, 0.10), (0.054, 0.052)),
-        Lump("head", "head", (0.008, 0.0, 0.062), (0.004, 0.0, 0.068), (0.1, 0.1), (0.96, 0.77, 1.0)),
-        Lump("head", "head", (0.034, 0.0, 0.01), (0.05, 0.0, -0.022), (0.066, 0.046), (1.0, 0.88, 1.0)),
-        Lump("head", "head", (0.098, 0.0, 0.045), (0.108, 0.0, 0.02), (0.010, 0.015)),
-        Lump("head", "head", (0.0, 0.075, 0.05), (-0.008, 0.076, 0.02), (0.018, 0.014), (1.0, 0.6, 1.0)),
-        Lump("head", "head", (0.0, -0.075, 0.05), (-0.008, -0.076, 0.02), (0.018, 0.014), (1.0, 0.6, 1.0)),
-    ]
+_HEAD = (
+    Lump("neck", "head", (-0.004, 0.0, -0.01), (0.008, 0.0, 0.10), (0.054, 0.052)),
+    Lump("head", "head", (0.008, 0.0, 0.062), (0.004, 0.0, 0.068), (0.1, 0.1), (0.96, 0.77, 1.0)),
+    Lump("head", "head", (0.034, 0.0, 0.01), (0.05, 0.0, -0.022), (0.066, 0.046), (1.0, 0.88, 1.0)),
+    Lump("head", "head", (0.098, 0.0, 0.045), (0.108, 0.0, 0.02), (0.010, 0.015)),
+    Lump("head", "head", (0.0, 0.075, 0.05), (-0.008, 0.076, 0.02), (0.018, 0.014), (1.0, 0.6, 1.0)),
+    Lump("head", "head", (0.0, -0.075, 0.05), (-0.008, -0.076, 0.02), (0.018, 0.014), (1.0, 0.6, 1.0)),
+)
+"""Neck, skull, jaw, nose and ears."""
 
 
 def _arm(anatomy: Anatomy, side: str, sign: float, sleeve: float) -> list[Lump]:
+    """Muscles, forearm, hand and thumb, and the sleeve over them."""
     part = f"{side}_arm"
-    upper = anatomy.length(f"{side}_elbow") / anatomy.stature * _AVERAGE_STATURE
-    lower = anatomy.length(f"{side}_wrist") / anatomy.stature * _AVERAGE_STATURE
+    upper, lower = _average(anatomy, f"{side}_elbow"), _average(anatomy, f"{side}_wrist")
     flat = (1.0, 0.48, 1.0)
     lumps = [
         Lump(f"{side}_shoulder", part, (0.0, 0.0, -0.01), (0.0, 0.004 * sign, -0.10), (0.056, 0.054)),
@@ -175,34 +168,18 @@ def _arm(anatomy: Anatomy, side: str, sign: float, sleeve: float) -> list[Lump]:
 
 
 def _leg(anatomy: Anatomy, side: str) -> list[Lump]:
-    part = f"{side}_leg"
-    upper = anatomy.length(f"{side}_knee") / anatomy.stature * _AVERAGE_STATURE
-    lower = anatomy.length(f"{side}_ankle") / anatomy.stature * _AVERAGE_STATURE
+    """Thigh, calf and shoe."""
+    part, shoe = f"{side}_leg", (1.0, 1.15, 1.0)
+    upper, lower = _average(anatomy, f"{side}_knee"), _average(anatomy, f"{side}_ankle")
     # Melting the lumps together makes the soles about 7 mm thicker.
-    ankle = anatomy.ankle_height / anatomy.stature * _AVERAGE_STATURE - 0.007
-    ball = anatomy.offsets[INDEX[f"{side}_toe"]] / anatomy.stature * _AVERAGE_STATURE
+    ankle = anatomy.ankle_height / anatomy.stature * AVERAGE_STATURE - 0.007
+    x, _, z = (float(value) for value in anatomy.offsets[INDEX[f"{side}_toe"]] / anatomy.stature * AVERAGE_STATURE)
     return [
         Lump(f"{side}_hip", part, (0.0, 0.0, -0.03), (0.004, 0.0, -upper), (0.090, 0.062)),
         Lump(f"{side}_knee", part, (0.004, 0.0, 0.0), (-0.008, 0.0, -0.14), (0.062, 0.062)),
         Lump(f"{side}_knee", part, (-0.008, 0.0, -0.14), (-0.008, 0.0, -lower + 0.05), (0.062, 0.050)),
         Lump(f"{side}_ankle", part, (-0.008, 0.0, 0.01), (-0.01, 0.0, -0.03), (0.038, 0.040)),
         Lump(f"{side}_ankle", part, (-0.036, 0.0, -0.04), (0.04, 0.0, -0.04), (0.037, 0.04), floor=-ankle),
-        Lump(
-            f"{side}_ankle",
-            part,
-            (0.03, 0.0, -0.035),
-            (float(ball[0]), 0.0, float(ball[2]) + 0.005),
-            (0.04, 0.036),
-            (1.0, 1.15, 1.0),
-            floor=-ankle,
-        ),
-        Lump(
-            f"{side}_toe",
-            part,
-            (0.0, 0.0, 0.005),
-            (0.05, 0.0, 0.0),
-            (0.036, 0.030),
-            (1.0, 1.15, 1.0),
-            floor=-ankle - float(ball[2]),
-        ),
+        Lump(f"{side}_ankle", part, (0.03, 0.0, -0.035), (x, 0.0, z + 0.005), (0.04, 0.036), shoe, -ankle),
+        Lump(f"{side}_toe", part, (0.0, 0.0, 0.005), (0.05, 0.0, 0.0), (0.036, 0.030), shoe, -ankle - z),
     ]

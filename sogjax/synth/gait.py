@@ -9,14 +9,18 @@ from jaxtyping import Float
 from scipy.interpolate import PchipInterpolator
 
 from sogjax.synth.anatomy import INDEX, SIDES, Anatomy, Pose
-from sogjax.synth.limbs import heading_matrix, pose_from_angles, reach
+from sogjax.synth.limbs import heading_matrix, leg, pose_from_angles, reach
 from sogjax.synth.rotations import Matrix, Vector, turned
 
 Path = Callable[[float], tuple[Float[np.ndarray, "2"], float]]
 """Place on the floor and heading (radians) after so many metres."""
+Footprint = tuple[Vector, float]
+"""Where a foot stands flat, below the ankle, and its heading."""
 
 _SWING = 0.76
 """Share of a step's time that its foot is in the air."""
+_STRIDE = 0.36
+"""Length of a step, as a share of the stature."""
 _MAX_STEPS = 4000
 
 
@@ -52,6 +56,37 @@ def egg(length: float, width: float, start: float) -> Path:
     return place
 
 
+def eased(since: float, ramp: float) -> float:
+    """Seconds in motion, some time after a start that takes `ramp` seconds."""
+    since = max(since, 0.0)
+    return since - ramp / 2 if since > ramp else since**2 / (2 * ramp)
+
+
+def footprint(path: Path, metres: float, side: str, aside: float, outwards: float) -> Footprint:
+    """A foot so many metres beside a path, its toes turned outwards by so many degrees."""
+    ground, heading = path(metres)
+    sign = 1.0 if side == "left" else -1.0
+    normal = np.array([-np.sin(heading), np.cos(heading)])
+    return np.array([*(ground + sign * aside * normal), 0.0]), heading + sign * np.deg2rad(outwards)
+
+
+def rolled(anatomy: Anatomy, side: str, print_: Footprint, pitch: float) -> tuple[Vector, Matrix]:
+    """Ankle and rotation of a foot that is pitched (degrees) about its heel (toes up) or its ball (heel up)."""
+    ground, heading = print_
+    flat, height = heading_matrix(heading), anatomy.ankle_height
+    ball = anatomy.offsets[INDEX[f"{side}_toe"]]
+    pivot = np.array([ball[0] if pitch > 0.0 else -0.62 * height, 0.0, -height])
+    rotation = turned(("y", pitch))
+    ankle = np.array([0.0, 0.0, height]) + pivot - rotation @ pivot
+    return ground + flat @ ankle, flat @ rotation
+
+
+def with_foot(anatomy: Anatomy, pose: Pose, side: str, foot: tuple[Vector, Matrix], toe: float, pole: Vector) -> Pose:
+    """The pose with an ankle and a foot's rotation reached, and its toes bent upwards by so many degrees."""
+    pose = reach(anatomy, pose, leg(side), foot[0], pole, foot[1])
+    return pose.with_rotation(f"{side}_toe", turned(("y", -toe)))
+
+
 @dataclass(frozen=True)
 class Walk:
     """A person who stands still, then walks along a path.
@@ -63,10 +98,6 @@ class Walk:
     path: Path
     delay: float = 0.2
     """Seconds before the first step."""
-    cadence: float = 1.75
-    """Steps per second."""
-    stride: float = 0.36
-    """Length of a step, as a share of the stature."""
     swing: float = 1.0
     """How far the arms swing, 1 = as usual."""
     aside: float = 9.0
@@ -75,22 +106,21 @@ class Walk:
 
     def __call__(self, time: float) -> Pose:
         """The pose at a time (seconds)."""
-        beat = self._beat(time)
+        beat = 1.75 * eased(time - self.delay, 0.5)  # steps made, as a real number
         effort = float(np.clip(beat, 0.0, 1.0)) ** 2
-        ground, heading = self.path(float(_progress_of(self.stride * self.anatomy.stature)(min(beat, _MAX_STEPS))))
+        ground, heading = self.path(float(_progress_of(_STRIDE * self.anatomy.stature)(min(beat, _MAX_STEPS))))
         side = 1.0 if self.first == "right" else -1.0
         sway, lead = side * effort * np.sin(np.pi * beat), -side * effort * np.cos(np.pi * beat)
         # Low while both feet stand wide apart (whole beats), high while one leg passes the other.
         bob = 0.014 * np.cos(2.0 * np.pi * (beat - 0.5)) * effort
         height = self.anatomy.hip_height - 0.012 - 0.024 * effort + bob
-        position = np.array([*ground, height]) + heading_matrix(heading) @ np.array([0.03 * effort, 0.018 * sway, 0.0])
-        pose = pose_from_angles(self._angles(lead, effort), position, self._pelvis(heading, lead, sway))
+        facing = heading_matrix(heading)
+        position = np.array([*ground, height]) + facing @ np.array([0.03 * effort, 0.018 * sway, 0.0])
+        pelvis = facing @ turned(("z", 5.0 * lead), ("x", 2.0 * sway), ("y", 3.0))
+        pose = pose_from_angles(self._angles(lead, effort), position, pelvis)
         for name in SIDES:
             pose = self._leg(pose, name, beat)
         return pose
-
-    def _pelvis(self, heading: float, lead: float, sway: float) -> Matrix:
-        return heading_matrix(heading) @ turned(("z", 5.0 * lead), ("x", 2.0 * sway), ("y", 3.0))
 
     def _angles(self, lead: float, effort: float) -> dict[str, float]:
         """Trunk and arms; `lead` is 1 when the left leg is behind and the right one in front, -1 the other way."""
@@ -106,84 +136,49 @@ class Walk:
             }
         return angles
 
-    def _beat(self, time: float) -> float:
-        """Steps made, as a real number; it starts smoothly."""
-        ramp, since = 0.5, max(time - self.delay, 0.0)
-        eased = since - ramp / 2 if since > ramp else since**2 / (2 * ramp)
-        return self.cadence * eased
-
-    def _footprint(self, side: str, step: int) -> tuple[Vector, float]:
-        """Where a foot stands flat after its step (0: at the start): below the ankle, and its heading."""
-        metres = 0.0 if step <= 0 else (step - 0.5) * self.stride * self.anatomy.stature
-        ground, heading = self.path(metres)
-        sign = 1.0 if side == "left" else -1.0
-        # Standing feet are as far apart as the hips, walking ones nearly on one line.
-        aside = self.anatomy.stature * (0.055 if step <= 0 else 0.042)
-        normal = np.array([-np.sin(heading), np.cos(heading)])
-        return np.array([*(ground + sign * aside * normal), 0.0]), heading + sign * np.deg2rad(6.0)
+    def _footprint(self, side: str, step: int) -> Footprint:
+        """Where a foot stands after its step: at the start (0) as far apart as the hips, then nearly on one line."""
+        metres = 0.0 if step <= 0 else (step - 0.5) * _STRIDE * self.anatomy.stature
+        return footprint(self.path, metres, side, self.anatomy.stature * (0.055 if step <= 0 else 0.042), 6.0)
 
     def _leg(self, pose: Pose, side: str, beat: float) -> Pose:
         """Set one leg: find the step its foot is in, roll over heel and ball while it stands."""
-        parity = 1 if side == self.first else 0
         step = int(np.floor(beat)) + 1
-        if step % 2 != parity:
+        if step % 2 != (1 if side == self.first else 0):
             step -= 1
         # `step` is the foot's latest step; it flies during the middle of [step - 1, step].
         flight = (beat - (step - 1) - (1.0 - _SWING) / 2) / _SWING
-        flying = 0.0 < flight < 1.0 and step >= 1
+        if step >= 1 and 0.0 < flight < 1.0:
+            return self._flying(pose, side, flight, step)
+        stood = step if step >= 1 and flight >= 1.0 else step - 2
+        print_, pitch = self._footprint(side, stood), _pitch(beat, stood) if stood > 0 else 0.0
+        return self._set_leg(pose, side, rolled(self.anatomy, side, print_, pitch), max(pitch, 0.0), print_[1])
+
+    def _flying(self, pose: Pose, side: str, flight: float, step: int) -> Pose:
         before, after = self._footprint(side, step - 2), self._footprint(side, step)
-        if step < 1:
-            return self._planted(pose, side, *before, self._roll(0.0))
-        if flight <= 0.0:
-            return self._planted(pose, side, *before, self._roll(-1.0 if step > 2 else 0.0, beat, step - 2))
-        if not flying:
-            return self._planted(pose, side, *after, self._roll(1.0, beat, step))
-        return self._flying(pose, side, before, after, flight, step)
-
-    def _roll(self, stage: float, beat: float = 0.0, step: int = 0) -> float:
-        """Pitch of a standing foot in degrees: toes up after touch-down, heel up before it lifts."""
-        if stage == 0.0:
-            return 0.0
-        touched = step - (1.0 - _SWING) / 2
-        lifted = step + 1.0 + (1.0 - _SWING) / 2
-        share = (beat - touched) / (lifted - touched)
-        down = float(np.clip(1.0 - share / 0.16, 0.0, 1.0))
-        up = float(np.clip((share - 0.52) / 0.48, 0.0, 1.0))
-        return -16.0 * down**2 * (3 - 2 * down) + 34.0 * up * up
-
-    def _planted(self, pose: Pose, side: str, ground: Vector, heading: float, pitch: float) -> Pose:
-        ankle, rotation = self._rolled(side, ground, heading, pitch)
-        return self._set_leg(pose, side, ankle, rotation, max(pitch, 0.0), heading)
-
-    def _rolled(self, side: str, ground: Vector, heading: float, pitch: float) -> tuple[Vector, Matrix]:
-        """Ankle and rotation of a foot that is pitched about its heel (toes up) or its ball (heel up)."""
-        flat, height = heading_matrix(heading), self.anatomy.ankle_height
-        ball = self.anatomy.offsets[INDEX[f"{side}_toe"]]
-        pivot = np.array([ball[0], 0.0, -height]) if pitch > 0.0 else np.array([-0.62 * height, 0.0, -height])
-        rotation = turned(("y", pitch))
-        ankle = np.array([0.0, 0.0, height]) + pivot - rotation @ pivot
-        return ground + flat @ ankle, flat @ rotation
-
-    def _flying(
-        self, pose: Pose, side: str, before: tuple[Vector, float], after: tuple[Vector, float], flight: float, step: int
-    ) -> Pose:
         from_pitch = 34.0 if step > 2 else 0.0
-        start, _ = self._rolled(side, *before, from_pitch)
-        end, _ = self._rolled(side, *after, -16.0)
+        start, _ = rolled(self.anatomy, side, before, from_pitch)
+        end, _ = rolled(self.anatomy, side, after, -16.0)
         share = flight * flight * (3.0 - 2.0 * flight)
         heading = before[1] + share * (after[1] - before[1])
         pitch = (1.0 - share) * from_pitch - 16.0 * share + 24.0 * np.sin(np.pi * flight) ** 2 * (1.0 - flight)
         ankle = start + share * (end - start)
         ankle[2] += 0.055 * np.sin(np.pi * flight) ** 2
-        rotation = heading_matrix(heading) @ turned(("y", pitch))
-        toe = max(from_pitch, 0.0) * (1.0 - share) ** 3
-        return self._set_leg(pose, side, ankle, rotation, toe, heading)
+        foot = ankle, heading_matrix(heading) @ turned(("y", pitch))
+        return self._set_leg(pose, side, foot, from_pitch * (1.0 - share) ** 3, heading)
 
-    def _set_leg(self, pose: Pose, side: str, ankle: Vector, rotation: Matrix, toe: float, heading: float) -> Pose:
-        limb = (f"{side}_hip", f"{side}_knee", f"{side}_ankle")
-        pole = heading_matrix(heading)[:, 0]
-        pose = reach(self.anatomy, pose, limb, ankle, pole, rotation)
-        return pose.with_rotation(f"{side}_toe", turned(("y", -toe)))
+    def _set_leg(self, pose: Pose, side: str, foot: tuple[Vector, Matrix], toe: float, heading: float) -> Pose:
+        return with_foot(self.anatomy, pose, side, foot, toe, heading_matrix(heading)[:, 0])
+
+
+def _pitch(beat: float, step: int) -> float:
+    """Pitch of a foot that stands after a step, in degrees: toes up after touch-down, heel up before it lifts."""
+    touched = step - (1.0 - _SWING) / 2
+    lifted = step + 1.0 + (1.0 - _SWING) / 2
+    share = (beat - touched) / (lifted - touched)
+    down = float(np.clip(1.0 - share / 0.16, 0.0, 1.0))
+    up = float(np.clip((share - 0.52) / 0.48, 0.0, 1.0))
+    return -16.0 * down**2 * (3 - 2 * down) + 34.0 * up * up
 
 
 @cache

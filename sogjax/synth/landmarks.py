@@ -5,11 +5,9 @@ from jaxtyping import Float, Int
 
 from sogjax.synth.anatomy import INDEX, SIDES, Anatomy, Pose
 from sogjax.synth.figure import Figure
-from sogjax.synth.flesh import PARTS, bind_pose
+from sogjax.synth.flesh import AVERAGE_STATURE, PARTS, bind_pose
 
 Offset = tuple[float, float, float]
-
-_AVERAGE_STATURE = 1.75
 
 _LANDMARKS: dict[str, tuple[str, Offset]] = {
     "pelvis": ("pelvis", (0.0, 0.0, 0.0)),
@@ -81,39 +79,29 @@ def _two_sided(centre: dict, side: dict) -> dict:
 
 LANDMARKS: dict[str, tuple[str, Offset]] = _two_sided(_LANDMARKS, _SIDE_LANDMARKS)
 KEYPOINTS: dict[str, tuple[str, Offset]] = LANDMARKS | _two_sided(_FACE_AND_FEET, _SIDE_FACE_AND_FEET)
-"""What the keypoints of a scheme are points of."""
+"""What the keypoints of a scheme are points of; the landmarks come first."""
 MARKERS: dict[str, tuple[str, str, Offset]] = _two_sided(_MARKERS, _SIDE_MARKERS)
 
 
 def landmark_points(anatomy: Anatomy, pose: Pose) -> Float[np.ndarray, "landmark 3"]:
     """The landmarks in the world, in the order of `LANDMARKS`."""
-    return _points(anatomy, pose, LANDMARKS)
+    return keypoint_points(anatomy, pose, np.zeros((len(KEYPOINTS), 3)))[: len(LANDMARKS)]
 
 
 def keypoint_points(
     anatomy: Anatomy, pose: Pose, shifts: Float[np.ndarray, "keypoint 3"]
 ) -> Float[np.ndarray, "keypoint 3"]:
     """What keypoints are of, in the world, in the order of `KEYPOINTS`; shifted in their joints' frames, metres."""
-    return _points(anatomy, pose, KEYPOINTS, shifts)
-
-
-def _points(
-    anatomy: Anatomy,
-    pose: Pose,
-    table: dict[str, tuple[str, Offset]],
-    shifts: Float[np.ndarray, "point 3"] | None = None,
-) -> Float[np.ndarray, "point 3"]:
     frames = anatomy.world_from_joint(pose)
-    scale = anatomy.stature / _AVERAGE_STATURE
-    moved = np.zeros((len(table), 3)) if shifts is None else shifts
-    places = zip(table.values(), moved, strict=True)
+    scale = anatomy.stature / AVERAGE_STATURE
+    places = zip(KEYPOINTS.values(), shifts, strict=True)
     return np.stack([_point(frames, joint, scale * np.array(offset) + shift) for (joint, offset), shift in places])
 
 
 def marker_vertices(figure: Figure) -> Int[np.ndarray, "marker"]:
     """The vertices that carry the markers, in the order of `MARKERS`."""
     frames = figure.anatomy.world_from_joint(bind_pose(figure.anatomy))
-    scale = figure.anatomy.stature / _AVERAGE_STATURE
+    scale = figure.anatomy.stature / AVERAGE_STATURE
     vertices = []
     for part, joint, offset in MARKERS.values():
         target = _point(frames, joint, scale * np.array(offset))

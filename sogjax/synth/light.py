@@ -60,7 +60,7 @@ class ShadowMap:
     axes: Float[np.ndarray, "3 3"]
     """Columns: the grid's x and y, and the direction from the lamp."""
     origin: Float[np.ndarray, "3"]
-    """Of the grid, and of the distances, in the grid's axes (metres)."""
+    """Where grid and distances begin, in the grid's axes (metres)."""
     spacing: float
     spread: float
     """Radius over which shadows are softened, metres."""
@@ -76,7 +76,7 @@ class ShadowMap:
         spread: float = 0.03,
         bias: float = 0.03,
     ) -> "ShadowMap":
-        """The map of some meshes, lit from the direction `towards`."""
+        """The map of some meshes, lit from the direction `towards`; lengths in metres."""
         axes = frame(-towards, [1.0, 0.0, 0.0])
         if not meshes:
             return cls(axes, np.zeros(3), spacing, spread, bias, np.full((1, 1), _FAR, np.float32))
@@ -89,9 +89,8 @@ class ShadowMap:
         depths = np.full((window.height, window.width), _FAR, np.float32)
         for mesh, local in zip(meshes, points, strict=True):
             local = local - origin
-            hits = rasterize(
-                local[:, :2] / spacing, local[:, 2] + 0.5, mesh.faces, window, perspective=False, cull=False
-            )
+            pixels, heights = local[:, :2] / spacing, local[:, 2] + 0.5
+            hits = rasterize(pixels, heights, mesh.faces, window, perspective=False, cull=False)
             old = depths[hits.rows, hits.columns]
             depths[hits.rows, hits.columns] = np.minimum(old, hits.depths.astype(np.float32) - 0.5)
         return cls(axes, origin, spacing, spread, bias, depths)

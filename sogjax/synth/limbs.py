@@ -4,12 +4,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from sogjax.synth.anatomy import INDEX, JOINTS, SIDES, Anatomy, Pose
+from sogjax.synth.anatomy import INDEX, JOINTS, PARENTS, SIDES, Anatomy, Pose
 from sogjax.synth.rotations import Matrix, Vector, about, frame, mirrored, turned, unit
-
-_SPINE = ("spine", "waist", "chest")
-_STRETCH = 0.999
-"""A reaching limb never gets quite straight: the bend direction stays defined."""
 
 
 def pose_from_angles(angles: Mapping[str, float], position: Vector, heading: Matrix | None = None) -> Pose:
@@ -27,7 +23,7 @@ def pose_from_angles(angles: Mapping[str, float], position: Vector, heading: Mat
     rotations[0] = np.eye(3) if heading is None else heading
     spine = turned(("z", get("turn") / 3), ("y", get("bend") / 3), ("x", -get("lean") / 3))
     head = turned(("z", get("look") / 2), ("y", get("nod") / 2), ("x", -get("tilt") / 2))
-    for names, rotation in ((_SPINE, spine), (("neck", "head"), head)):
+    for names, rotation in ((("spine", "waist", "chest"), spine), (("neck", "head"), head)):
         for name in names:
             rotations[INDEX[name]] = rotation
     for side in SIDES:
@@ -41,7 +37,8 @@ def _arm(angles: Mapping[str, float]) -> dict[str, Matrix]:
     """Rotations of a left arm; the shoulder girdle rises with the arm, which still points where it should."""
     get = lambda name: float(angles.get(name, 0.0))
     raised, plane = get("raise"), get("plane")
-    clavicle = turned(("x", clavicle_lift(raised)))
+    share = np.clip((raised - 30.0) / 150.0, 0.0, 1.0)
+    clavicle = turned(("x", float(28.0 * share * share * (3.0 - 2.0 * share))))
     upper_arm = turned(("z", plane), ("y", -raised), ("z", get("roll") - plane))
     return {
         "clavicle": clavicle,
@@ -49,12 +46,6 @@ def _arm(angles: Mapping[str, float]) -> dict[str, Matrix]:
         "elbow": turned(("y", -get("elbow"))),
         "wrist": turned(("z", get("palm")), ("x", get("wrist"))),
     }
-
-
-def clavicle_lift(raised: float) -> float:
-    """Degrees by which the shoulder girdle rises with an arm raised by so many degrees."""
-    share = np.clip((raised - 30.0) / 150.0, 0.0, 1.0)
-    return float(28.0 * share * share * (3.0 - 2.0 * share))
 
 
 def _leg(angles: Mapping[str, float]) -> dict[str, Matrix]:
@@ -65,6 +56,16 @@ def _leg(angles: Mapping[str, float]) -> dict[str, Matrix]:
         "ankle": turned(("y", -get("ankle"))),
         "toe": np.eye(3),
     }
+
+
+def arm(side: str) -> tuple[str, str, str]:
+    """The joints of an arm that reaches: root, middle and end."""
+    return f"{side}_shoulder", f"{side}_elbow", f"{side}_wrist"
+
+
+def leg(side: str) -> tuple[str, str, str]:
+    """The joints of a leg that reaches: root, middle and end."""
+    return f"{side}_hip", f"{side}_knee", f"{side}_ankle"
 
 
 def reach(
@@ -88,26 +89,21 @@ def reach(
     forwards = pole if root_joint.endswith("hip") else -pole
     upper_rotation = frame(root - middle, forwards)
     lower_rotation = frame(middle - tip, forwards)
-    above = frames[_parent(root_joint), :3, :3]
+    above = frames[PARENTS[INDEX[root_joint]], :3, :3]
     pose = pose.with_rotation(root_joint, above.T @ upper_rotation)
     pose = pose.with_rotation(middle_joint, upper_rotation.T @ lower_rotation)
     return pose if end is None else pose.with_rotation(end_joint, lower_rotation.T @ end)
 
 
 def _bend(root: Vector, target: Vector, upper: float, lower: float, pole: Vector) -> tuple[Vector, Vector]:
-    """Middle and end of two bones from `root` towards `target`, bent towards `pole`."""
+    """Middle and end of two bones from `root` towards `target`, bent towards `pole`, never quite straight."""
     direction = unit(target - root)
-    longest, shortest = _STRETCH * (upper + lower), abs(upper - lower) + 0.05
+    longest, shortest = 0.999 * (upper + lower), abs(upper - lower) + 0.05
     distance = float(np.clip(np.linalg.norm(target - root), shortest, longest))
     along = (upper**2 - lower**2 + distance**2) / (2.0 * distance)
     aside = np.sqrt(max(upper**2 - along**2, 0.0))
     sideways = unit(pole - (pole @ direction) * direction)
     return root + along * direction + aside * sideways, root + distance * direction
-
-
-def _parent(joint: str) -> int:
-    side, _, base = joint.rpartition("_")
-    return INDEX["pelvis"] if base == "hip" else INDEX[f"{side}_clavicle"]
 
 
 def heading_matrix(heading: float) -> Matrix:

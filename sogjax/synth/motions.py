@@ -1,4 +1,4 @@
-"""What the people of a recording do: a pose for every moment."""
+"""What the people of a recording do: a pose for every moment; and where furniture stands among them."""
 
 from collections.abc import Callable, Sequence
 
@@ -6,26 +6,17 @@ import numpy as np
 
 from sogjax.synth.anatomy import Anatomy, Pose
 from sogjax.synth.cartwheel import Cartwheel
-from sogjax.synth.contact import fighting, hugging
-from sogjax.synth.dancing import dance_keys
-from sogjax.synth.exercises import ARMS, Exercise, squat_kick_keys
-from sogjax.synth.furniture import Site
+from sogjax.synth.contact import TABLE_AHEAD, fighting, hugging, sitting
+from sogjax.synth.exercises import Exercise
 from sogjax.synth.gait import Walk, circle, egg
-from sogjax.synth.rotations import Vector
-from sogjax.synth.settings import PAIRED
-from sogjax.synth.sitting import TABLE_AHEAD, sitting
+from sogjax.synth.rooms import Site
+from sogjax.synth.rotations import ahead_and_left
+from sogjax.synth.routines import ARMS, dance_keys, squat_kick_keys, throw_keys
 from sogjax.synth.sprint import Run
-from sogjax.synth.throwing import throw_keys
 
 Motion = Callable[[float], Pose]
 """The pose at a time in seconds."""
 
-_LANE = 1.25
-"""Metres between people who exercise beside or behind each other, where they have room for arms and legs."""
-_INNER, _OUTER = 0.84, 1.50
-"""Radii of the two circles on which people walk past each other."""
-_RUNWAY = 1.6
-"""Radius of the circle on which people run."""
 _TABLES = {
     "arms": (0.95, 0.0),
     "cartwheel": (1.05, 0.0),
@@ -57,19 +48,17 @@ def motions_of(
         return _passing(anatomies, turn)
     if kind == "run":
         starts = turn + 2.0 * np.pi * np.arange(len(anatomies)) / len(anatomies)
-        return [Run(a, circle((0.0, 0.0), _RUNWAY, float(s), 1.0)) for a, s in zip(anatomies, starts, strict=True)]
-    if kind in PAIRED:
+        return [Run(a, circle((0.0, 0.0), 1.6, float(s), 1.0)) for a, s in zip(anatomies, starts, strict=True)]
+    if kind in ("hug", "fight"):
         return list((hugging if kind == "hug" else fighting)(anatomies, turn))
-    return [
-        _exercise(kind, anatomy, turn, lane, 0.35 * number)
-        for number, (anatomy, lane) in enumerate(zip(anatomies, _lanes(len(anatomies)), strict=True))
-    ]
+    lanes = enumerate(zip(anatomies, _lanes(len(anatomies)), strict=True))
+    return [_exercise(kind, anatomy, turn, lane, 0.35 * number) for number, (anatomy, lane) in lanes]
 
 
 def furniture_sites(kind: str, people: int, rng: np.random.Generator) -> list[Site]:
     """Where furniture stands among people whose motions are drawn from the same random numbers."""
     turn = _drawn_turn(rng)
-    ahead, aside = _axes(turn)
+    ahead, aside = ahead_and_left(turn)
     if kind == "sit":
         return [Site(lane * aside + TABLE_AHEAD * ahead, turn - np.pi / 2, sitter=True) for lane in _lanes(people)]
     if kind not in _TABLES:
@@ -84,12 +73,8 @@ def _drawn_turn(rng: np.random.Generator) -> float:
 
 
 def _lanes(people: int) -> np.ndarray:
-    return _LANE * (np.arange(people) - (people - 1) / 2.0)
-
-
-def _axes(turn: float) -> tuple[Vector, Vector]:
-    """The directions ahead and to the left."""
-    return np.array([np.cos(turn), np.sin(turn), 0.0]), np.array([-np.sin(turn), np.cos(turn), 0.0])
+    """Metres aside or ahead at which people exercise, where each has room for arms and legs."""
+    return 1.25 * (np.arange(people) - (people - 1) / 2.0)
 
 
 def _passing(anatomies: Sequence[Anatomy], turn: float) -> list[Motion]:
@@ -97,26 +82,20 @@ def _passing(anatomies: Sequence[Anatomy], turn: float) -> list[Motion]:
     walks: list[Motion] = []
     inner = (len(anatomies) + 1) // 2
     for k, anatomy in enumerate(anatomies):
-        ring, place = (0, k // 2) if k % 2 == 0 else (1, k // 2)
-        around = 2.0 * np.pi * place / (inner if ring == 0 else len(anatomies) - inner)
-        if ring == 0:
-            path = circle((0.0, 0.0), _INNER, turn + around - 0.62, 1.0)
-        else:
-            path = circle((0.0, 0.0), _OUTER, turn + around + 0.62, -1.0)
-        first = "right" if k % 2 else "left"
-        walks.append(Walk(anatomy, path, delay=0.15, swing=0.7, aside=6.0, first=first))
+        radius, sense, count = (1.50, -1.0, len(anatomies) - inner) if k % 2 else (0.84, 1.0, inner)
+        around = 2.0 * np.pi * (k // 2) / count
+        path = circle((0.0, 0.0), radius, turn + around - sense * 0.62, sense)
+        walks.append(Walk(anatomy, path, delay=0.15, swing=0.7, aside=6.0, first="right" if k % 2 else "left"))
     return walks
 
 
 def _exercise(kind: str, anatomy: Anatomy, turn: float, lane: float, delay: float) -> Motion:
     """Something done on the spot, or along a lane of one's own."""
-    ahead, aside = _axes(turn)
+    ahead, aside = ahead_and_left(turn)
+    place = lane * (ahead if kind in _BEHIND_EACH_OTHER else aside)
     if kind == "cartwheel":
-        return Cartwheel(anatomy, lane * ahead, turn, delay)
-    if kind == "arms":
-        return Exercise(anatomy, ARMS, lane * ahead, turn, delay)
-    place = lane * aside
+        return Cartwheel(anatomy, place, turn, delay)
     if kind == "sit":
         return sitting(anatomy, place, turn, delay)
-    keys = {"squat_kick": squat_kick_keys, "throw": throw_keys, "dance": dance_keys}[kind]
+    keys = {"arms": lambda: ARMS, "squat_kick": squat_kick_keys, "throw": throw_keys, "dance": dance_keys}[kind]
     return Exercise(anatomy, keys(), place, turn, delay)

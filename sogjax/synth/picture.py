@@ -1,4 +1,4 @@
-"""People in front of the empty scene, as a camera sees them."""
+"""The empty scene and people in front of it, as a camera sees them: pictures are averages of samples."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,29 +7,83 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from sogjax.synth import light
-from sogjax.synth.clothes import Wardrobe
 from sogjax.synth.figure import Figure, Mesh
-from sogjax.synth.plate import OVERSAMPLING, Plate, averaged, sample_pixels
 from sogjax.synth.raster import Hits, Window, rasterize
 from sogjax.synth.rotations import unit
+from sogjax.synth.scene import Scene
 from sogjax.synth.views import View
+
+OVERSAMPLING = 2
+"""Samples per pixel in each direction."""
+
+
+@dataclass(frozen=True)
+class Plate:
+    """The empty scene in one camera: the light of its pixels, in two parts, and what they show (linear)."""
+
+    ambient: Float[np.ndarray, "row column 3"]
+    direct: Float[np.ndarray, "row column 3"]
+    points: Float[np.ndarray, "row column 3"]
+    props: Float[np.ndarray, "y x"] | None = None
+    """Depth of the samples that show what stands among the people, infinite elsewhere; None where nothing does."""
+
+    @property
+    def total(self) -> Float[np.ndarray, "row column 3"]:
+        """The picture without people."""
+        return self.ambient + self.direct
+
+
+def sample_pixels(view: View, points: Float[np.ndarray, "n 3"]) -> tuple[np.ndarray, np.ndarray]:
+    """Projected points in the grid of samples, where integers are the samples' places, and depths."""
+    pixels, depths = view.project(points)
+    return (pixels + 0.5) * OVERSAMPLING - 0.5, depths
+
+
+def averaged(samples: Float[np.ndarray, "row column channel"]) -> Float[np.ndarray, "r c channel"]:
+    """Pixels from samples: the mean of each square of them."""
+    n = OVERSAMPLING
+    total = samples[::n, ::n].copy()
+    for i in range(n * n):
+        if i:
+            total += samples[i // n :: n, i % n :: n]
+    return total / np.float32(n * n)
+
+
+def plate_of(scene: Scene, view: View) -> Plate:
+    """Draw the empty scene."""
+    window = Window(0, 0, view.width * OVERSAMPLING, view.height * OVERSAMPLING)
+    pixels, depths = sample_pixels(view, scene.mesh.vertices)
+    hits = rasterize(pixels, depths, scene.mesh.faces, window)
+    vertices = np.concatenate([scene.mesh.vertices, scene.uv], 1, dtype=np.float32)
+    values = hits.interpolated(vertices, scene.mesh.faces)
+    normals = scene.mesh.normals[scene.mesh.faces[hits.faces, 0]].astype(np.float32)
+    albedo = light.linear_from_srgb(scene.colors(hits.faces, values[:, 3:]))
+
+    def image(samples: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "row column 3"]:
+        filled = np.zeros((window.height, window.width, 3), np.float32)
+        filled[hits.rows, hits.columns] = samples
+        return filled
+
+    # Where the shadows of the furniture fall is looked up once per pixel: they are softer than that anyway.
+    points, upwards = (image(v)[::OVERSAMPLING, ::OVERSAMPLING] for v in (values[:, :3], normals))
+    lit = scene.shadow.lit((points + np.float32(0.02) * upwards).reshape(-1, 3), taps=6)
+    lamp = averaged(image(albedo * light.direct(normals))) * lit.reshape(view.height, view.width, 1)
+    ambient = averaged(image(albedo * light.ambient(normals)))
+    return Plate(ambient, lamp, np.ascontiguousarray(points), _depths_of_props(scene, hits, window))
+
+
+def _depths_of_props(scene: Scene, hits: Hits, window: Window) -> Float[np.ndarray, "y x"] | None:
+    if scene.props is None:
+        return None
+    seen = hits.where(scene.props[hits.faces])
+    depths = np.full((window.height, window.width), np.inf)
+    depths[seen.rows, seen.columns] = seen.depths
+    return depths
+
 
 _CONTACT = 0.25
 """Metres around people within which they take away light from above."""
 _LEAST_AMBIENT = 0.45
-
-
-@dataclass(frozen=True)
-class Person:
-    """A person to draw, with clothes fitted."""
-
-    figure: Figure
-    wardrobe: Wardrobe
-
-    @classmethod
-    def dressed(cls, figure: Figure) -> "Person":
-        """Fit the clothes of a figure."""
-        return cls(figure, Wardrobe.fitted(figure.outfit, figure.anatomy))
 
 
 @dataclass(frozen=True)
@@ -39,7 +93,7 @@ class Shadows:
     lamp: light.ShadowMap
     above: light.ShadowMap
     scene: light.ShadowMap | None = None
-    """Of what stands among the people and throws shadows on them."""
+    """The shadows that what stands among the people throws on them."""
 
     @classmethod
     def of(cls, meshes: Sequence[Mesh], scene: light.ShadowMap | None = None) -> "Shadows":
@@ -62,9 +116,14 @@ class Shot:
     coverage: Float[np.ndarray, "row column"]
     """Share of each pixel that shows people."""
 
+    @property
+    def mask(self) -> Bool[np.ndarray, "row column"]:
+        """The pixels that show people by at least a half."""
+        return self.coverage >= 0.5
+
 
 def shot_of(
-    view: View, plate: Plate, people: Sequence[Person], meshes: Sequence[Mesh], shadows: Shadows | None
+    view: View, plate: Plate, people: Sequence[Figure], meshes: Sequence[Mesh], shadows: Shadows | None
 ) -> Shot:
     """Draw people into the empty scene, behind what stands in front of them."""
     picture = plate.total
@@ -81,7 +140,7 @@ def shot_of(
 
 
 def _people_samples(
-    view: View, plate: Plate, people: Sequence[Person], meshes: Sequence[Mesh], shadows: Shadows | None
+    view: View, plate: Plate, people: Sequence[Figure], meshes: Sequence[Mesh], shadows: Shadows | None
 ) -> tuple[np.ndarray, np.ndarray, Window]:
     """Light and coverage of the samples of the smallest window that holds all people."""
     limit = Window(0, 0, view.width * OVERSAMPLING, view.height * OVERSAMPLING)
@@ -92,23 +151,22 @@ def _people_samples(
     covered = np.zeros((window.height, window.width, 1), np.float32)
     empty = np.full((window.height, window.width), np.inf)
     nearest = empty if plate.props is None else plate.props[window.slices].copy()
-    for person, mesh, (pixels, depths) in zip(people, meshes, projected, strict=True):
+    for figure, mesh, (pixels, depths) in zip(people, meshes, projected, strict=True):
         hits = rasterize(pixels, depths, mesh.faces, window)
         front = hits.depths < nearest[hits.rows, hits.columns]
         hits = hits.where(front)
         nearest[hits.rows, hits.columns] = hits.depths
-        colors[hits.rows, hits.columns] = _shaded(person, mesh, hits, shadows)
+        colors[hits.rows, hits.columns] = _shaded(figure, mesh, hits, shadows)
         covered[hits.rows, hits.columns] = 1.0
     return colors, covered, window
 
 
-def _shaded(person: Person, mesh: Mesh, hits: Hits, shadows: Shadows | None) -> Float[np.ndarray, "n 3"]:
+def _shaded(figure: Figure, mesh: Mesh, hits: Hits, shadows: Shadows | None) -> Float[np.ndarray, "n 3"]:
     """Light that the person sends to the camera from the places seen."""
-    figure = person.figure
     attributes = np.concatenate([mesh.vertices, mesh.normals, figure.rest], 1, dtype=np.float32)
     values = hits.interpolated(attributes, mesh.faces)
     points, normals, rest = values[:, :3], unit(values[:, 3:6]), values[:, 6:]
-    albedo = light.linear_from_srgb(person.wardrobe.colors(figure.face_part[hits.faces], rest))
+    albedo = light.linear_from_srgb(figure.wardrobe.colors(figure.face_part[hits.faces], rest))
     lamp = light.direct(normals)
     if shadows is not None:
         lamp = lamp * shadows.lit(points + np.float32(0.02) * normals)[:, None]
@@ -142,8 +200,3 @@ def _darken(
     shape = (window.height, window.width, 1)
     left = _LEAST_AMBIENT + (1.0 - _LEAST_AMBIENT) * open_above.reshape(shape)
     picture[rows, columns] = plate.ambient[rows, columns] * left + plate.direct[rows, columns] * lit.reshape(shape)
-
-
-def mask_of(shot: Shot) -> Bool[np.ndarray, "row column"]:
-    """The pixels that show people by at least a half."""
-    return shot.coverage >= 0.5

@@ -55,7 +55,7 @@ class Hits:
 
     rows: Int[np.ndarray, "n"]
     columns: Int[np.ndarray, "n"]
-    """Of the window."""
+    """Rows and columns of the window."""
     faces: Int[np.ndarray, "n"]
     barycentric: Float[np.ndarray, "3 n"]
     """Weights of the face's corners, corrected for perspective."""
@@ -120,7 +120,7 @@ def _areas(corners: Corners) -> Float[np.ndarray, "face"]:
 
 
 def _plane(corners: Corners, areas: np.ndarray, linear: np.ndarray) -> Float[np.ndarray, "3 face"]:
-    """Of each face the plane a x + b y + c that its `linear` values at the corners lie on."""
+    """The planes a x + b y + c that the `linear` values at the corners of each face lie on."""
     x, y = corners
     first, second = linear[1] - linear[0], linear[2] - linear[0]
     a = (first * (y[2] - y[0]) - second * (y[1] - y[0])) / areas

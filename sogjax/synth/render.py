@@ -13,11 +13,10 @@ from sogjax.io.calibration.rig import CameraEntry, rig_from_entries
 from sogjax.io.calibration.tables import write_toml
 from sogjax.io.ground_truth import GroundTruth, save_ground_truth
 from sogjax.io.recording_files import CALIBRATION, GROUND_TRUTH, INITIAL_POSE, SETTINGS
-from sogjax.synth.anatomy import Anatomy, Pose
-from sogjax.synth.crew import film_all, num_workers
+from sogjax.synth.anatomy import Pose
 from sogjax.synth.detector import DetectorSettings
 from sogjax.synth.exercises import EXAMPLE_POSES
-from sogjax.synth.filming import example_folder, num_pictures
+from sogjax.synth.filming import example_folder, film_all, num_pictures, num_workers
 from sogjax.synth.keypoints import keypoint_folder, write_simulated
 from sogjax.synth.landmarks import LANDMARKS, MARKERS, landmark_points, marker_vertices
 from sogjax.synth.settings import SynthSettings
@@ -25,11 +24,6 @@ from sogjax.synth.stage import Stage, stage_of
 
 Progress = Callable[[Iterable, int, str], Iterable]
 """Wraps an iterable, given its length and a label, and yields the same."""
-
-_ROUGHNESS = 0.025
-"""Metres by which a rough landmark is off, standard deviation on each axis."""
-_ROUGH = 8
-"""Stream of random numbers."""
 
 
 def silent(items: Iterable, total: int, label: str) -> Iterable:
@@ -58,9 +52,15 @@ def render_recording(
     """
     settings.check()
     out = Path(out)
-    _check_free(out)
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        remedy = "choose another, or give overwrite=true to replace it"
+        raise InputError(f"out={out}: exists and is not empty; {remedy}")
     stage = stage_of(settings)
-    temporary = _temporary_beside(out)
+    temporary = out.with_name(f".{out.name[:80]}.{uuid.uuid4().hex[:8]}.tmp")
+    try:
+        temporary.mkdir(parents=True)
+    except OSError as error:
+        raise InputError(f"out={out}: its folder cannot be written ({error.strerror}); choose another") from error
     try:
         _write_descriptions(stage, temporary)
         if detector is not None and detector.keypoints != "none":
@@ -79,23 +79,8 @@ def render_recording(
     return out
 
 
-def _check_free(out: Path) -> None:
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        remedy = "choose another, or give overwrite=true to replace it"
-        raise InputError(f"out={out}: exists and is not empty; {remedy}")
-
-
-def _temporary_beside(out: Path) -> Path:
-    temporary = out.with_name(f".{out.name[:80]}.{uuid.uuid4().hex[:8]}.tmp")
-    try:
-        temporary.mkdir(parents=True)
-    except OSError as error:
-        raise InputError(f"out={out}: its folder cannot be written ({error.strerror}); choose another") from error
-    return temporary
-
-
 def _write_descriptions(stage: Stage, folder: Path) -> None:
-    """Everything but the pictures."""
+    """Write everything but the pictures."""
     entries = [
         CameraEntry(
             name=view.name,
@@ -135,13 +120,13 @@ def ground_truth_of(stage: Stage) -> GroundTruth:
     """True markers and joints of every frame."""
     several = stage.settings.actors > 1
     prefixes = [f"{name}/" if several else "" for name in stage.settings.actor_names]
-    vertices = [marker_vertices(person.figure) for person in stage.people]
+    vertices = [marker_vertices(person) for person in stage.people]
     markers, joints = [], []
     for frame in range(stage.settings.frames):
         poses = stage.poses(frame)
         placed = list(zip(stage.people, poses, vertices, strict=True))
-        markers.append(np.concatenate([person.figure.posed(pose).vertices[v] for person, pose, v in placed]))
-        joints.append(np.concatenate([landmark_points(p.figure.anatomy, pose) for p, pose, _ in placed]))
+        markers.append(np.concatenate([person.posed(pose).vertices[v] for person, pose, v in placed]))
+        joints.append(np.concatenate([landmark_points(p.anatomy, pose) for p, pose, _ in placed]))
     return GroundTruth(
         fps=stage.settings.fps,
         markers=np.stack(markers),
@@ -152,11 +137,10 @@ def ground_truth_of(stage: Stage) -> GroundTruth:
 
 
 def _rough(stage: Stage, actor: int, number: int, pose: Pose) -> dict:
-    """Landmarks as a person would read them off, as plain YAML."""
-    anatomy: Anatomy = stage.people[actor].figure.anatomy
-    rng = np.random.default_rng([stage.settings.seed, _ROUGH, actor, number])
-    points = landmark_points(anatomy, pose)
-    points = points + _ROUGHNESS * rng.standard_normal(points.shape)
+    """Landmarks as a person would read them off, as plain YAML: 25 mm off, standard deviation on each axis."""
+    rng = np.random.default_rng([stage.settings.seed, 8, actor, number])
+    points = landmark_points(stage.people[actor].anatomy, pose)
+    points = points + 0.025 * rng.standard_normal(points.shape)
     return {"landmarks": {name: np.round(p, 3).tolist() for name, p in zip(LANDMARKS, points, strict=True)}}
 
 

@@ -1,4 +1,4 @@
-"""The room: floor, walls, furniture along them and posters, in several kinds."""
+"""The room in several kinds: floor, walls, what stands along them, and furniture among the people, which hides legs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,27 +8,16 @@ import numpy as np
 from jaxtyping import Float
 
 from sogjax.synth.clothes import Outfit
-from sogjax.synth.scene import Panel, box, direction
-from sogjax.synth.textures import Rgb, Texture
+from sogjax.synth.rotations import ahead_and_left
+from sogjax.synth.scene import Panel, Rgb, Texture, box, direction
 
 _WALLS = (-5.6, 5.9, -5.8, 5.5, 3.3)
-"""x from, x to, y from, y to, height."""
+"""Metres: x from, x to, y from, y to, height."""
 
 _FURNITURE: tuple[Rgb, ...] = (
-    (0.60, 0.22, 0.20),
-    (0.25, 0.36, 0.55),
-    (0.72, 0.60, 0.30),
-    (0.33, 0.47, 0.33),
-    (0.78, 0.74, 0.66),
-    (0.30, 0.28, 0.27),
-    (0.52, 0.38, 0.26),
-    (0.80, 0.64, 0.52),
-    (0.46, 0.44, 0.58),
+    *((0.60, 0.22, 0.20), (0.25, 0.36, 0.55), (0.72, 0.60, 0.30), (0.33, 0.47, 0.33), (0.78, 0.74, 0.66)),
+    *((0.30, 0.28, 0.27), (0.52, 0.38, 0.26), (0.80, 0.64, 0.52), (0.46, 0.44, 0.58)),
 )
-
-_PLAIN: Rgb = (0.62, 0.61, 0.58)
-_GREEN: Rgb = (0.22, 0.60, 0.28)
-_CEILING: tuple[Rgb, Rgb] = ((0.86, 0.86, 0.84), (0.82, 0.82, 0.80))
 
 
 @dataclass(frozen=True)
@@ -51,10 +40,10 @@ def room_of(kind: str, outfits: Sequence[Outfit], rng: np.random.Generator) -> l
         outfits: what the people wear.
         rng: draws the furniture.
     """
-    if kind == "plain":
-        return _bare_shell(_PLAIN)
-    if kind == "green":
-        return _bare_shell(_GREEN)
+    bare: dict[str, Rgb] = {"plain": (0.62, 0.61, 0.58), "green": (0.22, 0.60, 0.28)}
+    if kind in bare:
+        sheet = Texture("plain", (bare[kind],), 1.0, 21)
+        return _shell(sheet, sheet, sheet, 22)
     return _cluttered(rng, _camouflage(outfits) if kind == "camouflage" else Decor())
 
 
@@ -68,7 +57,10 @@ def _camouflage(outfits: Sequence[Outfit]) -> Decor:
 
 def _cluttered(rng: np.random.Generator, decor: Decor) -> list[Panel]:
     """A room with furniture along its walls, a few low things inside, and posters."""
-    panels = [*_shell(rng, decor), *_posters(rng, decor)]
+    seed = int(rng.integers(1 << 30))
+    floor, paint = Texture("planks", decor.floor, 0.14, seed), Texture("wall", decor.paint, 1.0, seed + 1)
+    panels = _shell(floor, paint, Texture("bricks", decor.bricks, 0.24, seed + 2), seed + 3)
+    panels += _posters(rng, decor)
     for angle in np.deg2rad(np.arange(0, 360, 24) + rng.uniform(-6, 6, 15)):
         panels += _standing_thing(angle, rng, decor)
     for angle in np.deg2rad(rng.uniform(0, 90) + np.array([0, 95, 200, 275])):
@@ -77,24 +69,10 @@ def _cluttered(rng: np.random.Generator, decor: Decor) -> list[Panel]:
     return panels
 
 
-def _shell(rng: np.random.Generator, decor: Decor) -> list[Panel]:
-    seed = int(rng.integers(1 << 30))
-    return _walls(
-        Texture("planks", decor.floor, 0.14, seed),
-        Texture("wall", decor.paint, 1.0, seed + 1),
-        Texture("bricks", decor.bricks, 0.24, seed + 2),
-        Texture("checks", _CEILING, 0.6, seed + 3),
-    )
-
-
-def _bare_shell(color: Rgb) -> list[Panel]:
-    """Floor and walls of one colour."""
-    sheet = Texture("plain", (color,), 1.0, 21)
-    return _walls(sheet, sheet, sheet, Texture("checks", _CEILING, 0.6, 22))
-
-
-def _walls(floor: Texture, paint: Texture, bricks: Texture, ceiling: Texture) -> list[Panel]:
+def _shell(floor: Texture, paint: Texture, bricks: Texture, seed: int) -> list[Panel]:
+    """Floor, ceiling and walls, one of them of bricks."""
     x0, x1, y0, y1, top = _WALLS
+    ceiling = Texture("checks", ((0.86, 0.86, 0.84), (0.82, 0.82, 0.80)), 0.6, seed)
     x, y, z = np.array([x1 - x0, 0, 0]), np.array([0, y1 - y0, 0]), np.array([0, 0, top])
     return [
         Panel(np.array([x0, y0, 0.0]), x, y, floor, False),
@@ -107,22 +85,19 @@ def _walls(floor: Texture, paint: Texture, bricks: Texture, ceiling: Texture) ->
 
 
 def _posters(rng: np.random.Generator, decor: Decor) -> list[Panel]:
+    """Four posters on every wall."""
     x0, x1, y0, y1, _ = _WALLS
+    x, y = np.array([1.0, 0, 0]), np.array([0, 1.0, 0])
     panels = []
-    for wall in range(4):
-        for along in (-3.4, -1.2, 0.9, 3.2):
+    for offset, along, aside in ((y0 + 0.015, -x, y), (y1 - 0.015, x, y), (x0 + 0.015, y, x), (x1 - 0.015, -y, x)):
+        for place in (-3.4, -1.2, 0.9, 3.2):
             size = rng.uniform([0.7, 0.8], [1.3, 1.2])
             height = rng.uniform(1.15, 1.6)
-            shift = along + rng.uniform(-0.3, 0.3)
-            corner, u = {
-                0: (np.array([shift, y0 + 0.015, height]), np.array([-1.0, 0, 0])),
-                1: (np.array([shift, y1 - 0.015, height]), np.array([1.0, 0, 0])),
-                2: (np.array([x0 + 0.015, shift, height]), np.array([0, 1.0, 0])),
-                3: (np.array([x1 - 0.015, shift, height]), np.array([0, -1.0, 0])),
-            }[wall]
+            shift = place + rng.uniform(-0.3, 0.3)
+            corner = shift * np.abs(along) + offset * aside + np.array([0, 0, height])
             colors = tuple(decor.furniture[k] for k in rng.permutation(len(decor.furniture))[:5])
             texture = Texture("poster", colors, float(size.max()), int(rng.integers(1 << 30)))
-            panels.append(Panel(corner, size[0] * u, np.array([0, 0, size[1]]), texture, False))
+            panels.append(Panel(corner, size[0] * along, np.array([0, 0, size[1]]), texture, False))
     return panels
 
 
@@ -153,10 +128,91 @@ def _standing_thing(angle: float, rng: np.random.Generator, decor: Decor) -> lis
 
 def _barrel(place: Float[np.ndarray, "3"], radius: float, height: float, texture: Texture) -> list[Panel]:
     """A tub with twelve sides and a lid."""
-    angles = np.linspace(0, 2 * np.pi, 13)
-    rim = [place + radius * direction(angle) for angle in angles]
+    rim = [place + radius * direction(angle) for angle in np.linspace(0, 2 * np.pi, 13)]
     z = np.array([0.0, 0.0, height])
     sides = [Panel(a, b - a, z, texture) for a, b in pairwise(rim)]
     half = radius * 0.70
-    lid = box(place + z * 0.98, np.array([2 * half, 2 * half, 0.02 * height + 0.01]), 0.3, texture)
-    return sides + lid
+    return sides + box(place + z * 0.98, np.array([2 * half, 2 * half, 0.02 * height + 0.01]), 0.3, texture)
+
+
+TABLE_SIZE, TABLE_HEIGHT, SEAT_HEIGHT = (1.15, 0.72), 0.74, 0.45
+"""Metres: length and depth of a table, its height, and that of a seat."""
+SITTER_SEAT, EDGE = -0.34, 0.20
+"""Metres from where a sitter's feet stand to the hips on the chair, and to the table."""
+
+_WOOD = Texture("planks", ((0.56, 0.40, 0.26), (0.64, 0.47, 0.31)), 0.24, 5)
+_DARK = Texture("plain", ((0.34, 0.26, 0.20),), 1.0, 6)
+_SEATS = Texture("plain", ((0.45, 0.20, 0.17),), 1.0, 7)
+
+
+@dataclass(frozen=True)
+class Site:
+    """Where furniture stands: the middle of the table on the floor, and the direction its long side runs in."""
+
+    place: Float[np.ndarray, "3"]
+    turn: float
+    """Radians about the vertical; people at the table look along `turn` + 90 degrees or the other way."""
+    sitter: bool = False
+    """Whether the chair stands at the long side, for somebody who sits at the table; else one at each end."""
+
+
+def furniture(kind: str, sites: Sequence[Site]) -> list[Panel]:
+    """Panels of the furniture.
+
+    Args:
+        kind: `table`, `chairs` or `table_and_chairs`.
+        sites: where; one table with its chairs each.
+    """
+    panels: list[Panel] = []
+    for site in sites:
+        if kind != "chairs":
+            panels += _table(site)
+        if kind != "table":
+            for place, facing in _chair_places(site, kind == "chairs"):
+                panels += _chair(place, facing)
+    return panels
+
+
+def _chair_places(site: Site, close: bool) -> list[tuple[Float[np.ndarray, "3"], float]]:
+    """Where chairs stand and look; without a table between them they stand closer together."""
+    along, across = ahead_and_left(site.turn)
+    if site.sitter:
+        return [(site.place - (0.5 * TABLE_SIZE[1] + EDGE - SITTER_SEAT - 0.02) * across, site.turn + np.pi / 2)]
+    away = 0.42 if close else 0.5 * TABLE_SIZE[0] + 0.10
+    return [(site.place - away * along, site.turn), (site.place + away * along, site.turn + np.pi)]
+
+
+def _table(site: Site) -> list[Panel]:
+    """A top, four legs, and a board between the legs along the middle."""
+    along, across = ahead_and_left(site.turn)
+    length, depth = TABLE_SIZE
+    below = TABLE_HEIGHT - 0.035
+    panels = _slab(site.place, (length, depth), below, TABLE_HEIGHT, site.turn, _WOOD)
+    for a, b in ((-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)):
+        leg = site.place + a * (0.5 * length - 0.06) * along + b * (0.5 * depth - 0.06) * across
+        panels += _slab(leg, (0.055, 0.055), 0.0, below, site.turn, _DARK)
+    board = site.place + (0.14 * across if site.sitter else 0.0)
+    return panels + _slab(board, (length - 0.14, 0.03), 0.28, below, site.turn, _WOOD)
+
+
+def _chair(place: Float[np.ndarray, "3"], facing: float) -> list[Panel]:
+    """A seat on four legs with a back; `place` is below the middle of the seat."""
+    ahead, aside = ahead_and_left(facing)
+    seat, below = 0.43, SEAT_HEIGHT - 0.04
+    panels = _slab(place, (seat, seat), below, SEAT_HEIGHT, facing, _SEATS)
+    for a, b in ((-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)):
+        leg = place + 0.5 * (seat - 0.05) * (a * ahead + b * aside)
+        panels += _slab(leg, (0.04, 0.04), 0.0, below, facing, _DARK)
+    back = place - 0.5 * (seat - 0.03) * ahead
+    return panels + _slab(back, (0.03, seat - 0.02), SEAT_HEIGHT, 0.90, facing, _SEATS)
+
+
+def _slab(
+    place: Float[np.ndarray, "3"], size: tuple[float, float], low: float, high: float, turn: float, texture: Texture
+) -> list[Panel]:
+    """A box from one height to another, with its underside."""
+    raised = place + np.array([0.0, 0.0, low])
+    along, across = ahead_and_left(turn)
+    u, v = size[0] * along, size[1] * across
+    below = Panel(raised - (u + v) / 2, v, u, texture)
+    return [*box(raised, np.array([*size, high - low]), turn, texture), below]

@@ -11,9 +11,6 @@ Vector = Float[np.ndarray, "3"]
 
 _PLANES = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}
 
-MIRROR = np.diag([1.0, -1.0, 1.0])
-"""Reflection of left and right in the body's frame (x forward, y left, z up)."""
-
 
 def about(axis: str, angle: float) -> Matrix:
     """Rotation by `angle` (radians) about the coordinate axis `x`, `y` or `z`."""
@@ -38,8 +35,14 @@ def _about(axis: str, cosine: float, sine: float) -> np.ndarray:
 
 
 def mirrored(rotation: Matrix) -> Matrix:
-    """The same turn on the other side of the body."""
-    return MIRROR @ rotation @ MIRROR
+    """The same turn on the other side of a body whose axes point forward, left and up."""
+    mirror = np.diag([1.0, -1.0, 1.0])
+    return mirror @ rotation @ mirror
+
+
+def ahead_and_left(turn: float) -> tuple[Vector, Vector]:
+    """The horizontal directions ahead and to the left of who faces `turn` (radians from x)."""
+    return np.array([np.cos(turn), np.sin(turn), 0.0]), np.array([-np.sin(turn), np.cos(turn), 0.0])
 
 
 def frame(z: Iterable[float], towards_x: Iterable[float]) -> Matrix:

@@ -12,6 +12,12 @@ PROPS = ("auto", "none", "table", "chairs", "table_and_chairs")
 OUTFITS = ("random", "patterned", "striped", "plain", "black_suit", "long_sleeves")
 ROOMS = ("cluttered", "camouflage", "plain", "green")
 ACTOR_NAMES = ("anna", "ben", "cleo", "dan")
+_RANGES = {
+    **{"cameras": (1, 200), "width": (64, 4096), "height": (64, 4096), "fps": (1.0, 1000.0), "frames": (1, 100_000)},
+    **{"seed": (0, 2**32 - 1), "noise": (0.0, 0.5), "camera_variation": (0.0, 0.2), "radius": (3.5, 4.5)},
+    **{"distortion": (-0.3, 0.1), "light_drift": (0.0, 0.6)},
+}
+"""Lowest and highest value of the settings that are numbers."""
 
 
 @dataclass
@@ -69,17 +75,8 @@ class SynthSettings:
         self._check_range("actors", 1, len(ACTOR_NAMES))
         self._check_people()
         self._check_props()
-        self._check_range("cameras", 1, 200)
-        self._check_range("width", 64, 4096)
-        self._check_range("height", 64, 4096)
-        self._check_range("fps", 1.0, 1000.0)
-        self._check_range("frames", 1, 100_000)
-        self._check_range("seed", 0, 2**32 - 1)
-        self._check_range("noise", 0.0, 0.5)
-        self._check_range("camera_variation", 0.0, 0.2)
-        self._check_range("radius", 3.5, 4.5)
-        self._check_range("distortion", -0.3, 0.1)
-        self._check_range("light_drift", 0.0, 0.6)
+        for name, (lowest, highest) in _RANGES.items():
+            self._check_range(name, lowest, highest)
         for name in ("width", "height"):
             if getattr(self, name) % 2:
                 raise InputError(

@@ -73,7 +73,7 @@ def _edge_centres(corners: np.ndarray) -> np.ndarray:
 
 
 def _quads(values: np.ndarray, cells: np.ndarray) -> Int[np.ndarray, "quad 4"]:
-    """For every grid edge the surface crosses, the vertices of the four cells around it."""
+    """The vertices of the four cells around every grid edge that the surface crosses."""
     number = np.full(np.array(values.shape) - 1, -1)
     number[tuple(cells.T)] = np.arange(len(cells))
     quads = []

@@ -1,14 +1,16 @@
-"""The ring of pinhole cameras, in plain numpy (OpenCV axes; pixel (0, 0) is the centre of the first pixel)."""
+"""The ring of rendered cameras: where they stand, what they see, and how they turn light into pictures.
+
+They are pinholes in plain numpy (OpenCV axes; pixel (0, 0) is the centre of the first pixel).
+"""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, UInt8
 
+from sogjax.synth.light import srgb_from_linear
 from sogjax.synth.settings import SynthSettings
-
-_HEIGHTS = (1.15, 2.35)
-_TARGET = np.array([0.0, 0.0, 0.92])
 
 
 @dataclass(frozen=True)
@@ -21,12 +23,6 @@ class View:
     matrix: Float[np.ndarray, "3 3"]
     camera_from_world: Float[np.ndarray, "4 4"]
     distortion: Float[np.ndarray, "5"]
-
-    @property
-    def centre(self) -> Float[np.ndarray, "3"]:
-        """Where the camera stands, in the world."""
-        rotation, translation = self.camera_from_world[:3, :3], self.camera_from_world[:3, 3]
-        return -rotation.T @ translation
 
     def project(
         self, points_world: Float[np.ndarray, "n 3"]
@@ -50,9 +46,9 @@ def ring_of_views(settings: SynthSettings, rng: np.random.Generator) -> tuple[Vi
     for k in range(settings.cameras):
         angle = 2.0 * np.pi * (k + 0.15 * rng.uniform(-1, 1)) / settings.cameras
         radius = settings.radius * (1.0 + 0.02 * rng.uniform(-1, 1))
-        height = _HEIGHTS[k % 2] + 0.08 * rng.uniform(-1, 1)
+        height = (1.15, 2.35)[k % 2] + 0.08 * rng.uniform(-1, 1)
         centre = np.array([radius * np.cos(angle), radius * np.sin(angle), height])
-        target = _TARGET + 0.06 * rng.uniform(-1, 1, 3)
+        target = np.array([0.0, 0.0, 0.92]) + 0.06 * rng.uniform(-1, 1, 3)
         roll = np.deg2rad(1.5) * rng.uniform(-1, 1)
         focal = min(1.16 * settings.height, 0.87 * settings.width) * (1.0 + 0.04 * rng.uniform(-1, 1))
         aspect = 1.0 + 0.002 * rng.uniform(-1, 1)
@@ -84,3 +80,37 @@ def _looking_at(
     transform[:3, :3] = np.stack([right, down, forward])
     transform[:3, 3] = -transform[:3, :3] @ centre
     return transform
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """How one camera turns light into numbers."""
+
+    gain: Float[np.ndarray, "3"]
+    noise: float
+    """Standard deviation in units of the brightest value."""
+    seed: int
+
+    @classmethod
+    def drawn(cls, settings: SynthSettings, rng: np.random.Generator) -> "Sensor":
+        """A sensor with an exposure and a colour balance of its own."""
+        spread = settings.camera_variation * np.clip(rng.standard_normal(4), -2.0, 2.0)
+        return cls((1.0 + spread[0]) * (1.0 + spread[1:] / 3.0), settings.noise, settings.seed)
+
+    def exposed(
+        self, picture: Float[np.ndarray, "row column 3"], rng: np.random.Generator
+    ) -> UInt8[np.ndarray, "row column 3"]:
+        """The picture as recorded, BGR."""
+        values = srgb_from_linear(picture[..., ::-1] * self.gain[::-1].astype(np.float32)) * np.float32(255.0)
+        if self.noise > 0.0:
+            bank = _noise_bank(self.seed)
+            first = int(rng.integers(len(bank)))
+            noise = np.take(bank, np.arange(first, first + values.size), mode="wrap")
+            values += np.float32(255.0 * self.noise) * noise.reshape(values.shape)
+        return np.clip(values + 0.5, 0.0, 255.0).astype(np.uint8)
+
+
+@cache
+def _noise_bank(seed: int) -> Float[np.ndarray, "n"]:
+    """Many normal numbers; pictures take theirs from it, which is ten times faster than drawing new ones."""
+    return np.random.default_rng([seed, 31]).standard_normal(1 << 22, np.float32)

@@ -16,7 +16,6 @@ from sogjax.errors import InputError
 from sogjax.model.camera import Camera, project
 from sogjax.model.color import averaging_space, convert, from_rgb
 from sogjax.model.compiled import stage_barrier
-from sogjax.model.skeleton import Skeleton
 from sogjax.model.sog import Sog
 from sogjax.scene.foreground import BackgroundModel, SubjectColors, foreground_weights, log_odds
 from sogjax.scene.quadtree import Candidates, keep_blobs, keep_blobs_of_planes, quadtree_of_planes
@@ -188,11 +187,6 @@ def _color_planes(
     """SRGB cells in a colour space, channel by channel."""
     colors = from_rgb(cells, space)
     return [colors[..., k] for k in range(3)]
-
-
-def actor_of_blobs(skeleton: Skeleton, blob_joints: tuple[int, ...]) -> Int[np.ndarray, "blob"]:
-    """Number of the tree (the actor) that each blob belongs to."""
-    return np.array([skeleton.trees[joint] for joint in blob_joints], int)
 
 
 def body_boxes(

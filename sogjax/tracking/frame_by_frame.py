@@ -1,15 +1,19 @@
-"""Tracking frame by frame (Section 5.3): one compiled step for every frame of a recording."""
+"""Tracking frame by frame (Section 5.3): one compiled step for every frame; and what it would say of known poses."""
 
 import time
 from collections.abc import Iterable, Iterator
 
 import equinox as eqx
 import jax
-from jaxtyping import Array, Float
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int, UInt8
 
+from sogjax.model.sog import Sog
+from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.tracking.capacity import first_capacities, larger_capacities
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import AnyFrame, TrackedFrame, TrackState, on_device, on_host
+from sogjax.tracking.frame import AnyFrame, FrameInput, TrackedFrame, TrackState, on_device, on_host
 from sogjax.tracking.tracker import Tracker
 
 _step = eqx.filter_jit(Tracker.step)
@@ -47,3 +51,51 @@ def track(
         state = next_state
         seconds = time.perf_counter() - begin
         yield TrackedFrame(index, on_host(result), capacities, tracker.reader.color_space, seconds)
+
+
+@eqx.filter_jit
+def image_blobs(tracker: Tracker, state: TrackState, frame: FrameInput, capacities: Capacities) -> Sog:
+    """The image blobs of a frame that was tracked already."""
+    return tracker.views(frame, tracker.led(state, frame), capacities)[0].images
+
+
+@eqx.filter_jit
+def best_after(
+    tracker: Tracker,
+    state: TrackState,
+    cells: UInt8[Array, "camera rows columns 3"],
+    capacities: Capacities,
+    counts: Int[Array, "count"],
+) -> tuple[Float[Array, "count dof"], Float[Array, "count"]]:
+    """The best pose that the tracker's solver has seen after so many iterations of a frame, and its energy.
+
+    The frame is solved again for every count, so no solver needs to know that it is watched.
+    """
+    seen = tracker.views(FrameInput(cells), state, capacities)
+
+    def after(count: Int[Array, ""]) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
+        stopped = eqx.tree_at(lambda t: t.solver.max_iterations, tracker, count)
+        _, result = stopped.found(state, seen, capacities)
+        return result.pose, result.energy
+
+    return jax.lax.map(after, jnp.asarray(counts))
+
+
+def confidence_of_poses(
+    tracker: Tracker, poses: Float[np.ndarray, "frame dof"], frames: Iterable[AnyFrame]
+) -> Iterator[LimbConfidence]:
+    """Of one frame after the other; none where the tracker judges no limbs."""
+    baseline = tracker.with_memory(TrackState.from_pose(jnp.asarray(poses[0], jnp.float32))).baseline
+    if baseline is None:
+        return
+    for pose, frame in zip(poses, frames, strict=True):
+        found = _judged(tracker, on_device(frame), jnp.asarray(pose, jnp.float32), baseline)
+        baseline = found.baseline
+        yield found
+
+
+@eqx.filter_jit
+def _judged(
+    tracker: Tracker, frame: FrameInput, pose: Float[Array, "dof"], baseline: Float[Array, "2 blob"]
+) -> LimbConfidence:
+    return tracker.judged(pose, baseline, tracker.windows(frame, TrackState.from_pose(pose)), frame)

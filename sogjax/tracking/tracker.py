@@ -24,7 +24,7 @@ from sogjax.model.compiled import stage_barrier
 from sogjax.quality.limb_confidence import LimbConfidence, frame_fit, limb_confidence
 from sogjax.quality.limb_evidence import LimbBlobs, blob_evidence
 from sogjax.solve.solution import Scales, Solution, Solver
-from sogjax.tracking.culling import Capacities, ImageReader, actor_of_blobs, body_boxes, union_boxes
+from sogjax.tracking.culling import Capacities, ImageReader, body_boxes, union_boxes
 from sogjax.tracking.frame import AnyFrame, FrameInput, FrameResult, TrackState, on_device
 from sogjax.tracking.keypoint_prefit import KeypointPrefit
 from sogjax.tracking.solving import solve_near
@@ -81,9 +81,8 @@ class Tracker(eqx.Module):
 
     def boxes(self, state: TrackState) -> Float[Array, "camera actor 2 2"]:
         """Where the actors may be seen: around the last pose and, unless told otherwise, the predicted one too."""
-        actors = actor_of_blobs(self.body.skeleton, self.body.blobs.joints)
         around = lambda pose: jax.vmap(body_boxes, in_axes=(None, 0, None, None))(
-            self.body.posed_blobs(pose), self.cameras, actors, self.reader.box_enlargement
+            self.body.posed_blobs(pose), self.cameras, self.body.blob_actors, self.reader.box_enlargement
         )
         boxes = around(state.previous)
         if self.reader.box_around == "predicted":

@@ -24,14 +24,14 @@ _PALETTE = np.array(
 
 @dataclass(frozen=True)
 class Bones:
-    """Which lines of an actor to draw."""
+    """The lines of an actor that are drawn."""
 
     joints: Int[np.ndarray, "joint"]
     """The distinct joints."""
     tips: Int[np.ndarray, "tip"]
     """The blobs that the last joints point to."""
     edges: Int[np.ndarray, "edge 2"]
-    """From point to point: joints first, then tips."""
+    """Numbers of the two points of each line: joints first, then tips."""
     sides: Int[np.ndarray, "edge"]
     """LEFT, MIDDLE or RIGHT of each edge."""
 
@@ -53,7 +53,7 @@ class Bones:
 
 
 def doubtful_edges(motion: Motion, bones: Bones) -> Bool[np.ndarray, "frame edge"]:
-    """Which bones belong to a limb that is in doubt."""
+    """Whether each bone belongs to a limb that is in doubt."""
     doubt = in_doubt(motion)
     if motion.joint_limb is None or doubt.shape[1] == 0:
         return np.zeros((motion.num_frames, len(bones.edges)), bool)
@@ -104,7 +104,7 @@ def _side(name: str) -> int:
 
 
 def _drawn_as(motion: Motion) -> Int[np.ndarray, "joint"]:
-    """For each joint the topmost one within 0.1 mm in every frame; -1 for joints that only place the root in the world.
+    """The topmost joint within 0.1 mm of each one in every frame; -1 for joints that only place the root in the world.
 
     A root's translations are joints of their own, some of which stay on the world's axes: nothing is drawn
     above the first joint that has a blob or more than one child.

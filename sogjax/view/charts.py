@@ -149,7 +149,7 @@ class RankedCurves:
     title: str
     frames: Int[np.ndarray, "frame"]
     gain: Curve
-    """By what share of the energy the true pose is worth more."""
+    """The share of the energy by which the true pose is worth more."""
     gain_by_term: Mapping[str, Curve]
     """What each term adds to it."""
     errors: Mapping[str, Curve]

@@ -13,7 +13,7 @@ from sogjax.view.projection import picture_points
 from sogjax.view.tiles import write_label
 
 CAMERAS = 4
-"""At most so many are shown of each frame, spread evenly over all."""
+"""The cameras that are shown of each frame at most, spread evenly over all."""
 HEIGHT = 320
 """Height of a cut-out in pixels."""
 

@@ -1,7 +1,9 @@
 """The tracked skeleton drawn over the pictures of all cameras: one grid per frame, or a whole video."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
 
 import cv2
 import numpy as np
@@ -10,6 +12,8 @@ from jaxtyping import Bool, Float, Int, UInt8
 from sogjax.errors import InputError
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.io.motion import Motion
+from sogjax.io.recording import Recording
+from sogjax.io.video import VideoWriter
 from sogjax.view.bones import Bones, actor_palette, bones_from_motion, doubtful_edges
 from sogjax.view.projection import picture_points
 from sogjax.view.tiles import Fit, grid_for, shrink, write_label
@@ -32,7 +36,7 @@ class _Actor:
     """Pixels of the tiles."""
     colors: UInt8[np.ndarray, "3 3"]
     doubtful: Bool[np.ndarray, "frame edge"]
-    """Which bones belong to a limb in doubt."""
+    """Whether each bone belongs to a limb in doubt."""
 
 
 class Overlay:
@@ -164,3 +168,40 @@ def _fixed_points(pixels: Float[np.ndarray, "point 2"]) -> dict[int, Point]:
 def _bgr(rgb: UInt8[np.ndarray, "3"]) -> tuple[int, int, int]:
     red, green, blue = (int(value) for value in rgb)
     return blue, green, red
+
+
+class OverlayVideo:
+    """A video (mp4) of motions over the pictures of all cameras, within a `with` block; whole or not there.
+
+    Args:
+        path: the video.
+        recording: what is tracked.
+        width: largest width in pixels.
+    """
+
+    def __init__(self, path: Path, recording: Recording, width: int = WIDTH):
+        self._rig, self._width = recording.rig, width
+        self._video = VideoWriter(Path(path), recording.fps)
+        self._bones: list[Bones] | None = None
+        self._empty = Overlay(recording.rig, [], width=width)
+
+    def __enter__(self) -> "OverlayVideo":
+        self._video.__enter__()
+        return self
+
+    def tile(self, camera: int, image: np.ndarray) -> np.ndarray:
+        """A camera's picture (BGR) at the size that is shown; thread-safe."""
+        return self._empty.tile(camera, image)
+
+    def write(self, motions: Sequence[Motion], tiles: Iterable[Sequence[np.ndarray | None]]) -> None:
+        """Append the frames of motions, one for each actor, that follow; `tiles` of all cameras for each of them."""
+        if self._bones is None:
+            self._bones = [bones_from_motion(motion) for motion in motions]
+        overlay = Overlay(self._rig, motions, width=self._width, bones=self._bones)
+        for frame, pictures in zip(motions[0].frame, tiles, strict=True):
+            self._video.write(overlay.draw(pictures, int(frame)))
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._video.__exit__(kind, error, traceback)

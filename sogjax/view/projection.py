@@ -46,7 +46,7 @@ def picture_points(
 
 
 def unfolded_radii(rig: CameraRig) -> Float[np.ndarray, "camera"]:
-    """By camera the tangent of the angle from its axis up to which its polynomial model grows; farther out it folds.
+    """The tangent of the angle from each camera's axis up to which its polynomial model grows; farther out it folds.
 
     Infinity where it never folds, and for fisheye cameras.
     """
@@ -89,7 +89,7 @@ class PictureCamera:
     scale: Float[np.ndarray, "2"]
     size: tuple[int, int]
     maps: tuple[np.ndarray, np.ndarray] | None
-    """For `cv2.remap` of the smaller picture; None without distortion."""
+    """The maps with which `cv2.remap` undistorts the smaller picture; None without distortion."""
 
     def jpeg(self, image: UInt8[np.ndarray, "h w 3"]) -> bytes:
         """A picture (BGR) as recorded, made smaller and freed of distortion."""

@@ -11,7 +11,8 @@ from puppet import PUPPET
 
 from sogjax.io.actor_file import load_body
 from sogjax.io.ground_truth import GroundTruth, save_ground_truth
-from sogjax.io.motion import motion_from_poses, save_motion
+from sogjax.io.motion import motion_from_poses
+from sogjax.io.motion_data import save_motion
 
 Damage = Callable[[Path], object]
 """Done to a workplace."""

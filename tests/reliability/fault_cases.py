@@ -13,12 +13,13 @@ from pathlib import Path
 import numpy as np
 import yaml
 from faults import SAME, Survived, Ward, said_by
-from kill_and_resume import PARTIAL, frames_left, killed_and_resumed, started
+from kill_and_resume import frames_left, killed_and_resumed, started
 
 from sogjax.errors import InputError
 from sogjax.io.array_log import ROWS
+from sogjax.io.cell_store import CELLS
+from sogjax.io.frame_motions import FRAMES, PARTIAL
 from sogjax.io.npz_file import npy_header
-from sogjax.run.kept_run import FOLDER
 
 FIRST_FRAMES = 8
 LATER_FRAMES = 24
@@ -53,7 +54,7 @@ def full_disk(ward: Ward) -> list[Survived]:
     """Files that may not grow beyond some bytes (RLIMIT_FSIZE)."""
     motion = (ward.place / "alone/motion.npz").stat().st_size
     file = (ward.place / "alone/motion.rrd").stat().st_size
-    return [limited(ward, "motion.partial", motion * 3 // 4), limited(ward, "motion.rrd", file // 2)]
+    return [limited(ward, "the log of frames", motion * 3 // 4), limited(ward, "motion.rrd", file // 2)]
 
 
 def limited(ward: Ward, name: str, limit: int) -> Survived:
@@ -120,10 +121,10 @@ def put(path: Path, content: bytes) -> None:
 
 
 def power_loss(ward: Ward) -> list[Survived]:
-    """The last record of both logs lost in part, or something else behind it."""
+    """The last record of the log lost in part, or something else behind it."""
     cuts = {
-        "half of the last record of each log cut off": lambda content, row: content[: -row // 2],
-        "10 records of random bytes behind each log": lambda content, row: (
+        "half of the last record of the log cut off": lambda content, row: content[: -row // 2],
+        "10 records of random bytes behind the log": lambda content, row: (
             content + np.random.default_rng(0).bytes(10 * row)
         ),
     }
@@ -133,10 +134,10 @@ def power_loss(ward: Ward) -> list[Survived]:
         process = after_frames(ward.alone.command, folder, LATER_FRAMES)
         process.kill()
         said = said_by(process)
-        for log in (folder / PARTIAL / ROWS, folder / FOLDER / ROWS):
-            with log.open("rb") as file:
-                row = npy_header(file)[1].itemsize
-            log.write_bytes(change(log.read_bytes(), row))
+        log = folder / PARTIAL / FRAMES / ROWS
+        with log.open("rb") as file:
+            row = npy_header(file)[1].itemsize
+        log.write_bytes(change(log.read_bytes(), row))
         row = ward.resumed("loss of power", f"SIGKILL, and {what}", folder, said, status=-signal.SIGKILL)
         rows.append(replace(row, good=row.good and int(row.frames) >= LATER_FRAMES - 1))
     return rows
@@ -163,14 +164,14 @@ def damaged_cells(ward: Ward) -> Survived:
     command = [*ward.alone.command, f"images.cache={cells}", *LIGHT]
     light = replace(ward, settings=replace(ward.settings, overlay=False))
     _, made = light.compared(ward.place / "cells_made", said_by(started(command, ward.place / "cells_made")))
-    (file,) = cells.glob("*.npy")
+    (file,) = cells.glob(f"*/{CELLS}")
     content = file.read_bytes()
     middle = len(content) // 2
     file.write_bytes(content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :])
     said = said_by(started(command, ward.place / "cells_again"), about="images.cache")
     frames = frames_left(ward.place / "cells_again")
     end, same = light.compared(ward.place / "cells_again", said)
-    good = made and same and next(cells.glob("*.npy")).read_bytes() == content
+    good = made and same and file.read_bytes() == content
     end = f"not needed: {end}, and so are the cells" if good else end
     return Survived(
         "damaged cells",

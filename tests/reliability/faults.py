@@ -20,8 +20,7 @@ from kill_and_resume import undisturbed as left_alone
 
 from sogjax.errors import InputError
 from sogjax.run.compilation_cache import VARIABLE
-from sogjax.study.machine import machine_line
-from sogjax.study.script import run_script, settings_from
+from sogjax.study.script import machine_line, run_script, settings_from
 
 SAME = "bit for bit that of the undisturbed run"
 

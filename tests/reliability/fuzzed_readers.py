@@ -1,10 +1,10 @@
 """Every reader of files with a good file, for `fuzzing.py`."""
 
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import calibration_cases
-import jax.numpy as jnp
 import numpy as np
 import skeleton_cases
 from bad_inputs import make_workplace
@@ -12,28 +12,34 @@ from keypoint_cases import write_keypoints
 
 from sogjax.errors import InputError
 from sogjax.io.actor_file import load_body
-from sogjax.io.array_log import ArrayLog
 from sogjax.io.calibration.load import load_calibration
-from sogjax.io.cell_cache import cell_cache
+from sogjax.io.cell_store import CELLS, CellStore
+from sogjax.io.cell_store import FRAMES as KEPT
+from sogjax.io.frame_motions import FRAMES, ClipFacts, load_one_motion
+from sogjax.io.frame_table import FrameLog, FrameTable, read_frames_log
 from sogjax.io.ground_truth import load_ground_truth
 from sogjax.io.image_file import read_image, read_mask
 from sogjax.io.initial_pose import load_initial_poses
 from sogjax.io.keypoints.camera_keypoints import read_camera, read_keypoint_array
 from sogjax.io.keypoints.scheme import load_scheme
-from sogjax.io.motion import load_motion
-from sogjax.io.motion_log import MotionLog
+from sogjax.io.motion import Motion, load_motion
 from sogjax.io.recording import open_recording
 from sogjax.io.recording_settings import read_recording_settings
 from sogjax.io.skeletons.load import read_skeleton
-from sogjax.io.skeletons.skeletool_motion import read_skeletool_motion
+from sogjax.io.skeletons.skeletool import read_skeletool_motion
 from sogjax.io.source import look_at_source, open_source
-from sogjax.run.kept_run import FOLDER, NOTE, KeptRun
-from sogjax.run.prefix import CAPACITIES, CAPACITY, COLUMNS, TERM, Prefix
+from sogjax.run.actors import Actors
+from sogjax.run.background import Background
+from sogjax.run.initial_pose import InitialPose
+from sogjax.run.merge import Merged
+from sogjax.run.run_files import KEPT as PARTIAL
+from sogjax.run.run_files import NOTE
+from sogjax.run.run_folder import read_note, write_note
 
 Read = Callable[[Path], object]
 
 CALIBRATIONS = {"Skeletool": "rig.calibration", "Qualisys": "rig.qca.txt", "Panoptic": "rig.json"}
-CELLS = np.arange(4 * 3 * 6 * 8 * 3, dtype=np.uint8).reshape(4, 3, 6, 8, 3)
+SEEN = np.arange(4 * 3 * 6 * 8 * 3, dtype=np.uint8).reshape(4, 3, 6, 8, 3)
 """Kept cells of the workplace's recording."""
 
 
@@ -95,43 +101,52 @@ def _keypoints(place: Path) -> dict[str, tuple[Path, Read]]:
 
 
 def _runs(place: Path) -> dict[str, tuple[Path, Read]]:
-    """What a run that did not end leaves: its motion so far, and what it needs to go on."""
-    with_motion, kept = MotionLog(place / "motion.partial"), KeptRun(place)
-    motion = load_motion(place / "motion.npz")
-    with_motion.append(motion)
-    with_motion.close()
-    kept.begin("track", {"version": "1"})
-    kept.keep_actors([load_body(place / "actor.yaml")])
-    kept.keep_start(jnp.asarray(motion.pose[0]), 0)
-    names = (*COLUMNS, f"{TERM}similarity", *(CAPACITY.format(name) for name in CAPACITIES))
-    rows = dict.fromkeys(names, motion.iterations) | {"pose": motion.pose}
-    ArrayLog(kept.folder, {}, rows).close()
-    kept.settle(Prefix(rows))
-    kept.keep_sampled({0: jnp.asarray(motion.pose[0])})
-    whole_motion = lambda path: load_motion(path.parent)
-    return {
-        "motion.partial, rows.npy": (place / "motion.partial/rows.npy", whole_motion),
-        "motion.partial, constant.npz": (place / "motion.partial/constant.npz", whole_motion),
-        "run.partial, run.json": (place / FOLDER / NOTE, lambda _: kept.note or _refused()),
-        "run.partial, rows.npy": (place / FOLDER / "rows.npy", lambda _: kept.prefix(4, 4) or _refused()),
-        "run.partial, settled.npz": (place / FOLDER / "settled.npz", lambda _: kept.settled(4) or _refused()),
-        "run.partial, sampled.npz": (place / FOLDER / "sampled.npz", lambda _: kept.sampled() or _refused()),
-        "run.partial, start.npz": (place / FOLDER / "start.npz", lambda _: kept.start()),
-        "run.partial, actors.npz": (place / FOLDER / "actors.npz", lambda _: kept.actors()),
-        "run.partial, actor_0.yaml": (place / FOLDER / "actor_0.yaml", lambda _: kept.actors()),
+    """What a run that did not end leaves: the records of its passes, and the log of its frames."""
+    kept, motion = PARTIAL.of(place), load_motion(place / "motion.npz")
+    recording = open_recording(place / "walk")
+    write_note(NOTE.of(kept), {"command": "track", "origin": {"version": "1"}})
+    Actors((load_body(place / "actor.yaml"),)).save(kept)
+    InitialPose(0, motion.pose[0], "file").save(kept)
+    Background(None, "nobody moves").save(kept)
+    ClipFacts.of(recording).save(kept)
+    table = _table(motion)
+    with FrameLog(kept / FRAMES) as log:
+        log.append(table)
+    Merged(table).save(kept)
+    so_far = lambda path: load_one_motion(kept)
+    loads = {
+        "run.json": lambda _: read_note(NOTE.of(kept)) or _refused(),
+        "frames/rows.npy": lambda _: read_frames_log(kept / FRAMES) or _refused(),
+        "clip.json": so_far,
+        "actors.npz": lambda _: Actors.load(kept),
+        "actor_0.yaml": lambda _: Actors.load(kept),
+        "initial_pose.npz": lambda _: InitialPose.load(kept),
+        "background.npz": lambda _: Background.load(kept),
+        "merged.npz": lambda _: Merged.load(kept),
     }
+    return {f"run.partial, {name}": (kept / name, read) for name, read in loads.items()}
+
+
+def _table(motion: Motion) -> FrameTable:
+    """A run's rows with the poses of a motion."""
+    count = motion.num_frames
+    known = {"frame": motion.frame, "pose": motion.pose, "energy": motion.energy, "iterations": motion.iterations}
+    views = {name: np.zeros((count, 2), int) for name in ("num_near", "num_matching")}
+    capacities = np.full((count, 3), 256)
+    rest = {"evaluations": motion.iterations, "converged": motion.converged, "num_blocks": np.zeros(count, int)}
+    return FrameTable(**known, **rest, **views, capacities=capacities, terms={"similarity": motion.similarity})
 
 
 def _pictures(place: Path) -> dict[str, tuple[Path, Read]]:
     walk, tpose = place / "walk", place / "walk/example_poses/tpose"
-    array, _, find_array = _kept_cells(place / "cells")
-    _, note, find_note = _kept_cells(place / "other_cells")
+    cells, _, find_cells = _kept_cells(place / "cells")
+    _, frames, find_frames = _kept_cells(place / "other_cells")
     return {
         "video, mp4": (walk / "videos/left.mp4", read_video),
         "picture, jpg": (tpose / "left.jpg", read_image),
         "mask, png": (tpose / "left.mask.png", read_mask),
-        "kept cells, npy": (array, find_array),
-        "kept cells, json": (note, find_note),
+        "kept cells": (cells, find_cells),
+        "kept cells, which are there": (frames, find_frames),
     }
 
 
@@ -150,20 +165,21 @@ def read_video(path: Path) -> list[np.ndarray]:
 
 def _kept_cells(folder: Path) -> tuple[Path, Path, Read]:
     """The two files of kept cells, and what finds them: cells that are not those that were kept are a bug."""
-    cache = cell_cache(str(folder), open_recording(folder.parent / "walk"), 4, lambda sentence: None)
-    list(cache.kept(0, len(CELLS), iter(CELLS), lambda cells: cells))
-    (array,), (note,) = cache.folder.glob("*.npy"), cache.folder.glob("*.json")
-    good = {path: path.read_bytes() for path in (array, note)}
+    recording = open_recording(folder.parent / "walk")
+    store = CellStore(folder, recording, 4, SEEN.shape[1:4], lambda sentence: None)
+    present = np.ones(SEEN.shape[1], bool)
+    for frame, cells in enumerate(SEEN):
+        store.keep(frame, cells, present)
+    store.close()
 
     def found(path: Path) -> object:
-        other = note if path == array else array
-        other.write_bytes(good[other])  # a cache removes both where one is damaged
-        cells = cache.find(0, len(CELLS))
-        if cells is not None and not np.array_equal(cells, CELLS):
-            raise AssertionError("other cells than those that were kept")
-        return _refused() if cells is None else cells
+        with closing(store):
+            for frame in np.flatnonzero(store.kept(range(len(SEEN)))).tolist():
+                if (kept := store.find(frame)) is not None and not np.array_equal(kept[0], SEEN[frame]):
+                    raise AssertionError("other cells than those that were kept")
+        return store
 
-    return array, note, found
+    return folder / CELLS, folder / KEPT, found
 
 
 def _refused() -> None:

@@ -20,14 +20,14 @@ import numpy as np
 
 from sogjax.errors import InputError
 from sogjax.io.actor_file import named_body
+from sogjax.io.frame_motions import FRAMES, PARTIAL
+from sogjax.io.frame_table import read_frames_log
 from sogjax.io.motion import Motion, load_motion
 from sogjax.io.source import look_at_source
-from sogjax.study.machine import machine_line
-from sogjax.study.script import run_script, settings_from
+from sogjax.study.script import machine_line, run_script, settings_from
 from sogjax.synth.cache import cached_recording
 from sogjax.synth.settings import SynthSettings
 
-PARTIAL = "motion.partial"
 LATE = 0.2
 """Part of a run's life in which it is killed after it wrote frames."""
 
@@ -152,9 +152,10 @@ def frames_left(folder: Path) -> int:
     if done.is_file():
         return load_motion(done).num_frames
     try:
-        return load_motion(folder / PARTIAL).num_frames
+        found = read_frames_log(folder / PARTIAL / FRAMES)
     except InputError:
         return 0
+    return 0 if found is None else len(found)
 
 
 def check_same(folder: Path, whole: Motion, settings: Settings) -> None:

@@ -5,7 +5,7 @@ from fuzzing import FuzzedReader
 from kill_and_resume import Settings as RunSettings
 from outcomes import Outcome
 
-from sogjax.study.machine import machine_line
+from sogjax.study.script import machine_line
 
 RUNS = RunSettings()
 """The runs that the faults are injected into."""

@@ -1,17 +1,15 @@
 """The actors of several recordings: one for each subject, made once and used for all takes of it."""
 
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sogjax.cli import actor as actor_command
+from sogjax.cli.sweep.results import reason
 from sogjax.errors import InputError
 from sogjax.io.recording_files import ACTOR, SETTINGS, named_subjects, posed_subjects
 from sogjax.run.terminal import say
 from sogjax.settings.run import ActorConfig, TrackConfig
-
-LOG = logging.getLogger(__name__)
 
 TRIED = 3
 """Takes of a subject that an actor is tried to be made of."""
@@ -68,11 +66,8 @@ class Subjects:
             try:
                 actor_command.run(settings, subject)
                 return ""
-            except InputError as error:
-                reasons.append(str(error))
             except Exception as error:  # another take may do, and the takes of others
-                LOG.exception("an actor was not made")
-                reasons.append(f"{type(error).__name__}: {error}")
+                reasons.append(reason(error, "an actor was not made"))
             say(f"no actor of {take}: {reasons[-1]}")
         return reasons[0] if reasons else f"no recording shows {subject} alone or in example poses of its own"
 

@@ -7,7 +7,9 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
-from sogjax.cli.config.overrides import quoted_value
+from hydra.core.override_parser.types import ChoiceSweep
+
+from sogjax.cli.words import parsed, quoted_value
 from sogjax.errors import InputError, counted
 from sogjax.io.projects import calibrations_of, project_in
 from sogjax.io.recording_files import SETTINGS
@@ -19,19 +21,26 @@ ACTORS = "actors"
 """The folder of the actors that were made, beside the results of the recordings."""
 
 
-def with_folders(words: Sequence[str]) -> list[str]:
-    """The words of a sweep, `recording=glob(PATTERN)` as the list of the recordings that it matches.
+def with_folders(words: Sequence[str]) -> tuple[list[str], Path | None]:
+    """The words of a sweep, `recording=glob(PATTERN)` as the list of the recordings that it matches; and its root.
+
+    The root is the folder that the patterns begin in, their parts before the first wildcard; None without a pattern.
+    What a pattern matches may change with every recording that is added; the root does not.
 
     Raises:
         InputError: the pattern cannot be read, or matches no recording.
     """
-    return [_expanded(word) if _is_pattern(word) else word for word in words]
+    found, root = [], None
+    for word in words:
+        if word.startswith(f"{KEY}=glob("):
+            patterns = _parsed(word)
+            word, root = _expanded(word, patterns), _common(map(_fixed_part, _spelled_out(patterns.include)))
+        found.append(word)
+    return found, root
 
 
 def recordings_in(words: Sequence[str]) -> list[str]:
     """The recordings that a sweep names, in order; one of them, or none, where it has no list of them."""
-    from hydra.core.override_parser.types import ChoiceSweep
-
     for word in reversed(words):
         if word.partition("=")[0] == KEY:
             value = _parsed(word)
@@ -39,23 +48,8 @@ def recordings_in(words: Sequence[str]) -> list[str]:
     return []
 
 
-def root_of(words: Sequence[str]) -> Path | None:
-    """The folder that the patterns of a sweep begin in: their parts before the first wildcard; None: it names none.
-
-    What a pattern matches may change with every recording that is added; this does not.
-
-    Raises:
-        InputError: a pattern cannot be read.
-    """
-    for word in reversed(words):
-        if word.startswith(f"{KEY}="):
-            patterns = _parsed(word).include if _is_pattern(word) else []
-            return _common(map(_fixed_part, _spelled_out(patterns))) if patterns else None
-    return None
-
-
 def whole_path(path: str | Path) -> Path:
-    """From the root of the file system, without `..`: two spellings of a path are one; links stay as they are."""
+    """A path from the root, without `..`, so that two spellings of it are one; links stay as they are."""
     return Path(os.path.abspath(path))  # noqa: PTH100  resolve() follows links, absolute() keeps `..`
 
 
@@ -87,18 +81,14 @@ def _common(folders: Iterable[Path]) -> Path:
     return Path(os.path.commonpath([*folders]))
 
 
-def _is_pattern(word: str) -> bool:
-    return word.startswith(f"{KEY}=glob(")
-
-
 def _fixed_part(pattern: str) -> Path:
     """The folder that a pattern begins in; of a recording without any wildcard the one around it."""
     parts = whole_path(pattern).parts
     return Path(*takewhile(lambda part: not glob.has_magic(part), parts[:-1] or parts))
 
 
-def _expanded(word: str) -> str:
-    value = _parsed(word)
+def _expanded(word: str, value: Any) -> str:
+    """A word with a pattern as the list of the recordings that it matches; folders that are none are named."""
     included, excluded = (_matching(patterns) for patterns in (value.include, value.exclude))
     found = sorted(included[path] for path in included.keys() - excluded.keys())
     recordings = [path for path in found if _is_recording(Path(path))]
@@ -118,7 +108,7 @@ def _matching(patterns: Sequence[object]) -> dict[Path, str]:
 
 
 def _spelled_out(patterns: Sequence[object]) -> list[str]:
-    """As Hydra parsed them, with the home folder for `~`."""
+    """The patterns that Hydra parsed, with the home folder for `~`."""
     return [os.path.expanduser(_text(pattern)) for pattern in patterns]  # noqa: PTH111  Path's raises for no user
 
 
@@ -138,12 +128,9 @@ def _parsed(word: str) -> Any:
     Raises:
         InputError: it cannot be read.
     """
-    from hydra.core.override_parser.overrides_parser import OverridesParser
-    from hydra.errors import HydraException
-
     try:
-        return OverridesParser.create().parse_override(word).value()
-    except HydraException as error:
+        return parsed([word])[0].value()
+    except InputError as error:
         raise InputError(
             f"{word}: cannot be read; write \"recording=glob('/data/*')\", or several patterns as "
             "\"recording=glob(['/a/*','/b/*'],exclude='/a/old*')\""
@@ -151,5 +138,5 @@ def _parsed(word: str) -> Any:
 
 
 def _text(value: object) -> str:
-    """Of an element as Hydra parsed it, without its quotes."""
+    """An element as Hydra parsed it, without its quotes."""
     return str(getattr(value, "text", value))

@@ -1,23 +1,19 @@
 """Many recordings by one command: each as if tracked alone, one table at the end, and only what is missing is done."""
 
-import logging
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from sogjax.cli.config.composition import composed
-from sogjax.cli.config.overrides import quoted_value
 from sogjax.cli.sweep.actors import Subjects
 from sogjax.cli.sweep.folders import ACTORS, KEY, places_of, recordings_in, whole_path
-from sogjax.cli.sweep.results import Member
-from sogjax.cli.sweep.take_table import NO_RESULT, Row, finish_takes, forget_failure, keep_row, row_of
+from sogjax.cli.sweep.results import NO_RESULT, Member, Row, forget_failure, keep_row, reason, row_of
+from sogjax.cli.sweep.tables import finish_takes
+from sogjax.cli.words import composed, parsed, quoted_value
 from sogjax.errors import InputError, counted
-from sogjax.run.outputs import results_folder
+from sogjax.run.run_folder import results_folder
 from sogjax.run.terminal import say
 from sogjax.settings.run import TrackConfig
-
-LOG = logging.getLogger(__name__)
 
 SWEEP_FOLDERS = ("hydra.sweep.dir", "hydra.sweep.subdir")
 """Where the members of a sweep over settings lie."""
@@ -34,17 +30,12 @@ class Take:
 
 def is_of_takes(words: Sequence[str], by_pattern: bool = False) -> bool:
     """Whether the words of a sweep name several recordings, or any `by_pattern`, and sweep over nothing else."""
-    from hydra.core.override_parser.overrides_parser import OverridesParser
-    from hydra.errors import HydraException
-
     try:
-        parsed = OverridesParser.create().parse_overrides(list(words))
-    except HydraException:
+        swept = [override.get_key_element() for override in parsed(words) if override.is_sweep_override()]
+    except InputError:
         return False
-    swept = [override.get_key_element() for override in parsed if override.is_sweep_override()]
-    return (swept == [KEY] or (by_pattern and not swept)) and not any(
-        word.startswith("hydra/sweeper=") for word in words
-    )
+    own_sweeper = any(word.startswith("hydra/sweeper=") for word in words)
+    return (swept == [KEY] or (by_pattern and not swept)) and not own_sweeper
 
 
 def track_takes(words: Sequence[str], run: Callable[[list[str]], int], root: Path | None = None) -> int:
@@ -109,15 +100,10 @@ def _ready(takes: Sequence[Take], config: TrackConfig, out: Path) -> list[tuple[
     for take in takes:
         try:
             ready.append((take, subjects.actor_of(take.recording, config, failed)))
-        except InputError as error:
-            reason = str(error)
-        except Exception as error:  # the other takes are tracked
-            LOG.exception("a recording has no actor")
-            reason = f"{type(error).__name__}: {error}"
-        else:
-            continue
-        say(f"{take.place}: {reason}")
-        keep_row(out / take.place, Member([], reason))
+        except Exception as error:
+            why = reason(error, "a recording has no actor")
+            say(f"{take.place}: {why}")
+            keep_row(out / take.place, Member([], why))
     return ready
 
 

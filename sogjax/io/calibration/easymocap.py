@@ -27,11 +27,7 @@ def recognises_easymocap(text: str) -> bool:
 
 
 def read_easymocap(path: Path, unit: str = "m") -> CameraRig:
-    """The cameras of a pair of files, given by either one; translations in `unit`.
-
-    Raises:
-        InputError: no YAML of OpenCV, the other half is missing, a missing key, or a wrong value.
-    """
+    """The cameras of a pair of files, given by either one; translations in `unit`."""
     text = _text(path)
     intrinsic, extrinsic = bool(_INTRINSIC.search(text)), bool(_EXTRINSIC.search(text))
     content = _content(path, text)
@@ -117,7 +113,7 @@ def _text(path: Path) -> str:
 
 
 def _content(path: Path, text: str) -> Content:
-    """By key a matrix as a row of numbers, or a number; all else is None."""
+    """The content by key: a matrix as a row of numbers, or a number; all else is None."""
     if _too_deep(text) or "\0" in text:
         raise InputError(f"{path}: is not YAML as OpenCV writes it (nested too deeply); export it again")
     try:

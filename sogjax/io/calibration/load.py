@@ -35,7 +35,7 @@ FORMATS: tuple[CalibrationFormat, ...] = (
 )
 
 WRITERS: dict[str, Callable[[Path, CameraRig], None]] = {".toml": write_toml, ".calibration": write_skeletool}
-"""By file ending."""
+"""What writes a calibration, by the file's ending."""
 
 
 def load_calibration(path: Path, unit: str | None = None) -> CameraRig:

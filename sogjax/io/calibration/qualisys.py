@@ -32,11 +32,7 @@ def recognises_qualisys(text: str) -> bool:
 
 
 def read_qualisys(path: Path, unit: str = "mm") -> CameraRig:
-    """The cameras of a file whose lengths are in `unit`.
-
-    Raises:
-        InputError: no XML, XML with a DOCTYPE or entities, a missing attribute, or a wrong value.
-    """
+    """The cameras of a file whose lengths are in `unit`."""
     text = read_text(path, MAX_BYTES)
     declared = re.search(r"<!\s*(DOCTYPE|ENTITY)", text, re.I)
     if declared:

@@ -75,7 +75,7 @@ class CameraRig:
 
 @dataclass(frozen=True)
 class CameraEntry:
-    """One camera as read from a file, not yet checked; lengths in metres."""
+    """A camera as read from a file, not yet checked; lengths in metres."""
 
     name: str
     intrinsics: Float[np.ndarray, "3 3"]
@@ -85,7 +85,7 @@ class CameraEntry:
     distortion: Float[np.ndarray, "coefficient"]
     """OpenCV's k1 k2 p1 p2 [k3]; of a fisheye camera k1 k2 k3 k4."""
     size: tuple[int, int] | None
-    """None where the file does not say."""
+    """Width and height of its pictures; None where the file does not say."""
     fisheye: bool = False
 
 

@@ -28,16 +28,13 @@ class _Camera:
     name: str
     values: dict[str, np.ndarray] = field(default_factory=dict)
     framed: dict[str, tuple[str, np.ndarray]] = field(default_factory=dict)
-    """Of an animated camera: what holds in every frame so far, and the first frame that said so."""
+    """What held in every frame of an animated camera so far, and the first frame that said so."""
 
 
 def read_skeletool(path: Path, unit: str = "mm") -> CameraRig:
     """The cameras of a file whose translations are in `unit`; `radial` is taken for OpenCV's k1.
 
     An animated camera is taken where it stands still.
-
-    Raises:
-        InputError: no such file, a missing key, a wrong value, or a camera that moves.
     """
     lines = read_text(path, MAX_BYTES).splitlines()
     cameras: list[_Camera] = []

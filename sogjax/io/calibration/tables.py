@@ -28,9 +28,6 @@ def read_toml(path: Path, unit: str = "m") -> CameraRig:
     """The cameras of a TOML file, one table per camera, whose translations are in `unit`.
 
     Tables without a matrix, rotation and translation (`[metadata]`) are ignored.
-
-    Raises:
-        InputError: no TOML, a missing key, or a wrong value.
     """
     tables = read_parsed(path, "TOML", tomllib.loads, "correct or export it again", MAX_BYTES)
     cameras = {
@@ -97,11 +94,7 @@ def recognises_panoptic(text: str) -> bool:
 
 
 def read_panoptic(path: Path, unit: str = "cm") -> CameraRig:
-    """The cameras of a JSON file, a list `cameras` with K, R, t, distCoef and resolution; translations in `unit`.
-
-    Raises:
-        InputError: no JSON, a missing key, or a wrong value.
-    """
+    """The cameras of a JSON file, a list `cameras` with K, R, t, distCoef and resolution; translations in `unit`."""
     content = read_parsed(path, "JSON", json.loads, "export it again", MAX_BYTES)
     cameras = content.get("cameras") if isinstance(content, dict) else None
     if not isinstance(cameras, list) or not all(isinstance(camera, dict) for camera in cameras):

@@ -26,7 +26,7 @@ class _Pair:
     """A bone relative to the one above it, named by the joints whose frames they are."""
 
     above: str | None
-    """None: the ground."""
+    """The upper bone; None: the ground."""
     below: str
     order: str
     """The axes about which it turns, one after the other."""
@@ -113,11 +113,7 @@ def write_angles_csv(path: Path, motion: MotionData, up: str = "z") -> None:
 
 
 def write_mot(path: Path, motion: MotionData, up: str = "z") -> None:
-    """Write OpenSim's motion file.
-
-    Raises:
-        InputError: as `joint_angles`; no frames, unevenly spaced frames, or a path that cannot be written.
-    """
+    """Write OpenSim's motion file."""
     frame_time(path, motion)
     columns = {"time": motion.time, **joint_angles(motion, up)}
     header = [path.stem, "version=1", f"nRows={motion.num_frames}", f"nColumns={len(columns)}", "inDegrees=yes"]

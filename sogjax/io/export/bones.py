@@ -92,11 +92,7 @@ def frame_time(path: Path, motion: MotionData) -> float:
 
 
 def check_frames(path: Path, motion: MotionData) -> None:
-    """Check that there is anything to write.
-
-    Raises:
-        InputError: there is no frame.
-    """
+    """Check that there is anything to write."""
     if motion.num_frames == 0:
         raise InputError(f"{path}: the motion has no frames; export one that has")
 

@@ -1,6 +1,6 @@
 """BVH, the hierarchy and channels that Blender and most animation programs read.
 
-Y is up, +Z is where a body in its rest pose looks, lengths are metres unless asked otherwise, angles degrees.
+Y is up, +Z is where a body in its rest pose looks, lengths are metres, angles degrees.
 """
 
 from collections.abc import Iterator
@@ -13,9 +13,6 @@ from jaxtyping import Float
 from sogjax.io.export.bones import CONSTANT, bone_frames, bones_of, euler_angles, frame_time, in_parents, world_turn
 from sogjax.io.files import write_file
 from sogjax.io.motion_data import MotionData
-
-PER_METRE = {"m": 1.0, "cm": 100.0}
-"""The units of length that a BVH file may be written in; the file itself does not say which."""
 
 
 @dataclass
@@ -41,20 +38,17 @@ class _Bone:
         return np.zeros(3) if self.is_root else np.median(self.positions, axis=0)
 
 
-def write_bvh(path: Path, motion: MotionData, up: str = "z", unit: str = "m") -> None:
-    """Write `motion`, whose world has the vertical `up`, as BVH with Y up; lengths in `unit` (`m`, `cm`).
+def write_bvh(path: Path, motion: MotionData, up: str = "z") -> None:
+    """Write `motion`, whose world has the vertical `up`, as BVH with Y up.
 
     One-axis joints that share their origin become one BVH joint with three rotation channels. The root, and
     joints that slide, have position channels too.
 
     Raises:
         InputError: no frames, unevenly spaced frames, or a path that cannot be written.
-        ValueError: no such unit.
     """
-    if unit not in PER_METRE:
-        raise ValueError(f"no unit {unit!r}; use one of {', '.join(PER_METRE)}")
     seconds = frame_time(path, motion)
-    root = _root_bone(motion, up, PER_METRE[unit])
+    root = _root_bone(motion, up)
     bones = list(_depth_first(root))
     channels = [np.concatenate([bone.positions, bone.angles], 1) if bone.moves else bone.angles for bone in bones]
     lines = [
@@ -68,8 +62,8 @@ def write_bvh(path: Path, motion: MotionData, up: str = "z", unit: str = "m") ->
     write_file(path, "\n".join(lines) + "\n")
 
 
-def _root_bone(motion: MotionData, up: str, scale: float) -> _Bone:
-    """The tree of bones, with lengths times `scale`."""
+def _root_bone(motion: MotionData, up: str) -> _Bone:
+    """The tree of bones."""
     found = bones_of(motion)
     rotations, positions = bone_frames(motion, found, up, "y")
     turns, offsets = in_parents(found, rotations, positions)
@@ -81,9 +75,9 @@ def _root_bone(motion: MotionData, up: str, scale: float) -> _Bone:
         bone = _Bone(
             name=name,
             is_root=above < 0,
-            positions=offsets[:, index] * scale,
+            positions=offsets[:, index],
             angles=np.unwrap(euler_angles(turns[:, index], "ZXY"), axis=0, period=360.0),
-            end=_end(attached, offsets[0, index]) * scale,
+            end=_end(attached, offsets[0, index]),
         )
         bones.append(bone)
         if above >= 0:

@@ -57,11 +57,7 @@ class _Content:
 
 
 def write_glb(path: Path, motion: MotionData, up: str = "z") -> None:
-    """Write a motion whose world has the vertical `up`.
-
-    Raises:
-        InputError: no frames, or a path that cannot be written.
-    """
+    """Write a motion whose world has the vertical `up`."""
     check_frames(path, motion)
     bones = bones_of(motion)
     rotations, positions = bone_frames(motion, bones, up, "y")

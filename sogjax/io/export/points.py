@@ -37,12 +37,8 @@ def marker_points(
 ) -> tuple[list[str], Float[np.ndarray, "frame marker 3"]]:
     """Names and positions (metres) of the points, in a world turned from the vertical `up` to `to`.
 
-    Args:
-        motion: whose points.
-        up: the vertical of its world.
-        to: that of the file's.
-        markers: None: joint centres, toes, heels, hands and the top of the head; `all`: every bone, too, those that
-            only roll as well; else a keypoint scheme, by name or file, whose points are written under its names.
+    Without `markers` they are joint centres, toes, heels, hands and the top of the head; with `all` every bone, too,
+    those that only roll as well; else those of a keypoint scheme, by name or file, under its names.
 
     Raises:
         InputError: no such scheme, or the motion lacks one of its points.
@@ -124,11 +120,7 @@ def write_csv(path: Path, motion: MotionData, up: str = "z") -> None:
 
 
 def write_columns(path: Path, motion: MotionData, note: str, columns: Mapping[str, Float[np.ndarray, "frame"]]) -> None:
-    """Write CSV: after a line starting with `#` with a note, and the columns' names, one row per frame.
-
-    Raises:
-        InputError: a path that cannot be written.
-    """
+    """Write CSV: after a line starting with `#` with a note, and the columns' names, one row per frame."""
     with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         file.write(f"# {note}\n")
         writer = csv.writer(file, lineterminator="\n")

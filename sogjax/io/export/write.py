@@ -26,7 +26,7 @@ WRITERS: dict[str, Callable[[Path, MotionData, str], None]] = {
     ".npz": lambda path, motion, up: save_motion(path, replace(motion, up=up)),
     ".trc": write_trc,
 }
-"""By file ending: a function of the path, the motion, and the vertical of the motion's world."""
+"""What writes a motion, by the file's ending; the last argument is the vertical of the motion's world."""
 
 
 def export_motion(motion: MotionData, path: Path, up: str | None = None) -> None:

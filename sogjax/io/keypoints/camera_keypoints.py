@@ -1,7 +1,4 @@
-"""Keypoints as npy arrays: MediaPipe's by FreeMoCap (camera, frame, point, x y), or one file a camera.
-
-All keypoint files of one camera, and whether they are of its pictures.
-"""
+"""The keypoints of one camera: of a JSON file, a folder of them or an array, and whether they are of its pictures."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,15 +8,9 @@ from jaxtyping import Float
 
 from sogjax.errors import InputError, counted
 from sogjax.io.keypoint_files import json_files
-from sogjax.io.keypoints.formats import read_pictures
-from sogjax.io.keypoints.people import Person, cleaned
+from sogjax.io.keypoints.formats import cleaned, read_pictures
+from sogjax.io.keypoints.scheme import Person
 from sogjax.io.npz_file import check_npy
-
-MEDIAPIPE = 33
-_WITH_HANDS_AND_FACE = (543, 553)
-"""Points of MediaPipe's holistic model without and with the irises: the body's 33 come first."""
-
-MAX_BYTES = 4 * 2**30
 
 
 def read_keypoint_array(path: Path) -> Float[np.ndarray, "camera frame all_keypoints 3"]:
@@ -30,9 +21,10 @@ def read_keypoint_array(path: Path) -> Float[np.ndarray, "camera frame all_keypo
     Raises:
         InputError: no npy, pickled objects inside, or an array of another form.
     """
+    most_bytes = 4 * 2**30
     check_npy(path)
-    if path.stat().st_size > MAX_BYTES:
-        raise InputError(f"{path}: is larger than {MAX_BYTES} bytes; give a file of keypoints")
+    if path.stat().st_size > most_bytes:
+        raise InputError(f"{path}: is larger than {most_bytes} bytes; give a file of keypoints")
     try:
         values = np.load(path, allow_pickle=False, mmap_mode="r")
     except (OSError, ValueError, EOFError) as error:
@@ -43,23 +35,13 @@ def read_keypoint_array(path: Path) -> Float[np.ndarray, "camera frame all_keypo
             f"{path}: is of the shape {values.shape} and type {values.dtype}; keypoints are {form} numbers"
         )
     values = values[None] if values.ndim == 3 else values
-    if values.shape[2] in _WITH_HANDS_AND_FACE:
-        values = values[:, :, :MEDIAPIPE]
+    if values.shape[2] in (543, 553):  # MediaPipe's holistic model without and with irises: the body comes first
+        values = values[:, :, :33]
     points = np.array(values[..., :2], np.float64)
     # A third number is MediaPipe's depth; only a fourth is a confidence.
     scores = np.array(values[..., 3]) if values.shape[-1] == 4 else np.ones(values.shape[:-1])
     scores = np.where(np.isfinite(points).all(-1), scores, 0.0)
     return cleaned(np.concatenate([points, scores[..., None]], axis=-1))
-
-
-OUTSIDE = 0.2
-"""Share of the keypoints outside a camera's pictures above which they are of other pictures."""
-MARGIN = 0.05
-"""Of a picture's size: detectors put keypoints that far outside."""
-SURE = 0.3
-"""Confidence of the keypoints that are looked at."""
-SHORT = 0.9
-"""Share of a video that keypoints should reach."""
 
 
 @dataclass(frozen=True)
@@ -68,21 +50,17 @@ class CameraKeypoints:
 
     path: Path
     pictures: dict[int, tuple[Person, ...]]
-    """By number of the picture as the files count."""
+    """The people of each picture, by its number as the files count."""
     warnings: tuple[str, ...] = ()
 
     @property
     def people(self) -> list[Person]:
-        """Of all pictures."""
+        """The people of all pictures."""
         return [person for people in self.pictures.values() for person in people]
 
 
 def read_camera(path: Path) -> CameraKeypoints:
-    """The keypoints of one camera: a JSON file, or a folder of them.
-
-    Raises:
-        InputError: none of the files can be read, or two are of the same picture.
-    """
+    """The keypoints of one camera: a JSON file, or a folder of them."""
     files = json_files(path) if path.is_dir() else [path]
     pictures: dict[int, tuple[Person, ...]] = {}
     wrong: list[str] = []
@@ -104,11 +82,7 @@ def read_camera(path: Path) -> CameraKeypoints:
 
 
 def of_array(path: Path, points: np.ndarray, num_images: int | None) -> CameraKeypoints:
-    """The keypoints of one camera out of an array (frame, all_keypoints, 3).
-
-    Raises:
-        InputError: another number of frames than the camera's video has.
-    """
+    """The keypoints of one camera out of an array (frame, all_keypoints, 3)."""
     if num_images is not None and len(points) != num_images:
         raise InputError(f"{path}: has {counted(len(points), 'frame')}, the video {num_images}; run the detector again")
     people = ((person,) if (person[:, 2] > 0.0).any() else () for person in points)
@@ -116,15 +90,9 @@ def of_array(path: Path, points: np.ndarray, num_images: int | None) -> CameraKe
 
 
 def with_image_numbers(found: CameraKeypoints, first_image: int, num_images: int | None) -> CameraKeypoints:
-    """The same, its pictures counted from 0 as the camera's images are.
+    """The keypoints with their pictures counted from 0, as the camera's images are.
 
-    Args:
-        found: as the files count.
-        first_image: number in the name of the camera's first image; 0 of a video.
-        num_images: that the camera has; None: not known.
-
-    Raises:
-        InputError: there are keypoints of images that the camera does not have.
+    `first_image` is the number in the name of the camera's first image, 0 of a video; None images: not known.
     """
     numbers = sorted(found.pictures)
     if not numbers:
@@ -140,17 +108,13 @@ def with_image_numbers(found: CameraKeypoints, first_image: int, num_images: int
         )
     warnings = found.warnings
     reached = numbers[-1] - start + 1
-    if num_images is not None and reached < SHORT * num_images:
+    if num_images is not None and reached < 0.9 * num_images:
         warnings += (f"{found.path}: ends with the picture {reached} of {num_images}",)
     return CameraKeypoints(found.path, {number - start: found.pictures[number] for number in numbers}, warnings)
 
 
 def check_pixels(found: CameraKeypoints, size: tuple[int, int]) -> None:
-    """Check that keypoints lie in pictures of (width, height).
-
-    Raises:
-        InputError: nobody was found, coordinates are no pixels, or too many lie outside.
-    """
+    """Check that keypoints lie in pictures of (width, height)."""
     people = found.people
     points = np.concatenate(people) if people else np.zeros((0, 3))
     points = points[points[:, 2] > 0.0]
@@ -160,11 +124,11 @@ def check_pixels(found: CameraKeypoints, size: tuple[int, int]) -> None:
         raise InputError(
             f"{found.path}: its coordinates are shares of the picture; write pixels (OpenPose: --keypoint_scale 0)"
         )
-    sure = points[points[:, 2] >= SURE]
+    sure = points[points[:, 2] >= 0.3]
     sure = sure if len(sure) else points
-    margin = MARGIN * np.array(size)
+    margin = 0.05 * np.array(size)  # detectors put keypoints that far outside
     outside = ((sure[:, :2] < -margin) | (sure[:, :2] > np.array(size) + margin)).any(-1).mean()
-    if outside > OUTSIDE:
+    if outside > 0.2:
         raise InputError(
             f"{found.path}: {100 * outside:.0f} % of its keypoints lie outside the camera's pictures of "
             f"{size[0]}x{size[1]}; run the detector on the recorded pictures"

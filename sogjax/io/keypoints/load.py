@@ -1,7 +1,4 @@
-"""Keypoints of a recording: where other programs' detectors saw the joints of people in each picture.
-
-Reads the keypoints of a recording, camera by camera, and brings them to its frames.
-"""
+"""Keypoints of a recording: where other programs' detectors saw the joints of people, brought to its frames."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,8 +18,7 @@ from sogjax.io.keypoints.camera_keypoints import (
     read_keypoint_array,
     with_image_numbers,
 )
-from sogjax.io.keypoints.people import check_counts, told_scheme
-from sogjax.io.keypoints.scheme import KeypointScheme, named_scheme
+from sogjax.io.keypoints.scheme import KeypointScheme, check_counts, named_scheme, told_scheme
 from sogjax.io.recording import Recording
 from sogjax.io.source import numbered_images, videos_in
 
@@ -41,7 +37,7 @@ class Keypoints:
     """x and y in pixels of the recorded (distorted) pictures, (0, 0) being the centre of the first pixel, and
     confidence from 0 to 1; all three 0 where a keypoint was not found. Read-only."""
     warnings: tuple[str, ...] = ()
-    """One sentence each: what was left out, and why."""
+    """Sentences on what was left out, and why."""
 
     def __post_init__(self) -> None:
         self.points.setflags(write=False)
@@ -53,7 +49,7 @@ class Keypoints:
 
     @property
     def pixels(self) -> Float[np.ndarray, "camera frame person keypoint 2"]:
-        """Where they are, 0 where there is none."""
+        """Where the keypoints are; 0 where there is none."""
         return self.points[..., :2]
 
     @property
@@ -68,17 +64,13 @@ class Keypoints:
         return tuple(name for name, confidence in pairs if (confidence > 0.0).any())
 
     def select(self, cameras: Sequence[str]) -> "Keypoints":
-        """Those of some cameras, in their order."""
+        """The keypoints of some cameras, in their order."""
         indices = [self.cameras.index(name) for name in cameras]
         return Keypoints(self.scheme, tuple(cameras), self.points[indices], self.warnings)
 
     def between(self, first: int, stop: int) -> "Keypoints":
-        """Those of the frames from `first` on and before `stop`."""
+        """The keypoints of the frames from `first` on and before `stop`."""
         return Keypoints(self.scheme, self.cameras, self.points[:, first:stop], self.warnings)
-
-
-MOST_KEPT = 16
-"""People of a picture that are kept: the most confident."""
 
 
 def load_keypoints(recording: Recording, folder: Path | None = None, scheme: str | None = None) -> Keypoints | None:
@@ -106,14 +98,15 @@ def load_keypoints(recording: Recording, folder: Path | None = None, scheme: str
     people = [person for camera in found.values() for person in camera.people]
     kept = wanted or told_scheme(files.folder, people)
     most = max(len(people) for camera in found.values() for people in camera.pictures.values())
-    if most > MOST_KEPT:
-        warnings.append(f"{files.folder}: has up to {most} people in a picture; the {MOST_KEPT} surest are used")
-    points = _by_frame(recording, found, kept, min(most, MOST_KEPT))
+    most_kept = 16
+    if most > most_kept:
+        warnings.append(f"{files.folder}: has up to {most} people in a picture; the {most_kept} surest are used")
+    points = _by_frame(recording, found, kept, min(most, most_kept))
     return Keypoints(kept, recording.rig.names, points, tuple(warnings))
 
 
 def _read(recording: Recording, files: KeypointFiles) -> tuple[dict[str, CameraKeypoints], list[str]]:
-    """By camera what was read of it, and sentences on those that were left out."""
+    """What was read of each camera, and sentences on those that were left out."""
     if files.of_all is not None:
         given = _of_all(recording, files.of_all)
     else:
@@ -140,7 +133,7 @@ def _read(recording: Recording, files: KeypointFiles) -> tuple[dict[str, CameraK
 
 
 def _of_all(recording: Recording, path: Path) -> dict[str, tuple[Path, Float[np.ndarray, "frame all_keypoints 3"]]]:
-    """By camera its part of an array of all cameras, which are in the order of their videos' names."""
+    """Each camera's part of an array of all, which are in the order of their videos' names."""
     array = read_keypoint_array(path)
     videos = videos_in(next(iter(recording.sources.values())).parent)
     if len(videos) != len(array):
@@ -170,11 +163,11 @@ def _by_frame(
     points = np.zeros((len(recording.rig), recording.num_frames, most, len(scheme.keypoints), 3), np.float32)
     for camera, keypoints in found.items():
         place = recording.rig.names.index(camera)
-        for frame in range(recording.num_frames):
+        for row, frame in enumerate(recording.frames):
             people = keypoints.pictures.get(_image(recording, camera, frame), ())
             if people and not recording.is_missing(camera, frame):
                 surest = sorted(people, key=lambda person: -person[:, 2].sum())[:most]
-                points[place, frame, : len(surest)] = scheme.chosen(np.stack(surest))
+                points[place, row, : len(surest)] = scheme.chosen(np.stack(surest))
     return points
 
 
@@ -182,5 +175,5 @@ def _image(recording: Recording, camera: str, frame: int) -> int:
     """Number of the image of a camera's file that shows a frame; -1 where there is none."""
     if not recording.has_image(camera, frame):
         return -1
-    number = recording.first_frame + frame + recording.frame_offset[camera]
+    number = frame + recording.frame_offset[camera]
     return recording.picked[camera][number] if camera in recording.picked else number

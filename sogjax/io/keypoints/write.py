@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float
 
-from sogjax.io.files import atomic_path
+from sogjax.io.files import atomic_path, write_file
 from sogjax.io.keypoints.scheme import KeypointScheme
 
 People = Float[np.ndarray, "person all_keypoints 3"]
@@ -79,7 +79,7 @@ WRITERS: dict[str, tuple[Callable[[Path, str, Sequence[People | None]], None], s
     "alphapose": (write_alphapose, "HALPE_26"),
     "mediapipe": (write_mediapipe, "MEDIAPIPE_33"),
 }
-"""By program: how it writes the pictures of a camera, and its usual scheme."""
+"""How a program writes the pictures of a camera, and its usual scheme, by its name."""
 
 
 def pictures_to_write(
@@ -106,8 +106,7 @@ def _write_pictures(path_of: Callable[[int], Path], pictures: Sequence[People | 
 
 
 def _write(path: Path, content: object) -> None:
-    with atomic_path(path) as temporary:
-        temporary.write_text(json.dumps(content, separators=(",", ":")), encoding="utf-8")
+    write_file(path, json.dumps(content, separators=(",", ":")))
 
 
 def _rounded(values: Float[np.ndarray, "..."]) -> list[float]:

@@ -15,11 +15,7 @@ _EXPECTED = "OFFSET, CHANNELS, JOINT, End Site, { or }"
 
 
 def read_bvh_hierarchy(path: Path) -> SkeletonRows:
-    """The skeleton of a BVH file, with blobs along its bones and a landmark at every joint.
-
-    Raises:
-        InputError: a line that is not what it should be.
-    """
+    """The skeleton of a BVH file, with blobs along its bones and a landmark at every joint."""
     lines = Lines(path, MAX_BYTES, own_line="{}", until="MOTION")
     if lines.take("the header") != [HEADER]:
         raise lines.error(f"the header {HEADER}")

@@ -14,11 +14,6 @@ from sogjax.io.yaml_entry import Entry
 from sogjax.model.body import Body
 from sogjax.model.rotation import world_from_upright
 
-EXTENTS = (0.05, 10.0)
-"""Metres. A skeleton of another size is suspected to be in another unit."""
-
-_HEAD_BYTES = 4096
-
 
 def read_skeleton(path: Path, dof: Path | None = None, unit: str | None = None, up: str = "y") -> Body:
     """The body of a `.skeleton` (with a `.dof`, if given) or of the hierarchy of a BVH, standing upright.
@@ -41,7 +36,7 @@ def read_skeleton(path: Path, dof: Path | None = None, unit: str | None = None, 
     chosen = unit or prescribed
     body = body_from(Entry(path, "", rows.document()), METRES[chosen])
     extent = METRES[chosen] * rows.extent()
-    if not EXTENTS[0] <= extent <= EXTENTS[1]:
+    if not 0.05 <= extent <= 10.0:  # metres; a skeleton of another size is suspected to be in another unit
         others = ", ".join(other for other in METRES if other != chosen)
         raise InputError(f"{path}: its rest pose is {extent:.3g} m in size in {chosen}; give unit= as one of {others}")
     return body.rotated(jnp.asarray(world_from_upright(up).T, body.blob_sigmas.dtype))
@@ -50,6 +45,6 @@ def read_skeleton(path: Path, dof: Path | None = None, unit: str | None = None, 
 def _head(path: Path) -> str:
     try:
         with path.open("rb") as file:
-            return file.read(_HEAD_BYTES).decode("utf-8-sig", errors="replace").lstrip()
+            return file.read(4096).decode("utf-8-sig", errors="replace").lstrip()
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from error

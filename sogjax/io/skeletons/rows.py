@@ -1,11 +1,4 @@
-"""A skeleton as read from a file: the tables of a body file, not yet checked, in the units of the file.
-
-Blobs along the bones of a skeleton that has none: a start, which the actor's pictures then scale.
-
-Along every bone, from a joint to a child elsewhere or to the bone's end: four blobs, two where the bone is shorter
-than a tenth of the skeleton, one below a twenty-fifth. They share the bone evenly and their sigma is half of such a
-share, so that neighbours touch where each counts as body. All are grey.
-"""
+"""A skeleton as read from a file: the tables of a body file, not yet checked, with blobs along bones that have none."""
 
 import re
 from collections.abc import Iterator
@@ -18,7 +11,7 @@ from jaxtyping import Float
 from sogjax.io.actor_rows import WORLD
 
 MAX_ROWS = 2000
-"""One-axis joints, markers, groups and degrees of freedom of a file, each."""
+"""How many one-axis joints a file may have, and how many markers, groups and degrees of freedom."""
 
 Row = dict[str, Any]
 
@@ -33,9 +26,9 @@ class SkeletonRows:
     blobs: list[Row] = field(default_factory=list)
     landmarks: list[Row] = field(default_factory=list)
     shape: dict[str, dict[str, list[str]]] = field(default_factory=dict)
-    """By name of a group what is scaled together, as in a body file."""
+    """What is scaled together, by name of the group, as in a body file."""
     ends: dict[str, list[float]] = field(default_factory=dict)
-    """By joint without children: where its bone ends, from the joint."""
+    """Where the bone of a joint without children ends, from the joint."""
 
     def add_joint(self, name: str, parent: str, offset: list[float], axis: list[float] | str, kind: str) -> None:
         """Append a one-axis joint; the parent of a root is `world`."""
@@ -74,31 +67,31 @@ class SkeletonRows:
         return float(np.ptp(np.array(points).reshape(-1, 3), axis=0).max()) if points else 0.0
 
 
-BLOBS_OF_BONES = ((0.1, 4), (0.04, 2), (0.0, 1))
-"""Bones longer than this part of the skeleton's extent have so many blobs."""
-
-SIGMA_OF_SHARE = 0.52
-"""A blob's sigma in parts of its share of the bone: a little over half, as in the default body."""
-
 GREY = [0.5, 0.5, 0.5]
 
 _SIDE = re.compile(r"[Ll]eft|[Rr]ight|LEFT|RIGHT|^[lrLR](?=[A-Z_.])|(?<=[_.])[lrLR]$")
 
 
 def attach_blobs(rows: SkeletonRows) -> None:
-    """Add blobs along all bones, and the groups in which lengths and sizes are scaled: left and right together."""
+    """Add blobs along all bones, and the groups in which lengths and sizes are scaled: left and right together.
+
+    Along every bone, from a joint to a child elsewhere or to the bone's end, lie four grey blobs, two where the bone is
+    shorter than a tenth of the skeleton, one below a twenty-fifth: a start, which the actor's pictures then scale. They
+    share the bone evenly, and their sigma is a little over half of such a share, as in the default body, so that
+    neighbours touch where each counts as body.
+    """
     extent = rows.extent()
     group_of = {joint: name for name, members in rows.shape.items() for joint in members.get("joint_offsets", [])}
     for joint, end, below in _bones(rows):
         length = float(np.linalg.norm(end))
         if length <= 1e-6 * extent:
             continue
-        count = next(number for part, number in BLOBS_OF_BONES if length > part * extent)
+        count = 4 if length > 0.1 * extent else 2 if length > 0.04 * extent else 1
         label = f"{joint}_end" if below is None else f"{below}_bone"
         names = [f"{label}{k + 1}" for k in range(count)]
         for k, name in enumerate(names):
             offset = (end * (k + 0.5) / count).tolist()
-            sigma = SIGMA_OF_SHARE * length / count
+            sigma = 0.52 * length / count
             rows.blobs.append({"name": name, "joint": joint, "offset": offset, "sigma": sigma, "color": GREY})
         both_sides = _SIDE.sub("", label).strip("_. ")
         if below is None or below not in group_of:

@@ -1,16 +1,22 @@
-"""Skeletool's `.skeleton` V1.0 and `.dof` v0.3: millimetres and radians."""
+"""Skeletool's `.skeleton` V1.0, `.dof` v0.3 and `.motion` V1.0: millimetres and radians."""
 
 from pathlib import Path
 
+import numpy as np
+from jaxtyping import Float
+
+from sogjax.errors import InputError, counted
 from sogjax.io.actor_rows import WORLD
+from sogjax.io.files import atomic_path
+from sogjax.io.motion import Motion, motion_from_poses
+from sogjax.io.motion_data import DEFAULT_UP
 from sogjax.io.skeletons.rows import GREY, MAX_ROWS, Row, SkeletonRows, attach_blobs
 from sogjax.io.text_lines import Lines
+from sogjax.model.body import Body
 
-HEADER = "Skeletool Skeleton Definition V1.0"
+HEADER, MOTION_HEADER = "Skeletool Skeleton Definition V1.0", "Skeletool Motion File V1.0"
 MAX_BYTES = 4 * 2**20
-
-SIGMA_OF_RADIUS = 1.0 / 1.35
-"""A blob of sigma r / 1.35 fits a disc of radius r best."""
+"""A larger file is no skeleton."""
 
 _JOINT = "a joint: name revolute|prismatic parent offset (3) axis (3) scale"
 _MARKER = "a marker: name parent point offset (3) [size [r g b]]"
@@ -23,13 +29,8 @@ def read_skeletool_skeleton(path: Path, dof: Path | None = None) -> SkeletonRows
 
     Markers with a size become blobs, those without landmarks. Where no marker has a size, blobs are put along the
     bones.
-
-    Raises:
-        InputError: a line that is not what it should be, or more lines promised than there are.
     """
-    lines = Lines(path, MAX_BYTES)
-    if " ".join(lines.take("the header")) != HEADER:
-        raise lines.error(f"the header {HEADER!r}")
+    lines = _after_header(path, HEADER, MAX_BYTES)
     rows = SkeletonRows(path.stem)
     sections = {"joints:": _joints, "markers:": _markers, "scaling": _scaling, "dofs:": _dofs}
     while lines.left:
@@ -39,7 +40,7 @@ def read_skeletool_skeleton(path: Path, dof: Path | None = None) -> SkeletonRows
             raise lines.error(f"one of {' '.join(sections)} with a number, each once")
         section(lines, rows, lines.count(words[-1], MAX_ROWS))
     if dof is not None:
-        rows.dofs = read_dof(dof)
+        rows.dofs = _read_dof(dof)
     if not rows.landmarks:
         rows.landmarks = [{"name": row["name"], "joint": row["name"], "offset": [0.0] * 3} for row in rows.joints]
     if not rows.blobs:
@@ -47,12 +48,16 @@ def read_skeletool_skeleton(path: Path, dof: Path | None = None) -> SkeletonRows
     return rows
 
 
-def read_dof(path: Path) -> list[Row]:
-    """The degrees of freedom of a `.dof`; their smoothness has no counterpart here.
+def _after_header(path: Path, header: str, max_bytes: int) -> Lines:
+    """The lines of a file that begins with a header, behind it."""
+    lines = Lines(path, max_bytes)
+    if " ".join(lines.take("the header")) != header:
+        raise lines.error(f"the header {header!r}")
+    return lines
 
-    Raises:
-        InputError: a line that is not what it should be.
-    """
+
+def _read_dof(path: Path) -> list[Row]:
+    """The degrees of freedom of a `.dof`; their smoothness has no counterpart here."""
     lines = Lines(path, MAX_BYTES)
     words = lines.take("`dofs: N`")
     if words[0] != "dofs:":
@@ -107,7 +112,8 @@ def _markers(lines: Lines, rows: SkeletonRows, count: int) -> None:
         else:
             color = numbers[4:] or GREY
             color = [value / 255.0 for value in color] if max(color) > 1.0 else color
-            rows.blobs.append(place | {"sigma": SIGMA_OF_RADIUS * numbers[3], "color": color})
+            sigma = (1.0 / 1.35) * numbers[3]  # fits a disc of that radius best
+            rows.blobs.append(place | {"sigma": sigma, "color": color})
 
 
 def _scaling(lines: Lines, rows: SkeletonRows, count: int) -> None:
@@ -136,3 +142,53 @@ def _limits(lines: Lines, words: list[str]) -> list[float] | str:
     if len(words) != 3 or words[0] != "limits":
         raise lines.error(_LIMITS)
     return lines.numbers(words[1:], _LIMITS)
+
+
+def read_skeletool_motion(path: Path, body: Body, fps: float, up: str = DEFAULT_UP) -> Motion:
+    """The motion of `body`, which stands upright in a world with the vertical `up`; the file has no frame rate.
+
+    Raises:
+        InputError: no such file, or a line that is not a frame and a value for every degree of freedom.
+    """
+    lines = _after_header(path, MOTION_HEADER, 256 * 2**20)
+    count = body.skeleton.num_dofs
+    expected = f"a frame and {counted(count, 'number')}, one for each degree of freedom of {body.name!r}"
+    frames: list[int] = []
+    poses: list[list[float]] = []
+    while lines.left:
+        words = lines.take(expected, (1 + count,))
+        frame = lines.number(words[0], expected)
+        if frame != round(frame) or (frames and frame <= frames[-1]):
+            raise lines.error(f"{expected}; frames are whole numbers that increase")
+        frames.append(int(frame))
+        poses.append(lines.numbers(words[1:], expected))
+    values = np.array(poses, float).reshape(-1, count) / _file_units(body)
+    return motion_from_poses(body, values, fps, frame=np.array(frames, int), up=up)
+
+
+def write_skeletool_motion(path: Path, motion: Motion, body: Body) -> None:
+    """Write the poses of a motion of `body`.
+
+    Raises:
+        InputError: the motion is not one of this body.
+    """
+    if tuple(motion.dof_names.tolist()) != body.skeleton.dof_names:
+        raise InputError(
+            f"{path}: the motion's degrees of freedom are not those of the body {body.name!r}; "
+            "give the actor that was tracked as actor=..."
+        )
+    values = motion.pose.astype(float) * _file_units(body)
+    rows = (
+        f"{frame} {' '.join(f'{value:.9g}' for value in row)}\n"
+        for frame, row in zip(motion.frame.tolist(), values.tolist(), strict=True)
+    )
+    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(f"{MOTION_HEADER}\n")
+        file.writelines(rows)
+
+
+def _file_units(body: Body) -> Float[np.ndarray, "dof"]:
+    """What a metre or radian is in the file: degrees of freedom that only slide joints are lengths."""
+    moves = np.asarray(body.skeleton.parameter_transform) != 0.0
+    turns = (moves & np.asarray(body.skeleton.revolute)[:, None]).any(axis=0)
+    return np.where(turns, 1.0, 1000.0)

@@ -73,7 +73,7 @@ def _curve(name: str, actor: str | None) -> str:
 
 
 def _plot(curve: str) -> str:
-    """Which plot a curve belongs in; what is not known is a term that a user added."""
+    """The plot that a curve belongs in; what is not known is a term that a user added."""
     if curve.startswith(_DOUBT):
         return "doubts"
     if "penalty" in curve:

@@ -4,7 +4,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -12,7 +11,6 @@ import numpy as np
 from jaxtyping import UInt8
 
 from sogjax.io.motion import Motion
-from sogjax.io.motion_log import PER_FRAME, SOMETIMES_PER_FRAME
 
 ATTEMPTS, LONGEST = 3, 120
 """A viewer on a busy machine may take its picture before the file is loaded; seconds that it may take."""
@@ -58,5 +56,4 @@ def drawn_frames(motions: Sequence[Motion], frame: int) -> list[Motion]:
 
 
 def _only(motion: Motion, rows: np.ndarray) -> Motion:
-    names = [name for name in (*PER_FRAME, *SOMETIMES_PER_FRAME) if getattr(motion, name) is not None]
-    return replace(motion, **{name: getattr(motion, name)[rows] for name in names})
+    return motion.of_rows(rows)

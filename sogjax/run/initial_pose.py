@@ -1,0 +1,198 @@
+"""The pass that finds where tracking begins: sources of the initial pose, asked in turn."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Array, Float
+
+from sogjax.energy.term import Term
+from sogjax.errors import InputError
+from sogjax.io.initial_pose import InitialPose as PoseDescription
+from sogjax.io.initial_pose import load_initial_poses
+from sogjax.io.npz_file import finite_array, read_npz, save_npz, text_array
+from sogjax.io.recording import Recording
+from sogjax.model.body import Body
+from sogjax.run.actors import Actors
+from sogjax.run.background import Background
+from sogjax.run.clip import Clip
+from sogjax.run.clip_search import ClipSearch, clear_guess
+from sogjax.run.keypoint_start import keypoint_starts
+from sogjax.run.recordings import upright
+from sogjax.run.terminal import say
+from sogjax.search.found_pose import FoundPose
+from sogjax.search.rough_pose import check_rough_pose, rough_pose
+from sogjax.settings.run import TrackConfig
+
+AUTO = "auto"
+FILE = "initial_pose.npz"
+
+
+@dataclass(frozen=True)
+class InitialPose:
+    """Where tracking begins."""
+
+    frame: int
+    """The recording's number; frames before it are tracked backwards."""
+    pose: Float[np.ndarray, "dof"]
+    """A rough pose of all actors in that frame."""
+    source: str
+    """Which of the sources found it."""
+
+    @classmethod
+    def of_actors(cls, frame: int, poses: Sequence[Float[np.ndarray | Array, "_dof"]], source: str) -> "InitialPose":
+        """From the pose of each actor."""
+        return cls(frame, np.concatenate([np.asarray(pose) for pose in poses]), source)
+
+    def save(self, folder: Path) -> None:
+        """Keep it in a run's folder."""
+        save_npz(folder / FILE, {"pose": self.pose, "frame": np.array(self.frame), "source": np.array(self.source)})
+
+    @classmethod
+    def load(cls, folder: Path) -> "InitialPose | None":
+        """What was kept, if it was."""
+        path = folder / FILE
+        if not path.is_file():
+            return None
+        arrays = read_npz(path)
+        pose = np.asarray(finite_array(path, arrays, "pose", (None,)), arrays["pose"].dtype)
+        frame = int(finite_array(path, arrays, "frame", ()))
+        return cls(frame, pose, str(text_array(path, arrays, "source", ())))
+
+
+@dataclass(frozen=True)
+class PoseRequest:
+    """What an initial pose is asked for, and all that is known before tracking."""
+
+    clip: Clip
+    background: Background
+    actors: Actors
+    config: TrackConfig
+    terms: Sequence[Term] = ()
+    """Of the energy, beside those of the settings."""
+    picture: Path | None = None
+    """Where the best guess is drawn if none is sure; None: into the working folder."""
+
+    @property
+    def bodies(self) -> list[Body]:
+        """The actors as they stand in the recording's world."""
+        return [upright(actor, self.clip.recording) for actor in self.actors.bodies]
+
+
+PoseSource = Callable[[PoseRequest], InitialPose | None]
+"""Finds an initial pose, or None where it cannot tell."""
+
+
+def find_initial_pose(request: PoseRequest, sources: Sequence[PoseSource]) -> InitialPose:
+    """The pose of the first source that tells one.
+
+    Raises:
+        InputError: none does, or the source that was asked for cannot be used.
+    """
+    for source in sources:
+        if (found := source(request)) is not None:
+            return found
+    raise InputError(
+        f"{request.clip.recording.path}: no initial pose was found; write one into "
+        f"{request.clip.recording.path / 'initial_pose.yaml'}"
+    )
+
+
+def from_file(request: PoseRequest) -> InitialPose | None:
+    """The rough pose of the recording's `initial_pose.yaml`, or of the file that was asked for.
+
+    Raises:
+        InputError: the file is invalid.
+    """
+    recording, frame = request.clip.recording, request.clip.numbers[0]
+    descriptions = described_poses(recording, request.bodies, request.config)
+    if descriptions is None:
+        return None
+    if frame > 0:
+        say(f"warning: the rough pose of {pose_file(recording, request.config)} is used for frame {frame}")
+    pairs = zip(request.bodies, descriptions, strict=True)
+    return InitialPose.of_actors(frame, [rough_pose(body, each, recording.up) for body, each in pairs], "file")
+
+
+def from_example_frames(request: PoseRequest) -> InitialPose | None:
+    """The frame of the videos that every actor was made of in which all fit best, if it is among those to track."""
+    known = [each for each in request.actors.known_frames if each.frame in request.clip.numbers]
+    if not known:
+        return None
+    best = max(known, key=lambda each: each.agreement)
+    whose = "whose pose is known" if len(request.actors.bodies) == 1 else "where all poses are known"
+    say(f"tracking begins in frame {best.frame}, {whose}, and goes both ways")
+    return InitialPose(best.frame, best.pose, "example frames")
+
+
+def from_keypoints(request: PoseRequest) -> InitialPose | None:
+    """The poses that keypoints beside the recording tell in the first frame, unless a search was asked for.
+
+    Raises:
+        InputError: none of the keypoint files can be used.
+    """
+    if request.config.initial_pose == AUTO:
+        return None
+    frame = request.clip.numbers[0]
+    poses = keypoint_starts(request.clip, request.background, request.bodies, request.config, frame)
+    return None if poses is None else InitialPose.of_actors(frame, poses, "keypoints")
+
+
+def from_search(request: PoseRequest) -> InitialPose | None:
+    """The best pose of a search in the first frame; where that is not sure, of a later one, followed back.
+
+    Raises:
+        InputError: the actors are not found in the pictures.
+    """
+    search = ClipSearch(request.clip, request.background, request.bodies, request.config, request.terms)
+    guess, frame = clear_guess(search, request.picture), request.clip.numbers[0]
+    return InitialPose.of_actors(frame, search.carried(guess, frame), "search")
+
+
+SOURCES: tuple[PoseSource, ...] = (from_file, from_example_frames, from_keypoints, from_search)
+"""In the order in which they are asked."""
+
+
+def pose_file(recording: Recording, config: TrackConfig) -> Path | None:
+    """The file with rough poses; None: there is none, or a search was asked for.
+
+    Raises:
+        InputError: the requested file does not exist.
+    """
+    if config.initial_pose == AUTO:
+        return None
+    if config.initial_pose is None:
+        return recording.initial_poses
+    path = Path(config.initial_pose)
+    if not path.is_file():
+        raise InputError(f"initial_pose={config.initial_pose}: there is no such file; give one, or initial_pose=auto")
+    return path
+
+
+def described_poses(recording: Recording, bodies: Sequence[Body], config: TrackConfig) -> list[PoseDescription] | None:
+    """What the file says of the poses of bodies, upright in the recording's world; None: there is no file.
+
+    Raises:
+        InputError: the file is invalid.
+    """
+    path = pose_file(recording, config)
+    if path is None:
+        return None
+    given = load_initial_poses(path, [body.name for body in bodies])
+    for body in bodies:
+        try:
+            check_rough_pose(body, given[body.name], recording.up)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from error
+    return [given[body.name] for body in bodies]
+
+
+def searched_poses(request: PoseRequest) -> list[FoundPose]:
+    """The poses that fit the pictures of the first frame best, in the order of the actors, sure or not.
+
+    Raises:
+        InputError: the pictures show nothing in an actor's colours where the cameras look.
+    """
+    search = ClipSearch(request.clip, request.background, request.bodies, request.config, request.terms)
+    return search.found_in(request.clip.numbers[0])

@@ -1,0 +1,100 @@
+"""What a run thinks of itself: its verdict in numbers and in a line, and a picture of its worst frames."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from sogjax.errors import InputError
+from sogjax.io.ground_truth import load_ground_truth
+from sogjax.io.image_file import write_image
+from sogjax.io.motion import Motion
+from sogjax.io.recording import Recording
+from sogjax.io.video import read_frames
+from sogjax.quality.evaluation import GroupEvaluation, evaluate_motions
+from sogjax.quality.limb_warnings import limits_of
+from sogjax.quality.numbers import write_json
+from sogjax.quality.verdict import NUM_WORST, Verdict, expected_of, verdicts
+from sogjax.run.result import RunResult
+from sogjax.run.run import Run
+from sogjax.run.run_files import WORST
+from sogjax.run.terminal import say
+from sogjax.view.closeups import closeups
+
+
+def judged_result(run: Run) -> RunResult:
+    """The result of a run, with the comparison with a truth, if there is one, and with what the run thinks of it."""
+    result = run.result_so_far
+    limits = {body.name: limits_of(body) for body in result.bodies}
+    return replace(
+        result,
+        evaluation=compared(result.recording, result.motions),
+        verdicts=verdicts(result.motions, expected_of(result.bodies), limits),
+    )
+
+
+def compared(recording: Recording, motions: Mapping[str, Motion]) -> GroupEvaluation | None:
+    """The comparison with the recording's ground truth; None: there is none, or none that fits, which is said."""
+    if recording.ground_truth is None:
+        return None
+    truth = load_ground_truth(recording.ground_truth)
+    if len(motions) > 1 and not set(motions) <= set(truth.subjects):
+        say(f"warning: {recording.ground_truth} knows {', '.join(truth.subjects)}; nothing was compared")
+        return None
+    try:
+        return evaluate_motions(motions, truth)
+    except InputError as error:
+        say(f"warning: not compared with the truth: {error}")
+        return None
+
+
+def say_verdicts(result: RunResult) -> None:
+    """Print in a line each whether the actors' motions look right; a warning where they cannot be relied on."""
+    drawn = f"; see {WORST.name}" if any(path.name == WORST.name for path in result.files) else ""
+    for name, verdict in result.verdicts.items():
+        whose = f"{name}: " if len(result.verdicts) > 1 else ""
+        if verdict.wrong:
+            say(f"WARNING: {whose}{verdict.sentence}{drawn}")
+        else:
+            print(f"\nverdict: {whose}{verdict.sentence}{'' if verdict.looks_right else drawn}")
+
+
+def write_metrics(path: Path, result: RunResult) -> None:
+    """Write the comparison with the truth, if there is one, and the verdicts."""
+    errors: dict[str, Any] = {} if result.evaluation is None else result.evaluation.as_dict()
+    write_json(path, errors | {"verdicts": {name: found.as_dict() for name, found in result.verdicts.items()}})
+
+
+def kept_verdicts(path: Path) -> dict[str, Verdict]:
+    """What `write_metrics` wrote of the actors; nothing where that cannot be read."""
+    try:
+        kept = json.loads(path.read_text(encoding="utf-8"))["verdicts"]
+        return {name: Verdict.from_dict(found) for name, found in kept.items()}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return {}
+
+
+def write_worst(path: Path, result: RunResult) -> bool:
+    """Write a picture of the frames that fit worst; whether that could be done, which is said otherwise."""
+    frames = _worst(result)
+    try:
+        drawn = closeups(_pictures(result.recording, frames), result.recording.rig, list(result.motions.values()))
+    except InputError as error:
+        say(f"warning: no {path.name}: {error}")
+        return False
+    write_image(path, drawn)
+    return True
+
+
+def _worst(result: RunResult) -> list[int]:
+    """The worst frames of all actors in turn, each once, in the order of time."""
+    found: dict[int, None] = {}
+    for row in range(NUM_WORST):
+        found |= {verdict.worst[row]: None for verdict in result.verdicts.values() if row < len(verdict.worst)}
+    return sorted(list(found)[:NUM_WORST])
+
+
+def _pictures(recording: Recording, frames: Sequence[int]) -> Iterator[tuple[int, list[Any]]]:
+    for frame in frames:
+        yield frame, next(iter(read_frames(recording, frame, frame + 1)))

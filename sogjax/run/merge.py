@@ -1,0 +1,63 @@
+"""The pass that tracks backwards around limbs in doubt, and takes each part of the body from the better way."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from sogjax.errors import InputError, counted
+from sogjax.io.frame_table import TERM, FramesRecord, FrameTable
+from sogjax.run.frames import capacities_of
+from sogjax.run.setup import Setup
+from sogjax.run.terminal import alive, say
+from sogjax.search.backward_pass import Pass
+from sogjax.search.merge_passes import Revised, in_doubt, merge_passes
+from sogjax.tracking.frame import FrameInput
+
+
+class Merged(FramesRecord):
+    """The frames with what backward passes explain better."""
+
+    file = "merged.npz"
+
+
+def merge_backward(setup: Setup, tracked: FrameTable) -> Merged:
+    """The frames with what backward passes explain better; as they are where nothing is, or a pass failed.
+
+    That a pass failed is said.
+    """
+    if tracked.limb_doubt is None or tracked.baseline is None:
+        return Merged(tracked)
+    energy = float(np.abs(tracked.energy).mean())
+    passed = Pass(tracked.pose, tracked.limb_doubt, tracked.baseline, energy, capacities_of(tracked, row=None))
+    numbers = setup.clip.numbers
+
+    def backwards(first: int, stop: int) -> Iterable[FrameInput]:
+        """The frames of some rows, the last one first."""
+        way = numbers[first:stop][::-1]
+        return setup.clip.frames(way.start, way.stop, way.step)
+
+    if doubtful := int(in_doubt(passed).sum()):
+        say(f"limbs in doubt in {counted(doubtful, 'frame')}: tracked backwards around them, too")
+    try:
+        with alive("tracking backwards"):
+            found = merge_passes(setup.tracker, passed, backwards)
+    except InputError as error:
+        say(f"warning: not told both ways, the first pass stays as it is: {error}")
+        return Merged(tracked)
+    if not found.frames:
+        return Merged(tracked)
+    parts = ", ".join(f"{name} ({len(rows)})" for name, rows in sorted(found.parts.items()))
+    say(f"taken from the backward pass in {counted(len(found.frames), 'frame')}: {parts}")
+    return Merged(tracked.with_rows(found.frames, [_columns(revised) for revised in found.frames.values()]))
+
+
+def _columns(revised: Revised) -> dict[str, object]:
+    """What is known of a revised frame, by the names of columns; the baseline stays that of the first pass."""
+    return {
+        "pose": revised.pose,
+        "energy": revised.energy,
+        "limb_doubt": revised.judged.error_probability,
+        "explained": revised.judged.explained,
+        "overlap": revised.judged.overlap,
+        **{TERM + name: value for name, value in revised.terms.items()},
+    }

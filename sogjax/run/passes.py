@@ -1,0 +1,120 @@
+"""The machine: the passes of a run in their order. Each reads what earlier ones found, and leaves one record."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+from sogjax.errors import counted
+from sogjax.io.frame_motions import FRAMES, ClipFacts
+from sogjax.io.frame_table import FrameLog
+from sogjax.run.actors import Actors, make_actors
+from sogjax.run.adjust_clip import Adjusted, adjust_clip
+from sogjax.run.background import Background, learn_background, said_if_none
+from sogjax.run.clock import ACTORS, ADJUSTING, BACKGROUND, BOTH_WAYS, FIRST_POSE, PREPARING, TRACKING, WRITING
+from sogjax.run.forward import Tracked, kept_rows, track_forward
+from sogjax.run.initial_pose import InitialPose, find_initial_pose
+from sogjax.run.judge import judged_result
+from sogjax.run.keypoint_bias import KeypointBias, estimate_keypoint_bias
+from sogjax.run.merge import Merged, merge_backward
+from sogjax.run.relearn_background import RelearntBackground, relearn_background
+from sogjax.run.result_streams import ResultStreams
+from sogjax.run.run import Run
+from sogjax.run.setup import compile_beforehand
+from sogjax.run.terminal import say
+from sogjax.run.write import check_pose2sim, write_results
+
+
+@dataclass(frozen=True)
+class Pass:
+    """A step of a run."""
+
+    name: str
+    """Of the field of `Run` that its record fills."""
+    stage: str
+    """On the clock."""
+    make: Callable[[Run], Any]
+    record: Any = None
+    """The class of the record, by which it is kept in the run's folder; None: it is not kept."""
+    wanted: Callable[[Run], bool] = lambda run: True
+
+
+def _background(run: Run) -> Background:
+    images = run.config.images
+    found = learn_background(run.clip, images.background, images.cache, run.samples_to_come)
+    return said_if_none(run.clip, images.background, found)
+
+
+def _initial_pose(run: Run) -> InitialPose:
+    """The initial pose; meanwhile the tracker is made and compiled.
+
+    What the actors do not lend themselves to is refused before.
+    """
+    if run.config.outputs.pose2sim:
+        numbers = run.clip.numbers
+        check_pose2sim(run.clip.recording, (numbers[0], numbers[-1]), run.actors.bodies, run.config.overwrite)
+    _ = run.adjusts
+    with ThreadPoolExecutor(1) as beside:
+        compiling = beside.submit(lambda: compile_beforehand(run.setup))
+        found = find_initial_pose(run.pose_request, run.pose_sources)
+        compiling.result()
+    return found
+
+
+def _tracked(run: Run) -> Tracked:
+    """The frames, tracked; rows and the files that show them are written as they come."""
+    log = rows = streams = None
+    if run.kept is not None:
+        rows = kept_rows(run.kept, run.initial_pose, run.clip.numbers)
+        log = FrameLog(run.kept / FRAMES, 0 if rows is None else len(rows))
+        ClipFacts.of(run.clip.recording, run.clip.numbers.step).save(run.kept)
+    if run.out is not None and not run.adjusts:
+        run.before_results()
+        streams = ResultStreams(run.out, run.clip, run.setup.bodies, run.config.outputs)
+    if rows is not None:
+        say(f"{run.out}: {len(rows)} of {counted(len(run.clip.numbers), 'frame')} are done; resuming after them")
+    table = track_forward(run.setup, run.initial_pose, run.times, log, rows, streams)
+    if streams is not None:
+        run.shown = (table, streams.files)
+    return Tracked(table)
+
+
+PASSES: tuple[Pass, ...] = (
+    Pass("background", PREPARING, _background, Background),
+    Pass("actors", ACTORS, lambda run: make_actors(run.actor_request, run.report_actors), Actors),
+    Pass("initial_pose", FIRST_POSE, _initial_pose, InitialPose),
+    Pass(
+        "relearnt",
+        BACKGROUND,
+        lambda run: relearn_background(run.setup, run.background, run.initial_pose),
+        RelearntBackground,
+        wanted=lambda run: run.background.is_learnt,
+    ),
+    Pass(
+        "keypoint_bias",
+        PREPARING,
+        lambda run: estimate_keypoint_bias(run.setup, run.initial_pose),
+        KeypointBias,
+        wanted=lambda run: run.clip.keypoints is not None,
+    ),
+    Pass("tracked", TRACKING, _tracked, Tracked),
+    Pass(
+        "merged",
+        BOTH_WAYS,
+        lambda run: merge_backward(run.setup, run.frames),
+        Merged,
+        wanted=lambda run: run.config.tracking.both_ways,
+    ),
+    Pass(
+        "adjusted",
+        ADJUSTING,
+        lambda run: adjust_clip(run.first_setup, run.background, run.frames, run.config.color, run.adjust),
+        Adjusted,
+        wanted=lambda run: run.adjusts,
+    ),
+    Pass("result", WRITING, judged_result),
+    Pass("files", WRITING, write_results, wanted=lambda run: run.out is not None),
+)
+"""The passes of `sogjax track`, of `sogjax.track`, of every member of a sweep and of every run of a study."""
+ADJUSTING_ALONE = ("background", "adjusted", "result", "files")
+"""Those of `sogjax adjust`, which begins with a motion that was tracked."""

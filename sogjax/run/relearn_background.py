@@ -1,0 +1,162 @@
+"""A background that is learnt a second time, once the subject was tracked: where its body is, no sample counts.
+
+Somebody who stays in one place hides what is around: a trunk that never moves and a wall look alike, so nothing around
+it counts as background at first. When the body was followed, it does.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from sogjax.errors import InputError
+from sogjax.io.recording import Recording
+from sogjax.model.body import Body
+from sogjax.run.background import Background
+from sogjax.run.clip_learning import LeftOut, UnsuitableError, background_samples, learnt_from
+from sogjax.run.initial_pose import InitialPose
+from sogjax.run.setup import Setup
+from sogjax.run.terminal import progress, say
+from sogjax.scene.clip_background import FEWEST_AGREEING
+from sogjax.scene.plate_difference import working_size
+from sogjax.search.search_energy import DISC
+from sogjax.tracking.frame_by_frame import track
+from sogjax.tracking.tracker import Tracker
+from sogjax.view.projection import picture_points
+
+FOLDER = "relearnt"
+MUCH_UNKNOWN = 0.015
+"""Share of the pictures from which on the background is learnt again; a subject covers some 0.05 of them."""
+BORDER = 0.15
+"""Metres around a blob that are left out, too: the body may be a little off. With 0.25 too little is left to learn."""
+
+
+@dataclass(frozen=True)
+class RelearntBackground:
+    """What was learnt where the body is not; None: the first background does."""
+
+    background: Background | None
+
+    def in_tracker(self, setup: Setup) -> Tracker:
+        """The tracker with this background where something is known of it, and with its own elsewhere."""
+        if self.background is None:
+            return setup.tracker
+        again, before = self.background.model(setup.clip.grids), setup.tracker.reader.background
+        assert again is not None
+        assert before is not None
+        return eqx.tree_at(lambda t: t.reader.background, setup.tracker, again.filled_by(before))
+
+    def save(self, folder: Path) -> None:
+        """Keep it in a run's folder."""
+        (self.background or Background(None)).save(folder / FOLDER)
+
+    @classmethod
+    def load(cls, folder: Path) -> "RelearntBackground | None":
+        """What was kept, if it was."""
+        kept = Background.load(folder / FOLDER)
+        return None if kept is None else cls(kept if kept.cameras else None)
+
+
+def relearn_background(
+    setup: Setup, background: Background, start: InitialPose, poses: Mapping[int, Array] | None = None
+) -> RelearntBackground:
+    """The background once more where the first one left much open, with the poses of sampled frames known.
+
+    Args:
+        setup: what is tracked with.
+        background: the first one.
+        start: where tracking begins.
+        poses: those that are known, by frame; None: the clip is tracked for them.
+
+    Raises:
+        InputError: a video cannot be read, the clip is unsuitable, or a picture has too many image blobs.
+    """
+    numbers = setup.clip.numbers
+    unknown = unknown_share(setup, background)
+    samples = frames_to_learn_from(unknown, background_samples(setup.clip.recording).frames, numbers)
+    if not samples:
+        return RelearntBackground(None)
+    if poses is None:
+        say(
+            f"{unknown:.1%} of the background is unknown: the clip is tracked once to learn it where the body is not, "
+            "then again"
+        )
+        poses = _tracked_poses(setup, start, frozenset(samples))
+    try:
+        learnt = learnt_from(setup.clip, body_masks(setup.clip.recording, setup.tracker.body, poses))
+    except UnsuitableError as reason:
+        raise InputError(f"{setup.clip.recording.path}: no background can be learnt, since {reason}") from reason
+    return RelearntBackground(Background(learnt))
+
+
+def frames_to_learn_from(unknown: float, samples: Sequence[int], numbers: range) -> list[int]:
+    """The sampled frames that are tracked; none where little is unknown, or of a part so short that few are in it."""
+    found = [frame for frame in samples if frame in numbers]
+    return found if unknown >= MUCH_UNKNOWN and len(found) >= FEWEST_AGREEING else []
+
+
+def unknown_share(setup: Setup, background: Background) -> float:
+    """How much of the pictures a background that was learnt from the clip leaves open; 0 without such a one."""
+    model = setup.tracker.reader.background
+    if model is None or not background.is_learnt:
+        return 0.0
+    inside = np.zeros(np.asarray(model.known).shape, bool)
+    for k, grid in enumerate(setup.clip.grids):
+        inside[k, : grid.rows, : grid.columns] = True
+    return 1.0 - float(np.asarray(model.known)[inside].mean())
+
+
+def _tracked_poses(setup: Setup, start: InitialPose, wanted: frozenset[int]) -> dict[int, Array]:
+    """The poses of some frames, by frame; the others are tracked, but not held in memory."""
+    numbers, poses = setup.clip.numbers, dict[int, Array]()
+    begin = numbers.index(start.frame)
+    for way, label in ((numbers[begin::-1], "tracking back"), (numbers[begin:], "tracking")):
+        if len(way) > 1 or way.step > 0:
+            frames = progress(
+                setup.clip.frames(way.start, way.stop, way.step), len(way), f"{label}, to learn the background"
+            )
+            for frame, done in zip(way, track(setup.tracker, jnp.asarray(start.pose), frames), strict=True):
+                if frame in wanted:
+                    poses[frame] = jnp.asarray(done.result.pose)
+    return poses
+
+
+def body_masks(recording: Recording, body: Body, poses: Mapping[int, Array]) -> LeftOut:
+    """Where a body is in the sampled frames, widened; a frame whose pose is not known is left out as a whole.
+
+    Args:
+        recording: with the cameras.
+        body: upright in the recording's world.
+        poses: by frame.
+    """
+    frames = background_samples(recording).frames
+    known = [frame for frame in frames if frame in poses]
+    blobs = eqx.filter_jit(lambda body, pose: body.posed_blobs(pose))
+    means = np.stack([np.asarray(blobs(body, jnp.asarray(poses[frame])).means, float) for frame in known])
+    pixels, depths = picture_points(recording.rig, means)
+    radii = DISC * np.asarray(body.blob_sigmas, float) + BORDER
+    masks: dict[str, dict[int, Bool[np.ndarray, "rows columns"]]] = {}
+    for k, name in enumerate(recording.rig.names):
+        width, height = working_size(*recording.rig.image_size(name))
+        focal = float(recording.rig.camera(name).focal_length)
+        scale = width / recording.rig.image_size(name)[0]
+        masks[name] = {frame: np.ones((height, width), bool) for frame in frames if frame not in poses}
+        for at, frame in enumerate(known):
+            sizes = radii * focal / np.maximum(depths[k, at], 0.1)
+            masks[name][frame] = _discs((height, width), scale * pixels[k, at], scale * sizes)
+    return masks
+
+
+def _discs(
+    shape: tuple[int, int], centres: Float[np.ndarray, "blob 2"], radii: Float[np.ndarray, "blob"]
+) -> Bool[np.ndarray, "rows columns"]:
+    mask = np.zeros(shape, np.uint8)
+    for centre, radius in zip(centres, radii, strict=True):
+        if np.isfinite(centre).all():
+            cv2.circle(mask, (round(float(centre[0])), round(float(centre[1]))), round(float(radius)), 1, -1)
+    return mask > 0
