@@ -36,7 +36,7 @@ def measured(what: str, actor: Path) -> float:
 
 
 def first_frame_seconds(actor: str) -> float:
-    """From the start of the imports to the first pose, the actor being known."""
+    """From the start of the imports to the initial pose, the actor being known."""
     begin = time.perf_counter()
     from track_speed import demo_recording
 

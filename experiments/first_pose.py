@@ -1,4 +1,4 @@
-"""Is a first pose that is called sure right?
+"""Is an initial pose that is called sure right?
 
     python experiments/first_pose.py [limit=200] [minutes=60] [out=outputs/first_pose] [sequences=[walk,hug]]
 

@@ -233,8 +233,8 @@ def test_a_pure_step_without_room_is_an_error(recording, tracker):
 def test_a_tracker_starts_where_it_is_told(actor, tracker):
     rest = actor.poses["rest"]
     np.testing.assert_array_equal(tracker.start(rest).previous, rest)
-    with pytest.raises(ValueError, match="no first pose"):
-        replace(tracker, first_pose=None).start()
+    with pytest.raises(ValueError, match="no initial pose"):
+        replace(tracker, initial_pose=None).start()
 
 
 def test_cells_of_other_cameras_or_frames_are_refused(recording, tracker):

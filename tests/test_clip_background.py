@@ -12,7 +12,7 @@ from sogjax.errors import InputError
 from sogjax.run.background import learn_background, said_if_none
 from sogjax.run.clip import Clip
 from sogjax.run.shared import SHARED
-from sogjax.scene.background import CameraBackground, background_cells_of, stack_background
+from sogjax.scene.background import BackgroundImage, background_cells_of, stack_background
 from sogjax.scene.cells import CellGrid
 from sogjax.scene.clip_background import SampledCamera, even_samples, learnt_background
 from sogjax.scene.foreground import foreground_probability
@@ -123,7 +123,7 @@ def test_cells_of_a_smaller_background_are_those_of_the_whole_picture():
     grid, other = CellGrid.from_depth(500, 380, 6), CellGrid.from_depth(128, 96, 5)
     large = cv2.resize(EMPTY.astype(np.uint8), (500, 380), interpolation=cv2.INTER_LINEAR)
     small = cv2.resize(large, (250, 190), interpolation=cv2.INTER_AREA)
-    plate = CameraBackground.from_plate(small)
+    plate = BackgroundImage.from_photograph(small)
     known = plate.known.copy()
     known[:, 100:] = False
     cells = stack_background([plate, replace(plate, known=known)], [grid, other])
@@ -142,7 +142,7 @@ def test_cells_of_a_smaller_background_are_those_of_the_whole_picture():
 def test_edges_of_a_plate_are_less_sure_than_its_planes():
     plate = np.full((20, 20, 3), 50, np.uint8)
     plate[:, 10:] = 200
-    spread = CameraBackground.from_plate(plate).spread
+    spread = BackgroundImage.from_photograph(plate).spread
     assert spread[10, 10] > 4 * spread[10, 2]
 
 

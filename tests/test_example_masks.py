@@ -10,7 +10,7 @@ from drawn_scene import draw, in_colors, standing
 from rig_cases import recording_of, ring_rig
 from test_segmentation import FLESH, iou, photo, scene
 
-from sogjax.actor.example_masks import FROM_FILE, FROM_PLATE, example_masks
+from sogjax.actor.example_masks import FROM_FILE, FROM_PHOTOGRAPH, example_masks
 from sogjax.actor.silhouettes import load_images, load_pictures
 from sogjax.errors import InputError
 from sogjax.io.example_poses import ExamplePose
@@ -52,7 +52,7 @@ def masks_of(recording):
 
 def test_files_come_before_plates(tmp_path):
     found = masks_of(example_recording(tmp_path, masks=(0, 2), plates=(0, 1)))
-    assert found.origins == {0: FROM_FILE, 1: FROM_PLATE, 2: FROM_FILE}
+    assert found.origins == {0: FROM_FILE, 1: FROM_PHOTOGRAPH, 2: FROM_FILE}
     assert list(found.masks) == [0, 1, 2]
     np.testing.assert_array_equal(found.masks[0], TRUTH[0])
     assert iou(found.masks[1], TRUTH[1]) > 0.85

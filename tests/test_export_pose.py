@@ -9,7 +9,7 @@ from command_line import done, refused
 from sogjax.io.initial_pose import load_initial_poses
 from sogjax.io.motion import motion_from_poses
 from sogjax.io.motion_data import save_motion
-from sogjax.search.rough_pose import rough_pose
+from sogjax.search.described_pose import described_pose
 
 TOLERANCE = 1e-4
 
@@ -34,7 +34,7 @@ def test_the_pose_of_a_frame_comes_back(capsys, tmp_path, body, motion):
     save_motion(tmp_path / "motion.npz", motion)
     to = tmp_path / "initial_pose.yaml"
     done(capsys, "export", f"motion={tmp_path / 'motion.npz'}", "frame=12", f"to={to}")
-    found = rough_pose(body, load_initial_poses(to, ["anna"])["anna"], "z")
+    found = described_pose(body, load_initial_poses(to, ["anna"])["anna"], "z")
     np.testing.assert_allclose(np.asarray(found), motion.pose[2], atol=TOLERANCE)
 
 

@@ -15,7 +15,7 @@ from sogjax.energy.foreground import Foreground
 from sogjax.energy.posed import Frame, History, Posed
 from sogjax.energy.views import COLUMNS, ROWS, Windows, windows_around
 from sogjax.scene.background import BackgroundCells
-from sogjax.scene.color_clusters import kind_odds, odds_where_told
+from sogjax.scene.color_clusters import cluster_odds, odds_where_told
 from sogjax.scene.foreground import LARGEST, BackgroundModel, foreground_weights, log_odds, subject_colors
 
 WALL, SHIRT, SKIN = (0.5, 0.6, 0.7), (0.1, 0.2, 0.6), (0.6, 0.42, 0.33)
@@ -82,7 +82,9 @@ def test_nothing_is_held_against_a_shoe_on_a_floor_of_its_colour():
     floor, shoe = wall(color=(0.1, 0.1, 0.11)), (0.13, 0.13, 0.13)
     tables, empty = jnp.stack([subject(shoe), subject(SKIN)]), BackgroundModel.from_background(floor)
     cells = seen(floor, SKIN)
-    usual, told = (odds(cells, jnp.ones(floor.known.shape), empty, tables)[0] for odds in (kind_odds, odds_where_told))
+    usual, told = (
+        odds(cells, jnp.ones(floor.known.shape), empty, tables)[0] for odds in (cluster_odds, odds_where_told)
+    )
     assert float(usual[0, 10, 10]) < -1.0
     assert abs(float(told[0, 10, 10])) < 0.3
     assert float(told[1, 10, 10]) == float(usual[1, 10, 10]) == -LARGEST  # skin would be told

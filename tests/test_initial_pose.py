@@ -1,4 +1,4 @@
-"""The first pose from a rough description: its landmarks and place are known by forward kinematics written twice."""
+"""The initial pose from a rough description: its landmarks and place are known by forward kinematics written twice."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -8,7 +8,7 @@ from body_cases import posed, reference_frames, reference_points, shipped
 from sogjax.errors import InputError
 from sogjax.io.initial_pose import InitialPose
 from sogjax.model.rotation import UP_AXES, axis_vector, world_from_upright
-from sogjax.search.rough_pose import rough_pose
+from sogjax.search.described_pose import described_pose
 
 HUMAN, DOG = shipped("human"), shipped("dog")
 FITTED = 0.02
@@ -43,13 +43,13 @@ def points_of(body, pose, up, position, degrees):
 @pytest.mark.parametrize("heading", [0.0, 75.0, -170.0])
 def test_a_named_pose_is_placed_and_turned_about_the_vertical(up, heading):
     body, position = upright(HUMAN, up), (0.3, -1.2, 0.8)
-    pose = rough_pose(body, describe("rest", position, heading), up)
+    pose = described_pose(body, describe("rest", position, heading), up)
     found = posed(body, pose)[1]
     np.testing.assert_allclose(found, points_of(HUMAN, "rest", up, position, heading), atol=1e-5)
 
 
 def test_the_position_is_that_of_the_root_and_values_of_single_dofs_are_taken():
-    pose = rough_pose(DOG, describe({"neck_bend": 0.2, "root_pitch": 0.1}, (1.0, 2.0, 0.4)), "z")
+    pose = described_pose(DOG, describe({"neck_bend": 0.2, "root_pitch": 0.1}, (1.0, 2.0, 0.4)), "z")
     assert pose[DOG.skeleton.dof_names.index("neck_bend")] == np.float32(0.2)
     frames = reference_frames(DOG.skeleton, pose)
     np.testing.assert_allclose(frames[DOG.skeleton.names.index("root_roll"), :3, 3], [1.0, 2.0, 0.4], atol=1e-6)
@@ -62,7 +62,7 @@ def test_landmarks_give_the_pose_back_from_any_heading(up, heading, pose):
     body = upright(HUMAN, up)
     points = points_of(HUMAN, pose, up, (0.5, -0.4, 1.0), heading)
     landmarks = {name: tuple(point) for name, point in zip(body.landmarks.names, points, strict=True)}
-    found = rough_pose(body, describe("rest", landmarks=landmarks), up)
+    found = described_pose(body, describe("rest", landmarks=landmarks), up)
     errors = np.linalg.norm(np.asarray(posed(body, found)[1], float) - points, axis=1)
     assert errors.mean() < FITTED
     assert errors.max() < 3.0 * FITTED
@@ -75,7 +75,7 @@ def test_rough_landmarks_give_a_rough_pose(seed):
     points = points_of(HUMAN, "walk_right", "z", (0.0, 0.0, 0.9), 40.0)
     noisy = points + rng.normal(size=points.shape) * 0.03 / np.sqrt(3.0)
     landmarks = {name: tuple(point) for name, point in zip(HUMAN.landmarks.names, noisy, strict=True)}
-    found = rough_pose(HUMAN, describe(landmarks=landmarks), "z")
+    found = described_pose(HUMAN, describe(landmarks=landmarks), "z")
     errors = np.linalg.norm(np.asarray(posed(HUMAN, found)[1], float) - points, axis=1)
     assert errors.mean() < 0.035
     lower, upper = (np.asarray(limit) for limit in HUMAN.skeleton.joint_limits())
@@ -89,7 +89,7 @@ def test_four_landmarks_are_enough_for_place_and_heading():
     names = ("head_top", "left_hand", "right_hand", "left_toe")
     points = points_of(HUMAN, "apose", "z", (1.0, 0.5, 0.95), 120.0)
     landmarks = {name: tuple(points[HUMAN.landmarks.names.index(name)]) for name in names}
-    found = rough_pose(HUMAN, describe("apose", landmarks=landmarks), "z")
+    found = described_pose(HUMAN, describe("apose", landmarks=landmarks), "z")
     errors = np.linalg.norm(np.asarray(posed(HUMAN, found)[1], float) - points, axis=1)
     assert errors.mean() < 0.05
 
@@ -98,7 +98,7 @@ def test_four_landmarks_are_enough_for_place_and_heading():
 def test_a_given_heading_is_where_the_fit_starts():
     points = points_of(DOG, "rest", "z", (0.0, 0.3, 0.45), -60.0)
     landmarks = {name: tuple(point) for name, point in zip(DOG.landmarks.names, points, strict=True)}
-    found = rough_pose(DOG, describe("rest", heading=-50.0, landmarks=landmarks), "z")
+    found = described_pose(DOG, describe("rest", heading=-50.0, landmarks=landmarks), "z")
     np.testing.assert_allclose(posed(DOG, found)[1], points, atol=FITTED)
 
 
@@ -117,4 +117,4 @@ THREE = {"pelvis": (0.0, 0.0, 1.0), "neck": (0.0, 0.0, 1.5), "head_top": (0.0, 0
 )
 def test_mistakes_are_named_with_their_remedy(description, message):
     with pytest.raises(InputError, match=message):
-        rough_pose(HUMAN, description, "z")
+        described_pose(HUMAN, description, "z")

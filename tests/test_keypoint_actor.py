@@ -15,7 +15,7 @@ from sogjax.run.actors import ActorRequest, new_actors
 from sogjax.run.background import Background
 from sogjax.run.clip import Clip
 from sogjax.run.keypoint_actor import keypoint_actor, with_rough_poses
-from sogjax.run.keypoint_start import keypoint_starts
+from sogjax.run.keypoint_initial_pose import keypoint_poses
 from sogjax.run.measured_colors import measured_colors
 from sogjax.run.recordings import upright
 from sogjax.settings.compose import track_config
@@ -96,12 +96,12 @@ def test_who_is_who_is_told_by_colours(tmp_path, monkeypatch):
     truth = load_ground_truth(recording.ground_truth)
     config = track_config(recording=recording.path, images={"background": "none"})
     body, nothing = upright(HUMAN, recording), Background(None)
-    monkeypatch.setattr("sogjax.run.keypoint_start.CLEARLY", 0.0)  # nobody has colours yet
-    poses = keypoint_starts(clip_of(recording), nothing, [body, replace(body, name="other")], config, 0)
+    monkeypatch.setattr("sogjax.run.keypoint_initial_pose.CLEARLY", 0.0)  # nobody has colours yet
+    poses = keypoint_poses(clip_of(recording), nothing, [body, replace(body, name="other")], config, 0)
     people = [measured_colors(recording, body, [0], np.asarray(pose)[None], SPACE) for pose in poses]
     monkeypatch.undo()
     named = [replace(person, name=name) for person, name in zip(people, ("a", "b"), strict=True)]
-    places = lambda bodies: [np.asarray(p)[:3] for p in keypoint_starts(clip_of(recording), nothing, bodies, config, 0)]
+    places = lambda bodies: [np.asarray(p)[:3] for p in keypoint_poses(clip_of(recording), nothing, bodies, config, 0)]
     one, two = places(named), places(named[::-1])
     np.testing.assert_allclose(one, two[::-1], atol=1e-3)
     assert len(truth.subjects) == 2

@@ -1,4 +1,4 @@
-"""The search for the first pose: places, limbs, and pictures of bodies whose pose is known."""
+"""The search for the initial pose: places, limbs, and pictures of bodies whose pose is known."""
 
 from dataclasses import replace
 
@@ -38,7 +38,7 @@ def frames_of(images, rig=RIG, depth=8):
     )
     cells = stack_cells(images, grids)
     return lambda searcher, _: SeenFrame.from_cells(
-        jax.tree.map(jnp.asarray, rig.cameras), reader, cells, searcher.kinds
+        jax.tree.map(jnp.asarray, rig.cameras), reader, cells, searcher.clusters
     )
 
 

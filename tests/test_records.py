@@ -13,7 +13,7 @@ from sogjax.run.actors import Actors, KnownFrame
 from sogjax.run.background import Background
 from sogjax.run.forward import kept_rows
 from sogjax.run.initial_pose import InitialPose
-from sogjax.scene.background import CameraBackground
+from sogjax.scene.background import BackgroundImage
 
 
 @pytest.fixture
@@ -57,7 +57,7 @@ def test_an_initial_pose_is_kept_and_one_under_another_name_is_refused(tmp_path)
 
 def test_a_background_is_kept_and_so_is_why_there_is_none(tmp_path):
     picture = np.arange(24, dtype=np.uint8).reshape(2, 4, 3)
-    camera = CameraBackground(picture, np.ones((2, 4), np.float32), np.eye(2, 4, dtype=bool), "clip")
+    camera = BackgroundImage(picture, np.ones((2, 4), np.float32), np.eye(2, 4, dtype=bool), "clip")
     Background((camera,)).save(tmp_path)
     found = Background.load(tmp_path)
     for name in ("picture", "spread", "known"):

@@ -1,4 +1,4 @@
-"""The calibration of first poses: what counts as right, which searches are drawn, and what the tables say."""
+"""The calibration of initial poses: what counts as right, which searches are drawn, and what the tables say."""
 
 from dataclasses import replace
 

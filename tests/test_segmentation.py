@@ -9,8 +9,8 @@ from drawn_scene import draw, in_colors, standing
 from rig_cases import opencv_pixels, ring_rig
 
 from sogjax.model.camera import distort, project_points
-from sogjax.scene.plate_difference import plate_difference
-from sogjax.scene.segmentation import masks_from_plates
+from sogjax.scene.background_difference import background_difference
+from sogjax.scene.segmentation import masks_from_backgrounds
 from sogjax.scene.visual_hull import (
     VOXELS,
     Cube,
@@ -51,7 +51,7 @@ def iou(a, b):
 @pytest.mark.parametrize(("gain", "offset"), [(1.0, 0.0), (0.75, 10.0), ((1.2, 1.0, 0.9), -5.0)])
 def test_another_exposure_is_no_difference(gain, offset):
     empty = scene()
-    found = plate_difference(photo(empty, 2, np.array(gain), offset), photo(empty, 1))
+    found = background_difference(photo(empty, 2, np.array(gain), offset), photo(empty, 1))
     assert found.different.mean() < 1e-3
     assert found.changed.mean() < 1e-3
 
@@ -61,7 +61,7 @@ def test_a_shadow_is_no_other_colour_and_told_by_its_pattern():
     box = (slice(60, 180), slice(100, 220))
     shaded = empty.copy()
     shaded[box] *= 0.6
-    found = plate_difference(photo(shaded, 2), photo(empty, 1))
+    found = background_difference(photo(shaded, 2), photo(empty, 1))
     inside = (slice(70, 170), slice(110, 210))
     assert found.different[inside].mean() < 0.02
     assert found.changed[inside].mean() < 0.3
@@ -72,7 +72,7 @@ def test_a_darker_thing_without_the_pattern_is_a_change_but_may_be_a_shadow():
     empty = scene(contrast=8.0)
     thing = empty.copy()
     thing[60:180, 100:220] = 0.6 * empty.mean(axis=(0, 1))
-    found = plate_difference(photo(thing, 2), photo(empty, 1))
+    found = background_difference(photo(thing, 2), photo(empty, 1))
     assert found.changed[70:170, 110:210].mean() > 0.9
 
 
@@ -104,7 +104,7 @@ def test_masks_of_a_body_with_its_shadow(num_cameras):
     known = {0: truth[0]}
     for given in ({}, known):
         wanted = {k: plates[k] for k in plates if k not in given}
-        masks = masks_from_plates(images, wanted, given, cameras, UP)
+        masks = masks_from_backgrounds(images, wanted, given, cameras, UP)
         assert set(masks) == set(wanted)
         for k, mask in masks.items():
             assert mask.shape == truth[k].shape
@@ -116,7 +116,7 @@ def test_a_plate_of_another_place_gives_no_mask():
     images = {k: photo(scene(seed=k, contrast=60.0)) for k in range(2)}
     plates = {k: photo(scene(seed=k + 10, contrast=60.0)) for k in range(2)}
     cameras = {k: rig.camera(name) for k, name in enumerate(rig.names)}
-    assert masks_from_plates(images, plates, {}, cameras, UP) == {}
+    assert masks_from_backgrounds(images, plates, {}, cameras, UP) == {}
 
 
 def sphere_masks(num_cameras=5):

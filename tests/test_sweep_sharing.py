@@ -78,7 +78,7 @@ def test_what_changes_what_is_seen_changes_the_first_pose(searches, word):
 
 @pytest.mark.parametrize(
     ("word", "said"),
-    [("energy.limit_weight=0,1", "one first pose and one actor for all 2 members"), ("start=0,1", "start: changes")],
+    [("energy.limit_weight=0,1", "one initial pose and one actor for all 2 members"), ("start=0,1", "start: changes")],
 )
 def test_it_is_said_whether_members_share(monkeypatch, capsys, word, said):
     monkeypatch.setattr(sweep_run, "run_hydra", lambda words: 0)

@@ -128,10 +128,10 @@ def test_joints_at_their_limits_are_named_of_kept_trials_as_well(tracking, trial
 
 
 def test_what_was_refused_is_tried_again(tracking, trials):
-    trial, tracking.error = replace(TRIAL, cameras=2), InputError("no first pose")
+    trial, tracking.error = replace(TRIAL, cameras=2), InputError("no initial pose")
     for do in (True, False):
         (run,) = trials.judged(trial, do=do)
-        assert run.refused == "no first pose"
+        assert run.refused == "no initial pose"
     assert tracking.count == 1
     tracking.error = None
     (run,) = trials.judged(trial)

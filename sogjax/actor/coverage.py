@@ -19,7 +19,7 @@ from sogjax.energy.overlap import EXACT_EXPONENT, overlaps, self_overlaps
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, distort, project, project_points
 from sogjax.model.sog import Sog
-from sogjax.scene.plate_difference import reduced_mask
+from sogjax.scene.background_difference import reduced_mask
 from sogjax.scene.visual_hull import resized
 
 SHARPNESS = 4.0

@@ -14,11 +14,11 @@ from sogjax.io.image_file import read_mask
 from sogjax.io.recording import Recording
 from sogjax.io.video import read_still
 from sogjax.model.rotation import axis_vector
-from sogjax.scene.background import CameraBackground
-from sogjax.scene.segmentation import largest_parts, masks_from_plates
+from sogjax.scene.background import BackgroundImage
+from sogjax.scene.segmentation import largest_parts, masks_from_backgrounds
 from sogjax.scene.visual_hull import AGREEING, disagreeing_cameras, hull_coverage
 
-FROM_FILE, FROM_PLATE, FROM_CLIP = "file", "plate", "background from the clip"
+FROM_FILE, FROM_PHOTOGRAPH, FROM_CLIP = "file", "empty scene", "background from the clip"
 
 Mask = Bool[np.ndarray, "_h _w"]
 
@@ -29,7 +29,7 @@ class ExampleMasks:
 
     masks: dict[int, Mask]
     origins: dict[int, str]
-    """`FROM_FILE`, `FROM_PLATE` or `FROM_CLIP`, of masks that are left out too."""
+    """`FROM_FILE`, `FROM_PHOTOGRAPH` or `FROM_CLIP`, of masks that are left out too."""
     left_out: dict[int, Mask]
     """Masks that do not agree with the others."""
     warnings: tuple[str, ...]
@@ -40,17 +40,16 @@ def example_masks(
     recording: Recording,
     example: ExamplePose,
     images: Mapping[int, UInt8[np.ndarray, "_h _w 3"]],
-    learnt: Sequence[CameraBackground] | None = None,
+    learnt: Sequence[BackgroundImage] | None = None,
 ) -> ExampleMasks:
     """Find the masks of one example pose.
 
     `images` are those of all its cameras, `learnt` is the background of every camera of the recording. A camera with
     neither a mask nor a picture of the empty scene is given the background that was learnt from the clip.
 
-    A camera with neither a mask nor a picture of the empty scene is given the background that was learnt from the clip.
-
     Raises:
-        InputError: fewer than two cameras have a picture with a mask or a plate; a mask that is empty or full.
+        InputError: fewer than two cameras have a picture and a mask, or one of the empty scene; a mask that is empty
+            or full.
     """
     names = recording.rig.names
     files = {camera: _checked_mask(example.masks[names[camera]]) for camera in images if names[camera] in example.masks}
@@ -62,18 +61,18 @@ def example_masks(
     from_clip = {
         camera: learnt[camera] for camera in images if learnt and camera not in files and camera not in photographed
     }
-    plates = photographed | {camera: background.picture for camera, background in from_clip.items()}
+    backgrounds = photographed | {camera: background.picture for camera, background in from_clip.items()}
     unknown = {camera: ~background.known for camera, background in from_clip.items()}
-    _check_count(recording, example, len(images), [*files, *plates])
+    _check_count(recording, example, len(images), [*files, *backgrounds])
     cameras = {camera: recording.rig.camera(names[camera]) for camera in images}
     up = axis_vector(recording.up)
-    made = masks_from_plates(images, plates, files, cameras, up, unknown) if plates else {}
+    made = masks_from_backgrounds(images, backgrounds, files, cameras, up, unknown) if backgrounds else {}
     found = _subject_alone(example, names, dict(sorted({**files, **made}.items())))
-    _check_found(recording, example, list(found), [camera for camera in plates if camera not in found])
+    _check_found(recording, example, list(found), [camera for camera in backgrounds if camera not in found])
     wrong = disagreeing_cameras(found, cameras)
     masks = {camera: mask for camera, mask in found.items() if camera not in wrong}
     warnings = [_unlike(example, names[camera], share) for camera, share in wrong.items()]
-    warnings += [_no_subject(recording, example, names[camera]) for camera in plates if camera not in made]
+    warnings += [_no_subject(recording, example, names[camera]) for camera in backgrounds if camera not in made]
     if len(masks) == 2 and (share := min(hull_coverage(masks, cameras).values())) < AGREEING:
         pair = " and ".join(names[camera] for camera in masks)
         warnings.append(
@@ -82,7 +81,7 @@ def example_masks(
         )
     return ExampleMasks(
         masks=masks,
-        origins={k: FROM_FILE if k in files else FROM_CLIP if k in from_clip else FROM_PLATE for k in found},
+        origins={k: FROM_FILE if k in files else FROM_CLIP if k in from_clip else FROM_PHOTOGRAPH for k in found},
         left_out={camera: found[camera] for camera in wrong},
         warnings=tuple(warnings),
     )
@@ -109,7 +108,7 @@ def _checked_mask(path: Path) -> Mask:
 
 
 def _check_count(recording: Recording, example: ExamplePose, num_images: int, usable: list[int]) -> None:
-    """Check that at least two cameras have a mask or a plate, as a pose needs."""
+    """Check that at least two cameras have a mask or a picture of the empty scene, as a pose needs."""
     if len(usable) >= 2:
         return
     where = f"{recording.path / 'example_poses' / example.name}: the example pose {example.name!r}"

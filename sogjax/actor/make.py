@@ -28,7 +28,7 @@ from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.rotation import world_from_upright
 from sogjax.model.shape import ShapeModel
-from sogjax.scene.background import CameraBackground
+from sogjax.scene.background import BackgroundImage
 
 POSE_FOUND = 0.5
 """Least IoU of masks and silhouettes, the mean over the cameras. Good fits have 0.8 to 0.9."""
@@ -94,7 +94,7 @@ def make_actor(
     report: Report = lambda _: None,
     progress: Progress = lambda items, total, label: items,
     symmetric: bool = True,
-    learnt: Sequence[CameraBackground] | None = None,
+    learnt: Sequence[BackgroundImage] | None = None,
     best: int | None = None,
 ) -> MadeActor:
     """Scale and colour a body after the example poses of one subject; `symmetric`: left and right alike.

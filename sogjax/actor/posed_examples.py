@@ -22,7 +22,7 @@ from sogjax.model.camera import Camera, camera_of
 from sogjax.quality.limb_confidence import frame_fit
 from sogjax.quality.limb_evidence import LimbBlobs, blob_evidence
 from sogjax.scene.foreground import subject_colors
-from sogjax.search.rough_pose import rough_pose
+from sogjax.search.described_pose import described_pose
 
 Report = Callable[[str], None]
 Progress = Callable[[Iterable[Any], int, str], Iterable[Any]]
@@ -81,7 +81,7 @@ def _starts(
 ) -> Float[Array, "heading named dof"]:
     """Where to look for the pose of one example: at its hint where there is one, else anywhere."""
     if example.initial_pose is not None:
-        return rough_pose(body, example.initial_pose, up)[None, None]
+        return described_pose(body, example.initial_pose, up)[None, None]
     return starts_at(body, subject_centre(pictures, rig), up, tuple(body.poses))
 
 

@@ -19,7 +19,7 @@ from sogjax.io.recording import Recording
 from sogjax.io.video import read_frames, read_still
 from sogjax.model.camera import Camera, camera_of
 from sogjax.model.sog import Sog
-from sogjax.scene.background import CameraBackground
+from sogjax.scene.background import BackgroundImage
 from sogjax.scene.cells import CellGrid, stack_cells
 from sogjax.scene.quadtree import Candidates, keep_blobs, quadtree
 from sogjax.scene.visual_hull import central_ray, nearest_point
@@ -49,13 +49,13 @@ def load_pictures(
     recording: Recording,
     example: ExamplePose,
     report: Callable[[str], None] = lambda _: None,
-    learnt: Sequence[CameraBackground] | None = None,
+    learnt: Sequence[BackgroundImage] | None = None,
 ) -> PosedPictures:
     """The pictures of an example pose that have masks, or for which masks can be made (`example_masks`).
 
     Raises:
-        InputError: fewer than two cameras have a picture with a mask or a plate; a mask that is empty or full; a
-            picture of another size.
+        InputError: fewer than two cameras have a picture and a mask, or one of the empty scene; a mask that is empty
+            or full; a picture of another size.
     """
     images = load_images(recording, example)
     masks = example_masks(recording, example, images, learnt)

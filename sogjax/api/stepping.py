@@ -52,7 +52,7 @@ def make_tracker(
         recording: whose cameras and first frame the tracker is made for.
         actor: one, or a list of them, which become one body with their poses one after the other.
         terms: further terms of the energy, beside those of the settings.
-        settings: as in `track_settings`; `start` is the frame of the first pose, and to be given to `read_cells` too.
+        settings: as in `track_settings`; `start` is the frame of the initial pose, and to be given to `read_cells` too.
 
     Raises:
         InputError: as `track`.
@@ -61,7 +61,7 @@ def make_tracker(
     clip = opened_clip(with_cameras(recording, config.cameras), config)
     run = Run(clip, config, terms=terms, records={"actors": Actors(tuple(actors))})
     run_passes(run, [each for each in PASSES if each.name in BEFORE_TRACKING])
-    tracker = replace(run.setup.tracker, first_pose=jnp.asarray(run.initial_pose.pose))
+    tracker = replace(run.setup.tracker, initial_pose=jnp.asarray(run.initial_pose.pose))
     frame = on_device(next(clip.frames(run.initial_pose.frame, run.initial_pose.frame + 1)))
     return replace(tracker, capacities=_with_more_room(first_capacities(tracker, tracker.start(), frame)))
 

@@ -86,7 +86,7 @@ def track(
         The motion, or a list with one for each actor in their order; metres and radians, in the recording's world.
 
     Raises:
-        InputError: a wrong setting, unreadable pictures, no such frames, or a first pose that is not found.
+        InputError: a wrong setting, unreadable pictures, no such frames, or an initial pose that is not found.
     """
     config, actors = track_settings(**settings), actor_list(actor)
     motions = track_recording(with_cameras(recording, config.cameras), actors, config, terms).motions

@@ -10,7 +10,7 @@ from jaxtyping import Bool
 
 from sogjax.check.pictures import Mask, Moment
 from sogjax.io.calibration.rig import CameraRig
-from sogjax.scene.plate_difference import widened
+from sogjax.scene.background_difference import widened
 from sogjax.scene.visual_hull import AGREEING, OWN_COVERAGE, Cube, cube_around, resized, voxel_pixels
 
 FEWEST_VIEWS = 3

@@ -21,12 +21,12 @@ References = Mapping[int, tuple[str, Picture]]
 """A still picture of what each camera sees, and what kind of picture it is."""
 
 
-def references_of(plates: Mapping[int, Picture], photographed: Sequence[Moment]) -> dict[int, tuple[str, Picture]]:
+def references_of(backgrounds: Mapping[int, Picture], photographed: Sequence[Moment]) -> dict[int, tuple[str, Picture]]:
     """The empty scene of each camera, else its example pose."""
     found = {
         camera: ("example pose", picture) for moment in photographed[:1] for camera, picture in moment.pictures.items()
     }
-    return found | {camera: ("background picture", picture) for camera, picture in plates.items()}
+    return found | {camera: ("background picture", picture) for camera, picture in backgrounds.items()}
 
 
 def place_findings(names: tuple[str, ...], references: References, filmed: Mapping[int, Picture]) -> list[Finding]:

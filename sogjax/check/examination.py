@@ -19,8 +19,8 @@ from sogjax.check.pictures import (
     Picture,
     Progress,
     example_moments,
+    read_backgrounds,
     read_clip,
-    read_plates,
     stills_in_step,
     video_moment,
     working_picture,
@@ -139,15 +139,15 @@ class _Looks:
 def _looks(
     recording: Recording, relative: CameraRig, geometry: RigGeometry, stills: Sequence[dict[int, Picture]]
 ) -> _Looks:
-    """Compare example poses, plates and stills of the videos with each other and with the calibration."""
+    """Compare example poses, backgrounds and stills of the videos with each other and with the calibration."""
     names = recording.rig.names
-    plates = read_plates(recording)
-    photographed = example_moments(recording, plates)
-    references, shown = references_of(plates, photographed), _first_pictures(stills)
+    backgrounds = read_backgrounds(recording)
+    photographed = example_moments(recording, backgrounds)
+    references, shown = references_of(backgrounds, photographed), _first_pictures(stills)
     places = place_findings(names, references, shown)
     elsewhere = {names.index(name) for finding in places for name in finding.cameras}
     here = lambda by_camera: {camera: one for camera, one in by_camera.items() if camera not in elsewhere}
-    filmed = [video_moment(pictures, here(plates)) for pictures in stills]
+    filmed = [video_moment(pictures, here(backgrounds)) for pictures in stills]
     changes = change_findings(names, here(references), shown)
     agreement, fits = calibration_findings(relative, photographed, filmed)
     good = [camera for camera in range(len(names)) if camera not in fits or not fits[camera].is_wrong]

@@ -13,7 +13,7 @@ from sogjax.io.example_poses import ExamplePose
 from sogjax.io.image_file import read_mask
 from sogjax.io.recording import Recording
 from sogjax.io.video import read_prepared, read_still
-from sogjax.scene.plate_difference import plate_difference, reduced_mask, working_size
+from sogjax.scene.background_difference import background_difference, reduced_mask, working_size
 from sogjax.scene.segmentation import first_guess, is_subject
 
 Mask = Bool[np.ndarray, "_h _w"]
@@ -120,7 +120,7 @@ def stills_in_step(clip: Clip, offsets: Sequence[int]) -> list[dict[int, Picture
     return stills
 
 
-def read_plates(recording: Recording) -> dict[int, Picture]:
+def read_backgrounds(recording: Recording) -> dict[int, Picture]:
     """The pictures of the empty scene by camera (its index in the rig)."""
     return {
         camera: working_picture(read_still(recording, name, recording.background[name]))
@@ -129,22 +129,22 @@ def read_plates(recording: Recording) -> dict[int, Picture]:
     }
 
 
-def video_moment(pictures: dict[int, Picture], plates: Mapping[int, Picture]) -> Moment:
-    """One moment of the videos, with masks where there are plates."""
+def video_moment(pictures: dict[int, Picture], backgrounds: Mapping[int, Picture]) -> Moment:
+    """One moment of the videos, with masks where there are backgrounds."""
     with ThreadPoolExecutor() as pool:
-        masks = pool.map(lambda camera: _from_plate(pictures[camera], plates.get(camera)), pictures)
+        masks = pool.map(lambda camera: _from_background(pictures[camera], backgrounds.get(camera)), pictures)
         return Moment(
             pictures, {camera: mask for camera, mask in zip(pictures, masks, strict=True) if mask is not None}
         )
 
 
-def example_moments(recording: Recording, plates: Mapping[int, Picture]) -> list[Moment]:
-    """The first two example poses, with their masks, or masks made from plates."""
+def example_moments(recording: Recording, backgrounds: Mapping[int, Picture]) -> list[Moment]:
+    """The first two example poses, with their masks, or masks made from backgrounds."""
     pictured = [example for example in recording.example_poses if example.frame is None]
-    return [_example_moment(recording, example, plates) for example in pictured[:2]]
+    return [_example_moment(recording, example, backgrounds) for example in pictured[:2]]
 
 
-def _example_moment(recording: Recording, example: ExamplePose, plates: Mapping[int, Picture]) -> Moment:
+def _example_moment(recording: Recording, example: ExamplePose, backgrounds: Mapping[int, Picture]) -> Moment:
     names = recording.rig.names
     shown = [camera for camera, name in enumerate(names) if name in example.images]
 
@@ -152,7 +152,7 @@ def _example_moment(recording: Recording, example: ExamplePose, plates: Mapping[
         name = names[camera]
         picture = working_picture(read_still(recording, name, example.images[name]))
         if name not in example.masks:
-            return picture, _from_plate(picture, plates.get(camera))
+            return picture, _from_background(picture, backgrounds.get(camera))
         mask = reduced_mask(read_mask(example.masks[name]))
         return picture, mask if mask.any() and not mask.all() else None
 
@@ -162,9 +162,9 @@ def _example_moment(recording: Recording, example: ExamplePose, plates: Mapping[
     return Moment({camera: picture for camera, (picture, _) in found.items()}, masks)
 
 
-def _from_plate(picture: Picture, plate: Picture | None) -> Mask | None:
-    """What differs from the empty scene; None where there is no plate or no subject."""
-    if plate is None:
+def _from_background(picture: Picture, background: Picture | None) -> Mask | None:
+    """What differs from the empty scene; None where there is no background or no subject."""
+    if background is None:
         return None
-    guess = first_guess(plate_difference(picture, plate))
+    guess = first_guess(background_difference(picture, background))
     return guess if is_subject(guess) else None

@@ -22,7 +22,7 @@ from sogjax.run.example_frames import with_examples
 from sogjax.run.recordings import opened
 from sogjax.run.run_folder import free_path, results_folder
 from sogjax.run.terminal import alive, progress, say
-from sogjax.scene.background import CameraBackground
+from sogjax.scene.background import BackgroundImage
 from sogjax.scene.foreground import foreground_probability
 from sogjax.settings.method import ImagesConfig
 from sogjax.view.sheets import background_sheet
@@ -61,7 +61,7 @@ def run(config: SegmentConfig) -> list[Path]:
     return sheets
 
 
-def _masks(recording: Recording, example: ExamplePose, out: Path, learnt: Sequence[CameraBackground] | None) -> Path:
+def _masks(recording: Recording, example: ExamplePose, out: Path, learnt: Sequence[BackgroundImage] | None) -> Path:
     """Write the masks of one example pose and their sheet."""
     images = load_images(recording, example)
     found = example_masks(recording, example, images, learnt)

@@ -28,15 +28,15 @@ DEPTH_SCALE = 0.06
 
 
 class ColorWindows(eqx.Module):
-    """A grid in each camera, undistorted pixels, and what each kind of blob would explain of its cells."""
+    """A grid in each camera, undistorted pixels, and what each cluster of blobs would explain of its cells."""
 
     x: Float[Array, "*camera column"]
     """Centres of the cells."""
     y: Float[Array, "*camera row"]
     step: Float[Array, "*camera 2"]
     """Width and height of a cell."""
-    odds: Float[Array, "*camera kind column row"]
-    """Log odds of a kind of blob against the background; 0 where nothing is known."""
+    odds: Float[Array, "*camera cluster column row"]
+    """Log odds of a cluster of blobs against the background; 0 where nothing is known."""
     free: Float[Array, "*camera column row"]
     """1 where a body may gain and lose; 0 where another one is seen."""
 
@@ -51,7 +51,7 @@ class ColorWindows(eqx.Module):
     @classmethod
     def in_boxes(
         cls,
-        odds: Float[Array, "camera kind rows columns"],
+        odds: Float[Array, "camera cluster rows columns"],
         cell_sizes: Float[Array, "camera"],
         cameras: Camera,
         boxes: Float[Array, "camera 2 2"],
@@ -75,18 +75,18 @@ class ColorWindows(eqx.Module):
 
 
 class BlobClusters(eqx.Module):
-    """Which blobs are of a kind, as arrays of one shape for all actors: a large kind is several."""
+    """Blobs of like colour, as arrays of one shape for all actors: a large cluster is several."""
 
-    members: Int[Array, "kind slot"]
-    """Blobs of each kind."""
-    real: Float[Array, "kind slot"]
+    members: Int[Array, "cluster slot"]
+    """Blobs of each cluster."""
+    real: Float[Array, "cluster slot"]
     """1, and 0 for padding."""
     slots: Int[Array, "blob"]
     """Where each blob is among the members."""
 
     @classmethod
     def from_members(cls, members: Sequence[Sequence[int]], num_slots: int) -> "BlobClusters":
-        """From the blobs of each kind, at most `num_slots`; every blob is of one kind."""
+        """From the blobs of each cluster, at most `num_slots`; every blob is in one."""
         table, real = np.zeros((len(members), num_slots), int), np.zeros((len(members), num_slots))
         slots = np.zeros(sum(map(len, members)), int)
         for k, part in enumerate(members):
@@ -94,25 +94,25 @@ class BlobClusters(eqx.Module):
             slots[list(part)] = k * num_slots + np.arange(len(part))
         return cls(jnp.asarray(table), jnp.asarray(real, jnp.result_type(float)), jnp.asarray(slots))
 
-    def grouped(self, values: Float[Array, "n blob"]) -> Float[Array, "kind n slot"]:
-        """Values of the blobs by kind; 0 in the padding."""
+    def grouped(self, values: Float[Array, "n blob"]) -> Float[Array, "cluster n slot"]:
+        """Values of the blobs by cluster; 0 in the padding."""
         return jnp.swapaxes(values[:, self.members] * self.real[None], 0, 1)
 
-    def spread(self, values: Float[Array, "kind n slot"]) -> Float[Array, "n blob"]:
-        """Values by kind for the blobs in their order."""
+    def spread(self, values: Float[Array, "cluster n slot"]) -> Float[Array, "n blob"]:
+        """Values by cluster for the blobs in their order."""
         return jnp.swapaxes(values, 0, 1).reshape(values.shape[1], -1)[:, self.slots]
 
 
 class Appearance(ImageTerm):
     """Log likelihood of the cells with the body before them, less that of the background alone.
 
-    A cell is covered by `C = 1 - exp(-sum_q A_q)`, and what is seen there is shared by the kinds of blobs as their
+    A cell is covered by `C = 1 - exp(-sum_q A_q)`, and what is seen there is shared by the clusters of blobs as their
     densities are, the nearer ones before those behind: `sum_i a_i log(1 - C_i + C_i sum_k share_ik odds_ik)`, the mean
     over the cameras, in units of the whole picture as in Eq. 9.
     """
 
     windows: ColorWindows
-    kinds: BlobClusters
+    clusters: BlobClusters
     density: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=2.0)
     """A_q in the middle of a blob, as in the foreground term."""
 
@@ -142,7 +142,9 @@ class Appearance(ImageTerm):
         rows = grid_rows(windows.x, windows.y, windows.step, seen, self.density)
         of_x, of_y = rows.of_x, rows.of_y
         total = jnp.matmul(of_x, of_y.T)
-        shares = jnp.matmul(self.kinds.grouped(of_x * nearness[None, :]), jnp.swapaxes(self.kinds.grouped(of_y), 1, 2))
+        shares = jnp.matmul(
+            self.clusters.grouped(of_x * nearness[None, :]), jnp.swapaxes(self.clusters.grouped(of_y), 1, 2)
+        )
         whole = jnp.sum(shares, axis=0) + 1e-6
         ratios = jnp.exp(windows.odds)
         mean = (jnp.sum(shares * ratios, axis=0) + 1e-6) / whole
@@ -157,8 +159,8 @@ class Appearance(ImageTerm):
 
         def summed(slope: Array, slopes: Array) -> tuple[Array, Array]:
             """Sums for each blob, along y of the slopes times its rows and along x of its columns."""
-            shared_y = self.kinds.spread(jnp.matmul(slopes, self.kinds.grouped(of_y)))
-            shared_x = self.kinds.spread(jnp.matmul(jnp.swapaxes(slopes, 1, 2), self.kinds.grouped(of_x)))
+            shared_y = self.clusters.spread(jnp.matmul(slopes, self.clusters.grouped(of_y)))
+            shared_x = self.clusters.spread(jnp.matmul(jnp.swapaxes(slopes, 1, 2), self.clusters.grouped(of_x)))
             near = nearness[None, :]
             return jnp.matmul(slope, of_y) + near * shared_y, jnp.matmul(slope.T, of_x) + near * shared_x
 
@@ -180,11 +182,11 @@ class Appearance(ImageTerm):
 
 
 class _Maps(NamedTuple):
-    """The maps of a grid: exp(-sum A), the nearness-weighted density, odds of the kinds, their mean, the likelihood."""
+    """The maps of a grid: exp(-sum A), the nearness-weighted density, odds of clusters, their mean, likelihood."""
 
     left: Float[Array, "*camera column row"]
     whole: Float[Array, "*camera column row"]
-    ratios: Float[Array, "*camera kind column row"]
+    ratios: Float[Array, "*camera cluster column row"]
     mean: Float[Array, "*camera column row"]
     likelihood: Float[Array, "*camera column row"]
 

@@ -46,7 +46,7 @@ def images_model(terms: Sequence[ImageTerm], posed: Posed, frame: Frame) -> Quad
     springs = jnp.where(seen.mask, pulls.stiffness, 0.0) * scale[:, None]
     stretched = across * springs[:, :, None, None]
     stiffness = jnp.einsum("cbki,cbkj->bij", across, stretched, precision="highest")
-    return springs_model(jnp.sum(pulls.value * scale), by_mean, stiffness, posed.point_jacobian())
+    return gauss_newton_model(jnp.sum(pulls.value * scale), by_mean, stiffness, posed.point_jacobian())
 
 
 def weighted_pulls(terms: Sequence[ImageTerm], posed: Posed, seen: Sog, frame: Frame) -> ImagePulls:
@@ -58,7 +58,7 @@ def weighted_pulls(terms: Sequence[ImageTerm], posed: Posed, seen: Sog, frame: F
     return reduce(lambda a, b: jax.tree.map(add, a, b), weighted)
 
 
-def springs_model(
+def gauss_newton_model(
     value: Float[Array, ""],
     by_point: Float[Array, "point 3"],
     stiffness: Float[Array, "point 3 3"],

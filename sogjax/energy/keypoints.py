@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from sogjax.energy.image_term import springs_model
+from sogjax.energy.image_term import gauss_newton_model
 from sogjax.energy.keypoint_views import KeypointViews, SeenKeypoints, belonging, body_sizes, exchange_odds
 from sogjax.energy.posed import Frame, Posed
 from sogjax.energy.term import Term, Terms
@@ -76,7 +76,7 @@ class KeypointTerm(Term):
         points = self.points(posed)
         pulls = self.pulls(points, cameras, views)
         jacobian = posed.body.skeleton.point_jacobian(posed.world_from_joint, self._joints(posed.body), points)
-        return springs_model(pulls.value, pulls.by_point, pulls.stiffness, jacobian)
+        return gauss_newton_model(pulls.value, pulls.by_point, pulls.stiffness, jacobian)
 
     def pulls(self, points: Float[Array, "point 3"], cameras: Camera, views: KeypointViews) -> PointPulls:
         """What keypoints say of points in the world, in the order of `points`, with the weight."""

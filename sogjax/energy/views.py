@@ -67,12 +67,12 @@ def windows_around(
 
 
 def odds_on_grid(
-    odds: Float[Array, "*kind rows columns"],
+    odds: Float[Array, "*cluster rows columns"],
     cell_size: Float[Array, ""],
     camera: Camera,
     x: Float[Array, "n"],
     y: Float[Array, "m"],
-) -> Float[Array, "*kind n m"]:
+) -> Float[Array, "*cluster n m"]:
     """The log odds of cells of one camera at the places of a grid (undistorted pixels); 0 outside its picture."""
     shape = (x.shape[0], y.shape[0])
     pixels = jnp.stack([jnp.broadcast_to(x[:, None], shape), jnp.broadcast_to(y[None], shape)], axis=-1)

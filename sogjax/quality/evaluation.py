@@ -96,7 +96,7 @@ class Evaluation:
         )
         return [
             f"markers by the rule {self.rule}; by either, mean +- std: {both}",
-            "markers are attached in their first frame, which counts: a wrong first pose shows in the joints only",
+            "markers are attached in their first frame, which counts: a wrong initial pose shows in the joints only",
         ]
 
 

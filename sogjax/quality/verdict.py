@@ -177,8 +177,8 @@ def _limbs(doubtful: Sequence[DoubtfulLimb]) -> list[str]:
 
 
 def _bent(motion: Motion, limits: Mapping[str, Limits]) -> list[str]:
-    strained = joints_at_limits(motion, limits).items()
-    return _shortened([f"look at {name}, at its limit in {share:.0%} of the frames" for name, share in strained])
+    at_limits = joints_at_limits(motion, limits).items()
+    return _shortened([f"look at {name}, at its limit in {share:.0%} of the frames" for name, share in at_limits])
 
 
 def _frames(first: int, last: int) -> str:

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from sogjax.energy.image_term import ImageTerm, springs_model, weighted_pulls
+from sogjax.energy.image_term import ImageTerm, gauss_newton_model, weighted_pulls
 from sogjax.energy.overlap import ImagePulls
 from sogjax.energy.posed import Frame, History, Posed
 from sogjax.energy.term import Terms
@@ -83,7 +83,7 @@ def frame_model(
     posed, frame = Posed.from_pose(body, pose), Frame(views, History.unknown(pose))
     seen = _seen_by([term for term in terms if isinstance(term, ImageTerm)], posed, frame, sights)
     jacobian = jnp.concatenate([posed.point_jacobian(), blobs_by_shape(body, rates, posed.world_from_joint)], axis=2)
-    springs = springs_model(seen.value, seen.by_mean, seen.stiffness, jacobian)
+    springs = gauss_newton_model(seen.value, seen.by_mean, seen.stiffness, jacobian)
     dofs = pose.shape[0]
     by_size = rates.blob_sigmas
     gradient = springs.gradient.at[dofs:].add(jnp.matmul(seen.by_sigma, by_size, precision="highest"))

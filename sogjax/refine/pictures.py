@@ -38,7 +38,7 @@ class ClipPictures(eqx.Module):
 
     views: Views
     windows: ColorWindows
-    kinds: BlobClusters = eqx.field()
+    clusters: BlobClusters = eqx.field()
     """Without that axis."""
 
     @property
@@ -51,7 +51,7 @@ class Reader(eqx.Module):
     """Makes the pictures of a clip from cells, for one body."""
 
     tracker: Tracker
-    kinds: ColorClusters = eqx.field(static=True)
+    clusters: ColorClusters = eqx.field(static=True)
     inside: Float[np.ndarray, "camera rows columns"]
     """1 for the cells of a picture, 0 for padding."""
 
@@ -67,7 +67,7 @@ class Reader(eqx.Module):
         Raises:
             InputError: more image blobs than the largest capacity.
         """
-        tables = jnp.asarray(self.kinds.tables, jnp.float32)
+        tables = jnp.asarray(self.clusters.tables, jnp.float32)
         states = [TrackState.from_pose(jnp.asarray(pose, jnp.float32)) for pose in poses]
         capacities = first_capacities(self.tracker, states[0], on_device(cells[0]))
         found: list[Views] = []
@@ -86,14 +86,14 @@ class Reader(eqx.Module):
             shown = jnp.where(present[:, None, None], self.inside, 0.0)
             windows.append(_windows(self.tracker, jnp.asarray(frame.cells), shown, tables, state.previous))
         stack = lambda *leaves: jnp.stack(leaves)
-        kinds = BlobClusters.from_members(self.kinds.members, SLOTS)
-        return ClipPictures(jax.tree.map(stack, *found), jax.tree.map(stack, *windows), kinds)
+        clusters = BlobClusters.from_members(self.clusters.members, SLOTS)
+        return ClipPictures(jax.tree.map(stack, *found), jax.tree.map(stack, *windows), clusters)
 
 
 def bytes_of_frame(cameras: int, num_blobs: int) -> int:
     """About how much memory the pictures of a frame take."""
-    kinds = -(-num_blobs // SLOTS) + SPARE
-    return 4 * cameras * (num_blobs * USUAL_BLOBS + COLUMNS * ROWS * kinds)
+    clusters = -(-num_blobs // SLOTS) + SPARE
+    return 4 * cameras * (num_blobs * USUAL_BLOBS + COLUMNS * ROWS * clusters)
 
 
 class NearPairs(eqx.Module):
@@ -159,10 +159,10 @@ def _windows(
     tracker: Tracker,
     cells: UInt8[Array, "camera rows columns 3"],
     inside: Float[Array, "camera rows columns"],
-    tables: Float[Array, "kind bin bin bin"],
+    tables: Float[Array, "cluster bin bin bin"],
     pose: Float[Array, "dof"],
 ) -> ColorWindows:
-    """Grids around a body: what each kind of blob would explain there."""
+    """Grids around a body: what each cluster of blobs would explain there."""
     cameras, body = tracker.cameras, tracker.body
     odds = odds_where_told(cells.astype(tables.dtype) / 255.0, inside, tracker.reader.background, tables)
     around = jax.vmap(body_boxes, in_axes=(None, 0, None, None))

@@ -10,7 +10,7 @@ from sogjax.actor.report import ActorReport, FinishedActor, actor_report
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.io.files import atomic_path
 from sogjax.io.image_file import write_image
-from sogjax.scene.plate_difference import reduced_mask
+from sogjax.scene.background_difference import reduced_mask
 from sogjax.view.sheets import LEGEND, SilhouetteView, body_picture, silhouette_sheet
 
 

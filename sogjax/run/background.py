@@ -16,7 +16,7 @@ from sogjax.run.clip import Clip, SampleKind
 from sogjax.run.clip_learning import UnsuitableError, learnt_from
 from sogjax.run.shared import SHARED
 from sogjax.run.terminal import say
-from sogjax.scene.background import CameraBackground, Origin, stack_background
+from sogjax.scene.background import BackgroundImage, Origin, stack_background
 from sogjax.scene.cells import CellGrid
 from sogjax.scene.foreground import BackgroundModel
 
@@ -29,7 +29,7 @@ _ORIGINS: tuple[Origin, ...] = ("picture", "clip")
 class Background:
     """What is known of the empty scene."""
 
-    cameras: tuple[CameraBackground, ...] | None
+    cameras: tuple[BackgroundImage, ...] | None
     """Of every camera; None: nothing is known."""
     reason: str = ""
     """Why nothing is known, with the remedy."""
@@ -45,7 +45,7 @@ class Background:
             return None
         return BackgroundModel.from_background(stack_background(self.cameras, grids))
 
-    def required(self) -> tuple[CameraBackground, ...]:
+    def required(self) -> tuple[BackgroundImage, ...]:
         """The background of every camera.
 
         Raises:
@@ -72,7 +72,7 @@ class Background:
         while f"{len(cameras)}.picture" in arrays:
             picture, spread, known = (arrays[f"{len(cameras)}.{part}"] for part in ("picture", "spread", "known"))
             learnt = bool(arrays[f"{len(cameras)}.learnt"])
-            cameras.append(CameraBackground(picture, spread, known, _ORIGINS[learnt]))
+            cameras.append(BackgroundImage(picture, spread, known, _ORIGINS[learnt]))
         return cls(tuple(cameras) or None, str(arrays["reason"]))
 
 
@@ -107,7 +107,7 @@ def learn_background(clip: Clip, choice: str, cache: str | None = None, more: Se
         return SHARED.get(
             json.dumps(["plates", *((name, str(path), fingerprint(path)) for name, path in plates)]),
             lambda: Background(
-                tuple(CameraBackground.from_plate(read_still(recording, name, path)) for name, path in plates)
+                tuple(BackgroundImage.from_photograph(read_still(recording, name, path)) for name, path in plates)
             ),
         )
     learnt = _of_clip(clip, cache, more)
@@ -140,12 +140,12 @@ def _of_clip(clip: Clip, cache: str | None, more: Sequence[SampleKind]) -> Backg
     return SHARED.get(key, kept_or_learnt)
 
 
-def _arrays(clip: Clip, cameras: Sequence[CameraBackground]) -> Arrays:
+def _arrays(clip: Clip, cameras: Sequence[BackgroundImage]) -> Arrays:
     parts = ("picture", "spread", "known")
     named = zip(clip.recording.rig.names, cameras, strict=True)
     return {f"{name}.{part}": getattr(camera, part) for name, camera in named for part in parts}
 
 
-def _of_arrays(arrays: Arrays, name: str) -> CameraBackground:
+def _of_arrays(arrays: Arrays, name: str) -> BackgroundImage:
     picture, spread, known = (arrays[f"{name}.{part}"] for part in ("picture", "spread", "known"))
-    return CameraBackground(picture, spread, known, "clip")
+    return BackgroundImage(picture, spread, known, "clip")

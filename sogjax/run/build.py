@@ -214,7 +214,7 @@ def varied(tracker: Tracker, config: TrackConfig) -> Tracker:
 
 
 def _tracking_terms(config: EnergyConfig, further: Sequence[Term]) -> Terms:
-    """The energy's terms, and being near rest: first poses, from which one is chosen, may be any."""
+    """The energy's terms, and being near rest: initial poses, from which one is chosen, may be any."""
     rest = [RestPenalty(config.rest_weight)] if config.rest_weight else []
     return energy_terms(config, [*rest, *further])
 

@@ -12,11 +12,11 @@ from sogjax.io.recording import Recording
 from sogjax.model.rotation import axis_vector
 from sogjax.run.clip import Clip, SampleKind, spread_frames
 from sogjax.run.terminal import say
-from sogjax.scene.background import CameraBackground
+from sogjax.scene.background import BackgroundImage
+from sogjax.scene.background_difference import working_size
 from sogjax.scene.clip_background import MOST_SAMPLES, SampledCamera, learnt_background
 from sogjax.scene.clip_steadiness import FEWEST_SAMPLES, moves, shaking
 from sogjax.scene.moving_zone import moving_zones
-from sogjax.scene.plate_difference import working_size
 
 MOST_BYTES = 2**30
 """Of samples in memory; beyond, fewer frames are looked at."""
@@ -41,7 +41,7 @@ def background_samples(recording: Recording) -> SampleKind:
 
 def learnt_from(
     clip: Clip, left_out: LeftOut | None = None, more: Sequence[SampleKind] = ()
-) -> tuple[CameraBackground, ...]:
+) -> tuple[BackgroundImage, ...]:
     """The background of every camera, from a clip in which somebody moves about.
 
     Args:
@@ -77,7 +77,7 @@ def learnt_from(
         of_one = lambda k: learnt_background(sampled[k], zones[k], (left_out or {}).get(names[k]))
         learnt = dict(zip(sampled, pool.map(of_one, sampled), strict=True))
     _say_unknown(recording, 1.0 - float(np.mean([background.known.mean() for background in learnt.values()])))
-    nothing = lambda name: CameraBackground.nothing(*working_size(*recording.rig.image_size(name)))
+    nothing = lambda name: BackgroundImage.nothing(*working_size(*recording.rig.image_size(name)))
     return tuple(learnt.get(k) or nothing(name) for k, name in enumerate(names))
 
 

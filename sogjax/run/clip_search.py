@@ -178,7 +178,7 @@ class ClipSearch:
     def _seen(self, searcher: PoseSearch, frame: FrameInput) -> SeenFrame:
         present = np.ones(len(frame.cells), bool) if frame.present is None else np.asarray(frame.present)
         return SeenFrame.from_cells(
-            self._cameras, self._reader, np.asarray(frame.cells), searcher.kinds, present.tolist()
+            self._cameras, self._reader, np.asarray(frame.cells), searcher.clusters, present.tolist()
         )
 
 
@@ -196,7 +196,7 @@ def clear_guess(search: ClipSearch, picture: Path | None = None) -> Guess:
     recording = search.clip.recording
     guesses: list[Guess] = []
     for frame in tried_frames(search.clip.numbers, search.clip.fps):
-        with alive(f"searching for the first pose in frame {frame}") as work:
+        with alive(f"searching for the initial pose in frame {frame}") as work:
             guesses.append(search.guess(frame, partial(setattr, work, "share")))
         for body, pose in zip(search.bodies, guesses[-1].poses, strict=True):
             say(

@@ -20,13 +20,13 @@ Item = TypeVar("Item")
 Turn = Callable[[str], None]
 """Called with the name of a stage that takes the place of the one that runs."""
 
-STARTING, RENDERING, ACTORS, FIRST_POSE = "starting the program", "rendering", "actors", "first pose"
+STARTING, RENDERING, ACTORS, INITIAL_POSE = "starting the program", "rendering", "actors", "initial pose"
 PREPARING, BACKGROUND = "background and compilation", "learning the background again"
-BEFORE, FIRST_FRAME, TRACKING = "tracking back from the first pose", "first frame, with compilation", "tracking"
+BEFORE, FIRST_FRAME, TRACKING = "tracking back from the initial pose", "first frame, with compilation", "tracking"
 BOTH_WAYS, ADJUSTING, WRITING = "tracking both ways", "adjusting", "writing results"
 OTHER, TOTAL = "other", "total"
 STAGES = (
-    *(STARTING, RENDERING, ACTORS, FIRST_POSE, PREPARING, BACKGROUND, BEFORE),
+    *(STARTING, RENDERING, ACTORS, INITIAL_POSE, PREPARING, BACKGROUND, BEFORE),
     *(FIRST_FRAME, TRACKING, BOTH_WAYS, ADJUSTING, WRITING),
 )
 """The stages of a clock, in the order in which they are shown."""

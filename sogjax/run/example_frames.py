@@ -16,7 +16,7 @@ from sogjax.run.clip import Clip
 from sogjax.run.example_people import AGREEING, OTHERWISE, num_people_seen, people_examples
 from sogjax.run.sampled_masks import masks_of_samples
 from sogjax.run.terminal import say
-from sogjax.scene.background import CameraBackground
+from sogjax.scene.background import BackgroundImage
 
 NUM_TRIED, NUM_EXAMPLES = 8, 5
 """Frames in which the pose is looked for, and those of them that the actor is made of."""
@@ -36,7 +36,7 @@ FEW_CAMERAS = 4
 
 def with_examples(
     clip: Clip, background: Callable[[], Background], actors: int | None = None
-) -> tuple[Recording, tuple[CameraBackground, ...] | None, int | None]:
+) -> tuple[Recording, tuple[BackgroundImage, ...] | None, int | None]:
     """The recording with example poses, its own or frames of its videos, and the background that their masks need.
 
     The number is that of the frames to keep, those in which the pose is found best; None: all, since they were given.
@@ -96,7 +96,7 @@ def _need_background(recording: Recording) -> bool:
     return any(example.frame is not None or without(example) for example in recording.example_poses)
 
 
-def _person_examples(clip: Clip, learnt: Sequence[CameraBackground]) -> tuple[ExamplePose, ...]:
+def _person_examples(clip: Clip, learnt: Sequence[BackgroundImage]) -> tuple[ExamplePose, ...]:
     recording, shapes = clip.recording, seen_shapes(clip, learnt)
     if (problem := unsuitable(shapes, lambda: num_people_seen(clip, learnt))) is not None:
         raise _no_examples(recording, problem)
@@ -106,7 +106,7 @@ def _person_examples(clip: Clip, learnt: Sequence[CameraBackground]) -> tuple[Ex
     return tuple(ExamplePose(frame_name(shape.frame), None, {}, {}, None, shape.frame) for shape in chosen)
 
 
-def _people_examples(clip: Clip, learnt: Sequence[CameraBackground], actors: int) -> tuple[ExamplePose, ...]:
+def _people_examples(clip: Clip, learnt: Sequence[BackgroundImage], actors: int) -> tuple[ExamplePose, ...]:
     examples = people_examples(clip, learnt, actors, NUM_TRIED)
     if isinstance(examples, str):
         raise _no_examples(clip.recording, examples)
@@ -165,7 +165,7 @@ def most_helpful(chosen: Sequence[SeenShape], num_cameras: int) -> str:
     return "pictures of a T-pose, of bent elbows and of a squat (example_poses/POSE/CAMERA.jpg)"
 
 
-def seen_shapes(clip: Clip, learnt: Sequence[CameraBackground]) -> list[SeenShape]:
+def seen_shapes(clip: Clip, learnt: Sequence[BackgroundImage]) -> list[SeenShape]:
     """What frames spread over the videos show, where somebody is seen."""
     seen, up = masks_of_samples(clip, learnt), axis_vector(clip.recording.up)
     cubes = subject_cubes(seen.masks, seen.cameras)

@@ -15,9 +15,9 @@ from sogjax.io.recording import Recording
 from sogjax.model.rotation import axis_vector
 from sogjax.run.clip import Clip
 from sogjax.run.sampled_masks import SampledMasks, masks_of_samples
-from sogjax.scene.background import CameraBackground
+from sogjax.scene.background import BackgroundImage
+from sogjax.scene.background_difference import reduced_mask
 from sogjax.scene.cells import CellGrid
-from sogjax.scene.plate_difference import reduced_mask
 
 LIGHT = 0.05
 """Standard deviation of the background's light, as a part of it: dark trousers must not pass for a shadow. Shadows are
@@ -39,7 +39,7 @@ def person_name(number: int) -> str:
     return f"person_{number + 1}"
 
 
-def num_people_seen(clip: Clip, learnt: Sequence[CameraBackground]) -> int:
+def num_people_seen(clip: Clip, learnt: Sequence[BackgroundImage]) -> int:
     """How many people most frames show that show any; 0: none does."""
     seen = masks_of_samples(clip, learnt, LIGHT)
     return most_seen([len(people) for people in everybody(seen, clip.recording.up)])
@@ -52,7 +52,7 @@ def most_seen(counts: Sequence[int]) -> int:
 
 
 def people_examples(
-    clip: Clip, learnt: Sequence[CameraBackground], actors: int, count: int
+    clip: Clip, learnt: Sequence[BackgroundImage], actors: int, count: int
 ) -> tuple[ExamplePose, ...] | str:
     """At most `count` frames as example poses of each of several people, or why there are none, with the remedy."""
     return examples_of_masks(clip.recording, masks_of_samples(clip, learnt, LIGHT), actors, count)

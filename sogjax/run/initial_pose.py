@@ -18,11 +18,11 @@ from sogjax.run.actors import Actors
 from sogjax.run.background import Background
 from sogjax.run.clip import Clip
 from sogjax.run.clip_search import ClipSearch, clear_guess
-from sogjax.run.keypoint_start import keypoint_starts
+from sogjax.run.keypoint_initial_pose import keypoint_poses
 from sogjax.run.recordings import upright
 from sogjax.run.terminal import say
+from sogjax.search.described_pose import check_described_pose, described_pose
 from sogjax.search.found_pose import FoundPose
-from sogjax.search.rough_pose import check_rough_pose, rough_pose
 from sogjax.settings.run import TrackConfig
 
 AUTO = "auto"
@@ -112,7 +112,7 @@ def from_file(request: PoseRequest) -> InitialPose | None:
     if frame > 0:
         say(f"warning: the rough pose of {pose_file(recording, request.config)} is used for frame {frame}")
     pairs = zip(request.bodies, descriptions, strict=True)
-    return InitialPose.of_actors(frame, [rough_pose(body, each, recording.up) for body, each in pairs], "file")
+    return InitialPose.of_actors(frame, [described_pose(body, each, recording.up) for body, each in pairs], "file")
 
 
 def from_example_frames(request: PoseRequest) -> InitialPose | None:
@@ -135,7 +135,7 @@ def from_keypoints(request: PoseRequest) -> InitialPose | None:
     if request.config.initial_pose == AUTO:
         return None
     frame = request.clip.numbers[0]
-    poses = keypoint_starts(request.clip, request.background, request.bodies, request.config, frame)
+    poses = keypoint_poses(request.clip, request.background, request.bodies, request.config, frame)
     return None if poses is None else InitialPose.of_actors(frame, poses, "keypoints")
 
 
@@ -182,7 +182,7 @@ def described_poses(recording: Recording, bodies: Sequence[Body], config: TrackC
     given = load_initial_poses(path, [body.name for body in bodies])
     for body in bodies:
         try:
-            check_rough_pose(body, given[body.name], recording.up)
+            check_described_pose(body, given[body.name], recording.up)
         except InputError as error:
             raise InputError(f"{path}: {error}") from error
     return [given[body.name] for body in bodies]

@@ -11,7 +11,7 @@ from sogjax.io.frame_table import FrameLog
 from sogjax.run.actors import Actors, make_actors
 from sogjax.run.adjust_clip import Adjusted, adjust_clip
 from sogjax.run.background import Background, learn_background, said_if_none
-from sogjax.run.clock import ACTORS, ADJUSTING, BACKGROUND, BOTH_WAYS, FIRST_POSE, PREPARING, TRACKING, WRITING
+from sogjax.run.clock import ACTORS, ADJUSTING, BACKGROUND, BOTH_WAYS, INITIAL_POSE, PREPARING, TRACKING, WRITING
 from sogjax.run.forward import Tracked, kept_rows, track_forward
 from sogjax.run.initial_pose import InitialPose, find_initial_pose
 from sogjax.run.judge import judged_result
@@ -82,7 +82,7 @@ def _tracked(run: Run) -> Tracked:
 PASSES: tuple[Pass, ...] = (
     Pass("background", PREPARING, _background, Background),
     Pass("actors", ACTORS, lambda run: make_actors(run.actor_request, run.report_actors), Actors),
-    Pass("initial_pose", FIRST_POSE, _initial_pose, InitialPose),
+    Pass("initial_pose", INITIAL_POSE, _initial_pose, InitialPose),
     Pass(
         "relearnt",
         BACKGROUND,

@@ -22,8 +22,8 @@ from sogjax.run.clip_learning import LeftOut, UnsuitableError, background_sample
 from sogjax.run.initial_pose import InitialPose
 from sogjax.run.setup import Setup
 from sogjax.run.terminal import progress, say
+from sogjax.scene.background_difference import working_size
 from sogjax.scene.clip_background import FEWEST_AGREEING
-from sogjax.scene.plate_difference import working_size
 from sogjax.search.search_energy import DISC
 from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.tracker import Tracker

@@ -12,7 +12,7 @@ from sogjax.actor.frame_choice import Mask
 from sogjax.io.recording import Recording
 from sogjax.model.camera import Camera
 from sogjax.run.clip import Clip, SampleKind, cell_grids, spread_frames
-from sogjax.scene.background import CameraBackground, stack_background
+from sogjax.scene.background import BackgroundImage, stack_background
 from sogjax.scene.cells import CellGrid
 from sogjax.scene.foreground import SHADOW, BackgroundModel, log_odds
 from sogjax.scene.segmentation import largest_parts
@@ -51,7 +51,7 @@ def mask_samples(recording: Recording) -> SampleKind:
     return SampleKind("masks", tuple(frames), lambda camera, picture: grids[camera].averages(picture))
 
 
-def masks_of_samples(clip: Clip, learnt: Sequence[CameraBackground], shadow: float = SHADOW) -> SampledMasks:
+def masks_of_samples(clip: Clip, learnt: Sequence[BackgroundImage], shadow: float = SHADOW) -> SampledMasks:
     """Of at most `MOST_LOOKED_AT` frames that all cameras have.
 
     `shadow` is the standard deviation of the light that a shadow takes, as a part of the background's: what is darker

@@ -38,7 +38,7 @@ def shared_pose(request: PoseRequest) -> InitialPose | None:
     """
 
     def found() -> InitialPose | None:
-        say("the first pose is searched for once, with the usual energy, for all members that see the same")
+        say("the initial pose is searched for once, with the usual energy, for all members that see the same")
         usual = replace(request, config=_usual(request.config), terms=())
         return from_keypoints(usual) or from_search(usual)
 

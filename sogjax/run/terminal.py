@@ -77,7 +77,7 @@ class Work:
 
 @contextmanager
 def alive(label: str, stream: TextIOBase | None = None) -> Iterator[Work]:
-    """Say that work without a count goes on: a line like `first pose: 20 s so far`, whenever nothing came for ten.
+    """Say that work without a count goes on: a line like `initial pose: 20 s so far`, whenever nothing came for ten.
 
     The line tells the time that is left, too, if whoever works sets the `share` of what is yielded.
     """

@@ -9,8 +9,8 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Bool, Float, UInt8
 
+from sogjax.scene.background_difference import EDGE_NOISE
 from sogjax.scene.cells import CellGrid, stack_shape
-from sogjax.scene.plate_difference import EDGE_NOISE
 
 
 class BackgroundCells(eqx.Module):
@@ -33,7 +33,7 @@ Origin = Literal["picture", "clip"]
 
 
 @dataclass(frozen=True)
-class CameraBackground:
+class BackgroundImage:
     """The background of one camera, at any size."""
 
     picture: UInt8[np.ndarray, "_h _w 3"]
@@ -46,13 +46,13 @@ class CameraBackground:
     """A photograph of the empty scene, or learnt from the clip."""
 
     @classmethod
-    def from_plate(cls, picture: UInt8[np.ndarray, "_h _w 3"]) -> "CameraBackground":
+    def from_photograph(cls, picture: UInt8[np.ndarray, "_h _w 3"]) -> "BackgroundImage":
         """The background from a photograph of the empty scene, known everywhere."""
         spread = np.hypot(NOISE_FLOOR, EDGE_NOISE * local_contrast(picture)).astype(np.float32)
         return cls(picture, spread, np.ones(picture.shape[:2], bool), "picture")
 
     @classmethod
-    def nothing(cls, width: int, height: int) -> "CameraBackground":
+    def nothing(cls, width: int, height: int) -> "BackgroundImage":
         """A background of which nothing is known."""
         empty = np.zeros((height, width), np.float32)
         return cls(np.zeros((height, width, 3), np.uint8), empty + NOISE_FLOOR, empty > 0, "clip")
@@ -63,7 +63,7 @@ def local_contrast(picture: np.ndarray) -> Float[np.ndarray, "_h _w"]:
     return cv2.morphologyEx(picture, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8)).max(axis=-1).astype(np.float32)
 
 
-def stack_background(backgrounds: Sequence[CameraBackground], grids: Sequence[CellGrid]) -> BackgroundCells:
+def stack_background(backgrounds: Sequence[BackgroundImage], grids: Sequence[CellGrid]) -> BackgroundCells:
     """The cells of one background per camera, whatever their sizes, padded to the largest grid."""
     rows, columns = stack_shape(tuple(grids))
     colors = np.zeros((len(grids), rows, columns, 3), np.uint8)
@@ -76,7 +76,7 @@ def stack_background(backgrounds: Sequence[CameraBackground], grids: Sequence[Ce
 
 
 def background_cells_of(
-    background: CameraBackground, grid: CellGrid
+    background: BackgroundImage, grid: CellGrid
 ) -> tuple[UInt8[np.ndarray, "rows columns 3"], Float[np.ndarray, "rows columns"], Bool[np.ndarray, "rows columns"]]:
     """Colours (RGB), spread (0..1) and `known` of the cells of one camera, averaged over what is known of each."""
     weight = background.known.astype(np.float32)

@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from sogjax.scene.background import NOISE_FLOOR, CameraBackground, local_contrast
+from sogjax.scene.background import NOISE_FLOOR, BackgroundImage, local_contrast
+from sogjax.scene.background_difference import EDGE_NOISE, disc, same_exposure
 from sogjax.scene.neighbour_growth import grown, modes_of
-from sogjax.scene.plate_difference import EDGE_NOISE, disc, same_exposure
 
 MEDIAN_OF = 15
 """Samples that the reference is the median of."""
@@ -113,9 +113,7 @@ class SampledCamera:
         return cls(tuple(images), even, noise, tolerance, moving)
 
 
-def learnt_background(
-    camera: SampledCamera, zone: Mask, left_out: Mapping[int, Mask] | None = None
-) -> CameraBackground:
+def learnt_background(camera: SampledCamera, zone: Mask, left_out: Mapping[int, Mask] | None = None) -> BackgroundImage:
     """The background of one camera.
 
     Outside of the zone it is the mean of all samples. Inside it is what was uncovered: a colour that at least
@@ -148,7 +146,7 @@ def learnt_background(
         picture[zone], spread[zone] = modes.colors[pick, :, at], modes.deviations[pick, at]
         known[zone] = chosen >= 0
     spread = np.sqrt(spread**2 + NOISE_FLOOR**2 + camera.even.drift**2)
-    return CameraBackground(np.rint(picture).clip(0, 255).astype(np.uint8), spread, known, "clip")
+    return BackgroundImage(np.rint(picture).clip(0, 255).astype(np.uint8), spread, known, "clip")
 
 
 def _noise(even: EvenSamples) -> float:

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
+from sogjax.scene.background_difference import opened
 from sogjax.scene.clip_background import SampledCamera
-from sogjax.scene.plate_difference import opened
 
 COMPARED = 12
 """Samples that are compared with the middle one."""

@@ -1,4 +1,4 @@
-"""Kinds of blobs of a body by their colours, and what cells say for each kind against the background."""
+"""Clusters of blobs of a body by their colours, and what cells say for each cluster against the background."""
 
 from dataclasses import dataclass
 
@@ -22,9 +22,9 @@ from sogjax.scene.foreground import (
 NUM_COLORS = 6
 """Skin, hair, shirt, trousers, shoes, and what lies between two of them."""
 SLOTS = 8
-"""Blobs of a kind, at most: a colour of more blobs is several kinds, so that one program serves all actors."""
+"""Blobs of a cluster, at most: a colour of more blobs is several clusters, so that one program serves all actors."""
 SPARE = 4
-"""Kinds beside as many as the blobs would fill."""
+"""Clusters beside as many as the blobs would fill."""
 PICTURE_SMOOTHING = 0.05
 """Share of any colour in the colours of a picture whose background is not known."""
 ALIKE = 0.1
@@ -35,28 +35,28 @@ UNKNOWN_BACKGROUND = 0.6
 
 @dataclass(frozen=True)
 class ColorClusters:
-    """The blobs of a body by colour, and the log density of the colours of each kind."""
+    """The blobs of a body by colour, and the log density of the colours of each cluster."""
 
     members: tuple[tuple[int, ...], ...]
-    """The blobs of each kind, at most `SLOTS`; none for kinds that a body does not need."""
-    tables: Float[np.ndarray, "kind bin bin bin"]
+    """The blobs of each cluster, at most `SLOTS`; none for clusters that a body does not need."""
+    tables: Float[np.ndarray, "cluster bin bin bin"]
     whole: Float[np.ndarray, "bin bin bin"]
     """The log density of the colours of the whole body."""
 
     @classmethod
     def from_body(cls, body: Body) -> "ColorClusters":
-        """The kinds of a body's blobs, from their colours (sRGB) and how much of the body each is."""
+        """The clusters of a body's blobs, from their colours (sRGB) and how much of the body each is."""
         colors, areas = np.asarray(body.blob_colors, float), np.asarray(np.asarray(body.blob_sigmas) ** 2, float)
         members, whole = _by_color(colors), subject_colors(colors, areas)
         tables = [subject_colors(colors[np.array(part)], areas[np.array(part)]) for part in members]
-        missing = _num_kinds(len(colors)) - len(members)
+        missing = _num_clusters(len(colors)) - len(members)
         every = tuple(tuple(part) for part in [*members, *[[]] * missing])
         return cls(every, np.stack([*tables, *[np.zeros_like(whole)] * missing]), whole)
 
 
 def _by_color(colors: Float[np.ndarray, "blob 3"]) -> list[list[int]]:
     """Blobs of about the same colour, at most `SLOTS` together."""
-    most, kinds = _num_kinds(len(colors)), []
+    most, clusters = _num_clusters(len(colors)), []
     for count in range(min(NUM_COLORS, len(np.unique(np.round(colors, 2), axis=0))), 0, -1):
         labels = (
             kmeans2(colors, count, minit="++", rng=np.random.default_rng(0))[1]
@@ -64,23 +64,23 @@ def _by_color(colors: Float[np.ndarray, "blob 3"]) -> list[list[int]]:
             else np.zeros(len(colors), int)
         )
         parts = [np.flatnonzero(labels == k).tolist() for k in range(count)]
-        kinds = [part[k : k + SLOTS] for part in parts for k in range(0, len(part), SLOTS)]
-        if len(kinds) <= most:
+        clusters = [part[k : k + SLOTS] for part in parts for k in range(0, len(part), SLOTS)]
+        if len(clusters) <= most:
             break
-    return kinds
+    return clusters
 
 
-def _num_kinds(num_blobs: int) -> int:
+def _num_clusters(num_blobs: int) -> int:
     return -(-num_blobs // SLOTS) + SPARE
 
 
-def kind_odds(
+def cluster_odds(
     cells: Float[Array, "camera rows columns 3"],
     inside: Float[Array, "camera rows columns"],
     background: BackgroundModel | None,
-    tables: Float[Array, "kind bin bin bin"],
-) -> Float[Array, "camera kind rows columns"]:
-    """Log odds of each kind of blob against the background in every cell, within `LARGEST`.
+    tables: Float[Array, "cluster bin bin bin"],
+) -> Float[Array, "camera cluster rows columns"]:
+    """Log odds of each cluster of blobs against the background in every cell, within `LARGEST`.
 
     Where the background is not known, what the picture shows elsewhere stands for it: a colour that is everywhere says
     little. `inside` is 1 for the cells of the pictures, 0 for padding.
@@ -100,18 +100,18 @@ def odds_where_told(
     cells: Float[Array, "camera rows columns 3"],
     inside: Float[Array, "camera rows columns"],
     background: BackgroundModel | None,
-    tables: Float[Array, "kind bin bin bin"],
-) -> Float[Array, "camera kind rows columns"]:
-    """`kind_odds`, but where a kind looks as the background does, nothing is held against it.
+    tables: Float[Array, "cluster bin bin bin"],
+) -> Float[Array, "camera cluster rows columns"]:
+    """`cluster_odds`, but where a cluster looks as the background does, nothing is held against it.
 
     A black shoe on a black floor is the floor's black to a grey level, or is not, for all of its cells and in every
-    frame: such cells must not be counted as if each one told. Where the background is known no better than a kind's
-    own colours are (`ALIKE`), what is left speaks against the kind.
+    frame: such cells must not be counted as if each one told. Where the background is known no better than a cluster's
+    own colours are (`ALIKE`), what is left speaks against the cluster.
     """
-    odds = kind_odds(cells, inside, background, tables)
+    odds = cluster_odds(cells, inside, background, tables)
     if background is None:
         return odds
-    least = kind_odds(cells, inside, background.blurred(ALIKE), tables)
+    least = cluster_odds(cells, inside, background.blurred(ALIKE), tables)
     return jnp.maximum(odds, jnp.minimum(least, 0.0))
 
 

@@ -9,11 +9,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, UInt8
 
-from sogjax.scene.background import BackgroundCells, CameraBackground
-from sogjax.scene.plate_difference import working_size
+from sogjax.scene.background import BackgroundCells, BackgroundImage
+from sogjax.scene.background_difference import working_size
 
 LARGEST = 2.0
-"""No cell says more than this: what disturbs one (a reflection, a wrong plate) disturbs its neighbours too."""
+"""No cell says more than this: what disturbs one (a reflection, a wrong background) disturbs its neighbours too."""
 SMALLEST_SPREAD = 0.015
 """Standard deviation of a channel at one place in one light, at least (compression, a lens that breathes)."""
 SHADOW = 0.25
@@ -189,7 +189,7 @@ _log_odds = jax.jit(log_odds)
 
 
 def foreground_probability(
-    image: UInt8[np.ndarray, "height width 3"], background: CameraBackground
+    image: UInt8[np.ndarray, "height width 3"], background: BackgroundImage
 ) -> Float[np.ndarray, "rows columns"]:
     """The probability of each pixel (BGR, working size), as the tracker has it for cells; a half where unknown."""
     size = working_size(image.shape[1], image.shape[0])

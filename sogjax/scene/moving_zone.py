@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from sogjax.model.camera import Camera
-from sogjax.scene.plate_difference import closed, disc, without_holes
+from sogjax.scene.background_difference import closed, disc, without_holes
 from sogjax.scene.visual_hull import MANY, Cube, cube_around, from_upright, resized, upright, voxel_pixels
 
 SMALLEST_ROOM = 2.6

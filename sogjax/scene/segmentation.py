@@ -8,11 +8,11 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from sogjax.model.camera import Camera
-from sogjax.scene.plate_difference import (
+from sogjax.scene.background_difference import (
     Difference,
+    background_difference,
     closed,
     disc,
-    plate_difference,
     reduced_mask,
     widened,
     without_holes,
@@ -32,9 +32,9 @@ UNCHANGED = 3.0
 Mask = Bool[np.ndarray, "_h _w"]
 
 
-def masks_from_plates(
+def masks_from_backgrounds(
     images: Mapping[int, UInt8[np.ndarray, "_h _w 3"]],
-    plates: Mapping[int, UInt8[np.ndarray, "_h _w 3"]],
+    backgrounds: Mapping[int, UInt8[np.ndarray, "_h _w 3"]],
     known: Mapping[int, Mask],
     cameras: Mapping[int, Camera],
     up: Float[np.ndarray, "3"],
@@ -42,12 +42,12 @@ def masks_from_plates(
 ) -> dict[int, Mask]:
     """Masks of the cameras that have a picture of the empty scene, at the pictures' size.
 
-    What differs from the plate in colour is the subject; what is only darker may be its shadow, and is the subject
+    What differs from the background in colour is the subject; what is only darker may be its shadow, and is the subject
     where the other cameras' changed regions meet above the floor. OpenCV's grabCut then finds the outline.
 
     Args:
         images: the subject, by camera.
-        plates: the empty scene, for the cameras whose masks are wanted.
+        backgrounds: the empty scene, for the cameras whose masks are wanted.
         known: masks of other cameras, which help.
         cameras: all of these cameras.
         up: the world's vertical.
@@ -55,12 +55,12 @@ def masks_from_plates(
             other cameras decide.
 
     Returns:
-        Masks by camera; a camera is absent if no subject could be told apart from its plate.
+        Masks by camera; a camera is absent if no subject could be told apart from its background.
     """
     with ThreadPoolExecutor() as pool:
-        compare = lambda k: plate_difference(images[k], plates[k], (unknown or {}).get(k))
-        found = pool.map(compare, plates)
-        differences = dict(zip(plates, found, strict=True))
+        compare = lambda k: background_difference(images[k], backgrounds[k], (unknown or {}).get(k))
+        found = pool.map(compare, backgrounds)
+        differences = dict(zip(backgrounds, found, strict=True))
         guesses = {camera: first_guess(difference) for camera, difference in differences.items()}
         guesses = {camera: guess for camera, guess in guesses.items() if is_subject(guess)}
         guesses |= _seen_together({c: differences[c] for c in guesses}, guesses, known, cameras, up)

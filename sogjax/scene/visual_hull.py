@@ -11,7 +11,7 @@ from jaxtyping import Array, Bool, Float
 from scipy.ndimage import binary_opening
 
 from sogjax.model.camera import NEAR, Camera, distort, near_picture, project_points
-from sogjax.scene.plate_difference import reduced_mask, widened
+from sogjax.scene.background_difference import reduced_mask, widened
 
 VOXELS = 64
 """Voxels along each side of the cube."""

@@ -11,9 +11,9 @@ from jaxtyping import Array, Float, Int
 from sogjax.io.keypoints.scheme import KeypointScheme
 from sogjax.model.body import Body
 from sogjax.model.shape import ShapeModel
+from sogjax.search.described_pose import MIN_LANDMARKS, NUM_HEADINGS, dof_spread
 from sogjax.search.placed_body import headings, landmarks_of, placed, root_position, turned
 from sogjax.search.point_fit import Points, fitted_to_points
-from sogjax.search.rough_pose import MIN_LANDMARKS, NUM_HEADINGS, dof_spread
 from sogjax.solve.gauss_newton import GaussNewton, LeastSquares
 from sogjax.solve.solution import Scales
 

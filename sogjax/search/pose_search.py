@@ -64,7 +64,7 @@ class PoseSearch:
     """What a search for one body needs beside the frame."""
 
     body: Body
-    kinds: ColorClusters
+    clusters: ColorClusters
     terms: Sequence[Term]
     up: str
 
@@ -80,7 +80,7 @@ class PoseSearch:
 
     def energy(self, frame: SeenFrame) -> SearchEnergy:
         """The energy of poses in a frame."""
-        return SearchEnergy.from_terms(self.body, frame.cameras, self.terms, self.kinds)
+        return SearchEnergy.from_terms(self.body, frame.cameras, self.terms, self.clusters)
 
 
 def unreported(share: float) -> None:

@@ -71,20 +71,20 @@ class SearchEnergy(eqx.Module):
     cameras: Camera
     terms: Terms
     """All but the appearance."""
-    kinds: BlobClusters
+    clusters: BlobClusters
 
     @classmethod
-    def from_terms(cls, body: Body, cameras: Camera, terms: Sequence[Term], kinds: ColorClusters) -> "SearchEnergy":
+    def from_terms(cls, body: Body, cameras: Camera, terms: Sequence[Term], clusters: ColorClusters) -> "SearchEnergy":
         """The energy with the terms of tracking that need no windows, lists or history."""
         others = [term for term in terms if not isinstance(term, (Similarity, Foreground, AccelerationPenalty))]
         others = [eqx.tree_at(lambda term: term.weight, term, LIMITS * term.weight) for term in others]
-        return cls(body, cameras, (*others, RestPrior(REST_WEIGHT)), BlobClusters.from_members(kinds.members, SLOTS))
+        return cls(body, cameras, (*others, RestPrior(REST_WEIGHT)), BlobClusters.from_members(clusters.members, SLOTS))
 
     def appearance(self, windows: ColorWindows) -> Appearance:
         """The appearance, in units of the body's own area in the pictures: it does not matter how large it is seen."""
         whole = jnp.mean(windows.scale**2 / whole_image_overlap(self.cameras.image_size))
         size = SILHOUETTE * jnp.pi * jnp.sum((DISC * self.body.blob_sigmas) ** 2)
-        return Appearance(1.0 / (size * whole), windows, self.kinds)
+        return Appearance(1.0 / (size * whole), windows, self.clusters)
 
     def of_windows(self, windows: ColorWindows) -> FrameEnergy:
         """The energy with what is seen around some poses."""

@@ -1,4 +1,4 @@
-"""What the cameras see in one frame, as searches take it: how much each kind of blob would explain, cell by cell."""
+"""What the cameras see in one frame, as searches take it: what each cluster of blobs would explain, by cell."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,7 +14,7 @@ from sogjax.model.body import Body
 from sogjax.model.camera import Camera, project, project_points
 from sogjax.model.sog import Sog
 from sogjax.scene.cells import inside_pictures
-from sogjax.scene.color_clusters import ColorClusters, kind_odds
+from sogjax.scene.color_clusters import ColorClusters, cluster_odds
 from sogjax.scene.foreground import BackgroundModel
 from sogjax.tracking.culling import ImageReader
 
@@ -31,8 +31,8 @@ class SeenFrame(eqx.Module):
     """The cells of one frame, compared with the colours of one body."""
 
     cameras: Camera
-    odds: Float[Array, "camera kind rows columns"]
-    """Log odds of each kind of blob against the background; the last kind is the body as a whole."""
+    odds: Float[Array, "camera cluster rows columns"]
+    """Log odds of each cluster of blobs against the background; the last cluster is the body as a whole."""
     cell_sizes: Float[Array, "camera"]
     known: Float[Array, ""]
     """Part of the cells whose background is known."""
@@ -45,7 +45,7 @@ class SeenFrame(eqx.Module):
         cameras: Camera,
         reader: ImageReader,
         cells: UInt8[np.ndarray | Array, "camera rows columns 3"],
-        kinds: ColorClusters,
+        clusters: ColorClusters,
         present: Sequence[bool] | None = None,
     ) -> "SeenFrame":
         """The frame as a reader of pictures understands it; without a background, if the reader has none.
@@ -53,7 +53,7 @@ class SeenFrame(eqx.Module):
         A camera that is not `present` (None: all are) says nothing.
         """
         dtype = cameras.intrinsics.dtype
-        tables = jnp.asarray(np.concatenate([kinds.tables, kinds.whole[None]]), dtype)
+        tables = jnp.asarray(np.concatenate([clusters.tables, clusters.whole[None]]), dtype)
         grids = reader.candidates.grids
         inside = inside_pictures(grids, cells.shape[1:3])
         if present is not None:
@@ -113,4 +113,4 @@ def _is_tuple(value: object) -> bool:
 
 @eqx.filter_jit
 def _odds(cells: Array, inside: Array, background: BackgroundModel | None, tables: Array) -> Array:
-    return kind_odds(cells.astype(tables.dtype) / 255.0, inside.astype(tables.dtype), background, tables)
+    return cluster_odds(cells.astype(tables.dtype) / 255.0, inside.astype(tables.dtype), background, tables)

@@ -60,7 +60,7 @@ def ranked(
     Args:
         recording: in which was tracked.
         bodies: the actors, in their own upright frames.
-        config: of the track; its first pose is not used.
+        config: of the track; its initial pose is not used.
         frames: counted from the recording's first, one after the other.
         starts: the tracked and the true poses of all actors beside each other; NaN where not known.
     """

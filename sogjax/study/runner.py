@@ -28,7 +28,7 @@ from sogjax.study.source import Source
 
 STAGES = ("decode", "step", "whole")
 ALL = "all"
-"""Frames by the time of the whole run: first pose, backward passes and adjusting included."""
+"""Frames by the time of the whole run: initial pose, backward passes and adjusting included."""
 
 
 def run_row(

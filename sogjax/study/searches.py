@@ -1,4 +1,4 @@
-"""Searches for first poses in rendered recordings: what was found and said, against the truth."""
+"""Searches for initial poses in rendered recordings: what was found and said, against the truth."""
 
 import hashlib
 import json

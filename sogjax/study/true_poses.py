@@ -12,7 +12,7 @@ from sogjax.io.ground_truth import GroundTruth
 from sogjax.io.motion import Motion, motion_from_poses
 from sogjax.model.body import Attachments, Body
 from sogjax.quality.metrics import landmark_named
-from sogjax.search.rough_pose import MIN_LANDMARKS, fit_landmarks
+from sogjax.search.described_pose import MIN_LANDMARKS, fit_landmarks
 
 Points = Float[np.ndarray, "frame point 3"]
 Poses = Float[np.ndarray, "frame dof"]

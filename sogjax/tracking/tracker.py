@@ -53,18 +53,18 @@ class Tracker(eqx.Module):
     """Which are judged in every frame; None: none."""
     capacities: Capacities | None = None
     """Room for image blobs of a step that is given none."""
-    first_pose: Float[Array, "dof"] | None = None
+    initial_pose: Float[Array, "dof"] | None = None
     """Where `start` begins."""
 
     def start(self, pose: Float[Array | np.ndarray, "dof"] | None = None) -> TrackState:
-        """The state before the first frame, from a rough pose of it; None: from `first_pose`.
+        """The state before the first frame, from a rough pose of it; None: from `initial_pose`.
 
         Raises:
             ValueError: there is neither.
         """
-        pose = self.first_pose if pose is None else pose
+        pose = self.initial_pose if pose is None else pose
         if pose is None:
-            raise ValueError("the tracker knows no first pose; give one: tracker.start(pose)")
+            raise ValueError("the tracker knows no initial pose; give one: tracker.start(pose)")
         return self.with_memory(TrackState.from_pose(jnp.asarray(pose, self.body.skeleton.offsets.dtype)))
 
     def with_memory(self, state: TrackState) -> TrackState:

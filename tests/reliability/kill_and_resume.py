@@ -2,9 +2,9 @@
 
 python tests/reliability/kill_and_resume.py kills=20
 
-tracks a small rendered walk, all outputs on, first pose searched for; kills the process (SIGKILL) at random moments of
-its life in its folder, every other time after it wrote its first frames; goes on with resume=true, and compares every
-array of the end with a run that was left alone.
+tracks a small rendered walk, all outputs on, initial pose searched for; kills the process (SIGKILL) at random moments
+of its life in its folder, every other time after it wrote its first frames; goes on with resume=true, and compares
+every array of the end with a run that was left alone.
 """
 
 import random

@@ -52,7 +52,7 @@ def faults_part(rows: list[Survived]) -> list[str]:
         "",
         "## Faults injected and survived",
         "",
-        f"A small rendered walk ({RUNS.frames} frames, {RUNS.cameras} cameras, all outputs, searched first pose) was "
+        f"A small rendered walk ({RUNS.frames} frames, {RUNS.cameras} cameras, all outputs, searched initial pose) was "
         "tracked while its",
         "surroundings failed. Every fault was real and hit a process of its own. Then the same command with",
         "`resume=true` continued the run, and every array of its `motion.npz` was compared with an undisturbed run's.",

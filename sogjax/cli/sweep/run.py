@@ -110,15 +110,15 @@ def _check_members(words: Sequence[str]) -> None:
 
 
 def _say_shared(members: Sequence[TrackConfig]) -> None:
-    """Say whether all members begin with one first pose and one actor, and if not, why."""
+    """Say whether all members begin with one initial pose and one actor, and if not, why."""
     if len(members) < 2 or len({member.recording for member in members}) == len(members):
         return  # of different recordings nobody expects it
     each = [of_initial_pose(member) for member in members]
     changed = [key for key in each[0] if any(other[key] != each[0][key] for other in each)]
     if changed:
-        say(f"{', '.join(changed)}: changes what the first pose is, so members have different ones")
+        say(f"{', '.join(changed)}: changes what the initial pose is, so members have different ones")
     else:
-        say(f"one first pose{'' if members[0].actor else ' and one actor'} for all {len(members)} members")
+        say(f"one initial pose{'' if members[0].actor else ' and one actor'} for all {len(members)} members")
 
 
 def members_of(overrides: Sequence[Override]) -> Iterator[tuple[str, ...]]:

@@ -1,4 +1,4 @@
-"""The first pose from keypoints beside a recording, without a search."""
+"""The initial pose from keypoints beside a recording, without a search."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ from sogjax.run.actors import Actors
 from sogjax.run.background import Background
 from sogjax.run.clip import Clip
 from sogjax.run.initial_pose import PoseRequest, find_initial_pose, from_example_frames, from_file, from_keypoints
-from sogjax.run.keypoint_start import keypoint_starts
+from sogjax.run.keypoint_initial_pose import keypoint_poses
 from sogjax.run.recordings import upright
 from sogjax.settings.compose import track_config
 from sogjax.synth.detector import DetectorSettings
@@ -40,7 +40,7 @@ def folder(tmp_path_factory):
 
 def starts(recording, bodies, frame=0):
     config = track_config(recording=recording.path)
-    return keypoint_starts(Clip(recording, recording.frames, 8), Background(None), bodies, config, frame)
+    return keypoint_poses(Clip(recording, recording.frames, 8), Background(None), bodies, config, frame)
 
 
 def error(recording, pose, frame):

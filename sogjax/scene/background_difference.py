@@ -9,18 +9,18 @@ from jaxtyping import Bool, Float, UInt8
 WORKING_SIZE = 648
 """Pixels. Pictures are scaled down until their longer side is at most this: averaging removes noise."""
 CHANGED = 8.0
-"""Squared differences to the plate above this, in units of the noise, are a change."""
+"""Squared differences to the background above this, in units of the noise, are a change."""
 UNDECIDED = 0.5 * CHANGED
-"""What is said of a pixel whose plate is unknown: neither a change nor none."""
+"""What is said of a pixel whose background is unknown: neither a change nor none."""
 DIFFERENT = 4.5
-"""Squared differences, in units of the noise, that are left when the plate may be darker or a little brighter: above
-this, the colour is another one."""
+"""Squared differences, in units of the noise, that are left when the background may be darker or a little brighter:
+above this, the colour is another one."""
 SHADOW_RANGE = (0.4, 1.1)
-"""Share of the plate's light that a shadow or reflected light leaves."""
+"""Share of the background's light that a shadow or reflected light leaves."""
 EDGE_NOISE = 0.08
-"""Noise beside edges of the plate, as a share of their contrast: a little misalignment and compression."""
+"""Noise beside edges of the background, as a share of their contrast: a little misalignment and compression."""
 SHADOW_CORRELATION = 0.65
-"""A darker place whose pattern is that of the plate to this degree is a shadow."""
+"""A darker place whose pattern is that of the background to this degree is a shadow."""
 PATTERN_WINDOW = 11
 """Pixels of the working picture; also how far a shadow's edge blurs the comparison."""
 SATURATED = (4.0, 250.0)
@@ -28,7 +28,7 @@ SATURATED = (4.0, 250.0)
 
 @dataclass(frozen=True)
 class Difference:
-    """A picture beside its plate, at the working size."""
+    """A picture beside its background, at the working size."""
 
     image: UInt8[np.ndarray, "rows columns 3"]
     """BGR."""
@@ -41,7 +41,7 @@ class Difference:
     different: Bool[np.ndarray, "rows columns"]
     """Subject: the colour is another one."""
     unknown: Bool[np.ndarray, "rows columns"]
-    """Where the plate says nothing."""
+    """Where the background says nothing."""
 
     @property
     def open(self) -> Bool[np.ndarray, "rows columns"]:
@@ -61,9 +61,9 @@ def reduced_mask(mask: Bool[np.ndarray, "height width"]) -> Bool[np.ndarray, "ro
     return cv2.resize(mask.astype(np.float32), size, interpolation=cv2.INTER_AREA) > 0.5
 
 
-def plate_difference(
+def background_difference(
     image: UInt8[np.ndarray, "height width 3"],
-    plate: UInt8[np.ndarray, "plate_height plate_width 3"],
+    background: UInt8[np.ndarray, "background_height background_width 3"],
     unknown: Bool[np.ndarray, "_rows _columns"] | None = None,
 ) -> Difference:
     """Compare a picture with the empty scene, seen by the same camera under an exposure that may differ.
@@ -71,14 +71,14 @@ def plate_difference(
     Where the scene is not `known` (None: it is everywhere), the picture counts as changed, as the subject may be there,
     but not as different.
 
-    A shadow is the plate, darker: Horprasert, Harwood and Davis, "A Statistical Approach for Real-time Robust
+    A shadow is the background, darker: Horprasert, Harwood and Davis, "A Statistical Approach for Real-time Robust
     Background Subtraction and Shadow Detection" (1999). Where a brown trouser leg before a brown floor looks like one,
-    the pattern may tell: a shadow keeps the floor's. Where the plate is `unknown`, nothing is said.
+    the pattern may tell: a shadow keeps the floor's. Where the background is `unknown`, nothing is said.
     """
     size = working_size(image.shape[1], image.shape[0])
     small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
     light = small.astype(np.float32)
-    expected = _same_exposure(light, cv2.resize(plate, size, interpolation=cv2.INTER_AREA).astype(np.float32))
+    expected = _same_exposure(light, cv2.resize(background, size, interpolation=cv2.INTER_AREA).astype(np.float32))
     noise = 1.48 * float(np.median(np.abs(light - expected))) + 0.7
     contrast = cv2.morphologyEx(expected, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
     variance = noise**2 + (EDGE_NOISE * contrast) ** 2
@@ -123,13 +123,13 @@ def disc(width: int) -> np.ndarray:
 
 
 def same_exposure(
-    light: np.ndarray, plate: np.ndarray, every: int = 3
+    light: np.ndarray, background: np.ndarray, every: int = 3
 ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
-    """Gain and offset of each channel that make a plate most like a picture's background.
+    """Gain and offset of each channel that make the empty scene most like a picture's background.
 
     What differs for another reason is left out by itself; of rows and columns only one in `every` is looked at.
     """
-    seen, empty = (part[::every, ::every].reshape(-1, 3).astype(float) for part in (light, plate))
+    seen, empty = (part[::every, ::every].reshape(-1, 3).astype(float) for part in (light, background))
     low, high = SATURATED
     usable = ((seen > low) & (seen < high) & (empty > low) & (empty < high)).all(axis=1)
     gain, offset = np.ones(3), np.zeros(3)
@@ -147,11 +147,11 @@ def same_exposure(
 
 
 def _same_exposure(
-    light: Float[np.ndarray, "rows columns 3"], plate: Float[np.ndarray, "rows columns 3"]
+    light: Float[np.ndarray, "rows columns 3"], background: Float[np.ndarray, "rows columns 3"]
 ) -> Float[np.ndarray, "rows columns 3"]:
-    """The plate under the picture's exposure."""
-    gain, offset = same_exposure(light, plate)
-    return np.clip(gain * plate + offset, 0.0, 255.0).astype(np.float32)
+    """The background under the picture's exposure."""
+    gain, offset = same_exposure(light, background)
+    return np.clip(gain * background + offset, 0.0, 255.0).astype(np.float32)
 
 
 def _averaged(squares: Float[np.ndarray, "rows columns 3"]) -> Float[np.ndarray, "rows columns"]:
@@ -163,7 +163,7 @@ def _brightness(
     expected: Float[np.ndarray, "rows columns 3"],
     weights: Float[np.ndarray, "rows columns 3"],
 ) -> Float[np.ndarray, "rows columns"]:
-    """Brightness of each pixel and its neighbours together, in units of the plate's."""
+    """Brightness of each pixel and its neighbours together, in units of the background's."""
     above = cv2.blur((light * expected * weights).sum(axis=-1), (3, 3))
     below = cv2.blur((expected * expected * weights).sum(axis=-1), (3, 3))
     return above / (below + 1e-6)
@@ -182,7 +182,7 @@ def _unexplained(
 def _keeps_pattern(
     light: Float[np.ndarray, "rows columns 3"], expected: Float[np.ndarray, "rows columns 3"], noise: float
 ) -> Bool[np.ndarray, "rows columns"]:
-    """Where the picture has the plate's pattern, and there is one."""
+    """Where the picture has the background's pattern, and there is one."""
     window = (PATTERN_WINDOW, PATTERN_WINDOW)
     grey = [cv2.cvtColor(part, cv2.COLOR_BGR2GRAY) for part in (light, expected)]
     seen, empty = (part - cv2.blur(part, window) for part in grey)

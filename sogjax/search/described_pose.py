@@ -23,13 +23,13 @@ NUM_HEADINGS = 12
 MIN_LANDMARKS = 4
 
 
-def rough_pose(body: Body, description: InitialPose, up: str) -> Float[Array, "dof"]:
+def described_pose(body: Body, description: InitialPose, up: str) -> Float[Array, "dof"]:
     """The pose that a description means; `body` stands upright in the recording's world (vertical `up`) already.
 
     Raises:
-        InputError: as `check_rough_pose`.
+        InputError: as `check_described_pose`.
     """
-    check_rough_pose(body, description, up)
+    check_described_pose(body, description, up)
     start = _named_pose(body, description.pose)
     if description.position is not None:
         start = placed(body, start, np.asarray(description.position, float))
@@ -40,7 +40,7 @@ def rough_pose(body: Body, description: InitialPose, up: str) -> Float[Array, "d
     return start
 
 
-def check_rough_pose(body: Body, description: InitialPose, up: str) -> None:
+def check_described_pose(body: Body, description: InitialPose, up: str) -> None:
     """Refuse a description that means no pose of a body.
 
     Raises:

@@ -1,4 +1,4 @@
-"""The first poses from keypoints that another program left beside a recording: nothing has to be searched."""
+"""The initial poses from keypoints that another program left beside a recording: nothing has to be searched."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -37,7 +37,7 @@ CLEARLY = 1.05
 """By which factor the pictures must be more similar to be sure who is who."""
 
 
-def keypoint_starts(
+def keypoint_poses(
     clip: Clip, background: Background, bodies: Sequence[Body], config: TrackConfig, frame: int
 ) -> list[Float[Array, "dof"]] | None:
     """The poses of bodies, upright in the recording's world, in a frame.
