@@ -94,8 +94,8 @@ def test_a_section_tells_the_failures_of_a_method(study):
         *(("theirs", "a"), ("theirs", "b")),
         *(("ours", "a"), ("ours", "b"), ("ours", "c")),
     ]
-    assert "failed, b: r: lost" in "\n".join(section.parts)
-    assert any(part.startswith("**Theirs** (`preset=paper`)") for part in section.parts)
+    assert "failed, theirs, b: r: lost" in "\n".join(section.parts)
+    assert any(part.startswith("**Ours** (`preset=default`): Smallest mean error: a") for part in section.parts)
     assert len(section.pictures) == 1
 
 

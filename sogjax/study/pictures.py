@@ -41,8 +41,8 @@ def experiment_chart(experiment: Experiment, rows: Mapping[str, Sequence[RowSumm
         value="frames/s, whole" if speed else "marker error, mm",
         paper=papers,
     )
-    what = "frames per second" if speed else "mean error with its 95 % interval; thin lines: each recording"
-    return Picture(f"{experiment.name}.png", content, f"{experiment.config.title}: {what}")
+    what = "Frames per second" if speed else "Mean error, its 95 % interval, and each recording"
+    return Picture(f"{experiment.name}.png", content, what)
 
 
 def _bars(experiment: Experiment, rows: Mapping[str, Sequence[RowSummary]]) -> Picture:
@@ -58,7 +58,7 @@ def _bars(experiment: Experiment, rows: Mapping[str, Sequence[RowSummary]]) -> P
         values = {method: of_rows for method, of_rows in values.items() if np.isfinite(of_rows).any()}
         panels.append(Bars("all cameras" if count is None else f"{count} cameras", names, values))
     content = bar_chart(panels, value="joint error, mm")
-    return Picture(f"{experiment.name}.png", content, f"{experiment.config.title}: mean error of the joints")
+    return Picture(f"{experiment.name}.png", content, "Mean error of the joints")
 
 
 def _panel(title: str, rows: Sequence[RowSummary], speed: bool) -> Means:

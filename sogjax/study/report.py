@@ -49,7 +49,7 @@ def write_report(config: ReportConfig) -> list[Path]:
         sections += [section(study) for name, section in BESIDE.items() if name in names]
         say(f"runs done or read in {time.perf_counter() - begin:.0f} s")
         sections += [worst_section(done, config.pictures)] if config.pictures else []
-        sections += [about_section(config, done), versions_section(config)]
+        sections += [about_section(config, done), versions_section()]
         write_html(out / "report.html", TITLE, sections)
         files = [out / "report.html", *write_markdown(out / "report.md", TITLE, sections)]
     return [*files, write_runs(out / "runs.csv", done)]

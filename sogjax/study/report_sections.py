@@ -4,9 +4,6 @@ import platform
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 
-from omegaconf import OmegaConf
-
-from sogjax.settings.compose import track_config
 from sogjax.study.document import Section
 from sogjax.study.experiment import OVERVIEW, Experiment
 from sogjax.study.methods import Rows, comparison_table, overview_table, settings_table
@@ -71,16 +68,15 @@ def own_section() -> Section:
     )
 
 
-def versions_section(config: ReportConfig) -> Section:
-    """Packages, and the settings that rows do not change."""
-    tree = OmegaConf.structured(track_config(config.overrides, recording="RECORDING"))
+def versions_section() -> Section:
+    """The packages, and where the settings of each run are."""
     return Section(
-        "Configuration and versions",
+        "Versions",
         [
             "\n".join(f"- {name} {installed_version(name)}" for name in PACKAGES)
             + f"\n- Python {platform.python_version()}",
-            "What rows do not set is the default; `runs.csv` lists every run, and `runs/KEY.json` holds it.",
-            "```\n" + OmegaConf.to_yaml(tree).strip() + "\n```",
+            "What rows do not set is the default; `runs.csv` lists every run, and `runs/KEY.json` holds it with all of "
+            "its settings.",
         ],
     )
 
@@ -113,14 +109,7 @@ def experiment_section(experiment: Experiment, study: Study, done: list[Done]) -
 
 def _parts(experiment: Experiment, rows: Rows, study: Study) -> list[str]:
     config = experiment.config
-    parts = [_question(experiment)]
-    if config.methods:
-        parts += [comparison_table(experiment, rows)]
-    if experiment.name == OVERVIEW:
-        parts += [overview_table([row for row in of_method if row.by_recording]) for of_method in rows.values()]
-        parts += [
-            f"failed, {row.name}: {reason}" for of_method in rows.values() for row in of_method for reason in row.failed
-        ]
+    parts = [_question(experiment), *([comparison_table(experiment, rows)] if config.methods else [])]
     for method, of_method in rows.items():
         parts += _of_method(experiment, method, of_method)
     parts += [config.note] if config.note else []
@@ -136,15 +125,17 @@ def _question(experiment: Experiment) -> str:
 
 
 def _of_method(experiment: Experiment, method: str, rows: Sequence[RowSummary]) -> list[str]:
-    """One method's rows in full."""
-    title = f"**{method[:1].upper()}{method[1:]}** (`{' '.join(experiment.methods[method]) or 'preset=default'}`):"
-    parts = [title] if method else []
-    if not any(row.by_recording for row in rows):
-        return [*parts, *(f"failed, {row.name}: {reason}" for row in rows for reason in row.failed)]
-    parts += [] if experiment.name == OVERVIEW else [markdown_table(experiment, rows)]
-    if experiment.config.measure == "accuracy" and experiment.config.reference is not None:
-        parts += ["Mean error on each recording, mm:", recordings_table(experiment, rows)]
+    """What one method's rows say; their table, where none compares the methods."""
+    worked, of = [row for row in rows if row.by_recording], f", {method}" if method else ""
+    failed = [f"failed{of}, {row.name}: {reason}" for row in rows for reason in row.failed]
+    if not worked:
+        return failed
+    if experiment.name == OVERVIEW:
+        parts = [overview_table(worked), "Mean error on each recording, mm:", recordings_table(experiment, worked)]
+    else:
+        parts = [] if method else [markdown_table(experiment, worked)]
     if experiment.config.iterations_by_recording:
-        parts += ["Iterations per frame on each recording:", iterations_table(experiment, rows)]
-    said = findings(experiment, rows)
-    return [*parts, *(["\n".join(f"- {line}" for line in said)] if said else [])]
+        parts += [f"Iterations per frame on each recording{of}:", iterations_table(experiment, worked)]
+    title = f"**{method[:1].upper()}{method[1:]}** (`{' '.join(experiment.methods[method]) or 'preset=default'}`): "
+    said = " ".join(findings(experiment, worked))
+    return [*parts, *([f"{title if method else ''}{said}"] if said else []), *failed]

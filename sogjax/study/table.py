@@ -47,7 +47,7 @@ def markdown_table(experiment: Experiment, rows: Sequence[RowSummary]) -> str:
     lines = [f"| {in_cell(experiment.config.axis)} | " + " | ".join(texts) + " |", "|---" * (1 + len(texts)) + "|"]
     for k, row in enumerate(rows):
         lines.append(f"| {in_cell(row.name)} | " + " | ".join(cells[k] for cells in texts.values()) + " |")
-    return "\n".join(lines + [f"\nfailed, {row.name}: {reason}" for row in rows for reason in row.failed])
+    return "\n".join(lines)
 
 
 def recordings_table(experiment: Experiment, rows: Sequence[RowSummary]) -> str:
@@ -91,21 +91,13 @@ def significance(row: RowSummary) -> str:
 
 
 def findings(experiment: Experiment, rows: Sequence[RowSummary]) -> list[str]:
-    """What the experiment says in words: the best rows, which differences are significant, the paper's best row."""
+    """What the experiment says in words: its best rows, and the paper's."""
     done = [row for row in rows if np.isfinite(row.mean)]
     if not done or experiment.config.measure != "accuracy":
         return []
-    compared = [row for row in done if row.difference is not None and row.difference.recordings > 1]
-    reference = next((row.name for row in rows if row.is_reference), "")
-    lines = _best(done)
-    significant = {row.name: row.difference is not None and row.difference.is_significant for row in compared}
-    for words, kind in (("Significantly different", True), ("Not significantly different", False)):
-        names = [name for name, is_so in significant.items() if is_so is kind]
-        lines += [f"{words} from {reference!r}: {', '.join(names)}."] if names else []
     papers = [row for row in rows if row.paper_value is not None]
-    if papers:
-        lines.append(f"The paper's best: {min(papers, key=lambda row: row.paper_value or 0.0).name}.")
-    return lines
+    best = [f"The paper's best: {min(papers, key=lambda row: row.paper_value or 0.0).name}."] if papers else []
+    return [*_best(done), *best]
 
 
 def _best(rows: Sequence[RowSummary]) -> list[str]:
