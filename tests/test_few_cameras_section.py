@@ -6,7 +6,7 @@ import pytest
 
 from sogjax.errors import InputError
 from sogjax.study import few_cameras
-from sogjax.study.few_cameras import Result, Trial, Trials, few_cameras_section
+from sogjax.study.few_cameras import KINDS, Result, Trial, Trials, each_table, few_cameras_section
 from sogjax.study.study import Study
 from sogjax.synth.settings import SynthSettings
 
@@ -23,13 +23,13 @@ def test_results_that_were_kept_are_averaged_over_sequences(study, monkeypatch):
         Trial("run", 2, "keypoints"): Result(24.0, 44.0, 2, 54.0, 1),
     }
     monkeypatch.setattr(Trials, "kept", lambda self, trial: results.get(trial))
-    about, together, each = few_cameras_section(study).parts
+    about, together = few_cameras_section(study).parts
     assert "few_cameras.py" in about
     assert together.splitlines()[2:] == [
         "| 2 | without | 30.0 | 80.0 | 1 |  |  |",
         "| 2 | keypoints | 22.0 | 42.0 | 2 | 52.0 | 4 |",
     ]
-    walk, run = each.splitlines()[2:]
+    walk, run = each_table(results, KINDS).splitlines()[2:]
     assert walk.startswith("| walk | 30.0, 1 | 20.0 |")
     assert run.startswith("| run |  | 24.0, 2 |")
 

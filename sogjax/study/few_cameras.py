@@ -176,12 +176,12 @@ def few_cameras_section(study: Study) -> Section:
             done[trial] = found
     about = (
         "What are keypoints of a detector worth with few cameras, and the body model beside triangulation? "
-        "(`python experiments/few_cameras.py`) Errors of joints. The keypoints are simulated and 35 mm off on average, "
-        "as a detector's are; actors are made with all cameras, backgrounds are photographed. Two cameras stand a "
-        "third of a circle apart, others evenly around."
+        "(`python experiments/few_cameras.py`, which also gives each sequence) Errors of joints. The keypoints are "
+        "simulated and 35 mm off on average, as a detector's are; actors are made with all cameras, backgrounds are "
+        "photographed. Two cameras stand a third of a circle apart, others evenly around."
     )
-    tables = [together_table(done, KINDS), each_table(done, KINDS)] if done else ["Nothing was tracked for this."]
-    return Section("Few cameras and keypoints", [about, *tables, *without])
+    table = together_table(done, KINDS) if done else "Nothing was tracked for this."
+    return Section("Few cameras and keypoints", [about, table, *without])
 
 
 def together_table(done: Mapping[Trial, Result], kinds: Sequence[tuple[int, str]]) -> str:

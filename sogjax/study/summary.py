@@ -52,7 +52,6 @@ class RowSummary:
     lost: int
     swaps: int
     iterations: float
-    evaluations: float
     not_converged: int
     milliseconds: float
     """The median of a tracking step; the mean over the recordings."""
@@ -103,7 +102,6 @@ def _summary(name: str, records: Records, reference: Records | None, paper: tupl
         lost=sum(record.lost for record in runs),
         swaps=sum(record.swaps for record in runs),
         iterations=average(lambda record: _mean(record.iterations)),
-        evaluations=average(lambda record: _mean(record.evaluations)),
         not_converged=sum(not one for record in runs for one in record.converged),
         milliseconds=average(lambda record: record.step_ms),
         image_blobs=average(lambda record: record.image_blobs),

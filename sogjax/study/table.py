@@ -17,7 +17,6 @@ ACCURACY: dict[str, Cell] = {
     "joints, mm": lambda row: f"{row.joints:.1f}",
     "lost": lambda row: str(row.lost),
     "iterations": lambda row: f"{row.iterations:.1f}",
-    "evaluations": lambda row: f"{row.evaluations:.1f}",
     "not converged": lambda row: str(row.not_converged),
     "ms per step": lambda row: f"{row.milliseconds:.0f}",
     "the paper": lambda row: row.paper or "",

@@ -35,12 +35,11 @@ def page(outcomes: list[Outcome], fuzzed: list[FuzzedReader], failed: list[Survi
         "The readers got valid files in which bytes were changed, lines removed, doubled or swapped, and numbers made",
         "extreme. Each file must be read or refused with one sentence (`InputError`).",
         "",
-        "| reader | files | refused | read | other exceptions |",
-        "|---|---|---|---|---|",
+        f"{sum(r.files for r in fuzzed)} files: {sum(r.refused for r in fuzzed)} were refused, "
+        f"{sum(len(r.crashes) for r in fuzzed)} ended with another exception, the others were read. "
+        f"Readers: {'; '.join(r.name for r in fuzzed)}.",
     ]
-    for r in fuzzed:
-        counts = (r.files, r.refused, r.files - r.refused - len(r.crashes), len(r.crashes))
-        lines.append(f"| {r.name} | {' | '.join(map(str, counts))} |")
+    lines += [f"\n{r.name}: {len(r.crashes)} other exceptions, the first: {r.crashes[0]}" for r in fuzzed if r.crashes]
     return "\n".join(lines + faults_part(failed)) + "\n"
 
 
