@@ -57,7 +57,7 @@ class Scene:
 
     def tracked(self, *overrides: str) -> RunResult:
         """A run without files, evaluated."""
-        result = track_recording(self.recording, self.bodies, self.config(*overrides))
+        result = track_recording(self.recording, self.bodies, self.config(*overrides)).result_so_far
         assert self.recording.ground_truth is not None
         result.evaluation = evaluate_motions(result.motions, load_ground_truth(self.recording.ground_truth))
         return result

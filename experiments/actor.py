@@ -66,7 +66,7 @@ def report(recording: Recording, made: MadeActor, solver: str) -> list[str]:
     truth = load_ground_truth(recording.ground_truth)
     errors = bone_errors(made.body, truth)
     words = [f"solver={solver}"] if solver else []
-    run = track_recording(recording, [made.body], track_config(words, recording=recording.path))
+    run = track_recording(recording, [made.body], track_config(words, recording=recording.path)).result_so_far
     evaluation = evaluate_motions(run.motions, truth)
     markers = np.concatenate(
         [part.markers.errors.ravel() for part in evaluation.evaluations.values() if part.markers is not None]

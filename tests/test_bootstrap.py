@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sogjax.quality.bootstrap import Interval, bootstrap_interval
+from sogjax.study.summary import Interval, bootstrap_interval
 
 
 def test_interval_of_independent_frames_is_that_of_the_central_limit():

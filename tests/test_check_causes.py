@@ -12,7 +12,7 @@ from small_recording import make_recording, toml_camera, write_calibration
 
 from sogjax.check.calibration import unit_rig
 from sogjax.check.cameras import rig_geometry
-from sogjax.check.opening import opening_problems
+from sogjax.check.examination import opening_problems
 from sogjax.check.scale import implausible_distance, scale_findings
 from sogjax.cli.main import main
 from sogjax.cli.schemas import SCHEMAS

@@ -11,7 +11,7 @@ from sogjax.cli.schemas import CALIBRATIONS, FORMATS, MOTIONS
 from sogjax.cli.words import check_endings, composed
 from sogjax.errors import InputError
 from sogjax.io.export.write import WRITERS
-from sogjax.run.tracked_motion import _config
+from sogjax.run.adjust import _config
 from sogjax.settings.compose import track_config
 from sogjax.settings.run import OutputsConfig
 from sogjax.settings.wrong_values import REMOVED

@@ -8,7 +8,7 @@ from command_line import actor_file, done, refused, trackable
 from project_cases import CAMERAS, freemocap, pose2sim
 from small_recording import FPS
 
-from sogjax.check.opening import opening_problems
+from sogjax.check.examination import opening_problems
 from sogjax.errors import InputError
 from sogjax.io.actor_file import load_body, named_body, save_body
 from sogjax.io.keypoints.load import load_keypoints

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sogjax.study.found_pose import FoundError, kind_of, other_side
 from sogjax.study.search_tables import least_share, reliability, sure_table, write_searches, wrong_table
-from sogjax.study.searches import Search, Trial, drawn_trials
+from sogjax.study.searches import FoundError, Search, Trial, drawn_trials, kind_of, other_side
 from sogjax.study.verdicts import LimbErrors
 from sogjax.view.charts import reliability_chart
 

@@ -7,8 +7,7 @@ from sogjax.study import study as study_module
 from sogjax.study.experiment import Experiment, ExperimentConfig, RowConfig
 from sogjax.study.methods import comparison_table, overview_table, settings_table
 from sogjax.study.record import RunRecord
-from sogjax.study.report import experiment_sections
-from sogjax.study.report_sections import experiment_section
+from sogjax.study.report import experiment_section, experiment_sections
 from sogjax.study.source import Source
 from sogjax.study.study import Study
 

@@ -10,7 +10,7 @@ from command_line import actor_file
 from small_recording import named_recording
 
 from sogjax.cli import actor as actor_command
-from sogjax.cli.sweep import actors
+from sogjax.cli.sweep import takes as sweep_takes
 from sogjax.errors import InputError
 from sogjax.io.actor_file import load_body
 from sogjax.io.recording_files import posed_subjects
@@ -34,13 +34,13 @@ def made(monkeypatch):
         Path(config.out).parent.mkdir(exist_ok=True)
         actor_file(Path(config.out), lambda content: content.update(name=name))
 
-    monkeypatch.setattr(actors.actor_command, "run", run)
+    monkeypatch.setattr(sweep_takes.actor_command, "run", run)
     return seen
 
 
 def test_a_subject_has_one_actor_made_of_the_take_with_example_poses(tmp_path, made):
     takes = [named_recording(tmp_path / name, "anna", poses=name == "poses") for name in ("first", "poses", "last")]
-    subjects, config, failed = actors.Subjects(tmp_path / "actors", takes, True), TrackConfig(recording="r"), {}
+    subjects, config, failed = sweep_takes.Subjects(tmp_path / "actors", takes, True), TrackConfig(recording="r"), {}
     files = [subjects.actor_of(take, config, failed) for take in takes]
     assert files == [[str(tmp_path / "actors" / "anna.yaml")]] * 3
     assert made == [("poses", None)]
@@ -50,7 +50,7 @@ def test_a_subject_has_one_actor_made_of_the_take_with_example_poses(tmp_path, m
 def test_an_actor_beside_the_videos_goes_first_and_nobody_named_has_none(tmp_path, made):
     own, unnamed = named_recording(tmp_path / "own", "anna"), named_recording(tmp_path / "unnamed")
     actor_file(own / "actor.yaml")
-    subjects = actors.Subjects(tmp_path / "actors", [own, unnamed], True)
+    subjects = sweep_takes.Subjects(tmp_path / "actors", [own, unnamed], True)
     assert subjects.actor_of(own, TrackConfig(recording="r"), {}) == [str(own / "actor.yaml")]
     assert subjects.actor_of(unnamed, TrackConfig(recording="r"), {}) is None
     assert made == []
@@ -58,10 +58,10 @@ def test_an_actor_beside_the_videos_goes_first_and_nobody_named_has_none(tmp_pat
 
 def test_the_next_take_is_tried_where_one_fails_and_the_failure_counts_for_all(tmp_path, made):
     takes = [named_recording(tmp_path / name, "anna", poses=True) for name in ("bad", "good")]
-    assert actors.Subjects(tmp_path / "actors", takes, True).actor_of(takes[0], TrackConfig(recording="r"), {})
+    assert sweep_takes.Subjects(tmp_path / "actors", takes, True).actor_of(takes[0], TrackConfig(recording="r"), {})
     assert [name for name, _ in made] == ["bad", "good"]
     alone, failed = named_recording(tmp_path / "bad_ben", "ben"), {}
-    subjects = actors.Subjects(tmp_path / "actors", [alone], True)
+    subjects = sweep_takes.Subjects(tmp_path / "actors", [alone], True)
     for _ in range(2):
         with pytest.raises(InputError, match="no actor of ben: no pose was found"):
             subjects.actor_of(alone, TrackConfig(recording="r"), failed)
@@ -70,10 +70,10 @@ def test_the_next_take_is_tried_where_one_fails_and_the_failure_counts_for_all(t
 
 def test_any_error_is_a_reason_and_no_end_of_the_command(tmp_path, made):
     takes = [named_recording(tmp_path / name, "anna", poses=True) for name in ("broken", "good")]
-    assert actors.Subjects(tmp_path / "actors", takes, True).actor_of(takes[0], TrackConfig(recording="r"), {})
+    assert sweep_takes.Subjects(tmp_path / "actors", takes, True).actor_of(takes[0], TrackConfig(recording="r"), {})
     alone = named_recording(tmp_path / "broken_ben", "ben")
     with pytest.raises(InputError, match="no actor of ben: ArithmeticError: no such inverse"):
-        actors.Subjects(tmp_path / "actors", [alone], True).actor_of(alone, TrackConfig(recording="r"), {})
+        sweep_takes.Subjects(tmp_path / "actors", [alone], True).actor_of(alone, TrackConfig(recording="r"), {})
 
 
 @pytest.mark.parametrize(("overwrite", "times"), [(True, 1), (False, 0)])
@@ -81,11 +81,11 @@ def test_overwrite_makes_an_actor_anew_once_for_all_takes(tmp_path, made, overwr
     takes = [named_recording(tmp_path / name, "anna") for name in ("walk", "run")]
     (tmp_path / "actors").mkdir()
     actor_file(tmp_path / "actors" / "anna.yaml")
-    subjects, failed = actors.Subjects(tmp_path / "actors", takes, True), {}
+    subjects, failed = sweep_takes.Subjects(tmp_path / "actors", takes, True), {}
     for take in takes:
         subjects.actor_of(take, TrackConfig(recording="r", overwrite=overwrite), failed)
     assert len(made) == times
-    given = actors.Subjects(tmp_path / "actors", takes, False)
+    given = sweep_takes.Subjects(tmp_path / "actors", takes, False)
     given.actor_of(takes[0], TrackConfig(recording="r", overwrite=True), {})
     assert len(made) == times  # those in a folder of the user's own are never made
 
@@ -132,7 +132,7 @@ def test_a_folder_of_actors_must_have_everybody(tmp_path, made):
     pair = named_recording(tmp_path / "pair", "[anna, ben]")
     (tmp_path / "mine").mkdir()
     actor_file(tmp_path / "mine" / "anna.yaml")
-    subjects = actors.Subjects(tmp_path / "mine", [pair], False)
+    subjects = sweep_takes.Subjects(tmp_path / "mine", [pair], False)
     with pytest.raises(InputError, match=r"has no ben.yaml.*sogjax actor recording="):
         subjects.actor_of(pair, TrackConfig(recording="r"), {})
     actor_file(tmp_path / "mine" / "ben.yaml")
@@ -152,4 +152,4 @@ def test_example_poses_tell_whom_they_show(tmp_path):
 @pytest.mark.parametrize("value", ["[]", "[a, a]", "../a", "3"])
 def test_subjects_are_names(tmp_path, value):
     with pytest.raises(InputError, match="subject"):
-        actors.named_subjects(named_recording(tmp_path / "r", value))
+        sweep_takes.named_subjects(named_recording(tmp_path / "r", value))

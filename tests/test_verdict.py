@@ -12,12 +12,12 @@ from motion_cases import walking_motion
 from rig_cases import ring_rig
 
 from sogjax.cli.actor import actor_verdict
+from sogjax.io.files import write_json
 from sogjax.quality.limb_warnings import Limits
-from sogjax.quality.numbers import write_json
 from sogjax.quality.verdict import verdicts, worst_frames
 from sogjax.run.forward import say_if_other_subject
 from sogjax.run.judge import kept_verdicts
-from sogjax.view.closeups import HEIGHT, closeups
+from sogjax.view.overlay import HEIGHT, closeups
 
 CAMERAS = ("left", "right")
 

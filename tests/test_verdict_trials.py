@@ -87,7 +87,7 @@ class Tracking:
         self.count += 1
         if self.error is not None:
             raise self.error
-        return SimpleNamespace(motions={"tiny": self.motion})
+        return SimpleNamespace(result_so_far=SimpleNamespace(motions={"tiny": self.motion}))
 
 
 @pytest.fixture

@@ -105,11 +105,11 @@ def _refined(
 SIDES = 4
 """Sides of the body that are told apart: front, left, back and right."""
 FEWEST_SAMPLES = 6
-"""Of a blob in one picture, to say what colour it has on that side."""
+"""Samples of a blob in one picture that it takes to say what colour it has on that side."""
 
 COLOR_WEIGHT = 2.0
-"""Of the squared deviation of colours, against a share of the fit. Somebody seen back to front in one of five moments
-loses 0.3 % of the fit, and colours then deviate by 0.0015 more."""
+"""Weight of the squared deviation of colours against a share of the fit. Somebody seen back to front in one of five
+moments loses 0.3 % of the fit, and colours then deviate by 0.0015 more."""
 
 SideColors = Float[np.ndarray, "blob side 3"]
 """Colours (sRGB, 0..1) of every blob on every side; NaN where it is not seen."""

@@ -104,7 +104,7 @@ def spread_choice(shapes: Sequence[SeenShape], count: int) -> list[SeenShape]:
 
 
 def spread_moments(moments: Sequence[tuple[SeenShape, ...]], count: int) -> list[tuple[SeenShape, ...]]:
-    """The same for frames that show several people, who all count: their shapes are in one order."""
+    """Moments of several people, the best of them unlike each other; all count, and their shapes are in one order."""
     worth = lambda moment: float(np.prod([shape.worth for shape in moment]))
     unlike = lambda one, other: float(np.mean([unlikeness(a, b) for a, b in zip(one, other, strict=True)]))
     left = sorted(moments, key=lambda moment: -worth(moment))

@@ -35,8 +35,8 @@ POSE_FOUND = 0.5
 
 
 FRAMES_SUIT = 0.75
-"""The same for frames that nobody chose, the mean over them. At 0.86 and 0.89 the subject was followed to the end, at
-0.70 an arm and a leg were wrong in the frame where tracking began."""
+"""Least mean IoU of frames that nobody chose. At 0.86 and 0.89 the subject was followed to the end, at 0.70 an arm and
+a leg were wrong in the frame where tracking began."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class MadeActor:
     frames: dict[str, int]
     """The recording's number of each example pose that is a frame of the videos."""
     pictures: tuple[PosedPictures, ...]
-    """Of the example poses, in their order."""
+    """The pictures of the example poses, in their order."""
     rig: Camera
     """The cameras of the pictures."""
     shape_model: ShapeModel
@@ -76,7 +76,7 @@ class MadeActor:
 
     @property
     def shape_priors(self) -> Float[np.ndarray, "shape"]:
-        """The same without any pictures."""
+        """Standard deviations of the shape parameters without any pictures."""
         return np.asarray(self.shape_model.spread, float)
 
     @property

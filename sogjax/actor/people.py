@@ -24,7 +24,7 @@ LEAST_HEIGHT = 0.4
 HIDDEN = 0.1
 """Share of a silhouette that another one covers, above which a camera's mask is not used."""
 COLOR_BINS = 6
-"""Of each channel, in the histogram of somebody's colours."""
+"""Bins of each channel in the histogram of somebody's colours."""
 
 
 @dataclass(frozen=True)

@@ -42,17 +42,17 @@ class FinishedActor(Protocol):
 
     @property
     def example_poses(self) -> Mapping[str, Float[Array, "dof"]]:
-        """By example pose."""
+        """The pose of each example."""
         ...
 
     @property
     def pictures(self) -> Sequence[PosedPictures]:
-        """In the order of `example_poses`."""
+        """The pictures, in the order of `example_poses`."""
         ...
 
     @property
     def shape_names(self) -> Sequence[str]:
-        """Of the shape parameters (logarithms of scale factors)."""
+        """Names of the shape parameters (logarithms of scale factors)."""
         ...
 
     @property
@@ -91,11 +91,11 @@ class ActorReport:
     warnings: tuple[str, ...]
     """One sentence each."""
     notes: tuple[str, ...] = ()
-    """The same, for what is usual."""
+    """Sentences about what is usual."""
 
     @property
     def mean_iou(self) -> float:
-        """Over all poses and cameras."""
+        """The mean over all poses and cameras."""
         return float(np.mean([value for cameras in self.ious.values() for value in cameras.values()]))
 
     def pose_iou(self, pose: str) -> float:

@@ -32,7 +32,7 @@ from sogjax.solve.solution import QuadraticModel, Scales, Solution
 from sogjax.tracking.solving import pose_scales
 
 MAX_CELLS = 2048
-"""For each camera."""
+"""Cells of each camera, at most."""
 BORDER = 0.12
 """Border around the subject's box, as a part of its longer side."""
 
@@ -112,7 +112,7 @@ class SilhouetteFit(eqx.Module):
 
     model: ShapeModel
     silhouettes: Silhouettes
-    """With a leading axis for the poses."""
+    """The silhouettes, with a leading axis for the poses."""
 
     @property
     def num_poses(self) -> int:

@@ -89,7 +89,7 @@ def track(
         InputError: a wrong setting, unreadable pictures, no such frames, or an initial pose that is not found.
     """
     config, actors = track_settings(**settings), actor_list(actor)
-    motions = track_recording(with_cameras(recording, config.cameras), actors, config, terms).motions
+    motions = track_recording(with_cameras(recording, config.cameras), actors, config, terms).result_so_far.motions
     found = [motions[each.name] for each in actors]
     return found[0] if isinstance(actor, Body) else found
 

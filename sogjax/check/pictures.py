@@ -58,7 +58,7 @@ class Moment:
 
 
 def read_clip(recording: Recording, start: int, frames: int, progress: Progress) -> Clip:
-    """At most `frames` frames from the frame `start` on.
+    """A clip of at most `frames` frames from the frame `start` on.
 
     Raises:
         InputError: a video that ends early or changes its size.

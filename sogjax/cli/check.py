@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import NoReturn
 
 from sogjax.check.calibration import unit_rig
-from sogjax.check.examination import Examination, examined
+from sogjax.check.examination import Examination, examined, opening_problems
 from sogjax.check.findings import SEVERITIES, Finding
-from sogjax.check.opening import opening_problems
 from sogjax.cli.schemas import CheckConfig
 from sogjax.errors import InputError, counted
 from sogjax.io.files import atomic_path

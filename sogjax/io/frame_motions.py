@@ -35,7 +35,7 @@ class ClipFacts:
 
     @classmethod
     def of(cls, recording: Recording, every: int = 1) -> "ClipFacts":
-        """Of a recording of which only `every`-th frame is tracked."""
+        """The facts of a recording of which only `every`-th frame is tracked."""
         return cls(recording.fps / every, recording.up, recording.rig.names)
 
     def save(self, folder: Path) -> None:

@@ -13,15 +13,15 @@ Item = TypeVar("Item")
 _END: Any = object()
 
 
-def prefetch(items: Iterable[Item], room: int) -> Generator[Item, None, None]:
-    """The items, made by a thread: one is in the making while up to `room` wait.
+def prefetch(items: Iterable[Item], capacity: int) -> Generator[Item, None, None]:
+    """The items, made by a thread: one is in the making while up to `capacity` wait.
 
     The thread ends, and closes `items`, when this iterator ends or is closed. An error is raised after the items
     before it.
     """
     iterator = iter(items)
     with ThreadPoolExecutor(1, "prefetch") as thread:
-        ahead = deque(thread.submit(next, iterator, _END) for _ in range(room + 1))
+        ahead = deque(thread.submit(next, iterator, _END) for _ in range(capacity + 1))
         try:
             while (item := ahead.popleft().result()) is not _END:
                 ahead.append(thread.submit(next, iterator, _END))
@@ -33,15 +33,15 @@ def prefetch(items: Iterable[Item], room: int) -> Generator[Item, None, None]:
 
 
 class Writer(Generic[Item]):
-    """A `with` block whose items a thread consumes; at most `room` of them wait.
+    """A `with` block whose items a thread consumes; at most `capacity` of them wait.
 
     At the end of the block everything that was put has been consumed, also when the block was left by an error. An
     error of the consumer is raised by the next `put`, or at the end.
     """
 
-    def __init__(self, consume: Callable[[Iterator[Item]], None], room: int):
+    def __init__(self, consume: Callable[[Iterator[Item]], None], capacity: int):
         self._consume = consume
-        self._items: Queue[Item] = Queue(room)
+        self._items: Queue[Item] = Queue(capacity)
         self._error: BaseException | None = None
         self._thread = Thread(target=self._run, name="writer", daemon=True)
 

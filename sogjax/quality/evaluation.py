@@ -9,12 +9,13 @@ import numpy as np
 from jaxtyping import Int
 
 from sogjax.errors import InputError, counted
+from sogjax.io.files import write_json
 from sogjax.io.ground_truth import GroundTruth
 from sogjax.io.motion import Motion
 from sogjax.quality.limb_warnings import DoubtfulLimb, doubtful_limbs
 from sogjax.quality.markers import MARKER_RULES, MarkerRule, PointErrors, common_frames, joint_errors, marker_errors
 from sogjax.quality.metrics import ErrorSummary, LostPoint, lost_points, summarize
-from sogjax.quality.numbers import MM, TABLE_ROW, in_mm, points_dict, rule_dict, summary_dict, summary_row, write_json
+from sogjax.quality.numbers import MM, TABLE_ROW, in_mm, points_dict, rule_dict, summary_dict, summary_row
 from sogjax.quality.swaps import Swap, identity_swaps
 
 

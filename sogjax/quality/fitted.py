@@ -19,9 +19,9 @@ class Weights:
 
     constant: float
     worse: float
-    """For each unit of log likelihood by which the colours fit worse than usual."""
+    """Weight of each unit of log likelihood by which the colours fit worse than usual."""
     contradicted: float
-    """For the share of places in which the background is seen more often than usual."""
+    """Weight of the share of places in which the background is seen more often than usual."""
 
 
 @dataclass(frozen=True)

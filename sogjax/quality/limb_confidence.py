@@ -45,7 +45,7 @@ class LimbConfidence(eqx.Module):
 def limb_confidence(
     limbs: LimbBlobs, evidence: BlobEvidence, baseline: Float[Array, "2 blob"], has_background: bool
 ) -> LimbConfidence:
-    """Of the limbs, from the evidence for their blobs and what was usual before (NaN in the first frame)."""
+    """The confidence of limbs, from the evidence for their blobs and what was usual before (NaN in the first frame)."""
     measures = limb_measures(limbs, evidence, baseline)
     numbers, weights = fitted_numbers().limb_baseline, fitted_numbers().limb_weights
     probability = error_probability(measures, weights.with_background if has_background else weights.without_background)
@@ -57,7 +57,7 @@ def limb_confidence(
 
 
 def limb_measures(limbs: LimbBlobs, evidence: BlobEvidence, baseline: Float[Array, "2 blob"]) -> LimbMeasures:
-    """Of the limbs in one frame."""
+    """The measures of limbs in one frame."""
     numbers = fitted_numbers().limb_baseline
     certainty, (own, contradicted) = _certainty(evidence), _known(evidence, baseline)
     more = evidence.contradicted - jnp.minimum(contradicted, numbers.most_contradicted)
@@ -92,18 +92,18 @@ CLEARLY = 0.3
 
 
 class FrameFit(eqx.Module):
-    """Of each actor in a frame."""
+    """How well each actor fits a frame."""
 
     explained: Float[Array, "actor"]
     """Part of its visible area that shows its blobs' own colours, and no background where that is known."""
     overlap: Float[Array, "actor camera"]
-    """Of its silhouette with the foreground around it (intersection over union); NaN where no background is known."""
+    """Intersection over union of its silhouette and the foreground around it; NaN where no background is known."""
 
 
 def frame_fit(
     limbs: LimbBlobs, evidence: BlobEvidence, posed: Posed, cameras: Camera, windows: Windows | None
 ) -> FrameFit:
-    """Of posed bodies, from the evidence for their blobs and the foreground around each actor."""
+    """How well posed bodies fit a frame, from the evidence for their blobs and the foreground around each actor."""
     actors = np.array(limbs.actor_of_blob, int)
     own = jnp.asarray(actors[None, :] == np.arange(actors.max() + 1)[:, None], posed.blobs.sigmas.dtype)
     areas = own * (evidence.seen * posed.blobs.sigmas**2)[None, :]

@@ -35,7 +35,7 @@ class LimbBlobs(eqx.Module):
 
     @classmethod
     def from_body(cls, body: Body) -> "LimbBlobs":
-        """Of a body, or several beside each other."""
+        """The limbs of a body, or of several beside each other."""
         members = limb_blobs(body)
         counts = np.ceil(WORST * members.sum(axis=1, keepdims=True))
         worst = (np.arange(members.shape[1]) < counts) / np.maximum(counts, 1.0)
@@ -58,13 +58,13 @@ SAMPLES = ((0.0, 0.0), (0.6, 0.0), (-0.6, 0.0), (0.0, 0.6), (0.0, -0.6))
 DEPTH_SCALE = 0.16
 """Metres of depth over which a blob comes to hide another."""
 DENSITY = 2.0
-"""Of a blob's middle along a ray, as in the foreground term."""
+"""Density of a blob's middle along a ray, as in the foreground term."""
 BACKGROUND = -0.3
 """Log odds below which a sample speaks for the background."""
 
 
 class BlobEvidence(NamedTuple):
-    """Of each blob, over all cameras, where other limbs and the trunk do not hide it."""
+    """The evidence for each blob, over all cameras, where other limbs and the trunk do not hide it."""
 
     own: Float[Array, "blob"]
     """Log likelihood of the colours seen, as the blob's own against any of the subject's; mean of the samples."""

@@ -63,7 +63,7 @@ MOSTLY = 0.5
 
 
 class Limits(NamedTuple):
-    """Of a degree of freedom: the smallest and largest value, and that of the rest pose (radians or metres)."""
+    """The bounds of a degree of freedom, and its value in the rest pose (radians or metres)."""
 
     low: float
     high: float
@@ -71,7 +71,7 @@ class Limits(NamedTuple):
 
 
 def limits_of(body: Body) -> dict[str, Limits]:
-    """Of a body's degrees of freedom, by name; infinite where there is no limit."""
+    """The limits of a body's degrees of freedom, by name; infinite where there is no limit."""
     skeleton = body.skeleton
     columns = (skeleton.dof_lower, skeleton.dof_upper, body.poses["rest"])
     rows = zip(*(np.asarray(column, float).tolist() for column in columns), strict=True)

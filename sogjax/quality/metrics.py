@@ -123,7 +123,7 @@ BONES = {
     "shoulders": ("left_shoulder", "right_shoulder"),
     "hips": ("left_hip", "right_hip"),
 }
-"""By the names of landmarks of `human`; left and right are taken together."""
+"""Bones by the names of landmarks of `human`; left and right are taken together."""
 
 
 def bone_errors(body: Body, truth: GroundTruth) -> dict[str, float]:

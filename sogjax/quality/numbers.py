@@ -1,14 +1,11 @@
-"""The numbers of an evaluation as JSON and as rows of a plain-text table, in millimetres."""
+"""The numbers of an evaluation as mappings and as rows of a plain-text table, in millimetres."""
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from sogjax.io.files import atomic_path
 from sogjax.quality.markers import PointErrors
 from sogjax.quality.metrics import ErrorSummary, mean_per_frame, mean_per_point, std_per_point, summarize
 
@@ -25,12 +22,6 @@ def rule_dict(parts: Sequence[PointErrors]) -> dict[str, float]:
     """Mean and deviation of all markers of some actors, for JSON."""
     summary = summarize(np.concatenate([part.errors.reshape(-1, 1) for part in parts]))
     return {"mean_mm": MM * summary.mean, "std_mm": MM * summary.std}
-
-
-def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Write a mapping as readable JSON, in one piece or not at all; NaN becomes null."""
-    with atomic_path(Path(path)) as temporary:
-        temporary.write_text(json.dumps(_without_nan(dict(content)), indent=2) + "\n")
 
 
 def summary_row(title: str, s: ErrorSummary) -> str:
@@ -65,11 +56,3 @@ def points_dict(points: PointErrors | None) -> dict[str, Any] | None:
 def in_mm(content: dict[str, Any], *keys: str) -> dict[str, Any]:
     """A mapping with some lengths in millimetres, which their keys then say."""
     return {f"{k}_mm" if k in keys else k: MM * v if k in keys else v for k, v in content.items()}
-
-
-def _without_nan(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _without_nan(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_without_nan(item) for item in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value

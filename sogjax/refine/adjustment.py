@@ -22,7 +22,7 @@ from sogjax.refine.pictures import ClipPictures
 from sogjax.tracking.tracker import Tracker
 
 SHAPE_FRAMES = 60
-"""Of a long clip, from which the shape is taken."""
+"""Frames of a long clip from which the shape is taken."""
 OVERLAP = 8
 """Frames at the end of a window that the next one does again, since what follows them was not known."""
 FIXED = 2
@@ -40,7 +40,7 @@ class Adjusted:
     poses: Float[np.ndarray, "frame dof"]
     params: Float[np.ndarray, "shape"]
     body: Body
-    """With these shape parameters, upright in the recording's world."""
+    """The body with these shape parameters, upright in the recording's world."""
     before: float
     """Energy of the clip, the mean over the frames."""
     after: float
@@ -48,13 +48,13 @@ class Adjusted:
     """Rows of the motion that told the shape."""
     iterations: int
     values: dict[str, Float[np.ndarray, "frame"]]
-    """Of each term of tracking in every frame, without its weight and without a history."""
+    """Values of each term of tracking in every frame, without its weight and without a history."""
     room: int
-    """For image blobs: how many a picture had at most, and then some."""
+    """Capacity for image blobs: how many a picture had at most, and then some."""
     moves: Float[np.ndarray, "camera 7"]
-    """Of the cameras, as `camera_moves` has them."""
+    """Moves of the cameras, as `camera_moves` has them."""
     told: dict[Part, float]
-    """Which of them the clip told, and what each is worth as a share of what its camera could gain at most."""
+    """The moves that the clip told, and what each is worth as a share of what its camera could gain at most."""
 
 
 def adjusted(
@@ -202,7 +202,7 @@ class _Clip:
         return np.concatenate([stand.params, stand.moves.reshape(-1)])[: energy.num_shared]
 
     def _energy(self, rows: Int[np.ndarray, "row"], stand: _Stand, cameras_move: bool) -> ClipEnergy:
-        """Of some frames, whose blobs move as in the whole motion."""
+        """The energy of some frames, whose blobs move as in the whole motion."""
         velocities = None
         if cameras_move:
             body = self.shape.shaped(jnp.asarray(stand.params, jnp.float32))

@@ -21,11 +21,11 @@ class ArrowSystem:
     own: Blocks
     """Curvature of each frame."""
     next: Blocks
-    """Between each frame (rows) and the one after it (columns); the last one is 0."""
+    """Blocks between each frame (rows) and the one after it (columns); the last one is 0."""
     after_next: Float[np.ndarray, "frame dof"]
     """Diagonals between each frame and the one after the next; the last two are 0."""
     cross: Float[np.ndarray, "frame dof shared"]
-    """Between each frame and the shared parameters."""
+    """Blocks between each frame and the shared parameters."""
     corner: Float[np.ndarray, "shared shared"]
     gradient: Float[np.ndarray, "frame dof"]
     shared_gradient: Float[np.ndarray, "shared"]
@@ -60,7 +60,7 @@ class ArrowSystem:
         return gradient, self.corner - np.einsum("tis,tir->sr", self.cross, cross, optimize=True)
 
     def restricted(self, free: Bool[np.ndarray, "shared"]) -> "ArrowSystem":
-        """With only some of the shared parameters; the others stay as they are."""
+        """The system with only some of the shared parameters; the others stay as they are."""
         return replace(
             self,
             cross=self.cross[..., free],

@@ -38,7 +38,7 @@ class Part:
 
     @property
     def columns(self) -> slice:
-        """Among the moves of all cameras."""
+        """Where it stands among the moves of all cameras."""
         part = PARTS[self.name]
         return slice(MOVE * self.camera + part.start, MOVE * self.camera + part.stop)
 
@@ -50,7 +50,7 @@ class CamerasModel:
     gradient: Float[np.ndarray, "move"]
     curvature: Float[np.ndarray, "move move"]
     moves: Float[np.ndarray, "move"]
-    """As they are."""
+    """The moves as they are."""
     most: Float[np.ndarray, "camera"]
     """What each camera would gain if every blob could move freely in its picture."""
 
@@ -100,7 +100,7 @@ class CamerasModel:
         return len(self.most) - len(moved) > FEWEST_AGREEING[part.name]
 
     def _rivals(self, best: Part, gains: dict[Part, float], free: list[Part], undone: Sequence[Part]) -> list[Part]:
-        """The same of other cameras, which explains it as well; what was undone before rivals with less."""
+        """The parts of other cameras that explain it as well; what was undone before rivals with less."""
         tried = {part: self._gain(part, free) for part in undone if part.name == best.name}
         if any(gain > EXPLAINED * gains[best] for gain in tried.values()):
             return list(tried)

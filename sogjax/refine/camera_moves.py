@@ -17,7 +17,7 @@ it was calibrated, and by how many frames what it sees is later than its frame's
 SPREAD = np.array([np.deg2rad(0.3)] * 3 + [0.01] * 3 + [1.0])
 """Expected deviation of each."""
 LARGEST_STEP = np.array([0.01] * 3 + [0.03] * 3 + [0.3])
-"""Of one iteration."""
+"""The largest step of one iteration."""
 
 
 def moved_camera(camera: Camera, move: Float[Array, "7"]) -> Camera:
@@ -29,7 +29,7 @@ def moved_camera(camera: Camera, move: Float[Array, "7"]) -> Camera:
 
 
 moved_cameras = jax.vmap(moved_camera)
-"""The same for a stack of cameras."""
+"""Cameras of a stack, each moved by its own numbers."""
 
 
 def seen_after(camera: Camera, move: Float[Array, "7"], blobs: Sog, velocities: Float[Array, "blob 3"]) -> Sog:

@@ -12,7 +12,7 @@ from sogjax.refine.climb import LEAST_DAMPING, Climbed, climbed
 from sogjax.refine.clip_energy import ClipEnergy
 
 ROUNDS = 6
-"""Of freeing and undoing, at most."""
+"""Rounds of freeing and undoing, at most."""
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class FoundCameras:
     """Where cameras are, and when."""
 
     climbed: Climbed
-    """With the cameras' moves behind the shape parameters."""
+    """What was climbed, with the cameras' moves behind the shape parameters."""
     moves: Float[np.ndarray, "camera 7"]
     shares: dict[Part, float]
     """What is believed, and what each is worth as a share of what its camera could gain at most."""

@@ -11,7 +11,7 @@ from sogjax.refine.clip_energy import ClipEnergy
 ROUNDS = 4
 """How often the pairs of blobs are found again, at most."""
 ITERATIONS = 25
-"""Of a round."""
+"""Iterations of a round."""
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 0.1, 1e-3, 1e4
 COMMON = 3.0
 """Damping of every degree of freedom by the mean curvature, beside that by its own, as the tracker has it."""
@@ -20,7 +20,7 @@ CHANGE = 4.0
 SMALL_GAIN = 1e-5
 """Part of the energy below which another step is not worth its time."""
 ROUND_GAIN = 1e-4
-"""The same for another round."""
+"""The gain from which on another round is worth it."""
 HELD = 1e9
 """Damping of poses that stay as they are, in units of their own."""
 
@@ -37,9 +37,9 @@ class Climbed:
     """Never less."""
     iterations: int
     values: dict[str, Float[np.ndarray, "frame"]]
-    """Of the terms of tracking in every frame, at the end."""
+    """Values of the terms of tracking in every frame, at the end."""
     room: int
-    """For image blobs of a picture."""
+    """Capacity for image blobs of a picture."""
 
 
 def climbed(

@@ -28,27 +28,27 @@ from sogjax.refine.pictures import ClipPictures, NearPairs
 from sogjax.tracking.tracker import Tracker
 
 LARGEST_SHAPE_STEP = 0.05
-"""Of an iteration: logarithms of scales, metres."""
+"""The largest step of an iteration: logarithms of scales, metres."""
 MANY_CAMERAS = 12
-"""For which the weight of the shape's prior is given: the energy is a mean over cameras, of which few say little."""
+"""Cameras for which the weight of the shape's prior is given: the energy is a mean over them, and few say little."""
 
 
 @dataclass(frozen=True)
 class Weights:
-    """Of the parts of a clip's energy, in units of the similarity of Eq. 9; each sums over frames."""
+    """Weights of the parts of a clip's energy, in units of the similarity of Eq. 9; each sums over frames."""
 
     appearance: float = 1.0
-    """Of what the cells say against the background, beside the terms of tracking."""
+    """Weight of what the cells say against the background, beside the terms of tracking."""
     rest: float = 2e-5
     shape: float = 3e-5
-    """Of half a squared shape parameter in units of its expected deviation, with `MANY_CAMERAS`."""
+    """Weight of half a squared shape parameter in units of its expected deviation, with `MANY_CAMERAS`."""
     smooth: float = 0.0025
     sudden: float = 0.05
     """Radians and metres for each squared frame: second differences above it count only linearly."""
     contact: float = 10.0
     """1/m^2: of how far a standing foot moves from frame to frame."""
     cameras: float = 5e-6
-    """Of half a squared number of a camera's move in units of its expected deviation."""
+    """Weight of half a squared number of a camera's move in units of its expected deviation."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class ClipEnergy:
     pairs: NearPairs | None = None
     """None: they must be found first (`near`)."""
     velocities: Float[np.ndarray, "frame blob 3"] | None = None
-    """Of the blobs, metres a frame; None: cameras do not move, and have no part in the parameters."""
+    """Velocities of the blobs, metres a frame; None: cameras do not move, and have no part in the parameters."""
 
     @property
     def num_shared(self) -> int:
@@ -81,7 +81,7 @@ class ClipEnergy:
         )
 
     def moves(self, params: Float[np.ndarray, "shared"]) -> Float[np.ndarray, "camera 7"]:
-        """Those of the cameras."""
+        """The parameters that are the cameras' moves."""
         return params[self.shape.num_params :].reshape(-1, MOVE)
 
     @property
@@ -92,7 +92,7 @@ class ClipEnergy:
 
     @property
     def largest_steps(self) -> Float[np.ndarray, "shared"]:
-        """Of each shared parameter in one iteration."""
+        """The largest step of each shared parameter in one iteration."""
         shape = self.shape.num_params
         return np.concatenate(
             [np.full(shape, LARGEST_SHAPE_STEP), np.tile(LARGEST_STEP, (self.num_shared - shape) // MOVE)]
@@ -107,7 +107,7 @@ class ClipEnergy:
         return weights * len(self.frames) / self.spread**2
 
     def near(self, poses: Float[np.ndarray, "frame dof"], params: Float[np.ndarray, "shared"]) -> "ClipEnergy":
-        """With the pairs of blobs that matter near some poses, and the feet that stand there."""
+        """The energy with the pairs of blobs that matter near some poses, and the feet that stand there."""
         capacity = 0 if self.pairs is None else self.pairs.capacity
         body = self.body(params)
         found = NearPairs.of(self.tracker, body, self.pictures, _single(poses), capacity, self._sights(params))
@@ -206,7 +206,7 @@ class ClipEnergy:
 
 
 def _padded(contact: ContactModel, shared: int) -> ContactModel:
-    """With 0 for shared parameters that do not move the blobs."""
+    """Derivatives with 0 for shared parameters that do not move the blobs."""
     more = shared - len(contact.shared_gradient)
     return contact._replace(
         cross=np.pad(contact.cross, ((0, 0), (0, 0), (0, more))),

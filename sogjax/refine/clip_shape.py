@@ -19,8 +19,8 @@ PLACE_SPREAD = 0.015
 WHOLE_SPREAD = 0.05
 """Expected deviation of the whole body's scale (logarithm): an actor has about the right size already."""
 RIGID = 0.3
-"""Of their usual spread: sizes, and lengths at the ends of limbs. Blobs that grow or hide within a limb please the
-energy of the pictures, whatever the body is like."""
+"""What is left of the usual spread of sizes, and of lengths at the ends of limbs. Blobs that grow or hide within a limb
+please the energy of the pictures, whatever the body is like."""
 
 
 class ClipShape(eqx.Module):
@@ -40,7 +40,7 @@ class ClipShape(eqx.Module):
 
     @classmethod
     def from_body(cls, body: Body, up: str, symmetric: bool = True) -> "ClipShape":
-        """Of a body that stands upright in a world with the vertical `up`."""
+        """The shape of a body that stands upright in a world with the vertical `up`."""
         groups = ShapeModel.from_body(body, symmetric)
         moves, names = _place_moves(body, up, symmetric)
         dtype = body.blob_sigmas.dtype
@@ -131,7 +131,7 @@ def _move_back(points: Attachments, joints: list[int], direction: Float[np.ndarr
 
 
 WELL_SEEN = 0.9
-"""Of the median energy of the frames around: where it is less, a limb may be lost, and a lost limb bends the shape."""
+"""Share of the median energy of the frames around. Where it is less, a limb may be lost, which bends the shape."""
 AROUND = 30
 """Frames to both sides."""
 

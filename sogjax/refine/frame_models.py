@@ -22,7 +22,7 @@ from sogjax.refine.camera_moves import MOVE, Sights, sight_rates
 from sogjax.refine.clip_shape import ClipShape
 
 LOOSE = 0.1
-"""Of the mean stiffness of a picture's blobs: what holds each of them at least."""
+"""Share of the mean stiffness of a picture's blobs: what holds each of them at least."""
 
 
 class FrameModels(NamedTuple):
@@ -66,7 +66,7 @@ class SeenByCameras(NamedTuple):
 
 
 def shape_rates(shape: ClipShape, params: Float[Array, "shape"]) -> ShapeRates:
-    """At some shape parameters."""
+    """How points move with the shape, at some shape parameters."""
     lengths = lambda p: (lambda b: ShapeRates(b.skeleton.offsets, b.blobs.offsets, b.blob_sigmas))(shape.shaped(p))
     return jax.jacfwd(lengths)(params)
 
@@ -79,7 +79,10 @@ def frame_model(
     terms: Terms,
     sights: Sights | None = None,
 ) -> FrameModels:
-    """Of one frame; `terms` look at `views`, without a history. With `sights` also by the moves of the cameras."""
+    """The quadratic model of one frame, with `sights` also by the moves of the cameras.
+
+    `terms` look at `views`, without a history.
+    """
     posed, frame = Posed.from_pose(body, pose), Frame(views, History.unknown(pose))
     seen = _seen_by([term for term in terms if isinstance(term, ImageTerm)], posed, frame, sights)
     jacobian = jnp.concatenate([posed.point_jacobian(), blobs_by_shape(body, rates, posed.world_from_joint)], axis=2)
@@ -145,7 +148,7 @@ def _seen_by_cameras(
     springs: Float[Array, "camera blob"],
     across: Float[Array, "camera blob 2 3"],
 ) -> SeenByCameras:
-    """Before the sum over the cameras."""
+    """What each camera sees, before the sum over the cameras."""
     rates = jax.vmap(sight_rates, in_axes=(0, 0, None, None))(cameras, sights.moves, blobs, sights.velocities)
     dot = lambda what, *arrays: jnp.einsum(what, *arrays, precision="highest")
     gradient = dot("cbk,cbkm->cm", pulls.by_mean, rates.means) + dot("cb,cbm->cm", pulls.by_sigma, rates.sigmas)
@@ -156,7 +159,7 @@ def _seen_by_cameras(
 
 
 def _most(pulls: ImagePulls, springs: Float[Array, "camera blob"]) -> Float[Array, "camera"]:
-    """By the springs' own model; blobs that hardly any spring holds would move far for nothing."""
+    """What the springs could gain at most; blobs that hardly any spring holds would move far for nothing."""
     held = springs + LOOSE * jnp.mean(springs, axis=1, keepdims=True) + jnp.finfo(springs.dtype).tiny
     return 0.5 * jnp.sum(jnp.sum(pulls.by_mean**2, axis=-1) / held, axis=1)
 

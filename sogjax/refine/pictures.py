@@ -30,7 +30,7 @@ BORDER = 0.08
 """Around a body's box, as a part of its size: adjusted poses stay near those that were tracked."""
 BLOCK_HEADROOM = 1.1
 USUAL_BLOBS = 2048
-"""Of a picture."""
+"""Image blobs of a picture."""
 
 
 class ClipPictures(eqx.Module):
@@ -39,7 +39,7 @@ class ClipPictures(eqx.Module):
     views: Views
     windows: ColorWindows
     clusters: BlobClusters = eqx.field()
-    """Without that axis."""
+    """The clusters, which have no axis of frames."""
 
     @property
     def num_frames(self) -> int:
@@ -57,12 +57,12 @@ class Reader(eqx.Module):
 
     @classmethod
     def from_tracker(cls, tracker: Tracker, shape: tuple[int, int]) -> "Reader":
-        """For cells of so many rows and columns."""
+        """A reader for cells of so many rows and columns."""
         inside = inside_pictures(tracker.reader.candidates.grids, shape)
         return cls(tracker, ColorClusters.from_body(tracker.body), inside)
 
     def pictures(self, cells: Sequence[AnyFrame], poses: Float[np.ndarray, "frame dof"]) -> ClipPictures:
-        """Of frames, near the poses in them.
+        """The pictures of frames, near the poses in them.
 
         Raises:
             InputError: more image blobs than the largest capacity.
@@ -112,7 +112,7 @@ class NearPairs(eqx.Module):
         capacity: int,
         sights: Sights | None = None,
     ) -> "NearPairs":
-        """With room for at least `capacity` blocks in each frame; `sights` has a velocity of each frame's blobs."""
+        """The pairs, at least `capacity` blocks in each frame; `sights` has a velocity of each frame's blobs."""
         exponent = similarity_among(tracker.terms).exponent
         while True:
             pairs, count = _pairs(body, pictures.views, poses, exponent, max(capacity, BLOCK_STEP), sights)

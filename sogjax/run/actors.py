@@ -44,7 +44,7 @@ class KnownFrame:
     frame: int
     """The recording's number."""
     pose: Float[np.ndarray, "dof"]
-    """Of all actors, upright in the recording's world."""
+    """The pose of all actors, upright in the recording's world."""
     agreement: float
     """How well masks and silhouettes agree (IoU) for the actor for whom they do least."""
 
@@ -68,7 +68,7 @@ class Actors:
 
     @classmethod
     def load(cls, folder: Path) -> "Actors | None":
-        """Those that were kept, if they were.
+        """The actors that were kept, if they were.
 
         Raises:
             InputError: what was kept does not fit together.
@@ -112,7 +112,7 @@ class ActorRequest:
     number: int | None = None
     """How many people the videos show, where neither files nor example poses say so; None: one."""
     subjects: tuple[str | None, ...] | None = None
-    """Which of those that example poses show are made, None among them stands for the only one; None: all."""
+    """The subjects of example poses that are made, None among them stands for the only one; None: all."""
     symmetric: bool = True
     """Whether left and right limbs have the same lengths and sizes."""
 

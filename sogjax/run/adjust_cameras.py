@@ -32,7 +32,7 @@ STILL = 0.002
 
 
 def parts_in_question(cameras: bool, offsets: bool) -> tuple[str, ...]:
-    """Of the cameras' moves."""
+    """The parts of the cameras' moves that are in question."""
     return (("turn", "place") if cameras else ()) + (("time",) if offsets else ())
 
 
@@ -69,7 +69,7 @@ def check_cameras(recording: Recording, motion: Motion, cameras: bool, offsets: 
 
 
 def moves_of(recording: Recording) -> Float[np.ndarray, "camera 7"]:
-    """Of cameras whose frames show, as the recording knows, what was a part of a frame earlier."""
+    """The moves of cameras whose frames show, as the recording knows, what was a part of a frame earlier."""
     moves = np.zeros((len(recording.rig), TIME.stop))
     moves[:, TIME.start] = [-recording.frame_part.get(name, 0.0) for name in recording.rig.names]
     return moves
@@ -100,7 +100,7 @@ def camera_numbers(recording: Recording, found: Adjusted) -> dict[str, dict[str,
 
 
 def camera_lines(numbers: dict[str, dict[str, Any]], names: tuple[str, ...]) -> str:
-    """The same in lines."""
+    """What is said of the cameras, in lines."""
     lines = []
     for name in names:
         if name not in numbers:

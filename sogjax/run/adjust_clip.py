@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
+from sogjax.io.files import write_json
 from sogjax.io.frame_motions import ClipFacts, motions_of
 from sogjax.io.frame_table import FramesRecord, FrameTable
 from sogjax.io.ground_truth import load_ground_truth
@@ -20,7 +21,6 @@ from sogjax.model.body import Body
 from sogjax.model.bones import bone_lengths
 from sogjax.model.rotation import axis_vector, world_from_upright
 from sogjax.quality.markers import joint_errors
-from sogjax.quality.numbers import write_json
 from sogjax.refine.adjustment import Adjusted as Found
 from sogjax.refine.adjustment import adjusted
 from sogjax.refine.clip_priors import floor_height, standing, undersides
@@ -52,11 +52,11 @@ class Adjusted(FramesRecord):
     """An adjusted clip of one actor; its frames are as if they had been tracked."""
 
     actor: Body
-    """In its own upright frame."""
+    """The actor in its own upright frame."""
     numbers: dict[str, Any]
-    """Before and after, for JSON."""
+    """The numbers before and after, for JSON."""
     moves: Float[np.ndarray, "camera 7"]
-    """Of the cameras, as they were found."""
+    """The moves of the cameras that were found."""
 
     def setup(self, before: Setup) -> Setup:
         """What the adjusted frames would be tracked with."""
@@ -152,7 +152,7 @@ def _informed(setup: Setup, background: Background, table: FrameTable) -> Setup:
 
 
 def _found_setup(setup: Setup, body: Body, moves: Float[np.ndarray, "camera 7"] | None) -> Setup:
-    """With the body that was found, and the cameras where they were."""
+    """The setup with the body that was found, and the cameras where they were."""
     tracker, clip = replace(setup.tracker, body=body), setup.clip
     if moves is not None:
         rig = moved_rig(clip.recording.rig, moves)

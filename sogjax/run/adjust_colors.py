@@ -21,7 +21,7 @@ from sogjax.tracking.frame_by_frame import confidence_of_poses
 from sogjax.tracking.tracker import Tracker
 
 NUM_FRAMES = 6
-"""From which colours are taken: as many as there are example poses, and some more."""
+"""Frames from which colours are taken: as many as there are example poses, and some more."""
 MORE_DOUBT = 0.02
 """About a limb, on average over the frames, that new colours may cause."""
 REACH = 60
@@ -38,7 +38,7 @@ def color_rows(
 
 
 def mean_similarity(tracker: Tracker, cells: list[FrameInput], poses: Float[np.ndarray, "chosen dof"]) -> float:
-    """Of the tracker's body in some frames."""
+    """The mean similarity of the tracker's body in some frames."""
     shape = cells[0].cells.shape[1:3]
     pictures = Reader.from_tracker(tracker, (int(shape[0]), int(shape[1]))).pictures(cells, poses)
     at = jnp.asarray(poses, jnp.float32)

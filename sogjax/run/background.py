@@ -30,7 +30,7 @@ class Background:
     """What is known of the empty scene."""
 
     cameras: tuple[BackgroundImage, ...] | None
-    """Of every camera; None: nothing is known."""
+    """The background of every camera; None: nothing is known."""
     reason: str = ""
     """Why nothing is known, with the remedy."""
 
@@ -126,7 +126,7 @@ def said_if_none(clip: Clip, choice: str, background: Background) -> Background:
 
 
 def _of_clip(clip: Clip, cache: str | None, more: Sequence[SampleKind]) -> Background:
-    """From the folder where backgrounds are kept, or else learnt now; the runs of a process share it."""
+    """The background from the folder where these are kept, or else learnt now; the runs of a process share it."""
     recording = clip.recording
 
     def kept_or_learnt() -> Background:

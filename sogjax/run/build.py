@@ -35,7 +35,7 @@ from sogjax.tracking.solving import pose_scales
 from sogjax.tracking.tracker import PairChoice, Tracker
 
 MAX_DEPTH = 12
-"""Of a quad-tree: one pixel of the largest pictures cameras take."""
+"""Depth of a quad-tree, at most: one pixel of the largest pictures cameras take."""
 OPTIMISTIX_METHODS = ("bfgs", "lbfgs", "nonlinear_cg")
 
 

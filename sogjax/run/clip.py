@@ -66,7 +66,7 @@ class Clip:
     numbers: range
     """The frames to track, in their order."""
     depth: int
-    """Of the quad-trees whose cells are read."""
+    """Depth of the quad-trees whose cells are read."""
     keypoints: ClipKeypoints | None = None
     """What detectors saw; None: there are no files, or they do not count."""
     store: CellStore | None = None

@@ -24,13 +24,13 @@ class ClipKeypoints:
 
     found: Keypoints
     seen: SeenKeypoints
-    """By frame of the recording and camera."""
+    """Keypoints by frame of the recording and camera."""
     first: int
     """The recording's number of its first frame."""
 
     @classmethod
     def of_recording(cls, recording: Recording) -> "ClipKeypoints | None":
-        """Those beside a recording; None where it has none. Warnings are printed.
+        """The keypoints beside a recording; None where it has none. Warnings are printed.
 
         Raises:
             InputError: none of the keypoint files can be used.

@@ -19,11 +19,11 @@ from sogjax.scene.clip_steadiness import FEWEST_SAMPLES, moves, shaking
 from sogjax.scene.moving_zone import moving_zones
 
 MOST_BYTES = 2**30
-"""Of samples in memory; beyond, fewer frames are looked at."""
+"""Bytes of samples in memory; beyond, fewer frames are looked at."""
 MUCH_UNKNOWN = 0.15
 """Share of the pictures from which on an unknown background is said."""
 LeftOut = Mapping[str, Mapping[int, Bool[np.ndarray, "rows columns"]]]
-"""By camera and frame, where the tracked bodies are."""
+"""Where, by camera and frame, the tracked bodies are."""
 
 
 class UnsuitableError(Exception):

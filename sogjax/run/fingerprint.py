@@ -30,7 +30,7 @@ SHOWN = 60
 """Longest value that is quoted in a sentence, characters."""
 
 RunFingerprint = dict[str, Any]
-"""By a short description: what can be stored as JSON, and must be equal."""
+"""What must be equal, by a short description; it can be stored as JSON."""
 
 
 def run_fingerprint(
@@ -96,7 +96,7 @@ def _code_of_terms(config: TrackConfig) -> RunFingerprint:
 
 
 def _of_keypoints(recording: Recording) -> RunFingerprint:
-    """Of recordings that have keypoints; files that appear later are a difference."""
+    """The fingerprint of keypoint files, where there are any; files that appear later are a difference."""
     found = find_keypoints(recording.path)
     if found is None:
         return {}

@@ -72,7 +72,7 @@ class FramesFound:
     streams: ResultStreams | None
     times: StageTimes
     row: int
-    """Of the frame that comes next."""
+    """The row of the frame that comes next."""
 
     def __post_init__(self) -> None:
         self._blocks: list[FrameTable] = [] if self.kept is None else [self.kept]

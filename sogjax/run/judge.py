@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from sogjax.errors import InputError
+from sogjax.io.files import write_json
 from sogjax.io.ground_truth import load_ground_truth
 from sogjax.io.image_file import write_image
 from sogjax.io.motion import Motion
@@ -14,13 +15,12 @@ from sogjax.io.recording import Recording
 from sogjax.io.video import read_frames
 from sogjax.quality.evaluation import GroupEvaluation, evaluate_motions
 from sogjax.quality.limb_warnings import limits_of
-from sogjax.quality.numbers import write_json
 from sogjax.quality.verdict import NUM_WORST, Verdict, expected_of, verdicts
 from sogjax.run.result import RunResult
 from sogjax.run.run import Run
 from sogjax.run.run_files import WORST
 from sogjax.run.terminal import say
-from sogjax.view.closeups import closeups
+from sogjax.view.overlay import closeups
 
 
 def judged_result(run: Run) -> RunResult:

@@ -38,14 +38,14 @@ class SeenPoints:
     """Metres; NaN where unknown."""
 
     def pose(self, body: Body, up: str, row: int) -> KeypointPose | None:
-        """Of a body, upright in the recording's world, if most of the points agree with it."""
+        """The pose of a body, upright in the recording's world, if most of the points agree with it."""
         found = pose_of_keypoints(body, up, self.scheme, self.points[row])
         good = found is not None and found.on >= LEAST_ON and found.num_points >= LEAST_POINTS
         return found if good else None
 
 
 def seen_points(recording: Recording, frames: tuple[int, ...] | None = None) -> SeenPoints | None:
-    """Of the person in some frames, or in frames spread over the clip; None without keypoints.
+    """The triangulated points of the person in some frames, or in frames spread over the clip; None without keypoints.
 
     Raises:
         InputError: none of the keypoint files can be used.

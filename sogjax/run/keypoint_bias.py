@@ -19,9 +19,9 @@ from sogjax.tracking.keypoint_prefit import estimated_offsets
 from sogjax.tracking.tracker import Tracker
 
 FRAMES, FEWEST = 48, 10
-"""Of a clip that tell the offsets, at most and at least."""
+"""Frames of a clip that tell the offsets, at most and at least."""
 LITTLE = 0.15
-"""Of the keypoints' weight, while the pictures are to tell where the body is."""
+"""Share of the keypoints' weight that counts while the pictures are to tell where the body is."""
 FILE = "keypoint_bias.npz"
 
 

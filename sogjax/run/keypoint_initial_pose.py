@@ -30,7 +30,7 @@ LEAST_ON = 0.7
 LEAST_POINTS = 10
 """Points that a pose must be fitted to."""
 MOST_ACTORS = 4
-"""Of whom it is tried who is who."""
+"""Actors of whom it is tried who is who."""
 CAMERAS = 3
 """Fewer do not tell whose keypoints of one camera are whose of another."""
 CLEARLY = 1.05
@@ -95,7 +95,7 @@ def _who_is_who(
     frame: int,
     found: list[list[KeypointPose | None]],
 ) -> tuple[int, ...] | None:
-    """By body the person that it is, by how similar the pictures are; None where that is not clear."""
+    """The person that each body is, by how similar the pictures are; None where that is not clear."""
     if len(bodies) == 1:
         return (0,)
     if any(pose is None for of_body in found for pose in of_body):

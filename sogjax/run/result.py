@@ -36,7 +36,7 @@ class RunResult:
 
     @property
     def iterations(self) -> Int[np.ndarray, "frame"]:
-        """Of the solver, for all actors together."""
+        """Iterations of the solver, for all actors together."""
         return next(iter(self.motions.values())).iterations
 
     @property

@@ -38,7 +38,7 @@ class ResultStreams:
         self._overlay: Any = None
         self._rerun: Any = None
         self.files: list[Path] = []
-        """Those that are complete at the end of the block."""
+        """The files that are complete at the end of the block."""
 
     @property
     def show_frames(self) -> bool:

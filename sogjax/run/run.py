@@ -44,7 +44,7 @@ class Run:
     """The folder where records lie until the run has ended; None: they are not kept."""
     pose_sources: Sequence[PoseSource] = SOURCES
     terms: Sequence[Term] = ()
-    """Of the energy, beside those of the settings."""
+    """Terms of the energy, beside those of the settings."""
     adjust: AdjustRequest = field(default_factory=AdjustRequest)
     frames_given: bool = False
     """Whether the frames were tracked before, and their table is given."""

@@ -15,7 +15,7 @@ class RunFile:
     """A file that a run may leave in its folder."""
 
     name: str
-    """Without the actor's name, which several actors add to the stem."""
+    """Its name without the actor's, which several actors add to the stem."""
     holds: str
     of_actors: bool = False
     """Whether there is one for each actor."""
@@ -30,7 +30,7 @@ class RunFile:
         return folder / (f"{stem}_{actor}{ending}" if self.of_actors and num_actors > 1 else self.name)
 
     def found(self, folder: Path) -> set[Path]:
-        """Those that are there."""
+        """The files of this name that are there."""
         return {path for path in folder.glob(self.name) if path.is_dir() == self.is_folder or path.is_symlink()}
 
 

@@ -20,7 +20,7 @@ from sogjax.scene.visual_hull import resized
 
 MOST_LOOKED_AT = 40
 DEPTH = 9
-"""Of the quad-tree whose cells are looked at."""
+"""Depth of the quad-tree whose cells are looked at."""
 FOREGROUND = 0.5
 """Log odds above which a cell counts as foreground."""
 
@@ -34,13 +34,13 @@ class SampledMasks:
     frames: list[int]
     """The recording's numbers, ascending."""
     masks: list[dict[int, Mask]]
-    """Of each of them: what is not the background."""
+    """A mask of each of them: what is not the background."""
     pictures: list[dict[int, Picture]]
     """The cells' colours, BGR."""
     unknown: dict[int, Mask]
     """Where nothing is known of the background."""
     cameras: dict[int, Camera]
-    """For pictures of the masks' size."""
+    """The cameras, for pictures of the masks' size."""
     grids: tuple[CellGrid, ...]
 
 
@@ -52,7 +52,7 @@ def mask_samples(recording: Recording) -> SampleKind:
 
 
 def masks_of_samples(clip: Clip, learnt: Sequence[BackgroundImage], shadow: float = SHADOW) -> SampledMasks:
-    """Of at most `MOST_LOOKED_AT` frames that all cameras have.
+    """The masks of at most `MOST_LOOKED_AT` frames that all cameras have.
 
     `shadow` is the standard deviation of the light that a shadow takes, as a part of the background's: what is darker
     by more is not the background.

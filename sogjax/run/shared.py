@@ -35,4 +35,4 @@ class SharedRecords:
 
 
 SHARED = SharedRecords()
-"""Those of this process."""
+"""The records of this process."""

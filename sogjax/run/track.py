@@ -89,8 +89,8 @@ def track_recording(
     terms: Sequence[Term] = (),
     pose_sources: Sequence[PoseSource] = SOURCES,
     every: int = 1,
-) -> RunResult:
-    """Track actors (in their own upright frames) without writing files.
+) -> Run:
+    """The run in which actors (in their own upright frames) were tracked; no files are written.
 
     Args:
         recording: that is tracked.
@@ -100,18 +100,6 @@ def track_recording(
         pose_sources: of the initial pose.
         every: of how many frames one is tracked.
     """
-    return run_without_files(recording, bodies, config, terms, pose_sources, every).result_so_far
-
-
-def run_without_files(
-    recording: Recording,
-    bodies: Sequence[Body],
-    config: TrackConfig,
-    terms: Sequence[Term] = (),
-    pose_sources: Sequence[PoseSource] = SOURCES,
-    every: int = 1,
-) -> Run:
-    """The run of `track_recording`, with the records of its passes."""
     forget_programs_if_many()
     config = replace(config, outputs=replace(NO_OUTPUTS, confidence=config.outputs.confidence))
     with TemporaryDirectory() as folder:

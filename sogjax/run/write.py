@@ -9,14 +9,13 @@ from sogjax.errors import InputError
 from sogjax.io.actor_file import save_body
 from sogjax.io.export.points import require_ezc3d, write_trc
 from sogjax.io.export.write import WRITERS, export_motion
-from sogjax.io.files import write_file
+from sogjax.io.files import write_file, write_json
 from sogjax.io.frame_motions import ClipFacts, motions_of
 from sogjax.io.keypoints.scheme import named_scheme
 from sogjax.io.motion_data import save_motion
 from sogjax.io.projects import CONFIG as PROJECT
 from sogjax.io.recording import Recording, open_recording
 from sogjax.model.body import Body
-from sogjax.quality.numbers import write_json
 from sogjax.run.adjust_cameras import camera_lines, write_cameras
 from sogjax.run.adjust_clip import Adjusted, sentence
 from sogjax.run.forward import show_known
@@ -28,7 +27,7 @@ from sogjax.run.terminal import say
 from sogjax.settings.run import OutputsConfig
 
 POSE2SIM_SCHEME = "HALPE_26"
-"""Of the points written for Pose2Sim: its default."""
+"""The scheme of the points written for Pose2Sim: its default."""
 
 
 def export_endings(wanted: OutputsConfig) -> list[str]:

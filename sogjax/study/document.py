@@ -17,7 +17,7 @@ class Picture:
     """A picture of a report."""
 
     name: str
-    """Of its file, with the ending `.png` or `.jpg`."""
+    """The name of its file, with the ending `.png` or `.jpg`."""
     content: bytes
     caption: str
 

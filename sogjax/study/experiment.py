@@ -39,7 +39,7 @@ class RowConfig:
     paper: str = ""
     """What the paper says of this row, in words for the table."""
     paper_value: float | None = None
-    """The same as a number for the plot, in the unit of the experiment's first column."""
+    """The paper's figure as a number for the plot, in the unit of the experiment's first column."""
 
 
 @dataclass
@@ -59,11 +59,11 @@ class ExperimentConfig:
     measure: str = "accuracy"
     """accuracy: from kept cells, one frame after the other | speed: from the videos, all stages beside each other."""
     frames: int | None = None
-    """Of each recording that are tracked where the study does not say; None: the usual number."""
+    """Frames of each recording that are tracked where the study does not say; None: the usual number."""
     slow: bool = False
     """Whether it is run on the fewer recordings, as those with several methods are."""
     recordings: list[str] | None = None
-    """Those that are tracked where the study is on the recordings of the committed report; None: the study's."""
+    """Recordings that are tracked where the study is on the recordings of the committed report; None: the study's."""
     note: str = ""
     """What holds of the comparison on any recordings."""
     iterations_by_recording: bool = False

@@ -40,7 +40,7 @@ CASES: dict[str, dict[str, float] | None] = {
     "10 % exchanges": BIASED | {"keypoint_exchanges": 0.1},
     "a third missing": BIASED | {"keypoint_missing": 1.0 / 3.0},
 }
-"""By name the detector's settings beside the usual ones; None: no keypoints. Real detectors are biased."""
+"""The detector's settings by name, beside the usual ones; None: no keypoints. Real detectors are biased."""
 
 
 @dataclass(frozen=True)
@@ -79,14 +79,14 @@ class Trials:
 
     folder: Path
     synth: dict[str, SynthSettings]
-    """By sequence."""
+    """The settings of each sequence."""
     frames: int
-    """Of each sequence, from its first."""
+    """Frames of each sequence, from its first."""
     words: tuple[str, ...] = ()
     """Settings of `sogjax track`."""
 
     def result(self, trial: Trial) -> Result:
-        """Of a trial: what was kept of it, else now.
+        """The result of a trial: what was kept of it, else made now.
 
         Raises:
             InputError: it cannot be tracked.
@@ -99,7 +99,7 @@ class Trials:
         return found
 
     def kept(self, trial: Trial) -> Result | None:
-        """Of a trial that was done before; None: it was not."""
+        """The result of a trial that was done before; None: it was not."""
         path = self._path(trial)
         return Result(**json.loads(path.read_text(encoding="utf-8"))["result"]) if path.is_file() else None
 
@@ -115,7 +115,7 @@ class Trials:
         recording = with_cameras(recording, evenly(recording.rig.names, trial.cameras))
         recording = replace(recording, num_frames=min(self.frames, recording.num_frames))
         config = track_config([f"images.cache={self.folder / 'cells'}", *self.words], recording=recording.path)
-        run = track_recording(recording, bodies, config)
+        run = track_recording(recording, bodies, config).result_so_far
         assert recording.ground_truth is not None
         truth = load_ground_truth(recording.ground_truth)
         evaluated = evaluate_motions(run.motions, truth).evaluations.values()

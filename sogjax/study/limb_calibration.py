@@ -137,7 +137,7 @@ def calibration_table(limbs: Sequence[JudgedLimb], weights: WeightsOf = committe
 def regained_table(
     limbs: Sequence[JudgedLimb], groups: dict[str, Callable[[JudgedLimb], bool]], weights: WeightsOf = committed
 ) -> str:
-    """Of limbs that were displaced on purpose, how many came back by themselves, and how many others were noticed."""
+    """How many limbs that were displaced on purpose came back by themselves, and how many others were noticed."""
     lines = [["", "displaced", f"back after {FOLLOWED} frames", "of the others in doubt then"]]
     for name, belongs in groups.items():
         group = [limb for limb in limbs if limb.kind == f"{limb.name} displaced" and belongs(limb)]

@@ -74,7 +74,7 @@ class LimbTrial:
     cameras: int | None
     """None: all."""
     background: str
-    """As `images.background`."""
+    """The background, as `images.background`."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Tracked:
     frames: Int[np.ndarray, "frame"]
     poses: Float[np.ndarray, "frame dof"]
     before: Float[np.ndarray, "frame dof"]
-    """Of the frames before."""
+    """What was known of the frames before."""
     follows: int
     """The frame of the plain run after which it goes on; 0: it begins with the clip."""
 

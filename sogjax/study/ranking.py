@@ -35,11 +35,11 @@ class RankedTrack:
     recording: Recording
     truth: GroundTruth
     actors: list[Body]
-    """In their own upright frames."""
+    """The actors in their own upright frames."""
     frames: Int[np.ndarray, "frame"]
     """The recording's numbers, one after the other."""
     tracked: Float[np.ndarray, "frame dof"]
-    """Of all actors beside each other."""
+    """The tracked poses of all actors beside each other."""
     true: Float[np.ndarray, "frame dof"]
     """NaN where the truth is not known."""
 

@@ -21,7 +21,7 @@ from sogjax.study.experiment import Experiment
 from sogjax.study.source import Source
 
 RECORD_VERSION = 3
-"""To be raised with every change that makes earlier runs incomparable."""
+"""A number to be raised with every change that makes earlier runs incomparable."""
 _DECIDE = ("model", "solve", "energy", "scene", "tracking", "search", "quality", "actor", "refine", "io", "run")
 """Packages whose code decides the result of a run."""
 _OF_THE_RESULT = ("body", "color", "images", "energy", "solver", "tracking")
@@ -68,7 +68,7 @@ class RunRecord:
     """Mean distance of the markers (of the joints where there are no markers), attached by the rule `scaled`; NaN:
     nothing to compare with."""
     closest_mm: list[float] = field(default_factory=list)
-    """The same by the rule `closest`, of Section 6."""
+    """Mean distance of the markers by the rule `closest`, of Section 6."""
     joint_error_mm: list[float] = field(default_factory=list)
     std_mm: float = float("nan")
     """Over all distances of `error_mm`."""
@@ -80,14 +80,14 @@ class RunRecord:
     evaluations: list[int] = field(default_factory=list)
     converged: list[bool] = field(default_factory=list)
     milliseconds: list[float] = field(default_factory=list)
-    """Of the tracking step; the first frame's hold the compilation."""
+    """Milliseconds of the tracking step; the first frame's hold the compilation."""
     image_blobs: float = float("nan")
     """Used in a frame by a camera."""
     pose: list[list[float]] = field(default_factory=list)
     rates: dict[str, float] = field(default_factory=dict)
     """Frames per second by stage, if the speed was measured."""
     seconds: float = float("nan")
-    """That the whole run took, with compilation and, where it was the first of its recording, the actor."""
+    """Seconds that the whole run took, with compilation and, where it was the first of its recording, the actor."""
     failed: str = ""
     """Why there is no result."""
 
@@ -109,7 +109,7 @@ class RunRecord:
 
     @property
     def closest_mean_mm(self) -> float:
-        """The same by the rule `closest`."""
+        """The mean over the frames by the rule `closest`."""
         present = np.asarray(self.closest_mm, float)
         present = present[np.isfinite(present)]
         return float(present.mean()) if present.size else float("nan")

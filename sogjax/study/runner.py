@@ -18,7 +18,7 @@ from sogjax.run.clock import StageTimes
 from sogjax.run.memory import forget_programs_if_many
 from sogjax.run.result import RunResult
 from sogjax.run.terminal import say
-from sogjax.run.track import run_without_files, track_recording
+from sogjax.run.track import track_recording
 from sogjax.settings.compose import track_config
 from sogjax.settings.run import TrackConfig
 from sogjax.study.experiment import Experiment
@@ -96,7 +96,7 @@ def _accuracy(
     images = replace(config.images, cache=str(source.cell_folder))
     config = replace(config, images=images, stop=source.num_frames)
     own = lambda request: source.initial_pose
-    run = run_without_files(source.seen_by(cameras), source.actors, config, pose_sources=(own,), every=every)
+    run = track_recording(source.seen_by(cameras), source.actors, config, pose_sources=(own,), every=every)
     table = run.frames
     record = replace(
         record,
@@ -133,7 +133,7 @@ def _speed(record: RunRecord, source: Source, config: TrackConfig, cameras: tupl
 def _timed(source: Source, cameras: tuple[str, ...], config: TrackConfig) -> tuple[RunResult, float]:
     """A run, and its seconds on the clock."""
     begin = time.perf_counter()
-    return track_recording(source.seen_by(cameras), source.actors, config), time.perf_counter() - begin
+    return track_recording(source.seen_by(cameras), source.actors, config).result_so_far, time.perf_counter() - begin
 
 
 def _rates(times: StageTimes) -> dict[str, float]:

@@ -9,8 +9,7 @@ import numpy as np
 from scipy.stats import beta
 
 from sogjax.io.files import atomic_path
-from sogjax.study.found_pose import RIGHT
-from sogjax.study.searches import Search
+from sogjax.study.searches import RIGHT, Search
 from sogjax.study.table import ruled_table
 from sogjax.view.charts import Reliability
 

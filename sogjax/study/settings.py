@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from sogjax.settings.option import expert, group, option
 
 USUAL_FRAMES = 40
-"""Of each recording that are tracked where neither the study nor the experiment says how many."""
+"""Frames of each recording that are tracked where neither the study nor the experiment says how many."""
 
 
 @dataclass

@@ -30,7 +30,7 @@ from sogjax.synth.settings import MOTIONS, SynthSettings
 
 _IN_NAME = ("motion", "seed", "actors", "frames")
 MOST_FRAMES = 60
-"""That are rendered of a motion; a study of fewer frames tracks the first ones of the same recording."""
+"""Frames that are rendered of a motion; a study of fewer frames tracks the first ones of the same recording."""
 
 
 @dataclass(eq=False)

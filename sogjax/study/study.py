@@ -28,7 +28,7 @@ class Study:
     frames: int | None = None
     """Tracked of each recording, at most; None: as many as the experiment asks for, or the usual number."""
     overrides: Sequence[str] = ()
-    """Of the track config, for all runs."""
+    """Overrides of the track config, for all runs."""
     do: bool = True
     """Whether runs that are missing are done; else they are left out."""
     body: str = "human"

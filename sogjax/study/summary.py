@@ -1,13 +1,72 @@
-"""An experiment's runs in a few numbers per row: means with their intervals, and significant differences."""
+"""An experiment's runs in a few numbers per row: means with their intervals, and significant differences.
+
+An interval comes from a bootstrap over recordings, or over stretches of frames of a single one.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
+from scipy.stats import t as student
 
-from sogjax.quality.bootstrap import Interval, bootstrap_interval
 from sogjax.study.record import RunRecord
+
+BLOCK = 10
+"""Frames that are drawn together: the errors of neighbouring frames are alike."""
+FEWEST_BLOCKS = 3
+"""Blocks of one recording, at least; those of shorter ones are shorter."""
+DRAWS = 2000
+LEVEL = 0.95
+
+
+class Interval(NamedTuple):
+    """The range in which a mean lies; NaN where there is nothing to say it from."""
+
+    low: float
+    high: float
+
+    @property
+    def holds_zero(self) -> bool:
+        """Whether a difference with this interval is not significant."""
+        return not (self.low > 0.0 or self.high < 0.0)
+
+
+def bootstrap_interval(
+    clips: Sequence[Float[np.ndarray, "_"]],
+    *,
+    block: int = BLOCK,
+    draws: int = DRAWS,
+    level: float = LEVEL,
+    seed: int = 0,
+) -> Interval:
+    """Interval of the mean of all frames of all clips: Student's t with the standard error of a bootstrap.
+
+    Recordings are drawn with replacement as a whole, since their frames are alike (cluster bootstrap). Of a single one
+    stretches of frames are drawn: that says nothing of other recordings.
+    Percentiles of so few pieces would be too narrow, so the error is that of a sample (n / (n - 1)) and the quantile
+    that of n - 1 degrees of freedom. NaN is left out beforehand.
+    """
+    present = [values for clip in clips if (values := np.asarray(clip, float)[np.isfinite(clip)]).size]
+    if len(present) == 1:
+        present = _blocks(present[0], block)
+    count = len(present)
+    if count < 2:
+        return Interval(float("nan"), float("nan"))
+    sums, lengths = np.array([clip.sum() for clip in present]), np.array([len(clip) for clip in present], float)
+    drawn = np.random.default_rng(seed).integers(count, size=(draws, count))
+    means = sums[drawn].sum(axis=1) / lengths[drawn].sum(axis=1)
+    half = student.ppf(0.5 + level / 2.0, count - 1) * means.std() * (count / (count - 1)) ** 0.5
+    mean = sums.sum() / lengths.sum()
+    return Interval(float(mean - half), float(mean + half))
+
+
+def _blocks(clip: Float[np.ndarray, "_"], block: int) -> list[Float[np.ndarray, "_"]]:
+    """A clip as stretches of frames; none where it is too short for `FEWEST_BLOCKS`."""
+    size = min(block, len(clip) // FEWEST_BLOCKS)
+    return np.array_split(clip, len(clip) // size) if size else []
+
 
 Records = Mapping[str, RunRecord]
 """The runs of one row, by recording."""
@@ -16,13 +75,13 @@ UNKNOWN = float("nan")
 
 @dataclass(frozen=True)
 class Difference:
-    """Of a row's error to that of the reference, in the same frames of the same recordings."""
+    """The difference of a row's error to that of the reference, in the same frames of the same recordings."""
 
     mean: float
     """Millimetres; positive: the row is worse."""
     interval: Interval
     recordings: int
-    """That it was taken on."""
+    """Recordings that it was taken on."""
 
     @property
     def is_significant(self) -> bool:
@@ -44,7 +103,7 @@ class RowSummary:
     """The mean with markers attached by the rule of Section 6, `closest`; `mean` is by `scaled`."""
     closest_std: float
     interval: Interval
-    """Of the mean, at 95 %."""
+    """The interval of the mean, at 95 %."""
     difference: Difference | None
     """None: this is the reference, or nothing can be compared."""
     is_reference: bool
@@ -154,7 +213,7 @@ def _joined(parts: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _mean(values: Sequence[float] | Sequence[int] | np.ndarray) -> float:
-    """Of those that are finite; NaN where none is."""
+    """The mean of those that are finite; NaN where none is."""
     present = np.asarray(values, float)
     present = present[np.isfinite(present)]
     return float(present.mean()) if present.size else UNKNOWN

@@ -127,7 +127,7 @@ def _waiting(row: RowSummary) -> str:
 
 
 def in_cell(text: str) -> str:
-    """Without what would end a cell of a table."""
+    """The text without what would end a cell of a table."""
     return text.replace("|", "\\|")
 
 

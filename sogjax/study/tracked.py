@@ -36,13 +36,13 @@ def track_folder(folder: Path, overrides: Sequence[str] = ()) -> RunResult:
     config = track_config(overrides, recording=folder)
     recording = opened(config.recording, config.cameras)
     actors = make_actors(ActorRequest.of_track(opened_clip(recording, config), config))
-    result = track_recording(recording, actors.bodies, config)
+    result = track_recording(recording, actors.bodies, config).result_so_far
     result.evaluation = compared(recording, result.motions)
     return result
 
 
 def kept_actors(folder: Path, source: Path, body: str = "human") -> list[Body]:
-    """Those that a folder holds, else made of a recording's example poses with all cameras; kept all or none.
+    """The actors that a folder holds, else made of a recording's example poses with all cameras; kept all or none.
 
     Raises:
         InputError: the example poses are unsuitable, or the folder cannot be written.

@@ -46,9 +46,9 @@ class VerdictTrial:
     sequence: str
     cameras: int
     background: str
-    """As `images.background`."""
+    """The background, as `images.background`."""
     case: str
-    """Of `CASES`."""
+    """One of `CASES`."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class JudgedRun:
     refused: str = ""
     verdict: Verdict | None = None
     mean: float = float("nan")
-    """Of all joints (metres)."""
+    """Mean error of all joints (metres)."""
     lost: dict[str, int] | None = None
     """Frames in which a limb is far off, by limb, of the stretches that last."""
 
@@ -81,17 +81,17 @@ def own(bodies: list[Body], others: list[Body]) -> list[Body]:
 
 
 def exchanged_colors(bodies: list[Body], others: list[Body]) -> list[Body]:
-    """As of pictures whose red and blue are exchanged."""
+    """The actors as made of pictures whose red and blue are exchanged."""
     return [eqx.tree_at(lambda body: body.blob_colors, body, body.blob_colors[:, ::-1]) for body in bodies]
 
 
 def larger(bodies: list[Body], others: list[Body]) -> list[Body]:
-    """By a fifth."""
+    """The actors, larger by a fifth."""
     return [scaled(body, 1.2) for body in bodies]
 
 
 def smaller(bodies: list[Body], others: list[Body]) -> list[Body]:
-    """By a fifth."""
+    """The actors, smaller by a fifth."""
     return [scaled(body, 0.8) for body in bodies]
 
 
@@ -122,9 +122,9 @@ class VerdictTrials:
 
     folder: Path
     synth: dict[str, SynthSettings]
-    """By sequence."""
+    """The settings of each sequence."""
     frames: int
-    """Of each sequence, from its first."""
+    """Frames of each sequence, from its first."""
     words: tuple[str, ...] = ()
     """Settings of `sogjax track`."""
 
@@ -150,7 +150,7 @@ class VerdictTrials:
         return [judged_run(trial, name, motion, truth, found[name]) for name, motion in motions.items()]
 
     def _limits(self, trial: VerdictTrial, kept: dict[str, Any]) -> dict[str, dict[str, Limits]]:
-        """By actor and degree of freedom; earlier versions did not keep them beside the motions."""
+        """The limits by actor and degree of freedom; earlier versions did not keep them beside the motions."""
         if "limits" not in kept:
             return {body.name: limits_of(body) for body in self._bodies(trial)}
         return {name: {dof: Limits(*row) for dof, row in rows.items()} for name, rows in kept["limits"].items()}
@@ -163,7 +163,7 @@ class VerdictTrials:
         words = [f"images.cache={self.folder / 'cells'}", f"images.background={trial.background}", *self.words]
         kept: dict[str, Any] = {"trial": asdict(trial), "refused": "", "expected": {}}
         try:
-            run = track_recording(recording, bodies, track_config(words, recording=recording.path))
+            run = track_recording(recording, bodies, track_config(words, recording=recording.path)).result_so_far
         except InputError as error:
             if isinstance(error.__cause__, OSError):  # a full disk says nothing of the subject
                 raise
@@ -186,7 +186,7 @@ class VerdictTrials:
         return kept_actors(self.folder / "actors" / source.name, source)
 
     def _others(self, trial: VerdictTrial) -> list[Body]:
-        """Of the sequence before in the list that has as many actors, or of the first that has more, the last one."""
+        """The actors of the sequence before that has as many, or the last one of the first that has more."""
         count = self.synth[trial.sequence].actors
         if trial.case == "other clothes":
             alike = [name for name, settings in self.synth.items() if settings.actors == count]
@@ -207,7 +207,7 @@ def _read(place: Path) -> dict[str, Any] | None:
 
 
 def judged_run(trial: VerdictTrial, name: str, motion: Motion, truth: GroundTruth, verdict: Verdict) -> JudgedRun:
-    """Beside the truth: of the subject of this name, or of the only one."""
+    """A run beside the truth of the subject of this name, or of the only one."""
     subject = name if name in truth.subjects else next(iter(truth.subjects), None)
     found = joint_errors(motion, truth.subject(subject) if subject else truth)
     if found is None:

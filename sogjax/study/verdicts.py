@@ -88,13 +88,13 @@ class Ranking:
     """The recording's numbers."""
     pair: Pair
     tracked: LimbErrors
-    """Of the poses as they were tracked."""
+    """Errors of the poses as they were tracked."""
     reached: LimbErrors
-    """Of the optima above them."""
+    """Errors of the optima above them."""
     optimum: LimbErrors
-    """Of the optima above the true poses."""
+    """Errors of the optima above the true poses."""
     fitted: LimbErrors
-    """Of the true poses: what the skeleton cannot follow."""
+    """Errors of the fitted true poses: what the skeleton cannot follow."""
     far: float
     """Metres: a limb that is farther off than this is lost."""
 
@@ -111,7 +111,7 @@ class Ranking:
 
     @cached_property
     def verdicts(self) -> list[str]:
-        """Of every frame, a key of `VERDICTS`, or that the truth is not known."""
+        """A verdict of every frame: a key of `VERDICTS`, or that the truth is not known."""
         return [self._verdict(k) for k in range(len(self.frames))]
 
     def _verdict(self, frame: int) -> str:
@@ -127,7 +127,7 @@ class Ranking:
         return SEARCH if self.gain[frame] > EQUAL else OBJECTIVE
 
     def of_limb(self, limb: int) -> "Ranking":
-        """The same with one limb's errors only."""
+        """The verdicts on one limb, by its errors only."""
         narrow = lambda errors: replace(errors, names=(errors.names[limb],), limbs=errors.limbs[:, [limb]])
         return replace(
             self,

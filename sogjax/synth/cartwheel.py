@@ -114,7 +114,7 @@ class Cartwheel:
 
 
 def _mirrored(angles: Angles) -> dict[str, float]:
-    """The same moment of the second half: left and right exchanged, seen from the other end of the way."""
+    """The matching moment of the second half: left and right exchanged, seen from the other end of the way."""
     swap = {"left": "right", "right": "left"}
     result = {}
     for name, value in angles.items():

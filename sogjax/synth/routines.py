@@ -118,7 +118,7 @@ def _swing(side: str) -> dict[str, float]:
 
 
 def _side_steps(start: float) -> _Keys:
-    """To the left and to the right again, twice as far back as forth, ending in the middle."""
+    """Steps to the left and to the right again, twice as far back as forth, ending in the middle."""
     s = 0.115  # a step's share of the stature
     left, right = _swing("left"), _swing("right")
     steps = [

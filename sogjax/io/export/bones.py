@@ -127,7 +127,7 @@ def _slides(motion: MotionData, joint: int) -> bool:
 
 
 def _unique_names(chains: list[list[str]]) -> list[str]:
-    """For every chain the words with which all its joints' names begin, else its last joint's name."""
+    """A name for every chain: the words with which all its joints' names begin, else its last joint's name."""
     names: list[str] = []
     for chain in chains:
         columns = zip(*(name.split("_") for name in chain), strict=False)
