@@ -6,9 +6,9 @@ import yaml
 from body_cases import shipped
 from command_line import done, refused
 
-from sogjax.io.initial_pose import load_initial_poses
 from sogjax.io.motion import motion_from_poses
 from sogjax.io.motion_data import save_motion
+from sogjax.io.pose_description import load_initial_poses
 from sogjax.search.described_pose import described_pose
 
 TOLERANCE = 1e-4

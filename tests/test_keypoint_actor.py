@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from body_cases import shipped
 
+from sogjax.actor.colors import measured_colors
 from sogjax.errors import InputError
 from sogjax.io.example_poses import ExamplePose
 from sogjax.io.ground_truth import load_ground_truth
@@ -16,7 +17,6 @@ from sogjax.run.background import Background
 from sogjax.run.clip import Clip
 from sogjax.run.keypoint_actor import keypoint_actor, with_rough_poses
 from sogjax.run.keypoint_initial_pose import keypoint_poses
-from sogjax.run.measured_colors import measured_colors
 from sogjax.run.recordings import upright
 from sogjax.settings.compose import track_config
 from sogjax.synth.detector import DetectorSettings

@@ -13,7 +13,7 @@ from sogjax.io.cache_folder import default_cache_dir
 from sogjax.io.calibration.rig import CameraEntry, rig_from_entries
 from sogjax.io.ground_truth import load_ground_truth
 from sogjax.io.image_file import read_image, read_mask
-from sogjax.io.initial_pose import load_initial_poses
+from sogjax.io.pose_description import load_initial_poses
 from sogjax.io.recording import open_recording
 from sogjax.io.recording_files import RECORDING_FILES
 from sogjax.io.video import read_frames

@@ -7,12 +7,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, UInt8
 
+from sogjax.io.recording import Recording
+from sogjax.io.video import read_frames
 from sogjax.model.body import Body
-from sogjax.model.camera import Camera, distort, project, project_points
+from sogjax.model.camera import Camera, camera_of, distort, project, project_points
 from sogjax.model.color import averaging_space, from_rgb, linear_light, to_rgb
 from sogjax.model.sog import Sog
 from sogjax.search.placed_body import means_of
@@ -172,3 +175,30 @@ def _median(values: Float[np.ndarray, "camera blob 3"], axis: int) -> Float[np.n
     known = np.isfinite(values).any(axis=axis)
     filled = np.where(np.expand_dims(known, axis), values, 0.0)
     return np.where(known, np.nanmedian(filled, axis=axis), np.nan)
+
+
+def measured_colors(
+    recording: Recording, body: Body, frames: list[int], poses: Float[np.ndarray, "chosen dof"], space: str
+) -> Body:
+    """The body with the colours that the pictures of some frames show.
+
+    Args:
+        recording: whose pictures are read.
+        body: upright in the recording's world.
+        frames: the recording's numbers, increasing.
+        poses: in those frames.
+        space: in which colours are averaged.
+
+    Raises:
+        InputError: a picture cannot be read.
+    """
+    rig = jax.tree.map(jnp.asarray, recording.rig.cameras)
+    of_frame = dict(zip(frames, poses, strict=True))
+    views = [
+        ColoredView(camera_of(rig, k), image, None, jnp.asarray(of_frame[frame], jnp.float32))
+        for frame, images in enumerate(read_frames(recording, frames[0], frames[-1] + 1), frames[0])
+        if frame in of_frame
+        for k, image in enumerate(images)
+        if image is not None
+    ]
+    return colored(body, back_projected_colors(body, views, space))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sogjax.io.ground_truth import load_ground_truth
-from sogjax.io.initial_pose import read_initial_poses
+from sogjax.io.pose_description import read_initial_poses
 from sogjax.io.recording_settings import read_recording_settings
 
 

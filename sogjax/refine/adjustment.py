@@ -49,7 +49,7 @@ class Adjusted:
     iterations: int
     values: dict[str, Float[np.ndarray, "frame"]]
     """Values of each term of tracking in every frame, without its weight and without a history."""
-    room: int
+    capacity: int
     """Capacity for image blobs: how many a picture had at most, and then some."""
     moves: Float[np.ndarray, "camera 7"]
     """Moves of the cameras, as `camera_moves` has them."""
@@ -126,7 +126,7 @@ def adjusted(
         chosen,
         sum(part.iterations for _, part in parts),
         values,
-        max(part.room for _, part in parts),
+        max(part.capacity for _, part in parts),
         stand.moves,
         told,
     )

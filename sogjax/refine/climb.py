@@ -38,7 +38,7 @@ class Climbed:
     iterations: int
     values: dict[str, Float[np.ndarray, "frame"]]
     """Values of the terms of tracking in every frame, at the end."""
-    room: int
+    capacity: int
     """Capacity for image blobs of a picture."""
 
 
@@ -68,8 +68,8 @@ def climbed(
         poses, params, value, iterations = end.poses, end.params, end.value, iterations + end.iterations
         if end.settled:
             break
-    values, room = energy.near(poses, params).values(poses, params), energy.pictures.views.images.capacity
-    return Climbed(poses, params, before or 0.0, value, iterations, values, room)
+    values, capacity = energy.near(poses, params).values(poses, params), energy.pictures.views.images.capacity
+    return Climbed(poses, params, before or 0.0, value, iterations, values, capacity)
 
 
 @dataclass

@@ -69,9 +69,8 @@ class TrackedMotion:
 def _motion_file(path: Path) -> Path:
     if not path.is_dir():
         return path
-    several = sorted(file.name for file in path.glob("motion_*.npz"))
     file = MOTION.of(path)
-    if not file.is_file() and several:
+    if not file.is_file() and any(MOTION.matches(other.name) for other in path.iterdir()):
         raise InputError(f"motion={path}: holds the motions of several actors; only a clip of one can be adjusted")
     if not file.is_file():
         raise InputError(f"motion={path}: this folder holds no {file.name}; give the folder of a run, or the file")

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
+from sogjax.actor.colors import measured_colors
 from sogjax.io.files import write_json
 from sogjax.io.frame_motions import ClipFacts, motions_of
 from sogjax.io.frame_table import FramesRecord, FrameTable
@@ -33,7 +34,6 @@ from sogjax.run.adjust_colors import color_rows, judged_with_colors, mean_simila
 from sogjax.run.background import Background
 from sogjax.run.initial_pose import InitialPose
 from sogjax.run.keypoint_bias import FRAMES, bias_of_poses
-from sogjax.run.measured_colors import measured_colors
 from sogjax.run.recordings import upright
 from sogjax.run.relearn_background import relearn_background
 from sogjax.run.setup import Setup
@@ -221,7 +221,7 @@ def _table(found: Found, setup: Setup, before: FrameTable) -> FrameTable:
         num_near=none,
         num_matching=none,
         num_blocks=np.zeros(count, int),
-        capacities=np.tile([found.room, found.room, 0], (count, 1)),
+        capacities=np.tile([found.capacity, found.capacity, 0], (count, 1)),
         terms={name: value.astype(np.float32) for name, value in found.values.items()},
     )
 

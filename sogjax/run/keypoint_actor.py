@@ -6,15 +6,15 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from sogjax.actor.colors import measured_colors
 from sogjax.errors import counted
-from sogjax.io.initial_pose import InitialPose
 from sogjax.io.keypoints.load import Keypoints, load_keypoints
 from sogjax.io.keypoints.scheme import KeypointScheme
+from sogjax.io.pose_description import PoseDescription
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.model.rotation import world_from_upright
 from sogjax.model.shape import ShapeModel
-from sogjax.run.measured_colors import measured_colors
 from sogjax.run.terminal import say
 from sogjax.search.keypoint_people import triangulated_people
 from sogjax.search.keypoint_pose import KeypointPose, pose_of_keypoints, shape_of_keypoints
@@ -116,11 +116,11 @@ def keypoint_actor(recording: Recording, body: Body, space: str, symmetric: bool
     return colored.rotated(jnp.asarray(world_from_upright(recording.up).T, body.blob_sigmas.dtype))
 
 
-def _rough(body: Body, found: KeypointPose) -> InitialPose:
+def _rough(body: Body, found: KeypointPose) -> PoseDescription:
     """The pose as places of the body's landmarks."""
     points = np.asarray(body.posed_landmarks(jnp.asarray(found.pose, body.landmarks.offsets.dtype)), float)
     places = zip(body.landmarks.names, points.tolist(), strict=True)
-    return InitialPose(landmarks={name: (x, y, z) for name, (x, y, z) in places})
+    return PoseDescription(landmarks={name: (x, y, z) for name, (x, y, z) in places})
 
 
 def _upright(body: Body, recording: Recording) -> Body:

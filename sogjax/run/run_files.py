@@ -29,6 +29,11 @@ class RunFile:
         stem, ending = Path(self.name).stem, Path(self.name).suffix
         return folder / (f"{stem}_{actor}{ending}" if self.of_actors and num_actors > 1 else self.name)
 
+    def matches(self, name: str) -> bool:
+        """Whether a file of this name is one, of whatever actor."""
+        stem, ending = Path(self.name).stem, Path(self.name).suffix
+        return name == self.name or (self.of_actors and name.startswith(f"{stem}_") and name.endswith(ending))
+
     def found(self, folder: Path) -> set[Path]:
         """The files of this name that are there."""
         return {path for path in folder.glob(self.name) if path.is_dir() == self.is_folder or path.is_symlink()}
@@ -78,8 +83,8 @@ def left_in(folder: Path, listed: Iterable[object] = ()) -> list[Path]:
 def in_the_way(folder: Path, listed: Iterable[object] = ()) -> list[Path]:
     """The results in a folder that another run must not replace unasked, those of several actors among them."""
     results = [path for path in left_in(folder, listed) if path.name not in {each.name for each in _NO_RESULT}]
-    several = [path for each in MOTIONS.values() for path in folder.glob(f"{Path(each.name).stem}_*{each.name[6:]}")]
-    return results or sorted(several)
+    motions = [path for path in folder.glob("*") if any(each.matches(path.name) for each in MOTIONS.values())]
+    return results or sorted(motions)
 
 
 def half_written(folder: Path) -> list[Path]:

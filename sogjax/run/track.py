@@ -159,7 +159,7 @@ def _ended(folder: RunFolder, recording: Recording) -> RunResult:
     """The result of a run that ended before."""
     say(f"{folder.path}: the run has already ended; nothing to do")
     files = [folder.path / name for name in folder.note["files"]]
-    written = [path for path in files if path.suffix == ".npz" and path.name.startswith(MOTION.name[:6])]
+    written = [path for path in files if MOTION.matches(path.name)]
     motions = {name: motion for path in written for name, motion in load_motions(path).items()}
     missing = recording.num_missing(next(iter(motions.values())).frame.tolist())
     result = RunResult(recording, (), motions, StageTimes(), float("nan"), files=files, missing=missing)

@@ -19,10 +19,10 @@ from sogjax.io.frame_motions import FRAMES, ClipFacts, load_one_motion
 from sogjax.io.frame_table import FrameLog, FrameTable, read_frames_log
 from sogjax.io.ground_truth import load_ground_truth
 from sogjax.io.image_file import read_image, read_mask
-from sogjax.io.initial_pose import load_initial_poses
 from sogjax.io.keypoints.camera_keypoints import read_camera, read_keypoint_array
 from sogjax.io.keypoints.scheme import load_scheme
 from sogjax.io.motion import Motion, load_motion
+from sogjax.io.pose_description import load_initial_poses
 from sogjax.io.recording import open_recording
 from sogjax.io.recording_settings import read_recording_settings
 from sogjax.io.skeletons.load import read_skeleton
