@@ -25,7 +25,7 @@ from start_up import start_up_quantities
 from sweep_speed import sweep_quantities
 
 from sogjax.io.actor_file import save_body
-from sogjax.io.files import atomic_path
+from sogjax.io.files import write_file
 from sogjax.run.compilation_cache import use_compiler_options
 from sogjax.study.script import machine_line
 
@@ -137,8 +137,7 @@ def write(path: Path, quantities: list[Quantity], reference: float) -> None:
         REFERENCE: reference,
         "quantities": {q.key: {"value": q.value, "unit": q.kind, "target": q.target} for q in quantities},
     }
-    with atomic_path(path) as temporary:
-        temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    write_file(path, json.dumps(content, indent=1) + "\n")
 
 
 def compare(path: Path, quantities: list[Quantity], reference: float) -> int:

@@ -8,13 +8,11 @@ Actors are made with all cameras. What was done is kept in `out` and not done ag
 parts. Tables are printed, and written as tables.md and results.csv.
 """
 
-import csv
-import io
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 
 from sogjax.errors import InputError
-from sogjax.io.files import atomic_path
+from sogjax.io.files import csv_text, write_file
 from sogjax.run.terminal import say
 from sogjax.study.experiment import synth_settings, yardsticks
 from sogjax.study.few_cameras import CASES, Result, Trial, Trials, each_table, together_table
@@ -62,20 +60,15 @@ def main() -> None:
             say(f"{sequence}, {count} cameras, {case}: {done[trial].mean:.1f} mm, {done[trial].lost} lost")
     made_by = f"{machine_line()}: `{command_line()}`"
     text = "\n\n".join([made_by, together_table(done, kinds), each_table(done, kinds)]) + "\n"
-    with atomic_path(out / "tables.md") as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    with atomic_path(out / "results.csv") as temporary:
-        temporary.write_text(rows(done), encoding="utf-8")
+    write_file(out / "tables.md", text)
+    write_file(out / "results.csv", rows(done))
     print(text)
 
 
 def rows(done: dict[Trial, Result]) -> str:
     """Every trial, as CSV."""
-    text = io.StringIO()
-    writer = csv.writer(text)
-    writer.writerow([entry.name for kind in (Trial, Result) for entry in fields(kind)])
-    writer.writerows([[*asdict(trial).values(), *asdict(result).values()] for trial, result in done.items()])
-    return text.getvalue()
+    titles = [entry.name for kind in (Trial, Result) for entry in fields(kind)]
+    return csv_text([titles, *([*asdict(trial).values(), *asdict(result).values()] for trial, result in done.items())])
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from sogjax.errors import InputError
-from sogjax.io.files import atomic_path
+from sogjax.io.files import write_file
 from sogjax.run.terminal import say
 from sogjax.study.experiment import yardsticks
 from sogjax.study.script import machine_line, run_script, settings_from
@@ -54,8 +54,7 @@ def main() -> None:
         raise InputError(f"minutes={settings.minutes:g}: no search was made; give more time")
     print(machine_line(), sure_table(searches), kinds_line(searches), wrong_table(searches), sep="\n\n")
     write_searches(out / "searches.csv", searches)
-    with atomic_path(out / "reliability.png") as temporary:
-        temporary.write_bytes(reliability_chart(reliability(searches)))
+    write_file(out / "reliability.png", reliability_chart(reliability(searches)))
     print(f"\n{out / 'searches.csv'}\n{out / 'reliability.png'}")
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from sogjax.errors import InputError
-from sogjax.io.files import atomic_path
+from sogjax.io.files import write_file
 from sogjax.quality.fitted import PATH, Weights
 from sogjax.run.memory import forget_programs_if_many
 from sogjax.study.experiment import yardsticks
@@ -120,8 +120,7 @@ def _print(found: list[JudgedLimb], names: list[str], settings: Settings) -> Non
             print(f"\nSaid and found, {title}:\n", calibration_table(group, of_rest), sep="\n")
             curves[title] = limb_curve(group, of_rest)
     path = Path(settings.out) / "limb_doubt.png"
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(limb_chart(curves))
+    write_file(path, limb_chart(curves))
     print(f"\n{path}")
 
 

@@ -20,7 +20,7 @@ from typing import Any
 from omegaconf import MISSING
 
 from sogjax.io.actor_file import load_body
-from sogjax.io.files import atomic_path
+from sogjax.io.files import write_file
 from sogjax.io.motion import load_motion
 from sogjax.model.body import Body
 from sogjax.run.recordings import file_list, opened
@@ -57,8 +57,7 @@ def main() -> None:
         rankings.append(ranking_of(track, words, settings.far))
     print(machine_line(), verdicts_table(rankings), limbs_table(rankings), terms_table(rankings), sep="\n\n")
     write_csv(Path(f"{settings.out}.csv"), rankings)
-    with atomic_path(Path(f"{settings.out}.png")) as temporary:
-        temporary.write_bytes(ranking_chart([curves_of(ranking) for ranking in rankings]))
+    write_file(Path(f"{settings.out}.png"), ranking_chart([curves_of(ranking) for ranking in rankings]))
     print(f"\n{settings.out}.csv\n{settings.out}.png")
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from sogjax.errors import InputError
-from sogjax.io.files import atomic_path
+from sogjax.io.files import write_file
 from sogjax.run.memory import forget_programs_if_many
 from sogjax.run.terminal import say
 from sogjax.study.experiment import synth_settings, yardsticks
@@ -74,8 +74,7 @@ def main() -> None:
     if not found:
         raise InputError("no trial was run; do=true runs them")
     text = tables(found)
-    with atomic_path(Path(settings.out) / "tables.md") as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_file(Path(settings.out) / "tables.md", text)
     print(text)
 
 

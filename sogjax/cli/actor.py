@@ -12,7 +12,7 @@ from sogjax.actor.colors import ColoredView, estimated_gains
 from sogjax.actor.make import MadeActor
 from sogjax.errors import InputError, counted
 from sogjax.io.actor_file import save_body
-from sogjax.io.files import atomic_path
+from sogjax.io.files import write_file
 from sogjax.io.recording import Recording
 from sogjax.model.camera import camera_of
 from sogjax.run.actor_report import report_folder, write_actor_report
@@ -93,8 +93,9 @@ def say_gains(recording: Recording, made: MadeActor, folder: Path) -> None:
     found = estimated_gains(made.upright_body, views)
     total = {names[camera]: gains * recording.color_gains.get(names[camera], 1.0) for camera, gains in found.items()}
     rounded = {name: [round(float(gain), 3) for gain in gains] for name, gains in total.items()}
-    with atomic_path(folder / "color_gains.yaml") as temporary:
-        temporary.write_text(yaml.safe_dump({"color_gains": rounded}, default_flow_style=None, sort_keys=False))
+    write_file(
+        folder / "color_gains.yaml", yaml.safe_dump({"color_gains": rounded}, default_flow_style=None, sort_keys=False)
+    )
     unlike = {names[camera]: gains for camera, gains in found.items() if np.abs(np.log(gains)).max() > NOTICED}
     if unlike:
         worst = max(unlike, key=lambda name: float(np.abs(np.log(unlike[name])).max()))

@@ -11,7 +11,7 @@ from sogjax.check.examination import Examination, examined, opening_problems
 from sogjax.check.findings import SEVERITIES, Finding
 from sogjax.cli.schemas import CheckConfig
 from sogjax.errors import InputError, counted
-from sogjax.io.files import atomic_path
+from sogjax.io.files import write_file
 from sogjax.io.image_file import write_image
 from sogjax.io.recording import Recording, open_recording
 from sogjax.io.recording_files import SETTINGS
@@ -33,8 +33,7 @@ def run(config: CheckConfig) -> list[Finding]:
     out = Path(config.out) if config.out else Path("outputs") / recording.name / "check"
     with results_folder(out), alive("examining the recording"):
         found = examined(recording, start, frames, config.largest_offset, progress)
-        with atomic_path(out / "check.json") as temporary:
-            temporary.write_text(json.dumps(found.numbers, indent=1))
+        write_file(out / "check.json", json.dumps(found.numbers, indent=1))
         write_image(out / "check.png", _picture(recording, found))
     for finding in found.findings:
         print(finding.line())

@@ -8,7 +8,7 @@ import numpy as np
 from sogjax.actor.coverage import body_silhouette
 from sogjax.actor.report import ActorReport, FinishedActor, actor_report
 from sogjax.io.calibration.rig import CameraRig
-from sogjax.io.files import atomic_path
+from sogjax.io.files import write_file
 from sogjax.io.image_file import write_image
 from sogjax.scene.background_difference import reduced_mask
 from sogjax.view.sheets import LEGEND, SilhouetteView, body_picture, silhouette_sheet
@@ -76,5 +76,4 @@ def _table(head: list[str], rows: list[list[str]]) -> str:
 
 
 def _write_text(path: Path, text: str) -> None:
-    with atomic_path(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_file(path, text)

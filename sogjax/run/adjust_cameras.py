@@ -12,7 +12,7 @@ from jaxtyping import Float
 from sogjax.errors import InputError, counted
 from sogjax.io.calibration.load import save_calibration
 from sogjax.io.calibration.rig import CameraRig
-from sogjax.io.files import atomic_path
+from sogjax.io.files import write_file
 from sogjax.io.motion import Motion
 from sogjax.io.recording import Recording
 from sogjax.io.recording_files import SETTINGS
@@ -150,8 +150,7 @@ def write_cameras(
     }
     if any(offsets.values()):
         lines["frame_offset"] = offsets_line({name: offset for name, offset in offsets.items() if offset})
-    with atomic_path(DESCRIPTION.of(out)) as temporary:
-        temporary.write_text(with_entries(own, text, lines), encoding="utf-8")
+    write_file(DESCRIPTION.of(out), with_entries(own, text, lines))
     return [CALIBRATION.of(out), DESCRIPTION.of(out)]
 
 

@@ -1,6 +1,5 @@
 """What keypoints are worth with few cameras: trials with and without them, and the section that tells of them."""
 
-import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -9,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from sogjax.errors import InputError
-from sogjax.io.files import atomic_path
+from sogjax.io.files import write_file
 from sogjax.io.ground_truth import load_ground_truth
 from sogjax.io.keypoints.load import load_keypoints
 from sogjax.io.recording import Recording
@@ -21,7 +20,7 @@ from sogjax.run.track import track_recording
 from sogjax.settings.compose import track_config
 from sogjax.study.document import Section
 from sogjax.study.experiment import synth_settings, yardsticks
-from sogjax.study.record import program_digest
+from sogjax.study.record import key_of, program_digest
 from sogjax.study.source import MOST_FRAMES
 from sogjax.study.study import Study
 from sogjax.study.tracked import kept_actors
@@ -94,8 +93,7 @@ class Trials:
         if (kept := self.kept(trial)) is not None:
             return kept
         found = self._run(trial)
-        with atomic_path(self._path(trial)) as temporary:
-            temporary.write_text(json.dumps({"trial": asdict(trial), "result": asdict(found)}), encoding="utf-8")
+        write_file(self._path(trial), json.dumps({"trial": asdict(trial), "result": asdict(found)}))
         return found
 
     def kept(self, trial: Trial) -> Result | None:
@@ -105,8 +103,7 @@ class Trials:
 
     def _path(self, trial: Trial) -> Path:
         program = [program_digest(f"study/{name}.py") for name in ("few_cameras", "triangulation_trials")]
-        content = [program, asdict(trial), asdict(self.synth[trial.sequence]), self.frames, self.words, CASES]
-        key = hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
+        key = key_of(program, asdict(trial), asdict(self.synth[trial.sequence]), self.frames, self.words, CASES)
         return self.folder / "results" / f"{key}.json"
 
     def _run(self, trial: Trial) -> Result:

@@ -1,7 +1,5 @@
 """Tracks in which limbs were lost, by themselves or on purpose: what tells of it in each frame, against the truth."""
 
-import hashlib
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -23,7 +21,7 @@ from sogjax.quality.limb_evidence import blob_evidence
 from sogjax.run.terminal import say
 from sogjax.search.placed_body import means_of
 from sogjax.settings.compose import track_config
-from sogjax.study.record import program_digest
+from sogjax.study.record import key_of, program_digest
 from sogjax.study.source import Source
 from sogjax.study.study import Study
 from sogjax.study.true_poses import true_poses
@@ -193,8 +191,7 @@ class LimbTrials:
 
     def path(self, trial: LimbTrial) -> Path:
         """Where a trial is kept."""
-        content = [program_digest("study/limb_trials.py"), asdict(trial), self.overrides, self.study.body]
-        key = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
+        key = key_of(program_digest("study/limb_trials.py"), asdict(trial), self.overrides, self.study.body)
         return self.study.folder / "limbs" / f"{key}.npz"
 
     def _tracker(self, trial: LimbTrial) -> tuple[Source, Tracker, list[FrameInput]]:

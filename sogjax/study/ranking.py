@@ -1,7 +1,5 @@
 """A track held against its truth, ranked by a set of terms; the rankings as tables and files."""
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +9,7 @@ from jaxtyping import Float, Int
 
 from sogjax.errors import InputError
 from sogjax.io.cache_folder import default_cache_dir
-from sogjax.io.files import atomic_path
+from sogjax.io.files import csv_text, write_file
 from sogjax.io.ground_truth import GroundTruth, load_ground_truth
 from sogjax.io.motion import Motion
 from sogjax.io.recording import Recording
@@ -151,17 +149,15 @@ def write_csv(path: Path, rankings: Sequence[Ranking]) -> None:
     terms = list(dict.fromkeys(name for ranking in rankings for name in ranking.pair.true.parts))
     limbs = rankings[0].tracked.names if rankings else ()
     sides = ("tracked", "reached", "optimum", "fitted")
-    text = io.StringIO()
-    writer = csv.writer(text)
     head = ["set", "frame", "verdict", "gain", "energy tracked", "energy true"]
     head += [f"{term} {side}" for term in terms for side in ("tracked", "true")]
     head += [f"{side} mm" for side in sides] + [f"{limb} {side} mm" for limb in limbs for side in sides[:3]]
-    writer.writerow(head)
-    for ranking in rankings:
-        for k, frame in enumerate(ranking.frames):
-            writer.writerow([ranking.name, frame, ranking.verdicts[k], *_numbers(ranking, k, terms)])
-    with atomic_path(path) as temporary:
-        temporary.write_text(text.getvalue(), encoding="utf-8")
+    lines = [
+        [ranking.name, frame, ranking.verdicts[k], *_numbers(ranking, k, terms)]
+        for ranking in rankings
+        for k, frame in enumerate(ranking.frames)
+    ]
+    write_file(path, csv_text([head, *lines]))
 
 
 def _numbers(ranking: Ranking, frame: int, terms: Sequence[str]) -> list[str]:

@@ -1,8 +1,6 @@
 """What is kept of the runs of a study: a JSON file each, by which a run is not done again, and their list."""
 
-import csv
 import hashlib
-import io
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field, fields
@@ -15,7 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 import sogjax
-from sogjax.io.files import atomic_path
+from sogjax.io.files import csv_text, write_file
 from sogjax.settings.run import TrackConfig
 from sogjax.study.experiment import Experiment
 from sogjax.study.source import Source
@@ -52,8 +50,7 @@ class RunPlan:
     @property
     def key(self) -> str:
         """Sixteen letters that differ where anything differs, the program's own files included."""
-        content = [RECORD_VERSION, version("sogjax"), program_digest(), asdict(self)]
-        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
+        return key_of(RECORD_VERSION, version("sogjax"), program_digest(), asdict(self))
 
 
 @dataclass
@@ -120,6 +117,11 @@ class RunRecord:
         return float(np.median(self.milliseconds[1:])) if len(self.milliseconds) > 1 else float("nan")
 
 
+def key_of(*content: Any) -> str:
+    """Sixteen letters that name a file of what was kept, and differ where anything that decides it differs."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
+
+
 @cache
 def program_digest(further: str = "") -> str:
     """The digest of those files of the program that decide how a run comes out, and of `further` ones (a pattern)."""
@@ -155,8 +157,7 @@ class RunFolder:
         Raises:
             InputError: the folder cannot be written.
         """
-        with atomic_path(self._path(plan)) as temporary:
-            temporary.write_text(json.dumps(asdict(record)), encoding="utf-8")
+        write_file(self._path(plan), json.dumps(asdict(record)))
 
     def _path(self, plan: RunPlan) -> Path:
         return self.folder / "runs" / f"{plan.key}.json"
@@ -191,16 +192,13 @@ def different(done: Sequence[Done]) -> Iterator[Done]:
 
 def write_runs(path: Path, done: Sequence[Done]) -> Path:
     """Every row on every recording, with its overrides, as CSV."""
-    text = io.StringIO()
-    writer = csv.writer(text)
-    writer.writerow(COLUMNS)
+    lines: list[Sequence[object]] = [COLUMNS]
     for one in done:
         record = one.record
         errors = [f"{value:.2f}" for value in (record.mean_mm, record.closest_mean_mm)]
         times = [f"{value:.2f}" for value in (record.step_ms, record.seconds)]
         words = " ".join(one.experiment.overrides(one.row, method=one.method))
         named = [one.experiment.name, one.method, one.row, one.source.name, words]
-        writer.writerow([*named, *errors, record.lost, *times, record.machine, record.failed])
-    with atomic_path(path) as temporary:
-        temporary.write_text(text.getvalue(), encoding="utf-8")
+        lines.append([*named, *errors, record.lost, *times, record.machine, record.failed])
+    write_file(path, csv_text(lines))
     return path

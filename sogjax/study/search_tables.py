@@ -1,14 +1,12 @@
 """A calibration's searches as tables in Markdown, as CSV, and as what their chart shows."""
 
-import csv
-import io
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 from scipy.stats import beta
 
-from sogjax.io.files import atomic_path
+from sogjax.io.files import csv_text, write_file
 from sogjax.study.searches import RIGHT, Search
 from sogjax.study.table import ruled_table
 from sogjax.view.charts import Reliability
@@ -99,14 +97,12 @@ def reliability(searches: Sequence[Search]) -> Reliability:
 
 def write_searches(path: Path, searches: Sequence[Search]) -> None:
     """A row for each search and actor, as CSV."""
-    text = io.StringIO()
-    writer = csv.writer(text)
-    writer.writerow(
+    lines: list[Sequence[object]] = [
         [
             *("number", "sequence", "actor", "cameras", "turn", "plates", "frame", "sure", "confidence", "joints mm"),
             *("worst limb", "worst mm", "kind", "seconds", "processor seconds", "refused"),
         ]
-    )
+    ]
     for search in searches:
         trial, error = search.trial, search.error
         off = ["", "", "", ""]
@@ -114,11 +110,9 @@ def write_searches(path: Path, searches: Sequence[Search]) -> None:
             off = [f"{MM * error.joints:.1f}", error.worst_limb, f"{MM * error.worst:.1f}", error.kind]
         place = [trial.number, trial.sequence, search.actor, trial.cameras, trial.turn, trial.plates, trial.frame]
         said = [search.sure, f"{search.confidence:.6g}"]
-        writer.writerow(
-            [*place, *said, *off, f"{search.seconds:.1f}", f"{search.processor_seconds:.1f}", search.refused]
-        )
-    with atomic_path(path) as temporary:
-        temporary.write_text(text.getvalue(), encoding="utf-8")
+        times = [f"{search.seconds:.1f}", f"{search.processor_seconds:.1f}"]
+        lines.append([*place, *said, *off, *times, search.refused])
+    write_file(path, csv_text(lines))
 
 
 def _right(searches: Sequence[Search]) -> str:

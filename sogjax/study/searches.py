@@ -1,6 +1,5 @@
 """Searches for initial poses in rendered recordings: what was found and said, against the truth."""
 
-import hashlib
 import json
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sogjax.errors import InputError
-from sogjax.io.files import atomic_path
+from sogjax.io.files import write_file
 from sogjax.io.ground_truth import GroundTruth
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
@@ -24,7 +23,7 @@ from sogjax.run.memory import forget_programs_if_many
 from sogjax.run.terminal import say
 from sogjax.run.track import opened_clip
 from sogjax.settings.compose import track_config
-from sogjax.study.record import program_digest
+from sogjax.study.record import key_of, program_digest
 from sogjax.study.source import Source
 from sogjax.study.study import Study
 from sogjax.study.verdicts import LimbErrors, limb_errors
@@ -179,8 +178,7 @@ class Searches:
         if not do:
             return []
         found = self._made(trial)
-        with atomic_path(path) as temporary:
-            temporary.write_text(json.dumps([asdict(each) for each in found]), encoding="utf-8")
+        write_file(path, json.dumps([asdict(each) for each in found]))
         return found
 
     def _made(self, trial: Trial) -> list[Search]:
@@ -214,8 +212,7 @@ class Searches:
         return searches
 
     def _path(self, trial: Trial) -> Path:
-        content = [program_digest(SEARCH_FILES), asdict(trial), [*self.overrides], self.study.body]
-        key = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
+        key = key_of(program_digest(SEARCH_FILES), asdict(trial), [*self.overrides], self.study.body)
         return self.study.folder / "searches" / f"{key}.json"
 
 

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from sogjax.errors import InputError
-from sogjax.io.files import atomic_path
+from sogjax.io.files import write_file
 from sogjax.io.ground_truth import GroundTruth, load_ground_truth
 from sogjax.io.motion import Motion, load_motion
 from sogjax.io.motion_data import save_motion
@@ -174,8 +174,7 @@ class VerdictTrials:
             kept["limits"] = {body.name: limits_of(body) for body in bodies}
             for name, motion in run.motions.items():
                 save_motion(place / f"{name}.npz", motion)
-        with atomic_path(place / TRIAL) as temporary:
-            temporary.write_text(json.dumps(kept, indent=1), encoding="utf-8")
+        write_file(place / TRIAL, json.dumps(kept, indent=1))
 
     def _bodies(self, trial: VerdictTrial) -> list[Body]:
         """The right or wrong actors of a trial."""

@@ -1,7 +1,5 @@
 """The tables at the end: of a sweep's members with a chart, and of many recordings."""
 
-import csv
-import io
 import textwrap
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -9,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from sogjax.cli.sweep.results import APART, FAILED, Member, Row
-from sogjax.io.files import write_file
+from sogjax.io.files import csv_text, write_file
 from sogjax.run.result import COLUMNS, OBJECTIVE
 from sogjax.run.terminal import say
 from sogjax.view.charts import Bars, bar_chart
@@ -52,7 +50,7 @@ def finish_sweep(sweep: Path, members: Sequence[Member]) -> None:
     if done:
         print(f"\n{legend(_known(done))}")
     print()
-    _write(sweep / "sweep.csv", _csv(_lines_of_members(members)))
+    _write(sweep / "sweep.csv", csv_text(_lines_of_members(members)))
     column = next((column for column in TITLES if any(np.isfinite(row[column]) for row in done)), None)
     if not done:
         say("no sweep.png: no member worked")
@@ -80,7 +78,7 @@ def finish_takes(out: Path, rows: Sequence[Row]) -> None:
         columns = "".join(f"{cell:>{width + 2}}" for cell, width in zip(numbers, widths[1:-1], strict=True))
         print(f"{place:<{widths[0]}}{columns}  {_shown(sentence)}")
     print(f"\nresults of each: {out}/RECORDING")
-    _write(out / "recordings.csv", _csv(_lines_of_takes(rows)))
+    _write(out / "recordings.csv", csv_text(_lines_of_takes(rows)))
     _write(out / "recordings.md", _markdown(cells))
 
 
@@ -163,12 +161,6 @@ def _lines_of_takes(rows: Sequence[Row]) -> Iterable[Sequence[object]]:
     for row in rows:
         numbers = ["" if np.isnan(value := row.number(column)) else value for column in OF_TAKES]
         yield [row.place, *numbers, "" if row.failed else row.sentence, row.failed, row.folder]
-
-
-def _csv(lines: Iterable[Sequence[object]]) -> str:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(lines)
-    return text.getvalue()
 
 
 def _markdown(cells: Sequence[Sequence[str]]) -> str:
