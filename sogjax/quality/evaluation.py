@@ -1,6 +1,6 @@
 """One motion, or several, held against a ground truth: as data, as JSON and as a table."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,9 +14,19 @@ from sogjax.io.ground_truth import GroundTruth
 from sogjax.io.motion import Motion
 from sogjax.quality.limb_warnings import DoubtfulLimb, doubtful_limbs
 from sogjax.quality.markers import MARKER_RULES, MarkerRule, PointErrors, common_frames, joint_errors, marker_errors
-from sogjax.quality.metrics import ErrorSummary, LostPoint, lost_points, summarize
-from sogjax.quality.numbers import MM, TABLE_ROW, in_mm, points_dict, rule_dict, summary_dict, summary_row
+from sogjax.quality.metrics import (
+    ErrorSummary,
+    LostPoint,
+    lost_points,
+    mean_per_frame,
+    mean_per_point,
+    std_per_point,
+    summarize,
+)
 from sogjax.quality.swaps import Swap, identity_swaps
+
+MM = 1000.0
+TABLE_ROW = "{:<24}{:>8}{:>8}{:>8}{:>8}{:>8}{:>7}{:>7}"
 
 
 @dataclass(frozen=True)
@@ -207,3 +217,48 @@ def evaluate_motions(
             f"the truth knows no point in the motion's frames {frames[0]} to {frames[-1]}; compare labelled frames"
         )
     return GroupEvaluation(evaluations, identity_swaps(motions, truth) if len(motions) > 1 else ())
+
+
+def summary_dict(summary: ErrorSummary) -> dict[str, Any]:
+    """A summary for JSON, in millimetres."""
+    return in_mm(asdict(summary), "mean", "std", "median", "percentile_95", "maximum")
+
+
+def rule_dict(parts: Sequence[PointErrors]) -> dict[str, float]:
+    """Mean and deviation of all markers of some actors, for JSON."""
+    summary = summarize(np.concatenate([part.errors.reshape(-1, 1) for part in parts]))
+    return {"mean_mm": MM * summary.mean, "std_mm": MM * summary.std}
+
+
+def summary_row(title: str, s: ErrorSummary) -> str:
+    """One line of the table."""
+    if s.num_values == 0:
+        return TABLE_ROW.format(title, *"-------")
+    lengths = [f"{MM * value:.1f}" for value in (s.mean, s.std, s.median, s.percentile_95, s.maximum)]
+    return TABLE_ROW.format(title, *lengths, f"{s.under_50mm:.0%}", f"{s.under_100mm:.0%}")
+
+
+def points_dict(points: PointErrors | None) -> dict[str, Any] | None:
+    """Points for JSON: all together, each one, each frame."""
+    if points is None:
+        return None
+    per_point = zip(
+        points.names,
+        points.compared_with,
+        mean_per_point(points.errors),
+        std_per_point(points.errors),
+        strict=True,
+    )
+    return {
+        **summary_dict(summarize(points.errors)),
+        "per_point": {
+            name: {"joint": joint, "mean_mm": MM * float(mean), "std_mm": MM * float(std)}
+            for name, joint, mean, std in per_point
+        },
+        "mean_per_frame_mm": [MM * float(value) for value in mean_per_frame(points.errors)],
+    }
+
+
+def in_mm(content: dict[str, Any], *keys: str) -> dict[str, Any]:
+    """A mapping with some lengths in millimetres, which their keys then say."""
+    return {f"{k}_mm" if k in keys else k: MM * v if k in keys else v for k, v in content.items()}
