@@ -23,7 +23,7 @@ from sogjax.quality.markers import joint_errors
 from sogjax.quality.numbers import write_json
 from sogjax.refine.adjustment import Adjusted as Found
 from sogjax.refine.adjustment import adjusted
-from sogjax.refine.clip_priors import floor_height, standing, undersides
+from sogjax.refine.clip_priors import floor_height, standing, step_of, undersides
 from sogjax.refine.pictures import ClipPictures, Reader
 from sogjax.run import build
 from sogjax.run.actors import Actors
@@ -120,7 +120,7 @@ def adjust_clip(
         table.pose,
         table.frame,
         np.asarray(table.terms["similarity"], float),
-        setup.clip.fps,
+        recording.fps,
         recording.up,
         request.window,
         with_shape=request.with_shape,
@@ -184,7 +184,7 @@ class _Source:
 
 
 def _motion(setup: Setup, table: FrameTable) -> Motion:
-    facts = ClipFacts.of(setup.clip.recording, setup.clip.numbers.step)
+    facts = ClipFacts.of(setup.clip.recording)
     return next(iter(motions_of(table, setup.bodies, facts).values()))
 
 
@@ -249,8 +249,8 @@ def _numbers(body: Body, before: Motion, after: Motion, found: Found, recording:
 
 def _feet(before: Motion, after: Motion) -> dict[str, float | None]:
     """How far feet that stand move from frame to frame, on average: those that stand in the adjusted motion."""
-    heights = undersides(after.blob_means, after.blob_sigma, axis_vector(after.up))
-    stand = standing(after.blob_means, heights - floor_height(heights), after.frame, after.fps)[:-1]
+    heights, step = undersides(after.blob_means, after.blob_sigma, axis_vector(after.up)), step_of(after.frame)
+    stand = standing(after.blob_means, heights - floor_height(heights), after.frame, after.fps, step)[:-1]
     moved = lambda motion: 1e3 * float(np.linalg.norm(np.diff(motion.blob_means, axis=0), axis=-1)[stand].mean())
     found = [moved(motion) if stand.any() else None for motion in (before, after)]
     return {"standing_foot_before_mm": found[0], "standing_foot_after_mm": found[1]}

@@ -67,7 +67,7 @@ def _tracked(run: Run) -> Tracked:
     if run.kept is not None:
         rows = kept_rows(run.kept, run.initial_pose, run.clip.numbers)
         log = FrameLog(run.kept / FRAMES, 0 if rows is None else len(rows))
-        ClipFacts.of(run.clip.recording, run.clip.numbers.step).save(run.kept)
+        ClipFacts.of(run.clip.recording).save(run.kept)
     if run.out is not None and not run.adjusts:
         run.before_results()
         streams = ResultStreams(run.out, run.clip, run.setup.bodies, run.config.outputs)

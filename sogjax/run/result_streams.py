@@ -33,7 +33,7 @@ class ResultStreams:
 
     def __init__(self, folder: Path, clip: Clip, bodies: Sequence[Body], wanted: OutputsConfig):
         self._folder, self._clip, self._bodies, self._wanted = folder, clip, bodies, wanted
-        self._facts = ClipFacts.of(clip.recording, clip.numbers.step)
+        self._facts = ClipFacts.of(clip.recording)
         self._stack = ExitStack()
         self._overlay: Any = None
         self._rerun: Any = None

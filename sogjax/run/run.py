@@ -172,7 +172,7 @@ class Run:
     def result_so_far(self) -> RunResult:
         """The motions, without anything that was thought of them."""
         setup, table, recording = self.final_setup, self.frames, self.clip.recording
-        motions = motions_of(table, setup.bodies, ClipFacts.of(recording, self.clip.numbers.step))
+        motions = motions_of(table, setup.bodies, ClipFacts.of(recording))
         image_blobs = float(self.unadjusted.num_matching.mean())
         missing = recording.num_missing(self.clip.numbers)
         return RunResult(setup.clip.recording, setup.bodies, motions, self.times, image_blobs, missing=missing)
