@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import fields
 
 import pytest
 import yaml
@@ -13,7 +14,8 @@ from sogjax.errors import InputError
 from sogjax.io.export.write import WRITERS
 from sogjax.run.tracked_motion import _config
 from sogjax.settings.compose import track_config
-from sogjax.settings.run import OutputsConfig
+from sogjax.settings.option import telling_settings
+from sogjax.settings.run import OutputsConfig, TrackConfig
 from sogjax.settings.wrong_values import REMOVED
 
 
@@ -82,3 +84,12 @@ def test_one_switch_for_the_motion_only():
     assert (asked.overlay, asked.rerun, asked.bvh, asked.formats) == (False, False, False, None)
     assert OutputsConfig().asked().overlay
     check_endings("track", track_config(recording="r"))
+
+
+def test_without_files_what_belongs_to_the_motion_is_kept():
+    asked = OutputsConfig(motion_only=True, confidence=False, formats=["c3d"]).asked()
+    assert (asked.confidence, asked.formats) == (False, None)
+    assert OutputsConfig(motion_only=True).asked().confidence
+    files = {"motion_only", "overlay", "overlay_width", "rerun", "rerun_images", "bvh", "formats", "pose2sim"}
+    telling = {key.removeprefix("outputs.") for key in telling_settings(TrackConfig()) if key.startswith("outputs.")}
+    assert telling == {entry.name for entry in fields(OutputsConfig)} - files

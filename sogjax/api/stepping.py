@@ -12,11 +12,12 @@ from sogjax.energy.term import Term
 from sogjax.errors import InputError
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
+from sogjax.run import build
 from sogjax.run.actors import Actors
 from sogjax.run.clip import Clip
 from sogjax.run.clip_keypoints import ClipKeypoints
 from sogjax.run.passes import PASSES
-from sogjax.run.recordings import with_cameras
+from sogjax.run.recordings import chosen_frames, with_cameras
 from sogjax.run.run import Run
 from sogjax.run.runner import run_passes
 from sogjax.run.track import opened_clip
@@ -52,7 +53,8 @@ def make_tracker(
         recording: whose cameras and first frame the tracker is made for.
         actor: one, or a list of them, which become one body with their poses one after the other.
         terms: further terms of the energy, beside those of the settings.
-        settings: as in `track_settings`; `start` is the frame of the first pose, and to be given to `read_cells` too.
+        settings: as in `track_settings`; `start` is the frame of the first pose; it and `every` are to be given to
+            `read_cells` too.
 
     Raises:
         InputError: as `track`.
@@ -66,7 +68,9 @@ def make_tracker(
     return replace(tracker, capacities=_with_more_room(first_capacities(tracker, tracker.start(), frame)))
 
 
-def read_cells(recording: Recording, tracker: Tracker, start: int = 0, stop: int | None = None) -> Iterator[AnyFrame]:
+def read_cells(
+    recording: Recording, tracker: Tracker, start: int = 0, stop: int | None = None, every: int = 1
+) -> Iterator[AnyFrame]:
     """What a tracker's step takes of each frame: the pictures of all cameras, averaged to cells (sRGB).
 
     Args:
@@ -74,6 +78,7 @@ def read_cells(recording: Recording, tracker: Tracker, start: int = 0, stop: int
         tracker: which says how pictures are cut into cells.
         start: first frame, counted from the recording's first.
         stop: the frame before which to stop; None: the end.
+        every: how many frames lie from one to the next.
 
     Returns:
         An iterator with the cells of each frame, as bytes; where a camera has no picture, or keypoints count, with
@@ -83,21 +88,15 @@ def read_cells(recording: Recording, tracker: Tracker, start: int = 0, stop: int
         InputError: a picture cannot be read, another number of cameras, or no such frames.
     """
     grids = tracker.reader.candidates.grids
-    last = recording.num_frames if stop is None else stop
     if len(grids) != len(recording.rig.names):
         raise InputError(
             f"{recording.path}: the tracker was made for {len(grids)} cameras, this recording has "
             f"{len(recording.rig.names)}; open it with the same cameras"
         )
-    if not 0 <= start < last <= recording.num_frames:
-        raise InputError(
-            f"start={start} stop={stop}: {recording.path} has the frames 0 to {recording.num_frames - 1}; choose "
-            f"0 <= start < stop <= {recording.num_frames}"
-        )
     pulled = keypoint_term_among(tracker.terms) is not None
     keypoints = ClipKeypoints.of_recording(recording) if pulled else None
-    numbers = recording.frames[start:last]
-    clip = Clip(recording, numbers, grids[0].depth, keypoints)
+    build.at_least("every", every, 1)
+    clip = Clip(recording, chosen_frames(recording, start, stop, every), grids[0].depth, keypoints)
     return (frame.cells if frame[1:] == (None, None) else frame for frame in map(on_device, clip.frames()))
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from sogjax.io.frame_table import FrameTable
 from sogjax.io.motion import Motion
+from sogjax.refine.clip_priors import step_of
 from sogjax.run import build
 from sogjax.run.actors import Actors
 from sogjax.run.adjust_cameras import check_cameras, parts_in_question
@@ -51,6 +52,7 @@ def adjust_to_folder(config: AdjustConfig) -> RunResult:
         tracked.config,
         **{"recording": config.recording, "out": config.out, "actor": None, "adjust": True, "outputs": outputs},
         **{"start": first, "stop": int(motion.frame[-1]) - recording.first_frame + 1},
+        every=step_of(motion.frame),
     )
     build.check(settings)
     request = AdjustRequest(config.window, config.shape, parts_in_question(config.cameras, config.offsets))

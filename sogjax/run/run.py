@@ -27,9 +27,7 @@ from sogjax.run.run_files import GUESS
 from sogjax.run.sampled_masks import mask_samples
 from sogjax.run.setup import Setup, tracking_setup
 from sogjax.run.terminal import say
-from sogjax.settings.run import OutputsConfig, TrackConfig
-
-NO_OUTPUTS = OutputsConfig(motion_only=True).asked()
+from sogjax.settings.run import TrackConfig
 
 
 @dataclass
