@@ -17,7 +17,7 @@ from sogjax.actor.make import make_actor, subjects_of
 from sogjax.energy.frame_energy import standard_terms
 from sogjax.errors import InputError
 from sogjax.io.example_poses import ExamplePose
-from sogjax.io.initial_pose import InitialPose
+from sogjax.io.initial_pose import PoseDescription
 from sogjax.model.body import Attachments
 from sogjax.model.shape import ShapeModel
 
@@ -142,7 +142,7 @@ def made(tmp_path_factory):
     stand = moved(truth, standing(truth, 1.1), {"root_yaw": 0.6})
     trot = np.array(truth.poses["trot_left"])
     trot = moved(truth, trot, {"root_x": 0.1, "root_z": 1.1 - float(trot[2]), "root_yaw": -1.0})
-    hint = InitialPose(pose="rest", position=(0.08, -0.06, 1.1), heading=np.degrees(0.6) - 30.0, landmarks={})
+    hint = PoseDescription(pose="rest", position=(0.08, -0.06, 1.1), heading=np.degrees(0.6) - 30.0, landmarks={})
     examples = (
         write_example(folder, "stand", truth, stand, rig, hint),
         write_example(folder, "trot", truth, trot, rig),

@@ -6,7 +6,7 @@ import pytest
 from body_cases import posed, reference_frames, reference_points, shipped
 
 from sogjax.errors import InputError
-from sogjax.io.initial_pose import InitialPose
+from sogjax.io.initial_pose import PoseDescription
 from sogjax.model.rotation import UP_AXES, axis_vector, world_from_upright
 from sogjax.search.rough_pose import rough_pose
 
@@ -16,7 +16,7 @@ FITTED = 0.02
 
 
 def describe(pose=None, position=None, heading=None, landmarks=None):
-    return InitialPose(pose=pose, position=position, heading=heading, landmarks=landmarks or {})
+    return PoseDescription(pose=pose, position=position, heading=heading, landmarks=landmarks or {})
 
 
 def upright(body, up):

@@ -3,7 +3,7 @@
 import pytest
 
 from sogjax.errors import InputError
-from sogjax.io.initial_pose import InitialPose, load_initial_poses
+from sogjax.io.initial_pose import PoseDescription, load_initial_poses
 
 
 @pytest.fixture
@@ -13,12 +13,12 @@ def path(tmp_path):
 
 def test_the_two_forms_alone_and_together(path):
     path.write_text("landmarks: {pelvis: [0, 1.5, -2], toe: [1, 2, 3]}\n")
-    expected = InitialPose(landmarks={"pelvis": (0.0, 1.5, -2.0), "toe": (1.0, 2.0, 3.0)})
+    expected = PoseDescription(landmarks={"pelvis": (0.0, 1.5, -2.0), "toe": (1.0, 2.0, 3.0)})
     assert load_initial_poses(path, ["Ann"]) == {"Ann": expected}
     path.write_text("pose: tpose\nposition: [1, 2, 3]\nheading: 90\n")
-    assert load_initial_poses(path, ["Ann"])["Ann"] == InitialPose("tpose", (1.0, 2.0, 3.0), 90.0)
+    assert load_initial_poses(path, ["Ann"])["Ann"] == PoseDescription("tpose", (1.0, 2.0, 3.0), 90.0)
     path.write_text("pose: {elbow: 0.5}\nlandmarks: {toe: [1, 2, 3]}\n")
-    pose = InitialPose({"elbow": 0.5}, landmarks={"toe": (1.0, 2.0, 3.0)})
+    pose = PoseDescription({"elbow": 0.5}, landmarks={"toe": (1.0, 2.0, 3.0)})
     assert load_initial_poses(path, ["Ann"])["Ann"] == pose
 
 
@@ -26,9 +26,9 @@ def test_several_actors_are_a_mapping(path):
     path.write_text("Ann: {pose: rest}\nBob: {landmarks: {toe: [1, 2, 3]}}\n")
     poses = load_initial_poses(path, ["Bob", "Ann"])
     assert list(poses) == ["Bob", "Ann"]
-    assert poses["Ann"] == InitialPose("rest")
+    assert poses["Ann"] == PoseDescription("rest")
     path.write_text("Ann: {pose: rest}\n")
-    assert load_initial_poses(path, ["Ann"]) == {"Ann": InitialPose("rest")}
+    assert load_initial_poses(path, ["Ann"]) == {"Ann": PoseDescription("rest")}
 
 
 @pytest.mark.parametrize(

@@ -1,15 +1,18 @@
 """The runner: passes in their order, each done once however often a run is stopped."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
+from body_cases import shipped
 from frame_table_cases import frame_table
 from rig_cases import recording_of, ring_rig
 
 from sogjax.io.frame_table import FramesRecord
+from sogjax.run.actors import Actors
+from sogjax.run.background import Background
 from sogjax.run.clip import Clip
-from sogjax.run.passes import ADJUSTING_ALONE, PASSES, Pass
+from sogjax.run.passes import BEFORE_TRACKING, PASSES, Pass
 from sogjax.run.run import Run
 from sogjax.run.runner import run_passes
 from sogjax.settings.compose import track_config
@@ -75,8 +78,31 @@ def test_frames_are_those_of_the_last_pass_that_left_any(tmp_path):
     assert run.frames is tracked.table
     run.records["filtered"] = filtered
     assert run.frames is run.unadjusted is filtered.table
+    run.records |= {"adjusted": FramesRecord(frame_table([[2.0] * 5] * 3)), "smoothed": FramesRecord(tracked.table)}
+    assert run.unadjusted is filtered.table
+    assert run.frames is tracked.table
 
 
 def test_every_record_that_is_kept_says_how():
     assert all(hasattr(each.record, "save") and hasattr(each.record, "load") for each in PASSES if each.record)
-    assert {*ADJUSTING_ALONE} <= {each.name for each in PASSES}
+
+
+def wanted(run):
+    return [each.name for each in PASSES if each.name not in run.records and each.wanted(run)]
+
+
+def test_the_passes_of_a_command_are_those_that_it_wants(tmp_path):
+    """Of every pass it is said here which commands have it."""
+    recording = recording_of(ring_rig(2), 8)
+    clip, config = Clip(recording, recording.frames, 4), track_config(recording="r")
+    known = {"background": Background(None), "actors": Actors((shipped("dog"),))}
+    tracking = ["initial_pose", "tracked", "merged"]
+    assert wanted(Run(clip, config, tmp_path, records=dict(known))) == [*tracking, "result", "files"]
+    assert wanted(Run(clip, config, records=dict(known))) == tracking
+    adjusting = replace(config, adjust=True)
+    given = Run(clip, adjusting, tmp_path, frames_given=True, records=known | {"tracked": None})
+    assert wanted(given) == ["adjusted", "result", "files"]
+    assert wanted(Run(clip, adjusting, records=dict(known))) == [*tracking, "adjusted"]
+    assert [each.name for each in BEFORE_TRACKING] == ["background", "actors", "initial_pose", "keypoint_bias"]
+    conditional = {"relearnt", "keypoint_bias"}  # a background learnt from the clip, keypoints
+    assert {each.name for each in PASSES} == {*known, *tracking, "adjusted", "result", "files"} | conditional

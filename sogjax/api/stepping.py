@@ -16,7 +16,7 @@ from sogjax.run import build
 from sogjax.run.actors import Actors
 from sogjax.run.clip import Clip
 from sogjax.run.clip_keypoints import ClipKeypoints
-from sogjax.run.passes import PASSES
+from sogjax.run.passes import BEFORE_TRACKING
 from sogjax.run.recordings import chosen_frames, with_cameras
 from sogjax.run.run import Run
 from sogjax.run.runner import run_passes
@@ -26,8 +26,6 @@ from sogjax.tracking.culling import Capacities, capacity_for
 from sogjax.tracking.frame import AnyFrame, on_device
 from sogjax.tracking.tracker import Tracker
 
-BEFORE_TRACKING = ("background", "initial_pose", "keypoint_bias")
-"""The passes that say how the first frame is tracked."""
 ROOM = 2
 """Times the room that suits the first frame: nobody makes more while a pure step runs."""
 
@@ -62,7 +60,7 @@ def make_tracker(
     config, actors = track_settings(**settings), actor_list(actor)
     clip = opened_clip(with_cameras(recording, config.cameras), config)
     run = Run(clip, config, terms=terms, records={"actors": Actors(tuple(actors))})
-    run_passes(run, [each for each in PASSES if each.name in BEFORE_TRACKING])
+    run_passes(run, BEFORE_TRACKING)
     tracker = replace(run.setup.tracker, first_pose=jnp.asarray(run.initial_pose.pose))
     frame = on_device(next(clip.frames(run.initial_pose.frame, run.initial_pose.frame + 1)))
     return replace(tracker, capacities=_with_more_room(first_capacities(tracker, tracker.start(), frame)))

@@ -12,7 +12,7 @@ from sogjax.errors import InputError
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.io.files import visible_files
 from sogjax.io.image_file import IMAGE_SUFFIXES, read_image, read_mask
-from sogjax.io.initial_pose import InitialPose, parse_initial_pose
+from sogjax.io.initial_pose import PoseDescription, parse_initial_pose
 from sogjax.io.yaml_entry import Entry
 
 
@@ -22,7 +22,7 @@ class ExampleSettings:
 
     name: str
     actor: str | None = None
-    initial_pose: InitialPose | None = None
+    initial_pose: PoseDescription | None = None
     frame: int | None = None
     """The frame of the videos, in the recording's own numbering; None: the pictures lie in the folder `name`."""
 
@@ -74,7 +74,7 @@ class ExamplePose:
     """The picture of each camera."""
     masks: dict[str, Path]
     """The mask of each camera that has one; white = subject."""
-    initial_pose: InitialPose | None
+    initial_pose: PoseDescription | None
     frame: int | None = None
     """The recording's number, where the images are a frame of the videos; None: they are files."""
     within: dict[str, Bool[np.ndarray, "_rows _columns"]] | None = None

@@ -11,7 +11,7 @@ _KEYS = ("pose", "position", "heading", "landmarks")
 
 
 @dataclass(frozen=True)
-class InitialPose:
+class PoseDescription:
     """A rough pose: a named or listed pose at a place, roughly known points, or both."""
 
     pose: str | dict[str, float] | None = None
@@ -24,14 +24,14 @@ class InitialPose:
     """Roughly known points, metres, world."""
 
 
-def load_initial_poses(path: Path, actors: Sequence[str]) -> dict[str, InitialPose]:
+def load_initial_poses(path: Path, actors: Sequence[str]) -> dict[str, PoseDescription]:
     """The initial pose of each of `actors`; with one actor the file may be its pose alone. Others are left out.
 
     Raises:
         InputError: no such file, an actor is missing, or a value is wrong.
     """
     poses = read_initial_poses(path)
-    if isinstance(poses, InitialPose):
+    if isinstance(poses, PoseDescription):
         if len(actors) == 1:
             return {actors[0]: poses}
         raise InputError(
@@ -44,7 +44,7 @@ def load_initial_poses(path: Path, actors: Sequence[str]) -> dict[str, InitialPo
     return {actor: poses[actor] for actor in actors}
 
 
-def read_initial_poses(path: Path) -> InitialPose | dict[str, InitialPose]:
+def read_initial_poses(path: Path) -> PoseDescription | dict[str, PoseDescription]:
     """What the file holds: one pose, or a mapping of actor names to poses."""
     entry = read_yaml(path)
     actors = entry.mapping()
@@ -54,13 +54,13 @@ def read_initial_poses(path: Path) -> InitialPose | dict[str, InitialPose]:
     return parse_initial_pose(entry)
 
 
-def parse_initial_pose(entry: Entry) -> InitialPose:
+def parse_initial_pose(entry: Entry) -> PoseDescription:
     """The pose that is written in an entry of a YAML file."""
     given = entry.given(_KEYS)
     if not given.keys() & {"pose", "position", "landmarks"}:
         raise entry.error("'pose' and 'position', or 'landmarks'")
     landmarks = given["landmarks"].mapping() if "landmarks" in given else {}
-    return InitialPose(
+    return PoseDescription(
         pose=_pose(given["pose"]) if "pose" in given else None,
         position=_point(given["position"]) if "position" in given else None,
         heading=given["heading"].number("degrees") if "heading" in given else None,

@@ -34,7 +34,7 @@ Report = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Adjusted:
+class Adjustment:
     """An adjusted clip."""
 
     poses: Float[np.ndarray, "frame dof"]
@@ -71,7 +71,7 @@ def adjusted(
     report: Report = lambda _: None,
     moves: Float[np.ndarray, "camera 7"] | None = None,
     in_question: tuple[str, ...] = (),
-) -> Adjusted:
+) -> Adjustment:
     """Poses and shape of highest energy near a tracked motion.
 
     Args:
@@ -117,7 +117,7 @@ def adjusted(
         for name, value in part.values.items():
             values[name][rows] = value
     total = sum(len(rows) for rows, _ in parts)
-    return Adjusted(
+    return Adjustment(
         stand.poses,
         stand.params,
         shape.shaped(jnp.asarray(stand.params, jnp.float32)),

@@ -15,7 +15,6 @@ from sogjax.run.adjust_checks import check_length, check_window
 from sogjax.run.adjust_clip import AdjustRequest
 from sogjax.run.fingerprint import RunFingerprint, digest
 from sogjax.run.forward import Tracked
-from sogjax.run.passes import ADJUSTING_ALONE, PASSES
 from sogjax.run.recordings import opened
 from sogjax.run.result import RunResult
 from sogjax.run.run import Run
@@ -69,7 +68,7 @@ def adjust_to_folder(config: AdjustConfig) -> RunResult:
             before_results=lambda: folder.clear(tracked.files),
             records={"actors": Actors((tracked.actor,)), "tracked": Tracked(_table(motion))},
         )
-        run_passes(run, [each for each in PASSES if each.name in ADJUSTING_ALONE])
+        run_passes(run)
         folder.finish("adjust", fingerprint, run.files)
     return replace(run.result, files=run.files)
 

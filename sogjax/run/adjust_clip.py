@@ -21,8 +21,7 @@ from sogjax.model.bones import bone_lengths
 from sogjax.model.rotation import axis_vector, world_from_upright
 from sogjax.quality.markers import joint_errors
 from sogjax.quality.numbers import write_json
-from sogjax.refine.adjustment import Adjusted as Found
-from sogjax.refine.adjustment import adjusted
+from sogjax.refine.adjustment import Adjustment, adjusted
 from sogjax.refine.clip_priors import floor_height, standing, step_of, undersides
 from sogjax.refine.pictures import ClipPictures, Reader
 from sogjax.run import build
@@ -189,7 +188,7 @@ def _motion(setup: Setup, table: FrameTable) -> Motion:
 
 
 def _recolored(
-    setup: Setup, source: _Source, found: Found, table: FrameTable, color: ColorConfig
+    setup: Setup, source: _Source, found: Adjustment, table: FrameTable, color: ColorConfig
 ) -> tuple[Body, float]:
     """The adjusted body with the colours that the clip shows, if it is more similar so; and by which factor it is."""
     say("adjusting: colours")
@@ -201,13 +200,13 @@ def _recolored(
     return (body if after > CLEARLY * before else found.body), after / before
 
 
-def _energies(found: Found, setup: Setup) -> Float[np.ndarray, "frame"]:
+def _energies(found: Adjustment, setup: Setup) -> Float[np.ndarray, "frame"]:
     """Eq. 10 of each frame, without a history."""
     parts = [float(term.signed_weight) * found.values[term.name] for term in setup.tracker.terms]
     return np.sum(parts, axis=0)
 
 
-def _table(found: Found, setup: Setup, before: FrameTable) -> FrameTable:
+def _table(found: Adjustment, setup: Setup, before: FrameTable) -> FrameTable:
     """The adjusted frames as a run keeps them."""
     count, cameras = len(found.poses), len(setup.clip.grids)
     none = np.zeros((count, cameras), int)
@@ -226,7 +225,7 @@ def _table(found: Found, setup: Setup, before: FrameTable) -> FrameTable:
     )
 
 
-def _numbers(body: Body, before: Motion, after: Motion, found: Found, recording: Recording) -> dict[str, Any]:
+def _numbers(body: Body, before: Motion, after: Motion, found: Adjustment, recording: Recording) -> dict[str, Any]:
     """What was changed, and what it was good for."""
     was, now = bone_lengths(body), bone_lengths(found.body)
     numbers: dict[str, Any] = {

@@ -9,8 +9,7 @@ from jaxtyping import Array, Float
 
 from sogjax.energy.term import Term
 from sogjax.errors import InputError
-from sogjax.io.initial_pose import InitialPose as PoseDescription
-from sogjax.io.initial_pose import load_initial_poses
+from sogjax.io.initial_pose import PoseDescription, load_initial_poses
 from sogjax.io.npz_file import finite_array, read_npz, save_npz, text_array
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sogjax.errors import counted
-from sogjax.io.initial_pose import InitialPose
+from sogjax.io.initial_pose import PoseDescription
 from sogjax.io.keypoints.load import Keypoints, load_keypoints
 from sogjax.io.keypoints.scheme import KeypointScheme
 from sogjax.io.recording import Recording
@@ -116,11 +116,11 @@ def keypoint_actor(recording: Recording, body: Body, space: str, symmetric: bool
     return colored.rotated(jnp.asarray(world_from_upright(recording.up).T, body.blob_sigmas.dtype))
 
 
-def _rough(body: Body, found: KeypointPose) -> InitialPose:
+def _rough(body: Body, found: KeypointPose) -> PoseDescription:
     """The pose as places of the body's landmarks."""
     points = np.asarray(body.posed_landmarks(jnp.asarray(found.pose, body.landmarks.offsets.dtype)), float)
     places = zip(body.landmarks.names, points.tolist(), strict=True)
-    return InitialPose(landmarks={name: (x, y, z) for name, (x, y, z) in places})
+    return PoseDescription(landmarks={name: (x, y, z) for name, (x, y, z) in places})
 
 
 def _upright(body: Body, recording: Recording) -> Body:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import takewhile
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -144,7 +145,8 @@ class Run:
     @property
     def unadjusted(self) -> FrameTable:
         """The frames as they held before they were adjusted."""
-        return _last_table(record for record in self.records.values() if record is not self.adjusted)
+        before = takewhile(lambda name: name != "adjusted", self.records)
+        return _last_table(self.records[name] for name in before)
 
     @property
     def final_setup(self) -> Setup:

@@ -22,7 +22,6 @@ from sogjax.run.fingerprint import run_fingerprint
 from sogjax.run.initial_pose import SOURCES, PoseSource, described_poses, pose_file
 from sogjax.run.judge import compared, kept_verdicts
 from sogjax.run.memory import forget_programs_if_many
-from sogjax.run.passes import PASSES
 from sogjax.run.recordings import chosen_frames, file_list, opened, upright
 from sogjax.run.result import RunResult
 from sogjax.run.run import Run
@@ -32,8 +31,6 @@ from sogjax.run.runner import run_passes
 from sogjax.run.terminal import say
 from sogjax.run.write import check_pose2sim, export_endings
 from sogjax.settings.run import TrackConfig
-
-WITHOUT_FILES = tuple(each for each in PASSES if each.name not in ("result", "files"))
 
 
 def track_to_folder(
@@ -118,7 +115,7 @@ def run_without_files(
             pose_sources=pose_sources,
             records={"actors": Actors(tuple(bodies))},
         )
-        return run_passes(run, WITHOUT_FILES)
+        return run_passes(run)
 
 
 def opened_clip(recording: Recording, config: TrackConfig) -> Clip:

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from sogjax.errors import InputError, counted
-from sogjax.io.initial_pose import InitialPose
+from sogjax.io.initial_pose import PoseDescription
 from sogjax.model.body import Body
 from sogjax.search.placed_body import heading_dof, headings, landmarks_of, placed, root_dofs, root_position, turned
 from sogjax.search.point_fit import ANYWHERE, Points, fitted_to_points
@@ -23,7 +23,7 @@ NUM_HEADINGS = 12
 MIN_LANDMARKS = 4
 
 
-def rough_pose(body: Body, description: InitialPose, up: str) -> Float[Array, "dof"]:
+def rough_pose(body: Body, description: PoseDescription, up: str) -> Float[Array, "dof"]:
     """The pose that a description means; `body` stands upright in the recording's world (vertical `up`) already.
 
     Raises:
@@ -40,7 +40,7 @@ def rough_pose(body: Body, description: InitialPose, up: str) -> Float[Array, "d
     return start
 
 
-def check_rough_pose(body: Body, description: InitialPose, up: str) -> None:
+def check_rough_pose(body: Body, description: PoseDescription, up: str) -> None:
     """Refuse a description that means no pose of a body.
 
     Raises:
