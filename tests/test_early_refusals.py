@@ -12,9 +12,10 @@ from sogjax.cli.schemas import CALIBRATIONS, FORMATS, MOTIONS
 from sogjax.cli.words import check_endings, composed
 from sogjax.errors import InputError
 from sogjax.io.export.write import WRITERS
+from sogjax.run.initial_pose import NAMES
 from sogjax.run.tracked_motion import _config
 from sogjax.settings.compose import track_config
-from sogjax.settings.option import telling_settings
+from sogjax.settings.option import help_lines, telling_settings
 from sogjax.settings.run import OutputsConfig, TrackConfig
 from sogjax.settings.wrong_values import REMOVED
 
@@ -77,6 +78,11 @@ def test_the_configuration_of_an_older_run_is_read_without_what_is_no_setting_an
     old = {"solver": {"method": "lbfgs", "grow": 1.2}, "tracking": {"repair": False}, "outputs": {"worst": True}}
     (tmp_path / "config.yaml").write_text(yaml.safe_dump({"recording": "r", "stop": 9} | old))
     assert _config(tmp_path / "config.yaml") == track_config(recording="r", stop=9, solver={"method": "lbfgs"})
+
+
+def test_the_help_tells_the_names_that_an_initial_pose_can_have():
+    (text,) = [line.text for line in help_lines(TrackConfig) if line.key == "initial_pose"]
+    assert all(f"{name}: " in text for name in NAMES)
 
 
 def test_one_switch_for_the_motion_only():

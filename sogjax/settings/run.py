@@ -64,8 +64,8 @@ class TrackConfig:
     body: str = option("human", "body that actors are made from: human, dog, or a body file")
     initial_pose: str | None = option(
         None,
-        "auto: search | file with a rough pose; null: the recording's initial_pose.yaml, else its keypoints if there "
-        "is one actor, else auto",
+        "auto: a frame of the videos that the actor was made of, else a search | file with a rough pose; null: the "
+        "recording's initial_pose.yaml, else such a frame, else its keypoints, else a search",
     )
     start: int = option(0, "first frame to track, counted from the recording's first")
     stop: int | None = option(None, "frame before which to stop; null: the end")
