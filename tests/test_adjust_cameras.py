@@ -97,6 +97,12 @@ def test_velocities_are_those_of_frames_that_follow():
     np.testing.assert_allclose(found[:, 0, 0], [1.0, 2.0, 4.0, 5.0, 0.0])
 
 
+def test_every_second_frame_has_the_velocities_of_all():
+    frames = np.arange(3, 13)
+    means = np.array([0.2, -0.1, 0.3]) * frames[:, None, None] + np.zeros((1, 2, 3))
+    np.testing.assert_allclose(velocities_of(means[::2], frames[::2]), velocities_of(means, frames)[::2])
+
+
 def cameras_model(moves, most=1.0, at=None):
     """Cameras of which each alone decides; the best moves are given, and those now, and what else there is to gain."""
     count = len(moves)

@@ -62,17 +62,18 @@ def differences(value, at, step=1e-6):
 def test_smoothness_has_the_gradient_of_its_value_and_forgives_what_is_sudden():
     rng = np.random.default_rng(1)
     poses, frames = rng.normal(scale=0.05, size=(7, 3)), np.arange(7)
-    value = lambda p: smooth_model(p, frames, 2.0, 0.06).value
-    model = smooth_model(poses, frames, 2.0, 0.06)
+    value = lambda p: smooth_model(p, frames, 2.0, 0.06, 1).value
+    model = smooth_model(poses, frames, 2.0, 0.06, 1)
     np.testing.assert_allclose(model.gradient, differences(value, poses), atol=1e-7)
     jump = np.zeros((7, 1))
     jump[3:] = 1.0
     assert value(10.0 * jump) > 12.0 * value(jump)  # negative; squares would be 100 times as much
 
 
-def test_frames_apart_are_not_joined():
+@pytest.mark.parametrize("step", [1, 2])
+def test_frames_apart_are_not_joined(step):
     poses = np.array([[0.0], [1.0], [0.0], [5.0], [0.0]])
-    together = smooth_model(poses, np.array([0, 1, 2, 9, 10]), 1.0, 100.0)
+    together = smooth_model(poses, step * np.array([0, 1, 2, 9, 10]), 1.0, 100.0, step)
     assert together.value == pytest.approx(-0.5 * 2.0**2)
     assert np.all(together.gradient[3:] == 0.0)
 
@@ -115,12 +116,13 @@ def walking_feet(frames=20, fps=30.0):
     return means, np.array([0.04, 0.04, 0.08])
 
 
-def test_a_foot_that_is_slow_and_low_stands():
+@pytest.mark.parametrize("step", [1, 3])
+def test_a_foot_that_is_slow_and_low_stands(step):
     means, sigmas = walking_feet()
     heights = undersides(means, sigmas, UP)
     floor = floor_height(heights)
     assert floor == pytest.approx(0.0, abs=0.005)
-    pairs = standing(means, heights - floor, np.arange(20), 30.0)
+    pairs = standing(means, heights - floor, step * np.arange(20), 30.0 * step, step)
     assert pairs[:-1, 0].all()
     assert not pairs[-1].any()
     assert not pairs[:, 1:].any()
@@ -131,7 +133,7 @@ def test_somebody_in_the_air_has_no_floor():
     means[..., 2] += np.linspace(0.0, 1.0, 20)[:, None]
     floor = floor_height(undersides(means, sigmas, UP))
     assert np.isnan(floor)
-    assert not standing(means, undersides(means, sigmas, UP) - floor, np.arange(20), 30.0).any()
+    assert not standing(means, undersides(means, sigmas, UP) - floor, np.arange(20), 30.0, 1).any()
 
 
 @pytest.fixture(scope="module")

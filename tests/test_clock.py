@@ -52,6 +52,12 @@ def test_a_stage_that_ends_with_an_error_ends(at):
     assert running.seconds() == {TRACKING: 2.0, OTHER: 1.0, TOTAL: 3.0}
 
 
+def test_a_stage_of_any_name_has_its_line(at):
+    with clocked() as running, stage("smoothing"):
+        at(2.0)
+    assert running.seconds() == {"smoothing": 2.0, OTHER: 0.0, TOTAL: 2.0}
+
+
 def test_other_threads_and_no_clock_count_nothing(at):
     with stage(TRACKING):
         at(1.0)

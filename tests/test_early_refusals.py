@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import fields
 
 import pytest
 import yaml
@@ -12,8 +13,10 @@ from sogjax.cli.words import check_endings, composed
 from sogjax.errors import InputError
 from sogjax.io.export.write import WRITERS
 from sogjax.run.adjust import _config
+from sogjax.run.initial_pose import NAMES
 from sogjax.settings.compose import track_config
-from sogjax.settings.run import OutputsConfig
+from sogjax.settings.option import help_lines, telling_settings
+from sogjax.settings.run import OutputsConfig, TrackConfig
 from sogjax.settings.wrong_values import REMOVED
 
 
@@ -77,8 +80,22 @@ def test_the_configuration_of_an_older_run_is_read_without_what_is_no_setting_an
     assert _config(tmp_path / "config.yaml") == track_config(recording="r", stop=9, solver={"method": "lbfgs"})
 
 
+def test_the_help_tells_the_names_that_an_initial_pose_can_have():
+    (text,) = [line.text for line in help_lines(TrackConfig) if line.key == "initial_pose"]
+    assert all(f"{name}: " in text for name in NAMES)
+
+
 def test_one_switch_for_the_motion_only():
     asked = track_config(["outputs.motion_only=true"], recording="r").outputs.asked()
     assert (asked.overlay, asked.rerun, asked.bvh, asked.formats) == (False, False, False, None)
     assert OutputsConfig().asked().overlay
     check_endings("track", track_config(recording="r"))
+
+
+def test_without_files_what_belongs_to_the_motion_is_kept():
+    asked = OutputsConfig(motion_only=True, confidence=False, formats=["c3d"]).asked()
+    assert (asked.confidence, asked.formats) == (False, None)
+    assert OutputsConfig(motion_only=True).asked().confidence
+    files = {"motion_only", "overlay", "overlay_width", "rerun", "rerun_images", "bvh", "formats", "pose2sim"}
+    telling = {key.removeprefix("outputs.") for key in telling_settings(TrackConfig()) if key.startswith("outputs.")}
+    assert telling == {entry.name for entry in fields(OutputsConfig)} - files

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from rig_cases import recording_of, ring_rig
+from run_cases import pose_request
 
 from sogjax.actor.example_pose import consistent_ways, disagreement
 from sogjax.actor.frame_choice import SHAPE_VOXELS, SeenShape, spread_choice, unlikeness
@@ -13,11 +14,9 @@ from sogjax.actor.make import MadeActor
 from sogjax.errors import InputError
 from sogjax.io.example_poses import ExamplePose
 from sogjax.run.actors import Actors, known_frames
-from sogjax.run.background import Background
 from sogjax.run.clip import Clip
 from sogjax.run.example_frames import check_actors, most_helpful, several_people, unsuitable
-from sogjax.run.initial_pose import PoseRequest, from_example_frames
-from sogjax.settings.run import TrackConfig
+from sogjax.run.initial_pose import from_example_frames
 
 
 def shape(frame, part, **values):
@@ -92,18 +91,20 @@ class Made(MadeActor):
         return self.fits[self.frames[name]]
 
 
-def test_several_actors_begin_where_all_poses_are_known_and_the_worst_fits_best():
-    recording, config = recording_of(ring_rig(2), 99), TrackConfig(recording="walk")
+def test_several_actors_begin_where_all_poses_are_known_and_the_worst_fits_best(capsys):
+    recording = recording_of(ring_rig(2), 99)
     anna = Made({3: 0.9, 8: 0.8, 20: 0.99}, {3: [3.0], 8: [8.0], 20: [20.0]})
     ben = Made({3: 0.6, 8: 0.7}, {3: [30.0, 31.0], 8: [80.0, 81.0]})
 
-    def found(made, start=0):
-        clip, actors = Clip(recording, recording.frames[start:], 4), Actors((), known_frames(made))
-        return from_example_frames(PoseRequest(clip, Background(None), actors, config))
+    def found(made, start=0, every=1):
+        clip = Clip(recording, recording.frames[start::every], 4)
+        return from_example_frames(pose_request(clip=clip, actors=Actors((), known_frames(made))))
 
     assert found([anna, ben]).frame == 8
     np.testing.assert_array_equal(found([anna, ben]).pose, [8.0, 80.0, 81.0])
     assert found([anna, ben], start=9) is None
+    assert found([anna, ben], every=7) is None
+    assert "(3, 8) are not among those to track" in capsys.readouterr().err
     assert found([anna]).frame == 20
 
 

@@ -18,3 +18,9 @@ def test_a_clip_is_tracked_for_its_background_only_where_that_can_help(unknown, 
 
 def test_every_second_frame_has_the_samples_that_it_has():
     assert frames_to_learn_from(0.5, SAMPLES, range(0, 300, 2)) == SAMPLES
+
+
+def test_samples_that_are_not_tracked_are_told(capsys):
+    samples = [*range(0, 600, 30)]
+    assert frames_to_learn_from(0.5, samples, range(0, 600, 20)) == samples[::2]
+    assert "of 20 frames to learn the background from, 10 are tracked" in capsys.readouterr().err

@@ -11,7 +11,7 @@ from sogjax.cli.words import composed
 from sogjax.io.actor_file import load_body
 from sogjax.io.motion import load_motion
 from sogjax.io.recording import open_recording
-from sogjax.refine.adjustment import Adjusted
+from sogjax.refine.adjustment import Adjustment
 from sogjax.run import adjust_clip, merge, passes, track
 from sogjax.settings.compose import track_config
 from sogjax.tracking import frame_by_frame
@@ -41,7 +41,7 @@ def higher(monkeypatch):
         found = poses.copy()
         found[:, 2] += HIGHER
         values = {term.name: np.zeros(len(poses)) for term in tracker.terms} | {"similarity": np.asarray(similarity)}
-        return Adjusted(
+        return Adjustment(
             found, np.zeros(0), tracker.body, 1.0, 2.0, np.arange(len(poses)), 1, values, 256, np.asarray(moves), {}
         )
 

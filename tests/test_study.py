@@ -64,7 +64,7 @@ def experiment(**rows):
     [
         ("title: T\nquestion: Q\naxis: x\nrows: {a: {}}", "has no reference"),
         ("title: T\nquestion: Q\naxis: x\nreference: b\nrows: {a: {}}", "'b' is not a row"),
-        ("title: T\nquestion: Q\naxis: x\nreference: a\nrows: {a: {every: 0}}", "must be 1 or more"),
+        ("title: T\nquestion: Q\naxis: x\nreference: a\nrows: {a: {cameras: 0}}", "must be 1 or more"),
         ("title: T\nquestion: Q\naxis: x\nreference: a\nrows: {a: {sets: []}}", "sets"),
         (
             "title: T\nquestion: Q\naxis: x\nreference: a\nmethods: {m: []}\nrows: {a: {methods: [n]}}",
@@ -82,14 +82,16 @@ def test_a_wrong_experiment_file_is_refused(tmp_path, text, words):
 
 
 def test_the_key_of_a_run_knows_its_numbers_and_not_its_outputs():
-    base = RunPlan.of("walk", 9, ("a",), 1, "accuracy", TrackConfig())
+    base = RunPlan.of("walk", 9, ("a",), "accuracy", TrackConfig())
     same = TrackConfig(out="elsewhere", recording="there")
     same.images.cache = "cells"
-    assert RunPlan.of("walk", 9, ("a",), 1, "accuracy", same).key == base.key
+    assert RunPlan.of("walk", 9, ("a",), "accuracy", same).key == base.key
     other = TrackConfig()
     other.energy.limit_weight = 2.0
-    keys = {replace(base, every=2).key, replace(base, frames=8).key, replace(base, cameras=["b"]).key}
-    assert len(keys | {base.key, RunPlan.of("walk", 9, ("a",), 1, "accuracy", other).key}) == 5
+    stepped = RunPlan.of("walk", 9, ("a",), "accuracy", TrackConfig(every=2, adjust=True))
+    assert stepped.config == base.config | {"every": 2, "adjust": True}
+    keys = {replace(base, frames=8).key, replace(base, cameras=["b"]).key}
+    assert len(keys | {base.key, RunPlan.of("walk", 9, ("a",), "accuracy", other).key}) == 4
 
 
 PAPERS = dict.fromkeys("abc", ("", None))
@@ -171,7 +173,7 @@ def source_folder(tmp_path_factory):
 
 @pytest.mark.slow
 def test_a_run_is_done_once_and_resumed_after_that(source_folder, monkeypatch, capsys):
-    rows = {"a": RowConfig(set=list(SMALL)), "b": RowConfig(set=list(SMALL), cameras=2, every=2)}
+    rows = {"a": RowConfig(set=list(SMALL)), "b": RowConfig(set=[*SMALL, "every=2"], cameras=2)}
     study = Study(source_folder, [str(source_folder / "person")], 4)
     first = {row: run for row, _, run in study.records(experiment(**rows))}
     assert [run.frame for run in first.values()] == [[0, 1, 2, 3], [0, 2]]
@@ -179,7 +181,7 @@ def test_a_run_is_done_once_and_resumed_after_that(source_folder, monkeypatch, c
     assert all(np.isfinite(run.errors[1:]).all() for run in first.values())
     assert all(run.errors[0] < 1e-3 for run in first.values())  # mm: where markers are attached; it counts, too
     assert all(len(run.closest_mm) == len(run.error_mm) for run in first.values())
-    monkeypatch.setattr(runner, "run_without_files", None)
+    monkeypatch.setattr(runner, "track_recording", None)
     again = {row: run for row, _, run in Study(source_folder, study.recordings, 4).records(experiment(**rows))}
     assert repr(again) == repr(first)  # NaN equals nothing
     assert len(list((source_folder / "runs").glob("*.json"))) == 2
@@ -224,7 +226,7 @@ def test_a_run_that_fails_is_kept_and_the_others_go_on(source_folder):
 
 
 def test_a_broken_record_is_made_again(tmp_path):
-    runs, plan = RunFolder(tmp_path), RunPlan.of("walk", 9, (), 1, "accuracy", TrackConfig())
+    runs, plan = RunFolder(tmp_path), RunPlan.of("walk", 9, (), "accuracy", TrackConfig())
     runs.keep(plan, record([1.0, float("nan")]))
     np.testing.assert_array_equal(runs.find(plan).errors, [1.0, np.nan])
     (tmp_path / "runs" / f"{plan.key}.json").write_text("{")

@@ -20,13 +20,13 @@ from sogjax.cli.sweep.results import APART, Failure, Member, distances_to_first,
 from sogjax.cli.sweep.tables import finish_sweep
 from sogjax.io.motion_data import save_motion
 from sogjax.io.recording import open_recording
-from sogjax.run import shared_pose
 from sogjax.run.actors import Actors
 from sogjax.run.background import Background, learn_background
 from sogjax.run.clip import Clip
-from sogjax.run.initial_pose import InitialPose, PoseRequest
+from sogjax.run.initial_pose import SOURCES, InitialPose, PoseRequest
 from sogjax.run.result import COLUMNS, Numbers
 from sogjax.run.shared import SHARED, SharedRecords
+from sogjax.run.shared_pose import KNOWN, SWEEP_SOURCES, shared
 from sogjax.settings.compose import track_config
 
 UNKNOWN = float("nan")
@@ -45,11 +45,11 @@ class Searches(list):
     def initial_pose(self, *words):
         """What a member begins with."""
         config = track_config(words, recording="r")
-        return shared_pose.shared_pose(PoseRequest(self.clip, Background(None), Actors(()), config))
+        return self.source(PoseRequest(self.clip, Background(None), Actors(()), config))
 
 
 @pytest.fixture
-def searches(monkeypatch, tmp_path):
+def searches(tmp_path):
     """The configs of the searches that are done, each for another pose."""
     seen = Searches(open_recording(trackable(tmp_path / "two")))
 
@@ -57,23 +57,31 @@ def searches(monkeypatch, tmp_path):
         seen.append(request.config)
         return InitialPose(4, np.full(3, float(len(seen))), "search")
 
-    monkeypatch.setattr(shared_pose, "from_keypoints", lambda request: None)
-    monkeypatch.setattr(shared_pose, "from_search", search)
+    seen.source = shared([lambda request: None, search])
     SHARED.forget()
     yield seen
     SHARED.forget()
 
 
 def test_a_setting_of_energy_or_solver_leaves_the_first_pose(searches):
-    words = ("energy.limit_weight=0", "energy.limit_weight=1", "solver=lbfgs")
-    assert [searches.initial_pose(word).pose.tolist() for word in words] == [[1.0] * 3] * 3
+    words = ("energy.limit_weight=0", "energy.limit_weight=1", "solver=lbfgs", "outputs.bvh=false", "adjust=true")
+    assert [searches.initial_pose(word).pose.tolist() for word in words] == [[1.0] * 3] * len(words)
     usual = track_config(recording="r").energy
     assert searches[0].energy == usual  # and not the first member's
 
 
-@pytest.mark.parametrize("word", ["start=4", "cameras=[a,b]", "color.space=rgb", "images.background=none", "body=dog"])
+@pytest.mark.parametrize(
+    "word", ["start=4", "every=2", "cameras=[a,b]", "color.space=rgb", "images.background=none", "body=dog"]
+)
 def test_what_changes_what_is_seen_changes_the_first_pose(searches, word):
     assert searches.initial_pose().pose.tolist() != searches.initial_pose(word).pose.tolist()
+
+
+def test_members_ask_every_source_in_its_order():
+    alone = [source for source in SOURCES if source in KNOWN]
+    assert [source for source in SWEEP_SOURCES if source in KNOWN] == alone
+    assert SWEEP_SOURCES[0] is SOURCES[0]
+    assert len(SWEEP_SOURCES) == len(alone) + 1  # the others follow each other
 
 
 @pytest.mark.parametrize(

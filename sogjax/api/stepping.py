@@ -12,11 +12,12 @@ from sogjax.energy.term import Term
 from sogjax.errors import InputError
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
+from sogjax.run import build
 from sogjax.run.actors import Actors
 from sogjax.run.clip import Clip
 from sogjax.run.clip_keypoints import ClipKeypoints
-from sogjax.run.passes import PASSES
-from sogjax.run.recordings import with_cameras
+from sogjax.run.passes import BEFORE_TRACKING
+from sogjax.run.recordings import chosen_frames, with_cameras
 from sogjax.run.run import Run
 from sogjax.run.runner import run_passes
 from sogjax.run.track import opened_clip
@@ -25,8 +26,6 @@ from sogjax.tracking.culling import Capacities, capacity_for
 from sogjax.tracking.frame import AnyFrame, on_device
 from sogjax.tracking.tracker import Tracker
 
-BEFORE_TRACKING = ("background", "initial_pose", "keypoint_bias")
-"""The passes that say how the first frame is tracked."""
 ROOM = 2
 """Times the room that suits the first frame: nobody makes more while a pure step runs."""
 
@@ -52,7 +51,8 @@ def make_tracker(
         recording: whose cameras and first frame the tracker is made for.
         actor: one, or a list of them, which become one body with their poses one after the other.
         terms: further terms of the energy, beside those of the settings.
-        settings: as in `track_settings`; `start` is the frame of the initial pose, and to be given to `read_cells` too.
+        settings: as in `track_settings`; `start` is the frame of the initial pose; it and `every` are to be given to
+            `read_cells` too.
 
     Raises:
         InputError: as `track`.
@@ -60,13 +60,15 @@ def make_tracker(
     config, actors = track_settings(**settings), actor_list(actor)
     clip = opened_clip(with_cameras(recording, config.cameras), config)
     run = Run(clip, config, terms=terms, records={"actors": Actors(tuple(actors))})
-    run_passes(run, [each for each in PASSES if each.name in BEFORE_TRACKING])
+    run_passes(run, BEFORE_TRACKING)
     tracker = replace(run.setup.tracker, initial_pose=jnp.asarray(run.initial_pose.pose))
     frame = on_device(next(clip.frames(run.initial_pose.frame, run.initial_pose.frame + 1)))
     return replace(tracker, capacities=_with_more_room(first_capacities(tracker, tracker.start(), frame)))
 
 
-def read_cells(recording: Recording, tracker: Tracker, start: int = 0, stop: int | None = None) -> Iterator[AnyFrame]:
+def read_cells(
+    recording: Recording, tracker: Tracker, start: int = 0, stop: int | None = None, every: int = 1
+) -> Iterator[AnyFrame]:
     """What a tracker's step takes of each frame: the pictures of all cameras, averaged to cells (sRGB).
 
     Args:
@@ -74,6 +76,7 @@ def read_cells(recording: Recording, tracker: Tracker, start: int = 0, stop: int
         tracker: which says how pictures are cut into cells.
         start: first frame, counted from the recording's first.
         stop: the frame before which to stop; None: the end.
+        every: how many frames lie from one to the next.
 
     Returns:
         An iterator with the cells of each frame, as bytes; where a camera has no picture, or keypoints count, with
@@ -83,21 +86,15 @@ def read_cells(recording: Recording, tracker: Tracker, start: int = 0, stop: int
         InputError: a picture cannot be read, another number of cameras, or no such frames.
     """
     grids = tracker.reader.candidates.grids
-    last = recording.num_frames if stop is None else stop
     if len(grids) != len(recording.rig.names):
         raise InputError(
             f"{recording.path}: the tracker was made for {len(grids)} cameras, this recording has "
             f"{len(recording.rig.names)}; open it with the same cameras"
         )
-    if not 0 <= start < last <= recording.num_frames:
-        raise InputError(
-            f"start={start} stop={stop}: {recording.path} has the frames 0 to {recording.num_frames - 1}; choose "
-            f"0 <= start < stop <= {recording.num_frames}"
-        )
     pulled = keypoint_term_among(tracker.terms) is not None
     keypoints = ClipKeypoints.of_recording(recording) if pulled else None
-    numbers = recording.frames[start:last]
-    clip = Clip(recording, numbers, grids[0].depth, keypoints)
+    build.at_least("every", every, 1)
+    clip = Clip(recording, chosen_frames(recording, start, stop, every), grids[0].depth, keypoints)
     return (frame.cells if frame[1:] == (None, None) else frame for frame in map(on_device, clip.frames()))
 
 

@@ -17,6 +17,7 @@ from sogjax.run.recordings import with_cameras
 from sogjax.run.track import opened_clip, track_recording
 from sogjax.search.found_pose import FoundPose
 from sogjax.settings.compose import track_config
+from sogjax.settings.option import is_inert
 from sogjax.settings.run import OutputsConfig, TrackConfig
 
 _NOT_HERE = {
@@ -29,8 +30,6 @@ _NOT_HERE = {
     "overwrite": "no file is written, so nothing is overwritten",
 }
 """Options of the command that have no meaning without its files, and why."""
-_KEPT_OUTPUTS = ("confidence",)
-"""Outputs that are a part of the motion, and no files."""
 
 
 def track_settings(**settings: Any) -> TrackConfig:
@@ -53,7 +52,7 @@ def track_settings(**settings: Any) -> TrackConfig:
     build.check(config)
     outputs = settings.get("outputs")
     for entry in fields(OutputsConfig):
-        if isinstance(outputs, Mapping) and entry.name in outputs and entry.name not in _KEPT_OUTPUTS:
+        if isinstance(outputs, Mapping) and entry.name in outputs and is_inert(entry):
             raise InputError(f"outputs.{entry.name}: no file is written; use motion.save(path) or sogjax.write_rerun")
     return config
 

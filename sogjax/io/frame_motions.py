@@ -30,13 +30,14 @@ class ClipFacts:
     """What motions have to know of the clip that they were found in."""
 
     fps: float
+    """Of the recording, whose numbers frames have, however few of them are tracked."""
     up: str
     cameras: tuple[str, ...]
 
     @classmethod
-    def of(cls, recording: Recording, every: int = 1) -> "ClipFacts":
-        """The facts of a recording of which only `every`-th frame is tracked."""
-        return cls(recording.fps / every, recording.up, recording.rig.names)
+    def of(cls, recording: Recording) -> "ClipFacts":
+        """The facts of a recording."""
+        return cls(recording.fps, recording.up, recording.rig.names)
 
     def save(self, folder: Path) -> None:
         """Keep them in the folder of a run."""

@@ -30,7 +30,11 @@ class FrameTable:
     """What was found in the frames of a clip, all actors as one model; optional columns are None where unknown."""
 
     frame: Int[np.ndarray, "frame"] = column("", "the recording's number of the frame, increasing")
-    pose: Float[np.ndarray, "frame dof"] = column("rad, m", "Theta of all actors")
+    pose: Float[np.ndarray, "frame dof"] = column(
+        "rad, m",
+        "Theta of all actors; angles go on beyond half a turn, but may jump by whole ones at the ends of a merged "
+        "stretch: unwrap before filtering",
+    )
     energy: Float[np.ndarray, "frame"] = column("", "Eq. 10")
     iterations: Int[np.ndarray, "frame"] = column("", "iterations of the solver")
     evaluations: Int[np.ndarray, "frame"] = column("", "evaluations of the energy with its gradient")

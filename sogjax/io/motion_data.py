@@ -25,6 +25,7 @@ class MotionData:
     """
 
     fps: float
+    """Of the numbers in `frame`, which are the recording's: frame / fps is a time, however few frames there are."""
     frame: Int[np.ndarray, "frame"]
     """Frames of the recording, increasing."""
     time: Float[np.ndarray, "frame"]

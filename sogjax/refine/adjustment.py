@@ -16,7 +16,7 @@ from sogjax.refine.camera_moves import MOVE, velocities_of
 from sogjax.refine.camera_search import FoundCameras, found_cameras
 from sogjax.refine.climb import Climbed, climbed
 from sogjax.refine.clip_energy import ClipEnergy, Weights
-from sogjax.refine.clip_priors import floor_height, undersides
+from sogjax.refine.clip_priors import floor_height, step_of, undersides
 from sogjax.refine.clip_shape import ClipShape, frames_by_spread
 from sogjax.refine.pictures import ClipPictures
 from sogjax.tracking.tracker import Tracker
@@ -34,7 +34,7 @@ Report = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Adjusted:
+class Adjustment:
     """An adjusted clip."""
 
     poses: Float[np.ndarray, "frame dof"]
@@ -71,7 +71,7 @@ def adjusted(
     report: Report = lambda _: None,
     moves: Float[np.ndarray, "camera 7"] | None = None,
     in_question: tuple[str, ...] = (),
-) -> Adjusted:
+) -> Adjustment:
     """Poses and shape of highest energy near a tracked motion.
 
     Args:
@@ -80,7 +80,7 @@ def adjusted(
         poses: tracked.
         frames: their numbers.
         similarity: of each frame as tracked, NaN where it is not known.
-        fps: frames per second.
+        fps: frames per second, of their numbers.
         up: the world's vertical.
         window: frames that are adjusted together; so many frames' pictures are kept in memory.
         weights: of the parts of the energy; None: the usual.
@@ -117,7 +117,7 @@ def adjusted(
         for name, value in part.values.items():
             values[name][rows] = value
     total = sum(len(rows) for rows, _ in parts)
-    return Adjusted(
+    return Adjustment(
         stand.poses,
         stand.params,
         shape.shaped(jnp.asarray(stand.params, jnp.float32)),
@@ -210,7 +210,7 @@ class _Clip:
             velocities = velocities_of(means, self.frames)[rows]
         return ClipEnergy(
             self.tracker, self.shape, self.pictures(rows, stand.poses[rows]), self.frames[rows], self.fps,
-            self.vertical, self.weights, self.floor, velocities=velocities,
+            step_of(self.frames), self.vertical, self.weights, self.floor, velocities=velocities,
         )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from jaxtyping import Array, Float, Int
 from sogjax.model.camera import Camera, project, projection_jacobian
 from sogjax.model.rotation import cross_matrix
 from sogjax.model.sog import Sog
+from sogjax.refine.clip_priors import step_of
 
 TURN, PLACE, TIME = slice(0, 3), slice(3, 6), slice(6, 7)
 MOVE = 7
@@ -75,9 +76,13 @@ def sight_rates(camera: Camera, move: Float[Array, "7"], blobs: Sog, velocities:
 def velocities_of(
     means: Float[np.ndarray, "frame blob 3"], frames: Int[np.ndarray, "frame"]
 ) -> Float[np.ndarray, "frame blob 3"]:
-    """How fast blobs move (metres a frame), from the frames before and after; 0 where neither is known."""
-    steps = np.diff(means, axis=0)
-    follows = (np.diff(frames) == 1).astype(float)[:, None, None]
+    """How fast the blobs of a clip move (metres by a frame's number), from the frames before and after.
+
+    0 where neither is known.
+    """
+    step = step_of(frames)
+    steps = np.diff(means, axis=0) / step
+    follows = (np.diff(frames) == step).astype(float)[:, None, None]
     total, count = np.zeros_like(means), np.zeros((len(means), 1, 1))
     for part in (slice(1, None), slice(None, -1)):
         total[part] += follows * steps

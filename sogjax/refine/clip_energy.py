@@ -61,6 +61,9 @@ class ClipEnergy:
     frames: Int[np.ndarray, "frame"]
     """Their numbers."""
     fps: float
+    """Of these numbers."""
+    step: int
+    """Between the numbers of frames of which none is missing."""
     vertical: Float[np.ndarray, "3"]
     """Unit vector upwards."""
     weights: Weights
@@ -113,7 +116,7 @@ class ClipEnergy:
         found = NearPairs.of(self.tracker, body, self.pictures, _single(poses), capacity, self._sights(params))
         blobs = self.blobs(poses, params)
         heights = undersides(blobs.means, blobs.sigmas, self.vertical) - self.floor
-        feet = standing(blobs.means, heights, self.frames, self.fps)
+        feet = standing(blobs.means, heights, self.frames, self.fps, self.step)
         return replace(self, pairs=found, standing=feet)
 
     def body(self, params: Float[np.ndarray, "shared"]) -> Body:
@@ -142,7 +145,7 @@ class ClipEnergy:
         assert self.standing is not None
         dofs, weights = poses.shape[1], self.weights
         value, gradient, curvature = (np.asarray(part, float) for part in self._seen(poses, params)[:3])
-        smooth = smooth_model(poses, self.frames, weights.smooth, weights.sudden)
+        smooth = smooth_model(poses, self.frames, weights.smooth, weights.sudden, self.step)
         contact = contact_model(self.blobs(poses, params), self.floor, self.vertical, self.standing, weights.contact)
         contact = _padded(contact, self.num_shared)
         prior = self.priors

@@ -45,6 +45,11 @@ class ContactModel(NamedTuple):
     corner: Float[np.ndarray, "shape shape"]
 
 
+def step_of(frames: Int[np.ndarray, "frame"]) -> int:
+    """By how much the numbers of a clip's frames grow where none is missing."""
+    return int(np.diff(frames).min()) if len(frames) > 1 else 1
+
+
 def undersides(
     means: Float[np.ndarray, "frame blob 3"], sigmas: Float[np.ndarray, "blob"], vertical: Float[np.ndarray, "3"]
 ) -> Float[np.ndarray, "frame blob"]:
@@ -64,16 +69,17 @@ def standing(
     heights: Float[np.ndarray, "frame blob"],
     frames: Int[np.ndarray, "frame"],
     fps: float,
+    step: int,
 ) -> Bool[np.ndarray, "frame blob"]:
     """Which blobs stand from each frame to the next one, whatever body it is; the last row is false.
 
-    Heights are those of undersides over the floor (NaN: there is none); frames that are missing in between join
-    nothing.
+    Heights are those of undersides over the floor (NaN: there is none); `fps` counts the numbers of frames. Frames
+    farther apart than a `step` join nothing.
     """
     pairs = np.zeros(heights.shape, bool)
     if len(frames) > 2 * SPAN:
         still = (heights < NEAR_FLOOR) & (_speeds(means, frames, fps) < SLOW)
-        pairs[:-1] = still[:-1] & still[1:] & (np.diff(frames) == 1)[:, None]
+        pairs[:-1] = still[:-1] & still[1:] & (np.diff(frames) == step)[:, None]
     return pairs
 
 
@@ -155,14 +161,15 @@ class SmoothModel(NamedTuple):
 
 
 def smooth_model(
-    poses: Float[np.ndarray, "frame dof"], frames: Int[np.ndarray, "frame"], weight: float, sudden: float
+    poses: Float[np.ndarray, "frame dof"], frames: Int[np.ndarray, "frame"], weight: float, sudden: float, step: int
 ) -> SmoothModel:
     """Minus Huber's penalty of the second differences of three frames that follow each other.
 
-    Where frames are missing in between, nothing is penalised. From the second difference `sudden` on (radians and
-    metres) the penalty grows only linearly; `weight` is that of half a squared one.
+    Farther apart than a `step`, they are not penalised. From the second difference `sudden` on (radians and metres) the
+    penalty grows only linearly; `weight` is that of half a squared one.
     """
-    triples = _following(frames)[:, None]
+    follows = np.diff(frames) == step
+    triples = (follows[:-1] & follows[1:])[:, None]
     bend = poses[2:] - 2.0 * poses[1:-1] + poses[:-2]
     size = np.abs(bend)
     cost = np.where(size <= sudden, 0.5 * bend**2, sudden * (size - 0.5 * sudden))
@@ -176,8 +183,3 @@ def smooth_model(
     following[1:-1] -= 2.0 * stiffness
     after_next[:-2] += stiffness
     return SmoothModel(-weight * float(np.sum(triples * cost)), gradient, own, following, after_next)
-
-
-def _following(frames: Int[np.ndarray, "frame"]) -> Bool[np.ndarray, "triple"]:
-    """Which frames are followed by the next and the one after it."""
-    return (frames[1:-1] - frames[:-2] == 1) & (frames[2:] - frames[1:-1] == 1)

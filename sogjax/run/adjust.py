@@ -14,6 +14,7 @@ from sogjax.io.frame_table import FrameTable
 from sogjax.io.motion import Motion, load_motion, motion_from_poses
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
+from sogjax.refine.clip_priors import step_of
 from sogjax.run import build
 from sogjax.run.actors import Actors
 from sogjax.run.adjust_cameras import check_cameras, parts_in_question
@@ -21,7 +22,6 @@ from sogjax.run.adjust_checks import check_length, check_window
 from sogjax.run.adjust_clip import AdjustRequest
 from sogjax.run.fingerprint import RunFingerprint, digest
 from sogjax.run.forward import Tracked
-from sogjax.run.passes import ADJUSTING_ALONE, PASSES
 from sogjax.run.recordings import opened, upright
 from sogjax.run.result import RunResult
 from sogjax.run.run import Run
@@ -152,6 +152,7 @@ def adjust_to_folder(config: AdjustConfig) -> RunResult:
         tracked.config,
         **{"recording": config.recording, "out": config.out, "actor": None, "adjust": True, "outputs": outputs},
         **{"start": first, "stop": int(motion.frame[-1]) - recording.first_frame + 1},
+        every=step_of(motion.frame),
     )
     build.check(settings)
     request = AdjustRequest(config.window, config.shape, parts_in_question(config.cameras, config.offsets))
@@ -168,7 +169,7 @@ def adjust_to_folder(config: AdjustConfig) -> RunResult:
             before_results=lambda: folder.clear(tracked.files),
             records={"actors": Actors((tracked.actor,)), "tracked": Tracked(_table(motion))},
         )
-        run_passes(run, [each for each in PASSES if each.name in ADJUSTING_ALONE])
+        run_passes(run)
         folder.finish("adjust", fingerprint, run.files)
     return replace(run.result, files=run.files)
 

@@ -17,7 +17,7 @@ from sogjax.io.motion import Motion
 from sogjax.io.recording import Recording
 from sogjax.io.recording_files import SETTINGS
 from sogjax.io.recording_settings import offsets_line, with_entries
-from sogjax.refine.adjustment import Adjusted
+from sogjax.refine.adjustment import Adjustment
 from sogjax.refine.camera_moves import PLACE, TIME, TURN, moved_cameras, velocities_of
 from sogjax.run.run_files import CALIBRATION, DESCRIPTION
 
@@ -83,7 +83,7 @@ def moved_rig(rig: CameraRig, moves: Float[np.ndarray, "camera 7"]) -> CameraRig
     return CameraRig(rig.names, eqx.tree_at(lambda cameras: cameras.camera_from_world, rig.cameras, poses))
 
 
-def camera_numbers(recording: Recording, found: Adjusted) -> dict[str, dict[str, Any]]:
+def camera_numbers(recording: Recording, found: Adjustment) -> dict[str, dict[str, Any]]:
     """What was found of each camera, for JSON: by name how far it was turned, moved, and is late.
 
     A camera without an entry stays as it is.

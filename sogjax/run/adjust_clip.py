@@ -22,9 +22,8 @@ from sogjax.model.body import Body
 from sogjax.model.bones import bone_lengths
 from sogjax.model.rotation import axis_vector, world_from_upright
 from sogjax.quality.markers import joint_errors
-from sogjax.refine.adjustment import Adjusted as Found
-from sogjax.refine.adjustment import adjusted
-from sogjax.refine.clip_priors import floor_height, standing, undersides
+from sogjax.refine.adjustment import Adjustment, adjusted
+from sogjax.refine.clip_priors import floor_height, standing, step_of, undersides
 from sogjax.refine.pictures import ClipPictures, Reader
 from sogjax.run import build
 from sogjax.run.actors import Actors
@@ -120,7 +119,7 @@ def adjust_clip(
         table.pose,
         table.frame,
         np.asarray(table.terms["similarity"], float),
-        setup.clip.fps,
+        recording.fps,
         recording.up,
         request.window,
         with_shape=request.with_shape,
@@ -184,12 +183,12 @@ class _Source:
 
 
 def _motion(setup: Setup, table: FrameTable) -> Motion:
-    facts = ClipFacts.of(setup.clip.recording, setup.clip.numbers.step)
+    facts = ClipFacts.of(setup.clip.recording)
     return next(iter(motions_of(table, setup.bodies, facts).values()))
 
 
 def _recolored(
-    setup: Setup, source: _Source, found: Found, table: FrameTable, color: ColorConfig
+    setup: Setup, source: _Source, found: Adjustment, table: FrameTable, color: ColorConfig
 ) -> tuple[Body, float]:
     """The adjusted body with the colours that the clip shows, if it is more similar so; and by which factor it is."""
     say("adjusting: colours")
@@ -201,13 +200,13 @@ def _recolored(
     return (body if after > CLEARLY * before else found.body), after / before
 
 
-def _energies(found: Found, setup: Setup) -> Float[np.ndarray, "frame"]:
+def _energies(found: Adjustment, setup: Setup) -> Float[np.ndarray, "frame"]:
     """Eq. 10 of each frame, without a history."""
     parts = [float(term.signed_weight) * found.values[term.name] for term in setup.tracker.terms]
     return np.sum(parts, axis=0)
 
 
-def _table(found: Found, setup: Setup, before: FrameTable) -> FrameTable:
+def _table(found: Adjustment, setup: Setup, before: FrameTable) -> FrameTable:
     """The adjusted frames as a run keeps them."""
     count, cameras = len(found.poses), len(setup.clip.grids)
     none = np.zeros((count, cameras), int)
@@ -226,7 +225,7 @@ def _table(found: Found, setup: Setup, before: FrameTable) -> FrameTable:
     )
 
 
-def _numbers(body: Body, before: Motion, after: Motion, found: Found, recording: Recording) -> dict[str, Any]:
+def _numbers(body: Body, before: Motion, after: Motion, found: Adjustment, recording: Recording) -> dict[str, Any]:
     """What was changed, and what it was good for."""
     was, now = bone_lengths(body), bone_lengths(found.body)
     numbers: dict[str, Any] = {
@@ -249,8 +248,8 @@ def _numbers(body: Body, before: Motion, after: Motion, found: Found, recording:
 
 def _feet(before: Motion, after: Motion) -> dict[str, float | None]:
     """How far feet that stand move from frame to frame, on average: those that stand in the adjusted motion."""
-    heights = undersides(after.blob_means, after.blob_sigma, axis_vector(after.up))
-    stand = standing(after.blob_means, heights - floor_height(heights), after.frame, after.fps)[:-1]
+    heights, step = undersides(after.blob_means, after.blob_sigma, axis_vector(after.up)), step_of(after.frame)
+    stand = standing(after.blob_means, heights - floor_height(heights), after.frame, after.fps, step)[:-1]
     moved = lambda motion: 1e3 * float(np.linalg.norm(np.diff(motion.blob_means, axis=0), axis=-1)[stand].mean())
     found = [moved(motion) if stand.any() else None for motion in (before, after)]
     return {"standing_foot_before_mm": found[0], "standing_foot_after_mm": found[1]}

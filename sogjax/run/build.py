@@ -90,6 +90,7 @@ def check(config: TrackConfig) -> None:
     at_least("energy.rest_weight", config.energy.rest_weight, 0.0)
     box_around(config.images)
     one_of("images.background", config.images.background, CHOICES)
+    at_least("every", config.every, 1)
     at_least("outputs.overlay_width", config.outputs.overlay_width, 64)
 
 

@@ -29,7 +29,7 @@ STAGES = (
     *(STARTING, RENDERING, ACTORS, INITIAL_POSE, PREPARING, BACKGROUND, BEFORE),
     *(FIRST_FRAME, TRACKING, BOTH_WAYS, ADJUSTING, WRITING),
 )
-"""The stages of a clock, in the order in which they are shown."""
+"""Stages of a clock, in the order in which they are shown; those of other names come after them."""
 STEP_STAGES = {
     "decode": "waiting for decoded pictures",
     "cells": "averaging pictures to cells",
@@ -110,7 +110,8 @@ class Clock:
     def seconds(self) -> dict[str, float]:
         """Seconds of every stage so far that took time; `OTHER` and the `TOTAL` come last."""
         self.turn(self._open[-1])
-        found = {stage: self._times.total(stage) for stage in STAGES if self._times.total(stage)}
+        stages = [stage for stage in dict.fromkeys((*STAGES, *self._times.seconds)) if stage != OTHER]
+        found = {stage: self._times.total(stage) for stage in stages if self._times.total(stage)}
         total = sum(map(self._times.total, self._times.seconds))
         return found | {OTHER: total - sum(found.values()), TOTAL: total}
 

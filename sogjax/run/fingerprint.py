@@ -3,7 +3,6 @@
 import hashlib
 import sys
 from collections.abc import Sequence
-from dataclasses import fields, is_dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -18,14 +17,12 @@ from sogjax.io.recording import Recording
 from sogjax.io.source import files_fingerprint, fingerprint
 from sogjax.model.body import Body
 from sogjax.run import build
+from sogjax.settings.option import telling_settings
 from sogjax.settings.run import TrackConfig
 
 PACKAGES = ("sogjax", "jax", "jaxlib", "numpy", "equinox", "optimistix", "opencv-python-headless")
-NO_MATTER = (
-    *("preset", "recording", "out", "actor", "cameras", "outputs", "adjust", "resume", "overwrite"),
-    "images.cache",
-)
-"""Settings that change no pose, or whose files are compared instead."""
+NO_MATTER = ("recording", "actor", "cameras", "adjust")
+"""Settings, beside inert ones, whose files are compared instead, or that only begin to matter after tracking."""
 SHOWN = 60
 """Longest value that is quoted in a sentence, characters."""
 
@@ -49,9 +46,8 @@ def run_fingerprint(
         "PyAV": pyav_version(),
         "device": jax.default_backend(),
         "precision": str(jnp.asarray(0.0).dtype),
-        **_settings(config, ""),
+        **{key: value for key, value in telling_settings(config).items() if key not in NO_MATTER},
         **_code_of_terms(config),
-        "outputs.confidence": config.outputs.confidence,
         **_of_recording(recording),
         **_of_keypoints(recording),
         "the actors": None if given_actors is None else [digest(actor) for actor in given_actors],
@@ -75,16 +71,6 @@ def digest(arrays: Any) -> str:
     for leaf in map(np.asarray, jax.tree.leaves(arrays)):
         content.update(f"{leaf.dtype}{leaf.shape}".encode() + leaf.tobytes())
     return content.hexdigest()
-
-
-def _settings(config: Any, prefix: str) -> RunFingerprint:
-    """The settings that poses depend on, by key."""
-    found: RunFingerprint = {}
-    for entry in fields(config):
-        key, value = prefix + entry.name, getattr(config, entry.name)
-        if key not in NO_MATTER:
-            found |= _settings(value, f"{key}.") if is_dataclass(value) else {key: value}
-    return found
 
 
 def _code_of_terms(config: TrackConfig) -> RunFingerprint:

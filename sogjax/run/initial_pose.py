@@ -24,7 +24,8 @@ from sogjax.search.described_pose import check_described_pose, described_pose
 from sogjax.search.found_pose import FoundPose
 from sogjax.settings.run import TrackConfig
 
-AUTO = "auto"
+NAMES = ("auto",)
+"""Values of the setting `initial_pose` that name no file, but what is asked instead of files and keypoints."""
 FILE = "initial_pose.npz"
 
 
@@ -118,6 +119,8 @@ def from_example_frames(request: PoseRequest) -> InitialPose | None:
     """The frame of the videos that every actor was made of in which all fit best, if it is among those to track."""
     known = [each for each in request.actors.known_frames if each.frame in request.clip.numbers]
     if not known:
+        if others := ", ".join(str(each.frame) for each in request.actors.known_frames):
+            say(f"the frames in which the poses are known ({others}) are not among those to track")
         return None
     best = max(known, key=lambda each: each.agreement)
     whose = "whose pose is known" if len(request.actors.bodies) == 1 else "where all poses are known"
@@ -126,12 +129,12 @@ def from_example_frames(request: PoseRequest) -> InitialPose | None:
 
 
 def from_keypoints(request: PoseRequest) -> InitialPose | None:
-    """The poses that keypoints beside the recording tell in the first frame, unless a search was asked for.
+    """The poses that keypoints beside the recording tell in the first frame, unless something else was asked for.
 
     Raises:
         InputError: none of the keypoint files can be used.
     """
-    if request.config.initial_pose == AUTO:
+    if request.config.initial_pose in NAMES:
         return None
     frame = request.clip.numbers[0]
     poses = keypoint_poses(request.clip, request.background, request.bodies, request.config, frame)
@@ -154,18 +157,20 @@ SOURCES: tuple[PoseSource, ...] = (from_file, from_example_frames, from_keypoint
 
 
 def pose_file(recording: Recording, config: TrackConfig) -> Path | None:
-    """The file with rough poses; None: there is none, or a search was asked for.
+    """The file with rough poses; None: there is none, or something else was asked for.
 
     Raises:
         InputError: the requested file does not exist.
     """
-    if config.initial_pose == AUTO:
+    if config.initial_pose in NAMES:
         return None
     if config.initial_pose is None:
         return recording.initial_poses
     path = Path(config.initial_pose)
     if not path.is_file():
-        raise InputError(f"initial_pose={config.initial_pose}: there is no such file; give one, or initial_pose=auto")
+        raise InputError(
+            f"initial_pose={config.initial_pose}: there is no such file; give one, or initial_pose={'|'.join(NAMES)}"
+        )
     return path
 
 

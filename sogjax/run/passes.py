@@ -32,11 +32,14 @@ class Pass:
     name: str
     """Of the field of `Run` that its record fills."""
     stage: str
-    """On the clock."""
+    """Its line on the clock."""
     make: Callable[[Run], Any]
     record: Any = None
     """The class of the record, by which it is kept in the run's folder; None: it is not kept."""
     wanted: Callable[[Run], bool] = lambda run: True
+    """Whether the run has this pass; asked when it is its turn, or before."""
+    changes_frames: bool = False
+    """Whether it finds other frames than passes before, so that what shows these while they are tracked is in vain."""
 
 
 def _background(run: Run) -> Background:
@@ -67,8 +70,8 @@ def _tracked(run: Run) -> Tracked:
     if run.kept is not None:
         rows = kept_rows(run.kept, run.initial_pose, run.clip.numbers)
         log = FrameLog(run.kept / FRAMES, 0 if rows is None else len(rows))
-        ClipFacts.of(run.clip.recording, run.clip.numbers.step).save(run.kept)
-    if run.out is not None and not run.adjusts:
+        ClipFacts.of(run.clip.recording).save(run.kept)
+    if run.out is not None and not any(each.changes_frames and each.wanted(run) for each in PASSES):
         run.before_results()
         streams = ResultStreams(run.out, run.clip, run.setup.bodies, run.config.outputs)
     if rows is not None:
@@ -82,20 +85,20 @@ def _tracked(run: Run) -> Tracked:
 PASSES: tuple[Pass, ...] = (
     Pass("background", PREPARING, _background, Background),
     Pass("actors", ACTORS, lambda run: make_actors(run.actor_request, run.report_actors), Actors),
-    Pass("initial_pose", INITIAL_POSE, _initial_pose, InitialPose),
+    Pass("initial_pose", INITIAL_POSE, _initial_pose, InitialPose, wanted=lambda run: run.tracks),
     Pass(
         "relearnt",
         BACKGROUND,
         lambda run: relearn_background(run.setup, run.background, run.initial_pose),
         RelearntBackground,
-        wanted=lambda run: run.background.is_learnt,
+        wanted=lambda run: run.tracks and run.background.is_learnt,
     ),
     Pass(
         "keypoint_bias",
         PREPARING,
         lambda run: estimate_keypoint_bias(run.setup, run.initial_pose),
         KeypointBias,
-        wanted=lambda run: run.clip.keypoints is not None,
+        wanted=lambda run: run.tracks and run.clip.keypoints is not None,
     ),
     Pass("tracked", TRACKING, _tracked, Tracked),
     Pass(
@@ -103,18 +106,22 @@ PASSES: tuple[Pass, ...] = (
         BOTH_WAYS,
         lambda run: merge_backward(run.setup, run.frames),
         Merged,
-        wanted=lambda run: run.config.tracking.both_ways,
-    ),
+        wanted=lambda run: run.tracks and run.config.tracking.both_ways,
+    ),  # which seldom changes frames
     Pass(
         "adjusted",
         ADJUSTING,
         lambda run: adjust_clip(run.first_setup, run.background, run.frames, run.config.color, run.adjust),
         Adjusted,
         wanted=lambda run: run.adjusts,
+        changes_frames=True,
     ),
-    Pass("result", WRITING, judged_result),
+    Pass("result", WRITING, judged_result, wanted=lambda run: run.out is not None),
     Pass("files", WRITING, write_results, wanted=lambda run: run.out is not None),
 )
-"""The passes of `sogjax track`, of `sogjax.track`, of every member of a sweep and of every run of a study."""
-ADJUSTING_ALONE = ("background", "adjusted", "result", "files")
-"""Those of `sogjax adjust`, which begins with a motion that was tracked."""
+"""The passes of `sogjax track`, of `sogjax.track`, of every member of a sweep and of every run of a study; and of
+`sogjax adjust`, which is given frames that were tracked."""
+BEFORE_TRACKING = tuple(
+    each for each in PASSES[: [each.name for each in PASSES].index("tracked")] if each.name != "relearnt"
+)
+"""Those that say how the first frame is tracked, without the one for which the whole clip is."""

@@ -54,6 +54,21 @@ def with_cameras(recording: Recording, cameras: Sequence[str] | None) -> Recordi
     return replace(recording, rig=recording.rig.select(tuple(cameras)))
 
 
+def chosen_frames(recording: Recording, start: int = 0, stop: int | None = None, every: int = 1) -> range:
+    """The numbers of frames that are chosen by their places in a recording.
+
+    Raises:
+        InputError: there is none.
+    """
+    last = recording.num_frames if stop is None else stop
+    if not 0 <= start < last <= recording.num_frames:
+        raise InputError(
+            f"start={start} stop={'null' if stop is None else stop}: {recording.path} has the frames 0 to "
+            f"{recording.num_frames - 1}; choose 0 <= start < stop <= {recording.num_frames}"
+        )
+    return recording.frames[start:last:every]
+
+
 def body_named(name: str) -> Body:
     """A bundled body, or one from a file.
 

@@ -95,9 +95,17 @@ def relearn_background(
 
 
 def frames_to_learn_from(unknown: float, samples: Sequence[int], numbers: range) -> list[int]:
-    """The sampled frames that are tracked; none where little is unknown, or of a part so short that few are in it."""
-    found = [frame for frame in samples if frame in numbers]
-    return found if unknown >= MUCH_UNKNOWN and len(found) >= FEWEST_AGREEING else []
+    """The sampled frames that are tracked; none where little is unknown, or few of them are tracked.
+
+    Where frames between those to track are left out, it is said how many samples are.
+    """
+    if unknown < MUCH_UNKNOWN:
+        return []
+    spanned = [frame for frame in samples if numbers[0] <= frame <= numbers[-1]]
+    found = [frame for frame in spanned if frame in numbers]
+    if len(found) < len(spanned):
+        say(f"of {len(spanned)} frames to learn the background from, {len(found)} are tracked; the others do not count")
+    return found if len(found) >= FEWEST_AGREEING else []
 
 
 def unknown_share(setup: Setup, background: Background) -> float:

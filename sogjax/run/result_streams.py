@@ -33,7 +33,7 @@ class ResultStreams:
 
     def __init__(self, folder: Path, clip: Clip, bodies: Sequence[Body], wanted: OutputsConfig):
         self._folder, self._clip, self._bodies, self._wanted = folder, clip, bodies, wanted
-        self._facts = ClipFacts.of(clip.recording, clip.numbers.step)
+        self._facts = ClipFacts.of(clip.recording)
         self._stack = ExitStack()
         self._overlay: Any = None
         self._rerun: Any = None
@@ -56,7 +56,7 @@ class ResultStreams:
             from sogjax.view.overlay import OverlayVideo
 
             self.files.append(OVERLAY.of(self._folder))
-            video = OverlayVideo(self.files[-1], recording, width=self._wanted.overlay_width)
+            video = OverlayVideo(self.files[-1], recording, self._clip.fps, self._wanted.overlay_width)
             self._overlay = self._stack.enter_context(video)
         if self._wanted.rerun:
             from sogjax.view.rerun.file import RerunFile

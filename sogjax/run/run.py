@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import takewhile
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -27,9 +28,7 @@ from sogjax.run.run_files import GUESS
 from sogjax.run.sampled_masks import mask_samples
 from sogjax.run.setup import Setup, tracking_setup
 from sogjax.run.terminal import say
-from sogjax.settings.run import OutputsConfig, TrackConfig
-
-NO_OUTPUTS = OutputsConfig(motion_only=True).asked()
+from sogjax.settings.run import TrackConfig
 
 
 @dataclass
@@ -146,7 +145,8 @@ class Run:
     @property
     def unadjusted(self) -> FrameTable:
         """The frames as they held before they were adjusted."""
-        return _last_table(record for record in self.records.values() if record is not self.adjusted)
+        before = takewhile(lambda name: name != "adjusted", self.records)
+        return _last_table(self.records[name] for name in before)
 
     @property
     def final_setup(self) -> Setup:
@@ -172,7 +172,7 @@ class Run:
     def result_so_far(self) -> RunResult:
         """The motions, without anything that was thought of them."""
         setup, table, recording = self.final_setup, self.frames, self.clip.recording
-        motions = motions_of(table, setup.bodies, ClipFacts.of(recording, self.clip.numbers.step))
+        motions = motions_of(table, setup.bodies, ClipFacts.of(recording))
         image_blobs = float(self.unadjusted.num_matching.mean())
         missing = recording.num_missing(self.clip.numbers)
         return RunResult(setup.clip.recording, setup.bodies, motions, self.times, image_blobs, missing=missing)

@@ -7,7 +7,6 @@ from tempfile import TemporaryDirectory
 
 from sogjax.actor.make import MadeActor
 from sogjax.energy.term import Term
-from sogjax.errors import InputError
 from sogjax.io.frame_motions import load_motions
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
@@ -23,18 +22,15 @@ from sogjax.run.fingerprint import run_fingerprint
 from sogjax.run.initial_pose import SOURCES, PoseSource, described_poses, pose_file
 from sogjax.run.judge import compared, kept_verdicts
 from sogjax.run.memory import forget_programs_if_many
-from sogjax.run.passes import PASSES
-from sogjax.run.recordings import file_list, opened, upright
+from sogjax.run.recordings import chosen_frames, file_list, opened, upright
 from sogjax.run.result import RunResult
-from sogjax.run.run import NO_OUTPUTS, Run
+from sogjax.run.run import Run
 from sogjax.run.run_files import ACTOR, METRICS, MOTION
 from sogjax.run.run_folder import RunFolder, run_folder
 from sogjax.run.runner import run_passes
 from sogjax.run.terminal import say
 from sogjax.run.write import check_pose2sim, export_endings
 from sogjax.settings.run import TrackConfig
-
-WITHOUT_FILES = tuple(each for each in PASSES if each.name not in ("result", "files"))
 
 
 def track_to_folder(
@@ -51,7 +47,7 @@ def track_to_folder(
     recording = opened(config.recording, config.cameras)
     files = None if config.actor is None else file_list(config.actor)
     check_actors(recording, config.actors, None if files is None else len(files))
-    frame_range(recording, config)
+    chosen_frames(recording, config.start, config.stop, config.every)
     poses = pose_file(recording, config)
     path = Path(config.out or f"outputs/{recording.name}")
     with run_folder(path, config.overwrite, config.resume, command) as folder:
@@ -88,7 +84,6 @@ def track_recording(
     config: TrackConfig,
     terms: Sequence[Term] = (),
     pose_sources: Sequence[PoseSource] = SOURCES,
-    every: int = 1,
 ) -> Run:
     """The run in which actors (in their own upright frames) were tracked; no files are written.
 
@@ -98,48 +93,33 @@ def track_recording(
         config: the settings.
         terms: of the energy, beside those of the settings.
         pose_sources: of the initial pose.
-        every: of how many frames one is tracked.
     """
     forget_programs_if_many()
-    config = replace(config, outputs=replace(NO_OUTPUTS, confidence=config.outputs.confidence))
+    config = replace(config, outputs=replace(config.outputs, motion_only=True).asked())
     with TemporaryDirectory() as folder:
         run = Run(
-            clip=opened_clip(recording, config, every).kept_in(Path(folder), config.images.cache),
+            clip=opened_clip(recording, config).kept_in(Path(folder), config.images.cache),
             config=config,
             terms=terms,
             pose_sources=pose_sources,
             records={"actors": Actors(tuple(bodies))},
         )
-        return run_passes(run, WITHOUT_FILES)
+        return run_passes(run)
 
 
-def opened_clip(recording: Recording, config: TrackConfig, every: int = 1) -> Clip:
-    """The frames of a recording that the settings name, with keypoints if these count; of `every` few frames one."""
-    numbers = frame_range(recording, config)
-    return Clip(recording, numbers[::every], config.images.depth, clip_keypoints(recording, config))
-
-
-def frame_range(recording: Recording, config: TrackConfig) -> range:
-    """The numbers of the frames to track.
-
-    Raises:
-        InputError: there is none.
-    """
-    last = recording.num_frames if config.stop is None else config.stop
-    if not 0 <= config.start < last <= recording.num_frames:
-        raise InputError(
-            f"start={config.start} stop={'null' if config.stop is None else config.stop}: {recording.path} has the "
-            f"frames 0 to {recording.num_frames - 1}; choose 0 <= start < stop <= {recording.num_frames}"
-        )
-    return recording.frames[config.start : last]
+def opened_clip(recording: Recording, config: TrackConfig) -> Clip:
+    """The frames of a recording that the settings name, with keypoints if these count."""
+    numbers = chosen_frames(recording, config.start, config.stop, config.every)
+    return Clip(recording, numbers, config.images.depth, clip_keypoints(recording, config))
 
 
 def _given_actors(recording: Recording, config: TrackConfig, files: Sequence[Path]) -> Actors:
     """The actors of files; what is wrong with them, or with a rough pose of theirs, shows before any work."""
     clip = Clip(recording, recording.frames, config.images.depth)
     request = ActorRequest(clip, lambda: Background(None), files, number=config.actors)
-    actors, numbers = make_actors(request), frame_range(recording, config)
+    actors = make_actors(request)
     if config.outputs.pose2sim:
+        numbers = chosen_frames(recording, config.start, config.stop, config.every)
         check_pose2sim(recording, (numbers[0], numbers[-1]), actors.bodies, config.overwrite)
     described_poses(recording, [upright(body, recording) for body in actors.bodies], config)
     return actors

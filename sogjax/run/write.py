@@ -123,7 +123,7 @@ def _of_adjusting(run: Run, adjusted: Adjusted, out: Path) -> list[Path]:
     print(sentence(adjusted.numbers))
     if run.tracks:
         files += [UNADJUSTED.of(out), UNADJUSTED_ACTOR.of(out)]
-        facts = ClipFacts.of(run.clip.recording, run.clip.numbers.step)
+        facts = ClipFacts.of(run.clip.recording)
         save_motion(files[1], next(iter(motions_of(run.unadjusted, run.first_setup.bodies, facts).values())))
         save_body(files[2], run.actors.bodies[0])
     if run.adjust.in_question:

@@ -26,7 +26,9 @@ class ImagesConfig:
     background: str = option(
         "auto", "pictures: of the empty scene | clip: learnt from the clip | auto: pictures, else the clip | none"
     )
-    cache: str | None = option(None, "folder for averaged pictures, so that later runs decode no video; null: none")
+    cache: str | None = option(
+        None, "folder for averaged pictures, so that later runs decode no video; null: none", inert=True
+    )
 
 
 @dataclass

@@ -1,7 +1,7 @@
 """What a setting is: a field of a dataclass with its default and its help text."""
 
 from collections.abc import Callable
-from dataclasses import field, fields, is_dataclass
+from dataclasses import Field, field, fields, is_dataclass
 from typing import Any, NamedTuple
 
 REQUIRED: Any = "???"
@@ -18,14 +18,34 @@ class HelpLine(NamedTuple):
     """Whether only `--help all` lists it."""
 
 
-def option(default: Any, help_text: str) -> Any:
-    """A setting with its default and the text that `--help` prints."""
-    return field(default=default, metadata={"help": help_text})
+def option(default: Any, help_text: str, *, inert: bool = False, expert: bool = False) -> Any:
+    """A setting with its default and the text that `--help` prints.
+
+    An `inert` one changes no number of a motion: it is about files, or about how the work is done.
+    """
+    return field(default=default, metadata={"help": help_text, "inert": inert, "expert": expert})
 
 
-def expert(default: Any, help_text: str) -> Any:
+def expert(default: Any, help_text: str, *, inert: bool = False) -> Any:
     """A setting that few need, so that only `--help all` prints it."""
-    return field(default=default, metadata={"help": help_text, "expert": True})
+    return option(default, help_text, inert=inert, expert=True)
+
+
+def is_inert(entry: Field) -> bool:
+    """Whether a setting is known to change no number of a motion."""
+    return entry.metadata.get("inert", False)
+
+
+def telling_settings(config: Any, prefix: str = "") -> dict[str, Any]:
+    """The settings that are not inert, by key, groups unfolded."""
+    found: dict[str, Any] = {}
+    for entry in fields(config):
+        value = getattr(config, entry.name)
+        if is_dataclass(value):
+            found |= telling_settings(value, f"{prefix}{entry.name}.")
+        elif not is_inert(entry):
+            found[prefix + entry.name] = value
+    return found
 
 
 def group(schema: Callable[[], Any], help_text: str) -> Any:

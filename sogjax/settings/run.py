@@ -1,10 +1,10 @@
 """The settings of a run: what is tracked, with which method, and what is written; and those of an actor."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from sogjax.settings.method import ColorConfig, EnergyConfig, ImagesConfig, SolverConfig, TrackingConfig
-from sogjax.settings.option import REQUIRED, expert, group, option
+from sogjax.settings.option import REQUIRED, expert, group, is_inert, option
 
 OVERWRITE = "replace the results of an earlier run"
 
@@ -14,35 +14,45 @@ class OutputsConfig:
     """Files to write beside the motion."""
 
     motion_only: bool = option(
-        False, "none of them: no overlay, no picture, no Rerun file, no other format, whatever they say"
+        False, "none of them: no overlay, no picture, no Rerun file, no other format, whatever they say", inert=True
     )
-    overlay: bool = option(True, "overlay.mp4, the skeleton on every camera's pictures")
-    overlay_width: int = expert(1920, "width of the overlay video, px")
-    rerun: bool = option(True, "motion.rrd, for the Rerun viewer")
-    rerun_images: bool = expert(True, "put the pictures into motion.rrd")
-    bvh: bool = expert(True, "motion.bvh")
-    formats: list[str] | None = option(None, "further formats of the motion, some of [trc,c3d,glb,csv,mot]; null: none")
+    overlay: bool = option(True, "overlay.mp4, the skeleton on every camera's pictures", inert=True)
+    overlay_width: int = expert(1920, "width of the overlay video, px", inert=True)
+    rerun: bool = option(True, "motion.rrd, for the Rerun viewer", inert=True)
+    rerun_images: bool = expert(True, "put the pictures into motion.rrd", inert=True)
+    bvh: bool = expert(True, "motion.bvh", inert=True)
+    formats: list[str] | None = option(
+        None, "further formats of the motion, some of [trc,c3d,glb,csv,mot]; null: none", inert=True
+    )
     pose2sim: bool = option(
-        False, "PROJECT/pose-3d/TRIAL_FIRST-LAST.trc of a Pose2Sim project, which its next steps read (HALPE_26)"
+        False,
+        "PROJECT/pose-3d/TRIAL_FIRST-LAST.trc of a Pose2Sim project, which its next steps read (HALPE_26)",
+        inert=True,
     )
     confidence: bool = expert(
         True, "how likely each limb is more than 10 cm off: in motion.npz, motion.rrd, the overlay and the summary"
     )
 
     def asked(self) -> "OutputsConfig":
-        """The outputs, all of them off where only the motion is asked for."""
+        """The outputs, all files off where only the motion is asked for."""
         if not self.motion_only:
             return self
-        return replace(self, overlay=False, rerun=False, bvh=False, formats=None, pose2sim=False)
+        files = {entry.name: entry.default for entry in fields(self) if is_inert(entry)}
+        off = {name: False if usual is True else usual for name, usual in files.items()}
+        return replace(self, **off | {"motion_only": True})
 
 
 @dataclass
 class TrackConfig:
     """Track the actors of a recording."""
 
-    preset: str = option("default", "default | paper: all settings at once; those given individually take precedence")
+    preset: str = option(
+        "default", "default | paper: all settings at once; those given individually take precedence", inert=True
+    )
     recording: str = option(REQUIRED, "folder of the recording; with -m several: A,B,C or 'glob(/data/*)'")
-    out: str = option("", "folder for the results; default: outputs/RECORDING; of several recordings the one around")
+    out: str = option(
+        "", "folder for the results; default: outputs/RECORDING; of several recordings the one around", inert=True
+    )
     actor: Any = option(
         None,
         "actor file, or a list of them; of several recordings also a folder of SUBJECT.yaml; null: make it from the "
@@ -54,17 +64,18 @@ class TrackConfig:
     body: str = option("human", "body that actors are made from: human, dog, or a body file")
     initial_pose: str | None = option(
         None,
-        "auto: search | file with a rough pose; null: the recording's initial_pose.yaml, else its keypoints if there "
-        "is one actor, else auto",
+        "auto: a frame of the videos that the actor was made of, else a search | file with a rough pose; null: the "
+        "recording's initial_pose.yaml, else such a frame, else its keypoints, else a search",
     )
     start: int = option(0, "first frame to track, counted from the recording's first")
     stop: int | None = option(None, "frame before which to stop; null: the end")
+    every: int = expert(1, "how many frames lie from one that is tracked to the next")
     cameras: list[str] | None = option(None, "cameras to use; null: all")
     adjust: bool = option(
         False, "adjust poses and the actor's shape together at the end, as sogjax adjust; the clip is read again"
     )
-    resume: bool = option(False, "resume the run that was stopped in this folder")
-    overwrite: bool = option(False, OVERWRITE)
+    resume: bool = option(False, "resume the run that was stopped in this folder", inert=True)
+    overwrite: bool = option(False, OVERWRITE, inert=True)
     color: ColorConfig = group(ColorConfig, "")
     images: ImagesConfig = group(ImagesConfig, "")
     energy: EnergyConfig = group(EnergyConfig, "")

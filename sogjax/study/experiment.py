@@ -29,8 +29,6 @@ class RowConfig:
     """Overrides of the track config."""
     cameras: int | None = None
     """How many of the recording's cameras look on, evenly taken; None: all."""
-    every: int = 1
-    """Every so many frames are looked at."""
     synth: dict[str, Any] | None = None
     """Settings of the rendered recording that takes the place of the study's, as `sogjax synth` takes them; it is made
     when it is first needed and kept. None: the study's recordings."""
@@ -196,8 +194,8 @@ def _checked(path: Path, config: ExperimentConfig) -> ExperimentConfig:
     for name, row in config.rows.items():
         if unknown := sorted(set(row.methods or ()) - set(config.methods)):
             raise InputError(f"{path}: row {name!r}: methods: {unknown[0]!r} is none of {', '.join(config.methods)}")
-        if row.every < 1 or (row.cameras is not None and row.cameras < 1):
-            raise InputError(f"{path}: row {name!r}: every={row.every} cameras={row.cameras}: must be 1 or more")
+        if row.cameras is not None and row.cameras < 1:
+            raise InputError(f"{path}: row {name!r}: cameras={row.cameras}: must be 1 or more")
         try:
             synth_settings(row.synth or {}).check()
         except InputError as error:

@@ -14,6 +14,7 @@ from jaxtyping import Float, Int
 
 import sogjax
 from sogjax.io.files import csv_text, write_file
+from sogjax.settings.option import telling_settings
 from sogjax.settings.run import TrackConfig
 from sogjax.study.experiment import Experiment
 from sogjax.study.source import Source
@@ -22,7 +23,8 @@ RECORD_VERSION = 3
 """A number to be raised with every change that makes earlier runs incomparable."""
 _DECIDE = ("model", "solve", "energy", "scene", "tracking", "search", "quality", "actor", "refine", "io", "run")
 """Packages whose code decides the result of a run."""
-_OF_THE_RESULT = ("body", "color", "images", "energy", "solver", "tracking")
+_ELSEWHERE = ("recording", "cameras")
+"""Settings that a plan has by other names."""
 
 
 @dataclass(frozen=True)
@@ -33,19 +35,15 @@ class RunPlan:
     """The study's name of the recording, which for a rendered one holds its settings."""
     frames: int
     cameras: list[str]
-    every: int
     measure: str
     config: dict[str, Any]
-    """The track config, without what has no say in the result."""
+    """The track config by key, without what has no say in the result."""
 
     @classmethod
-    def of(
-        cls, recording: str, frames: int, cameras: tuple[str, ...], every: int, measure: str, config: TrackConfig
-    ) -> "RunPlan":
+    def of(cls, recording: str, frames: int, cameras: tuple[str, ...], measure: str, config: TrackConfig) -> "RunPlan":
         """A plan for a track config."""
-        kept = {key: value for key, value in asdict(config).items() if key in _OF_THE_RESULT}
-        kept["images"].pop("cache")
-        return cls(recording, frames, list(cameras), every, measure, kept)
+        kept = {key: value for key, value in telling_settings(config).items() if key not in _ELSEWHERE}
+        return cls(recording, frames, list(cameras), measure, kept)
 
     @property
     def key(self) -> str:

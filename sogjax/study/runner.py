@@ -60,7 +60,7 @@ def run_row(
         return None
     cameras = source.cameras(entry.cameras)
     measure = experiment.config.measure
-    plan = RunPlan.of(source.identity, source.num_frames, cameras, entry.every, measure, config)
+    plan = RunPlan.of(source.identity, source.num_frames, cameras, measure, config)
     found = runs.find(plan)
     if (found is not None and not found.failed) or not do:
         return found
@@ -69,7 +69,7 @@ def run_row(
     record, begin = RunRecord(plan=asdict(plan), machine=machine_facts()), time.perf_counter()
     try:
         measured = _accuracy if measure == "accuracy" else _speed
-        record = measured(record, source, config, cameras, entry.every)
+        record = measured(record, source, config, cameras)
     except Exception as error:
         reason = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
         record = replace(record, failed=reason.splitlines()[0])
@@ -89,14 +89,12 @@ def motions_of(record: RunRecord, bodies: Sequence[Body], fps: float) -> dict[st
     }
 
 
-def _accuracy(
-    record: RunRecord, source: Source, config: TrackConfig, cameras: tuple[str, ...], every: int
-) -> RunRecord:
+def _accuracy(record: RunRecord, source: Source, config: TrackConfig, cameras: tuple[str, ...]) -> RunRecord:
     """Track from kept cells, from the initial pose that all runs share."""
     images = replace(config.images, cache=str(source.cell_folder))
     config = replace(config, images=images, stop=source.num_frames)
     own = lambda request: source.initial_pose
-    run = track_recording(source.seen_by(cameras), source.actors, config, pose_sources=(own,), every=every)
+    run = track_recording(source.seen_by(cameras), source.actors, config, pose_sources=(own,))
     table = run.frames
     record = replace(
         record,
@@ -111,7 +109,7 @@ def _accuracy(
     return _evaluated(record, source)
 
 
-def _speed(record: RunRecord, source: Source, config: TrackConfig, cameras: tuple[str, ...], every: int) -> RunRecord:
+def _speed(record: RunRecord, source: Source, config: TrackConfig, cameras: tuple[str, ...]) -> RunRecord:
     """Track from the videos, all stages beside each other, as `sogjax track` does; twice, the faster one counts."""
     config = replace(config, stop=source.num_frames)
     runs = [_timed(source, cameras, config) for _ in range(2)]

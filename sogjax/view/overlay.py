@@ -176,12 +176,13 @@ class OverlayVideo:
     Args:
         path: the video.
         recording: what is tracked.
+        fps: frames that are shown per second.
         width: largest width in pixels.
     """
 
-    def __init__(self, path: Path, recording: Recording, width: int = WIDTH):
+    def __init__(self, path: Path, recording: Recording, fps: float, width: int = WIDTH):
         self._rig, self._width = recording.rig, width
-        self._video = VideoWriter(Path(path), recording.fps)
+        self._video = VideoWriter(Path(path), fps)
         self._bones: list[Bones] | None = None
         self._empty = Overlay(recording.rig, [], width=width)
 
