@@ -8,8 +8,9 @@ from sogjax.synth.anatomy import Pose, anatomy_from_seed
 from sogjax.synth.clothes import outfits_from_seed, without_green
 from sogjax.synth.exercises import EXAMPLE_POSES, standing_pose
 from sogjax.synth.figure import Figure, make_figure
+from sogjax.synth.furniture import furniture
 from sogjax.synth.motions import Motion, furniture_sites, motions_of
-from sogjax.synth.rooms import furniture, room_of
+from sogjax.synth.rooms import room_of
 from sogjax.synth.scene import Scene, assembled
 from sogjax.synth.settings import SynthSettings
 from sogjax.synth.views import Sensor, View, ring_of_views
@@ -27,7 +28,7 @@ class Stage:
     motions: tuple[Motion, ...]
     scene: Scene
     bare: Scene
-    """The scene without furniture among the people."""
+    """The scene without furniture."""
     views: tuple[View, ...]
     sensors: tuple[Sensor, ...]
 
@@ -57,7 +58,7 @@ def stage_of(settings: SynthSettings) -> Stage:
     return Stage(
         settings=settings,
         people=tuple(people),
-        motions=tuple(motions_of(settings.motion, anatomies, stream(_MOTIONS), furnished)),
+        motions=tuple(motions_of(settings.motion, anatomies, stream(_MOTIONS), settings.stands_among)),
         scene=assembled(room, furniture(settings.furniture, sites)) if furnished else bare,
         bare=bare,
         views=ring_of_views(settings, stream(_VIEWS)),
