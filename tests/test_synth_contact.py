@@ -16,6 +16,7 @@ from sogjax.synth.furniture import (
     SEAT_HEIGHT,
     TABLE_HEIGHT,
     TABLE_SIZE,
+    farther,
 )
 from sogjax.synth.motions import furniture_sites, motions_of
 from sogjax.synth.settings import MOTIONS, PAIRED
@@ -114,6 +115,8 @@ def test_nobody_goes_through_the_furniture(kind):
             a, b = np.abs(offset @ along), np.abs(offset @ np.array([-along[1], along[0], 0.0]))
             at_table = (a < 0.5 * TABLE_SIZE[0]) & (b < 0.5 * TABLE_SIZE[1]) & (skin[:, 2] < TABLE_HEIGHT)
             at_chair = (a < 0.90) & (b < 0.22) & (skin[:, 2] < 0.9)
+            away = skin - farther(site).place
+            a, b = np.abs(away @ along), np.abs(away @ np.array([-along[1], along[0], 0.0]))
             at_counter = (a < 0.5 * COUNTER_SIZE[0]) & (b < 0.5 * COUNTER_SIZE[1]) & (skin[:, 2] < COUNTER_SIZE[2])
             beside = (skin[:, 2] > BOARD_HEIGHTS[0]) & (skin[:, 2] < BOARD_HEIGHTS[1])
             at_board = (a < 0.5 * BOARD_SIZE[0]) & (b < 0.5 * BOARD_SIZE[1]) & beside

@@ -1,7 +1,7 @@
 """Furniture: a table and chairs among the people; and what stands between people and cameras."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -23,10 +23,12 @@ _BOARDS = Texture("planks", ((0.46, 0.50, 0.48), (0.60, 0.63, 0.58)), 0.17, 8)
 _NOTICES = Texture("poster", ((0.76, 0.74, 0.68), (0.30, 0.42, 0.50), (0.62, 0.34, 0.28), (0.40, 0.46, 0.34)), 1.0, 9)
 _CLOTHS = ((0.66, 0.60, 0.50), (0.56, 0.52, 0.46), (0.42, 0.36, 0.34))
 
-COUNTER_SIZE = (1.8, 0.44, 0.95)
+COUNTER_SIZE = (1.8, 0.44, 1.05)
 """Metres: length, depth and height of a counter."""
-BOARD_SIZE, BOARD_HEIGHTS = (1.5, 0.04), (0.80, 1.42)
+BOARD_SIZE, BOARD_HEIGHTS = (1.9, 0.04), (0.85, 1.52)
 """Metres: length and depth of a board, and the heights of its lower and its upper edge."""
+_FARTHER = 0.12
+"""Metres that these stand farther from people than a table."""
 AROUND = 2.35
 """Metres from the middle of the room to a screen or a fence."""
 SCREEN_ANGLES, SCREEN_HEIGHT = (-3.0, 19.0, 41.0, 63.0), 2.2
@@ -58,16 +60,23 @@ def furniture(kind: str, sites: Sequence[Site]) -> list[Panel]:
     return [panel for site in sites for panel in _AMONG[kind](site)]
 
 
+def farther(site: Site) -> Site:
+    """Where what is higher than a table stands beside people: out of reach of their arms."""
+    away = float(np.linalg.norm(site.place))
+    return replace(site, place=site.place * (1.0 + _FARTHER / away)) if away > 0.0 else site
+
+
 def _counter(site: Site) -> list[Panel]:
     """A counter closed down to the floor: it hides legs."""
     length, depth, height = COUNTER_SIZE
+    site = farther(site)
     top = _slab(site.place, (length, depth), height - 0.04, height, site.turn, _DARK)
     return [*box(site.place, np.array([length - 0.04, depth - 0.06, height - 0.04]), site.turn, _BOARDS), *top]
 
 
 def _board(site: Site) -> list[Panel]:
     """A board on two thin legs: it hides the trunk, and leaves head and lower legs."""
-    along, _ = ahead_and_left(site.turn)
+    site, (along, _) = farther(site), ahead_and_left(site.turn)
     length, depth = BOARD_SIZE
     low, high = BOARD_HEIGHTS
     panels = _slab(site.place, (length, depth), low, high, site.turn, _NOTICES)

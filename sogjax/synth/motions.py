@@ -32,7 +32,7 @@ _TABLES = {
     "fight": (0.0, 1.05),
     "talk": (0.0, 1.05),
     "embrace": (0.0, 0.95),
-    "couple": (0.0, 1.35),
+    "couple": (0.0, 1.15),
 }
 """Metres ahead and to the left of the people at which a table stands clear of what they do; else in the middle."""
 _ON_THE_SPOT = {

@@ -72,6 +72,10 @@ class SynthSettings:
         0.0, "share of the light that is lost over the clip, 0 to 0.6, most of it blue; plates show the beginning"
     )
 
+    alone: bool = expert(
+        False, "whether the first of the two people of a motion does the same without the other one; with actors=1"
+    )
+
     def check(self) -> None:
         """Refuse values that cannot be rendered.
 
@@ -98,6 +102,11 @@ class SynthSettings:
         return ACTOR_NAMES[: self.actors]
 
     @property
+    def roles(self) -> int:
+        """How many people the motion is made for."""
+        return 2 if self.alone else self.actors
+
+    @property
     def furniture(self) -> str:
         """What stands among the people: one of PROPS but auto."""
         if self.props == "auto":
@@ -112,7 +121,11 @@ class SynthSettings:
     def _check_people(self) -> None:
         if self.motion == "pass" and self.actors < 2:
             raise InputError(f"actors={self.actors}: the motion pass needs two people or more; set actors=2")
-        if self.motion in PAIRED and self.actors != 2:
+        if self.alone and self.motion not in PAIRED:
+            raise InputError(f"alone=true: the motion {self.motion} is not one of two people; leave it out")
+        if self.alone and self.actors != 1:
+            raise InputError(f"alone=true actors={self.actors}: one of two people is alone; set actors=1")
+        if self.motion in PAIRED and not self.alone and self.actors != 2:
             raise InputError(f"actors={self.actors}: the motion {self.motion} needs two people; set actors=2")
 
     def _check_props(self) -> None:

@@ -46,19 +46,20 @@ class Stage:
 def stage_of(settings: SynthSettings) -> Stage:
     """Make everything; the same settings make the same things."""
     stream = lambda *key: np.random.default_rng([settings.seed, *key])
-    outfits = outfits_from_seed(stream(_PEOPLE, 100), settings.actors, settings.outfit)
+    outfits = outfits_from_seed(stream(_PEOPLE, 100), settings.roles, settings.outfit)
     if settings.room == "green":
         outfits = [without_green(outfit) for outfit in outfits]
-    anatomies = [anatomy_from_seed(stream(_PEOPLE, number)) for number in range(settings.actors)]
-    people = [make_figure(*both) for both in zip(anatomies, outfits, strict=True)]
+    anatomies = [anatomy_from_seed(stream(_PEOPLE, number)) for number in range(settings.roles)]
+    people = [make_figure(*both) for both in zip(anatomies, outfits, strict=True)][: settings.actors]
     room = room_of(settings.room, outfits, stream(_ROOM))
     bare = assembled(room)
-    sites = furniture_sites(settings.motion, settings.actors, stream(_MOTIONS))
+    sites = furniture_sites(settings.motion, settings.roles, stream(_MOTIONS))
+    motions = motions_of(settings.motion, anatomies, stream(_MOTIONS), settings.stands_among)
     furnished = settings.furniture != "none"
     return Stage(
         settings=settings,
         people=tuple(people),
-        motions=tuple(motions_of(settings.motion, anatomies, stream(_MOTIONS), settings.stands_among)),
+        motions=tuple(motions[: settings.actors]),
         scene=assembled(room, furniture(settings.furniture, sites)) if furnished else bare,
         bare=bare,
         views=ring_of_views(settings, stream(_VIEWS)),
