@@ -19,7 +19,7 @@ from sogjax.synth.filming import film
 from sogjax.synth.flesh import PARTS
 from sogjax.synth.landmarks import LANDMARKS, landmark_points
 from sogjax.synth.picture import Shadows, plate_of, shot_of
-from sogjax.synth.render import render_recording
+from sogjax.synth.render import ground_truth_of, render_recording
 from sogjax.synth.settings import SynthSettings
 from sogjax.synth.stage import stage_of
 
@@ -227,6 +227,20 @@ def test_a_fence_is_before_low_cameras_and_a_screen_before_three_neighbours():
             if not seen_joints(made, view, mask)["left_knee"] and not seen_joints(made, view, mask)["right_knee"]
         ]
         assert hidden == expected
+
+
+@pytest.mark.parametrize("props", ["counter", "board", "screen", "fence"])
+def test_what_stands_in_front_is_in_the_plates_and_changes_no_truth(props):
+    """Where people are hidden the empty scene shows something else than without it."""
+    made, with_props = ring_of_masks(props)
+    bare, without = ring_of_masks("none")
+    hidden = np.stack(without) & ~np.stack(with_props)
+    pictures = [np.stack([p.total for p in plates(motion="stoop", props=each, cameras=12)]) for each in (props, "none")]
+    changed = np.abs(pictures[0] - pictures[1]).max(-1) > 0.01
+    assert changed[hidden].mean() > 0.8
+    truths = [ground_truth_of(each) for each in (made, bare)]
+    np.testing.assert_array_equal(truths[0].joints, truths[1].joints)
+    np.testing.assert_array_equal(truths[0].markers, truths[1].markers)
 
 
 def test_people_who_dress_alike_keep_their_own_skin_and_hair():

@@ -78,7 +78,7 @@ def _embrace_keys(stature: float) -> KeyPoses:
     ]
 
 
-def _closed(way: float) -> Angles:
+def _closed(way: float) -> dict[str, float]:
     """The embrace, so far ahead of where each one stood."""
     trunk = {"bend": 8.0, "tilt": 9.0, "nod": 4.0}
     return _ROUND | {"left_foot_x": way, "right_foot_x": way, "pelvis_x": way} | trunk
@@ -243,8 +243,8 @@ _HIGH = {
 """Arms on their way: the leader's below the other one's."""
 
 
-def _couple_keys(stature: float, hold: Angles, between: Angles) -> KeyPoses:
-    """Key poses over 6.4 s: take hold, twelve steps of which each turns the couple by 30 degrees, let go."""
+def _couple_keys(stature: float, hold: dict[str, float], between: Angles) -> KeyPoses:
+    """Key poses over 6.2 s: take hold, twelve steps of which each turns the couple by 30 degrees, let go."""
     free = {name: 0.0 if name.endswith("_hand") else value for name, value in hold.items() if "_hand" in name}
     standing, open_ = READY | free, {**hold, **free, **between}
     whole = {"yaw": 360.0, "left_foot_yaw": 360.0, "right_foot_yaw": 360.0}
