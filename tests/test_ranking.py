@@ -11,7 +11,7 @@ from sogjax.io.ground_truth import GroundTruth
 from sogjax.io.motion import motion_from_poses
 from sogjax.model.body import Attachments
 from sogjax.study.climbs import Climbed, Pair
-from sogjax.study.ranking import limbs_table, verdicts_table, write_csv
+from sogjax.study.ranking import limbs_table, oracle_table, verdicts_table, write_csv
 from sogjax.study.true_poses import true_poses
 from sogjax.study.verdicts import LimbErrors, Ranking, limb_of
 
@@ -78,3 +78,16 @@ def test_true_poses_lie_on_labelled_joints_and_follow_markers_where_there_are_la
     distances = np.linalg.norm(fitted.world_from_joint[:, joints][..., :3, 3] - points[known], axis=-1)
     assert distances.max() < 0.01
     assert np.linalg.norm(fitted.blob_means[:, 1] - motion.blob_means[known, 1], axis=-1).max() < 0.03
+
+
+def test_the_oracle_takes_the_truth_where_it_is_worth_more():
+    """Three frames, known gains: the truth is worth 10 % more with a lost arm, 2 % less, and as much."""
+    gains, near = np.array([0.1, -0.02, 0.0]), np.full((3, 2), 0.01)
+    arm_lost = np.array([[0.4, 0.01], [0.01, 0.01], [0.01, 0.01]])
+    errors = lambda values: LimbErrors(NAMES, values, values.mean(axis=1))
+    pair = Pair(Climbed(np.zeros((3, 1)), {"seen": 1.0 - gains}), Climbed(np.zeros((3, 1)), {"seen": np.ones(3)}))
+    reached, optimum = errors(arm_lost), errors(0.5 * near)
+    found = Ranking("default", np.arange(3), pair, errors(arm_lost), reached, optimum, errors(near), far=0.1)
+    np.testing.assert_allclose(found.chosen, [0.005, 0.01, 0.01])
+    cells = [cell.strip() for cell in oracle_table([found]).splitlines()[-1].strip("|").split("|")]
+    assert cells == ["default", "3", "33 %", "+2.667 %", "1", "100 %", "+10.000 %", "75.0", "8.3"]

@@ -13,7 +13,7 @@ from sogjax.synth.gait import circle, egg
 from sogjax.synth.landmarks import LANDMARKS, landmark_points
 
 NAMES = list(LANDMARKS)
-SINGLE = ["walk", "arms", "squat_kick", "cartwheel", "run", "sit", "throw", "dance"]
+SINGLE = ["walk", "arms", "squat_kick", "cartwheel", "run", "sit", "throw", "dance", "stoop"]
 FPS = 30.0
 SECONDS = 3.4
 

@@ -17,8 +17,9 @@ from sogjax.synth.cache import cache_name
 from sogjax.synth.clothes import outfits_from_seed
 from sogjax.synth.filming import film
 from sogjax.synth.flesh import PARTS
+from sogjax.synth.landmarks import LANDMARKS, landmark_points
 from sogjax.synth.picture import Shadows, plate_of, shot_of
-from sogjax.synth.render import render_recording
+from sogjax.synth.render import ground_truth_of, render_recording
 from sogjax.synth.settings import SynthSettings
 from sogjax.synth.stage import stage_of
 
@@ -158,7 +159,11 @@ def test_the_light_drifts_slowly_from_what_the_plates_show(tmp_path):
         ({"light_drift": float("nan")}, "light_drift=nan is out of range"),
         ({"motion": "hug"}, "actors=1: the motion hug needs two people; set actors=2"),
         ({"motion": "fight", "actors": 3}, "actors=3: the motion fight needs two people; set actors=2"),
+        ({"motion": "talk", "actors": 1}, "actors=1: the motion talk needs two people; set actors=2"),
+        ({"motion": "walk", "alone": True}, "alone=true: the motion walk is not one of two people"),
+        ({"motion": "talk", "actors": 2, "alone": True}, "alone=true actors=2: one of two people is alone"),
         ({"motion": "sit", "props": "none"}, "props=none: the motion sit needs a chair"),
+        ({"motion": "sit", "props": "fence"}, "props=fence: the motion sit needs a chair"),
         ({"motion": "pass", "actors": 2, "props": "table"}, "props=table: people who walk past each other"),
     ],
 )
@@ -175,3 +180,82 @@ def test_recordings_rendered_before_there_was_a_choice_keep_their_names():
     digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:12]
     assert cache_name(SMALL) == f"walk1-{digest}"
     assert len({cache_name(replace(SMALL, **c)) for c in ({}, {"room": "green"}, {"props": "table"})}) == 3
+
+
+def seen_joints(made, view, mask, frame=0):
+    """Which true joints of the first person a camera has people's pixels at."""
+    points = landmark_points(made.people[0].anatomy, made.poses(frame)[0])
+    column, row = np.round(view.project(points)[0]).astype(int).T
+    return dict(zip(LANDMARKS, mask[np.clip(row, 0, view.height - 1), np.clip(column, 0, view.width - 1)], strict=True))
+
+
+def ring_of_masks(props):
+    """Twelve cameras, and what they see of somebody who stands there."""
+    chosen = {"motion": "stoop", "props": props, "cameras": 12}
+    made = stage(**chosen)
+    return made, masks(made, plates(**chosen), 0)
+
+
+@pytest.mark.parametrize(
+    ("props", "hidden", "seen", "cameras"),
+    [
+        ("counter", ("left_knee", "right_knee", "left_ankle"), ("head_top", "neck", "chest"), (3, 5)),
+        ("board", ("pelvis",), ("left_ankle", "right_ankle", "head_top"), (3, 6)),
+        ("screen", ("pelvis", "chest", "neck", "left_knee", "left_ankle"), (), (3, 3)),
+        ("fence", ("left_knee", "right_knee", "left_ankle"), ("head_top", "neck", "chest"), (6, 6)),
+    ],
+)
+def test_what_stands_in_front_hides_what_it_is_meant_to(props, hidden, seen, cameras):
+    """True joints, from so many cameras; other joints are seen by all low cameras that would see them without it."""
+    made, with_props = ring_of_masks(props)
+    _, without = ring_of_masks("none")
+    few = 0
+    for number, (view, some, all_) in enumerate(zip(made.views, with_props, without, strict=True)):
+        joints, bare = seen_joints(made, view, some), seen_joints(made, view, all_)
+        assert not (some & ~all_).any()
+        assert number % 2 or all(joints[name] or not bare[name] for name in seen)
+        few += not any(joints[name] for name in hidden)
+    assert cameras[0] <= few <= cameras[1]
+
+
+def test_a_fence_is_before_low_cameras_and_a_screen_before_three_neighbours():
+    for props, expected in (("fence", [0, 2, 4, 6, 8, 10]), ("screen", [0, 1, 2])):
+        made, seen = ring_of_masks(props)
+        hidden = [
+            number
+            for number, (view, mask) in enumerate(zip(made.views, seen, strict=True))
+            if not seen_joints(made, view, mask)["left_knee"] and not seen_joints(made, view, mask)["right_knee"]
+        ]
+        assert hidden == expected
+
+
+@pytest.mark.parametrize("props", ["counter", "board", "screen", "fence"])
+def test_what_stands_in_front_is_in_the_plates_and_changes_no_truth(props):
+    """Where people are hidden the empty scene shows something else than without it."""
+    made, with_props = ring_of_masks(props)
+    bare, without = ring_of_masks("none")
+    hidden = np.stack(without) & ~np.stack(with_props)
+    pictures = [np.stack([p.total for p in plates(motion="stoop", props=each, cameras=12)]) for each in (props, "none")]
+    changed = np.abs(pictures[0] - pictures[1]).max(-1) > 0.01
+    assert changed[hidden].mean() > 0.8
+    truths = [ground_truth_of(each) for each in (made, bare)]
+    np.testing.assert_array_equal(truths[0].joints, truths[1].joints)
+    np.testing.assert_array_equal(truths[0].markers, truths[1].markers)
+
+
+def test_people_who_dress_alike_keep_their_own_skin_and_hair():
+    usual, alike = (outfits_from_seed(np.random.default_rng(7), 3, kind) for kind in ("random", "alike"))
+    worn = lambda outfit: (outfit.shirt, outfit.trousers, outfit.shoes, outfit.pattern, outfit.sleeve)
+    assert len({worn(outfit) for outfit in alike}) == 1
+    assert len({worn(outfit) for outfit in usual}) == 3
+    assert [(o.skin, o.hair) for o in alike] == [(o.skin, o.hair) for o in usual]
+
+
+def test_one_of_two_people_does_the_same_alone():
+    """What two people cost a tracker is told by the first one alone: the same motion, clothes, cameras and room."""
+    both, alone = stage(motion="talk", actors=2), stage(motion="talk", alone=True)
+    assert len(alone.people) == len(alone.motions) == 1
+    for frame in (0, 2):
+        np.testing.assert_array_equal(both.poses(frame)[0].rotations, alone.poses(frame)[0].rotations)
+        np.testing.assert_array_equal(both.poses(frame)[0].position, alone.poses(frame)[0].position)
+    assert both.people[0].outfit == alone.people[0].outfit

@@ -50,12 +50,17 @@ class Pair:
 
 
 def ranked(
-    recording: Recording, bodies: list[Body], config: TrackConfig, frames: Int[np.ndarray, "frame"], starts: list[Poses]
+    recording: Recording,
+    bodies: list[Body],
+    config: TrackConfig,
+    frames: Int[np.ndarray, "frame"],
+    starts: list[Poses],
+    every: int = 1,
 ) -> Pair:
     """Climb from tracked and from true poses with the solver and the energy of a config.
 
-    Either path has its own history: the acceleration penalty is that of its own optima. The pictures are culled around
-    both poses.
+    Either path has its own history: the acceleration penalty is that of its own optima, or of the poses that it starts
+    from where frames are left out. The pictures are culled around both poses.
 
     Args:
         recording: in which was tracked.
@@ -63,6 +68,7 @@ def ranked(
         config: of the track; its initial pose is not used.
         frames: counted from the recording's first, one after the other.
         starts: the tracked and the true poses of all actors beside each other; NaN where not known.
+        every: of how many of these frames one is climbed in.
     """
     tracked, true = starts
     clip = opened_clip(recording, config)
@@ -71,11 +77,14 @@ def ranked(
     first = recording.first_frame + int(frames[0])
     climber = _Climber(tracker)
     paths: list[list[_Optimum | None]] = [[], []]
-    for k, seen in enumerate(clip.frames(first, first + len(frames))):
+    rows = range(0, len(frames), every)
+    for k, seen in zip(rows, clip.frames(first, first + len(frames), every), strict=True):
         for path, poses in zip(paths, starts, strict=True):
             known = np.isfinite(poses[k]).all() and np.isfinite(true[k]).all()
+            optima = [None if one is None else one.pose for one in path[-2:]]
+            before = optima if every == 1 else [*poses[max(k - 2, 0) : k]]
             around = (tracked[k], true[k])
-            path.append(climber.climb(np.asarray(seen.cells), around, poses[k], path) if known else None)
+            path.append(climber.climb(np.asarray(seen.cells), around, poses[k], before) if known else None)
     return Pair(*(_joined(path, tracker) for path in paths))
 
 
@@ -97,9 +106,9 @@ class _Climber:
         cells: UInt8[np.ndarray, "camera rows columns 3"],
         around: Sequence[Float[np.ndarray, "dof"]],
         start: Float[np.ndarray, "dof"],
-        before: Sequence[_Optimum | None],
+        before: Sequence[Float[np.ndarray | Array, "dof"] | None],
     ) -> _Optimum:
-        """The optimum above a pose, in pictures culled around two poses, after the optima of the frames before."""
+        """The optimum above a pose, in pictures culled around two poses, after the poses of the frames before."""
         dtype = self.tracker.body.skeleton.offsets.dtype
         last, predicted, pose = (jnp.asarray(each, dtype) for each in (*around, start))
         seen_from = TrackState(last, 2.0 * last - predicted, jnp.asarray(0))
@@ -137,8 +146,8 @@ def _climbed(
     return solution.params, parts, (near, matching, blocks)
 
 
-def _history(before: Sequence[_Optimum | None], pose: Float[Array, "dof"]) -> History:
-    two = [optimum.pose for optimum in before[-2:] if optimum is not None]
+def _history(before: Sequence[Float[np.ndarray | Array, "dof"] | None], pose: Float[Array, "dof"]) -> History:
+    two = [jnp.asarray(each, pose.dtype) for each in before if each is not None and np.isfinite(each).all()]
     return History(two[1], two[0], jnp.asarray(True)) if len(two) == 2 else History.unknown(pose)
 
 

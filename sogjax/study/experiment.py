@@ -178,6 +178,7 @@ _ORDER = (
     "overlap_exponent",
     "throughput",
     "sequences",
+    "together",
 )
 """The paper's own experiments first."""
 
@@ -204,14 +205,23 @@ def _checked(path: Path, config: ExperimentConfig) -> ExperimentConfig:
 
 
 def yardsticks(names: Sequence[str] = ()) -> dict[str, dict[str, object]]:
-    """The settings of the rendered recordings of the experiment `sequences`, by the names of their rows; none: all.
+    """The settings of rendered recordings, by the names of their rows.
+
+    Args:
+        names: rows of the experiments `sequences` and `together`; none: all of `sequences`.
 
     Raises:
         InputError: a name that is no row's.
     """
-    rows = Experiment.named("sequences").config.rows
-    whole = {name: row.synth for name, row in rows.items() if row.synth is not None and row.methods is None}
-    unknown = [name for name in names if name not in whole]
+    whole = _rendered("sequences")
+    known = {**_rendered("together"), **whole} if names else whole
+    unknown = [name for name in names if name not in known]
     if unknown:
-        raise InputError(f"sequences: {unknown[0]}: is none of {', '.join(whole)}")
-    return {name: whole[name] for name in names or whole}
+        raise InputError(f"sequences: {unknown[0]}: is none of {', '.join(known)}")
+    return {name: known[name] for name in names or whole}
+
+
+def _rendered(name: str) -> dict[str, dict[str, object]]:
+    """The settings of the recordings of an experiment's rows that are run with all its methods."""
+    rows = Experiment.named(name).config.rows
+    return {name: row.synth for name, row in rows.items() if row.synth is not None and row.methods is None}

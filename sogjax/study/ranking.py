@@ -65,17 +65,25 @@ class RankedTrack:
         return cls(recording, truth, [*actors], frames, np.concatenate(tracked, axis=1), np.concatenate(true, axis=1))
 
 
-def ranking_of(track: RankedTrack, words: str, far: float) -> Ranking:
-    """The ranking of a track by the terms, pictures and solver of a set: options of track, with spaces between them."""
+def ranking_of(track: RankedTrack, words: str, far: float, every: int = 1) -> Ranking:
+    """The ranking of a track by the terms, pictures and solver of a set.
+
+    Args:
+        track: that is ranked.
+        words: options of track, with spaces between them.
+        far: metres; a limb that is farther off is lost.
+        every: of how many frames one is looked at.
+    """
     given = [] if words == DEFAULT else words.split()
     cache: Mapping[str, str] = {"cache": str(default_cache_dir() / "cells")}
     config = track_config(given, recording=track.recording.path, images=cache, outputs={"confidence": False})
     starts = [track.tracked, track.true]
-    pair = ranked(track.recording, track.actors, config, track.frames - track.recording.first_frame, starts)
+    pair = ranked(track.recording, track.actors, config, track.frames - track.recording.first_frame, starts, every)
     bodies = [upright(actor, track.recording) for actor in track.actors]
-    poses = (track.tracked, pair.tracked.poses, pair.true.poses, track.true)
-    errors = [limb_errors(bodies, track.truth, track.frames, each) for each in poses]
-    return Ranking(words, track.frames, pair, *errors, far=far)
+    frames = track.frames[::every]
+    poses = (track.tracked[::every], pair.tracked.poses, pair.true.poses, track.true[::every])
+    errors = [limb_errors(bodies, track.truth, frames, each) for each in poses]
+    return Ranking(words, frames, pair, *errors, far=far)
 
 
 MM = 1000.0
@@ -94,6 +102,30 @@ def verdicts_table(rankings: Sequence[Ranking]) -> str:
         lines.append([ranking.name, *counts, wrong, least, *(_millimetres(each.mean) for each in errors)])
     meanings = "\n".join(f"{verdict}: {meaning}" for verdict, meaning in VERDICTS.items())
     return f"{ruled_table(lines)}\n\n{meanings}"
+
+
+def oracle_table(rankings: Sequence[Ranking]) -> str:
+    """A line for each set: the truth as one more hypothesis beside the tracked pose, climbed from and judged as it is.
+
+    How often the higher energy chooses the truth, by what share of the energy it is worth more, in all frames and in
+    those with a lost limb, and the mean joint errors before and after the choice.
+    """
+    lines = [
+        ["set", "frames", "truth chosen", "mean gain", "lost", "truth chosen", "mean gain", "reached, mm", "chosen"]
+    ]
+    for ranking in rankings:
+        known = np.isfinite(ranking.gain)
+        lost = known & ranking.lost.any(axis=1)
+        errors = [_millimetres(each[known]) for each in (ranking.reached.mean, ranking.chosen)]
+        lines.append([ranking.name, *_choice(ranking.gain[known]), *_choice(ranking.gain[lost]), *errors])
+    return f"The truth as one more hypothesis, chosen where it is worth more after the climb:\n\n{ruled_table(lines)}"
+
+
+def _choice(gains: Float[np.ndarray, "frame"]) -> list[str]:
+    """How many frames, in what share of them the truth is worth more, and by how much on average."""
+    if not gains.size:
+        return ["0", "", ""]
+    return [str(gains.size), f"{100.0 * np.mean(gains > EQUAL):.0f} %", f"{100.0 * gains.mean():+.3f} %"]
 
 
 def limbs_table(rankings: Sequence[Ranking]) -> str:

@@ -153,7 +153,8 @@ def rendered_source(settings: Mapping[str, Any], num_frames: int, folder: Path, 
     wanted = synth_settings({"frames": max(num_frames, MOST_FRAMES), **settings})
     path = cached_recording(wanted, progress=progress)
     usual = asdict(SynthSettings(wanted.motion, seed=wanted.seed))
-    chosen = [str(value) for key, value in settings.items() if key not in _IN_NAME and value != usual[key]]
+    differing = {key: value for key, value in settings.items() if key not in _IN_NAME and value != usual[key]}
+    chosen = [key if value is True else str(value) for key, value in differing.items()]
     people = [f"{wanted.actors}people"] if wanted.actors > 1 else []
     name = "-".join([wanted.motion, f"seed{wanted.seed}", *people, *chosen])
     return Source(name, path, path.name, min(num_frames, wanted.frames), folder, body)

@@ -105,6 +105,11 @@ class Ranking:
         return (true - self.pair.tracked.energy) / np.abs(true)
 
     @property
+    def chosen(self) -> Float[np.ndarray, "frame"]:
+        """Mean joint errors of what is worth more: the optima above the tracked poses, or above the true ones."""
+        return np.where(self.gain > EQUAL, self.optimum.mean, self.reached.mean)
+
+    @property
     def lost(self) -> Bool[np.ndarray, "frame limb"]:
         """Which limbs the tracked poses had lost."""
         return self.tracked.limbs > self.far

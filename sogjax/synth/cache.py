@@ -19,7 +19,7 @@ SYNTH_VERSION = 2
 KEYPOINT_VERSION = 1
 """Raise it with every change that alters simulated keypoints."""
 
-_CHOICES = ("props", "outfit", "room", "light_drift")
+_CHOICES = ("props", "outfit", "room", "light_drift", "alone")
 """Settings that name no recording while they have their defaults."""
 
 

@@ -44,8 +44,11 @@ class Outfit:
 
 
 def outfits_from_seed(rng: np.random.Generator, count: int, kind: str = "random") -> list[Outfit]:
-    """Draw clothes for several people, who wear different ones; `kind` is one of `settings.OUTFITS`."""
-    return [_changed(outfit, kind, k) for k, outfit in enumerate(_drawn(rng, count))]
+    """Draw clothes for several people, who wear different ones unless `kind`, one of `settings.OUTFITS`, is alike."""
+    drawn = _drawn(rng, count)
+    if kind == "alike":
+        return [replace(drawn[0], skin=outfit.skin, hair=outfit.hair) for outfit in drawn]
+    return [_changed(outfit, kind, k) for k, outfit in enumerate(drawn)]
 
 
 def _changed(outfit: Outfit, kind: str, number: int) -> Outfit:

@@ -1,4 +1,4 @@
-"""People whose hands are held at places: one sits down at a table; two embrace, or box and kick."""
+"""People whose hands are held at places: one sits down at a table; two box and kick."""
 
 from collections.abc import Callable, Sequence
 
@@ -7,16 +7,14 @@ from jaxtyping import Float
 
 from sogjax.synth.anatomy import INDEX, Anatomy
 from sogjax.synth.exercises import READY, Angles, Direction, Exercise, Handling, both, of_arms
+from sogjax.synth.furniture import EDGE, SEAT_HEIGHT, SITTER_SEAT, TABLE_HEIGHT, TABLE_SIZE
 from sogjax.synth.limbs import heading_matrix
-from sogjax.synth.rooms import EDGE, SEAT_HEIGHT, SITTER_SEAT, TABLE_HEIGHT, TABLE_SIZE
 from sogjax.synth.rotations import Vector, ahead_and_left
 
-_Keys = list[tuple[float, Angles]]
+KeyPoses = list[tuple[float, Angles]]
 
 TABLE_AHEAD = EDGE + 0.5 * TABLE_SIZE[1]
 """Metres from where a sitter stands to the middle of the table."""
-_MEETING, _EMBRACED = 1.50, 0.42
-"""Metres between two people before an embrace and in it."""
 _FIGHTING = 1.02
 """Metres between fighters."""
 _HALF = 2.7
@@ -30,7 +28,7 @@ def sitting(anatomy: Anatomy, place: Vector, heading: float, delay: float = 0.0)
     return Handling(Exercise(anatomy, _sit_keys(anatomy), place, heading, delay), lambda time: frame, flat=True)
 
 
-def _sit_keys(anatomy: Anatomy) -> _Keys:
+def _sit_keys(anatomy: Anatomy) -> KeyPoses:
     """Key poses for a chair behind and a table in front of the person."""
     stature = anatomy.stature
     hips = SEAT_HEIGHT + 0.104 * anatomy.girth * stature / 1.75  # on the flesh of a person of average stature and girth
@@ -89,24 +87,18 @@ _DRINK = _ON_TABLE | {
 """The right hand at the mouth."""
 
 
-def hugging(anatomies: Sequence[Anatomy], turn: float) -> tuple[Handling, Handling]:
-    """Two people who walk up to each other, embrace, and part; they pass each other's heads by 6 cm on either side."""
-    elbows = ((0.1, 0.85, 0.35), (0.0, 0.8, -0.6))
-    return _facing(anatomies, turn, _MEETING, 0.06, lambda anatomy, _: _hug_keys(anatomy.stature), elbows)
-
-
 def fighting(anatomies: Sequence[Anatomy], turn: float) -> tuple[Handling, Handling]:
     """Two people who box: punches, blocks and a kick that meets the other; then the other one attacks."""
     elbows = ((0.0, 0.5, -0.85), (0.0, 0.5, -0.85))
-    return _facing(anatomies, turn, _FIGHTING, 0.0, lambda anatomy, k: _fight_keys(anatomy.stature, k), elbows)
+    return facing(anatomies, turn, _FIGHTING, 0.0, lambda anatomy, k: _fight_keys(anatomy.stature, k), elbows)
 
 
-def _facing(
+def facing(
     anatomies: Sequence[Anatomy],
     turn: float,
     distance: float,
     aside: float,
-    keys: Callable[[Anatomy, int], _Keys],
+    keys: Callable[[Anatomy, int], KeyPoses],
     elbows: tuple[Direction, Direction],
 ) -> tuple[Handling, Handling]:
     """Two people who face each other; the places of each one's hands are given in the frame of the other's chest."""
@@ -114,10 +106,10 @@ def _facing(
     offset: Vector = -0.5 * distance * ahead + aside * left
     one = Exercise(anatomies[0], keys(anatomies[0], 0), offset, turn)
     other = Exercise(anatomies[1], keys(anatomies[1], 1), -offset, turn + np.pi)
-    return Handling(one, _chest_of(other), elbows), Handling(other, _chest_of(one), elbows)
+    return Handling(one, chest_of(other), elbows), Handling(other, chest_of(one), elbows)
 
 
-def _chest_of(exercise: Exercise) -> Callable[[float], Float[np.ndarray, "4 4"]]:
+def chest_of(exercise: Exercise) -> Callable[[float], Float[np.ndarray, "4 4"]]:
     """The frame of somebody's chest, in units of 1/1.75 of that person's stature."""
 
     def frame(time: float) -> Float[np.ndarray, "4 4"]:
@@ -126,59 +118,6 @@ def _chest_of(exercise: Exercise) -> Callable[[float], Float[np.ndarray, "4 4"]]
         return chest
 
     return frame
-
-
-def _hug_keys(stature: float) -> _Keys:
-    """Key poses of either one, over 4.7 s."""
-    way = 0.5 * (_MEETING - _EMBRACED) / stature
-    close = _ROUND | {"left_foot_x": way, "right_foot_x": way, "pelvis_x": way, "bend": 8.0, "tilt": 9.0, "nod": 4.0}
-    approach = [(time, _opened(min(time / 0.9, 1.0)) | feet) for time, feet in _steps_ahead(way)]
-    return [
-        (0.0, READY | _NO_HANDS),
-        *((0.2 + time, angles) for time, angles in approach),
-        (1.75, close | {"lean": 2.0}),
-        (2.1, close | {"lean": -5.0}),
-        (2.45, close | {"lean": 4.0}),
-        *((3.95 - time, angles) for time, angles in reversed(approach)),
-        (4.3, READY | _NO_HANDS),
-    ]
-
-
-def _steps_ahead(way: float) -> list[tuple[float, dict[str, float]]]:
-    """Three steps that lead so far ahead, over 1.15 s: pelvis and feet."""
-    places = (
-        (0.0, 0.0, 0.0, 0.0, ""),
-        (0.19, 0.12, 0.0, 0.25, "right"),
-        (0.38, 0.30, 0.0, 0.5, ""),
-        (0.58, 0.52, 0.5, 0.5, "left"),
-        (0.78, 0.74, 1.0, 0.5, ""),
-        (0.96, 0.92, 1.0, 0.78, "right"),
-        (1.15, 1.0, 1.0, 1.0, ""),
-    )
-    raised = lambda side: {f"{side}_foot_z": 0.035, f"{side}_foot_pitch": 8.0, "pelvis_z": -0.01} if side else {}
-    return [
-        (time, {"pelvis_x": pelvis * way, "left_foot_x": left * way, "right_foot_x": right * way} | raised(side))
-        for time, pelvis, left, right, side in places
-    ]
-
-
-_NO_HANDS = {
-    **{"left_hand": 0.0, "left_hand_x": -0.10, "left_hand_y": -0.12, "left_hand_z": 0.29},
-    **{"right_hand": 0.0, "right_hand_x": -0.05, "right_hand_y": 0.195, "right_hand_z": -0.05},
-}
-"""The left hand is meant for the other one's right shoulder, the right hand for the left side of the back."""
-_ROUND = _NO_HANDS | {
-    **{"left_hand": 1.0, "left_raise": 96.0, "left_plane": 30.0, "left_elbow": 40.0, "left_wrist": -34.0},
-    **{"right_hand": 1.0, "right_raise": 62.0, "right_plane": 48.0, "right_elbow": 45.0},
-    **{"right_palm": 62.0, "right_wrist": -46.0},
-}
-
-
-def _opened(share: float) -> dict[str, float]:
-    """Arms on their way from hanging to open."""
-    wide = {"left_raise": 98.0, "left_plane": 52.0, "left_elbow": 24.0}
-    wide |= {"right_raise": 56.0, "right_plane": 58.0, "right_elbow": 24.0}
-    return {name: READY[name] + share * (value - READY[name]) for name, value in wide.items()} | _NO_HANDS
 
 
 _AT_FACE = both(hand=0.0, hand_x=0.30, hand_y=0.0, hand_z=0.33)
@@ -206,7 +145,7 @@ def _block(side: str) -> Angles:
     return _GUARD | arm | {"pelvis_x": -0.03, "bend": -2.0, "lean": -5.0 if side == "left" else 5.0, "nod": 6.0}
 
 
-def _attack(stature: float) -> _Keys:
+def _attack(stature: float) -> KeyPoses:
     """A punch, a block, a kick with the right foot, whose ankle stays 28 cm away from the other one's place."""
     drawn = _GUARD | {
         **{"pelvis_y": 0.05, "pelvis_x": 0.04, "pelvis_z": -0.012, "tip": -4.0, "yaw": 0.0, "right_foot_yaw": 0.0},
@@ -223,14 +162,14 @@ def _attack(stature: float) -> _Keys:
     return [*hits, *kicks]
 
 
-def _defence() -> _Keys:
+def _defence() -> KeyPoses:
     """A block, a jab, a kick taken."""
     block = _block("left")
     first = [(0.28, _GUARD), (0.46, block), (0.60, block), (0.85, _GUARD), (1.0, _GUARD), (1.18, _JAB), (1.26, _JAB)]
     return [*first, (1.5, _GUARD), (1.85, _GUARD), (2.12, _STRUCK), (2.35, _STRUCK), (_HALF, _GUARD)]
 
 
-def _fight_keys(stature: float, number: int) -> _Keys:
+def _fight_keys(stature: float, number: int) -> KeyPoses:
     """Key poses of the one who attacks first (0) or second (1), over 6.4 s."""
     parts = [_attack(stature), _defence()]
     first, second = parts if number == 0 else parts[::-1]

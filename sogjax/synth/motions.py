@@ -6,27 +6,39 @@ import numpy as np
 
 from sogjax.synth.anatomy import Anatomy, Pose
 from sogjax.synth.cartwheel import Cartwheel
-from sogjax.synth.contact import TABLE_AHEAD, fighting, hugging, sitting
+from sogjax.synth.contact import TABLE_AHEAD, fighting, sitting
 from sogjax.synth.exercises import Exercise
+from sogjax.synth.furniture import Site
 from sogjax.synth.gait import Walk, circle, egg
-from sogjax.synth.rooms import Site
 from sogjax.synth.rotations import ahead_and_left
-from sogjax.synth.routines import ARMS, dance_keys, squat_kick_keys, throw_keys
+from sogjax.synth.routines import ARMS, dance_keys, squat_kick_keys, stoop_keys, throw_keys
 from sogjax.synth.sprint import Run
+from sogjax.synth.together import dancing_couple, embracing, hugging, talking
 
 Motion = Callable[[float], Pose]
 """The pose at a time in seconds."""
 
+_PAIRS: dict[str, Callable[[Sequence[Anatomy], float], tuple[Motion, Motion]]] = {
+    **{"hug": hugging, "embrace": embracing, "talk": talking, "couple": dancing_couple, "fight": fighting},
+}
 _TABLES = {
     "arms": (0.95, 0.0),
     "cartwheel": (1.05, 0.0),
     "squat_kick": (-0.90, 0.0),
     "throw": (-0.90, 0.0),
     "dance": (-1.15, 0.0),
+    "stoop": (1.15, 0.0),
     "hug": (0.0, 0.95),
     "fight": (0.0, 1.05),
+    "talk": (0.0, 1.05),
+    "embrace": (0.0, 0.95),
+    "couple": (0.0, 1.15),
 }
 """Metres ahead and to the left of the people at which a table stands clear of what they do; else in the middle."""
+_ON_THE_SPOT = {
+    **{"arms": lambda: ARMS, "squat_kick": squat_kick_keys, "stoop": stoop_keys, "throw": throw_keys},
+    **{"dance": dance_keys},
+}
 _BEHIND_EACH_OTHER = ("arms", "cartwheel")
 
 
@@ -49,8 +61,8 @@ def motions_of(
     if kind == "run":
         starts = turn + 2.0 * np.pi * np.arange(len(anatomies)) / len(anatomies)
         return [Run(a, circle((0.0, 0.0), 1.6, float(s), 1.0)) for a, s in zip(anatomies, starts, strict=True)]
-    if kind in ("hug", "fight"):
-        return list((hugging if kind == "hug" else fighting)(anatomies, turn))
+    if kind in _PAIRS:
+        return list(_PAIRS[kind](anatomies, turn))
     lanes = enumerate(zip(anatomies, _lanes(len(anatomies)), strict=True))
     return [_exercise(kind, anatomy, turn, lane, 0.35 * number) for number, (anatomy, lane) in lanes]
 
@@ -97,5 +109,4 @@ def _exercise(kind: str, anatomy: Anatomy, turn: float, lane: float, delay: floa
         return Cartwheel(anatomy, place, turn, delay)
     if kind == "sit":
         return sitting(anatomy, place, turn, delay)
-    keys = {"arms": lambda: ARMS, "squat_kick": squat_kick_keys, "throw": throw_keys, "dance": dance_keys}[kind]
-    return Exercise(anatomy, keys(), place, turn, delay)
+    return Exercise(anatomy, _ON_THE_SPOT[kind](), place, turn, delay)

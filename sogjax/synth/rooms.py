@@ -1,4 +1,4 @@
-"""The room in several kinds: floor, walls, what stands along them, and furniture among the people, which hides legs."""
+"""The room in several kinds: floor, walls, and what stands along them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +8,6 @@ import numpy as np
 from jaxtyping import Float
 
 from sogjax.synth.clothes import Outfit
-from sogjax.synth.rotations import ahead_and_left
 from sogjax.synth.scene import Panel, Rgb, Texture, box, direction
 
 _WALLS = (-5.6, 5.9, -5.8, 5.5, 3.3)
@@ -133,86 +132,3 @@ def _barrel(place: Float[np.ndarray, "3"], radius: float, height: float, texture
     sides = [Panel(a, b - a, z, texture) for a, b in pairwise(rim)]
     half = radius * 0.70
     return sides + box(place + z * 0.98, np.array([2 * half, 2 * half, 0.02 * height + 0.01]), 0.3, texture)
-
-
-TABLE_SIZE, TABLE_HEIGHT, SEAT_HEIGHT = (1.15, 0.72), 0.74, 0.45
-"""Metres: length and depth of a table, its height, and that of a seat."""
-SITTER_SEAT, EDGE = -0.34, 0.20
-"""Metres from where a sitter's feet stand to the hips on the chair, and to the table."""
-
-_WOOD = Texture("planks", ((0.56, 0.40, 0.26), (0.64, 0.47, 0.31)), 0.24, 5)
-_DARK = Texture("plain", ((0.34, 0.26, 0.20),), 1.0, 6)
-_SEATS = Texture("plain", ((0.45, 0.20, 0.17),), 1.0, 7)
-
-
-@dataclass(frozen=True)
-class Site:
-    """Where furniture stands: the middle of the table on the floor, and the direction its long side runs in."""
-
-    place: Float[np.ndarray, "3"]
-    turn: float
-    """Radians about the vertical; people at the table look along `turn` + 90 degrees or the other way."""
-    sitter: bool = False
-    """Whether the chair stands at the long side, for somebody who sits at the table; else one at each end."""
-
-
-def furniture(kind: str, sites: Sequence[Site]) -> list[Panel]:
-    """Panels of the furniture.
-
-    Args:
-        kind: `table`, `chairs` or `table_and_chairs`.
-        sites: where; one table with its chairs each.
-    """
-    panels: list[Panel] = []
-    for site in sites:
-        if kind != "chairs":
-            panels += _table(site)
-        if kind != "table":
-            for place, facing in _chair_places(site, kind == "chairs"):
-                panels += _chair(place, facing)
-    return panels
-
-
-def _chair_places(site: Site, close: bool) -> list[tuple[Float[np.ndarray, "3"], float]]:
-    """Where chairs stand and look; without a table between them they stand closer together."""
-    along, across = ahead_and_left(site.turn)
-    if site.sitter:
-        return [(site.place - (0.5 * TABLE_SIZE[1] + EDGE - SITTER_SEAT - 0.02) * across, site.turn + np.pi / 2)]
-    away = 0.42 if close else 0.5 * TABLE_SIZE[0] + 0.10
-    return [(site.place - away * along, site.turn), (site.place + away * along, site.turn + np.pi)]
-
-
-def _table(site: Site) -> list[Panel]:
-    """A top, four legs, and a board between the legs along the middle."""
-    along, across = ahead_and_left(site.turn)
-    length, depth = TABLE_SIZE
-    below = TABLE_HEIGHT - 0.035
-    panels = _slab(site.place, (length, depth), below, TABLE_HEIGHT, site.turn, _WOOD)
-    for a, b in ((-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)):
-        leg = site.place + a * (0.5 * length - 0.06) * along + b * (0.5 * depth - 0.06) * across
-        panels += _slab(leg, (0.055, 0.055), 0.0, below, site.turn, _DARK)
-    board = site.place + (0.14 * across if site.sitter else 0.0)
-    return panels + _slab(board, (length - 0.14, 0.03), 0.28, below, site.turn, _WOOD)
-
-
-def _chair(place: Float[np.ndarray, "3"], facing: float) -> list[Panel]:
-    """A seat on four legs with a back; `place` is below the middle of the seat."""
-    ahead, aside = ahead_and_left(facing)
-    seat, below = 0.43, SEAT_HEIGHT - 0.04
-    panels = _slab(place, (seat, seat), below, SEAT_HEIGHT, facing, _SEATS)
-    for a, b in ((-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)):
-        leg = place + 0.5 * (seat - 0.05) * (a * ahead + b * aside)
-        panels += _slab(leg, (0.04, 0.04), 0.0, below, facing, _DARK)
-    back = place - 0.5 * (seat - 0.03) * ahead
-    return panels + _slab(back, (0.03, seat - 0.02), SEAT_HEIGHT, 0.90, facing, _SEATS)
-
-
-def _slab(
-    place: Float[np.ndarray, "3"], size: tuple[float, float], low: float, high: float, turn: float, texture: Texture
-) -> list[Panel]:
-    """A box from one height to another, with its underside."""
-    raised = place + np.array([0.0, 0.0, low])
-    along, across = ahead_and_left(turn)
-    u, v = size[0] * along, size[1] * across
-    below = Panel(raised - (u + v) / 2, v, u, texture)
-    return [*box(raised, np.array([*size, high - low]), turn, texture), below]

@@ -1,4 +1,4 @@
-"""Key poses of what people do on the spot: arms, squat and kick, an overarm throw, a dance."""
+"""Key poses of what people do on the spot: arms, squat and kick, stoop, an overarm throw, a dance."""
 
 from collections.abc import Mapping
 
@@ -44,6 +44,41 @@ def _kick(side: str) -> _Keys:
     kick = chamber | foot(0.46, -0.035, 0.37, -38.0) | {"tip": -14.0, "bend": 4.0, "pelvis_x": 0.01}
     shifted = _GUARD | weight | {"pelvis_z": -0.008}
     return [(0.0, shifted), (0.35, chamber), (0.62, kick), (0.90, chamber), (1.3, shifted)]
+
+
+_BENT = {"tip": 44.0, "bend": 44.0, "nod": -24.0, "pelvis_x": -0.075, "pelvis_z": -0.045, "knees_out": 0.1}
+_PICK = _BENT | of_arms(72.0, 12.0, 8.0) | {"pelvis_z": -0.15, "tip": 48.0}
+_LIFT = of_arms(30.0, 10.0, 86.0, roll=-10.0) | {"bend": 10.0, "tip": 4.0}
+_REACH = {
+    **{"right_raise": 152.0, "right_plane": 40.0, "right_elbow": 12.0, "left_raise": 24.0, "left_plane": 70.0},
+    **{"left_elbow": 30.0, "lean": 10.0, "look": -12.0, "nod": -20.0, "right_heel": 12.0, "left_heel": 12.0},
+}
+_SIDEWAYS = _BENT | {
+    **{"left_raise": 58.0, "left_plane": 40.0, "left_elbow": 14.0, "right_raise": 34.0, "right_plane": 20.0},
+    **{"right_elbow": 70.0, "turn": 24.0, "look": 10.0},
+}
+"""The left hand at the floor beside the left foot, the right one at the knee."""
+
+
+def stoop_keys() -> _Keys:
+    """Stoop for something, lift it, put it on high, stoop to the side, work bent down; feet stay, over 6 s."""
+    return [
+        (0.0, READY),
+        (0.1, READY),
+        (0.65, _PICK),
+        (0.85, _PICK | {"bend": 48.0}),
+        (1.3, _LIFT),
+        (1.75, _REACH),
+        (2.05, _REACH | {"right_raise": 158.0, "lean": 14.0}),
+        (2.5, _LIFT | {"turn": 12.0}),
+        (3.0, _SIDEWAYS),
+        (3.35, _SIDEWAYS | {"left_plane": 60.0}),
+        (3.8, _BENT | of_arms(60.0, 20.0, 40.0, roll=-14.0)),
+        (4.2, _BENT | of_arms(66.0, 10.0, 24.0) | {"turn": -16.0}),
+        (4.6, _BENT | of_arms(52.0, 30.0, 60.0, roll=-20.0) | {"turn": 10.0}),
+        (5.4, READY),
+        (6.0, READY),
+    ]
 
 
 def _right_arm(raised: float, plane: float, elbow: float, roll: float) -> dict[str, float]:

@@ -5,11 +5,18 @@ from dataclasses import dataclass
 from sogjax.errors import InputError
 from sogjax.settings.option import expert, option
 
-MOTIONS = ("walk", "arms", "squat_kick", "cartwheel", "pass", "run", "sit", "throw", "dance", "hug", "fight")
-PAIRED = ("hug", "fight")
-"""Motions of two people in contact."""
-PROPS = ("auto", "none", "table", "chairs", "table_and_chairs")
-OUTFITS = ("random", "patterned", "striped", "plain", "black_suit", "long_sleeves")
+PAIRED = ("hug", "fight", "embrace", "talk", "couple")
+"""Motions of two people close together."""
+MOTIONS = (
+    *("walk", "arms", "squat_kick", "cartwheel", "pass", "run", "sit", "throw", "dance", "stoop"),
+    *PAIRED,
+)
+AMONG = ("table", "chairs", "table_and_chairs", "counter", "board")
+"""Furniture among the people."""
+AROUND = ("screen", "fence")
+"""Furniture between all people and some of the cameras."""
+PROPS = ("auto", "none", *AMONG, *AROUND)
+OUTFITS = ("random", "patterned", "striped", "plain", "black_suit", "long_sleeves", "alike")
 ROOMS = ("cluttered", "camouflage", "plain", "green")
 ACTOR_NAMES = ("anna", "ben", "cleo", "dan")
 _RANGES = {
@@ -26,8 +33,9 @@ class SynthSettings:
 
     motion: str = option(
         "walk",
-        "what the people do: walk, run, arms, squat_kick, cartwheel, throw, dance, sit (down at a table), pass (each "
-        "other closely), hug, fight (two people in contact)",
+        "what the people do: walk, run, arms, squat_kick, cartwheel, throw, dance, stoop (and reach on the spot), sit "
+        "(down at a table), pass (each other closely); two people: hug, embrace (for most of the clip), talk (at arm's "
+        "length), couple (who dance), fight",
     )
     actors: int = option(1, "number of people, 1 to 4")
     cameras: int = option(12, "number of cameras in a ring around the people, at two heights in turn")
@@ -47,13 +55,14 @@ class SynthSettings:
     shadows: bool = expert(True, "whether people throw shadows")
     props: str = option(
         "auto",
-        "furniture among the people, in the plates too but not in the example poses: none, table, chairs, "
-        "table_and_chairs; auto: table_and_chairs where somebody sits, else none",
+        "furniture, in the plates too but not in the example poses: none, table, chairs, table_and_chairs, counter "
+        "(hides legs), board (hides the trunk), screen (hides people from 3 of 12 cameras), fence (hides legs from all "
+        "low cameras); auto: table_and_chairs where somebody sits, else none",
     )
     outfit: str = option(
         "random",
         "clothes: random, patterned or striped (shirt and trousers), plain (one colour from neck to shoes), "
-        "black_suit, long_sleeves (random, with sleeves to the wrists)",
+        "black_suit, long_sleeves (random, with sleeves to the wrists), alike (random, the same for everybody)",
     )
     room: str = option(
         "cluttered",
@@ -61,6 +70,10 @@ class SynthSettings:
     )
     light_drift: float = option(
         0.0, "share of the light that is lost over the clip, 0 to 0.6, most of it blue; plates show the beginning"
+    )
+
+    alone: bool = expert(
+        False, "whether the first of the two people of a motion does the same without the other one; with actors=1"
     )
 
     def check(self) -> None:
@@ -89,25 +102,39 @@ class SynthSettings:
         return ACTOR_NAMES[: self.actors]
 
     @property
+    def roles(self) -> int:
+        """How many people the motion is made for."""
+        return 2 if self.alone else self.actors
+
+    @property
     def furniture(self) -> str:
         """What stands among the people: one of PROPS but auto."""
         if self.props == "auto":
             return "table_and_chairs" if self.motion == "sit" else "none"
         return self.props
 
+    @property
+    def stands_among(self) -> bool:
+        """Whether furniture stands among the people."""
+        return self.furniture in AMONG
+
     def _check_people(self) -> None:
         if self.motion == "pass" and self.actors < 2:
             raise InputError(f"actors={self.actors}: the motion pass needs two people or more; set actors=2")
-        if self.motion in PAIRED and self.actors != 2:
+        if self.alone and self.motion not in PAIRED:
+            raise InputError(f"alone=true: the motion {self.motion} is not one of two people; leave it out")
+        if self.alone and self.actors != 1:
+            raise InputError(f"alone=true actors={self.actors}: one of two people is alone; set actors=1")
+        if self.motion in PAIRED and not self.alone and self.actors != 2:
             raise InputError(f"actors={self.actors}: the motion {self.motion} needs two people; set actors=2")
 
     def _check_props(self) -> None:
-        if self.motion == "sit" and self.props in ("none", "table"):
+        if self.motion == "sit" and "chairs" not in self.furniture:
             raise InputError(f"props={self.props}: the motion sit needs a chair; leave props out or set props=chairs")
-        if self.furniture != "none" and (self.motion == "pass" or (self.motion == "walk" and self.actors > 1)):
+        if self.stands_among and (self.motion == "pass" or (self.motion == "walk" and self.actors > 1)):
             raise InputError(
-                f"props={self.props}: people who walk past each other need the floor; set props=none, actors=1 with "
-                "motion=walk, or another motion"
+                f"props={self.props}: people who walk past each other need the floor; set props=none, screen or fence, "
+                "actors=1 with motion=walk, or another motion"
             )
 
     def _check_range(self, name: str, lowest: int | float, highest: int | float) -> None:

@@ -8,8 +8,9 @@ from sogjax.synth.anatomy import Pose, anatomy_from_seed
 from sogjax.synth.clothes import outfits_from_seed, without_green
 from sogjax.synth.exercises import EXAMPLE_POSES, standing_pose
 from sogjax.synth.figure import Figure, make_figure
+from sogjax.synth.furniture import furniture
 from sogjax.synth.motions import Motion, furniture_sites, motions_of
-from sogjax.synth.rooms import furniture, room_of
+from sogjax.synth.rooms import room_of
 from sogjax.synth.scene import Scene, assembled
 from sogjax.synth.settings import SynthSettings
 from sogjax.synth.views import Sensor, View, ring_of_views
@@ -27,7 +28,7 @@ class Stage:
     motions: tuple[Motion, ...]
     scene: Scene
     bare: Scene
-    """The scene without furniture among the people."""
+    """The scene without furniture."""
     views: tuple[View, ...]
     sensors: tuple[Sensor, ...]
 
@@ -45,19 +46,20 @@ class Stage:
 def stage_of(settings: SynthSettings) -> Stage:
     """Make everything; the same settings make the same things."""
     stream = lambda *key: np.random.default_rng([settings.seed, *key])
-    outfits = outfits_from_seed(stream(_PEOPLE, 100), settings.actors, settings.outfit)
+    outfits = outfits_from_seed(stream(_PEOPLE, 100), settings.roles, settings.outfit)
     if settings.room == "green":
         outfits = [without_green(outfit) for outfit in outfits]
-    anatomies = [anatomy_from_seed(stream(_PEOPLE, number)) for number in range(settings.actors)]
-    people = [make_figure(*both) for both in zip(anatomies, outfits, strict=True)]
+    anatomies = [anatomy_from_seed(stream(_PEOPLE, number)) for number in range(settings.roles)]
+    people = [make_figure(*both) for both in zip(anatomies, outfits, strict=True)][: settings.actors]
     room = room_of(settings.room, outfits, stream(_ROOM))
     bare = assembled(room)
-    sites = furniture_sites(settings.motion, settings.actors, stream(_MOTIONS))
+    sites = furniture_sites(settings.motion, settings.roles, stream(_MOTIONS))
+    motions = motions_of(settings.motion, anatomies, stream(_MOTIONS), settings.stands_among)
     furnished = settings.furniture != "none"
     return Stage(
         settings=settings,
         people=tuple(people),
-        motions=tuple(motions_of(settings.motion, anatomies, stream(_MOTIONS), furnished)),
+        motions=tuple(motions[: settings.actors]),
         scene=assembled(room, furniture(settings.furniture, sites)) if furnished else bare,
         bare=bare,
         views=ring_of_views(settings, stream(_VIEWS)),
