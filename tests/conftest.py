@@ -2,27 +2,47 @@
 
 import logging
 import os
+import sys
 from pathlib import Path
 
-os.environ.setdefault("JAX_PLATFORMS", "cpu")
-# Most of the tests' time is compilation, a third of it optimisation, which the demo of `.ci/run` has.
-os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "true")
-os.environ.setdefault("XLA_FLAGS", "--xla_backend_optimization_level=1")
-# Both workers use what either compiled, and so does the next run.
-os.environ.setdefault("SOGJAX_COMPILATION_CACHE", str(Path(__file__).parent.parent / ".pytest_cache" / "programs"))
-os.environ.setdefault("SOGJAX_BACKGROUND_CACHE", "off")
-
-import jax
 import pytest
-from jaxtyping import install_import_hook
+import xdist
 
-install_import_hook("sogjax", "beartype.beartype")
-jax.config.update("jax_numpy_rank_promotion", "raise")
-jax.config.update("jax_numpy_dtype_promotion", "strict")
+CACHE = Path(__file__).parent.parent / ".pytest_cache"
+# Most of the tests' time is compilation: without what makes programs faster, for the demo of `.ci/run` has that, and
+# in one piece, as a piece for each core costs more.
+FLAGS = "backend_optimization_level=1", "cpu_use_fusion_emitters=false", "cpu_parallel_codegen_split_count=1"
 
-from sogjax.run.compilation_cache import use_compilation_cache  # noqa: E402  (after the hook)
+os.environ.setdefault("JAX_PLATFORMS", "cpu")
+os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "true")
+os.environ.setdefault("XLA_FLAGS", " ".join(f"--xla_{flag}" for flag in FLAGS))
+# Both workers use what either compiled, and so does the next run.
+os.environ.setdefault("SOGJAX_COMPILATION_CACHE", str(CACHE / "programs"))
+os.environ.setdefault("SOGJAX_BACKGROUND_CACHE", "off")
+if sys.dont_write_bytecode:  # else both workers and every command that a test starts read all modules anew
+    sys.dont_write_bytecode, sys.pycache_prefix = False, str(CACHE / "bytecode")
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
 
-use_compilation_cache()
+
+def pytest_sessionstart(session):
+    """Before the tests are imported; not in the process that only hands them out to others."""
+    if not xdist.is_xdist_controller(session):
+        be_strict()
+
+
+def be_strict():
+    """Check what is passed to and returned from every function of the package."""
+    import jax
+    from jaxtyping import install_import_hook
+
+    install_import_hook("sogjax", "beartype.beartype")
+    jax.config.update("jax_numpy_rank_promotion", "raise")
+    jax.config.update("jax_numpy_dtype_promotion", "strict")
+
+    from sogjax.run.compilation_cache import use_compilation_cache  # after the hook
+
+    use_compilation_cache()
 
 
 @pytest.fixture(scope="session")

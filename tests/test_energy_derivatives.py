@@ -63,7 +63,12 @@ def views_anew(energy, pose, body_colors, image_colors, radius, sparse):
     blobs = body.posed_blobs(pose)
     remade = type(views).from_images(views.cameras, images, blobs, views.normalizers, "rgb", radius)
     anew = FrameEnergy(body, remade, energy.history, energy.terms)
-    return near(anew, pose, 64)[0] if sparse else anew
+    return anew.near(pose, 64)[0] if sparse else anew
+
+
+@eqx.filter_jit
+def value_anew(energy, pose, body_colors, image_colors, radius, sparse):
+    return views_anew(energy, pose, body_colors, image_colors, radius, sparse)(pose)
 
 
 @pytest.mark.parametrize("sparse", fast_and_slow(True, False))
@@ -82,7 +87,7 @@ def test_the_derivative_by_colours_is_that_of_similarities_made_anew(what, spars
 
         def moved(size):
             changed = tuple(leaf + size * direction if k == place else leaf for k, leaf in enumerate(leaves))
-            return float(value(views_anew(energy, pose, *changed, sparse), pose))
+            return float(value_anew(energy, pose, *changed, sparse))
 
         expected = (moved(STEP) - moved(-STEP)) / (2.0 * STEP)
         by_leaf = lambda leaf: eqx.tree_at(of, energy, leaf)(pose)

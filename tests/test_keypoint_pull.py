@@ -44,23 +44,40 @@ def pull(**values):
     return in_float64(KeypointTerm(1.0, landmarks=marks, mirrored=MIRRORED, groups=GROUPS, offsets=offsets, **values))
 
 
+@eqx.filter_jit
 def projected(cameras, body, pose):
     """Landmarks in every picture: (camera, keypoint, 2)."""
     points = body.posed_landmarks(pose)
     return jax.vmap(project_points, in_axes=(0, None))(cameras, points)[0]
 
 
+@eqx.filter_jit
+def sizes(cameras, body, pose):
+    """Of the body in every picture."""
+    return body_sizes(cameras, body.posed_blobs(pose), jnp.full(2, 1e4), np.zeros(body.num_blobs, int))
+
+
 def views_of(cameras, body, pose, pixels, sure, exchanged=0.0):
     """Of keypoints (camera, person, keypoint, 2)."""
     seen = SeenKeypoints(jnp.asarray(pixels, jnp.float64), jnp.asarray(sure, jnp.float64))
-    blobs = body.posed_blobs(pose)
-    scale, areas = body_sizes(cameras, blobs, jnp.full(2, 1e4), np.zeros(body.num_blobs, int))
+    scale, areas = sizes(cameras, body, pose)
     belongs = jnp.ones((*seen.confidence.shape[:2], scale.shape[1]))
     return KeypointViews(seen, jnp.full(seen.confidence.shape, exchanged), scale, areas, belongs)
 
 
+@eqx.filter_jit
+def model(term, body, cameras, views, pose):
+    return term.model(Posed.from_pose(body, pose), cameras, views)
+
+
 def value(term, body, cameras, views, pose):
-    return term.model(Posed.from_pose(body, pose), cameras, views).value
+    return model(term, body, cameras, views, pose).value
+
+
+@eqx.filter_jit
+def slope(term, body, cameras, views, pose):
+    """The derivative of the value, by autodiff."""
+    return jax.grad(lambda p: term.model(Posed.from_pose(body, p), cameras, views).value)(pose)
 
 
 def drawn(seed=0, people=PEOPLE):
@@ -80,11 +97,11 @@ def test_the_gradient_is_that_of_autodiff(body, cameras, tolerance):
     sure = np.random.default_rng(1).uniform(0.2, 1.0, (2, PEOPLE, COUNT))
     views = views_of(cameras, body, pose, pixels, sure, exchanged=0.3)
     term = pull(tolerance=tolerance, offsets=jnp.full((1, COUNT, 3), 0.01))
-    expected = jax.grad(lambda p: value(term, body, cameras, views, p))(pose + 0.01)
-    model = term.model(Posed.from_pose(body, pose + 0.01), cameras, views)
+    expected = slope(term, body, cameras, views, pose + 0.01)
+    found = model(term, body, cameras, views, pose + 0.01)
     assert float(jnp.linalg.norm(expected)) > 1e-6
-    np.testing.assert_allclose(model.gradient, expected, rtol=1e-9, atol=1e-14)
-    assert float(jnp.linalg.eigvalsh(model.curvature).min()) > -1e-12
+    np.testing.assert_allclose(found.gradient, expected, rtol=1e-9, atol=1e-14)
+    assert float(jnp.linalg.eigvalsh(found.curvature).min()) > -1e-12
 
 
 @pytest.mark.slow
@@ -95,9 +112,9 @@ def test_the_curvature_is_that_of_the_value_where_the_landmarks_lie_on_keypoints
     views = views_of(cameras, body, pose, pixels, np.ones((2, 1, COUNT)))
     term = pull(outlier=0.1)
     expected = -jax.hessian(lambda p: value(term, body, cameras, views, p))(pose)
-    model = term.model(Posed.from_pose(body, pose), cameras, views)
-    np.testing.assert_allclose(model.curvature, expected, rtol=1e-6, atol=1e-9)
-    np.testing.assert_allclose(model.value, np.log(1.0 + 1.0 / 0.1) * np.mean(views.areas), rtol=1e-6)
+    found = model(term, body, cameras, views, pose)
+    np.testing.assert_allclose(found.curvature, expected, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(found.value, np.log(1.0 + 1.0 / 0.1) * np.mean(views.areas), rtol=1e-6)
 
 
 def test_somebody_else_far_away_does_not_matter(body, cameras):
@@ -105,18 +122,16 @@ def test_somebody_else_far_away_does_not_matter(body, cameras):
     pixels = np.asarray(projected(cameras, body, pose))[:, None] + drawn(people=1)
     alone = views_of(cameras, body, pose, pixels, np.ones((2, 1, COUNT)))
     both = views_of(cameras, body, pose, np.concatenate([pixels + 900.0, pixels], axis=1), np.ones((2, 2, COUNT)))
-    term = pull()
-    for part in ("value", "gradient"):
-        one, two = (getattr(term.model(Posed.from_pose(body, pose), cameras, v), part) for v in (alone, both))
-        np.testing.assert_allclose(two, one, rtol=1e-9)
+    one, two = (model(pull(), body, cameras, views, pose) for views in (alone, both))
+    np.testing.assert_allclose(two.value, one.value, rtol=1e-9)
+    np.testing.assert_allclose(two.gradient, one.gradient, rtol=1e-9)
 
 
 def test_padding_is_inert_whatever_it_holds(body, cameras):
     pose = near(body)
     at = np.asarray(projected(cameras, body, pose))[:, None]
     views = views_of(cameras, body, pose, np.concatenate([at, at], axis=1), np.zeros((2, 2, COUNT)))
-    gradient = jax.grad(lambda p: value(pull(), body, cameras, views, p))(pose)
-    assert (np.asarray(gradient) == 0.0).all()
+    assert (np.asarray(slope(pull(), body, cameras, views, pose)) == 0.0).all()
     assert float(value(pull(), body, cameras, views, pose)) == 0.0
 
 
@@ -169,10 +184,11 @@ def test_two_actors_are_each_drawn_to_what_is_near(body, cameras):
         for n in (2, 1)
     )
     twice = pull(landmarks=((0, 1, 2), (0, 1, 2)), offsets=jnp.zeros((2, COUNT, 3)))
-    posed = Posed.from_pose(body, pose + 0.01)
-    np.testing.assert_allclose(
-        twice.model(posed, cameras, views).gradient, pull().model(posed, cameras, one).gradient, rtol=1e-9
-    )
+    both, alone = model(twice, body, cameras, views, pose + 0.01), model(pull(), body, cameras, one, pose + 0.01)
+    np.testing.assert_allclose(both.gradient, alone.gradient, rtol=1e-9)
+
+
+belonging_of = jax.jit(belonging)
 
 
 def belongs(people, actors, sure=None):
@@ -181,7 +197,7 @@ def belongs(people, actors, sure=None):
     pixels = 100.0 * (np.asarray(people, float)[None, :, None] + spread)
     seen = SeenKeypoints(jnp.asarray(pixels), jnp.ones(pixels.shape[:3]) if sure is None else jnp.asarray(sure)[None])
     at = 100.0 * (np.asarray(actors, float)[None, :, None] + spread)
-    found = belonging(seen, jnp.asarray(at), jnp.ones(at.shape[:3], bool), jnp.full((1, len(actors)), 100.0))
+    found = belonging_of(seen, jnp.asarray(at), jnp.ones(at.shape[:3], bool), jnp.full((1, len(actors)), 100.0))
     return np.asarray(found)[0]
 
 
@@ -229,11 +245,11 @@ def test_an_actor_is_drawn_to_the_people_who_belong_to_it(body, cameras):
         SeenKeypoints(jnp.asarray(at), ones), zeros, jnp.full((2, 2), 300.0), jnp.ones(2), jnp.asarray([belongs] * 2)
     )
     twice = pull(landmarks=((0, 1, 2), (0, 1, 2)), offsets=jnp.zeros((2, COUNT, 3)))
-    points = twice.points(Posed.from_pose(body, pose))
-    found = twice.pulls(points, cameras, views([[1.0, 0.0], [0.0, 1.0]])).by_point
+    pulls = eqx.filter_jit(lambda views: twice.pulls(twice.points(Posed.from_pose(body, pose)), cameras, views))
+    found = pulls(views([[1.0, 0.0], [0.0, 1.0]])).by_point
     for actor, part in enumerate((slice(0, COUNT), slice(COUNT, 2 * COUNT))):
         only = np.zeros((2, 2))
         only[actor] = 1.0  # the other one is nobody's
-        alone = twice.pulls(points, cameras, views(only)).by_point
+        alone = pulls(views(only)).by_point
         np.testing.assert_allclose(found[part], alone[part], rtol=1e-9)
     assert not np.allclose(found[:COUNT], found[COUNT:])

@@ -36,6 +36,8 @@ near = eqx.filter_jit(
         body.posed_blobs(pose), similarity_among(terms).exponent, capacity
     )
 )
+projected = jax.jit(jax.vmap(project, (0, None)))
+displaced = jax.jit(displacement)
 moved = eqx.filter_jit(lambda cameras, body, a, b: displacement(cameras, body.posed_blobs(a), body.posed_blobs(b)))
 
 
@@ -81,7 +83,7 @@ def test_lists_leave_out_far_pairs_and_no_near_one():
     """Every pair that overlaps is in a block exactly once; written with loops."""
     views = scene(0)
     terms = standard_terms()
-    seen = jax.jit(jax.vmap(project, (0, None)))(views.cameras, posed(HUMAN, REST)[0])
+    seen = projected(views.cameras, posed(HUMAN, REST)[0])
     sparse, count = near(views, HUMAN, REST, terms, CAPACITY)
     pairs = sparse.pairs
     cameras, bodies, images = views.color_similarities.shape
@@ -113,10 +115,10 @@ def test_the_number_of_blocks_is_the_true_one_whatever_the_capacity():
 
 def test_displacement_is_the_largest_motion_of_a_blob_in_its_picture():
     before, after = posed(HUMAN, REST)[0], posed(HUMAN, REST.at[0].add(0.03))[0]
-    both = [jax.vmap(project, (0, None))(RIG.cameras, blobs).means for blobs in (before, after)]
+    both = [projected(RIG.cameras, blobs).means for blobs in (before, after)]
     widths = np.asarray(RIG.cameras.image_size)[:, 0]
     expected = np.max(np.linalg.norm(both[1] - both[0], axis=-1) / (MARGIN * widths)[:, None])
-    np.testing.assert_allclose(displacement(RIG.cameras, before, after), expected, rtol=1e-5)
+    np.testing.assert_allclose(displaced(RIG.cameras, before, after), expected, rtol=1e-5)
 
 
 def test_a_blob_that_comes_into_view_has_moved_too_far():
@@ -124,7 +126,7 @@ def test_a_blob_that_comes_into_view_has_moved_too_far():
     blobs = posed(HUMAN, REST)[0]
     eye = -np.asarray(camera.camera_from_world[0, :3, :3]).T @ np.asarray(camera.camera_from_world[0, :3, 3])
     behind = eqx.tree_at(lambda b: b.means, blobs, blobs.means.at[0].set(floats(1.5 * eye)))
-    assert np.isinf(displacement(camera, blobs, behind))
+    assert np.isinf(displaced(camera, blobs, behind))
 
 
 @pytest.mark.slow

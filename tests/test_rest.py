@@ -32,8 +32,13 @@ def frame(human):
     return Frame(random_views(ring_rig(2).cameras, human, 0, count=4), History.unknown(human.poses["rest"]))
 
 
+@eqx.filter_jit
+def penalty(body, pose, frame):
+    return RestPenalty(1.0).value(Posed.from_pose(body, pose), frame)
+
+
 def value(body, pose, frame):
-    return float(RestPenalty(1.0).value(Posed.from_pose(body, jnp.asarray(pose)), frame))
+    return float(penalty(body, jnp.asarray(pose), frame))
 
 
 def test_it_counts_joints_by_their_range_and_no_place_of_the_root(human, frame):
@@ -60,7 +65,10 @@ def test_a_joint_held_in_one_place_by_its_limits_has_a_finite_penalty(human, fra
 def test_its_model_is_that_of_its_value(human, frame):
     term = RestPenalty(0.3)
     pose = jnp.asarray(moved(human, standing(human, 1.0), HEAD_BENT))
-    model, by_autodiff = (kind.quadratic(term, Posed.from_pose(human, pose), frame) for kind in (RestPenalty, Term))
+    models = [
+        jax.jit(lambda p, k=kind: k.quadratic(term, Posed.from_pose(human, p), frame)) for kind in (RestPenalty, Term)
+    ]
+    model, by_autodiff = (found(pose) for found in models)
     np.testing.assert_allclose(model.value, by_autodiff.value, rtol=1e-6)
     gradient = jax.jit(jax.grad(lambda p: term.part(Posed.from_pose(human, p), frame)))(pose)
     np.testing.assert_allclose(model.gradient, gradient, rtol=1e-5, atol=1e-6)

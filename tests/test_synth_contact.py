@@ -1,5 +1,7 @@
 """Yardsticks: people who run, sit, throw, stoop, dance and fight as people can, and touch only what they should."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from body_cases import shipped
@@ -27,6 +29,7 @@ TIMES = {"sit": 6.0, "dance": 6.3, "stoop": 5.5, "hug": 4.4, "fight": 6.2, "embr
 """Seconds until the motion begins again; a little more than 3 where it is not named."""
 
 
+@cache
 def poses_of(kind, step, furnished=False):
     """The poses of all people of a motion from time to time."""
     acts = motions(kind, PEOPLE.get(kind, 1), furnished)
