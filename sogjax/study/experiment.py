@@ -214,7 +214,7 @@ def yardsticks(names: Sequence[str] = ()) -> dict[str, dict[str, object]]:
         InputError: a name that is no row's.
     """
     whole = _rendered("sequences")
-    known = {**_rendered("together"), **whole} if names else whole
+    known = {**whole, **_rendered("together")} if names else whole
     unknown = [name for name in names if name not in known]
     if unknown:
         raise InputError(f"sequences: {unknown[0]}: is none of {', '.join(known)}")
