@@ -1,7 +1,7 @@
 """The energy of a part of a body, such as a pair of limbs, while the rest of it is held.
 
-What the rest explains is taken from the pictures: the caps of Eq. 8, and the odds of the foreground term where it covers.
-What is left is the same energy of a few blobs, so that hundreds of ways to hold a limb can be compared.
+What the rest explains is taken from the pictures: from the caps of Eq. 8, and from the odds of the foreground term
+where it covers. What is left is the same energy of a few blobs, so that many ways to hold a limb can be compared.
 """
 
 from dataclasses import replace

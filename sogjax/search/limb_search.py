@@ -6,6 +6,7 @@ The rest of the body is held meanwhile (`energy/part_energy.py`).
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import equinox as eqx
 import jax
@@ -13,14 +14,18 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.part_energy import PartEnergy, PartIndex
+from sogjax.energy.posed import History
 from sogjax.model.body import Body
 from sogjax.model.limbs import limb_blobs, limb_names, limbs
+from sogjax.search.body_parts import limb_groups
 from sogjax.search.mirrored import fitted_to_blobs, other_side
+from sogjax.search.other_pass import Pass
 from sogjax.solve.gauss_newton import GaussNewton
-from sogjax.tracking.capacity import Needed
+from sogjax.tracking.capacity import Needed, with_room
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import FrameInput, TrackState
+from sogjax.tracking.frame import AnyFrame, FrameInput, TrackState, on_device
 from sogjax.tracking.tracker import Tracker
 
 NUM_DRAWN = 36
@@ -66,21 +71,16 @@ class Unit:
 
 def units_of(body: Body) -> tuple[Unit, ...]:
     """The pairs of limbs of a body; where it has no sides, its limbs."""
-    names, every_limb, blobs = limb_names(body), limbs(body.skeleton), limb_blobs(body)
-    others = other_side(body.skeleton.dof_names)
-    members = []
-    for k, dofs in enumerate(every_limb):
-        pair = [j for j, other in enumerate(every_limb) if j != k and np.isin(other, others[dofs]).any()]
-        members.append(tuple(sorted({k, *pair})) if blobs[[k, *pair]].any(axis=1).all() else ())
-    chosen = {m for m in members if len(m) == 2} or {m for m in members if len(m) == 1}
+    names, every_limb, blobs, groups = limb_names(body), limbs(body.skeleton), limb_blobs(body), limb_groups(body)
+    pairs = [members for members in groups if len(members) == 2]
     return tuple(
         Unit(
-            m,
-            " and ".join(names[j] for j in m),
-            tuple(every_limb[j] for j in m),
-            tuple(np.flatnonzero(blobs[j]) for j in m),
+            members,
+            " and ".join(names[j] for j in members),
+            tuple(every_limb[j] for j in members),
+            tuple(np.flatnonzero(blobs[j]) for j in members),
         )
-        for m in sorted(chosen)
+        for members in pairs or groups
     )
 
 
@@ -116,6 +116,84 @@ def _padded(rows: Sequence[Int[np.ndarray, "_n"]]) -> tuple[Int[np.ndarray, "row
         np.stack([np.pad(row, (0, size - len(row))) for row in rows]),
         np.stack([np.arange(size) < len(row) for row in rows]),
     )
+
+
+SLACK, WORTH = -0.002, 0.001
+"""Parts of a frame's energy: what another way gains, while the rest is held, for the whole body to be climbed from
+there, and what it gains then for a pass to go from there."""
+PAUSE = 3
+"""Key frames for which no other pass is begun after one of which nothing was taken."""
+
+
+class LimbSearch:
+    """Looks for better ways to hold limbs, in one key frame after the other."""
+
+    def __init__(self, tracker: Tracker, units: Sequence[Unit], arrays: Units) -> None:
+        self.tracker, self.units, self.arrays = tracker, units, arrays
+        self._turn = 0
+        self._carried: HeldOtherwise | None = None
+        self._pause_until = 0
+
+    @classmethod
+    def of(cls, tracker: Tracker) -> "LimbSearch":
+        """The search for the limbs of a tracker's body."""
+        units = units_of(tracker.body)
+        return cls(tracker, units, Units.of(tracker.body, units))
+
+    def note(self, taken: bool) -> None:
+        """Learn whether anything was taken of the pass from the last pose."""
+        if not taken:
+            self._pause_until = self._turn + PAUSE
+
+    def better_poses(self, frame: AnyFrame, passed: Pass, row: int) -> list[Float[np.ndarray, "dof"]]:
+        """Poses of a frame with limbs held otherwise, climbed with all degrees of freedom, that are worth more."""
+        pose, self._turn = passed.poses[row], self._turn + 1
+        known, room = on_device(frame), passed.capacities
+        tried = np.stack([self._tried(k, unit, pose) for k, unit in enumerate(self.units)])
+        held = partial(held_otherwise, self.tracker, known)
+        found = jax.device_get(
+            with_room(lambda room: held(room, jnp.asarray(pose), self.arrays, jnp.asarray(tried)), room)
+        )
+        self._carried = found
+        if self._turn < self._pause_until:
+            return []
+        promising = (found.gains > SLACK * passed.energy) & (found.apart > APART)
+        starts = [found.poses[k, w] for k, w in zip(*np.nonzero(promising), strict=True)]
+        if not starts:
+            return []
+        starts = [pose, *starts[:MOST_WHOLE]]
+        starts = np.stack([*starts, *[pose] * (MOST_WHOLE + 1 - len(starts))])
+        whole = lambda room: climbed_whole(self.tracker, known, room, jnp.asarray(starts))
+        ends, values = jax.device_get(with_room(whole, room))
+        best = int(np.argmax(values))
+        return [ends[best]] if values[best] - values[0] > WORTH * passed.energy else []
+
+    def _tried(self, number: int, unit: Unit, pose: Float[np.ndarray, "dof"]) -> Float[np.ndarray, "seed dof"]:
+        """Ways that are drawn, and those of the last key frame."""
+        drawn, before = drawn_ways(self.tracker.body, unit, pose, self._turn), np.tile(pose, (NUM_CLIMBED - 1, 1))
+        if self._carried is not None:
+            before[:, unit.all_dofs] = self._carried.poses[number, 1:][:, unit.all_dofs]
+        return np.concatenate([before, drawn])
+
+
+MOST_WHOLE = 3
+"""Poses that are climbed with all degrees of freedom in a frame, beside the tracked one."""
+
+
+@eqx.filter_jit
+def climbed_whole(
+    tracker: Tracker, frame: FrameInput, capacities: Capacities, starts: Float[Array, "start dof"]
+) -> tuple[tuple[Float[Array, "start dof"], Float[Array, "start"]], Needed]:
+    """Poses climbed with the tracker's energy and solver, in the same views, and what they are worth."""
+    state = TrackState.from_pose(starts[0])
+    views, near, matching = tracker.views(frame, state, capacities, wide_boxes(tracker.boxes(state)))
+    energy = FrameEnergy(tracker.body, views, History.unknown(starts[0]), tracker.terms)
+
+    def climb(start: Float[Array, "dof"]) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
+        found = tracker.solver.maximize(energy, start, tracker.scales)
+        return found.params, energy(found.params)
+
+    return jax.lax.map(climb, starts), (jnp.max(near), jnp.max(matching))
 
 
 class HeldOtherwise(eqx.Module):

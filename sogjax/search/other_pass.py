@@ -1,7 +1,10 @@
-"""A pass backwards beside one that is known: where they are apart, and which explains each part of the body better."""
+"""A pass from elsewhere beside one that is known: where they are apart, and which explains each part better.
+
+It begins behind frames in doubt and goes backwards, or at another pose of a key frame and goes both ways.
+"""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields, replace
 
 import equinox as eqx
 import jax
@@ -28,8 +31,8 @@ SURE_FRAMES = 3
 MOST_FRAMES = 240
 """Frames that are tracked backwards from one, at most: the cells of so many are held in memory."""
 
-FramesBackwards = Callable[[int, int], Iterable[AnyFrame]]
-"""The cells of the frames from the first to before the second, the last one first."""
+FramesOfRows = Callable[[range], Iterable[AnyFrame]]
+"""What is seen in some rows of a pass, in the order of the range, which may go backwards."""
 
 
 @dataclass(frozen=True)
@@ -62,48 +65,85 @@ class Pass:
 
 @dataclass
 class Compared:
-    """The frames of a backward pass beside the other, the last one first."""
+    """The frames of another pass beside the one that is known, in the order of `rows`."""
 
-    cells: list[AnyFrame]
-    poses: list[Float[np.ndarray, "dof"]]
-    gains: list[Float[np.ndarray, "part"]]
-    """The rise of the energy if a part is taken from the backward pass."""
-    apart: list[Float[np.ndarray, "part"]]
+    rows: list[int] = field(default_factory=list)
+    cells: list[AnyFrame] = field(default_factory=list)
+    poses: list[Float[np.ndarray, "dof"]] = field(default_factory=list)
+    gains: list[Float[np.ndarray, "part"]] = field(default_factory=list)
+    """The rise of the energy if a part is taken from the other pass."""
+    apart: list[Float[np.ndarray, "part"]] = field(default_factory=list)
     """Metres."""
+
+    def joined(self, later: "Compared") -> "Compared":
+        """These frames turned round, then later ones of which the first is known already."""
+        parts = (getattr(self, each.name)[::-1] + getattr(later, each.name)[1:] for each in fields(self))
+        return Compared(*parts)
 
 
 def compared_backwards(
-    tracker: Tracker, passed: Pass, frames: FramesBackwards, parts: Sequence[Part], first: int, last: int
-) -> tuple[Compared, int]:
-    """Track from the first frame behind a stretch until both passes agree again before it; and where it began."""
+    tracker: Tracker, passed: Pass, frames: FramesOfRows, parts: Sequence[Part], first: int, last: int
+) -> Compared:
+    """Track from the first frame behind a stretch until both passes agree again before it."""
     total = len(passed.poses)
     begin = min(last + 1, total)  # no frame behind the clip's last one: its pose is where the pass begins
     after = [min(begin + k, total - 1) for k in (0, 1)]
     pose, before = (jnp.asarray(passed.poses[row]) for row in after)
     known, baseline = 2 if begin < total else 0, jnp.asarray(passed.baseline[after[0]])
     start = TrackState(pose, before, jnp.asarray(known), baseline)
-    found, seen = Compared([], [], [], []), []
     lowest = max(0, begin - MOST_FRAMES, first - MOST_BEFORE)
+    return compared(tracker, passed, frames, parts, start, range(begin - 1, lowest - 1, -1), begin - first)
+
+
+def compared_both_ways(
+    tracker: Tracker,
+    passed: Pass,
+    frames: FramesOfRows,
+    parts: Sequence[Part],
+    row: int,
+    pose: Float[np.ndarray, "dof"],
+) -> Compared:
+    """Track from another pose of a frame, backwards and forwards, until the passes agree."""
+    start = replace(TrackState.from_pose(jnp.asarray(pose)), baseline=jnp.asarray(passed.baseline[row]))
+    ways = (
+        range(row, max(row - MOST_FRAMES, -1), -1),
+        range(row, min(row + MOST_FRAMES, len(passed.poses))),
+    )
+    back, forth = (compared(tracker, passed, frames, parts, start, way, 1) for way in ways)
+    return back.joined(forth)
+
+
+def compared(
+    tracker: Tracker,
+    passed: Pass,
+    frames: FramesOfRows,
+    parts: Sequence[Part],
+    start: TrackState,
+    rows: range,
+    at_least: int,
+) -> Compared:
+    """Track some rows, one after the other, until both passes agree again after at least so many."""
+    found, choices, numbers = Compared(), PartArrays.of(tracker.body, parts), fitted_numbers().merge_passes
 
     def coming() -> Iterable[AnyFrame]:
-        for frame in frames(lowest, begin):
-            seen.append(frame)
+        for frame in frames(rows):
+            found.cells.append(frame)
             yield frame
 
-    agree, choices, numbers = 0, PartArrays.of(tracker.body, parts), fitted_numbers().merge_passes
-    for k, tracked in enumerate(track(tracker, start, coming(), passed.capacities)):
-        row, both = begin - 1 - k, (jnp.asarray(passed.poses[begin - 1 - k]), jnp.asarray(tracked.result.pose))
+    agree = 0
+    for k, (row, tracked) in enumerate(zip(rows, track(tracker, start, coming(), passed.capacities), strict=False)):
+        both = (jnp.asarray(passed.poses[row]), jnp.asarray(tracked.result.pose))
         apart, gains = np.asarray(_apart(tracker.body, choices.blobs, *both)), np.zeros(len(parts))
         if apart.max(initial=0.0) > numbers.compared:
-            gains = np.asarray(part_gains(tracker, seen[k], tracked.capacities, choices, *both))
-        found.cells.append(seen[k])
+            gains = np.asarray(part_gains(tracker, found.cells[k], tracked.capacities, choices, *both))
+        found.rows.append(row)
         found.poses.append(np.asarray(both[1]))
         found.gains.append(gains)
         found.apart.append(apart)
         agree = agree + 1 if apart.max(initial=0.0) <= numbers.together else 0
-        if row <= first and agree >= SURE_FRAMES:
+        if k + 1 >= at_least and agree >= SURE_FRAMES:
             break
-    return found, begin
+    return found
 
 
 @eqx.filter_jit
