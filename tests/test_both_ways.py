@@ -99,9 +99,8 @@ def test_a_clip_that_ends_in_doubt_is_looked_at_from_its_last_frame(walking_dog)
 
 def test_a_clip_of_one_frame_that_is_in_doubt_is_looked_at_once(walking_dog):
     tracker, cells, right = walking_dog
-    only = replace(
-        right, poses=right.poses[:1], doubts=np.full_like(right.doubts[:1], 0.9), baseline=right.baseline[:1]
-    )
+    one = {name: getattr(right, name)[:1] for name in ("poses", "baseline", "energies")}
+    only = replace(right, doubts=np.full_like(right.doubts[:1], 0.9), **one)
     asked = []
     assert not merge_passes(tracker, only, reader(cells, asked)).frames
     assert asked == [range(0, -1, -1)]

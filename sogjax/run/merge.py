@@ -28,8 +28,8 @@ def merge_backward(setup: Setup, tracked: FrameTable) -> Merged:
     """
     if tracked.limb_doubt is None or tracked.baseline is None:
         return Merged(tracked)
-    energy = float(np.abs(tracked.energy).mean())
-    passed = Pass(tracked.pose, tracked.limb_doubt, tracked.baseline, energy, capacities_of(tracked, row=None))
+    energies, capacities = np.asarray(tracked.energy, float), capacities_of(tracked, row=None)
+    passed = Pass(tracked.pose, tracked.limb_doubt, tracked.baseline, energies, capacities)
     numbers = setup.clip.numbers
 
     def of_rows(rows: range) -> Iterable[FrameInput]:

@@ -69,7 +69,8 @@ def merge_passes(
 
     `frames` reads what is seen in rows of `passed`; the tracker must judge limbs.
     """
-    revising = _Revising(tracker, replace(passed, poses=passed.poses.copy(), doubts=passed.doubts.copy()), frames)
+    own = {name: getattr(passed, name).copy() for name in ("poses", "doubts", "energies")}
+    revising = _Revising(tracker, replace(passed, **own), frames)
     revising.search_limbs(key_rows, report)
     while (stretch := revising.next_stretch()) is not None:
         revising.take(compared_backwards(tracker, revising.passed, frames, revising.parts, *stretch))
@@ -145,7 +146,7 @@ class _Revising:
         known, room = on_device(frame), self.passed.capacities
         value = with_room(lambda room: _valued(self.tracker, history, known, room, pose, baseline), room)
         energy, terms, judged = jax.device_get(value)
-        self.passed.doubts[row] = judged.error_probability
+        self.passed.doubts[row], self.passed.energies[row] = judged.error_probability, float(energy)
         values = {name: float(term) for name, term in terms.items()}
         self.revision.frames[row] = Revised(poses[row].copy(), float(energy), values, judged)
 

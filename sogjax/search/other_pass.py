@@ -28,6 +28,10 @@ MOST_BEFORE = 45
 SURE_FRAMES = 3
 """Frames without doubt that lie between two stretches, at least."""
 
+PATIENCE, LEAST_GAIN = 6, 0.004
+"""Frames after which a pass from another pose of a key frame ends that explains less than the known one; and what it
+gains at least, as a part of a frame's energy, for its parts to be looked at."""
+
 MOST_FRAMES = 240
 """Frames that are tracked backwards from one, at most: the cells of so many are held in memory."""
 
@@ -43,22 +47,25 @@ class Pass:
     doubts: Float[np.ndarray, "frame limb"]
     baseline: Float[np.ndarray, "frame 2 blob"]
     """The limbs' baseline in every frame, as in `LimbConfidence`."""
-    energy: float
-    """The magnitude of a frame's energy, the mean over the frames."""
+    energies: Float[np.ndarray, "frame"]
     capacities: Capacities
     """The capacities of the last frame."""
+
+    @property
+    def energy(self) -> float:
+        """The magnitude of a frame's energy, the mean over the frames."""
+        return float(np.abs(self.energies).mean())
 
     @classmethod
     def from_frames(cls, frames: Sequence[TrackedFrame]) -> "Pass":
         """The pass of some frames, whose limbs were judged."""
         judged = [frame.result.limbs for frame in frames]
         column = lambda values: np.stack([np.asarray(value) for value in values])
-        energy = np.abs([float(frame.result.energy) for frame in frames]).mean()
         return cls(
             column(frame.result.pose for frame in frames),
             column(limbs.error_probability for limbs in judged if limbs is not None),
             column(limbs.baseline for limbs in judged if limbs is not None),
-            float(energy),
+            np.array([float(frame.result.energy) for frame in frames]),
             frames[-1].capacities,
         )
 
@@ -109,7 +116,7 @@ def compared_both_ways(
         range(row, max(row - MOST_FRAMES, -1), -1),
         range(row, min(row + MOST_FRAMES, len(passed.poses))),
     )
-    back, forth = (compared(tracker, passed, frames, parts, start, way, 1) for way in ways)
+    back, forth = (compared(tracker, passed, frames, parts, start, way, 1, PATIENCE) for way in ways)
     return back.joined(forth)
 
 
@@ -121,8 +128,12 @@ def compared(
     start: TrackState,
     rows: range,
     at_least: int,
+    patience: int | None = None,
 ) -> Compared:
-    """Track some rows, one after the other, until both passes agree again after at least so many."""
+    """Track some rows, one after the other, until both passes agree again after at least so many.
+
+    With `patience` the pass ends, too, where it has explained less than the known one for so many frames.
+    """
     found, choices, numbers = Compared(), PartArrays.of(tracker.body, parts), fitted_numbers().merge_passes
 
     def coming() -> Iterable[AnyFrame]:
@@ -130,19 +141,26 @@ def compared(
             found.cells.append(frame)
             yield frame
 
-    agree = 0
+    agree, capacities, gained = 0, [], []
     for k, (row, tracked) in enumerate(zip(rows, track(tracker, start, coming(), passed.capacities), strict=False)):
         both = (jnp.asarray(passed.poses[row]), jnp.asarray(tracked.result.pose))
-        apart, gains = np.asarray(_apart(tracker.body, choices.blobs, *both)), np.zeros(len(parts))
-        if apart.max(initial=0.0) > numbers.compared:
-            gains = np.asarray(part_gains(tracker, found.cells[k], tracked.capacities, choices, *both))
+        apart = np.asarray(_apart(tracker.body, choices.blobs, *both))
         found.rows.append(row)
         found.poses.append(np.asarray(both[1]))
-        found.gains.append(gains)
         found.apart.append(apart)
+        capacities.append(tracked.capacities)
+        gained.append(float(tracked.result.energy) - passed.energies[row])
         agree = agree + 1 if apart.max(initial=0.0) <= numbers.together else 0
         if k + 1 >= at_least and agree >= SURE_FRAMES:
             break
+        if patience is not None and k + 1 >= patience and sum(gained[-patience:]) < 0.0:
+            break
+    hopeless = patience is not None and max(np.cumsum(gained)) < LEAST_GAIN * passed.energy
+    for k, row in enumerate(found.rows):
+        both = (jnp.asarray(passed.poses[row]), jnp.asarray(found.poses[k]))
+        differs = found.apart[k].max(initial=0.0) > numbers.compared and not hopeless
+        gains = part_gains(tracker, found.cells[k], capacities[k], choices, *both) if differs else np.zeros(len(parts))
+        found.gains.append(np.asarray(gains))
     return found
 
 
