@@ -22,6 +22,7 @@ from sogjax.model.limbs import limb_blobs, limb_names, limbs
 from sogjax.search.body_parts import limb_groups
 from sogjax.search.mirrored import fitted_to_blobs, other_side
 from sogjax.search.other_pass import Pass
+from sogjax.search.placed_body import means_of
 from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.tracking.capacity import Needed, with_room
 from sogjax.tracking.culling import Capacities
@@ -149,7 +150,7 @@ class LimbSearch:
         """Poses of a frame with limbs held otherwise, climbed with all degrees of freedom, that are worth more."""
         pose, self._turn = passed.poses[row], self._turn + 1
         known, room = on_device(frame), passed.capacities
-        tried = np.stack([self._tried(k, unit, pose) for k, unit in enumerate(self.units)])
+        tried = np.stack([self._tried(k, unit, pose) for k, unit in enumerate(self.units)]).astype(pose.dtype)
         held = partial(held_otherwise, self.tracker, known)
         found = jax.device_get(
             with_room(lambda room: held(room, jnp.asarray(pose), self.arrays, jnp.asarray(tried)), room)
@@ -164,9 +165,11 @@ class LimbSearch:
         starts = [pose, *starts[:MOST_WHOLE]]
         starts = np.stack([*starts, *[pose] * (MOST_WHOLE + 1 - len(starts))])
         whole = lambda room: climbed_whole(self.tracker, known, room, jnp.asarray(starts))
-        ends, values = jax.device_get(with_room(whole, room))
+        ends, values, before = jax.device_get(with_room(whole, room))
         best = int(np.argmax(values))
-        return [ends[best]] if values[best] - values[0] > WORTH * passed.energy else []
+        moved = np.linalg.norm(np.diff(means_of(self.tracker.body, np.stack([pose, ends[best]])), axis=0), axis=-1)
+        worth = values[best] - before > WORTH * passed.energy and moved.max() > APART
+        return [ends[best]] if worth else []
 
     def _tried(self, number: int, unit: Unit, pose: Float[np.ndarray, "dof"]) -> Float[np.ndarray, "seed dof"]:
         """Ways that are drawn, and those of the last key frame."""
@@ -183,27 +186,28 @@ MOST_WHOLE = 3
 @eqx.filter_jit
 def climbed_whole(
     tracker: Tracker, frame: FrameInput, capacities: Capacities, starts: Float[Array, "start dof"]
-) -> tuple[tuple[Float[Array, "start dof"], Float[Array, "start"]], Needed]:
-    """Poses climbed with the tracker's energy and solver, in the same views, and what they are worth."""
+) -> tuple[tuple[Float[Array, "start dof"], Float[Array, "start"], Float[Array, ""]], Needed]:
+    """Poses climbed with the tracker's energy and solver, and what they are worth; last, what the first start is."""
     state = TrackState.from_pose(starts[0])
     views, near, matching = tracker.views(frame, state, capacities, wide_boxes(tracker.boxes(state)))
     energy = FrameEnergy(tracker.body, views, History.unknown(starts[0]), tracker.terms)
 
     def climb(start: Float[Array, "dof"]) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
         found = tracker.solver.maximize(energy, start, tracker.scales)
-        return found.params, energy(found.params)
+        return found.params, found.value
 
-    return jax.lax.map(climb, starts), (jnp.max(near), jnp.max(matching))
+    ends, values = jax.lax.map(climb, starts)
+    return (ends, values, energy(starts[0])), (jnp.max(near), jnp.max(matching))
 
 
 class HeldOtherwise(eqx.Module):
-    """Ways to hold each unit, climbed, with the rest of the body as it was tracked; the first as the unit was."""
+    """Ways to hold each unit, climbed, with the rest of the body as it was tracked; the first from where it was."""
 
-    poses: Float[Array, "unit way dof"]
-    gains: Float[Array, "unit way"]
-    """The energy above that of the first."""
-    apart: Float[Array, "unit way"]
-    """Metres from the first: mean over the blobs of the limb that differs more."""
+    poses: Float[Array, "*unit way dof"]
+    gains: Float[Array, "*unit way"]
+    """The energy above that of the tracked pose."""
+    apart: Float[Array, "*unit way"]
+    """Metres from the tracked pose: mean over the blobs of the limb that differs more."""
 
 
 @eqx.filter_jit
@@ -236,8 +240,8 @@ def held_otherwise(
         climb = lambda start: solver.maximize(energy, start, replace(scales, kinds=scales.kinds[index.dofs]))
         found = jax.vmap(climb)(params[chosen])
         places = jax.vmap(means)(found.params)
-        apart = jax.vmap(lambda each: _apart(each, places[0], of_limb))(places)
-        return HeldOtherwise(jax.vmap(held)(found.params), found.value - found.value[0], apart)
+        apart = jax.vmap(lambda each: _apart(each, means(params[0]), of_limb))(places)
+        return HeldOtherwise(jax.vmap(held)(found.params), found.value - values[0], apart)
 
     found = jax.lax.map(of_unit, (units.index, units.limbs, units.ends, tried))
     return found, (jnp.max(near), jnp.max(matching))
@@ -268,8 +272,8 @@ def _half_turned(
 ) -> Float[Array, "point 3"]:
     """Points turned by a half about the line from a root to an end: a knee or elbow on the other side of it."""
     along = (end - root) / jnp.maximum(jnp.linalg.norm(end - root), 1e-6)
-    off = points - root
-    return root + 2.0 * jnp.sum(off * along, axis=-1, keepdims=True) * along - off
+    off = points - root[None]
+    return root[None] + 2.0 * jnp.sum(off * along[None], axis=-1, keepdims=True) * along[None] - off
 
 
 def drawn_ways(
@@ -329,10 +333,10 @@ def _apart(
     """Metres, mean over the blobs of the limb that is farther off."""
     moved = jnp.linalg.norm(means - others, axis=-1)
     sums = jnp.sum(jnp.where(limbs, moved[None], 0.0), axis=1)
-    return jnp.max(sums / jnp.maximum(jnp.sum(limbs, axis=1), 1))
+    return jnp.max(sums / jnp.maximum(jnp.sum(limbs, axis=1, dtype=sums.dtype), 1.0))
 
 
 def wide_boxes(boxes: Float[Array, "camera actor 2 2"]) -> Float[Array, "camera actor 2 2"]:
     """Boxes wide enough for limbs that are held elsewhere."""
-    beyond = REACH * jnp.max(boxes[..., 1, :] - boxes[..., 0, :], axis=-1)[..., None]
+    beyond = REACH * jnp.max(boxes[..., 1, :] - boxes[..., 0, :], axis=-1, keepdims=True)
     return jnp.stack([boxes[..., 0, :] - beyond, boxes[..., 1, :] + beyond], axis=-2)
