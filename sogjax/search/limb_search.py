@@ -6,7 +6,6 @@ The rest of the body is held meanwhile (`energy/part_energy.py`).
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import equinox as eqx
 import jax
@@ -17,6 +16,7 @@ from jaxtyping import Array, Bool, Float, Int
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.part_energy import PartEnergy, PartIndex
 from sogjax.energy.posed import History
+from sogjax.energy.views import Views
 from sogjax.model.body import Body
 from sogjax.model.limbs import limb_blobs, limb_names, limbs
 from sogjax.search.body_parts import limb_groups
@@ -24,9 +24,8 @@ from sogjax.search.mirrored import fitted_to_blobs, other_side
 from sogjax.search.other_pass import Pass
 from sogjax.search.placed_body import means_of
 from sogjax.solve.gauss_newton import GaussNewton
-from sogjax.tracking.capacity import Needed, with_room
-from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import AnyFrame, FrameInput, TrackState, on_device
+from sogjax.tracking.capacity import views_near
+from sogjax.tracking.frame import AnyFrame, on_device
 from sogjax.tracking.tracker import Tracker
 
 NUM_DRAWN = 36
@@ -149,12 +148,10 @@ class LimbSearch:
     def better_poses(self, frame: AnyFrame, passed: Pass, row: int) -> list[Float[np.ndarray, "dof"]]:
         """Poses of a frame with limbs held otherwise, climbed with all degrees of freedom, that are worth more."""
         pose, self._turn = passed.poses[row], self._turn + 1
-        known, room = on_device(frame), passed.capacities
+        views = views_near(self.tracker, on_device(frame), jnp.asarray(pose), passed.capacities, REACH)
         tried = np.stack([self._tried(k, unit, pose) for k, unit in enumerate(self.units)]).astype(pose.dtype)
-        held = partial(held_otherwise, self.tracker, known)
-        found = jax.device_get(
-            with_room(lambda room: held(room, jnp.asarray(pose), self.arrays, jnp.asarray(tried)), room)
-        )
+        found = held_otherwise(self.tracker, views, jnp.asarray(pose), self.arrays, jnp.asarray(tried))
+        found = jax.device_get(found)
         self._carried = found
         if self._turn < self._pause_until:
             return []
@@ -164,8 +161,7 @@ class LimbSearch:
             return []
         starts = [pose, *starts[:MOST_WHOLE]]
         starts = np.stack([*starts, *[pose] * (MOST_WHOLE + 1 - len(starts))])
-        whole = lambda room: climbed_whole(self.tracker, known, room, jnp.asarray(starts))
-        ends, values, before = jax.device_get(with_room(whole, room))
+        ends, values, before = jax.device_get(climbed_whole(self.tracker, views, jnp.asarray(starts)))
         best = int(np.argmax(values))
         moved = np.linalg.norm(np.diff(means_of(self.tracker.body, np.stack([pose, ends[best]])), axis=0), axis=-1)
         worth = values[best] - before > WORTH * passed.energy and moved.max() > APART
@@ -185,11 +181,9 @@ MOST_WHOLE = 3
 
 @eqx.filter_jit
 def climbed_whole(
-    tracker: Tracker, frame: FrameInput, capacities: Capacities, starts: Float[Array, "start dof"]
-) -> tuple[tuple[Float[Array, "start dof"], Float[Array, "start"], Float[Array, ""]], Needed]:
+    tracker: Tracker, views: Views, starts: Float[Array, "start dof"]
+) -> tuple[Float[Array, "start dof"], Float[Array, "start"], Float[Array, ""]]:
     """Poses climbed with the tracker's energy and solver, and what they are worth; last, what the first start is."""
-    state = TrackState.from_pose(starts[0])
-    views, near, matching = tracker.views(frame, state, capacities, wide_boxes(tracker.boxes(state)))
     energy = FrameEnergy(tracker.body, views, History.unknown(starts[0]), tracker.terms)
 
     def climb(start: Float[Array, "dof"]) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
@@ -197,7 +191,7 @@ def climbed_whole(
         return found.params, found.value
 
     ends, values = jax.lax.map(climb, starts)
-    return (ends, values, energy(starts[0])), (jnp.max(near), jnp.max(matching))
+    return ends, values, energy(starts[0])
 
 
 class HeldOtherwise(eqx.Module):
@@ -212,19 +206,12 @@ class HeldOtherwise(eqx.Module):
 
 @eqx.filter_jit
 def held_otherwise(
-    tracker: Tracker,
-    frame: FrameInput,
-    capacities: Capacities,
-    pose: Float[Array, "dof"],
-    units: Units,
-    tried: Float[Array, "unit seed dof"],
-) -> tuple[HeldOtherwise, Needed]:
-    """The best different ways to hold each unit in a frame, climbed; and the room that is needed.
+    tracker: Tracker, views: Views, pose: Float[Array, "dof"], units: Units, tried: Float[Array, "unit seed dof"]
+) -> HeldOtherwise:
+    """The best different ways to hold each unit in what is seen, climbed.
 
     Compared are the tracked one, those that look like it, and those that are `tried`.
     """
-    state = TrackState.from_pose(pose)
-    views, near, matching = tracker.views(frame, state, capacities, wide_boxes(tracker.boxes(state)))
     scales = replace(tracker.scales, largest_steps=jnp.maximum(tracker.scales.largest_steps, LARGEST_ANGLE))
     solver = GaussNewton(max_iterations=ITERATIONS)
 
@@ -243,8 +230,7 @@ def held_otherwise(
         apart = jax.vmap(lambda each: _apart(each, means(params[0]), of_limb))(places)
         return HeldOtherwise(jax.vmap(held)(found.params), found.value - values[0], apart)
 
-    found = jax.lax.map(of_unit, (units.index, units.limbs, units.ends, tried))
-    return found, (jnp.max(near), jnp.max(matching))
+    return jax.lax.map(of_unit, (units.index, units.limbs, units.ends, tried))
 
 
 def look_alikes(
@@ -334,9 +320,3 @@ def _apart(
     moved = jnp.linalg.norm(means - others, axis=-1)
     sums = jnp.sum(jnp.where(limbs, moved[None], 0.0), axis=1)
     return jnp.max(sums / jnp.maximum(jnp.sum(limbs, axis=1, dtype=sums.dtype), 1.0))
-
-
-def wide_boxes(boxes: Float[Array, "camera actor 2 2"]) -> Float[Array, "camera actor 2 2"]:
-    """Boxes wide enough for limbs that are held elsewhere."""
-    beyond = REACH * jnp.max(boxes[..., 1, :] - boxes[..., 0, :], axis=-1, keepdims=True)
-    return jnp.stack([boxes[..., 0, :] - beyond, boxes[..., 1, :] + beyond], axis=-2)

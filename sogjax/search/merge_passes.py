@@ -16,6 +16,7 @@ from jaxtyping import Array, Bool, Float
 
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History
+from sogjax.energy.views import Views
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.quality.metrics import stretches
@@ -30,9 +31,8 @@ from sogjax.search.other_pass import (
     compared_both_ways,
 )
 from sogjax.search.pose_search import Report, unreported
-from sogjax.tracking.capacity import Needed, with_room
-from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import AnyFrame, FrameInput, TrackState, on_device
+from sogjax.tracking.capacity import views_near
+from sogjax.tracking.frame import AnyFrame, FrameInput, on_device
 from sogjax.tracking.tracker import Tracker
 
 MOST_LOOKS = 2
@@ -143,9 +143,9 @@ class _Revising:
         before, before_that = (jnp.asarray(poses[max(row - j, 0)]) for j in (1, 2))
         history = History(before, before_that, jnp.asarray(row >= 2))
         pose, baseline = jnp.asarray(poses[row]), jnp.asarray(self.passed.baseline[row])
-        known, room = on_device(frame), self.passed.capacities
-        value = with_room(lambda room: _valued(self.tracker, history, known, room, pose, baseline), room)
-        energy, terms, judged = jax.device_get(value)
+        known = on_device(frame)
+        views = views_near(self.tracker, known, pose, self.passed.capacities)
+        energy, terms, judged = jax.device_get(_valued(self.tracker, history, known, views, pose, baseline))
         self.passed.doubts[row], self.passed.energies[row] = judged.error_probability, float(energy)
         values = {name: float(term) for name, term in terms.items()}
         self.revision.frames[row] = Revised(poses[row].copy(), float(energy), values, judged)
@@ -163,12 +163,10 @@ def _valued(
     tracker: Tracker,
     history: History,
     frame: FrameInput,
-    capacities: Capacities,
+    views: Views,
     pose: Float[Array, "dof"],
     baseline: Float[Array, "2 blob"],
-) -> tuple[tuple[Float[Array, ""], dict[str, Float[Array, ""]], LimbConfidence], Needed]:
-    """Energy, terms and doubts of a pose that is known; and the room that they need."""
-    views, near, matching = tracker.views(frame, TrackState.from_pose(pose), capacities)
+) -> tuple[Float[Array, ""], dict[str, Float[Array, ""]], LimbConfidence]:
+    """Energy, terms and doubts of a pose that is known."""
     energy = FrameEnergy(tracker.body, views, history, tracker.terms)
-    judged = tracker.judged(pose, baseline, views.windows, frame)
-    return (energy(pose), energy.values(pose), judged), (jnp.max(near), jnp.max(matching))
+    return energy(pose), energy.values(pose), tracker.judged(pose, baseline, views.windows, frame)

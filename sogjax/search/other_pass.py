@@ -14,12 +14,13 @@ from jaxtyping import Array, Bool, Float
 
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History
+from sogjax.energy.views import Views
 from sogjax.model.body import Body
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.search.body_parts import Part, PartArrays
-from sogjax.tracking.capacity import Needed, with_room
+from sogjax.tracking.capacity import views_near
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import AnyFrame, FrameInput, TrackedFrame, TrackState, on_device
+from sogjax.tracking.frame import AnyFrame, TrackedFrame, TrackState, on_device
 from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.tracker import Tracker
 
@@ -160,7 +161,7 @@ def compared(
         both = (jnp.asarray(passed.poses[row]), jnp.asarray(found.poses[k]))
         differs = found.apart[k].max(initial=0.0) > numbers.compared and not hopeless
         gains = part_gains(tracker, found.cells[k], capacities[k], choices, *both) if differs else np.zeros(len(parts))
-        found.gains.append(np.asarray(gains))
+        found.gains.append(gains)
     return found
 
 
@@ -181,34 +182,31 @@ def part_gains(
     parts: PartArrays,
     first: Float[Array, "dof"],
     second: Float[Array, "dof"],
-) -> Float[Array, "part"]:
-    """The gains, with larger capacities where either pose sees more image blobs."""
-    known = on_device(frame)
-    return with_room(lambda room: _gains(tracker, known, room, parts, first, second), capacities)
-
-
-@eqx.filter_jit
-def _gains(
-    tracker: Tracker,
-    frame: FrameInput,
-    capacities: Capacities,
-    parts: PartArrays,
-    first: Float[Array, "dof"],
-    second: Float[Array, "dof"],
-) -> tuple[Float[Array, "part"], Needed]:
-    """The rise of the energy with each part of the second pose instead of the first one's, and the room needed.
+) -> Float[np.ndarray, "part"]:
+    """The rise of the energy with each part of the second pose instead of the first one's.
 
     The mean over what holds around it: the rest of the first pose and that of the second, in what is seen near either.
     """
-    mixed = jnp.concatenate([parts.mixed(tracker.body, first, second), parts.mixed(tracker.body, second, first)])
+    known, body = on_device(frame), tracker.body
+    poses = _mixed(body, parts, first, second)
 
-    def seen_near(at: Float[Array, "dof"]) -> tuple[Float[Array, "part"], Needed]:
-        views, near, matching = tracker.views(frame, TrackState.from_pose(at), capacities)
-        energy = FrameEnergy(tracker.body, views, History.unknown(at), tracker.terms)
-        values = jax.lax.map(energy, jnp.concatenate([first[None], second[None], mixed]))
+    def seen_near(at: Float[Array, "dof"]) -> Float[np.ndarray, "part"]:
+        values = np.asarray(values_in(tracker, views_near(tracker, known, at, capacities), poses))
         into_first, into_second = values[2:].reshape(2, -1)
-        gains = 0.5 * ((into_first - values[0]) + (values[1] - into_second))
-        return gains, (jnp.max(near), jnp.max(matching))
+        return 0.5 * ((into_first - values[0]) + (values[1] - into_second))
 
-    (one, needed), (other, needed_too) = seen_near(first), seen_near(second)
-    return 0.5 * (one + other), jax.tree.map(jnp.maximum, needed, needed_too)
+    return 0.5 * (seen_near(first) + seen_near(second))
+
+
+@eqx.filter_jit
+def _mixed(
+    body: Body, parts: PartArrays, first: Float[Array, "dof"], second: Float[Array, "dof"]
+) -> Float[Array, "mixed dof"]:
+    mixed = [parts.mixed(body, first, second), parts.mixed(body, second, first)]
+    return jnp.concatenate([first[None], second[None], *mixed])
+
+
+@eqx.filter_jit
+def values_in(tracker: Tracker, views: Views, poses: Float[Array, "start dof"]) -> Float[Array, "start"]:
+    """The energies of poses in the same views, without history."""
+    return jax.lax.map(FrameEnergy(tracker.body, views, History.unknown(poses[0]), tracker.terms), poses)
