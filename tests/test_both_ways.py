@@ -16,9 +16,9 @@ from sogjax.model.limbs import limb_names, limbs
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.metrics import stretches
 from sogjax.search import merge_passes as both_ways
-from sogjax.search.backward_pass import Compared, Pass, part_gains
 from sogjax.search.body_parts import PartArrays, best_choice, body_parts, merged_pose, select_parts
 from sogjax.search.merge_passes import merge_passes
+from sogjax.search.other_pass import Compared, Pass, part_gains
 from sogjax.search.placed_body import means_of
 from sogjax.tracking.capacity import with_room
 from sogjax.tracking.culling import Capacities
@@ -29,11 +29,11 @@ LOST = slice(4, 7)
 COSTS = fitted_numbers().merge_passes
 
 
-def backwards(cells, asked=None):
-    def frames(first, stop):
+def reader(cells, asked=None):
+    def frames(rows):
         if asked is not None:
-            asked.append((first, stop))
-        return cells[first:stop][::-1]
+            asked.append(rows)
+        return [cells[row] for row in rows]
 
     return frames
 
@@ -52,20 +52,21 @@ def with_lost_limb(walking_dog, doubt=0.9):
 def test_a_lost_limb_comes_back_from_the_other_side(walking_dog):
     tracker, cells, right = walking_dog
     passed, limb = with_lost_limb(walking_dog)
-    found = merge_passes(tracker, passed, backwards(cells))
+    found = merge_passes(tracker, passed, reader(cells))
     rows = sorted(found.frames)
     assert {*range(LOST.start, LOST.stop)} <= {*rows} <= {*range(LOST.start - 1, LOST.stop + 1)}
     assert found.parts == {limb_names(tracker.body)[limb]: {*rows}}
     body = tracker.body
     off = lambda poses: np.linalg.norm(means_of(body, poses) - means_of(body, right.poses[rows]), axis=-1).max()
     assert off(passed.poses[rows]) > 0.05
-    assert off(np.stack([found.frames[row].pose for row in rows])) < 0.01
+    # The other pass's own poses, which were climbed: as near as two passes are.
+    assert off(np.stack([found.frames[row].pose for row in rows])) < 0.015
 
 
 def test_what_holds_then_is_said_with_it(walking_dog):
     tracker, cells, right = walking_dog
     passed, limb = with_lost_limb(walking_dog)
-    found = merge_passes(tracker, passed, backwards(cells)).frames[LOST.start]
+    found = merge_passes(tracker, passed, reader(cells)).frames[LOST.start]
     assert found.terms["similarity"] > 0.9 * right.energy
     assert found.judged.error_probability[limb] < 0.3
 
@@ -74,7 +75,7 @@ def test_nothing_is_read_where_no_limb_is_in_doubt(walking_dog):
     tracker, cells, _ = walking_dog
     asked = []
     passed, _ = with_lost_limb(walking_dog, doubt=0.1)
-    assert not merge_passes(tracker, passed, backwards(cells, asked)).frames
+    assert not merge_passes(tracker, passed, reader(cells, asked)).frames
     assert asked == []
 
 
@@ -83,8 +84,8 @@ def test_a_right_pass_stays_though_it_is_doubted(walking_dog):
     doubts = np.zeros_like(right.doubts)
     doubts[LOST] = 0.9
     asked = []
-    assert not merge_passes(tracker, replace(right, doubts=doubts), backwards(cells, asked)).frames
-    assert asked == [(0, LOST.stop)]
+    assert not merge_passes(tracker, replace(right, doubts=doubts), reader(cells, asked)).frames
+    assert asked == [range(LOST.stop - 1, -1, -1)]
 
 
 def test_a_clip_that_ends_in_doubt_is_looked_at_from_its_last_frame(walking_dog):
@@ -92,18 +93,17 @@ def test_a_clip_that_ends_in_doubt_is_looked_at_from_its_last_frame(walking_dog)
     doubts = np.zeros_like(right.doubts)
     doubts[-2:] = 0.9
     asked = []
-    merge_passes(tracker, replace(right, doubts=doubts), backwards(cells, asked))
-    assert asked == [(0, FRAMES)]
+    merge_passes(tracker, replace(right, doubts=doubts), reader(cells, asked))
+    assert asked == [range(FRAMES - 1, -1, -1)]
 
 
 def test_a_clip_of_one_frame_that_is_in_doubt_is_looked_at_once(walking_dog):
     tracker, cells, right = walking_dog
-    only = replace(
-        right, poses=right.poses[:1], doubts=np.full_like(right.doubts[:1], 0.9), baseline=right.baseline[:1]
-    )
+    one = {name: getattr(right, name)[:1] for name in ("poses", "baseline", "energies")}
+    only = replace(right, doubts=np.full_like(right.doubts[:1], 0.9), **one)
     asked = []
-    assert not merge_passes(tracker, only, backwards(cells, asked)).frames
-    assert asked == [(0, 1)]
+    assert not merge_passes(tracker, only, reader(cells, asked)).frames
+    assert asked == [range(0, -1, -1)]
 
 
 def test_a_frame_that_two_passes_revise_counts_once(walking_dog, monkeypatch):
@@ -117,10 +117,11 @@ def test_a_frame_that_two_passes_revise_counts_once(walking_dog, monkeypatch):
         begin = last + 1
         column = lambda value: list(np.tile(np.where(np.arange(len(parts)) == 0, value, 0.0), (begin, 1)))
         poses = [passed.poses[row] + 1e-3 for row in reversed(range(begin))]
-        return Compared(cells[:begin][::-1], poses, column(10.0 * right.energy), column(2.0 * COSTS.apart)), begin
+        gains, apart = column(10.0 * right.energy), column(2.0 * COSTS.apart)
+        return Compared([*reversed(range(begin))], cells[:begin][::-1], poses, gains, apart)
 
     monkeypatch.setattr(both_ways, "compared_backwards", compared)
-    found = merge_passes(tracker, replace(right, doubts=doubts), backwards(cells))
+    found = merge_passes(tracker, replace(right, doubts=doubts), reader(cells))
     assert {*found.frames} == {*range(9)}
     assert found.parts == {parts[0].name: {*range(9)}}
 
@@ -151,7 +152,7 @@ def test_what_sees_more_image_blobs_than_there_is_room_for_is_valued_with_more_r
     monkeypatch.setattr(
         both_ways, "compared_backwards", lambda t, p, *rest: compared(t, replace(p, capacities=right.capacities), *rest)
     )
-    one, two = (merge_passes(tracker, each, backwards(cells)) for each in (replace(passed, capacities=small), passed))
+    one, two = (merge_passes(tracker, each, reader(cells)) for each in (replace(passed, capacities=small), passed))
     assert one.parts == two.parts
     assert one.frames[row].energy == pytest.approx(two.frames[row].energy, rel=1e-4)
 
@@ -162,7 +163,7 @@ def test_a_lost_limb_comes_back_though_a_camera_is_missing_in_some_frames(walkin
     passed, limb = with_lost_limb(walking_dog)
     present = np.arange(len(cells[0])) != 1
     some = [FrameInput(frame, present) if LOST.start <= k < LOST.stop else frame for k, frame in enumerate(cells)]
-    found = merge_passes(tracker, passed, backwards(some))
+    found = merge_passes(tracker, passed, reader(some))
     assert found.parts.keys() == {limb_names(tracker.body)[limb]}
     assert {*range(LOST.start, LOST.stop)} <= {*found.frames}
 
@@ -182,7 +183,7 @@ def test_a_limb_of_one_of_two_actors_comes_back(walking_dog):
     poses, doubts = right.poses.copy(), np.zeros_like(right.doubts)
     poses[LOST, limbs(body.skeleton)[limb][0]] += 0.8
     doubts[LOST, limb] = 0.9
-    found = merge_passes(tracker, replace(right, poses=poses, doubts=doubts), backwards(cells))
+    found = merge_passes(tracker, replace(right, poses=poses, doubts=doubts), reader(cells))
     assert found.parts.keys() == {limb_names(body)[limb]}
     assert {*range(LOST.start, LOST.stop)} <= {*found.frames}
     for row, revised in found.frames.items():

@@ -10,7 +10,7 @@ from rig_cases import ring_rig
 
 from sogjax.quality.limb_evidence import LimbBlobs
 from sogjax.scene.foreground import subject_colors
-from sogjax.search.backward_pass import Pass
+from sogjax.search.other_pass import Pass
 from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.tracking.frame_by_frame import track
 

@@ -15,10 +15,8 @@ from sogjax.energy.overlap import (
     EXACT_EXPONENT,
     GradientMode,
     ImagePulls,
-    capped_overlap,
     overlap_of_pairs,
     overlap_pulls,
-    self_overlaps,
 )
 from sogjax.energy.pairs import DensePairs
 from sogjax.energy.posed import Frame, Posed
@@ -50,10 +48,12 @@ class Similarity(ImageTerm):
             overlap = overlap_of_pairs(pairs, views.image_caps(pairs), seen, self.exponent, **modes)
             return jnp.mean(overlap / views.normalizers)
         similarities = colored_similarities(views.color_similarities, views.coloring, blobs.colors, views.images)
-        one_camera = lambda image, seen, similar, size: (
-            capped_overlap(image, seen, similar, self.exponent, **modes) / size
-        )
-        return jnp.mean(jax.vmap(one_camera)(views.images, seen, similarities, views.normalizers))
+
+        def one_camera(image: Sog, caps: Float[Array, "image"], seen: Sog, similar: Array) -> Float[Array, ""]:
+            return overlap_of_pairs(DensePairs.from_image(image, similar), caps, seen, self.exponent, **modes)
+
+        overlap = jax.vmap(one_camera)(views.images, views.unexplained, seen, similarities)
+        return jnp.mean(overlap / views.normalizers)
 
     def pulls(self, posed: Posed, seen: Sog, frame: Frame) -> ImagePulls:
         """Pulls of the image blobs at the projected body blobs, for each camera; the exponentials computed once."""
@@ -62,11 +62,11 @@ class Similarity(ImageTerm):
             caps = views.image_caps(views.pairs)
             return overlap_pulls(views.pairs, caps, seen, self.exponent, capped=self.capped)
 
-        def one_camera(image: Sog, similarities: Float[Array, "blob image"], seen: Sog) -> ImagePulls:
-            pairs = DensePairs.from_image(image, similarities)
-            return overlap_pulls(pairs, self_overlaps(image), seen, self.exponent, capped=self.capped)
+        def one_camera(image: Sog, caps: Float[Array, "image"], similar: Array, seen: Sog) -> ImagePulls:
+            pairs = DensePairs.from_image(image, similar)
+            return overlap_pulls(pairs, caps, seen, self.exponent, capped=self.capped)
 
-        return jax.vmap(one_camera)(views.images, views.color_similarities, seen)
+        return jax.vmap(one_camera)(views.images, views.unexplained, views.color_similarities, seen)
 
 
 def _colored(views: Views, body_colors: Float[Array, "blob 3"]) -> Views:

@@ -98,6 +98,8 @@ class Views(eqx.Module):
     """Foreground against background around the body; None: no background is known."""
     keypoints: KeypointViews | None = None
     """What detectors saw; None: nothing is known of that."""
+    caps: Float[Array, "camera image"] | None = None
+    """What of each image blob is left to be explained (Eq. 8), square pixels; None: all of it."""
 
     @classmethod
     def from_images(
@@ -119,10 +121,15 @@ class Views(eqx.Module):
         pairs, count = near_pairs(self.images, self.color_similarities, seen, margins(self.cameras), exponent, capacity)
         return replace(self, pairs=pairs), count
 
+    @property
+    def unexplained(self) -> Float[Array, "camera image"]:
+        """Caps of Eq. 8 of the image blobs."""
+        return self_overlaps(self.images) if self.caps is None else self.caps
+
     def image_caps(self, pairs: SparsePairs) -> Float[Array, "camera image"]:
         """Caps of Eq. 8 of the image blobs that pairs count, which fill whole tiles."""
         extra = pairs.image_shape[1] - self.images.capacity
-        return jnp.pad(self_overlaps(self.images), ((0, 0), (0, extra)))
+        return jnp.pad(self.unexplained, ((0, 0), (0, extra)))
 
 
 def whole_image_overlap(image_sizes: Float[Array, "*camera 2"]) -> Float[Array, "*camera"]:

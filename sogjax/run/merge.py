@@ -1,6 +1,7 @@
 """The pass that tracks backwards around limbs in doubt, and takes each part of the body from the better way."""
 
 from collections.abc import Iterable
+from functools import partial
 
 import numpy as np
 
@@ -9,8 +10,8 @@ from sogjax.io.frame_table import TERM, FramesRecord, FrameTable
 from sogjax.run.frames import capacities_of
 from sogjax.run.setup import Setup
 from sogjax.run.terminal import alive, say
-from sogjax.search.backward_pass import Pass
-from sogjax.search.merge_passes import Revised, in_doubt, merge_passes
+from sogjax.search.merge_passes import Revised, merge_passes
+from sogjax.search.other_pass import Pass
 from sogjax.tracking.frame import FrameInput
 
 
@@ -27,20 +28,19 @@ def merge_backward(setup: Setup, tracked: FrameTable) -> Merged:
     """
     if tracked.limb_doubt is None or tracked.baseline is None:
         return Merged(tracked)
-    energy = float(np.abs(tracked.energy).mean())
-    passed = Pass(tracked.pose, tracked.limb_doubt, tracked.baseline, energy, capacities_of(tracked, row=None))
+    energies, capacities = np.asarray(tracked.energy, float), capacities_of(tracked, row=None)
+    passed = Pass(tracked.pose, tracked.limb_doubt, tracked.baseline, energies, capacities)
     numbers = setup.clip.numbers
 
-    def backwards(first: int, stop: int) -> Iterable[FrameInput]:
-        """The frames of some rows, the last one first."""
-        way = numbers[first:stop][::-1]
-        return setup.clip.frames(way.start, way.stop, way.step)
+    def of_rows(rows: range) -> Iterable[FrameInput]:
+        """What is seen in some rows."""
+        first, step = numbers[rows.start], rows.step * numbers.step
+        return setup.clip.frames(first, first + len(rows) * step, step)
 
-    if doubtful := int(in_doubt(passed).sum()):
-        say(f"limbs in doubt in {counted(doubtful, 'frame')}: tracked backwards around them, too")
     try:
-        with alive("tracking backwards"):
-            found = merge_passes(setup.tracker, passed, backwards)
+        with alive("searching limbs over the clip") as work:
+            keys = key_rows(len(numbers), setup.clip.fps)
+            found = merge_passes(setup.tracker, passed, of_rows, keys, partial(setattr, work, "share"))
     except InputError as error:
         say(f"warning: not told both ways, the first pass stays as it is: {error}")
         return Merged(tracked)
@@ -49,6 +49,15 @@ def merge_backward(setup: Setup, tracked: FrameTable) -> Merged:
     parts = ", ".join(f"{name} ({len(rows)})" for name, rows in sorted(found.parts.items()))
     say(f"taken from the backward pass in {counted(len(found.frames), 'frame')}: {parts}")
     return Merged(tracked.with_rows(found.frames, [_columns(revised) for revised in found.frames.values()]))
+
+
+KEY_SECONDS = 0.15
+"""Seconds between frames in which limbs are searched."""
+
+
+def key_rows(num_rows: int, fps: float) -> range:
+    """The frames of a clip in which limbs are searched."""
+    return range(0, num_rows, max(round(KEY_SECONDS * fps), 1))
 
 
 def _columns(revised: Revised) -> dict[str, object]:

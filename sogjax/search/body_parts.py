@@ -12,7 +12,7 @@ from sogjax.model.body import Body
 from sogjax.model.limbs import limb_blobs, limb_names, limbs
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.metrics import stretches
-from sogjax.search.mirrored import fitted_to_blobs
+from sogjax.search.mirrored import fitted_to_blobs, other_side
 
 ITERATIONS = 8
 """Steps to put a limb in its place: the two poses are near each other."""
@@ -20,18 +20,24 @@ ITERATIONS = 8
 
 @dataclass(frozen=True)
 class Part:
-    """An actor, or a limb."""
+    """An actor, a limb, or a pair of limbs."""
 
-    name: str
+    names: tuple[str, ...]
+    """Of the actor, or of the limbs."""
     dofs: Int[np.ndarray, "of_part"]
     blobs: Bool[np.ndarray, "blob"]
     """The blobs that tell where it is: of an actor those of the trunk."""
     whole: int | None
     """Which part the limb's actor is; None for actors."""
 
+    @property
+    def name(self) -> str:
+        """What to call it."""
+        return " and ".join(self.names)
+
 
 def body_parts(body: Body) -> tuple[Part, ...]:
-    """The actors of a body, then their limbs."""
+    """The actors of a body, then their limbs, then the pairs of limbs that are each other's counterpart."""
     trees, of_blob = np.asarray(body.skeleton.trees), body.blob_actors
     in_limbs = limb_blobs(body)
     moves = np.asarray(body.skeleton.parameter_transform) != 0.0
@@ -41,11 +47,21 @@ def body_parts(body: Body) -> tuple[Part, ...]:
         blobs = trunk if trunk.any() else of_blob == actor
         root = body.skeleton.names[int(np.flatnonzero(trees == actor)[0])]
         name = "/".join([*root.split("/")[:-1], "whole body"])
-        parts.append(Part(name, np.flatnonzero(moves[trees == actor].any(axis=0)), blobs, None))
-    for name, dofs, blobs in zip(limb_names(body), limbs(body.skeleton), in_limbs, strict=True):
-        if blobs.any():
-            parts.append(Part(name, dofs, blobs, int(of_blob[blobs][0])))
+        parts.append(Part((name,), np.flatnonzero(moves[trees == actor].any(axis=0)), blobs, None))
+    names, every_limb = limb_names(body), limbs(body.skeleton)
+    for members in limb_groups(body):
+        blobs = in_limbs[list(members)].any(axis=0)
+        dofs = np.concatenate([every_limb[k] for k in members])
+        parts.append(Part(tuple(names[k] for k in members), dofs, blobs, int(of_blob[blobs][0])))
     return tuple(parts)
+
+
+def limb_groups(body: Body) -> list[tuple[int, ...]]:
+    """The limbs that have blobs, by their numbers; then the pairs of them that are each other's counterpart."""
+    every_limb, blobs, others = limbs(body.skeleton), limb_blobs(body), other_side(body.skeleton.dof_names)
+    known = [k for k in range(len(every_limb)) if blobs[k].any()]
+    pairs = [(j, k) for j in known for k in known if j < k and np.isin(every_limb[k], others[every_limb[j]]).any()]
+    return [*((k,) for k in known), *pairs]
 
 
 class PartArrays(eqx.Module):
@@ -124,7 +140,11 @@ def select_parts(
     costs, taken = fitted_numbers().merge_passes, np.zeros(apart.shape, bool)
     for k, part in enumerate(parts):
         whole = 0.0 if part.whole is None else apart[:, part.whole]
-        worth = np.where(whole > costs.apart, 0.0, gains[:, k] / energy) - costs.bias
+        alone = [
+            j for j, other in enumerate(parts) if len(part.names) > 1 and other.names in [(n,) for n in part.names]
+        ]
+        more = gains[:, k] - np.maximum(gains[:, alone], 0.0).sum(axis=1)  # of a pair, than of its limbs by themselves
+        worth = np.where(whole > costs.apart, 0.0, more / energy) - costs.bias
         found = best_choice(worth, costs.change * apart[:, k], open_ends)
         for stretch in (slice(*ends) for ends in stretches(found)):
             taken[stretch, k] = apart[stretch, k].max() > costs.apart

@@ -1,9 +1,11 @@
-"""Both ways: where limbs are in doubt, a clip is tracked backwards, too, and each limb is taken from the better pass.
+"""Other passes: each part of the body is taken from the pass that explains it better, over time.
 
-A limb that is lost is often found again by itself. Backwards from there it is followed into the frames where it was
-lost: what hid it, or moved too far for one frame, comes from the other side.
+In key frames all over the clip limbs are held in other ways, and where one of these is worth more than the tracked one,
+a pass goes from there both ways. Where limbs are in doubt then, a pass comes backwards from behind: a limb that is lost
+is often found again by itself, and what hid it, or moved too far for one frame, comes from the other side.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import equinox as eqx
@@ -14,14 +16,23 @@ from jaxtyping import Array, Bool, Float
 
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History
+from sogjax.energy.views import Views
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.quality.metrics import stretches
-from sogjax.search.backward_pass import SURE_FRAMES, FramesBackwards, Pass, compared_backwards
 from sogjax.search.body_parts import body_parts, merged_pose, select_parts
-from sogjax.tracking.capacity import Needed, with_room
-from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import AnyFrame, FrameInput, TrackState, on_device
+from sogjax.search.limb_search import LimbSearch
+from sogjax.search.other_pass import (
+    SURE_FRAMES,
+    Compared,
+    FramesOfRows,
+    Pass,
+    compared_backwards,
+    compared_both_ways,
+)
+from sogjax.search.pose_search import Report, unreported
+from sogjax.tracking.capacity import views_near
+from sogjax.tracking.frame import AnyFrame, FrameInput, on_device
 from sogjax.tracking.tracker import Tracker
 
 MOST_LOOKS = 2
@@ -51,50 +62,80 @@ def in_doubt(passed: Pass) -> Bool[np.ndarray, "frame"]:
     return passed.doubts.max(axis=1, initial=0.0) > fitted_numbers().merge_passes.doubtful
 
 
-def merge_passes(tracker: Tracker, passed: Pass, frames: FramesBackwards) -> Revision:
-    """Where another pass explains parts of the body better, among the frames around those that are in doubt.
+def merge_passes(
+    tracker: Tracker, passed: Pass, frames: FramesOfRows, key_rows: Sequence[int] = (), report: Report = unreported
+) -> Revision:
+    """Where another pass explains parts of the body better; `key_rows` are the frames in which limbs are searched.
 
-    `frames` reads cells backwards, by rows of `passed`; the tracker must judge limbs.
+    `frames` reads what is seen in rows of `passed`; the tracker must judge limbs.
     """
-    revising = _Revising(tracker, replace(passed, poses=passed.poses.copy(), doubts=passed.doubts.copy()), frames)
+    own = {name: getattr(passed, name).copy() for name in ("poses", "doubts", "energies")}
+    revising = _Revising(tracker, replace(passed, **own), frames)
+    revising.search_limbs(key_rows, report)
     while (stretch := revising.next_stretch()) is not None:
-        revising.look_at(*stretch)
+        revising.take(compared_backwards(tracker, revising.passed, frames, revising.parts, *stretch))
     return revising.revision
 
 
 class _Revising:
     """A pass while it is revised, one stretch after the other, the last one first."""
 
-    def __init__(self, tracker: Tracker, passed: Pass, frames: FramesBackwards) -> None:
+    def __init__(self, tracker: Tracker, passed: Pass, frames: FramesOfRows) -> None:
         self.tracker, self.passed, self.frames = tracker, passed, frames
         self.parts, self.revision = body_parts(tracker.body), Revision()
         self._tried: set[int] = set()
         self._looked_at = 0
 
+    @property
+    def _tired(self) -> bool:
+        return self._looked_at > MOST_LOOKS * len(self.passed.poses)
+
+    def search_limbs(self, rows: Sequence[int], report: Report) -> None:
+        """Hold limbs in other ways in some frames, and see where these lead that are worth more."""
+        search = LimbSearch.of(self.tracker)
+        for number, (row, frame) in enumerate(zip(rows, _one_by_one(self.frames, rows), strict=True)):
+            report(number / len(rows))
+            for pose in search.better_poses(frame, self.passed, row):
+                if not self._tired:
+                    took = self.take(compared_both_ways(self.tracker, self.passed, self.frames, self.parts, row, pose))
+                    search.note(took)
+
     def next_stretch(self) -> tuple[int, int] | None:
         """First and last frame of the last stretch in doubt from behind which no pass has begun."""
-        if self._looked_at > MOST_LOOKS * len(self.passed.poses):
+        if self._tired:
             return None
         found = [(first, stop - 1) for first, stop in stretches(in_doubt(self.passed), gap=SURE_FRAMES)]
         left = [stretch for stretch in found if stretch[1] not in self._tried]
+        if left:
+            self._tried.add(left[-1][1])
         return left[-1] if left else None
 
-    def look_at(self, first: int, last: int) -> None:
-        """Track backwards from behind a stretch, and revise what the pass explains better."""
-        found, begin = compared_backwards(self.tracker, self.passed, self.frames, self.parts, first, last)
-        rows = begin - 1 - np.arange(len(found.poses))
-        ends = (begin == len(self.passed.poses), bool(rows[-1] == 0))
+    def take(self, found: Compared) -> bool:
+        """Revise what another pass explains better; whether anything is."""
+        rows, total = np.array(found.rows), len(self.passed.poses)
+        ends = (bool(rows[0] in (0, total - 1)), bool(rows[-1] in (0, total - 1)))
         taken = select_parts(self.parts, np.stack(found.apart), np.stack(found.gains), self.passed.energy, ends)
         changed, poses = np.flatnonzero(taken.any(axis=1)), self.passed.poses
         for k in changed:
-            poses[rows[k]] = merged_pose(self.tracker.body, self.parts, poses[rows[k]], found.poses[k], taken[k])
+            poses[rows[k]] = self._merged(poses[rows[k]], found, int(k), taken[k])
         for k in changed:
             self._value(int(rows[k]), found.cells[k])
         for part, of_part in zip(self.parts, taken.T, strict=True):
-            if of_part.any():
-                self.revision.parts.setdefault(part.name, set()).update(rows[of_part].tolist())
-        self._tried.add(last)
+            for name in part.names if of_part.any() else ():
+                self.revision.parts.setdefault(name, set()).update(rows[of_part].tolist())
         self._looked_at += len(rows)
+        return bool(taken.any())
+
+    def _merged(
+        self, pose: Float[np.ndarray, "dof"], found: Compared, k: int, taken: Bool[np.ndarray, "part"]
+    ) -> Float[np.ndarray, "dof"]:
+        """A pose with the parts that are taken; all of the other pass's, which was climbed, where the rest is alike."""
+        moved = np.any([part.blobs for part, is_taken in zip(self.parts, taken, strict=True) if is_taken], axis=0)
+        rest = [np.any(part.blobs & ~moved) for part in self.parts]
+        alike = np.where(rest & ~taken, found.apart[k], 0.0).max() <= fitted_numbers().merge_passes.apart
+        if alike:
+            return found.poses[k].copy()
+        return merged_pose(self.tracker.body, self.parts, pose, found.poses[k], taken)
 
     def _value(self, row: int, frame: AnyFrame) -> None:
         """Note what a revised pose is worth."""
@@ -102,12 +143,19 @@ class _Revising:
         before, before_that = (jnp.asarray(poses[max(row - j, 0)]) for j in (1, 2))
         history = History(before, before_that, jnp.asarray(row >= 2))
         pose, baseline = jnp.asarray(poses[row]), jnp.asarray(self.passed.baseline[row])
-        known, room = on_device(frame), self.passed.capacities
-        value = with_room(lambda room: _valued(self.tracker, history, known, room, pose, baseline), room)
-        energy, terms, judged = jax.device_get(value)
-        self.passed.doubts[row] = judged.error_probability
+        known = on_device(frame)
+        views = views_near(self.tracker, known, pose, self.passed.capacities)
+        energy, terms, judged = jax.device_get(_valued(self.tracker, history, known, views, pose, baseline))
+        self.passed.doubts[row], self.passed.energies[row] = judged.error_probability, float(energy)
         values = {name: float(term) for name, term in terms.items()}
         self.revision.frames[row] = Revised(poses[row].copy(), float(energy), values, judged)
+
+
+def _one_by_one(frames: FramesOfRows, rows: Sequence[int]) -> Iterator[AnyFrame]:
+    """What is seen in some rows, which follow each other at equal steps."""
+    if len(rows) < 2:
+        return (frame for row in rows for frame in frames(range(row, row + 1)))
+    return iter(frames(range(rows[0], rows[-1] + 1, rows[1] - rows[0])))
 
 
 @eqx.filter_jit
@@ -115,12 +163,10 @@ def _valued(
     tracker: Tracker,
     history: History,
     frame: FrameInput,
-    capacities: Capacities,
+    views: Views,
     pose: Float[Array, "dof"],
     baseline: Float[Array, "2 blob"],
-) -> tuple[tuple[Float[Array, ""], dict[str, Float[Array, ""]], LimbConfidence], Needed]:
-    """Energy, terms and doubts of a pose that is known; and the room that they need."""
-    views, near, matching = tracker.views(frame, TrackState.from_pose(pose), capacities)
+) -> tuple[Float[Array, ""], dict[str, Float[Array, ""]], LimbConfidence]:
+    """Energy, terms and doubts of a pose that is known."""
     energy = FrameEnergy(tracker.body, views, history, tracker.terms)
-    judged = tracker.judged(pose, baseline, views.windows, frame)
-    return (energy(pose), energy.values(pose), judged), (jnp.max(near), jnp.max(matching))
+    return energy(pose), energy.values(pose), tracker.judged(pose, baseline, views.windows, frame)

@@ -6,10 +6,11 @@ from typing import TypeVar
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Int, UInt8
+from jaxtyping import Array, Float, Int, UInt8
 
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History
+from sogjax.energy.views import Views
 from sogjax.tracking.culling import CAPACITIES, Capacities, block_capacity, capacity_for
 from sogjax.tracking.frame import FrameInput, TrackState
 from sogjax.tracking.tracker import Tracker
@@ -37,6 +38,29 @@ def with_room(compute: Callable[[Capacities], tuple[Found, Needed]], capacities:
         if capacities.hold(near, matching):
             return found
         capacities = larger_capacities(capacities, near, matching, 0)
+
+
+def views_near(
+    tracker: Tracker, frame: FrameInput, pose: Float[Array, "dof"], capacities: Capacities, beyond: float = 0.0
+) -> Views:
+    """What the cameras see around a pose, with larger capacities where that needs them.
+
+    Boxes are wider by the part `beyond` of their longer sides: limbs may be held elsewhere.
+    """
+    part = jnp.asarray(beyond, tracker.body.blob_sigmas.dtype)
+    return with_room(lambda room: _views_near(tracker, frame, pose, part, room), capacities)
+
+
+@eqx.filter_jit
+def _views_near(
+    tracker: Tracker, frame: FrameInput, pose: Float[Array, "dof"], beyond: Float[Array, ""], capacities: Capacities
+) -> tuple[Views, Needed]:
+    state = TrackState.from_pose(pose)
+    boxes = tracker.boxes(state)
+    more = beyond * jnp.max(boxes[..., 1, :] - boxes[..., 0, :], axis=-1, keepdims=True)
+    wide = jnp.stack([boxes[..., 0, :] - more, boxes[..., 1, :] + more], axis=-2)
+    views, near, matching = tracker.views(frame, state, capacities, wide)
+    return views, (jnp.max(near), jnp.max(matching))
 
 
 def larger_capacities(capacities: Capacities, near: int, matching: int, blocks: int) -> Capacities:

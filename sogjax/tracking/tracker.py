@@ -106,14 +106,15 @@ class Tracker(eqx.Module):
         frame: FrameInput,
         state: TrackState,
         capacities: Capacities,
+        boxes: Float[Array, "camera actor 2 2"] | None = None,
     ) -> tuple[Views, Int[Array, "camera"], Int[Array, "camera"]]:
-        """What the cameras see, culled, and the counts that must be held against the capacities.
+        """What the cameras see in boxes (None: those of the state), and the counts to hold against the capacities.
 
         A camera that is not present sees nothing, and the similarity is the mean over the others.
         """
         present = None if frame.present is None else jnp.asarray(frame.present)
         rgb = self.rgb(frame)
-        odds, boxes = self.reader.odds(rgb), self.boxes(state)
+        odds, boxes = self.reader.odds(rgb), self.boxes(state) if boxes is None else boxes
         near_blobs = partial(self.reader.near_blobs, capacity=capacities.near)
         near, weights, num_near = stage_barrier(self.reader.true_at_run_time, near_blobs, rgb, odds, boxes)
         windows = None if odds is None else self.reader.windows(odds, self.cameras, boxes)

@@ -1,0 +1,322 @@
+"""Other ways to hold the limbs of a body in one frame: many are compared, the best different ones climbed.
+
+A unit is a pair of limbs that are each other's counterpart, since what one of them explains is often the other one's.
+The rest of the body is held meanwhile (`energy/part_energy.py`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from sogjax.energy.frame_energy import FrameEnergy
+from sogjax.energy.part_energy import PartEnergy, PartIndex
+from sogjax.energy.posed import History
+from sogjax.energy.views import Views
+from sogjax.model.body import Body
+from sogjax.model.limbs import limb_blobs, limb_names, limbs
+from sogjax.search.body_parts import limb_groups
+from sogjax.search.mirrored import fitted_to_blobs, other_side
+from sogjax.search.other_pass import Pass
+from sogjax.search.placed_body import means_of
+from sogjax.solve.gauss_newton import GaussNewton
+from sogjax.tracking.capacity import views_near
+from sogjax.tracking.frame import AnyFrame, on_device
+from sogjax.tracking.tracker import Tracker
+
+NUM_DRAWN = 36
+"""Ways to hold a unit that are drawn in a frame; another frame draws others."""
+NUM_CLIMBED = 5
+"""Different ways that are climbed, the tracked one among them."""
+AT_ONCE = 8
+ITERATIONS, FIT_ITERATIONS = 6, 10
+APART = 0.08
+"""Metres, mean over the blobs of the limb that differs more: ways to hold a unit that count as different."""
+SMALL_RANGE = 0.9
+"""Radians: a degree of freedom of less range is not drawn."""
+NEARBY = 1.2
+"""Radians around the tracked pose, within which every second way is drawn."""
+REACH = 0.3
+"""Part of the longer side of an actor's box by which pictures are looked at beyond it: limbs may be held there."""
+LARGEST_ANGLE = 0.3
+"""Radians: bound on a step of a climb."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Limbs that are searched together."""
+
+    limbs: tuple[int, ...]
+    """One, or two that are each other's counterpart; their numbers among those of the body."""
+    name: str
+    dofs: tuple[Int[np.ndarray, "_dof"], ...]
+    """Of each limb."""
+    blobs: tuple[Int[np.ndarray, "_blob"], ...]
+    """Of each limb, from its root to its end."""
+
+    @property
+    def all_dofs(self) -> Int[np.ndarray, "_dof"]:
+        """Of all its limbs."""
+        return np.concatenate(self.dofs)
+
+    @property
+    def all_blobs(self) -> Int[np.ndarray, "_blob"]:
+        """Of all its limbs."""
+        return np.concatenate(self.blobs)
+
+
+def units_of(body: Body) -> tuple[Unit, ...]:
+    """The pairs of limbs of a body; where it has no sides, its limbs."""
+    names, every_limb, blobs, groups = limb_names(body), limbs(body.skeleton), limb_blobs(body), limb_groups(body)
+    pairs = [members for members in groups if len(members) == 2]
+    return tuple(
+        Unit(
+            members,
+            " and ".join(names[j] for j in members),
+            tuple(every_limb[j] for j in members),
+            tuple(np.flatnonzero(blobs[j]) for j in members),
+        )
+        for members in pairs or groups
+    )
+
+
+class Units(eqx.Module):
+    """Units as arrays of one shape."""
+
+    index: PartIndex
+    limbs: Bool[Array, "unit limb slot"]
+    """Which of the unit's blobs are those of each limb; none where there is no second one."""
+    ends: Int[Array, "unit limb 2"]
+    """The first and the last blob of each limb."""
+    counterparts: Int[Array, "blob"]
+    """The blob of the other side, or the same."""
+
+    @classmethod
+    def of(cls, body: Body, units: Sequence[Unit]) -> "Units":
+        """Padded to the largest."""
+        dofs, blobs = _padded([unit.all_dofs for unit in units]), _padded([unit.all_blobs for unit in units])
+        of_limb = np.zeros((len(units), 2, blobs[0].shape[1]), bool)
+        ends = np.zeros((len(units), 2, 2), int)
+        for k, unit in enumerate(units):
+            for j, each in enumerate(unit.blobs):
+                of_limb[k, j] = np.isin(blobs[0][k], each) & blobs[1][k]
+            ends[k] = [[each[0], each[-1]] for each in (unit.blobs[0], unit.blobs[-1])]
+        index = PartIndex(*(jnp.asarray(array) for array in (*dofs, *blobs)))
+        return cls(index, jnp.asarray(of_limb), jnp.asarray(ends), jnp.asarray(other_side(body.blobs.names)))
+
+
+def _padded(rows: Sequence[Int[np.ndarray, "_n"]]) -> tuple[Int[np.ndarray, "row n"], Bool[np.ndarray, "row n"]]:
+    """Rows of the same length, and what of them is real."""
+    size = max(map(len, rows))
+    return (
+        np.stack([np.pad(row, (0, size - len(row))) for row in rows]),
+        np.stack([np.arange(size) < len(row) for row in rows]),
+    )
+
+
+SLACK, WORTH = -0.002, 0.001
+"""Parts of a frame's energy: what another way gains, while the rest is held, for the whole body to be climbed from
+there, and what it gains then for a pass to go from there."""
+PAUSE = 3
+"""Key frames for which no other pass is begun after one of which nothing was taken."""
+
+
+class LimbSearch:
+    """Looks for better ways to hold limbs, in one key frame after the other."""
+
+    def __init__(self, tracker: Tracker, units: Sequence[Unit], arrays: Units) -> None:
+        self.tracker, self.units, self.arrays = tracker, units, arrays
+        self._turn = 0
+        self._carried: HeldOtherwise | None = None
+        self._pause_until = 0
+
+    @classmethod
+    def of(cls, tracker: Tracker) -> "LimbSearch":
+        """The search for the limbs of a tracker's body."""
+        units = units_of(tracker.body)
+        return cls(tracker, units, Units.of(tracker.body, units))
+
+    def note(self, taken: bool) -> None:
+        """Learn whether anything was taken of the pass from the last pose."""
+        if not taken:
+            self._pause_until = self._turn + PAUSE
+
+    def better_poses(self, frame: AnyFrame, passed: Pass, row: int) -> list[Float[np.ndarray, "dof"]]:
+        """Poses of a frame with limbs held otherwise, climbed with all degrees of freedom, that are worth more."""
+        pose, self._turn = passed.poses[row], self._turn + 1
+        views = views_near(self.tracker, on_device(frame), jnp.asarray(pose), passed.capacities, REACH)
+        tried = np.stack([self._tried(k, unit, pose) for k, unit in enumerate(self.units)]).astype(pose.dtype)
+        found = held_otherwise(self.tracker, views, jnp.asarray(pose), self.arrays, jnp.asarray(tried))
+        found = jax.device_get(found)
+        self._carried = found
+        if self._turn < self._pause_until:
+            return []
+        promising = (found.gains > SLACK * passed.energy) & (found.apart > APART)
+        starts = [found.poses[k, w] for k, w in zip(*np.nonzero(promising), strict=True)]
+        if not starts:
+            return []
+        starts = [pose, *starts[:MOST_WHOLE]]
+        starts = np.stack([*starts, *[pose] * (MOST_WHOLE + 1 - len(starts))])
+        ends, values, before = jax.device_get(climbed_whole(self.tracker, views, jnp.asarray(starts)))
+        best = int(np.argmax(values))
+        moved = np.linalg.norm(np.diff(means_of(self.tracker.body, np.stack([pose, ends[best]])), axis=0), axis=-1)
+        worth = values[best] - before > WORTH * passed.energy and moved.max() > APART
+        return [ends[best]] if worth else []
+
+    def _tried(self, number: int, unit: Unit, pose: Float[np.ndarray, "dof"]) -> Float[np.ndarray, "seed dof"]:
+        """Ways that are drawn, and those of the last key frame."""
+        drawn, before = drawn_ways(self.tracker.body, unit, pose, self._turn), np.tile(pose, (NUM_CLIMBED - 1, 1))
+        if self._carried is not None:
+            before[:, unit.all_dofs] = self._carried.poses[number, 1:][:, unit.all_dofs]
+        return np.concatenate([before, drawn])
+
+
+MOST_WHOLE = 3
+"""Poses that are climbed with all degrees of freedom in a frame, beside the tracked one."""
+
+
+@eqx.filter_jit
+def climbed_whole(
+    tracker: Tracker, views: Views, starts: Float[Array, "start dof"]
+) -> tuple[Float[Array, "start dof"], Float[Array, "start"], Float[Array, ""]]:
+    """Poses climbed with the tracker's energy and solver, and what they are worth; last, what the first start is."""
+    energy = FrameEnergy(tracker.body, views, History.unknown(starts[0]), tracker.terms)
+
+    def climb(start: Float[Array, "dof"]) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
+        found = tracker.solver.maximize(energy, start, tracker.scales)
+        return found.params, found.value
+
+    ends, values = jax.lax.map(climb, starts)
+    return ends, values, energy(starts[0])
+
+
+class HeldOtherwise(eqx.Module):
+    """Ways to hold each unit, climbed, with the rest of the body as it was tracked; the first from where it was."""
+
+    poses: Float[Array, "*unit way dof"]
+    gains: Float[Array, "*unit way"]
+    """The energy above that of the tracked pose."""
+    apart: Float[Array, "*unit way"]
+    """Metres from the tracked pose: mean over the blobs of the limb that differs more."""
+
+
+@eqx.filter_jit
+def held_otherwise(
+    tracker: Tracker, views: Views, pose: Float[Array, "dof"], units: Units, tried: Float[Array, "unit seed dof"]
+) -> HeldOtherwise:
+    """The best different ways to hold each unit in what is seen, climbed.
+
+    Compared are the tracked one, those that look like it, and those that are `tried`.
+    """
+    scales = replace(tracker.scales, largest_steps=jnp.maximum(tracker.scales.largest_steps, LARGEST_ANGLE))
+    solver = GaussNewton(max_iterations=ITERATIONS)
+
+    def of_unit(each: tuple[PartIndex, Array, Array, Array]) -> HeldOtherwise:
+        index, of_limb, ends, others = each
+        energy = PartEnergy.around(tracker.body, views, tracker.terms, pose, index)
+        held = lambda params: index.put(pose, params)
+        means = lambda params: tracker.body.posed_blobs(held(params)).means[index.blobs]
+        alike = look_alikes(tracker.body, pose, index, of_limb, ends, units.counterparts)
+        params = jax.vmap(index.params)(jnp.concatenate([pose[None], alike, others]))
+        values = _in_parts(energy, params)
+        chosen = _different(jax.vmap(means)(params), values, of_limb)
+        climb = lambda start: solver.maximize(energy, start, replace(scales, kinds=scales.kinds[index.dofs]))
+        found = jax.vmap(climb)(params[chosen])
+        places = jax.vmap(means)(found.params)
+        apart = jax.vmap(lambda each: _apart(each, means(params[0]), of_limb))(places)
+        return HeldOtherwise(jax.vmap(held)(found.params), found.value - values[0], apart)
+
+    return jax.lax.map(of_unit, (units.index, units.limbs, units.ends, tried))
+
+
+def look_alikes(
+    body: Body,
+    pose: Float[Array, "dof"],
+    index: PartIndex,
+    of_limb: Bool[Array, "limb slot"],
+    ends: Int[Array, "limb 2"],
+    counterparts: Int[Array, "blob"],
+) -> Float[Array, "4 dof"]:
+    """A unit exchanged with its counterpart; and each of its limbs, or both, turned by a half from root to end."""
+    means = body.posed_blobs(pose).means
+    here = means[index.blobs]
+    turned = jax.vmap(lambda two: _half_turned(here, means[two[0]], means[two[1]]))(ends)
+    place = lambda moved: means.at[jnp.where(index.blob_mask, index.blobs, len(means))].set(moved, mode="drop")
+    first, second = (jnp.where(each[:, None], moved, here) for each, moved in zip(of_limb, turned, strict=True))
+    both = jnp.where(of_limb[1][:, None], second, first)
+    targets = jnp.stack([place(each) for each in (means[counterparts[index.blobs]], first, second, both)])
+    fitted = fitted_to_blobs(body, jnp.tile(pose, (len(targets), 1)), targets, FIT_ITERATIONS)[0]
+    return jax.vmap(lambda each: index.put(pose, index.params(each)))(fitted)
+
+
+def _half_turned(
+    points: Float[Array, "point 3"], root: Float[Array, "3"], end: Float[Array, "3"]
+) -> Float[Array, "point 3"]:
+    """Points turned by a half about the line from a root to an end: a knee or elbow on the other side of it."""
+    along = (end - root) / jnp.maximum(jnp.linalg.norm(end - root), 1e-6)
+    off = points - root[None]
+    return root[None] + 2.0 * jnp.sum(off * along[None], axis=-1, keepdims=True) * along[None] - off
+
+
+def drawn_ways(
+    body: Body, unit: Unit, pose: Float[np.ndarray, "dof"], turn: int, count: int = NUM_DRAWN
+) -> Float[np.ndarray, "drawn dof"]:
+    """Quasi-random ways to hold a unit: its first limb, its second, or both; within their limits, or nearby.
+
+    Each `turn` draws others.
+    """
+    lower, upper = np.asarray(body.skeleton.dof_lower), np.asarray(body.skeleton.dof_upper)
+    free = [dofs[(upper - lower)[dofs] > SMALL_RANGE] for dofs in unit.dofs]
+    dofs = np.concatenate(free)
+    shares = _quasi_random(count, turn, len(dofs))
+    whole = lower[dofs] + shares * (upper - lower)[dofs]
+    low, high = np.maximum(lower[dofs], pose[dofs] - NEARBY), np.minimum(upper[dofs], pose[dofs] + NEARBY)
+    values = np.where(np.arange(count)[:, None] % 2 == 0, whole, low + shares * (high - low))
+    found = np.tile(pose, (count, 1))
+    which = (np.arange(count) // 2) % (2 ** len(unit.limbs) - 1)
+    for k, of_limb in enumerate(free):
+        rows = np.flatnonzero((which == k) | (which == 2))
+        found[np.ix_(rows, of_limb)] = values[rows][:, np.isin(dofs, of_limb)]
+    return found.astype(pose.dtype)
+
+
+def _quasi_random(count: int, turn: int, dims: int) -> Float[np.ndarray, "count dims"]:
+    """Points that fill a cube evenly (Roberts' R sequence); later turns fill its gaps."""
+    root = 2.0
+    for _ in range(30):
+        root = (1.0 + root) ** (1.0 / (dims + 1))
+    steps = (1.0 / root) ** np.arange(1, dims + 1)
+    return np.mod(0.5 + (np.arange(count) + 1 + turn * count)[:, None] * steps[None], 1.0)
+
+
+def _in_parts(energy: PartEnergy, params: Float[Array, "seed param"]) -> Float[Array, "seed"]:
+    count = params.shape[0]
+    padded = jnp.concatenate([params, jnp.repeat(params[-1:], -count % AT_ONCE, axis=0)])
+    values = jax.lax.map(jax.vmap(energy), padded.reshape(-1, AT_ONCE, params.shape[1]))
+    return values.reshape(-1)[:count]
+
+
+def _different(
+    means: Float[Array, "seed slot 3"], values: Float[Array, "seed"], limbs: Bool[Array, "limb slot"]
+) -> Int[Array, "way"]:
+    """The first, and the best that lie apart from it and from each other."""
+    left, chosen = values, [jnp.asarray(0)]
+    for _ in range(NUM_CLIMBED - 1):
+        last = means[chosen[-1]]
+        near = jax.vmap(lambda each, last=last: _apart(each, last, limbs))(means) < APART
+        left = jnp.where(near, -jnp.inf, left)
+        chosen.append(jnp.argmax(left))
+    return jnp.stack(chosen)
+
+
+def _apart(
+    means: Float[Array, "slot 3"], others: Float[Array, "slot 3"], limbs: Bool[Array, "limb slot"]
+) -> Float[Array, ""]:
+    """Metres, mean over the blobs of the limb that is farther off."""
+    moved = jnp.linalg.norm(means - others, axis=-1)
+    sums = jnp.sum(jnp.where(limbs, moved[None], 0.0), axis=1)
+    return jnp.max(sums / jnp.maximum(jnp.sum(limbs, axis=1, dtype=sums.dtype), 1.0))

@@ -1,0 +1,212 @@
+"""A pass from elsewhere beside one that is known: where they are apart, and which explains each part better.
+
+It begins behind frames in doubt and goes backwards, or at another pose of a key frame and goes both ways.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, fields, replace
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from sogjax.energy.frame_energy import FrameEnergy
+from sogjax.energy.posed import History
+from sogjax.energy.views import Views
+from sogjax.model.body import Body
+from sogjax.quality.fitted import fitted_numbers
+from sogjax.search.body_parts import Part, PartArrays
+from sogjax.tracking.capacity import views_near
+from sogjax.tracking.culling import Capacities
+from sogjax.tracking.frame import AnyFrame, TrackedFrame, TrackState, on_device
+from sogjax.tracking.frame_by_frame import track
+from sogjax.tracking.tracker import Tracker
+
+MOST_BEFORE = 45
+"""Frames before a stretch in doubt that are tracked backwards, at most."""
+SURE_FRAMES = 3
+"""Frames without doubt that lie between two stretches, at least."""
+
+PATIENCE, LEAST_GAIN = 6, 0.004
+"""Frames after which a pass from another pose of a key frame ends that explains less than the known one; and what it
+gains at least, as a part of a frame's energy, for its parts to be looked at."""
+
+MOST_FRAMES = 240
+"""Frames that are tracked backwards from one, at most: the cells of so many are held in memory."""
+
+FramesOfRows = Callable[[range], Iterable[AnyFrame]]
+"""What is seen in some rows of a pass, in the order of the range, which may go backwards."""
+
+
+@dataclass(frozen=True)
+class Pass:
+    """What tracking found, a row a frame."""
+
+    poses: Float[np.ndarray, "frame dof"]
+    doubts: Float[np.ndarray, "frame limb"]
+    baseline: Float[np.ndarray, "frame 2 blob"]
+    """The limbs' baseline in every frame, as in `LimbConfidence`."""
+    energies: Float[np.ndarray, "frame"]
+    capacities: Capacities
+    """The capacities of the last frame."""
+
+    @property
+    def energy(self) -> float:
+        """The magnitude of a frame's energy, the mean over the frames."""
+        return float(np.abs(self.energies).mean())
+
+    @classmethod
+    def from_frames(cls, frames: Sequence[TrackedFrame]) -> "Pass":
+        """The pass of some frames, whose limbs were judged."""
+        judged = [frame.result.limbs for frame in frames]
+        column = lambda values: np.stack([np.asarray(value) for value in values])
+        return cls(
+            column(frame.result.pose for frame in frames),
+            column(limbs.error_probability for limbs in judged if limbs is not None),
+            column(limbs.baseline for limbs in judged if limbs is not None),
+            np.array([float(frame.result.energy) for frame in frames]),
+            frames[-1].capacities,
+        )
+
+
+@dataclass
+class Compared:
+    """The frames of another pass beside the one that is known, in the order of `rows`."""
+
+    rows: list[int] = field(default_factory=list)
+    cells: list[AnyFrame] = field(default_factory=list)
+    poses: list[Float[np.ndarray, "dof"]] = field(default_factory=list)
+    gains: list[Float[np.ndarray, "part"]] = field(default_factory=list)
+    """The rise of the energy if a part is taken from the other pass."""
+    apart: list[Float[np.ndarray, "part"]] = field(default_factory=list)
+    """Metres."""
+
+    def joined(self, later: "Compared") -> "Compared":
+        """These frames turned round, then later ones of which the first is known already."""
+        parts = (getattr(self, each.name)[::-1] + getattr(later, each.name)[1:] for each in fields(self))
+        return Compared(*parts)
+
+
+def compared_backwards(
+    tracker: Tracker, passed: Pass, frames: FramesOfRows, parts: Sequence[Part], first: int, last: int
+) -> Compared:
+    """Track from the first frame behind a stretch until both passes agree again before it."""
+    total = len(passed.poses)
+    begin = min(last + 1, total)  # no frame behind the clip's last one: its pose is where the pass begins
+    after = [min(begin + k, total - 1) for k in (0, 1)]
+    pose, before = (jnp.asarray(passed.poses[row]) for row in after)
+    known, baseline = 2 if begin < total else 0, jnp.asarray(passed.baseline[after[0]])
+    start = TrackState(pose, before, jnp.asarray(known), baseline)
+    lowest = max(0, begin - MOST_FRAMES, first - MOST_BEFORE)
+    return compared(tracker, passed, frames, parts, start, range(begin - 1, lowest - 1, -1), begin - first)
+
+
+def compared_both_ways(
+    tracker: Tracker,
+    passed: Pass,
+    frames: FramesOfRows,
+    parts: Sequence[Part],
+    row: int,
+    pose: Float[np.ndarray, "dof"],
+) -> Compared:
+    """Track from another pose of a frame, backwards and forwards, until the passes agree."""
+    start = replace(TrackState.from_pose(jnp.asarray(pose)), baseline=jnp.asarray(passed.baseline[row]))
+    ways = (
+        range(row, max(row - MOST_FRAMES, -1), -1),
+        range(row, min(row + MOST_FRAMES, len(passed.poses))),
+    )
+    back, forth = (compared(tracker, passed, frames, parts, start, way, 1, PATIENCE) for way in ways)
+    return back.joined(forth)
+
+
+def compared(
+    tracker: Tracker,
+    passed: Pass,
+    frames: FramesOfRows,
+    parts: Sequence[Part],
+    start: TrackState,
+    rows: range,
+    at_least: int,
+    patience: int | None = None,
+) -> Compared:
+    """Track some rows, one after the other, until both passes agree again after at least so many.
+
+    With `patience` the pass ends, too, where it has explained less than the known one for so many frames.
+    """
+    found, choices, numbers = Compared(), PartArrays.of(tracker.body, parts), fitted_numbers().merge_passes
+
+    def coming() -> Iterable[AnyFrame]:
+        for frame in frames(rows):
+            found.cells.append(frame)
+            yield frame
+
+    agree, capacities, gained = 0, [], []
+    for k, (row, tracked) in enumerate(zip(rows, track(tracker, start, coming(), passed.capacities), strict=False)):
+        both = (jnp.asarray(passed.poses[row]), jnp.asarray(tracked.result.pose))
+        apart = np.asarray(_apart(tracker.body, choices.blobs, *both))
+        found.rows.append(row)
+        found.poses.append(np.asarray(both[1]))
+        found.apart.append(apart)
+        capacities.append(tracked.capacities)
+        gained.append(float(tracked.result.energy) - passed.energies[row])
+        agree = agree + 1 if apart.max(initial=0.0) <= numbers.together else 0
+        if k + 1 >= at_least and agree >= SURE_FRAMES:
+            break
+        if patience is not None and k + 1 >= patience and sum(gained[-patience:]) < 0.0:
+            break
+    hopeless = patience is not None and max(np.cumsum(gained)) < LEAST_GAIN * passed.energy
+    for k, row in enumerate(found.rows):
+        both = (jnp.asarray(passed.poses[row]), jnp.asarray(found.poses[k]))
+        differs = found.apart[k].max(initial=0.0) > numbers.compared and not hopeless
+        gains = part_gains(tracker, found.cells[k], capacities[k], choices, *both) if differs else np.zeros(len(parts))
+        found.gains.append(gains)
+    return found
+
+
+@eqx.filter_jit
+def _apart(
+    body: Body, blobs: Bool[Array, "part blob"], pose: Float[Array, "dof"], other: Float[Array, "dof"]
+) -> Float[Array, "part"]:
+    """How far the blobs of each part are from those in another pose, in metres, on average."""
+    moved = body.posed_blobs(pose).means - body.posed_blobs(other).means
+    apart = jnp.broadcast_to(jnp.linalg.norm(moved, axis=-1), blobs.shape)
+    return jnp.mean(apart, axis=-1, where=blobs)
+
+
+def part_gains(
+    tracker: Tracker,
+    frame: AnyFrame,
+    capacities: Capacities,
+    parts: PartArrays,
+    first: Float[Array, "dof"],
+    second: Float[Array, "dof"],
+) -> Float[np.ndarray, "part"]:
+    """The rise of the energy with each part of the second pose instead of the first one's.
+
+    The mean over what holds around it: the rest of the first pose and that of the second, in what is seen near either.
+    """
+    known, body = on_device(frame), tracker.body
+    poses = _mixed(body, parts, first, second)
+
+    def seen_near(at: Float[Array, "dof"]) -> Float[np.ndarray, "part"]:
+        values = np.asarray(values_in(tracker, views_near(tracker, known, at, capacities), poses))
+        into_first, into_second = values[2:].reshape(2, -1)
+        return 0.5 * ((into_first - values[0]) + (values[1] - into_second))
+
+    return 0.5 * (seen_near(first) + seen_near(second))
+
+
+@eqx.filter_jit
+def _mixed(
+    body: Body, parts: PartArrays, first: Float[Array, "dof"], second: Float[Array, "dof"]
+) -> Float[Array, "mixed dof"]:
+    mixed = [parts.mixed(body, first, second), parts.mixed(body, second, first)]
+    return jnp.concatenate([first[None], second[None], *mixed])
+
+
+@eqx.filter_jit
+def values_in(tracker: Tracker, views: Views, poses: Float[Array, "start dof"]) -> Float[Array, "start"]:
+    """The energies of poses in the same views, without history."""
+    return jax.lax.map(FrameEnergy(tracker.body, views, History.unknown(poses[0]), tracker.terms), poses)

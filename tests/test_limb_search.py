@@ -1,0 +1,135 @@
+"""Limbs held in other ways: what a part adds to the energy, which ways are tried, what is found undoubted."""
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from body_cases import shipped
+from rig_cases import ring_rig
+from sog_cases import floats, random_views
+from test_both_ways import LOST, reader, with_lost_limb
+from test_energy_gradient import precise
+
+from sogjax.energy.frame_energy import FrameEnergy, standard_terms
+from sogjax.energy.part_energy import PartEnergy
+from sogjax.energy.posed import History
+from sogjax.energy.views import Windows
+from sogjax.model.body import concatenate
+from sogjax.model.limbs import limb_names
+from sogjax.search.limb_search import Units, drawn_ways, look_alikes, units_of
+from sogjax.search.merge_passes import merge_passes
+from sogjax.search.placed_body import means_of
+
+HUMAN = shipped("human")
+
+
+def with_random_foreground(views, rng):
+    """The views with a grid of log odds over the whole of each picture."""
+    cameras, cells = len(views.normalizers), 12
+    width, height = (float(size) for size in views.cameras.image_size[0])
+    along = lambda size: floats(np.broadcast_to((np.arange(cells) + 0.5) * size / cells, (cameras, 1, cells)))
+    step = floats(np.broadcast_to((width / cells, height / cells), (cameras, 1, 2)))
+    return replace(
+        views, windows=Windows(along(width), along(height), step, floats(rng.normal(size=(cameras, 1, cells, cells))))
+    )
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_what_a_part_adds_is_what_the_energy_of_the_whole_gains(number):
+    """To rounding, with the caps and the cover of the rest; its gradient is that of autodiff."""
+    with jax.enable_x64(True):
+        body, rng = precise(HUMAN), np.random.default_rng(number)
+        pose = np.asarray(body.poses["arms_forward"], float)
+        views = random_views(ring_rig(3).cameras, body, number, pose=floats(pose))
+        views = with_random_foreground(views, rng)
+        terms = standard_terms(floats(0.7), foreground_weight=floats(0.2))
+        units = units_of(body)
+        index = jax.tree.map(lambda leaf: leaf[number], Units.of(body, units).index)
+        moves = np.isin(np.arange(len(pose)), units[number].all_dofs)
+        others = [pose, *(pose + moves * rng.normal(0.0, 0.4, len(pose)) for _ in range(2))]
+        energy = FrameEnergy(body, views, History.unknown(floats(pose)), terms)
+        whole = jax.jit(lambda pose: energy(pose))
+        part = PartEnergy.around(body, views, terms, floats(pose), index)
+        params = jnp.stack([index.params(floats(other)) for other in others])
+        (values, slopes), models = jax.jit(
+            lambda params: (jax.vmap(jax.value_and_grad(part))(params), jax.vmap(part.quadratic)(params))
+        )(params)
+        expected = [float(whole(floats(other))) for other in others]
+        assert np.ptp(expected) > 1e-4
+        np.testing.assert_allclose(np.diff(values), np.diff(expected), rtol=1e-8, atol=1e-12)
+        np.testing.assert_allclose(models.value, values, rtol=1e-10)
+        np.testing.assert_allclose(models.gradient, slopes, atol=1e-8 * float(jnp.max(jnp.abs(slopes))))
+
+
+def test_units_are_pairs_of_limbs_of_each_actor():
+    assert [unit.name for unit in units_of(HUMAN)] == ["left leg and right leg", "left arm and right arm"]
+    both = concatenate([replace(HUMAN, name="anna"), replace(HUMAN, name="ben")])
+    names = [unit.name for unit in units_of(both)]
+    assert len(names) == 4
+    assert all(name.count(actor) in (0, 2) for name in names for actor in ("anna", "ben"))
+
+
+def alike_of(number, pose):
+    units = Units.of(HUMAN, units_of(HUMAN))
+    one = jax.tree.map(lambda leaf: leaf[number], (units.index, units.limbs, units.ends))
+    found = jax.jit(look_alikes)(HUMAN, jnp.asarray(pose), *one, units.counterparts)
+    return np.asarray(found)
+
+
+def test_what_looks_alike_has_its_legs_exchanged_or_its_knees_on_the_other_side():
+    pose = np.asarray(HUMAN.poses["walk_left"])
+    exchanged, left, right, both = alike_of(0, pose)
+    names = list(HUMAN.blobs.names)
+    at = lambda pose, name: means_of(HUMAN, np.asarray(pose)[None])[0, names.index(name)]
+    apart = lambda one, two: float(np.linalg.norm(one - two))
+    crossed = apart(at(exchanged, "left_shank4"), at(pose, "right_shank4"))
+    assert crossed < 0.4 * apart(at(pose, "left_shank4"), at(pose, "right_shank4"))
+    legs, arms = (unit.all_dofs for unit in units_of(HUMAN))
+    others = np.setdiff1d(np.arange(len(pose)), legs)
+    for found in (exchanged, left, right, both):
+        np.testing.assert_array_equal(found[others], pose[others])
+    first, second = units_of(HUMAN)[0].dofs
+    np.testing.assert_allclose(left[second], pose[second], atol=0.1)
+    np.testing.assert_allclose(right[first], pose[first], atol=0.1)
+    assert len(arms)
+
+
+def test_drawn_ways_lie_within_the_limits_and_are_others_each_turn():
+    pose, unit = np.asarray(HUMAN.poses["tpose"]), units_of(HUMAN)[1]
+    one, two = (drawn_ways(HUMAN, unit, pose, turn) for turn in (0, 1))
+    others = np.setdiff1d(np.arange(len(pose)), unit.all_dofs)
+    np.testing.assert_array_equal(one[:, others], np.tile(pose[others], (len(one), 1)))
+    lower, upper = (np.asarray(bound)[unit.all_dofs] for bound in (HUMAN.skeleton.dof_lower, HUMAN.skeleton.dof_upper))
+    for ways in (one, two):
+        assert np.all(ways[:, unit.all_dofs] >= np.minimum(lower, pose[unit.all_dofs]) - 1e-5)
+        assert np.all(ways[:, unit.all_dofs] <= np.maximum(upper, pose[unit.all_dofs]) + 1e-5)
+    alone = [np.all(one[:, dofs] == pose[dofs], axis=1) for dofs in unit.dofs]
+    assert alone[0].any()
+    assert alone[1].any()
+    assert (~alone[0] & ~alone[1]).any()
+    assert np.abs(one - two).max() > 0.1
+
+
+@pytest.mark.slow
+def test_a_lost_limb_that_nobody_doubts_is_found_in_a_key_frame(walking_dog):
+    tracker, cells, right = walking_dog
+    passed, limb = with_lost_limb(walking_dog, doubt=0.0)
+    assert not merge_passes(tracker, passed, reader(cells)).frames
+    energies = right.energies.copy()
+    energies[LOST] *= 0.9  # what a pass that has lost a leg is worth
+    passed = replace(passed, energies=energies)
+    found = merge_passes(tracker, passed, reader(cells), range(0, len(cells), 5))
+    assert limb_names(tracker.body)[limb] in found.parts
+    assert {4, 5, 6} <= {*found.frames}
+    for row in (4, 5, 6):
+        off = means_of(tracker.body, found.frames[row].pose[None]) - means_of(tracker.body, right.poses[[row]])
+        assert np.linalg.norm(off, axis=-1).max() < 0.02
+
+
+@pytest.mark.slow
+def test_a_right_pass_stays_as_it_is_when_limbs_are_searched(walking_dog):
+    tracker, cells, right = walking_dog
+    sound = replace(right, doubts=np.zeros_like(right.doubts))
+    assert not merge_passes(tracker, sound, reader(cells), range(0, len(cells), 3)).frames
