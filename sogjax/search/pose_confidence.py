@@ -16,7 +16,7 @@ class PoseEvidence:
     """What tells from one search whether a pose is right; energies are in units of the body's area in the pictures."""
 
     energy: float
-    """The energy in the frame that was searched."""
+    """The energy in the frame that was searched, for the part of the body that no other actor hides."""
     margin: float
     """How far the next different hypothesis is behind there, as a part of the energy."""
     later_margin: float
@@ -63,6 +63,12 @@ def pose_confidence(evidence: PoseEvidence) -> float:
     return _likely([excess(bound.name) for bound in fields(bounds)])
 
 
+def limb_confidence(evidence: PoseEvidence, explained: float) -> float:
+    """How likely a limb is right, from one search: what the body says, and what the limb explains for its size."""
+    bounds = fitted_numbers().pose_agreement
+    return min(pose_confidence(evidence), _likely([(explained - bounds.least_limb) / bounds.limb_scale]))
+
+
 def agreed_confidence(agreement: Agreement) -> float:
     """How likely a pose is right, from two searches in frames some time apart."""
     bounds = fitted_numbers().pose_agreement
@@ -78,4 +84,4 @@ def agreed_confidence(agreement: Agreement) -> float:
 
 def _likely(excesses: Iterable[float]) -> float:
     """0.99 where the least excess is 0, so that every bound is just met; a half where one is missed by its scale."""
-    return float(1.0 / (1.0 + np.exp(-4.6 * (1.0 + min(*excesses, 10.0)))))
+    return float(1.0 / (1.0 + np.exp(-4.6 * (1.0 + min([*excesses, 10.0])))))
