@@ -80,7 +80,7 @@ class ClipSearch:
     @cached_property
     def _searchers(self) -> list[PoseSearch]:
         terms = build.energy_terms(self.config.energy, self.terms)
-        return [PoseSearch.of_body(body, terms, self.clip.recording.up) for body in self.bodies]
+        return [PoseSearch.of_body(body, terms, self.clip.recording.up, len(self.bodies)) for body in self.bodies]
 
     @cached_property
     def _searched(self) -> dict[int, list[found_pose.Path]]:

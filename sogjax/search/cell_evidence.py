@@ -23,12 +23,12 @@ LEAST_VISIBLE = 0.15
 class CellEvidence(eqx.Module):
     """What the cells around a body say for its pose, in each camera and of each limb.
 
-    Cells in which another actor is seen say nothing: neither what that one explains is asked of this one, nor does it
-    lose where it is hidden. A camera in which it is hidden altogether has NaN.
+    Whether what looks like foreground is covered is asked of all actors together. Otherwise cells in which another one
+    is seen say nothing: who is hidden there neither gains nor loses. A camera in which it is hidden has NaN.
     """
 
     foreground: Float[Array, "camera"]
-    """Part of what looks like foreground, by log odds, that the body covers."""
+    """Part of what looks like foreground, by log odds, that the body and the others cover."""
     background: Float[Array, "camera"]
     """What the body covers that looks like background, as a part of what it covers."""
     gain: Float[Array, "camera"]
@@ -64,13 +64,13 @@ def _cell_evidence(
     sizes = jnp.sum(jnp.where(limbs, areas[None], 0.0), axis=1) / jnp.sum(areas)
     of_limb = lost / (jnp.maximum(jnp.abs(value), 1e-6) * sizes)
     best = jnp.max(here.odds, axis=1)
-    wanted, unwanted = jnp.maximum(best, 0.0) * here.free, (best < -CERTAIN).astype(cover.dtype) * here.free
+    wanted, unwanted = jnp.maximum(best, 0.0), (best < -CERTAIN).astype(cover.dtype) * here.free
     total = lambda values: jnp.sum(values, axis=(1, 2))
     whole = total(cover * here.free) + 1e-6
     visible = whole / (total(cover) + 1e-6)
     where_seen = lambda values: jnp.where(visible < LEAST_VISIBLE, jnp.nan, values)
     return CellEvidence(
-        foreground=where_seen(total(wanted * cover) / (total(wanted) + 1e-6)),
+        foreground=where_seen(total(wanted * (1.0 - here.free * (1.0 - cover))) / (total(wanted) + 1e-6)),
         background=where_seen(total(unwanted * cover) / whole),
         gain=where_seen(total(gain * here.free) / whole),
         visible=visible,

@@ -19,6 +19,7 @@ from sogjax.search.pose_search import (
     different,
     search,
     unreported,
+    with_better_limbs,
 )
 from sogjax.search.seen_frame import SeenFrame
 
@@ -94,7 +95,10 @@ def _paths_together(actors: list[Sought]) -> list[Path]:
     if len(actors) > 1 and (not combined.apart or combined.shares[poorest] < LEFT_OVER):
         actors[poorest] = _searched_again(actors, poorest, combined)
         combined = best_combination(_weighed(actors))
-    followed, best = _followed(actors, combined.chosen)
+    if len(actors) > 1:
+        at = [actor.poses[row] for actor, row in zip(actors, combined.chosen, strict=True)]
+        actors = [_with_limbs_beside(actors, k, at) for k in range(len(actors))]
+    followed, best = _followed(actors, [0] * len(actors) if len(actors) > 1 else combined.chosen)
     first = [paths.poses[0, row] for paths, row in zip(followed, best, strict=True)]
 
     def judge(k: int) -> Path:
@@ -133,6 +137,22 @@ def _searched_again(actors: Sequence[Sought], k: int, combined: Combination) -> 
     return Sought(
         actor.searcher, actor.frames, poses[different(actor.searcher.body, poses, values, NUM_LAST)].astype(np.float32)
     )
+
+
+def _with_limbs_beside(actors: Sequence[Sought], k: int, at: Sequence[Float[np.ndarray, "dof"]]) -> Sought:
+    """An actor with the best way to hold its limbs beside the others first, then other ways, then its other optima.
+
+    Alone, a limb is often held where another actor's limb is seen.
+    """
+    actor, others = actors[k], [(other, at[j]) for j, other in enumerate(actors) if j != k]
+    placed, tried = _placed(actor.searcher, actor.given(0, others), at[k][None])
+    held = with_better_limbs(placed, tried)
+    poses = np.concatenate([held.poses, actor.poses]).astype(np.float32)
+    values = np.concatenate([held.values, actor.scored(actor.given(0, others))])
+    values[np.argmax(held.values)] = values.max() + 1.0  # first, whatever those in another place are worth
+        values.max() + 1.0
+    )  # the first, whatever it is worth beside those in another one's place
+    return Sought(actor.searcher, actor.frames, poses[different(actor.searcher.body, poses, values, NUM_LAST)])
 
 
 def _followed(actors: Sequence[Sought], chosen: Sequence[int]) -> tuple[list[Followed], list[int]]:

@@ -22,9 +22,9 @@ class PoseEvidence:
     later_margin: float
     """The margin of the means over the frames that follow; where it is negative, the motion speaks for another pose."""
     foreground: float
-    """Part of what looks like foreground that the body covers, mean over the cameras."""
+    """Part of what looks like foreground that the actors cover, mean over the cameras."""
     worst_foreground: float
-    """Part of what looks like foreground that the body covers, in the camera in which it is least."""
+    """Part of what looks like foreground that the actors cover, in the camera in which it is least."""
     not_background: float
     """Part of what the body covers that does not look like background, mean over the cameras."""
     gain: float
