@@ -150,8 +150,6 @@ def _with_limbs_beside(actors: Sequence[Sought], k: int, at: Sequence[Float[np.n
     poses = np.concatenate([held.poses, actor.poses]).astype(np.float32)
     values = np.concatenate([held.values, actor.scored(actor.given(0, others))])
     values[np.argmax(held.values)] = values.max() + 1.0  # first, whatever those in another place are worth
-        values.max() + 1.0
-    )  # the first, whatever it is worth beside those in another one's place
     return Sought(actor.searcher, actor.frames, poses[different(actor.searcher.body, poses, values, NUM_LAST)])
 
 
