@@ -184,31 +184,32 @@ class ClipSearch:
 def best_guess(search: ClipSearch, picture: Path | None = None) -> Guess:
     """The guess of the first of some frames in which tracking can begin; else the likeliest, which is said and drawn.
 
-    `picture` is where it is drawn; None: in the working folder.
+    `picture` is where it is drawn; None: it is not, unless nobody is there, and then in the working folder.
 
     Raises:
         InputError: the frames show nothing like an actor, or fewer people than actors.
     """
-    guesses: list[Guess] = []
+    guesses, names = list[Guess](), [body.name for body in search.bodies]
     for _, frame in zip(range(MOST_TRIED), search.candidates(), strict=False):
         with alive(f"searching for the first pose in frame {frame}") as work:
             guesses += search.guesses(frame, partial(setattr, work, "share"))
-        say_guess(search.bodies, max(guesses, key=lambda guess: guess.confidence))
-        if guesses[-1].sure or guesses[0].sure:
+        say_guess(names, max(guesses, key=lambda guess: guess.confidence))
+        if any(guess.sure for guess in guesses):
             break
     best = likeliest(guesses)
     if best.sure:
         return best
     recording, frames = search.clip.recording, ", ".join(map(str, sorted({guess.frame for guess in guesses})))
-    path = _write_picture(search, best, picture or Path(f"{recording.name}_first_pose.png"))
-    if (problem := nobody_there(guesses, [body.name for body in search.bodies])) is not None:
+    if (problem := nobody_there(guesses, names)) is not None:
+        path = _write_picture(search, best, picture or Path(f"{recording.name}_first_pose.png"))
         raise InputError(
-            f"{recording.path}: {problem} in frames {frames}; begin with another frame (start=), or write "
-            f"{_remedy(search.clip)}; the best guess is drawn in {path}"
+            f"{recording.path}: {problem} in frames {frames}: leave out who is not there (actor=), begin with another "
+            f"frame (start=), or write {_remedy(search.clip)}; the best guess is drawn in {path}"
         )
+    look = "" if picture is None else f"; look at {_write_picture(search, best, picture)}"
     say(
         f"no pose is sure in frames {frames}: tracking begins with the likeliest (frame {best.frame}, "
-        f"{100.0 * best.confidence:.0f} %); look at {path}"
+        f"{100.0 * best.confidence:.0f} %){look}"
     )
     return best
 
@@ -229,19 +230,16 @@ def nobody_there(guesses: Sequence[Guess], names: Sequence[str]) -> str | None:
     if not missing:
         return None
     others = [name for name in names if name not in missing]
-    return (
-        f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} not seen beside {' and '.join(others)} "
-        f"(leave out who is not there, with fewer files in actor=)"
-    )
+    return f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} not seen beside {' and '.join(others)}"
 
 
-def say_guess(bodies: Sequence[Body], guess: Guess) -> None:
+def say_guess(names: Sequence[str], guess: Guess) -> None:
     """Tell how sure the poses of a guess are."""
-    for body, pose in zip(bodies, guess.poses, strict=True):
+    for name, pose in zip(names, guess.poses, strict=True):
         limbs = pose.unsure_limbs if pose.trunk_sure else []
         but = f" but for {', '.join(limbs)}" if limbs else ""
         say(
-            f"pose of {body.name} in frame {guess.frame}: {'sure' if pose.trunk_sure else 'not sure'}{but} "
+            f"pose of {name} in frame {guess.frame}: {'sure' if pose.trunk_sure else 'not sure'}{but} "
             f"({100.0 * pose.trunk:.0f} %)"
         )
 

@@ -82,7 +82,7 @@ class PoseRequest:
     terms: Sequence[Term] = ()
     """Of the energy, beside those of the settings."""
     picture: Path | None = None
-    """Where the best guess is drawn if none is sure; None: into the working folder."""
+    """Where the best guess is drawn if none is sure; None: into the working folder, where it is refused."""
 
     @property
     def bodies(self) -> list[Body]:
