@@ -114,7 +114,9 @@ def judged(
     def evidence(blobs: Bool[np.ndarray, "blob"]) -> PoseEvidence:
         others = apart[:, blobs].mean(axis=1) >= DIFFERENT
         margins = (_margin(energies, best, others) for energies in (paths.energies[0], paths.energies.mean(axis=0)))
-        return _evidence(seen, float(paths.energies[0, best]), *(min(margin, exchange) for margin in margins), known)
+        return _evidence(
+            seen, float(paths.energies[0, best]), *(min(margin, exchange) for margin in margins), known, share
+        )
 
     whole = evidence(np.ones(body.num_blobs, bool))
     likely = pose_confidence(whole)
@@ -135,7 +137,9 @@ def _margin(energies: Float[np.ndarray, "hypothesis"], best: int, others: Bool[n
     return float(behind / max(abs(energies[best]), 1e-6))
 
 
-def _evidence(seen: CellEvidence, energy: float, margin: float, later_margin: float, known: float) -> PoseEvidence:
+def _evidence(
+    seen: CellEvidence, energy: float, margin: float, later_margin: float, known: float, share: float
+) -> PoseEvidence:
     visible = max(float(np.mean(seen.visible)), LEAST_SEEN)
     shown = np.isfinite(np.asarray(seen.foreground))
     mean = lambda values: float(np.mean(np.asarray(values)[shown])) if shown.any() else 0.0
@@ -149,6 +153,7 @@ def _evidence(seen: CellEvidence, energy: float, margin: float, later_margin: fl
         gain=mean(seen.gain),
         worst_limb=float(np.min(seen.limbs, initial=1.0)),
         known=known,
+        share=share,
     )
 
 
@@ -158,10 +163,11 @@ def agreements(body: Body, first: Path, second: FoundPose, num_actors: int) -> t
     before, after, found = means_of(body, poses)
     apart, moved = np.linalg.norm(after - found, axis=-1), float(np.linalg.norm(before - after, axis=-1).mean())
     sides = float(sides_apart(body, poses).min())
+    share = min(first.found.share, second.share)
     least = [-np.inf if pose.evidence is None else pose.evidence.worst_limb for pose in (first.found, second)]
 
     def over(blobs: Bool[np.ndarray, "blob"], worst_limb: float) -> Agreement:
-        return Agreement(float(apart[blobs].mean()), moved, sides, worst_limb, num_actors)
+        return Agreement(float(apart[blobs].mean()), moved, sides, worst_limb, share, num_actors)
 
     of_limbs = zip(limb_names(body), limb_blobs(body), strict=True)
     # A limb elsewhere makes no trunk unsure; where both searches have it in one place, it is there.

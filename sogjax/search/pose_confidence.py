@@ -33,6 +33,8 @@ class PoseEvidence:
     """What the limb explains that explains least, for its size, as a part of what the body does."""
     known: float
     """Part of the pictures whose background is known."""
+    share: float = 1.0
+    """What is left of the energy beside the other actors, as a part of the most that is found where they are not."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,8 @@ class Agreement:
     sides: float
     """How far the limbs of a pair are from each other, as `sides_apart` has it, the least of both frames."""
     worst_limb: float
+    """As in `PoseEvidence`, the least of both frames."""
+    share: float = 1.0
     """As in `PoseEvidence`, the least of both frames."""
     num_actors: int = 1
     """How many were searched for together."""
@@ -78,6 +82,7 @@ def agreed_confidence(agreement: Agreement) -> float:
         (agreement.moved - bounds.least_moved) / bounds.moved_scale,
         (agreement.sides - bounds.least_sides) / bounds.sides_scale,
         (agreement.worst_limb - bounds.least_limb) / bounds.limb_scale,
+        (agreement.share - bounds.least_share) / bounds.share_scale,
     )
     return _likely(excesses)
 
