@@ -13,6 +13,7 @@ from sogjax.run import clip_search
 from sogjax.run.clip_search import ClipSearch, Guess, best_guess, likeliest, nobody_there
 from sogjax.run.initial_pose import InitialPose
 from sogjax.search.found_pose import TRUNK, FoundPose
+from sogjax.search.pose_search import unreported
 
 
 def found(trunk, energy=1.5, share=1.0, **limbs):
@@ -23,6 +24,9 @@ def found(trunk, energy=1.5, share=1.0, **limbs):
 
 class Searched(ClipSearch):
     """A search that finds what is given, by frame."""
+
+    results: dict
+    asked: list
 
     def __init__(self, results, names=("anna",)):
         named = lambda name: SimpleNamespace(name=name, path="clip", fps=30.0)
@@ -37,7 +41,7 @@ class Searched(ClipSearch):
     def candidates(self):
         return iter(self.results)
 
-    def guesses(self, frame, report):
+    def guesses(self, frame, report=unreported):
         self.asked.append(frame)
         return [Guess(frame, self.results[frame])]
 
@@ -89,10 +93,13 @@ def test_the_confidence_is_kept_with_the_pose(tmp_path):
     pose = InitialPose(7, np.arange(3.0), "search", np.array([0.64, 1.0]))
     pose.save(tmp_path)
     kept = InitialPose.load(tmp_path)
+    assert kept is not None
     np.testing.assert_array_equal(kept.confidence, pose.confidence)
     assert kept.frame == 7
     replace(pose, confidence=None).save(tmp_path)
-    assert InitialPose.load(tmp_path).confidence is None
+    again = InitialPose.load(tmp_path)
+    assert again is not None
+    assert again.confidence is None
 
 
 def test_a_doubtful_begin_is_told_only_where_the_motion_is_doubtful_too():

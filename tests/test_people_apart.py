@@ -194,6 +194,7 @@ def test_a_frame_shows_several_actors_each_where_its_rough_pose_is():
         assert [each.actor for each in told] == [first, second]
         _, pictures = seen_boxes(clip[0])
         blue, red = told
+        assert blue.within
         for name, region in blue.within.items():
             picture = pictures[RIG.names.index(name)]
             assert (picture[region] == BLUE).all(axis=-1).sum() > 20 * (picture[region] == RED).all(axis=-1).sum()

@@ -103,17 +103,15 @@ def _bodies(hull: Bool[np.ndarray, "x y z"], spacing: float, axis: int) -> list[
 
 
 def _pieces_joined(parts: list[Bool[np.ndarray, "x y z"]], spacing: float) -> list[Bool[np.ndarray, "x y z"]]:
-    """The parts, largest first, each with its pieces."""
-    whole: list[Bool[np.ndarray, "x y z"]] = []
-    for part in sorted(parts, key=lambda part: -int(part.sum())):
-        for k, body in enumerate(whole):
-            away: Any = distance_transform_edt(~body)
-            if part.sum() < PIECE * body.sum() and part.any() and away[part].min() * spacing <= NEAR:
-                whole[k] = body | part
+    """The parts that are no pieces of another one, in their order, with their pieces."""
+    volumes, bodies = [int(part.sum()) for part in parts], dict(enumerate(parts))
+    for k in np.argsort(volumes).tolist():
+        for j in [j for j in bodies if volumes[k] < PIECE * volumes[j]]:
+            away: Any = distance_transform_edt(~parts[j])
+            if away[parts[k]].min() * spacing <= NEAR:
+                bodies[j] = bodies[j] | bodies.pop(k)
                 break
-        else:
-            whole.append(part)
-    return whole
+    return list(bodies.values())
 
 
 def _regions(silhouettes: Sequence[Mask], pixels: VoxelPixels) -> list[Mask | None]:
@@ -126,7 +124,7 @@ def _regions(silhouettes: Sequence[Mask], pixels: VoxelPixels) -> list[Mask | No
         nearest = np.min(others, axis=0) if others else np.full(mask.shape, np.inf)
         covered = float((mask & (nearest <= 1.0)).sum() / max(mask.sum(), 1))
         shown = mask.any() and covered <= HIDDEN
-        regions.append((distance <= width) & (distance <= nearest) if shown else None)
+        regions.append((distance <= width) & (distance < nearest) if shown else None)
     return regions
 
 

@@ -79,7 +79,7 @@ def _told_apart(clip: Clip, learnt: tuple[CameraBackground, ...] | None) -> Reco
     """
     recording = clip.recording
     counts = Counter(example.frame for example in recording.example_poses if example.frame is not None)
-    shared = [example for example in recording.example_poses if counts[example.frame] > 1]
+    shared = [example for example in recording.example_poses if example.frame is not None and counts[example.frame] > 1]
     if not shared or learnt is None:
         return recording
     frames = sorted({example.frame for example in shared if example.frame is not None})
@@ -87,10 +87,10 @@ def _told_apart(clip: Clip, learnt: tuple[CameraBackground, ...] | None) -> Reco
     if isinstance(told, str):
         raise InputError(f"{recording.path}: example_poses: {told}")
     if all(example.initial_pose is None for example in shared):
+        names = " and who is ".join(dict.fromkeys(str(each.actor) for each in told))
         say(
-            f"who is {' and who is '.join(dict.fromkeys(str(each.actor) for each in told))} is not known: the names are "
-            "given by chance; if they are exchanged, exchange them, or give an entry `initial_pose: {position: [X, Y, "
-            "Z]}`"
+            f"who is {names} is not known: the names are given by chance; if they are exchanged, exchange them in the "
+            "list, or give an entry `initial_pose: {position: [X, Y, Z]}`"
         )
     with_places = iter(told)
     examples = tuple(next(with_places) if each in shared else each for each in recording.example_poses)

@@ -163,6 +163,7 @@ def _followed(actors: Sequence[Sought], chosen: Sequence[int]) -> tuple[list[Fol
     for number in range(len(actors[0].frames)):
         expected = [each[-1] if len(each) < 3 else 2.0 * each[-1] - each[-2] for each in poses]
         expected = [each.astype(np.float32) for each in expected]
+        climbed: list[Hypotheses] = []
         for _ in range(SWEEPS if number == 0 and len(actors) > 1 else 1):
             at = [each[row] for each, row in zip(expected, best, strict=True)]
             climbed = [_climbed_beside(actors, k, number, tried, at) for k, tried in enumerate(expected)]
