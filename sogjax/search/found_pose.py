@@ -113,10 +113,9 @@ def judged(
 
     def evidence(blobs: Bool[np.ndarray, "blob"]) -> PoseEvidence:
         others = apart[:, blobs].mean(axis=1) >= DIFFERENT
-        margins = (_margin(energies, best, others) for energies in (paths.energies[0], paths.energies.mean(axis=0)))
-        return _evidence(
-            seen, float(paths.energies[0, best]), *(min(margin, exchange) for margin in margins), known, share
-        )
+        behind = lambda energies: min(_margin(energies, best, others), exchange)
+        margin, later = behind(paths.energies[0]), behind(paths.energies.mean(axis=0))
+        return _evidence(seen, float(paths.energies[0, best]), margin, later, known, share)
 
     whole = evidence(np.ones(body.num_blobs, bool))
     likely = pose_confidence(whole)
