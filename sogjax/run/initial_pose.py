@@ -22,7 +22,6 @@ from sogjax.run.keypoint_start import keypoint_starts
 from sogjax.run.recordings import upright
 from sogjax.run.terminal import say
 from sogjax.search.found_pose import FoundPose
-from sogjax.search.pose_confidence import SURE
 from sogjax.search.rough_pose import check_rough_pose, rough_pose
 from sogjax.settings.run import TrackConfig
 
@@ -42,11 +41,6 @@ class InitialPose:
     """Which of the sources found it."""
     confidence: Float[np.ndarray, "actor"] | None = None
     """How likely the trunk of each actor is right, 0 to 1, as the search says; None: it was not searched for."""
-
-    @property
-    def is_doubtful(self) -> bool:
-        """Whether it is only the likeliest of what was found."""
-        return self.confidence is not None and bool(self.confidence.min() < SURE)
 
     @classmethod
     def of_actors(cls, frame: int, poses: Sequence[Float[np.ndarray | Array, "_dof"]], source: str) -> "InitialPose":
