@@ -9,7 +9,9 @@ from rig_cases import opencv_pixels, recording_of, ring_rig
 
 from sogjax.actor.frame_choice import subject_cubes
 from sogjax.actor.people import PersonSeen, matched, people_apart, runs_by_place, told_apart, unlike
-from sogjax.run.example_people import examples_of_masks
+from sogjax.io.example_poses import ExamplePose
+from sogjax.io.pose_description import PoseDescription
+from sogjax.run.example_people import examples_of_masks, told_by_name, too_few_apart
 from sogjax.run.sampled_masks import SampledMasks
 from sogjax.scene.cells import CellGrid
 
@@ -72,6 +74,18 @@ def test_shadows_on_the_floor_join_nobody():
 def test_a_gap_at_the_belt_makes_no_two_people():
     halves = [box((0.0, 0.0), 0.0, 0.9), box((0.0, 0.0), 1.0, 1.7)]
     assert len(people_of([(half, RED) for half in halves])) == 1
+
+
+def test_a_forearm_beside_somebody_is_a_piece_of_him():
+    forearm = np.array([[x, y, z] for x in (0.35, 0.6) for y in (-0.06, 0.06) for z in (0.4, 1.2)])
+    assert len(people_of([(box((0.0, 0.0)), RED), (forearm, RED)])) == 1
+
+
+def test_advice_is_neither_followed_already_nor_refused_in_turn():
+    assert "empty scene" in too_few_apart(2, [0, 0])
+    assert "empty scene" not in too_few_apart(2, [0, 0], plates=True)
+    assert "give actors=3" in too_few_apart(2, [3, 3, 3, 2])
+    assert "give actors" not in too_few_apart(2, [3, 3, 1, 1, 2])
 
 
 def moment(frame, *people):
@@ -164,3 +178,32 @@ def test_people_in_the_same_clothes_are_refused_where_places_do_not_tell():
     problem = examples_of_masks(replace(recording, fps=0.5), seen, 2, 3)
     assert isinstance(problem, str)
     assert "who is who" in problem
+
+
+def listed(frame, actor, position=None):
+    pose = None if position is None else PoseDescription(pose=None, position=position, heading=None, landmarks={})
+    return ExamplePose(f"frame_{frame}", actor, {}, {}, pose, frame)
+
+
+def test_a_frame_shows_several_actors_each_where_its_rough_pose_is():
+    clip = [[(box((-0.7, 0.0)), RED), (box((0.7, 0.0)), BLUE)]]
+    for first, second in (("man", "woman"), ("woman", "man")):
+        entries = [listed(0, first, (0.6, 0.1, 0.9)), listed(0, second)]
+        told = told_by_name(recording_of(RIG, 1), sampled(clip), entries)
+        assert not isinstance(told, str)
+        assert [each.actor for each in told] == [first, second]
+        _, pictures = seen_boxes(clip[0])
+        blue, red = told
+        assert blue.within
+        for name, region in blue.within.items():
+            picture = pictures[RIG.names.index(name)]
+            assert (picture[region] == BLUE).all(axis=-1).sum() > 20 * (picture[region] == RED).all(axis=-1).sum()
+        assert red.within
+
+
+def test_a_frame_that_shows_other_numbers_than_it_is_listed_for_is_refused():
+    clip = [[(box((-0.7, 0.0)), RED)]]
+    problem = told_by_name(recording_of(RIG, 1), sampled(clip), [listed(0, "man"), listed(0, "woman")])
+    assert isinstance(problem, str)
+    assert "frame 0 is listed for 2 actors" in problem
+    assert "1 person" in problem

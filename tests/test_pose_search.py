@@ -15,7 +15,9 @@ from sogjax.model.limbs import limbs, with_other_limb
 from sogjax.scene.cells import CellGrid, stack_cells
 from sogjax.scene.quadtree import Candidates
 from sogjax.scene.visual_hull import nearest_point
-from sogjax.search.found_pose import FoundPose, search_pose, search_poses
+from sogjax.search.combination import Optima, best_combination
+from sogjax.search.found_pose import TRUNK, FoundPose
+from sogjax.search.joint_search import search_poses
 from sogjax.search.mirrored import look_alikes, other_side, sides_apart
 from sogjax.search.placed_body import turns_with_vertical
 from sogjax.search.pose_confidence import SURE, Agreement, PoseEvidence, agreed_confidence, pose_confidence
@@ -66,7 +68,7 @@ def dog():
 def test_a_dog_is_found_without_a_hint(dog):
     truth = moved(dog, standing(dog, 1.1, (0.3, -0.2)), {"root_yaw": 2.1})
     search = searcher(dog)
-    found = search_pose(search, [frames_of(draw(dog, truth, RIG))(search, 0)]).found
+    found = search_poses([search], frames_of(draw(dog, truth, RIG)), 1)[0].found
     assert off(dog, found.pose, truth) < 0.05
     assert found.energy > 0.0
     assert 0.0 < found.margin <= 1.0
@@ -79,7 +81,7 @@ def test_two_dogs_of_other_colours_are_both_found(dog):
     second = moved(dog, standing(dog, 1.1, (0.1, -0.45)), {"root_yaw": -2.6})
     make = frames_of(over(draw(dog, first, RIG), draw(other, second, RIG)))
     shares = []
-    found = search_poses([dog, other], [searcher(dog), searcher(other)], make, 1, shares.append)
+    found = [path.found for path in search_poses([searcher(dog), searcher(other)], make, 1, shares.append)]
     assert shares == sorted(shares)
     assert 0.0 < shares[0] < shares[-1] <= 1.0
     assert off(dog, found[0].pose, first) < 0.06
@@ -134,8 +136,48 @@ def test_two_searches_that_agree_are_sure_unless_there_is_a_reason_why_both_may_
         agreed_confidence(replace(good, apart=0.04)) > SURE > agreed_confidence(replace(good, apart=0.04, num_actors=2))
     )
     unsure = FoundPose(np.zeros(3), 1.0, 0.0, False, 0.2)
-    assert unsure.with_agreement(good).sure
-    assert unsure.with_agreement(replace(good, apart=0.5)).confidence == 0.2
+    assert unsure.with_agreements(good, {}).sure
+    assert unsure.with_agreements(replace(good, apart=0.5), {}).confidence == 0.2
+
+
+def test_a_limb_that_is_not_sure_leaves_the_trunk_sure():
+    good = Agreement(apart=0.02, moved=0.3, sides=1.1, worst_limb=0.4)
+    far = replace(good, apart=0.5)
+    unsure = FoundPose(np.zeros(3), 1.0, 0.0, False, 0.2)
+    found = unsure.with_agreements(far, {TRUNK: good, "left arm": far, "right arm": good})
+    assert not found.sure
+    assert found.trunk_sure
+    assert found.unsure_limbs == ["left arm"]
+    assert not unsure.trunk_sure, "a pose without parts is as sure as the whole"
+
+
+def two_in_one_place():
+    """Either actor fits the place of the first best; each place explains one body only."""
+    inside = np.array([[True, False], [False, True]])
+    given = np.array([[0.1, 2.0], [1.6, 0.1]])
+    first = Optima(np.array([2.0, 1.6]), {1: given}, {1: inside})
+    second = Optima(np.array([1.9, 1.8]), {0: np.array([[0.1, 1.9], [1.8, 0.1]])}, {0: inside})
+    return [first, second]
+
+
+def test_two_actors_take_the_places_that_explain_most_together():
+    found = best_combination(two_in_one_place())
+    assert found.chosen == (0, 1)
+    assert found.energy == pytest.approx(2.0 + 1.8)
+    assert found.apart
+    assert found.shares == pytest.approx((1.0, 1.8 / 1.9))
+    # Exchanged they would explain 1.6 + 1.9.
+    assert found.exchange == pytest.approx(((3.8 - 3.5) / 3.8, (3.8 - 3.5) / 3.8))
+
+
+def test_two_actors_are_in_one_place_only_if_there_is_no_other():
+    crowded = [
+        Optima(np.array([2.0]), {1: np.array([[0.1]])}, {1: np.array([[True]])}),
+        Optima(np.array([1.9]), {0: np.array([[0.1]])}, {0: np.array([[True]])}),
+    ]
+    found = best_combination(crowded)
+    assert not found.apart
+    assert found.shares == pytest.approx((0.05, 0.1 / 1.9))
 
 
 def test_crossed_legs_are_nearer_to_each_other_than_in_any_named_pose():

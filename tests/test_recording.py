@@ -161,6 +161,8 @@ def test_frames_of_the_videos_are_example_poses(folder):
     [
         ("[0]", ["no frame 0", "1 to"]),
         ("[1, {frame: 1}]", ["example_poses[1]", "once"]),
+        ("[{frame: 1, actor: ann}, {frame: 1}]", ["example_poses[1].frame", "once"]),
+        ("[{frame: 1, actor: ann}, {frame: 1, actor: ann}]", ["example_poses[1].frame", "once"]),
         ("[1.5]", ["example_poses[0]", "frame"]),
         ("[{frame: tpose}]", ["example_poses[0].frame", "'tpose'"]),
         ("[{frame: 1, name: tpose}]", ["example_poses[0].name", "unknown"]),

@@ -10,7 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
-from scipy.ndimage import binary_dilation, gaussian_filter, label
+from scipy.ndimage import binary_dilation, distance_transform_edt, gaussian_filter, label
 from scipy.optimize import linear_sum_assignment
 
 from sogjax.actor.frame_choice import SMALLEST_BODY, Mask, widened
@@ -21,6 +21,9 @@ GAP = 0.25
 """Vertical gap between the parts of one body that is closed, metres: a belt in the background's colours."""
 LEAST_HEIGHT = 0.4
 """Height of a part of the hull, as a share of the tallest one's, from which on it may be somebody else."""
+PIECE, NEAR = 0.35, 0.35
+"""A part of less than this share of another one's volume, and no farther from it than this (metres), is a piece of it:
+a forearm or a foot whose joint the background's colours hide. People who stand so near each other are seldom apart."""
 HIDDEN = 0.1
 """Share of a silhouette that another one covers, above which a camera's mask is not used."""
 COLOR_BINS = 6
@@ -92,11 +95,23 @@ def _bodies(hull: Bool[np.ndarray, "x y z"], spacing: float, axis: int) -> list[
     volumes = [int(part.sum()) for part in parts]
     heights = [int(np.ptp(np.nonzero(part)[axis])) if part.any() else 0 for part in parts]
     large = [
-        part.ravel()
+        part
         for part, volume, height in zip(parts, volumes, heights, strict=True)
         if volume > SMALLEST_BODY * max(volumes) and height > LEAST_HEIGHT * max(heights)
     ]
-    return large
+    return [body.ravel() for body in _pieces_joined(large, spacing)]
+
+
+def _pieces_joined(parts: list[Bool[np.ndarray, "x y z"]], spacing: float) -> list[Bool[np.ndarray, "x y z"]]:
+    """The parts that are no pieces of another one, in their order, with their pieces."""
+    volumes, bodies = [int(part.sum()) for part in parts], dict(enumerate(parts))
+    for k in np.argsort(volumes).tolist():
+        for j in [j for j in bodies if volumes[k] < PIECE * volumes[j]]:
+            away: Any = distance_transform_edt(~parts[j])
+            if away[parts[k]].min() * spacing <= NEAR:
+                bodies[j] = bodies[j] | bodies.pop(k)
+                break
+    return list(bodies.values())
 
 
 def _regions(silhouettes: Sequence[Mask], pixels: VoxelPixels) -> list[Mask | None]:
@@ -109,7 +124,7 @@ def _regions(silhouettes: Sequence[Mask], pixels: VoxelPixels) -> list[Mask | No
         nearest = np.min(others, axis=0) if others else np.full(mask.shape, np.inf)
         covered = float((mask & (nearest <= 1.0)).sum() / max(mask.sum(), 1))
         shown = mask.any() and covered <= HIDDEN
-        regions.append((distance <= width) & (distance <= nearest) if shown else None)
+        regions.append((distance <= width) & (distance < nearest) if shown else None)
     return regions
 
 

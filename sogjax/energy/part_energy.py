@@ -126,7 +126,7 @@ def left_for(views: Views, terms: Terms, blobs: Sog, part: PartIndex) -> Views:
     """What the rest of a body (its blobs in the world) leaves to a part, in views in which all pairs are compared."""
     seen = jax.vmap(project, in_axes=(0, None))(views.cameras, part.rest_of(blobs))
     exponent = similarity_among(terms).exponent
-    explained = lambda *each: jnp.sum(overlaps(*each, exponent), axis=0)
+    explained = lambda image, seen, similar: jnp.sum(overlaps(image, seen, similar, exponent), axis=0)
     caps = jnp.maximum(views.unexplained - jax.vmap(explained)(views.images, seen, views.color_similarities), 0.0)
     similar = jnp.where(part.blob_mask[None, :, None], views.color_similarities[:, part.blobs], 0.0)
     size = min(MOST_IMAGE_BLOBS, caps.shape[1])

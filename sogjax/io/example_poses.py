@@ -32,12 +32,18 @@ def read_examples(entry: Entry) -> tuple[ExampleSettings, ...]:
     examples: list[ExampleSettings] = []
     for item in entry.items():
         example = _example(item)
-        if example.name in [other.name for other in examples]:
+        if any(_repeats(example, other) for other in examples):
             key = "name" if example.frame is None else "frame"
             repeated = item.mapping()[key] if isinstance(item.value, dict) else item
-            raise repeated.error("each folder and each frame once")
+            raise repeated.error("each folder once, and each frame once for an actor")
         examples.append(example)
     return tuple(examples)
+
+
+def _repeats(one: ExampleSettings, other: ExampleSettings) -> bool:
+    """Whether two entries show the same; a frame may show several actors, each by its name."""
+    several = one.frame is not None and None not in (one.actor, other.actor) and one.actor != other.actor
+    return one.name == other.name and not several
 
 
 def _example(entry: Entry) -> ExampleSettings:

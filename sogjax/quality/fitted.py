@@ -87,6 +87,7 @@ class PoseEvidenceBounds:
     worst_foreground: Bound
     gain: Bound
     not_background: Bound
+    share: Bound
 
 
 @dataclass(frozen=True)
@@ -107,6 +108,9 @@ class PoseAgreementBounds:
     least_limb: float
     """A limb that explains less than this is elsewhere."""
     limb_scale: float
+    least_share: float
+    """An actor of whom less is left beside the others may be anywhere in the rest."""
+    share_scale: float
 
 
 @dataclass(frozen=True)

@@ -78,21 +78,27 @@ def verdicts(
     motions: Mapping[str, Motion],
     expected: Mapping[str, float],
     limits: Mapping[str, Mapping[str, Limits]] | None = None,
+    begun: Mapping[str, str] | None = None,
 ) -> dict[str, Verdict]:
     """Of the actors of a run.
 
     `expected` is what actors explain in their example poses, where that is known; `limits` are those of their bodies
-    (`limits_of`).
+    (`limits_of`); `begun` says of actors that their initial pose was not sure, which counts where there is more.
     """
-    limits = limits or {}
+    limits, begun = limits or {}, begun or {}
     return {
-        name: _verdict(name, motion, expected.get(name), _inside(name, motions), limits.get(name, {}))
+        name: _verdict(name, motion, expected.get(name), _inside(name, motions), limits.get(name, {}), begun.get(name))
         for name, motion in motions.items()
     }
 
 
 def _verdict(
-    name: str, motion: Motion, expected: float | None, inside: Sequence[str], limits: Mapping[str, Limits]
+    name: str,
+    motion: Motion,
+    expected: float | None,
+    inside: Sequence[str],
+    limits: Mapping[str, Limits],
+    begun: str | None,
 ) -> Verdict:
     explained = None if motion.explained is None else float(np.median(motion.explained))
     overlap = _overlaps(motion)
@@ -100,6 +106,8 @@ def _verdict(
     doubtful = doubtful_limbs(motion)
     parts = [*_limbs(doubtful), *_bent(motion, limits)]
     look = [] if wrong else [*_bad_overlaps(overlap), *_bad_stretches(motion), *parts]
+    if begun is not None and (wrong or look):
+        look.append(begun)
     return Verdict(
         actor=name,
         wrong=bool(wrong),

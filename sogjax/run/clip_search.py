@@ -1,12 +1,11 @@
 """Searching the frames of a clip for the poses of its actors, without any hint."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
 
 from sogjax.energy.term import Term
 from sogjax.errors import InputError
@@ -16,24 +15,30 @@ from sogjax.io.video import read_frames
 from sogjax.model.body import Body
 from sogjax.run import build
 from sogjax.run.background import Background
-from sogjax.run.clip import Clip
+from sogjax.run.clip import Clip, spread_frames
 from sogjax.run.terminal import alive, say
-from sogjax.search.found_pose import FoundPose, followed, search_poses
-from sogjax.search.mirrored import sides_apart
-from sogjax.search.placed_body import means_of
-from sogjax.search.pose_confidence import Agreement
-from sogjax.search.pose_search import Optimum, PoseSearch, Report, unreported
+from sogjax.search import found_pose
+from sogjax.search.found_pose import FoundPose, agreements
+from sogjax.search.joint_search import search_poses
+from sogjax.search.places import places
+from sogjax.search.pose_search import PoseSearch, Report, unreported
 from sogjax.search.seen_frame import SeenFrame
 from sogjax.settings.run import TrackConfig
 from sogjax.tracking.frame import FrameInput
 from sogjax.view.overlay import overlay_frame
 
 NUM_FOLLOWED, SECONDS = 6, 0.07
-"""Frames through which hypotheses are followed, and the time between them."""
-TRIES = (0.0, 0.4, 0.8, 1.6, 3.0, 6.0)
-"""Seconds after the first frame at which a search is tried again."""
-AGREEING = 0.4
-"""Seconds to the frame in which a search that is not sure by itself is to find the same."""
+"""Frames through which hypotheses are followed, and the time between them; in the last one, a search that is not sure
+by itself is to find the same."""
+MOST_TRIED = 2
+"""Frames that are searched, each with the one that is to agree with it, before the likeliest is taken."""
+NUM_GLANCED = 6
+"""Frames spread over the clip, of which that is searched next in which the actors are seen best."""
+ROOM = 1.0
+"""Metres between two actors from which on neither is in the other's way."""
+NOTHING_LEFT = 0.1
+"""An actor is not there if this part is left of what it explains, once the others are taken away. Of somebody who is
+hidden by others half is left, of a woman half of whom had become background a fourth; of nobody 0.02 at most."""
 
 
 @dataclass(frozen=True)
@@ -45,13 +50,13 @@ class Guess:
 
     @property
     def sure(self) -> bool:
-        """Whether all of them are."""
-        return all(pose.sure for pose in self.poses)
+        """Whether tracking can begin there: the trunks of all actors are sure, and who is who."""
+        return all(pose.trunk_sure for pose in self.poses)
 
     @property
     def confidence(self) -> float:
-        """That of the least sure one."""
-        return min(pose.confidence for pose in self.poses)
+        """That of the least sure trunk."""
+        return min(pose.trunk for pose in self.poses)
 
 
 @dataclass(frozen=True)
@@ -75,10 +80,10 @@ class ClipSearch:
     @cached_property
     def _searchers(self) -> list[PoseSearch]:
         terms = build.energy_terms(self.config.energy, self.terms)
-        return [PoseSearch.of_body(body, terms, self.clip.recording.up) for body in self.bodies]
+        return [PoseSearch.of_body(body, terms, self.clip.recording.up, len(self.bodies)) for body in self.bodies]
 
     @cached_property
-    def _searched(self) -> dict[int, list[FoundPose]]:
+    def _searched(self) -> dict[int, list[found_pose.Path]]:
         """What was found, by frame."""
         return {}
 
@@ -90,41 +95,30 @@ class ClipSearch:
         Raises:
             InputError: no camera has the frame.
         """
-        found = Guess(frame, self.poses(frame, lambda share: report(0.5 * share)))
-        other = self._agreeing_frame(frame)
-        if found.sure or other is None or not all(pose.energy > 0.0 for pose in found.poses):
-            return found
-        agreements = self._agreements(found, Guess(other, self.poses(other, lambda share: report(0.5 + 0.5 * share))))
-        judged = [pose.with_agreement(each) for pose, each in zip(found.poses, agreements, strict=True)]
-        return Guess(frame, judged)
+        return self.guesses(frame, report)[0]
 
-    def _agreeing_frame(self, frame: int) -> int | None:
-        """The frame some time later, or before, where the clip ends; None: the clip is too short."""
-        step = max(round(AGREEING * self.clip.recording.fps), 1)
-        return next((other for other in (frame + step, frame - step) if other in self.clip.recording.frames), None)
+    def guesses(self, frame: int, report: Report = unreported) -> list[Guess]:
+        """The guess of a frame, and that of the frame whose search was to agree with it, if there was one.
 
-    def _agreements(self, first: Guess, second: Guess) -> list[Agreement]:
-        """Of each actor."""
-        agreements = []
-        followed_there = self.carried(first, second.frame)
-        for body, a, b, there in zip(self.bodies, first.poses, second.poses, followed_there, strict=True):
-            poses = np.stack([a.pose, there, b.pose]).astype(np.float32)
-            before, after, found = means_of(body, poses)
-            distance = lambda p, q: float(np.linalg.norm(p - q, axis=-1).mean())
-            limbs = [-np.inf if pose.evidence is None else pose.evidence.worst_limb for pose in (a, b)]
-            agreements.append(
-                Agreement(
-                    apart=distance(after, found),
-                    moved=distance(before, after),
-                    sides=float(sides_apart(body, poses).min()),
-                    worst_limb=min(limbs),
-                    num_actors=len(self.bodies),
-                )
-            )
-        return agreements
+        Raises:
+            InputError: no camera has the frame.
+        """
+        paths = self.paths(frame, lambda share: report(0.5 * share))
+        found, other = Guess(frame, [path.found for path in paths]), self._followed_frames(frame)[-1]
+        if found.sure or other == frame or not all(pose.energy > 0.0 for pose in found.poses):
+            return [found]
+        second = Guess(other, [path.found for path in self.paths(other, lambda share: report(0.5 + 0.5 * share))])
+        agreed = [
+            agreements(body, path, there, len(self.bodies))
+            for body, path, there in zip(self.bodies, paths, second.poses, strict=True)
+        ]
+        return [
+            replace(guess, poses=[pose.with_agreements(*each) for pose, each in zip(guess.poses, agreed, strict=True)])
+            for guess in (found, second)
+        ]
 
-    def poses(self, frame: int, report: Report = unreported) -> list[FoundPose]:
-        """The best poses of all actors in a frame, by what is seen there.
+    def paths(self, frame: int, report: Report = unreported) -> list[found_pose.Path]:
+        """The best poses of all actors in a frame and those that come next, by what is seen there.
 
         Raises:
             InputError: no camera has the frame.
@@ -133,24 +127,29 @@ class ClipSearch:
             self._searched[frame] = self._search(frame, report)
         return self._searched[frame]
 
-    def _search(self, frame: int, report: Report) -> list[FoundPose]:
+    def _search(self, frame: int, report: Report) -> list[found_pose.Path]:
         numbers = self._followed_frames(frame)
         frames = [*self.clip.frames(numbers.start, numbers.stop, numbers.step)]
         make = lambda searcher, k: self._seen(searcher, frames[k])
-        return search_poses(self.bodies, self._searchers, make, len(frames), report)
+        return search_poses(self._searchers, make, len(frames), report)
 
-    def carried(self, guess: Guess, frame: int) -> list[Float[np.ndarray, "dof"]]:
-        """The poses of a guess, followed to another frame."""
-        poses = [np.asarray(found.pose) for found in guess.poses]
-        if frame == guess.frame:
-            return poses
-        step = 1 if frame > guess.frame else -1
-        frames = [*self.clip.frames(guess.frame, frame + step, step)]
-        ends = []
-        for searcher, pose in zip(self._searchers, poses, strict=True):
-            seen = (self._seen(searcher, each) for each in frames)
-            ends.append(followed(searcher, [Optimum(pose, 0.0)], seen).poses[-1, 0])
-        return ends
+    def candidates(self) -> Iterator[int]:
+        """The frames to search until one is clear: the first, then others in which the actors are seen best."""
+        numbers = self.clip.numbers
+        yield numbers[0]
+        others = [frame for frame in spread_frames(numbers, NUM_GLANCED + 1) if frame not in self._searched]
+        scores = {frame: self.clearness(frame) for frame in others}
+        yield from sorted(others, key=lambda frame: (-scores[frame], frame))
+
+    def clearness(self, frame: int) -> float:
+        """At a glance: how much what is seen looks like the actors, and how far apart they are."""
+        seen = next(iter(self.clip.frames(frame, frame + 1)))
+        best = [places(self._seen(searcher, seen), searcher.up, 1) for searcher in self._searchers]
+        if not all(best):
+            return 0.0
+        centres = np.stack([found[0].centre for found in best])
+        between = np.linalg.norm(centres[:, None] - centres[None], axis=-1) + np.diag(np.full(len(best), np.inf))
+        return min(found[0].score for found in best) * min(float(between.min()) / ROOM, 1.0)
 
     def found_in(self, frame: int) -> list[FoundPose]:
         """The best poses in a frame, sure or not.
@@ -182,43 +181,67 @@ class ClipSearch:
         )
 
 
-def tried_frames(numbers: range, fps: float) -> list[int]:
-    """The frames that are searched until one is clear; `fps` is that of the range."""
-    return [numbers[row] for row in sorted({min(round(seconds * fps), len(numbers) - 1) for seconds in TRIES})]
+def best_guess(search: ClipSearch, picture: Path | None = None) -> Guess:
+    """The guess of the first of some frames in which tracking can begin; else the likeliest, which is said and drawn.
 
-
-def clear_guess(search: ClipSearch, picture: Path | None = None) -> Guess:
-    """The guess of the first of some frames of the clip in which the poses of all actors are sure.
+    `picture` is where it is drawn; None: it is not, unless nobody is there, and then in the working folder.
 
     Raises:
-        InputError: there is none; a picture of the best guess is drawn, into `picture`, or else the working folder.
+        InputError: the frames show nothing like an actor, or fewer people than actors.
     """
-    recording = search.clip.recording
-    guesses: list[Guess] = []
-    for frame in tried_frames(search.clip.numbers, search.clip.fps):
+    guesses, names = list[Guess](), [body.name for body in search.bodies]
+    for _, frame in zip(range(MOST_TRIED), search.candidates(), strict=False):
         with alive(f"searching for the initial pose in frame {frame}") as work:
-            guesses.append(search.guess(frame, partial(setattr, work, "share")))
-        for body, pose in zip(search.bodies, guesses[-1].poses, strict=True):
-            say(
-                f"pose of {body.name} in frame {frame}: {'sure' if pose.sure else 'not sure'} "
-                f"({100.0 * pose.confidence:.0f} %)"
-            )
-        if guesses[-1].sure:
-            return guesses[-1]
-    best = max(guesses, key=lambda guess: guess.confidence)
-    frames = ", ".join(str(guess.frame) for guess in guesses)
-    if all(pose.energy <= 0.0 for pose in best.poses):
-        names = ", ".join(body.name for body in search.bodies)
+            guesses += search.guesses(frame, partial(setattr, work, "share"))
+        say_guess(names, max(guesses, key=lambda guess: guess.confidence))
+        if any(guess.sure for guess in guesses):
+            break
+    best = likeliest(guesses)
+    if best.sure:
+        return best
+    recording, frames = search.clip.recording, ", ".join(map(str, sorted({guess.frame for guess in guesses})))
+    if (problem := nobody_there(guesses, names)) is not None:
+        path = _write_picture(search, best, picture or Path(f"{recording.name}_first_pose.png"))
         raise InputError(
-            f"{recording.path}: nothing like {names} is seen in frame {frames}; write {_remedy(search.clip)}, "
-            "or begin with another frame (start=)"
+            f"{recording.path}: {problem} in frames {frames}: leave out who is not there (actor=), begin with another "
+            f"frame (start=), or write {_remedy(search.clip)}; the best guess is drawn in {path}"
         )
-    path = _write_picture(search, best, picture or Path(f"{recording.name}_first_pose.png"))
-    helpful = "" if search.background.cameras else "; pictures of the empty scene (background/) help most"
-    raise InputError(
-        f"{recording.path}: no pose is sure in frame {frames}: the best guess is drawn in {path}; if it is right, or "
-        f"else as it should be, write {_remedy(search.clip)}{helpful}"
+    look = "" if picture is None else f"; look at {_write_picture(search, best, picture)}"
+    say(
+        f"no pose is sure in frames {frames}: tracking begins with the likeliest (frame {best.frame}, "
+        f"{100.0 * best.confidence:.0f} %){look}"
     )
+    return best
+
+
+def likeliest(guesses: Sequence[Guess]) -> Guess:
+    """That whose least sure trunk is surest, of those in which everybody is seen, if any."""
+    seen = [guess for guess in guesses if all(pose.energy > 0.0 for pose in guess.poses)]
+    return max(seen or guesses, key=lambda guess: guess.confidence)
+
+
+def nobody_there(guesses: Sequence[Guess], names: Sequence[str]) -> str | None:
+    """What is said of actors who are in none of the guesses; None: everybody is in some."""
+    nothing = [name for k, name in enumerate(names) if all(guess.poses[k].energy <= 0.0 for guess in guesses)]
+    if len(nothing) == len(names):
+        return f"nothing like {' or '.join(names)} is seen"
+    gone = [name for k, name in enumerate(names) if all(guess.poses[k].share < NOTHING_LEFT for guess in guesses)]
+    missing = [name for name in names if name in nothing or name in gone]
+    if not missing:
+        return None
+    others = [name for name in names if name not in missing]
+    return f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} not seen beside {' and '.join(others)}"
+
+
+def say_guess(names: Sequence[str], guess: Guess) -> None:
+    """Tell how sure the poses of a guess are."""
+    for name, pose in zip(names, guess.poses, strict=True):
+        limbs = pose.unsure_limbs if pose.trunk_sure else []
+        but = f" but for {', '.join(limbs)}" if limbs else ""
+        say(
+            f"pose of {name} in frame {guess.frame}: {'sure' if pose.trunk_sure else 'not sure'}{but} "
+            f"({100.0 * pose.trunk:.0f} %)"
+        )
 
 
 def _write_picture(search: ClipSearch, guess: Guess, path: Path) -> Path:

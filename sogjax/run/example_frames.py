@@ -1,5 +1,6 @@
 """Example poses from the frames of the videos, where a recording has none."""
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -13,7 +14,15 @@ from sogjax.io.recording import Recording
 from sogjax.model.rotation import axis_vector
 from sogjax.run.background import Background
 from sogjax.run.clip import Clip
-from sogjax.run.example_people import AGREEING, OTHERWISE, num_people_seen, people_examples
+from sogjax.run.example_people import (
+    AGREEING,
+    LIGHT,
+    OTHERWISE,
+    has_plates,
+    num_people_seen,
+    people_examples,
+    told_by_name,
+)
 from sogjax.run.sampled_masks import masks_of_samples
 from sogjax.run.terminal import say
 from sogjax.scene.background import BackgroundImage
@@ -49,7 +58,8 @@ def with_examples(
     recording = clip.recording
     check_actors(recording, actors)
     if recording.example_poses:
-        return recording, background().cameras if _need_background(recording) else None, None
+        learnt = background().cameras if _need_background(recording) else None
+        return _told_apart(clip, learnt), learnt, None
     known = background()
     if known.cameras is None:
         raise InputError(
@@ -59,6 +69,32 @@ def with_examples(
     count = 1 if actors is None else actors
     examples = _person_examples(clip, known.cameras) if count == 1 else _people_examples(clip, known.cameras, count)
     return replace(recording, example_poses=examples), known.cameras, NUM_EXAMPLES
+
+
+def _told_apart(clip: Clip, learnt: tuple[BackgroundImage, ...] | None) -> Recording:
+    """The recording, in whose frames that are listed for several actors it is known where each is.
+
+    Raises:
+        InputError: that cannot be told.
+    """
+    recording = clip.recording
+    counts = Counter(example.frame for example in recording.example_poses if example.frame is not None)
+    shared = [example for example in recording.example_poses if example.frame is not None and counts[example.frame] > 1]
+    if not shared or learnt is None:
+        return recording
+    frames = sorted({example.frame for example in shared if example.frame is not None})
+    told = told_by_name(recording, masks_of_samples(clip, learnt, LIGHT, frames), shared)
+    if isinstance(told, str):
+        raise InputError(f"{recording.path}: example_poses: {told}")
+    if all(example.initial_pose is None for example in shared):
+        names = " and who is ".join(dict.fromkeys(str(each.actor) for each in told))
+        say(
+            f"who is {names} is not known: the names are given by chance; if they are exchanged, exchange them in the "
+            "list, or give an entry `initial_pose: {position: [X, Y, Z]}`"
+        )
+    with_places = iter(told)
+    examples = tuple(next(with_places) if each in shared else each for each in recording.example_poses)
+    return replace(recording, example_poses=examples)
 
 
 def check_actors(recording: Recording, actors: int | None, num_files: int | None = None) -> None:
@@ -98,11 +134,11 @@ def _need_background(recording: Recording) -> bool:
 
 def _person_examples(clip: Clip, learnt: Sequence[BackgroundImage]) -> tuple[ExamplePose, ...]:
     recording, shapes = clip.recording, seen_shapes(clip, learnt)
-    if (problem := unsuitable(shapes, lambda: num_people_seen(clip, learnt))) is not None:
+    if (problem := unsuitable(shapes, lambda: num_people_seen(clip, learnt), has_plates(recording))) is not None:
         raise _no_examples(recording, problem)
     chosen = spread_choice([shape for shape in shapes if shape.agreement > AGREEING], NUM_TRIED)
     _say_chosen([shape.frame for shape in chosen], len(shapes))
-    say(f"the actor would gain most from {most_helpful(chosen, len(recording.rig.names))}")
+    say(f"the actor would gain most from {most_helpful(chosen, len(recording.rig.names), has_plates(recording))}")
     return tuple(ExamplePose(frame_name(shape.frame), None, {}, {}, None, shape.frame) for shape in chosen)
 
 
@@ -125,10 +161,11 @@ def _say_chosen(frames: Sequence[int], num_seen: int | None) -> None:
     say(f"example poses: frames {shown} of the videos{looked_at}")
 
 
-def unsuitable(shapes: Sequence[SeenShape], num_people: Callable[[], int]) -> str | None:
+def unsuitable(shapes: Sequence[SeenShape], num_people: Callable[[], int], plates: bool = False) -> str | None:
     """Why no example poses of one person can be taken from frames, and the remedy; None: they can.
 
-    `num_people` counts better than the parts of the hulls do, but takes seconds: a body may be seen in parts.
+    `plates` says whether every camera has a picture of the empty scene. `num_people` counts better than the parts of
+    the hulls do, but takes seconds: a body may be seen in parts.
     """
     if show_several(shapes) and (people := num_people()) != 1:
         return several_people(people)
@@ -139,8 +176,9 @@ def unsuitable(shapes: Sequence[SeenShape], num_people: Callable[[], int]) -> st
         )
     if sum(shape.agreement > AGREEING for shape in shapes) < FEWEST_EXAMPLES:
         return (
-            "nobody is seen in them whole and apart from the background; give pictures of the empty scene as "
-            "background/CAMERA.jpg, or example_poses/POSE/CAMERA.jpg with CAMERA.mask.png"
+            "nobody is seen in them whole and apart from the background; give "
+            f"{'' if plates else 'pictures of the empty scene as background/CAMERA.jpg, or '}"
+            "example_poses/POSE/CAMERA.jpg with CAMERA.mask.png"
         )
     return None
 
@@ -156,9 +194,9 @@ def several_people(seen: int) -> str:
     return f"they show {shown}; make an actor of each with actors={max(seen, 2)}, {OTHERWISE}"
 
 
-def most_helpful(chosen: Sequence[SeenShape], num_cameras: int) -> str:
-    """What would improve an actor that is made of frames most."""
-    if np.mean([shape.known for shape in chosen]) < MOSTLY_KNOWN:
+def most_helpful(chosen: Sequence[SeenShape], num_cameras: int, plates: bool = False) -> str:
+    """What would improve an actor that is made of frames most; `plates`: the empty scene is pictured already."""
+    if not plates and np.mean([shape.known for shape in chosen]) < MOSTLY_KNOWN:
         return "pictures of the empty scene (background/CAMERA.jpg): a part of it is never seen in the videos"
     if num_cameras < FEW_CAMERAS:
         return f"more cameras: there are {num_cameras}"

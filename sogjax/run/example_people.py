@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from sogjax.actor.frame_choice import Mask, SeenShape, seen_shape, spread_moments, subject_cubes
-from sogjax.actor.people import PersonSeen, people_apart, told_apart
+from sogjax.actor.people import PersonSeen, matched, people_apart, told_apart
 from sogjax.errors import counted
 from sogjax.io.example_poses import ExamplePose, frame_name
 from sogjax.io.recording import Recording
@@ -65,7 +65,7 @@ def examples_of_masks(
     moments = everybody(seen, recording.up)
     apart = [people for people in moments if len(people) == actors]
     if len(apart) < FEWEST_APART:
-        return too_few_apart(actors, [len(people) for people in moments])
+        return too_few_apart(actors, [len(people) for people in moments], has_plates(recording))
     told = told_apart(apart, recording.fps)
     if len(told) < max(FEWEST_APART, len(apart) // 2):
         return (
@@ -76,8 +76,8 @@ def examples_of_masks(
     chosen = spread_moments(suitable_moments(shapes), count)
     if len(chosen) < FEWEST_APART:
         return (
-            f"the {actors} people are never seen whole and apart from the background; give pictures of the empty scene "
-            f"as background/CAMERA.jpg, or {OTHERWISE}"
+            f"the {actors} people are never seen whole and apart from the background; "
+            f"{_plates_or(has_plates(recording))}{OTHERWISE}"
         )
     by_frame = {moment[0].frame: moment for moment in told}
     frames = [moment[0].frame for moment in chosen]
@@ -86,16 +86,77 @@ def examples_of_masks(
     )
 
 
-def too_few_apart(actors: int, counts: Sequence[int]) -> str:
-    """The sentence on frames that show other numbers of people."""
+def told_by_name(
+    recording: Recording, seen: SampledMasks, listed: Sequence[ExamplePose]
+) -> tuple[ExamplePose, ...] | str:
+    """Frames that are listed for several actors, each with where its actor is seen; or why that cannot be told.
+
+    Who is who is told by the places of their rough poses, where these are given, and else by the order in the list; in
+    all frames alike, by places and colours.
+    """
+    by_frame = {people[0].frame: people for people in everybody(seen, recording.up) if people}
+    names = tuple(dict.fromkeys(str(example.actor) for example in listed))
+    for frame in dict.fromkeys(example.frame for example in listed):
+        shown, wanted = len(by_frame.get(frame or 0, ())), sum(example.frame == frame for example in listed)
+        if shown != wanted or wanted != len(names):
+            return (
+                f"frame {frame} is listed for {counted(wanted, 'actor')} of {', '.join(names)}, and "
+                f"{counted(shown, 'person', 'people')} stand apart in it; list a frame in which just these stand "
+                "apart, for each of them"
+            )
+    told = told_apart(list(by_frame.values()), recording.fps)
+    if len(told) < len(by_frame):
+        return f"it is not clear who is who in all frames of {', '.join(names)}; list one frame only"
+    order = _order_of_names(names, told, listed)
+    places = {moment[0].frame: moment for moment in told}
+    return tuple(
+        replace(
+            _example(recording, str(each.actor), places[each.frame or 0][order[str(each.actor)]], seen.grids),
+            initial_pose=each.initial_pose,
+        )
+        for each in listed
+    )
+
+
+def _order_of_names(
+    names: Sequence[str], told: Sequence[Sequence[PersonSeen]], listed: Sequence[ExamplePose]
+) -> dict[str, int]:
+    """Which of the people is called how: that which is nearest to the places that are given."""
+    costs = np.zeros((len(names), len(names)))
+    for moment in told:
+        for example in listed:
+            pose = example.initial_pose
+            if example.frame == moment[0].frame and pose is not None and pose.position is not None:
+                away = [float(np.linalg.norm(person.place - np.array(pose.position))) for person in moment]
+                costs[names.index(str(example.actor))] += away
+    if costs.any():
+        return dict(zip(names, matched(costs)[0], strict=True))
+    return {name: k for k, name in enumerate(names)}
+
+
+def has_plates(recording: Recording) -> bool:
+    """Whether there is a picture of the empty scene for every camera: more cannot be asked for."""
+    return set(recording.rig.names) <= set(recording.background)
+
+
+def _plates_or(given: bool) -> str:
+    return "" if given else "give pictures of the empty scene as background/CAMERA.jpg, or "
+
+
+def too_few_apart(actors: int, counts: Sequence[int], plates: bool = False) -> str:
+    """The sentence on frames that show other numbers of people; `plates`: all cameras have one of the empty scene.
+
+    Another number is only recommended where it would not be refused in turn.
+    """
     most = most_seen(counts)
     if not most:
-        return f"nobody is seen apart from the background; give pictures of the empty scene, or {OTHERWISE}"
+        return f"nobody is seen apart from the background; {_plates_or(plates)}{OTHERWISE}"
     shown = "one person" if most == 1 else f"{most} people"
     return (
         f"actors={actors}, but {actors} people stand apart in {sum(n == actors for n in counts)} of "
         f"{counted(len(counts), 'frame')}, and {shown} in {sum(n == most for n in counts)}; "
-        f"give actors={most}, or {OTHERWISE}"
+        f"{f'give actors={most}, or ' if most != actors and 2 * sum(n == most for n in counts) > len(counts) else ''}"
+        f"{OTHERWISE}"
     )
 
 

@@ -1,7 +1,7 @@
 """The pass that finds where tracking begins: sources of the initial pose, asked in turn."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,7 @@ from sogjax.model.body import Body
 from sogjax.run.actors import Actors
 from sogjax.run.background import Background
 from sogjax.run.clip import Clip
-from sogjax.run.clip_search import ClipSearch, clear_guess
+from sogjax.run.clip_search import ClipSearch, best_guess
 from sogjax.run.keypoint_initial_pose import keypoint_poses
 from sogjax.run.recordings import upright
 from sogjax.run.terminal import say
@@ -39,6 +39,8 @@ class InitialPose:
     """A rough pose of all actors in that frame."""
     source: str
     """Which of the sources found it."""
+    confidence: Float[np.ndarray, "actor"] | None = None
+    """How likely the trunk of each actor is right, 0 to 1, as the search says; None: it was not searched for."""
 
     @classmethod
     def of_actors(cls, frame: int, poses: Sequence[Float[np.ndarray | Array, "_dof"]], source: str) -> "InitialPose":
@@ -47,7 +49,8 @@ class InitialPose:
 
     def save(self, folder: Path) -> None:
         """Keep it in a run's folder."""
-        save_npz(folder / FILE, {"pose": self.pose, "frame": np.array(self.frame), "source": np.array(self.source)})
+        arrays = {"pose": self.pose, "frame": np.array(self.frame), "source": np.array(self.source)}
+        save_npz(folder / FILE, arrays | ({} if self.confidence is None else {"confidence": self.confidence}))
 
     @classmethod
     def load(cls, folder: Path) -> "InitialPose | None":
@@ -58,7 +61,8 @@ class InitialPose:
         arrays = read_npz(path)
         pose = np.asarray(finite_array(path, arrays, "pose", (None,)), arrays["pose"].dtype)
         frame = int(finite_array(path, arrays, "frame", ()))
-        return cls(frame, pose, str(text_array(path, arrays, "source", ())))
+        confidence = finite_array(path, arrays, "confidence", (None,)) if "confidence" in arrays else None
+        return cls(frame, pose, str(text_array(path, arrays, "source", ())), confidence)
 
 
 @dataclass(frozen=True)
@@ -72,7 +76,7 @@ class PoseRequest:
     terms: Sequence[Term] = ()
     """Of the energy, beside those of the settings."""
     picture: Path | None = None
-    """Where the best guess is drawn if none is sure; None: into the working folder."""
+    """Where the best guess is drawn if none is sure; None: into the working folder, where it is refused."""
 
     @property
     def bodies(self) -> list[Body]:
@@ -142,14 +146,17 @@ def from_keypoints(request: PoseRequest) -> InitialPose | None:
 
 
 def from_search(request: PoseRequest) -> InitialPose | None:
-    """The best pose of a search in the first frame; where that is not sure, of a later one, followed back.
+    """The poses of a search in the first frame in which they are sure; in the likeliest, if they are in none.
 
     Raises:
-        InputError: the actors are not found in the pictures.
+        InputError: the frames show nothing like an actor, or fewer people than actors.
     """
     search = ClipSearch(request.clip, request.background, request.bodies, request.config, request.terms)
-    guess, frame = clear_guess(search, request.picture), request.clip.numbers[0]
-    return InitialPose.of_actors(frame, search.carried(guess, frame), "search")
+    guess = best_guess(search, request.picture)
+    if guess.frame != request.clip.numbers[0]:
+        say(f"tracking begins in frame {guess.frame}, and goes both ways")
+    found = InitialPose.of_actors(guess.frame, [pose.pose for pose in guess.poses], "search")
+    return replace(found, confidence=np.array([pose.trunk for pose in guess.poses]))
 
 
 SOURCES: tuple[PoseSource, ...] = (from_file, from_example_frames, from_keypoints, from_search)

@@ -20,6 +20,7 @@ from sogjax.run.result import RunResult
 from sogjax.run.run import Run
 from sogjax.run.run_files import WORST
 from sogjax.run.terminal import say
+from sogjax.search.pose_confidence import SURE
 from sogjax.view.overlay import closeups
 
 
@@ -30,8 +31,21 @@ def judged_result(run: Run) -> RunResult:
     return replace(
         result,
         evaluation=compared(result.recording, result.motions),
-        verdicts=verdicts(result.motions, expected_of(result.bodies), limits),
+        verdicts=verdicts(result.motions, expected_of(result.bodies), limits, _doubtful_begin(run)),
     )
+
+
+def _doubtful_begin(run: Run) -> dict[str, str]:
+    """What is said of each actor whose initial pose was not sure."""
+    start = run.records.get("initial_pose")
+    if start is None or start.confidence is None:
+        return {}
+    names = [body.name for body in run.actors.bodies]
+    return {
+        name: f"the initial pose was not sure ({likely:.0%}): look at frame {start.frame}"
+        for name, likely in zip(names, start.confidence.tolist(), strict=True)
+        if likely < SURE
+    }
 
 
 def compared(recording: Recording, motions: Mapping[str, Motion]) -> GroupEvaluation | None:

@@ -15,7 +15,7 @@ from sogjax.io.frame_motions import FRAMES
 from sogjax.io.source import find_sources
 from sogjax.run.clock import seconds_so_far
 from sogjax.run.fingerprint import RunFingerprint, difference
-from sogjax.run.run_files import KEPT, NOTE, half_written, in_the_way, left_in
+from sogjax.run.run_files import GUESS, KEPT, NOTE, half_written, in_the_way, left_in
 from sogjax.run.terminal import say
 
 try:
@@ -99,6 +99,7 @@ class RunFolder:
         self.began = True
         if self.kept.is_dir():
             _remove_kept(self.kept)
+        GUESS.of(self.path).unlink(missing_ok=True)
         write_note(NOTE.of(self.kept), {"command": command, "origin": fingerprint})
 
     def _check_same(self, before: RunFingerprint, now: RunFingerprint) -> None:
@@ -114,7 +115,7 @@ class RunFolder:
         if self._cleared:
             return
         self._cleared = True
-        kept = {path.resolve() for path in (*needed, self.kept)}
+        kept = {path.resolve() for path in (*needed, self.kept, GUESS.of(self.path))}  # the guess is this run's
         NOTE.of(self.path).unlink(missing_ok=True)  # first: without it nothing is taken for whole
         for path in [*left_in(self.path, self.note.get("files", [])), *half_written(self.path)]:
             if path.resolve() in kept:

@@ -44,22 +44,24 @@ class SampledMasks:
     grids: tuple[CellGrid, ...]
 
 
-def mask_samples(recording: Recording) -> SampleKind:
-    """The pictures, in cells (BGR), that are looked at for people."""
-    grids = cell_grids(recording, DEPTH)
-    frames = spread_frames(recording.frames, MOST_LOOKED_AT)
-    return SampleKind("masks", tuple(frames), lambda camera, picture: grids[camera].averages(picture))
+def mask_samples(recording: Recording, frames: Sequence[int] | None = None) -> SampleKind:
+    """The pictures, in cells (BGR), that are looked at for people: of the frames, or else spread over the clip."""
+    grids, name = cell_grids(recording, DEPTH), "masks" if frames is None else "masks of frames"
+    numbers = tuple(spread_frames(recording.frames, MOST_LOOKED_AT) if frames is None else frames)
+    return SampleKind(name, numbers, lambda camera, picture: grids[camera].averages(picture))
 
 
-def masks_of_samples(clip: Clip, learnt: Sequence[BackgroundImage], shadow: float = SHADOW) -> SampledMasks:
-    """The masks of at most `MOST_LOOKED_AT` frames that all cameras have.
+def masks_of_samples(
+    clip: Clip, learnt: Sequence[BackgroundImage], shadow: float = SHADOW, frames: Sequence[int] | None = None
+) -> SampledMasks:
+    """The masks of the frames, or else of at most `MOST_LOOKED_AT` spread over the clip, that all cameras have.
 
     `shadow` is the standard deviation of the light that a shadow takes, as a part of the background's: what is darker
     by more is not the background.
     """
     recording, grids = clip.recording, cell_grids(clip.recording, DEPTH)
     empty = BackgroundModel.from_background(stack_background(learnt, grids), shadow)
-    sampled = clip.sampled([mask_samples(recording)])[0]
+    sampled = clip.sampled([mask_samples(recording, frames)])[0]
     frames = sorted(set.intersection(*(set(of_camera) for of_camera in sampled)))
     pictures = [{k: of_camera[frame] for k, of_camera in enumerate(sampled)} for frame in frames]
     known = np.asarray(empty.known)

@@ -22,7 +22,7 @@ from sogjax.run.forward import show_known
 from sogjax.run.judge import write_metrics, write_worst
 from sogjax.run.result_streams import ResultStreams
 from sogjax.run.run import Run
-from sogjax.run.run_files import ACTOR, ADJUSTMENT, CONFIG, METRICS, MOTIONS, UNADJUSTED, UNADJUSTED_ACTOR, WORST
+from sogjax.run.run_files import ACTOR, ADJUSTMENT, CONFIG, GUESS, METRICS, MOTIONS, UNADJUSTED, UNADJUSTED_ACTOR, WORST
 from sogjax.run.terminal import say
 from sogjax.settings.run import OutputsConfig
 
@@ -101,6 +101,8 @@ def write_results(run: Run) -> list[Path]:
     write_metrics(files[-1], result)
     if not wanted.motion_only and write_worst(WORST.of(out), result):
         files.append(WORST.of(out))
+    if GUESS.of(out).is_file():
+        files.append(GUESS.of(out))
     files += grown
     return files if run.adjusted is None else files + _of_adjusting(run, run.adjusted, out)
 

@@ -50,7 +50,7 @@ def body_parts(body: Body) -> tuple[Part, ...]:
         parts.append(Part((name,), np.flatnonzero(moves[trees == actor].any(axis=0)), blobs, None))
     names, every_limb = limb_names(body), limbs(body.skeleton)
     for members in limb_groups(body):
-        blobs = in_limbs[list(members)].any(axis=0)
+        blobs = np.logical_or.reduce(in_limbs[list(members)])
         dofs = np.concatenate([every_limb[k] for k in members])
         parts.append(Part(tuple(names[k] for k in members), dofs, blobs, int(of_blob[blobs][0])))
     return tuple(parts)

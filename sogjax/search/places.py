@@ -1,6 +1,6 @@
 """Places where a body may be in one frame: the parts of space that look like it in all cameras, and how they lie."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import equinox as eqx
 import jax
@@ -29,6 +29,9 @@ APART = 0.4
 """Metres between places that count as different."""
 BODY_REACH = 0.95
 """Metres around a place in which the rest of the body is."""
+BETWEEN = 0.35
+"""Metres between the halves of a place from which on they may be two bodies that touch; of somebody with his arms
+stretched out 0.3, of two who embrace 0.45."""
 THICK, TALL = 0.35, 1.3
 """Metres: how far from a body's axis, and along it from the middle, what is seen is taken for its length."""
 
@@ -48,8 +51,11 @@ class Place:
     """Metres, how long it is in that direction: the height of somebody who stands straight."""
 
 
-def places(frame: SeenFrame, up: str, count: int) -> list[Place]:
-    """The places that look most like the body, best first, at most `count`."""
+def places(frame: SeenFrame, up: str, count: int, among: int = 1) -> list[Place]:
+    """The places that look most like the body, best first, at most `count`.
+
+    `among` is how many actors there are: the best place may be two of them who touch, and its halves come before it.
+    """
     grid, spacing = _voxels(frame.cameras, up)
     shape = grid.shape[:3]
     flat = jnp.asarray(grid.reshape(-1, 3), frame.odds.dtype)
@@ -64,7 +70,7 @@ def places(frame: SeenFrame, up: str, count: int) -> list[Place]:
             found.append(place)
         if len(found) == count:
             break
-    return found
+    return [*_halves(grid, scores, found[0], up), *found][:count] if among > 1 and found else found
 
 
 def _place_at(grid: np.ndarray, scores: np.ndarray, peak: tuple[int, ...], score: float) -> Place:
@@ -82,6 +88,25 @@ def _place_at(grid: np.ndarray, scores: np.ndarray, peak: tuple[int, ...], score
     solid = (weights > 0.0) & (np.linalg.norm(np.cross(off, axis), axis=1) < THICK) & (np.abs(off @ axis) < TALL)
     low, high = np.percentile(off[solid] @ axis, (0.5, 99.5)) if solid.any() else (0.0, 0.0)
     return Place(centre, axis, float(np.sqrt(values[2] / max(values[1], 1e-9))), score, float(high - low))
+
+
+def _halves(grid: np.ndarray, scores: np.ndarray, place: Place, up: str) -> list[Place]:
+    """Both sides of a place across the horizontal direction in which it is widest, if they lie far apart."""
+    level = np.abs(axis_vector(up)) < 0.5
+    off = grid.reshape(-1, 3) - place.centre
+    weights = np.maximum(scores - 0.5 * place.score, 0.0).reshape(-1) * (np.linalg.norm(off, axis=1) < BODY_REACH)
+    if weights.sum() <= 0.0:
+        return []
+    flat = off[:, level]
+    along = flat @ np.linalg.eigh((weights[:, None] * flat).T @ flat)[1][:, -1]
+    sides = [weights * (side * along > 0.0) for side in (1.0, -1.0)]
+    if min(side.sum() for side in sides) <= 0.0:
+        return []
+    middles = [(side @ off) / side.sum() for side in sides]
+    if np.linalg.norm((middles[0] - middles[1])[level]) < BETWEEN:
+        return []
+    found = [replace(place, centre=place.centre + middle, slenderness=1.0) for middle in middles]
+    return found if sides[0].sum() >= sides[1].sum() else found[::-1]
 
 
 def _voxels(cameras: Camera, up: str) -> tuple[Float[np.ndarray, "a b c 3"], float]:

@@ -16,15 +16,15 @@ class PoseEvidence:
     """What tells from one search whether a pose is right; energies are in units of the body's area in the pictures."""
 
     energy: float
-    """The energy in the frame that was searched."""
+    """The energy in the frame that was searched, for the part of the body that no other actor hides."""
     margin: float
     """How far the next different hypothesis is behind there, as a part of the energy."""
     later_margin: float
     """The margin of the means over the frames that follow; where it is negative, the motion speaks for another pose."""
     foreground: float
-    """Part of what looks like foreground that the body covers, mean over the cameras."""
+    """Part of what looks like foreground that the actors cover, mean over the cameras."""
     worst_foreground: float
-    """Part of what looks like foreground that the body covers, in the camera in which it is least."""
+    """Part of what looks like foreground that the actors cover, in the camera in which it is least."""
     not_background: float
     """Part of what the body covers that does not look like background, mean over the cameras."""
     gain: float
@@ -33,6 +33,8 @@ class PoseEvidence:
     """What the limb explains that explains least, for its size, as a part of what the body does."""
     known: float
     """Part of the pictures whose background is known."""
+    share: float = 1.0
+    """What is left of the energy beside the other actors, as a part of the most that is found where they are not."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,8 @@ class Agreement:
     sides: float
     """How far the limbs of a pair are from each other, as `sides_apart` has it, the least of both frames."""
     worst_limb: float
+    """As in `PoseEvidence`, the least of both frames."""
+    share: float = 1.0
     """As in `PoseEvidence`, the least of both frames."""
     num_actors: int = 1
     """How many were searched for together."""
@@ -63,6 +67,12 @@ def pose_confidence(evidence: PoseEvidence) -> float:
     return _likely([excess(bound.name) for bound in fields(bounds)])
 
 
+def limb_confidence(evidence: PoseEvidence, explained: float) -> float:
+    """How likely a limb is right, from one search: what the body says, and what the limb explains for its size."""
+    bounds = fitted_numbers().pose_agreement
+    return min(pose_confidence(evidence), _likely([(explained - bounds.least_limb) / bounds.limb_scale]))
+
+
 def agreed_confidence(agreement: Agreement) -> float:
     """How likely a pose is right, from two searches in frames some time apart."""
     bounds = fitted_numbers().pose_agreement
@@ -72,10 +82,11 @@ def agreed_confidence(agreement: Agreement) -> float:
         (agreement.moved - bounds.least_moved) / bounds.moved_scale,
         (agreement.sides - bounds.least_sides) / bounds.sides_scale,
         (agreement.worst_limb - bounds.least_limb) / bounds.limb_scale,
+        (agreement.share - bounds.least_share) / bounds.share_scale,
     )
     return _likely(excesses)
 
 
 def _likely(excesses: Iterable[float]) -> float:
     """0.99 where the least excess is 0, so that every bound is just met; a half where one is missed by its scale."""
-    return float(1.0 / (1.0 + np.exp(-4.6 * (1.0 + min(*excesses, 10.0)))))
+    return float(1.0 / (1.0 + np.exp(-4.6 * (1.0 + min([*excesses, 10.0])))))

@@ -67,11 +67,13 @@ class PoseSearch:
     clusters: ColorClusters
     terms: Sequence[Term]
     up: str
+    among: int = 1
+    """How many actors there are."""
 
     @classmethod
-    def of_body(cls, body: Body, terms: Sequence[Term], up: str) -> "PoseSearch":
-        """The search for a body in its colours."""
-        return cls(body, ColorClusters.from_body(body), terms, up)
+    def of_body(cls, body: Body, terms: Sequence[Term], up: str, among: int = 1) -> "PoseSearch":
+        """The search for a body in its colours, which is one of so many actors."""
+        return cls(body, ColorClusters.from_body(body), terms, up, among)
 
     @property
     def scales(self) -> Scales:
@@ -92,7 +94,7 @@ def search(searcher: PoseSearch, frame: SeenFrame, count: int = NUM_LAST, report
 
     `report` is called with the share of the work that is done.
     """
-    found = places(frame, searcher.up, NUM_PLACES)
+    found = places(frame, searcher.up, NUM_PLACES, searcher.among)
     if not found:
         return []
     found = [place for place in found if place.score >= POOR * found[0].score] or found[:1]
@@ -102,7 +104,7 @@ def search(searcher: PoseSearch, frame: SeenFrame, count: int = NUM_LAST, report
     tried = _best(searcher.body, tried, NUM_SECOND)
     report(0.3)
     for share in (0.6, 0.85):
-        tried = _best(searcher.body, _with_better_limbs(placed, tried), NUM_LAST)
+        tried = _best(searcher.body, with_better_limbs(placed, tried), NUM_LAST)
         report(share)
     tried = placed.climbed(_with_look_alikes(placed, tried), LAST_ITERATIONS)
     report(1.0)
@@ -181,7 +183,7 @@ def _windows(frame: SeenFrame, centres: Float[Array, "place 3"]) -> ColorWindows
     return jax.lax.map(lambda centre: frame.windows(centre, radius), centres)
 
 
-def _with_better_limbs(placed: PlacedSearch, tried: Hypotheses) -> Hypotheses:
+def with_better_limbs(placed: PlacedSearch, tried: Hypotheses) -> Hypotheses:
     """The poses, and each with one limb held in other ways, climbed if that looks promising."""
     body, variants, source = placed.searcher.body, [], []
     every_limb = limbs(body.skeleton)
