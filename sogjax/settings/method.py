@@ -67,6 +67,6 @@ class TrackingConfig:
     extrapolation: float = expert(0.5, "[alpha] share of the last motion that is added to predict the next pose")
     both_ways: bool = option(
         True,
-        "where limbs are in doubt, track backwards, too, and take each limb from the better pass; needs "
+        "search limbs again in frames all over the clip, and track backwards, too, where limbs are in doubt; needs "
         "outputs.confidence=true",
     )
