@@ -30,7 +30,7 @@ def command(tmp_path, monkeypatch):
 @pytest.fixture
 def farther(monkeypatch):
     """One frame is found to be farther along the first axis."""
-    monkeypatch.setattr(merge, "merge_passes", lambda tracker, passed, frames: moved_farther(tracker, passed))
+    monkeypatch.setattr(merge, "merge_passes", lambda tracker, passed, *_: moved_farther(tracker, passed))
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""The pass that tracks backwards around limbs in doubt, and takes each part of the body from the better way."""
+"""The pass that searches limbs over the clip and tracks backwards around doubts; parts come from what explains more."""
 
 from collections.abc import Iterable
 from functools import partial
@@ -16,13 +16,13 @@ from sogjax.tracking.frame import FrameInput
 
 
 class Merged(FramesRecord):
-    """The frames with what backward passes explain better."""
+    """The frames with what other passes explain better."""
 
     file = "merged.npz"
 
 
 def merge_backward(setup: Setup, tracked: FrameTable) -> Merged:
-    """The frames with what backward passes explain better; as they are where nothing is, or a pass failed.
+    """The frames with what other passes explain better; as they are where nothing is, or a pass failed.
 
     That a pass failed is said.
     """
@@ -42,12 +42,12 @@ def merge_backward(setup: Setup, tracked: FrameTable) -> Merged:
             keys = key_rows(len(numbers), setup.clip.fps)
             found = merge_passes(setup.tracker, passed, of_rows, keys, partial(setattr, work, "share"))
     except InputError as error:
-        say(f"warning: not told both ways, the first pass stays as it is: {error}")
+        say(f"warning: limbs were not searched over the clip, which stays as it was tracked: {error}")
         return Merged(tracked)
     if not found.frames:
         return Merged(tracked)
     parts = ", ".join(f"{name} ({len(rows)})" for name, rows in sorted(found.parts.items()))
-    say(f"taken from the backward pass in {counted(len(found.frames), 'frame')}: {parts}")
+    say(f"taken from other passes in {counted(len(found.frames), 'frame')}: {parts}")
     return Merged(tracked.with_rows(found.frames, [_columns(revised) for revised in found.frames.values()]))
 
 

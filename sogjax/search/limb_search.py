@@ -135,10 +135,10 @@ class LimbSearch:
         self._pause_until = 0
 
     @classmethod
-    def of(cls, tracker: Tracker) -> "LimbSearch":
-        """The search for the limbs of a tracker's body."""
+    def of(cls, tracker: Tracker) -> "LimbSearch | None":
+        """The search for the limbs of a tracker's body; None: it has none."""
         units = units_of(tracker.body)
-        return cls(tracker, units, Units.of(tracker.body, units))
+        return cls(tracker, units, Units.of(tracker.body, units)) if units else None
 
     def note(self, taken: bool) -> None:
         """Learn whether anything was taken of the pass from the last pose."""

@@ -93,6 +93,8 @@ class _Revising:
     def search_limbs(self, rows: Sequence[int], report: Report) -> None:
         """Hold limbs in other ways in some frames, and see where these lead that are worth more."""
         search = LimbSearch.of(self.tracker)
+        if search is None:
+            return
         for number, (row, frame) in enumerate(zip(rows, _one_by_one(self.frames, rows), strict=True)):
             report(number / len(rows))
             for pose in search.better_poses(frame, self.passed, row):
