@@ -100,8 +100,5 @@ def test_a_pass_backwards_that_fails_is_said_and_the_motion_stays(capsys, tmp_pa
     monkeypatch.setattr(merge, "merge_passes", merge_passes)
     shown = ["outputs.overlay=false", "outputs.rerun=false"]
     _, err = done(capsys, *command, *shown, "out=run")
-    assert (
-        "warning: limbs were not searched over the clip, which stays as it was tracked: a frame has too many image blobs"
-        in err
-    )
+    assert "limbs were not searched over the clip, which stays as it was tracked: a frame has too many" in err
     assert load_motion(tmp_path / "run" / "motion.npz").num_frames == FRAMES
