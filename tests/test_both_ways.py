@@ -116,12 +116,13 @@ def test_a_frame_that_two_passes_revise_counts_once(walking_dog, monkeypatch):
     def compared(tracker, passed, frames, parts, first, last):
         begin = last + 1
         column = lambda value: list(np.tile(np.where(np.arange(len(parts)) == 0, value, 0.0), (begin, 1)))
-        poses = [passed.poses[row] + 1e-3 for row in reversed(range(begin))]
+        poses = [right.poses[row] for row in reversed(range(begin))]
         gains, apart = column(10.0 * right.energy), column(2.0 * COSTS.apart)
         return Compared([*reversed(range(begin))], cells[:begin][::-1], poses, gains, apart)
 
     monkeypatch.setattr(both_ways, "compared_backwards", compared)
-    found = merge_passes(tracker, replace(right, doubts=doubts), reader(cells))
+    beside = replace(right, doubts=doubts, poses=right.poses + np.float32(0.02))
+    found = merge_passes(tracker, beside, reader(cells))
     assert {*found.frames} == {*range(9)}
     assert found.parts == {parts[0].name: {*range(9)}}
 

@@ -69,6 +69,8 @@ class PartArrays(eqx.Module):
 
     dofs: Bool[Array, "whole dof"]
     blobs: Bool[Array, "part blob"]
+    in_pairs: Bool[Array, "part"]
+    """Which are a limb of a pair."""
 
     @classmethod
     def of(cls, body: Body, parts: Sequence[Part]) -> "PartArrays":
@@ -77,7 +79,9 @@ class PartArrays(eqx.Module):
         dofs = np.zeros((len(whole), body.skeleton.num_dofs), bool)
         for k, part in enumerate(whole):
             dofs[k, part.dofs] = True
-        return cls(jnp.asarray(dofs), jnp.asarray(np.stack([part.blobs for part in parts])))
+        paired = {name for part in parts if len(part.names) > 1 for name in part.names}
+        in_pairs = [len(part.names) == 1 and part.names[0] in paired for part in parts]
+        return cls(jnp.asarray(dofs), jnp.asarray(np.stack([part.blobs for part in parts])), jnp.asarray(in_pairs))
 
     def mixed(self, body: Body, pose: Float[Array, "dof"], other: Float[Array, "dof"]) -> Float[Array, "part dof"]:
         """The pose with each part as it is in the other one."""

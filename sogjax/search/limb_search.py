@@ -19,6 +19,7 @@ from sogjax.energy.posed import History
 from sogjax.energy.views import Views
 from sogjax.model.body import Body
 from sogjax.model.limbs import limb_blobs, limb_names, limbs
+from sogjax.model.solid import Solid
 from sogjax.search.body_parts import limb_groups
 from sogjax.search.mirrored import fitted_to_blobs, other_side
 from sogjax.search.other_pass import Pass
@@ -121,6 +122,8 @@ def _padded(rows: Sequence[Int[np.ndarray, "_n"]]) -> tuple[Int[np.ndarray, "row
 SLACK, WORTH = -0.002, 0.001
 """Parts of a frame's energy: what another way gains, while the rest is held, for the whole body to be climbed from
 there, and what it gains then for a pass to go from there."""
+DEEP = 0.04
+"""Metres that limbs may be deeper in each other, or in the trunk, than in any named pose."""
 PAUSE = 3
 """Key frames for which no other pass is begun after one of which nothing was taken."""
 
@@ -130,6 +133,7 @@ class LimbSearch:
 
     def __init__(self, tracker: Tracker, units: Sequence[Unit], arrays: Units) -> None:
         self.tracker, self.units, self.arrays = tracker, units, arrays
+        self.solid = Solid.of(tracker.body)
         self._turn = 0
         self._carried: HeldOtherwise | None = None
         self._pause_until = 0
@@ -156,16 +160,25 @@ class LimbSearch:
         if self._turn < self._pause_until:
             return []
         promising = (found.gains > SLACK * passed.energy) & (found.apart > APART)
+        promising &= self.possible(pose, found.poses.reshape(-1, len(pose))).reshape(promising.shape)
         starts = [found.poses[k, w] for k, w in zip(*np.nonzero(promising), strict=True)]
         if not starts:
             return []
         starts = [pose, *starts[:MOST_WHOLE]]
         starts = np.stack([*starts, *[pose] * (MOST_WHOLE + 1 - len(starts))])
-        ends, values, before = jax.device_get(climbed_whole(self.tracker, views, jnp.asarray(starts)))
+        ends, values, before = jax.device_get(climbed_in(self.tracker, views, jnp.asarray(starts)))
         best = int(np.argmax(values))
         moved = np.linalg.norm(np.diff(means_of(self.tracker.body, np.stack([pose, ends[best]])), axis=0), axis=-1)
         worth = values[best] - before > WORTH * passed.energy and moved.max() > APART
+        worth &= bool(self.possible(pose, ends)[best])
         return [ends[best]] if worth else []
+
+    def possible(
+        self, known: Float[np.ndarray, "dof"], poses: Float[np.ndarray, "start dof"]
+    ) -> Bool[np.ndarray, "start"]:
+        """Which poses hold nothing deep in something else, or no deeper than the known one does."""
+        excess = self.solid.excess_of(self.tracker.body, np.concatenate([known[None], poses]))
+        return excess[1:] <= max(DEEP, float(excess[0]))
 
     def _tried(self, number: int, unit: Unit, pose: Float[np.ndarray, "dof"]) -> Float[np.ndarray, "seed dof"]:
         """Ways that are drawn, and those of the last key frame."""
@@ -180,7 +193,7 @@ MOST_WHOLE = 3
 
 
 @eqx.filter_jit
-def climbed_whole(
+def climbed_in(
     tracker: Tracker, views: Views, starts: Float[Array, "start dof"]
 ) -> tuple[Float[Array, "start dof"], Float[Array, "start"], Float[Array, ""]]:
     """Poses climbed with the tracker's energy and solver, and what they are worth; last, what the first start is."""

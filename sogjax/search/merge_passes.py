@@ -21,7 +21,7 @@ from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.quality.metrics import stretches
 from sogjax.search.body_parts import body_parts, merged_pose, select_parts
-from sogjax.search.limb_search import LimbSearch
+from sogjax.search.limb_search import LimbSearch, climbed_in
 from sogjax.search.other_pass import (
     SURE_FRAMES,
     Compared,
@@ -35,6 +35,8 @@ from sogjax.tracking.capacity import views_near
 from sogjax.tracking.frame import AnyFrame, FrameInput, on_device
 from sogjax.tracking.tracker import Tracker
 
+MOSTLY = 0.3
+"""Part of the frames of a pass in which a limb may be deep in another, or the trunk."""
 MOST_LOOKS = 2
 """Frames that are tracked backwards, at most, in lengths of the clip."""
 
@@ -99,8 +101,9 @@ class _Revising:
             report(number / len(rows))
             for pose in search.better_poses(frame, self.passed, row):
                 if not self._tired:
-                    took = self.take(compared_both_ways(self.tracker, self.passed, self.frames, self.parts, row, pose))
-                    search.note(took)
+                    found = compared_both_ways(self.tracker, self.passed, self.frames, self.parts, row, pose)
+                    deep = [not search.possible(self.passed.poses[k], p[None])[0] for k, p in found.poses_by_row()]
+                    search.note(float(np.mean(deep)) < MOSTLY and self.take(found))
 
     def next_stretch(self) -> tuple[int, int] | None:
         """First and last frame of the last stretch in doubt from behind which no pass has begun."""
@@ -113,34 +116,42 @@ class _Revising:
         return left[-1] if left else None
 
     def take(self, found: Compared) -> bool:
-        """Revise what another pass explains better; whether anything is."""
+        """Revise what another pass explains better; whether that raises the energy of the stretch, else all stays."""
         rows, total = np.array(found.rows), len(self.passed.poses)
+        self._looked_at += len(rows)
         ends = (bool(rows[0] in (0, total - 1)), bool(rows[-1] in (0, total - 1)))
         taken = select_parts(self.parts, np.stack(found.apart), np.stack(found.gains), self.passed.energy, ends)
-        changed, poses = np.flatnonzero(taken.any(axis=1)), self.passed.poses
-        for k in changed:
-            poses[rows[k]] = self._merged(poses[rows[k]], found, int(k), taken[k])
-        for k in changed:
-            self._value(int(rows[k]), found.cells[k])
+        changed = [(k, int(rows[k])) for k in np.flatnonzero(taken.any(axis=1))]
+        known = {row: self._valued(row, found.cells[k]) for k, row in changed}
+        for k, row in changed:
+            self.passed.poses[row] = self._merged(self.passed.poses[row], found, int(k), taken[k])
+        revised = {row: self._valued(row, found.cells[k]) for k, row in changed}
+        better = sum(revised[row].energy - known[row].energy for row in revised) > 0.0
+        for row, each in (revised if better else known).items():
+            self.passed.poses[row], self.passed.energies[row] = each.pose, each.energy
+            self.passed.doubts[row] = each.judged.error_probability
+        if better:
+            self.revision.frames.update(revised)
         for part, of_part in zip(self.parts, taken.T, strict=True):
-            for name in part.names if of_part.any() else ():
+            for name in part.names if better and of_part.any() else ():
                 self.revision.parts.setdefault(name, set()).update(rows[of_part].tolist())
-        self._looked_at += len(rows)
-        return bool(taken.any())
+        return better
 
     def _merged(
         self, pose: Float[np.ndarray, "dof"], found: Compared, k: int, taken: Bool[np.ndarray, "part"]
     ) -> Float[np.ndarray, "dof"]:
-        """A pose with the parts that are taken; all of the other pass's, which was climbed, where the rest is alike."""
+        """A pose with the parts that are taken; the other pass's as it is, where the rest is alike, else climbed."""
         moved = np.any([part.blobs for part, is_taken in zip(self.parts, taken, strict=True) if is_taken], axis=0)
         rest = [np.any(part.blobs & ~moved) for part in self.parts]
         alike = np.where(rest & ~taken, found.apart[k], 0.0).max() <= fitted_numbers().merge_passes.apart
         if alike:
             return found.poses[k].copy()
-        return merged_pose(self.tracker.body, self.parts, pose, found.poses[k], taken)
+        mixed = jnp.asarray(merged_pose(self.tracker.body, self.parts, pose, found.poses[k], taken))
+        views = views_near(self.tracker, on_device(found.cells[k]), mixed, self.passed.capacities)
+        return np.asarray(climbed_in(self.tracker, views, mixed[None])[0][0])
 
-    def _value(self, row: int, frame: AnyFrame) -> None:
-        """Note what a revised pose is worth."""
+    def _valued(self, row: int, frame: AnyFrame) -> Revised:
+        """What the pose of a frame is worth."""
         poses = self.passed.poses
         before, before_that = (jnp.asarray(poses[max(row - j, 0)]) for j in (1, 2))
         history = History(before, before_that, jnp.asarray(row >= 2))
@@ -148,9 +159,8 @@ class _Revising:
         known = on_device(frame)
         views = views_near(self.tracker, known, pose, self.passed.capacities)
         energy, terms, judged = jax.device_get(_valued(self.tracker, history, known, views, pose, baseline))
-        self.passed.doubts[row], self.passed.energies[row] = judged.error_probability, float(energy)
         values = {name: float(term) for name, term in terms.items()}
-        self.revision.frames[row] = Revised(poses[row].copy(), float(energy), values, judged)
+        return Revised(poses[row].copy(), float(energy), values, judged)
 
 
 def _one_by_one(frames: FramesOfRows, rows: Sequence[int]) -> Iterator[AnyFrame]:

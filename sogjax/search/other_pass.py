@@ -3,7 +3,7 @@
 It begins behind frames in doubt and goes backwards, or at another pose of a key frame and goes both ways.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 
 import equinox as eqx
@@ -82,6 +82,10 @@ class Compared:
     """The rise of the energy if a part is taken from the other pass."""
     apart: list[Float[np.ndarray, "part"]] = field(default_factory=list)
     """Metres."""
+
+    def poses_by_row(self) -> Iterator[tuple[int, Float[np.ndarray, "dof"]]]:
+        """The poses with their rows."""
+        return zip(self.rows, self.poses, strict=True)
 
     def joined(self, later: "Compared") -> "Compared":
         """These frames turned round, then later ones of which the first is known already."""
@@ -185,17 +189,20 @@ def part_gains(
 ) -> Float[np.ndarray, "part"]:
     """The rise of the energy with each part of the second pose instead of the first one's.
 
-    The mean over what holds around it: the rest of the first pose and that of the second, in what is seen near either.
+    What holds around a part is the rest of the first pose, or that of the second; in what is seen near either. Of a
+    limb that has a counterpart the lesser rise counts: where two are exchanged, one by itself gains only beside the
+    other's new place. Of other parts it is the mean.
     """
     known, body = on_device(frame), tracker.body
     poses = _mixed(body, parts, first, second)
 
-    def seen_near(at: Float[Array, "dof"]) -> Float[np.ndarray, "part"]:
+    def seen_near(at: Float[Array, "dof"]) -> Float[np.ndarray, "2 part"]:
         values = np.asarray(values_in(tracker, views_near(tracker, known, at, capacities), poses))
         into_first, into_second = values[2:].reshape(2, -1)
-        return 0.5 * ((into_first - values[0]) + (values[1] - into_second))
+        return np.stack([into_first - values[0], values[1] - into_second])
 
-    return 0.5 * (seen_near(first) + seen_near(second))
+    around = 0.5 * (seen_near(first) + seen_near(second))
+    return np.where(np.asarray(parts.in_pairs), around.min(axis=0), around.mean(axis=0))
 
 
 @eqx.filter_jit

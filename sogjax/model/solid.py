@@ -1,0 +1,95 @@
+"""Bodies are solid: how deep limbs lie in each other, in the trunk, or in another actor.
+
+A limb's bones are capsules between their first and last blob, which nothing slips through; each blob of the trunk is a
+sphere. Parts that touch in a named pose may touch: the deepest of these is allowed.
+"""
+
+from itertools import combinations, groupby
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from sogjax.model.body import Body
+from sogjax.model.limbs import limb_blobs
+
+RADIUS = 1.35
+"""Of the disc that a blob of sigma 1 stands for."""
+SOFT = 0.02
+"""Metres by which two parts may always be in each other: clothes and flesh give way."""
+
+
+class Solid(eqx.Module):
+    """The pairs of capsules of a body that cannot be in the same place."""
+
+    ends: Int[Array, "capsule 2"]
+    """The blobs where a capsule begins and ends; a sphere's are the same."""
+    radii: Float[Array, "capsule"]
+    """Metres."""
+    pairs: Int[Array, "pair 2"]
+    allowed: Float[Array, "pair"]
+    """Metres."""
+
+    @classmethod
+    def of(cls, body: Body) -> "Solid":
+        """Limbs against other limbs and the trunk, and everything against other actors, which it may only touch."""
+        of_limb, actors = limb_blobs(body), body.blob_actors
+        ends, owners = [], []
+        for blob in np.flatnonzero(~of_limb.any(axis=0)):
+            ends.append((blob, blob))
+            owners.append((actors[blob], -1))
+        for limb, blobs in enumerate(of_limb):
+            for _, bone in groupby(np.flatnonzero(blobs), key=lambda blob: body.blobs.joints[blob]):
+                members = [*bone]
+                ends.append((members[0], members[-1]))
+                owners.append((actors[members[0]], limb))
+        differ = lambda one, two: owners[one] != owners[two]
+        pairs = [pair for pair in combinations(range(len(ends)), 2) if differ(*pair)]
+        sigmas = np.asarray(body.blob_sigmas)
+        radii = np.array([RADIUS * sigmas[[*both]].mean() for both in ends])
+        known = cls(
+            jnp.asarray(np.array(ends, int).reshape(-1, 2)),
+            jnp.asarray(radii.reshape(-1), sigmas.dtype),
+            jnp.asarray(np.array(pairs, int).reshape(-1, 2)),
+            jnp.zeros(len(pairs), sigmas.dtype),
+        )
+        poses = jnp.stack([*body.poses.values()])
+        deepest = jnp.max(jax.vmap(lambda pose: known.depths(body.posed_blobs(pose).means))(poses), axis=0)
+        same = jnp.asarray([owners[one][0] == owners[two][0] for one, two in pairs], bool)
+        allowed = jnp.where(same, jnp.maximum(deepest, 0.0), 0.0) + SOFT
+        return eqx.tree_at(lambda solid: solid.allowed, known, allowed)
+
+    def excess_of(self, body: Body, poses: Float[np.ndarray, "start dof"]) -> Float[np.ndarray, "start"]:
+        """The `excess` of a body in some poses."""
+        return np.asarray(_excess(self, body, jnp.asarray(poses)))
+
+    def depths(self, means: Float[Array, "blob 3"]) -> Float[Array, "pair"]:
+        """How deep the capsules of each pair are in each other (metres); negative where they are apart."""
+        one, two = (means[self.ends[self.pairs[:, k]]] for k in (0, 1))
+        apart = jax.vmap(segment_distance)(one, two)
+        return self.radii[self.pairs[:, 0]] + self.radii[self.pairs[:, 1]] - apart
+
+    def excess(self, means: Float[Array, "blob 3"]) -> Float[Array, ""]:
+        """By how much the worst pair is deeper than is allowed (metres); 0 where none is."""
+        return jnp.max(self.depths(means) - self.allowed, initial=0.0)
+
+
+@eqx.filter_jit
+def _excess(solid: Solid, body: Body, poses: Float[Array, "start dof"]) -> Float[Array, "start"]:
+    return jax.vmap(lambda pose: solid.excess(body.posed_blobs(pose).means))(poses)
+
+
+def segment_distance(one: Float[Array, "2 3"], two: Float[Array, "2 3"]) -> Float[Array, ""]:
+    """The least distance of two segments, each given by its ends."""
+    dot = lambda a, b: jnp.sum(a * b)
+    u, v, w = one[1] - one[0], two[1] - two[0], one[0] - two[0]
+    a, b, c, d, e = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w)
+    tiny = 1e-9
+    share = lambda value, whole: jnp.clip(value / jnp.maximum(whole, tiny), 0.0, 1.0)
+    s = share(b * e - c * d, a * c - b * b)
+    t = share(b * s + e, c)
+    s = share(b * t - d, a)
+    t = share(b * s + e, c)
+    return jnp.linalg.norm(w + s * u - t * v)
