@@ -129,7 +129,8 @@ def test_a_recording_with_something_wrong(capsys, recording, tmp_path, change):
 @pytest.mark.slow
 def test_nothing_that_looks_like_the_actor(capsys, recording, tmp_path):
     folder, remedy = no_initial_pose(recording)
-    refused = refused_track_lines(capsys, folder, f"actor={actor_file(tmp_path / 'actor.yaml')}")
+    left = ["initial_pose.png"]  # the guess, to be judged by the user
+    refused = refused_track_lines(capsys, folder, f"actor={actor_file(tmp_path / 'actor.yaml')}", left=left)
     assert str(folder) in refused[-1]
     assert remedy in refused[-1]
 
@@ -218,12 +219,13 @@ def test_an_example_pose_with_something_wrong(capsys, recording, command, change
     assert sorted(recording.parent.rglob("*")) == before
 
 
-def refused_track_lines(capsys, recording, *arguments):
+def refused_track_lines(capsys, recording, *arguments, left=()):
     """As `refused_track`, where the work has begun to report what it does."""
     from sogjax.cli.main import main
 
     assert main(["track", f"recording={recording}", f"out={recording.parent / 'new'}", *arguments]) == 2
-    assert not (recording.parent / "new").exists()
+    new = recording.parent / "new"
+    assert sorted(path.name for path in new.iterdir()) == [*left] if left else not new.exists()
     return capsys.readouterr().err.splitlines()
 
 
