@@ -24,7 +24,7 @@ from sogjax.model.camera import project
 from sogjax.model.sog import Sog
 from sogjax.solve.solution import QuadraticModel
 
-MOST_IMAGE_BLOBS = 256
+MOST_IMAGE_BLOBS = 192
 """Image blobs of a camera that a part is compared with: those that it could explain most of."""
 
 

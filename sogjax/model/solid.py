@@ -55,8 +55,7 @@ class Solid(eqx.Module):
             jnp.asarray(np.array(pairs, int).reshape(-1, 2)),
             jnp.zeros(len(pairs), sigmas.dtype),
         )
-        poses = jnp.stack([*body.poses.values()])
-        deepest = jnp.max(jax.vmap(lambda pose: known.depths(body.posed_blobs(pose).means))(poses), axis=0)
+        deepest = _deepest(known, body, jnp.stack([*body.poses.values()]))
         same = jnp.asarray([owners[one][0] == owners[two][0] for one, two in pairs], bool)
         allowed = jnp.where(same, jnp.maximum(deepest, 0.0), 0.0) + SOFT
         return eqx.tree_at(lambda solid: solid.allowed, known, allowed)
@@ -74,6 +73,12 @@ class Solid(eqx.Module):
     def excess(self, means: Float[Array, "blob 3"]) -> Float[Array, ""]:
         """By how much the worst pair is deeper than is allowed (metres); 0 where none is."""
         return jnp.max(self.depths(means) - self.allowed, initial=0.0)
+
+
+@eqx.filter_jit
+def _deepest(solid: Solid, body: Body, poses: Float[Array, "start dof"]) -> Float[Array, "pair"]:
+    """How deep each pair is in each other in any of some poses."""
+    return jnp.max(jax.vmap(lambda pose: solid.depths(body.posed_blobs(pose).means))(poses), axis=0)
 
 
 @eqx.filter_jit

@@ -29,12 +29,12 @@ from sogjax.tracking.capacity import views_near
 from sogjax.tracking.frame import AnyFrame, on_device
 from sogjax.tracking.tracker import Tracker
 
-NUM_DRAWN = 36
+NUM_DRAWN = 24
 """Ways to hold a unit that are drawn in a frame; another frame draws others."""
-NUM_CLIMBED = 5
+NUM_CLIMBED = 4
 """Different ways that are climbed, the tracked one among them."""
 AT_ONCE = 8
-ITERATIONS, FIT_ITERATIONS = 6, 10
+ITERATIONS, FIT_ITERATIONS = 5, 5
 APART = 0.08
 """Metres, mean over the blobs of the limb that differs more: ways to hold a unit that count as different."""
 SMALL_RANGE = 0.9

@@ -29,7 +29,7 @@ MOST_BEFORE = 45
 SURE_FRAMES = 3
 """Frames without doubt that lie between two stretches, at least."""
 
-PATIENCE, LEAST_GAIN = 6, 0.004
+PATIENCE, LEAST_GAIN = 6, 0.02
 """Frames after which a pass from another pose of a key frame ends that explains less than the known one; and what it
 gains at least, as a part of a frame's energy, for its parts to be looked at."""
 
