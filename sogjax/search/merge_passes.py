@@ -49,6 +49,8 @@ class Revised:
     energy: float
     terms: dict[str, float]
     judged: LimbConfidence
+    still: float = 0.0
+    """The energy without history: by which passes are compared, since a change of pass is no smooth motion."""
 
 
 @dataclass
@@ -126,7 +128,7 @@ class _Revising:
         for k, row in changed:
             self.passed.poses[row] = self._merged(self.passed.poses[row], found, int(k), taken[k])
         revised = {row: self._valued(row, found.cells[k]) for k, row in changed}
-        better = sum(revised[row].energy - known[row].energy for row in revised) > 0.0
+        better = sum(revised[row].still - known[row].still for row in revised) > 0.0
         for row, each in (revised if better else known).items():
             self.passed.poses[row], self.passed.energies[row] = each.pose, each.energy
             self.passed.doubts[row] = each.judged.error_probability
@@ -158,9 +160,10 @@ class _Revising:
         pose, baseline = jnp.asarray(poses[row]), jnp.asarray(self.passed.baseline[row])
         known = on_device(frame)
         views = views_near(self.tracker, known, pose, self.passed.capacities)
-        energy, terms, judged = jax.device_get(_valued(self.tracker, history, known, views, pose, baseline))
+        found = _valued(self.tracker, history, known, views, pose, baseline)
+        energy, still, terms, judged = jax.device_get(found)
         values = {name: float(term) for name, term in terms.items()}
-        return Revised(poses[row].copy(), float(energy), values, judged)
+        return Revised(poses[row].copy(), float(energy), values, judged, float(still))
 
 
 def _one_by_one(frames: FramesOfRows, rows: Sequence[int]) -> Iterator[AnyFrame]:
@@ -178,7 +181,8 @@ def _valued(
     views: Views,
     pose: Float[Array, "dof"],
     baseline: Float[Array, "2 blob"],
-) -> tuple[Float[Array, ""], dict[str, Float[Array, ""]], LimbConfidence]:
-    """Energy, terms and doubts of a pose that is known."""
-    energy = FrameEnergy(tracker.body, views, history, tracker.terms)
-    return energy(pose), energy.values(pose), tracker.judged(pose, baseline, views.windows, frame)
+) -> tuple[Float[Array, ""], Float[Array, ""], dict[str, Float[Array, ""]], LimbConfidence]:
+    """Energy, that without history, terms and doubts of a pose that is known."""
+    energy, still = (FrameEnergy(tracker.body, views, each, tracker.terms) for each in (history, History.unknown(pose)))
+    judged = tracker.judged(pose, baseline, views.windows, frame)
+    return energy(pose), still(pose), energy.values(pose), judged
