@@ -10,7 +10,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.model.body import Body
 from sogjax.model.limbs import limb_blobs
@@ -28,6 +28,8 @@ class Solid(eqx.Module):
     """The blobs where a capsule begins and ends; a sphere's are the same."""
     radii: Float[Array, "capsule"]
     """Metres."""
+    of_limbs: Bool[Array, "capsule"]
+    """Which are bones of limbs; the others are the trunk's."""
     pairs: Int[Array, "pair 2"]
     allowed: Float[Array, "pair"]
     """Metres."""
@@ -52,6 +54,7 @@ class Solid(eqx.Module):
         known = cls(
             jnp.asarray(np.array(ends, int).reshape(-1, 2)),
             jnp.asarray(radii.reshape(-1), sigmas.dtype),
+            jnp.asarray([limb >= 0 for _, limb in owners], bool),
             jnp.asarray(np.array(pairs, int).reshape(-1, 2)),
             jnp.zeros(len(pairs), sigmas.dtype),
         )
@@ -60,9 +63,19 @@ class Solid(eqx.Module):
         allowed = jnp.where(same, jnp.maximum(deepest, 0.0), 0.0) + SOFT
         return eqx.tree_at(lambda solid: solid.allowed, known, allowed)
 
-    def excess_of(self, body: Body, poses: Float[np.ndarray, "start dof"]) -> Float[np.ndarray, "start"]:
-        """The `excess` of a body in some poses."""
-        return np.asarray(_excess(self, body, jnp.asarray(poses)))
+    def deeper(
+        self, body: Body, known: Float[np.ndarray, "dof"], poses: Float[np.ndarray, "start dof"]
+    ) -> Float[np.ndarray, "start pair"]:
+        """By how much pairs that are deeper than in a known pose are deeper than is allowed (metres); 0 for others."""
+        excess = np.asarray(_excess(self, body, jnp.asarray(np.concatenate([known[None], poses]))))
+        return np.where(excess[1:] > excess[:1] + SOFT, excess[1:], 0.0)
+
+    def blobs_of(self, pairs: Bool[np.ndarray, "pair"]) -> Int[np.ndarray, "_blob"]:
+        """Blobs of what is too deep in something else: of limbs, or of trunks that are in each other."""
+        found = [np.array(self.pairs)[k] for k in np.flatnonzero(pairs)]
+        of_limbs, ends = np.asarray(self.of_limbs), np.asarray(self.ends)
+        blamed = [each for pair in found for each in pair if of_limbs[each] or not of_limbs[pair].any()]
+        return np.unique(ends[np.array(blamed, int)])
 
     def depths(self, means: Float[Array, "blob 3"]) -> Float[Array, "pair"]:
         """How deep the capsules of each pair are in each other (metres); negative where they are apart."""
@@ -70,9 +83,9 @@ class Solid(eqx.Module):
         apart = jax.vmap(segment_distance)(one, two)
         return self.radii[self.pairs[:, 0]] + self.radii[self.pairs[:, 1]] - apart
 
-    def excess(self, means: Float[Array, "blob 3"]) -> Float[Array, ""]:
-        """By how much the worst pair is deeper than is allowed (metres); 0 where none is."""
-        return jnp.max(self.depths(means) - self.allowed, initial=0.0)
+    def excess(self, means: Float[Array, "blob 3"]) -> Float[Array, "pair"]:
+        """By how much each pair is deeper than is allowed (metres); 0 where it is not."""
+        return jnp.maximum(self.depths(means) - self.allowed, 0.0)
 
 
 @eqx.filter_jit
@@ -82,7 +95,7 @@ def _deepest(solid: Solid, body: Body, poses: Float[Array, "start dof"]) -> Floa
 
 
 @eqx.filter_jit
-def _excess(solid: Solid, body: Body, poses: Float[Array, "start dof"]) -> Float[Array, "start"]:
+def _excess(solid: Solid, body: Body, poses: Float[Array, "start dof"]) -> Float[Array, "start pair"]:
     return jax.vmap(lambda pose: solid.excess(body.posed_blobs(pose).means))(poses)
 
 

@@ -65,28 +65,30 @@ def limb_groups(body: Body) -> list[tuple[int, ...]]:
 
 
 class PartArrays(eqx.Module):
-    """The parts as arrays: whole actors first, then limbs."""
+    """Parts as arrays."""
 
-    dofs: Bool[Array, "whole dof"]
+    whole: Bool[Array, "part"]
+    """Which are whole actors."""
+    dofs: Bool[Array, "part dof"]
     blobs: Bool[Array, "part blob"]
     in_pairs: Bool[Array, "part"]
     """Which are a limb of a pair."""
 
     @classmethod
     def of(cls, body: Body, parts: Sequence[Part]) -> "PartArrays":
-        """The arrays of a body's parts, which are in that order."""
-        whole = [part for part in parts if part.whole is None]
-        dofs = np.zeros((len(whole), body.skeleton.num_dofs), bool)
-        for k, part in enumerate(whole):
+        """The arrays of a body's parts."""
+        dofs = np.zeros((len(parts), body.skeleton.num_dofs), bool)
+        for k, part in enumerate(parts):
             dofs[k, part.dofs] = True
         paired = {name for part in parts if len(part.names) > 1 for name in part.names}
         in_pairs = [len(part.names) == 1 and part.names[0] in paired for part in parts]
-        return cls(jnp.asarray(dofs), jnp.asarray(np.stack([part.blobs for part in parts])), jnp.asarray(in_pairs))
+        whole, blobs = [part.whole is None for part in parts], np.stack([part.blobs for part in parts])
+        return cls(*(jnp.asarray(array) for array in (np.array(whole), dofs, blobs, np.array(in_pairs))))
 
     def mixed(self, body: Body, pose: Float[Array, "dof"], other: Float[Array, "dof"]) -> Float[Array, "part dof"]:
         """The pose with each part as it is in the other one."""
-        limbs = with_blobs(body, pose, other, self.blobs[len(self.dofs) :])
-        return jnp.concatenate([jnp.where(self.dofs, other, pose), limbs])
+        limbs = with_blobs(body, pose, other, self.blobs)
+        return jnp.where(self.whole[:, None], jnp.where(self.dofs, other, pose), limbs)
 
 
 def merged_pose(

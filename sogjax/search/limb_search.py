@@ -124,6 +124,10 @@ SLACK, WORTH = -0.002, 0.001
 there, and what it gains then for a pass to go from there."""
 DEEP = 0.04
 """Metres that limbs may be deeper in each other, or in the trunk, than in any named pose."""
+SHORT = 8
+"""Frames of a pass that cost too little to pause for."""
+MOST_ROUNDS = 3
+"""Times that limbs are searched in a frame, each from the better pose that was found."""
 PAUSE = 3
 """Key frames for which no other pass is begun after one of which nothing was taken."""
 
@@ -144,41 +148,86 @@ class LimbSearch:
         units = units_of(tracker.body)
         return cls(tracker, units, Units.of(tracker.body, units)) if units else None
 
-    def note(self, taken: bool) -> None:
-        """Learn whether anything was taken of the pass from the last pose."""
-        if not taken:
+    def note(self, num_rows: int, taken: bool) -> None:
+        """Learn how long the pass from the last pose was, and whether anything was taken of it."""
+        if not taken and num_rows > SHORT:
             self._pause_until = self._turn + PAUSE
 
-    def better_poses(self, frame: AnyFrame, passed: Pass, row: int) -> list[Float[np.ndarray, "dof"]]:
-        """Poses of a frame with limbs held otherwise, climbed with all degrees of freedom, that are worth more."""
-        pose, self._turn = passed.poses[row], self._turn + 1
+    def better_pose(self, frame: AnyFrame, passed: Pass, row: int) -> Float[np.ndarray, "dof"] | None:
+        """The pose of a frame with limbs held otherwise, climbed with all degrees of freedom, if that is worth more.
+
+        From a better pose the limbs are searched again: one may have been in the place of another.
+        """
+        self._turn += 1
+        first = pose = passed.poses[row]
         views = views_near(self.tracker, on_device(frame), jnp.asarray(pose), passed.capacities, REACH)
+        for _ in range(MOST_ROUNDS):
+            found = self._held_otherwise(views, pose)
+            if self._turn < self._pause_until:
+                return None
+            better = self._climbed(views, first, pose, found, passed.energy)
+            if better is None:
+                break
+            pose = better
+        return None if pose is first else pose
+
+    def _held_otherwise(self, views: Views, pose: Float[np.ndarray, "dof"]) -> "HeldOtherwise":
         tried = np.stack([self._tried(k, unit, pose) for k, unit in enumerate(self.units)]).astype(pose.dtype)
         found = held_otherwise(self.tracker, views, jnp.asarray(pose), self.arrays, jnp.asarray(tried))
-        found = jax.device_get(found)
-        self._carried = found
-        if self._turn < self._pause_until:
-            return []
-        promising = (found.gains > SLACK * passed.energy) & (found.apart > APART)
-        promising &= self.possible(pose, found.poses.reshape(-1, len(pose))).reshape(promising.shape)
-        starts = [found.poses[k, w] for k, w in zip(*np.nonzero(promising), strict=True)]
-        if not starts:
-            return []
-        starts = [pose, *starts[:MOST_WHOLE]]
-        starts = np.stack([*starts, *[pose] * (MOST_WHOLE + 1 - len(starts))])
-        ends, values, before = jax.device_get(climbed_in(self.tracker, views, jnp.asarray(starts)))
-        best = int(np.argmax(values))
-        moved = np.linalg.norm(np.diff(means_of(self.tracker.body, np.stack([pose, ends[best]])), axis=0), axis=-1)
-        worth = values[best] - before > WORTH * passed.energy and moved.max() > APART
-        worth &= bool(self.possible(pose, ends)[best])
-        return [ends[best]] if worth else []
+        self._carried = jax.device_get(found)
+        return self._carried
+
+    def _climbed(
+        self,
+        views: Views,
+        first: Float[np.ndarray, "dof"],
+        pose: Float[np.ndarray, "dof"],
+        found: "HeldOtherwise",
+        energy: float,
+    ) -> Float[np.ndarray, "dof"] | None:
+        """The best that is reached from a pose with units held otherwise; None: nothing that is worth more.
+
+        `first` is the tracked pose, `energy` that of a frame, for scale.
+        """
+        starts = self._starts(pose, found, energy)
+        starts = starts[self.possible(first, starts)][:MOST_WHOLE]
+        if not len(starts):
+            return None
+        padded = np.stack([pose, *starts, *[pose] * (MOST_WHOLE - len(starts))])
+        ends, values, before = jax.device_get(climbed_in(self.tracker, views, jnp.asarray(padded)))
+        moved = np.linalg.norm(means_of(self.tracker.body, ends) - means_of(self.tracker.body, pose[None]), axis=-1)
+        apart = np.max([moved[:, blobs].mean(axis=1) for unit in self.units for blobs in unit.blobs], axis=0)
+        good = (values - before > WORTH * energy) & (apart > APART) & self.possible(first, ends)
+        return ends[np.argmax(np.where(good, values, -np.inf))] if good.any() else None
+
+    def _starts(
+        self, pose: Float[np.ndarray, "dof"], found: "HeldOtherwise", energy: float
+    ) -> Float[np.ndarray, "start dof"]:
+        """What is worth climbing: the best way of every unit together, then single ones, the best first."""
+        gains = np.where(found.apart > APART, found.gains, -np.inf)
+        best, starts = gains.argmax(axis=1), []
+        gaining = [k for k, way in enumerate(best) if gains[k, way] > 0.0]
+        if len(gaining) > 1:
+            together = pose.copy()
+            for k in gaining:
+                dofs = self.units[k].all_dofs
+                together[dofs] = found.poses[k, best[k]][dofs]
+            starts.append(together)
+        order = np.argsort(-gains, axis=None)
+        promising = order[gains.reshape(-1)[order] > SLACK * energy]
+        return np.array([*starts, *found.poses.reshape(-1, len(pose))[promising]]).reshape(-1, len(pose))
 
     def possible(
         self, known: Float[np.ndarray, "dof"], poses: Float[np.ndarray, "start dof"]
     ) -> Bool[np.ndarray, "start"]:
-        """Which poses hold nothing deep in something else, or no deeper than the known one does."""
-        excess = self.solid.excess_of(self.tracker.body, np.concatenate([known[None], poses]))
-        return excess[1:] <= max(DEEP, float(excess[0]))
+        """Which poses hold nothing deep in something else, but for what is as deep in the known one."""
+        return self.solid.deeper(self.tracker.body, known, poses).max(axis=1, initial=0.0) <= DEEP
+
+    def impossible_blobs(
+        self, known: Float[np.ndarray, "dof"], pose: Float[np.ndarray, "dof"]
+    ) -> Int[np.ndarray, "_blob"]:
+        """Blobs of what a pose holds deep in something else, and a known one does not."""
+        return self.solid.blobs_of(self.solid.deeper(self.tracker.body, known, pose[None])[0] > DEEP)
 
     def _tried(self, number: int, unit: Unit, pose: Float[np.ndarray, "dof"]) -> Float[np.ndarray, "seed dof"]:
         """Ways that are drawn, and those of the last key frame."""

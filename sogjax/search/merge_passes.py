@@ -5,7 +5,7 @@ a pass goes from there both ways. Where limbs are in doubt then, a pass comes ba
 is often found again by itself, and what hid it, or moved too far for one frame, comes from the other side.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import equinox as eqx
@@ -35,10 +35,12 @@ from sogjax.tracking.capacity import views_near
 from sogjax.tracking.frame import AnyFrame, FrameInput, on_device
 from sogjax.tracking.tracker import Tracker
 
-MOSTLY = 0.3
-"""Part of the frames of a pass in which a limb may be deep in another, or the trunk."""
+IMPOSSIBLE = 0.02
+"""Part of a frame's energy that a part costs in a frame in which it is deep in something else."""
+MOST_SWEEPS = 3
+"""Times that key frames are searched, where they changed meanwhile."""
 MOST_LOOKS = 2
-"""Frames that are tracked backwards, at most, in lengths of the clip."""
+"""Frames of other passes that gain nothing, at most, in lengths of the clip."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +90,7 @@ class _Revising:
         self.tracker, self.passed, self.frames = tracker, passed, frames
         self.parts, self.revision = body_parts(tracker.body), Revision()
         self._tried: set[int] = set()
+        self._changed: set[int] = set()
         self._looked_at = 0
 
     @property
@@ -95,17 +98,35 @@ class _Revising:
         return self._looked_at > MOST_LOOKS * len(self.passed.poses)
 
     def search_limbs(self, rows: Sequence[int], report: Report) -> None:
-        """Hold limbs in other ways in some frames, and see where these lead that are worth more."""
+        """Hold limbs in other ways in some frames, and see where these lead that are worth more.
+
+        Frames that changed meanwhile are searched again: a limb may have been in the place of another.
+        """
         search = LimbSearch.of(self.tracker)
         if search is None:
             return
-        for number, (row, frame) in enumerate(zip(rows, _one_by_one(self.frames, rows), strict=True)):
+        self._search_limbs(search, rows, report)
+        for _ in range(MOST_SWEEPS - 1):
+            changed = [row for row in rows if row in self._changed]
+            self._changed.clear()
+            self._search_limbs(search, changed, unreported)
+
+    def _search_limbs(self, search: LimbSearch, rows: Sequence[int], report: Report) -> None:
+        for number, row in enumerate(rows):
+            frame = next(iter(self.frames(range(row, row + 1))))
             report(number / len(rows))
-            for pose in search.better_poses(frame, self.passed, row):
-                if not self._tired:
-                    found = compared_both_ways(self.tracker, self.passed, self.frames, self.parts, row, pose)
-                    deep = [not search.possible(self.passed.poses[k], p[None])[0] for k, p in found.poses_by_row()]
-                    search.note(float(np.mean(deep)) < MOSTLY and self.take(found))
+            pose = None if self._tired else search.better_pose(frame, self.passed, row)
+            if pose is not None:
+                found = compared_both_ways(self.tracker, self.passed, self.frames, self.parts, row, pose)
+                search.note(len(found.rows), self.take(self._without_impossible(search, found)))
+
+    def _without_impossible(self, search: LimbSearch, found: Compared) -> Compared:
+        """The other pass; nothing is gained by parts that it holds deep in something else."""
+        for k, (row, pose) in enumerate(zip(found.rows, found.poses, strict=True)):
+            blobs = search.impossible_blobs(self.passed.poses[row], pose)
+            at_fault = np.array([part.blobs[blobs].any() for part in self.parts])
+            found.gains[k] = np.where(at_fault, -IMPOSSIBLE * self.passed.energy, found.gains[k])
+        return found
 
     def next_stretch(self) -> tuple[int, int] | None:
         """First and last frame of the last stretch in doubt from behind which no pass has begun."""
@@ -120,7 +141,6 @@ class _Revising:
     def take(self, found: Compared) -> bool:
         """Revise what another pass explains better; whether that raises the energy of the stretch, else all stays."""
         rows, total = np.array(found.rows), len(self.passed.poses)
-        self._looked_at += len(rows)
         ends = (bool(rows[0] in (0, total - 1)), bool(rows[-1] in (0, total - 1)))
         taken = select_parts(self.parts, np.stack(found.apart), np.stack(found.gains), self.passed.energy, ends)
         changed = [(k, int(rows[k])) for k in np.flatnonzero(taken.any(axis=1))]
@@ -132,8 +152,11 @@ class _Revising:
         for row, each in (revised if better else known).items():
             self.passed.poses[row], self.passed.energies[row] = each.pose, each.energy
             self.passed.doubts[row] = each.judged.error_probability
-        if better:
+        if not better:
+            self._looked_at += len(rows)
+        else:
             self.revision.frames.update(revised)
+            self._changed |= set(revised)
         for part, of_part in zip(self.parts, taken.T, strict=True):
             for name in part.names if better and of_part.any() else ():
                 self.revision.parts.setdefault(name, set()).update(rows[of_part].tolist())
@@ -164,13 +187,6 @@ class _Revising:
         energy, still, terms, judged = jax.device_get(found)
         values = {name: float(term) for name, term in terms.items()}
         return Revised(poses[row].copy(), float(energy), values, judged, float(still))
-
-
-def _one_by_one(frames: FramesOfRows, rows: Sequence[int]) -> Iterator[AnyFrame]:
-    """What is seen in some rows, which follow each other at equal steps."""
-    if len(rows) < 2:
-        return (frame for row in rows for frame in frames(range(row, row + 1)))
-    return iter(frames(range(rows[0], rows[-1] + 1, rows[1] - rows[0])))
 
 
 @eqx.filter_jit

@@ -3,7 +3,7 @@
 It begins behind frames in doubt and goes backwards, or at another pose of a key frame and goes both ways.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 
 import equinox as eqx
@@ -83,10 +83,6 @@ class Compared:
     apart: list[Float[np.ndarray, "part"]] = field(default_factory=list)
     """Metres."""
 
-    def poses_by_row(self) -> Iterator[tuple[int, Float[np.ndarray, "dof"]]]:
-        """The poses with their rows."""
-        return zip(self.rows, self.poses, strict=True)
-
     def joined(self, later: "Compared") -> "Compared":
         """These frames turned round, then later ones of which the first is known already."""
         parts = (getattr(self, each.name)[::-1] + getattr(later, each.name)[1:] for each in fields(self))
@@ -163,10 +159,15 @@ def compared(
     hopeless = patience is not None and max(np.cumsum(gained)) < LEAST_GAIN * passed.energy
     for k, row in enumerate(found.rows):
         both = (jnp.asarray(passed.poses[row]), jnp.asarray(found.poses[k]))
-        differs = found.apart[k].max(initial=0.0) > numbers.compared and not hopeless
-        gains = part_gains(tracker, found.cells[k], capacities[k], choices, *both) if differs else np.zeros(len(parts))
-        found.gains.append(gains)
+        differ = np.zeros(len(parts), bool) if hopeless else _differ(parts, found.apart[k] > numbers.compared)
+        found.gains.append(part_gains(tracker, found.cells[k], capacities[k], choices, *both, differ))
     return found
+
+
+def _differ(parts: Sequence[Part], apart: Bool[np.ndarray, "part"]) -> Bool[np.ndarray, "part"]:
+    """Parts to be compared: limbs that are apart, the pairs with one of these, and whole actors if anything is."""
+    moved = {name for part, is_apart in zip(parts, apart, strict=True) if is_apart for name in part.names}
+    return np.array([bool(moved) if part.whole is None else not moved.isdisjoint(part.names) for part in parts])
 
 
 @eqx.filter_jit
@@ -179,6 +180,10 @@ def _apart(
     return jnp.mean(apart, axis=-1, where=blobs)
 
 
+PARTS_AT_ONCE = 4
+"""Parts whose gains are computed in one call: seldom do more differ."""
+
+
 def part_gains(
     tracker: Tracker,
     frame: AnyFrame,
@@ -186,22 +191,42 @@ def part_gains(
     parts: PartArrays,
     first: Float[Array, "dof"],
     second: Float[Array, "dof"],
+    asked: Bool[np.ndarray, "part"] | None = None,
 ) -> Float[np.ndarray, "part"]:
     """The rise of the energy with each part of the second pose instead of the first one's.
 
     What holds around a part is the rest of the first pose, or that of the second; in what is seen near either. Of a
     limb that has a counterpart the lesser rise counts: where two are exchanged, one by itself gains only beside the
     other's new place. Of other parts it is the mean.
+
+    Args:
+        tracker: whose energy it is.
+        frame: what is seen.
+        capacities: room for image blobs.
+        parts: of the body.
+        first: the pose that is known.
+        second: the other one.
+        asked: of which parts the rise is wanted; None: of all. It is 0 for the others.
     """
-    known, body = on_device(frame), tracker.body
-    poses = _mixed(body, parts, first, second)
+    found = np.zeros(len(parts.whole))
+    rows = np.arange(len(found)) if asked is None else np.flatnonzero(asked)
+    if len(rows):
+        known = on_device(frame)
+        views = [views_near(tracker, known, at, capacities) for at in (first, second)]
+        for some in np.split(rows, range(PARTS_AT_ONCE, len(rows), PARTS_AT_ONCE)):
+            chosen = np.resize(some, PARTS_AT_ONCE)
+            those = jax.tree.map(lambda leaf, chosen=chosen: leaf[chosen], parts)
+            found[some] = np.asarray(_gains(tracker, views, those, first, second))[: len(some)]
+    return found
 
-    def seen_near(at: Float[Array, "dof"]) -> Float[np.ndarray, "2 part"]:
-        values = np.asarray(values_in(tracker, views_near(tracker, known, at, capacities), poses))
-        into_first, into_second = values[2:].reshape(2, -1)
-        return np.stack([into_first - values[0], values[1] - into_second])
 
-    around = 0.5 * (seen_near(first) + seen_near(second))
+def _gains(
+    tracker: Tracker, views: Sequence[Views], parts: PartArrays, first: Float[Array, "dof"], second: Float[Array, "dof"]
+) -> Float[np.ndarray, "part"]:
+    poses = _mixed(tracker.body, parts, first, second)
+    values = np.stack([np.asarray(values_in(tracker, near, poses)) for near in views])
+    into_first, into_second = np.split(values[:, 2:], 2, axis=1)
+    around = np.stack([into_first - values[:, :1], values[:, 1:2] - into_second]).mean(axis=1)
     return np.where(np.asarray(parts.in_pairs), around.min(axis=0), around.mean(axis=0))
 
 
