@@ -13,6 +13,7 @@ from sogjax.io.image_file import write_image
 from sogjax.io.motion import motion_from_poses
 from sogjax.io.video import read_frames
 from sogjax.model.body import Body
+from sogjax.quality.fitted import fitted_numbers
 from sogjax.run import build
 from sogjax.run.background import Background
 from sogjax.run.clip import Clip, spread_frames
@@ -52,6 +53,12 @@ class Guess:
     def sure(self) -> bool:
         """Whether tracking can begin there: the trunks of all actors are sure, and who is who."""
         return all(pose.trunk_sure for pose in self.poses)
+
+    @property
+    def side_by_side(self) -> bool:
+        """Whether each of several actors keeps what it explains beside the others: another frame tells no more."""
+        least = fitted_numbers().pose_agreement.least_share
+        return len(self.poses) > 1 and all(pose.energy > 0.0 and pose.share >= least for pose in self.poses)
 
     @property
     def confidence(self) -> float:
@@ -194,7 +201,7 @@ def best_guess(search: ClipSearch, picture: Path | None = None) -> Guess:
         with alive(f"searching for the initial pose in frame {frame}") as work:
             guesses += search.guesses(frame, partial(setattr, work, "share"))
         say_guess(names, max(guesses, key=lambda guess: guess.confidence))
-        if any(guess.sure for guess in guesses):
+        if any(guess.sure or guess.side_by_side for guess in guesses):
             break
     best = likeliest(guesses)
     if best.sure:

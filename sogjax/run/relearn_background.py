@@ -5,14 +5,14 @@ it counts as background at first. When the body was followed, it does.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, UInt8
 
 from sogjax.errors import InputError
 from sogjax.io.recording import Recording
@@ -22,6 +22,7 @@ from sogjax.run.clip_learning import LeftOut, UnsuitableError, background_sample
 from sogjax.run.initial_pose import InitialPose
 from sogjax.run.setup import Setup
 from sogjax.run.terminal import progress, say
+from sogjax.scene.background import BackgroundImage
 from sogjax.scene.background_difference import working_size
 from sogjax.scene.clip_background import FEWEST_AGREEING
 from sogjax.search.search_energy import DISC
@@ -29,11 +30,17 @@ from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.tracker import Tracker
 from sogjax.view.projection import picture_points
 
-FOLDER = "relearnt"
+FOLDER, FIRST = "relearnt", "first"
 MUCH_UNKNOWN = 0.015
 """Share of the pictures from which on the background is learnt again; a subject covers some 0.05 of them."""
 BORDER = 0.15
 """Metres around a blob that are left out, too: the body may be a little off. With 0.25 too little is left to learn."""
+
+
+SAME = 16
+"""Grey levels, of the channel that differs most: within, what the first background shows is what the body showed."""
+MOSTLY = 0.6
+"""Part of the samples in which the body covers a pixel: showing the same in so many, it was taken for background."""
 
 
 @dataclass(frozen=True)
@@ -41,12 +48,14 @@ class RelearntBackground:
     """What was learnt where the body is not; None: the first background does."""
 
     background: Background | None
+    first: Background | None = None
+    """The first background without what turned out to be the body; it holds where nothing was learnt."""
 
     def in_tracker(self, setup: Setup) -> Tracker:
         """The tracker with this background where something is known of it, and with its own elsewhere."""
         if self.background is None:
             return setup.tracker
-        again, before = self.background.model(setup.clip.grids), setup.tracker.reader.background
+        again, before = (found and found.model(setup.clip.grids) for found in (self.background, self.first))
         assert again is not None
         assert before is not None
         return eqx.tree_at(lambda t: t.reader.background, setup.tracker, again.filled_by(before))
@@ -54,12 +63,15 @@ class RelearntBackground:
     def save(self, folder: Path) -> None:
         """Keep it in a run's folder."""
         (self.background or Background(None)).save(folder / FOLDER)
+        (self.first or Background(None)).save(folder / FIRST)
 
     @classmethod
     def load(cls, folder: Path) -> "RelearntBackground | None":
         """What was kept, if it was."""
-        kept = Background.load(folder / FOLDER)
-        return None if kept is None else cls(kept if kept.cameras else None)
+        kept, first = (Background.load(folder / name) for name in (FOLDER, FIRST))
+        if kept is None or first is None:
+            return None
+        return cls(*(found if found.cameras else None for found in (kept, first)))
 
 
 def relearn_background(
@@ -87,11 +99,40 @@ def relearn_background(
             "then again"
         )
         poses = _tracked_poses(setup, start, frozenset(samples))
+    body = setup.tracker.body
     try:
-        learnt = learnt_from(setup.clip, body_masks(setup.clip.recording, setup.tracker.body, poses))
+        learnt = learnt_from(setup.clip, body_masks(setup.clip.recording, body, poses))
     except UnsuitableError as reason:
         raise InputError(f"{setup.clip.recording.path}: no background can be learnt, since {reason}") from reason
-    return RelearntBackground(Background(learnt))
+    shown = setup.clip.sampled([background_samples(setup.clip.recording)])[0]
+    masks = body_masks(setup.clip.recording, body, poses, border=0.0)
+    known = zip(background.required(), shown, masks.values(), strict=True)
+    without = [without_body(first, *of_camera) for first, *of_camera in known]
+    return RelearntBackground(Background(learnt), Background(tuple(without)))
+
+
+def without_body(
+    first: BackgroundImage,
+    shown: Mapping[int, UInt8[np.ndarray, "rows columns 3"]],
+    covered: Mapping[int, Bool[np.ndarray, "rows columns"]],
+) -> BackgroundImage:
+    """A learnt background that knows nothing where it shows what the body did that stood there.
+
+    Args:
+        first: of one camera.
+        shown: what it showed, by frame.
+        covered: where the body was, by frame.
+    """
+    if first.origin != "clip":
+        return first
+    count, same = np.zeros(first.known.shape), np.zeros(first.known.shape)
+    picture = first.picture.astype(np.int16)
+    for frame in shown.keys() & covered.keys():
+        if not covered[frame].all():
+            count += covered[frame]
+            same += covered[frame] & (np.abs(picture - shown[frame]).max(axis=-1) <= SAME)
+    taken = (count >= FEWEST_AGREEING) & (same >= MOSTLY * count)
+    return replace(first, known=first.known & ~taken)
 
 
 def frames_to_learn_from(unknown: float, samples: Sequence[int], numbers: range) -> list[int]:
@@ -134,20 +175,21 @@ def _tracked_poses(setup: Setup, start: InitialPose, wanted: frozenset[int]) -> 
     return poses
 
 
-def body_masks(recording: Recording, body: Body, poses: Mapping[int, Array]) -> LeftOut:
+def body_masks(recording: Recording, body: Body, poses: Mapping[int, Array], border: float = BORDER) -> LeftOut:
     """Where a body is in the sampled frames, widened; a frame whose pose is not known is left out as a whole.
 
     Args:
         recording: with the cameras.
         body: upright in the recording's world.
         poses: by frame.
+        border: metres by which it is widened.
     """
     frames = background_samples(recording).frames
     known = [frame for frame in frames if frame in poses]
     blobs = eqx.filter_jit(lambda body, pose: body.posed_blobs(pose))
     means = np.stack([np.asarray(blobs(body, jnp.asarray(poses[frame])).means, float) for frame in known])
     pixels, depths = picture_points(recording.rig, means)
-    radii = DISC * np.asarray(body.blob_sigmas, float) + BORDER
+    radii = DISC * np.asarray(body.blob_sigmas, float) + border
     masks: dict[str, dict[int, Bool[np.ndarray, "rows columns"]]] = {}
     for k, name in enumerate(recording.rig.names):
         width, height = working_size(*recording.rig.image_size(name))
