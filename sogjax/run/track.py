@@ -10,6 +10,7 @@ from sogjax.energy.term import Term
 from sogjax.io.frame_motions import load_motions
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
+from sogjax.quality.proportions import odd_sentence
 from sogjax.run import build
 from sogjax.run.actor_report import report_folder, write_actor_report
 from sogjax.run.actors import ActorRequest, Actors, make_actors
@@ -133,6 +134,8 @@ def _report_actors(made: Sequence[MadeActor], recording: Recording, out: Path) -
             older.unlink()
         report = write_actor_report(folder, actor, recording.rig)
         say(f"{actor.body.name}: silhouettes and masks agree to {report.mean_iou:.2f}; see {folder / 'report.md'}")
+        if (odd := odd_sentence(actor.body, actor.start)) is not None:
+            say(f"warning: {actor.body.name}: {odd}")
 
 
 def _ended(folder: RunFolder, recording: Recording) -> RunResult:
