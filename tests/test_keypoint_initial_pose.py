@@ -32,9 +32,7 @@ HUMAN = shipped("human")
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Four cameras that see a person walk, with keypoints and without a rough pose."""
-    settings = SynthSettings(
-        cameras=4, frames=FRAMES, width=160, height=120, example_poses=False, shadows=False
-    )
+    settings = SynthSettings(cameras=4, frames=FRAMES, width=160, height=120, example_poses=False, shadows=False)
     path = tmp_path_factory.mktemp("rendered") / "walk"
     render_recording(settings, path, workers=1, detector=DetectorSettings(keypoints="pose2sim"))
     (path / "initial_pose.yaml").unlink()
@@ -106,7 +104,7 @@ def test_a_person_of_the_keypoints_where_nobody_is_seen_is_no_actor(folder, caps
     true = np.asarray(triangulated_people(kept, recording.rig).points[:, 0])
     phantom = np.zeros((len(recording.rig), FRAMES, 1, *true.shape[1:]), np.float32)
     for camera, name in enumerate(recording.rig.names):
-        pixels = opencv_pixels(recording.rig, name, np.nan_to_num(true + [1.0, 1.1, 0.0]).reshape(-1, 3))
+        pixels = opencv_pixels(recording.rig, name, np.nan_to_num(true + np.array([1.0, 1.1, 0.0])).reshape(-1, 3))
         phantom[camera, ..., :2] = pixels.reshape(FRAMES, 1, -1, 2)
         phantom[camera, ..., 2] = np.isfinite(true).all(-1)[:, None]
 

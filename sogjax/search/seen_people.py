@@ -1,4 +1,4 @@
-"""Whether the people of keypoints are where somebody is seen: detectors find people in mirrors, posters and furniture."""
+"""Whether the people of keypoints are where somebody is seen: detectors find people in mirrors and posters, too."""
 
 from collections.abc import Mapping
 
