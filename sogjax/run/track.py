@@ -22,6 +22,7 @@ from sogjax.run.example_frames import check_actors
 from sogjax.run.fingerprint import run_fingerprint
 from sogjax.run.initial_pose import SOURCES, PoseSource, described_poses, pose_file
 from sogjax.run.judge import compared, kept_verdicts
+from sogjax.run.kept_actors import forget_actors
 from sogjax.run.memory import forget_programs_if_many
 from sogjax.run.recordings import chosen_frames, file_list, opened, upright
 from sogjax.run.result import RunResult
@@ -76,6 +77,8 @@ def track_to_folder(
             _ = run.adjusts  # refused before any work, where it cannot be
         run_passes(run)
         folder.finish(command, fingerprint, run.files)
+        if run.makes_actors:
+            forget_actors(run.actor_request, config.images)
     return replace(run.result, files=run.files)
 
 
