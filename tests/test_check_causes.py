@@ -7,13 +7,15 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from command_line import actor_file, refused, trackable
-from rig_cases import opencv_pixels, ring_rig
+from rig_cases import opencv_pixels, recording_of, ring_rig
 from small_recording import make_recording, toml_camera, write_calibration
 
 from sogjax.check.calibration import unit_rig
 from sogjax.check.cameras import rig_geometry
 from sogjax.check.examination import opening_problems
-from sogjax.check.scale import implausible_distance, scale_findings
+from sogjax.check.motion import motion_of, pair_barcodes
+from sogjax.check.pictures import Clip
+from sogjax.check.scale import SubjectSize, implausible_distance, scale_findings
 from sogjax.cli.main import main
 from sogjax.cli.schemas import SCHEMAS
 from sogjax.cli.words import composed
@@ -142,3 +144,30 @@ def test_every_command_accepts_overwrite(command):
     schema = SCHEMAS[command].__dataclass_fields__
     words = [f"{key.removesuffix('_')}={value}" for key, value in required.items() if key in schema]
     assert composed(command, [*words, "overwrite=true"]).overwrite
+
+
+def test_a_mouse_is_no_person_with_a_wrong_unit():
+    """Four cameras 0.3 m away, a tenth of the usual set-up, as for small animals."""
+    near = rig_geometry(unit_rig(ring_rig(4), 10.0), "z")
+    (unsaid,) = scale_findings(None, near, None)
+    assert unsaid.severity == "warning"
+    assert "body=FILE" in unsaid.remedy
+    (said,) = scale_findings(None, near, None, subject=0.1)
+    assert said.severity == "ok"
+    (tall,) = scale_findings(SubjectSize(0.06, 0.0), near, None, subject=0.08)
+    assert tall.severity == "ok"
+    (small,) = scale_findings(SubjectSize(0.06, 0.0), near, None)
+    assert small.severity == "warning"
+    (wrong,) = scale_findings(SubjectSize(1700.0, 0.0), near, None)
+    assert wrong.severity == "error"
+    assert "unit: mm" in wrong.remedy
+
+
+def test_pixels_without_a_direction_do_not_disturb_what_moves():
+    """A lens model that gives no angle towards the corners; warnings are errors in tests."""
+    rig = ring_rig(3, distortion=(-0.9, 0.4, 0.0, 0.0, 0.0))
+    rng = np.random.default_rng(0)
+    grey = tuple(rng.integers(0, 255, (8, 40, 60), dtype=np.uint8) for _ in rig.names)
+    clip = Clip(recording_of(rig, 8), 0, grey, np.ones((3, 8), bool), {}, {})
+    codes = pair_barcodes(motion_of(clip, rig))
+    assert all(np.isfinite(part).all() for both in codes.values() for part in both)

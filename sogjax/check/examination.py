@@ -70,7 +70,14 @@ class Examination:
     """The whole `frame_offset` of each camera to be written, where any was found; else empty."""
 
 
-def examined(recording: Recording, start: int, frames: int, largest_offset: int, progress: Progress) -> Examination:
+def examined(
+    recording: Recording,
+    start: int,
+    frames: int,
+    largest_offset: int,
+    progress: Progress,
+    subject: float | None = None,
+) -> Examination:
     """Look at cameras, files, frames, synchrony, silhouettes, size and exposure of a recording.
 
     Args:
@@ -79,6 +86,7 @@ def examined(recording: Recording, start: int, frames: int, largest_offset: int,
         frames: its length at most.
         largest_offset: offsets between cameras are looked for up to so many frames.
         progress: wraps the frames while they are read.
+        subject: the extent of the body that is to be tracked, metres; None: a person, unless it is smaller.
 
     Raises:
         InputError: a video that ends early, or a picture that does not open.
@@ -93,7 +101,7 @@ def examined(recording: Recording, start: int, frames: int, largest_offset: int,
     offsets = [0 if camera in jumps else found.of(camera) for camera in range(len(names))]
     stills = stills_in_step(clip, offsets)
     plates = read_plates(clip)
-    seen = _looks(recording, relative, geometry, stills, plates)
+    seen = _looks(recording, relative, geometry, stills, plates, subject)
     findings = [
         *(Finding("note", "files", warning) for warning in recording.warnings),
         *camera_findings(rig, geometry, recording.up),
@@ -157,6 +165,7 @@ def _looks(
     geometry: RigGeometry,
     stills: Sequence[dict[int, Picture]],
     plates: Plates,
+    subject: float | None,
 ) -> _Looks:
     """Compare example poses, backgrounds and stills of the videos with each other and with the calibration."""
     names = recording.rig.names
@@ -176,7 +185,7 @@ def _looks(
     of_exposure = exposure_findings(names, compared, "example poses" if photographed else "videos")
     gains = [[None if np.isnan(gain) else round(float(gain), 4) for gain in row] for row in compared.gains]
     unlike = plate_findings(recording, here(plates.fitted))
-    findings = [*places, *unlike, *changes, *agreement, *scale_findings(size, geometry, unit), *of_exposure]
+    findings = [*places, *unlike, *changes, *agreement, *scale_findings(size, geometry, unit, subject), *of_exposure]
     return _Looks(findings, fits, size, dict(zip(names, gains, strict=True)))
 
 
