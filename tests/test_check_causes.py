@@ -6,15 +6,18 @@ import cv2
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from body_cases import shipped
 from command_line import actor_file, refused, trackable
+from drawn_scene import draw, in_colors, standing
 from rig_cases import opencv_pixels, recording_of, ring_rig
 from small_recording import make_recording, toml_camera, write_calibration
 
-from sogjax.check.calibration import unit_rig
+from sogjax.check.agreement import Misfit
+from sogjax.check.calibration import _slightly_turned, calibration_findings, unit_rig
 from sogjax.check.cameras import rig_geometry
 from sogjax.check.examination import opening_problems
 from sogjax.check.motion import motion_of, pair_barcodes
-from sogjax.check.pictures import Clip
+from sogjax.check.pictures import Clip, Moment
 from sogjax.check.scale import SubjectSize, implausible_distance, scale_findings
 from sogjax.cli.main import main
 from sogjax.cli.schemas import SCHEMAS
@@ -171,3 +174,40 @@ def test_pixels_without_a_direction_do_not_disturb_what_moves():
     clip = Clip(recording_of(rig, 8), 0, grey, np.ones((3, 8), bool), {}, {})
     codes = pair_barcodes(motion_of(clip, rig))
     assert all(np.isfinite(part).all() for both in codes.values() for part in both)
+
+
+def fits(*away):
+    return {camera: Misfit(0.95, degrees, 0.0) for camera, degrees in enumerate(away)}
+
+
+@pytest.mark.parametrize(
+    ("away", "told"),
+    [
+        ((0.0, 0.6, 0.0, 0.3, 0.0, 0.0), True),
+        ((0.0, 0.45, 0.0, 0.0), True),
+        ((0.0, 0.3, 0.0, 0.0), False),
+        ((0.0, 0.6, 0.5, 0.0, 0.0), False),
+        ((0.3, 0.6, 0.3, 0.3), False),
+        ((0.0, 0.6, 0.0), False),
+    ],
+)
+def test_a_camera_that_is_slightly_turned_is_told_where_all_others_agree(away, told):
+    found = _slightly_turned(ring_rig(len(away)), fits(*away), "videos")
+    assert [finding.cameras for finding in found] == ([("cam1",)] if told else [])
+
+
+def test_a_turn_of_seven_tenths_of_a_degree_is_seen_in_silhouettes():
+    body, rig = in_colors(shipped("human")), ring_rig(5, (640, 480), distance=3.5)
+    pose = standing(body, 1.0)
+    masks = dict(enumerate(draw(body, pose, rig, masks=True)))
+    turned = np.array(rig.cameras.camera_from_world, float)
+    about_up = cv2.Rodrigues(np.array([0.0, np.deg2rad(0.7), 0.0]))[0]
+    turned[2, :3] = about_up @ turned[2, :3]
+    poses = jnp.asarray(turned, rig.cameras.camera_from_world.dtype)
+    moved = CameraRig(rig.names, replace(rig.cameras, camera_from_world=poses))
+    moment = Moment({}, masks)
+    findings = lambda cameras: calibration_findings(unit_rig(cameras, 3.5), [moment], [])[0]
+    assert [finding.severity for finding in findings(rig)] == ["ok"]
+    (found,) = findings(moved)
+    assert found.cameras == ("cam2",)
+    assert "0.5 degrees" in found.what or "0.6 degrees" in found.what or "0.7 degrees" in found.what
