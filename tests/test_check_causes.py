@@ -6,14 +6,19 @@ import cv2
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from body_cases import shipped
 from command_line import actor_file, refused, trackable
-from rig_cases import opencv_pixels, ring_rig
+from drawn_scene import draw, in_colors, standing
+from rig_cases import opencv_pixels, recording_of, ring_rig
 from small_recording import make_recording, toml_camera, write_calibration
 
-from sogjax.check.calibration import unit_rig
+from sogjax.check.agreement import Misfit
+from sogjax.check.calibration import _slightly_turned, calibration_findings, unit_rig
 from sogjax.check.cameras import rig_geometry
 from sogjax.check.examination import opening_problems
-from sogjax.check.scale import implausible_distance, scale_findings
+from sogjax.check.motion import motion_of, pair_barcodes
+from sogjax.check.pictures import Clip, Moment
+from sogjax.check.scale import SubjectSize, implausible_distance, scale_findings
 from sogjax.cli.main import main
 from sogjax.cli.schemas import SCHEMAS
 from sogjax.cli.words import composed
@@ -142,3 +147,67 @@ def test_every_command_accepts_overwrite(command):
     schema = SCHEMAS[command].__dataclass_fields__
     words = [f"{key.removesuffix('_')}={value}" for key, value in required.items() if key in schema]
     assert composed(command, [*words, "overwrite=true"]).overwrite
+
+
+def test_a_mouse_is_no_person_with_a_wrong_unit():
+    """Four cameras 0.3 m away, a tenth of the usual set-up, as for small animals."""
+    near = rig_geometry(unit_rig(ring_rig(4), 10.0), "z")
+    (unsaid,) = scale_findings(None, near, None)
+    assert unsaid.severity == "warning"
+    assert "body=FILE" in unsaid.remedy
+    (said,) = scale_findings(None, near, None, subject=0.1)
+    assert said.severity == "ok"
+    (tall,) = scale_findings(SubjectSize(0.06, 0.0), near, None, subject=0.08)
+    assert tall.severity == "ok"
+    (small,) = scale_findings(SubjectSize(0.06, 0.0), near, None)
+    assert small.severity == "warning"
+    (wrong,) = scale_findings(SubjectSize(1700.0, 0.0), near, None)
+    assert wrong.severity == "error"
+    assert "unit: mm" in wrong.remedy
+
+
+def test_pixels_without_a_direction_do_not_disturb_what_moves():
+    """A lens model that gives no angle towards the corners; warnings are errors in tests."""
+    rig = ring_rig(3, distortion=(-0.9, 0.4, 0.0, 0.0, 0.0))
+    rng = np.random.default_rng(0)
+    grey = tuple(rng.integers(0, 255, (8, 40, 60), dtype=np.uint8) for _ in rig.names)
+    clip = Clip(recording_of(rig, 8), 0, grey, np.ones((3, 8), bool), {}, {})
+    codes = pair_barcodes(motion_of(clip, rig))
+    assert all(np.isfinite(part).all() for both in codes.values() for part in both)
+
+
+def fits(*away):
+    return {camera: Misfit(0.95, degrees, 0.0) for camera, degrees in enumerate(away)}
+
+
+@pytest.mark.parametrize(
+    ("away", "told"),
+    [
+        ((0.0, 0.6, 0.0, 0.3, 0.0, 0.0), True),
+        ((0.0, 0.45, 0.0, 0.0), True),
+        ((0.0, 0.3, 0.0, 0.0), False),
+        ((0.0, 0.6, 0.5, 0.0, 0.0), False),
+        ((0.3, 0.6, 0.3, 0.3), False),
+        ((0.0, 0.6, 0.0), False),
+    ],
+)
+def test_a_camera_that_is_slightly_turned_is_told_where_all_others_agree(away, told):
+    found = _slightly_turned(ring_rig(len(away)), fits(*away), "videos")
+    assert [finding.cameras for finding in found] == ([("cam1",)] if told else [])
+
+
+def test_a_turn_of_seven_tenths_of_a_degree_is_seen_in_silhouettes():
+    body, rig = in_colors(shipped("human")), ring_rig(5, (640, 480), distance=3.5)
+    pose = standing(body, 1.0)
+    masks = dict(enumerate(draw(body, pose, rig, masks=True)))
+    turned = np.array(rig.cameras.camera_from_world, float)
+    about_up = cv2.Rodrigues(np.array([0.0, np.deg2rad(0.7), 0.0]))[0]
+    turned[2, :3] = about_up @ turned[2, :3]
+    poses = jnp.asarray(turned, rig.cameras.camera_from_world.dtype)
+    moved = CameraRig(rig.names, replace(rig.cameras, camera_from_world=poses))
+    moment = Moment({}, masks)
+    findings = lambda cameras: calibration_findings(unit_rig(cameras, 3.5), [moment], [])[0]
+    assert [finding.severity for finding in findings(rig)] == ["ok"]
+    (found,) = findings(moved)
+    assert found.cameras == ("cam2",)
+    assert "0.5 degrees" in found.what or "0.6 degrees" in found.what or "0.7 degrees" in found.what

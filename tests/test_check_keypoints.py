@@ -1,5 +1,7 @@
 """Checking keypoint files: a camera whose files are all wrong is named."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from command_line import done
@@ -7,8 +9,15 @@ from project_cases import pose2sim
 from rig_cases import opencv_pixels, recording_of, ring_rig
 
 from sogjax.check.keypoints import agreement, suspects
-from sogjax.io.keypoints.load import Keypoints
+from sogjax.check.pictures import read_clip, read_plates
+from sogjax.check.unseen_people import unseen_people_findings
+from sogjax.io.keypoints.load import Keypoints, load_keypoints
 from sogjax.io.keypoints.scheme import named_scheme
+from sogjax.io.recording import open_recording
+from sogjax.search.keypoint_people import triangulated_people
+from sogjax.synth.detector import DetectorSettings
+from sogjax.synth.render import render_recording
+from sogjax.synth.settings import SynthSettings
 
 FRAMES = 6
 
@@ -62,3 +71,37 @@ def test_a_pose2sim_project_is_checked_as_it_is(capsys, tmp_path):
     (folder / "pose/cam01_json/cam01_000000.json").write_text("{")
     out, _ = done(capsys, "check", f"recording={folder}", f"out={tmp_path / 'out'}")
     assert "1 file of 4 left out" in out
+
+
+@pytest.fixture(scope="module")
+def two_people(tmp_path_factory):
+    """Four cameras that see two people pass each other, with the keypoints of both."""
+    settings = SynthSettings(
+        motion="pass", actors=2, cameras=4, frames=10, width=160, height=120, example_poses=False, shadows=False
+    )
+    path = tmp_path_factory.mktemp("rendered") / "two"
+    render_recording(settings, path, workers=1, detector=DetectorSettings(keypoints="pose2sim"))
+    return path
+
+
+@pytest.mark.parametrize("plates", [True, False])
+def test_a_person_of_the_keypoints_who_is_never_in_the_pictures_is_told(two_people, plates):
+    recording = open_recording(two_people)
+    clip = read_clip(recording, 0, 10, lambda items, total, label: iter(items))
+    backgrounds = read_plates(clip).usable if plates else {}
+    keypoints = load_keypoints(recording)
+    assert keypoints is not None
+    assert unseen_people_findings(keypoints, clip, backgrounds, range(10)) == []
+    people = np.asarray(triangulated_people(keypoints, recording.rig, 2).points, float)
+    beside = np.nan_to_num(people[:, 0] + np.array([0.3, 1.6, 0.0]))
+    points = np.zeros((4, 10, 3, *people.shape[2:]), np.float32)
+    points[:, :, :2] = keypoints.points[:, :, :2]
+    for camera, name in enumerate(recording.rig.names):
+        points[camera, :, 2, :, :2] = opencv_pixels(recording.rig, name, beside.reshape(-1, 3)).reshape(10, -1, 2)
+        points[camera, :, 2, :, 2] = 0.8 * np.isfinite(people[:, 0]).all(-1)
+    if not plates:  # who moves that little might have become background
+        assert unseen_people_findings(replace(keypoints, points=points), clip, {}, range(10)) == []
+        return
+    (finding,) = unseen_people_findings(replace(keypoints, points=points), clip, backgrounds, range(10))
+    assert "3 people" in finding.what
+    assert "never in the pictures" in finding.what

@@ -7,16 +7,19 @@ import numpy as np
 import pytest
 from body_cases import shipped
 from keypoint_cases import write_keypoints
+from rig_cases import opencv_pixels
 
 from sogjax.io.ground_truth import load_ground_truth
 from sogjax.io.keypoints.load import load_keypoints
 from sogjax.io.recording import open_recording
 from sogjax.run.actors import Actors
-from sogjax.run.background import Background
+from sogjax.run.background import Background, learn_background
 from sogjax.run.clip import Clip
+from sogjax.run.clip_keypoints import clip_keypoints
 from sogjax.run.initial_pose import PoseRequest, find_initial_pose, from_example_frames, from_file, from_keypoints
 from sogjax.run.keypoint_initial_pose import keypoint_poses
 from sogjax.run.recordings import upright
+from sogjax.search.keypoint_people import triangulated_people
 from sogjax.settings.compose import track_config
 from sogjax.synth.detector import DetectorSettings
 from sogjax.synth.render import render_recording
@@ -29,9 +32,7 @@ HUMAN = shipped("human")
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Four cameras that see a person walk, with keypoints and without a rough pose."""
-    settings = SynthSettings(
-        cameras=4, frames=FRAMES, width=160, height=120, example_poses=False, background=False, shadows=False
-    )
+    settings = SynthSettings(cameras=4, frames=FRAMES, width=160, height=120, example_poses=False, shadows=False)
     path = tmp_path_factory.mktemp("rendered") / "walk"
     render_recording(settings, path, workers=1, detector=DetectorSettings(keypoints="pose2sim"))
     (path / "initial_pose.yaml").unlink()
@@ -90,3 +91,31 @@ def test_without_keypoints_or_with_wrong_ones_there_is_no_pose(folder, tmp_path,
     assert starts(replace(recording, path=tmp_path), [body]) is None
     found = load_keypoints(replace(recording, path=tmp_path))
     assert found is not None
+
+
+def test_a_person_of_the_keypoints_where_nobody_is_seen_is_no_actor(folder, capsys):
+    """A phantom on whom all cameras agree, 1.5 m beside the only person."""
+    recording = open_recording(folder)
+    body, config = upright(HUMAN, recording), track_config(recording=folder)
+    clip = Clip(recording, recording.frames, 8, clip_keypoints(recording, config))
+    plates = learn_background(clip, "pictures")
+    assert clip.keypoints is not None
+    kept = clip.keypoints.found
+    true = np.asarray(triangulated_people(kept, recording.rig).points[:, 0])
+    phantom = np.zeros((len(recording.rig), FRAMES, 1, *true.shape[1:]), np.float32)
+    for camera, name in enumerate(recording.rig.names):
+        pixels = opencv_pixels(recording.rig, name, np.nan_to_num(true + np.array([1.0, 1.1, 0.0])).reshape(-1, 3))
+        phantom[camera, ..., :2] = pixels.reshape(FRAMES, 1, -1, 2)
+        phantom[camera, ..., 2] = np.isfinite(true).all(-1)[:, None]
+
+    def found(points, background):
+        keypoints = replace(clip.keypoints, found=replace(kept, points=points))
+        return keypoint_poses(Clip(recording, recording.frames, 8, keypoints), background, [body], config, 0)
+
+    only, first = phantom, np.concatenate([phantom, kept.points], axis=2)
+    assert found(only, Background(None)) is not None, "which keypoints alone cannot tell"
+    capsys.readouterr()
+    assert found(only, plates) is None
+    assert "is left out" in capsys.readouterr().err
+    (pose,) = found(first, plates)
+    assert error(recording, pose, 0) < 0.08

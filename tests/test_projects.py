@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from command_line import actor_file, done, refused, trackable
 from project_cases import CAMERAS, freemocap, pose2sim
-from small_recording import FPS
+from small_recording import FPS, SIZE
 
 from sogjax.check.examination import opening_problems
 from sogjax.errors import InputError
@@ -33,6 +33,31 @@ def test_the_calibration_may_stand_in_the_session(tmp_path):
         (around / "Config.toml").write_text("[project]\n")
     (folder / "calibration").rename(tmp_path / "session/Calibration")
     assert open_recording(folder).rig.names == CAMERAS
+
+
+def test_the_calibration_of_a_project_may_be_of_any_format(tmp_path):
+    """Qualisys' in millimetres, as the format has it, whose unit nobody is asked for."""
+    folder, _ = pose2sim(tmp_path / "trial")
+    (folder / "calibration/Calib_scene.toml").unlink()
+    (folder / "calibration/Calib.qca.txt").write_text(qualisys(CAMERAS, SIZE, centre=(300.0, -4000.0, 1200.0)))
+    recording = open_recording(folder)
+    assert recording.rig.names == CAMERAS
+    assert recording.warnings == ()
+    pose = np.asarray(recording.rig.cameras.camera_from_world)[0]
+    np.testing.assert_allclose(-pose[:3, :3].T @ pose[:3, 3], [0.3, -4.0, 1.2], atol=1e-5)
+
+
+def qualisys(names, size, centre):
+    """The text of a calibration by Qualisys."""
+    width, height = size
+    camera = lambda name: (
+        f'<camera serial="{name}"><fov_video left="0" top="0" right="{width - 1}" bottom="{height - 1}"/>'
+        '<transform x="{}" y="{}" z="{}" '.format(*centre)
+        + 'r11="1" r12="0" r13="0" r21="0" r22="0" r23="1" r31="0" r32="-1" r33="0"/>'
+        f'<intrinsic focalLengthU="{64 * 60}" focalLengthV="{64 * 60}" centerPointU="{32 * width}" '
+        f'centerPointV="{32 * height}" skew="0"/></camera>'
+    )
+    return "<calibration><cameras>" + "".join(map(camera, names)) + "</cameras></calibration>"
 
 
 def test_recording_yaml_completes_a_project(tmp_path):

@@ -15,6 +15,8 @@ from sogjax.io.recording import Recording
 from sogjax.io.video import read_still
 from sogjax.model.rotation import axis_vector
 from sogjax.scene.background import BackgroundImage
+from sogjax.scene.background_difference import working_size
+from sogjax.scene.plates import FittedPlate, fitted_plate
 from sogjax.scene.segmentation import largest_parts, masks_from_backgrounds
 from sogjax.scene.visual_hull import AGREEING, disagreeing_cameras, hull_coverage
 
@@ -44,8 +46,9 @@ def example_masks(
 ) -> ExampleMasks:
     """Find the masks of one example pose.
 
-    `images` are those of all its cameras, `learnt` is the background of every camera of the recording. A camera with
-    neither a mask nor a picture of the empty scene is given the background that was learnt from the clip.
+    `images` are those of all its cameras, `learnt` is the background of every camera of the recording, as its videos
+    show it: for frames of these, and where there is neither a mask nor a picture of the empty scene. A photograph is
+    compared with the picture of the empty scene, moved to its place if the camera was touched in between.
 
     Raises:
         InputError: fewer than two cameras have a picture and a mask, or one of the empty scene; a mask that is empty
@@ -53,16 +56,18 @@ def example_masks(
     """
     names = recording.rig.names
     files = {camera: _checked_mask(example.masks[names[camera]]) for camera in images if names[camera] in example.masks}
-    photographed = {
-        camera: read_still(recording, names[camera], recording.background[names[camera]])
+    plates = {
+        camera: _plate_of(recording, names[camera], images[camera])
         for camera in images
-        if camera not in files and names[camera] in recording.background
+        if camera not in files and names[camera] in recording.background and not (learnt and example.frame is not None)
     }
+    photographed = {camera: plate.picture for camera, plate in plates.items()}
     from_clip = {
         camera: learnt[camera] for camera in images if learnt and camera not in files and camera not in photographed
     }
     backgrounds = photographed | {camera: background.picture for camera, background in from_clip.items()}
-    unknown = {camera: ~background.known for camera, background in from_clip.items()}
+    unknown = {camera: ~plate.known for camera, plate in (plates | from_clip).items() if not plate.known.all()}
+    of_clip = [camera for camera, background in from_clip.items() if background.origin == "clip"]
     _check_count(recording, example, len(images), [*files, *backgrounds])
     cameras = {camera: recording.rig.camera(names[camera]) for camera in images}
     up = axis_vector(recording.up)
@@ -72,6 +77,7 @@ def example_masks(
     wrong = disagreeing_cameras(found, cameras)
     masks = {camera: mask for camera, mask in found.items() if camera not in wrong}
     warnings = [_unlike(example, names[camera], share) for camera, share in wrong.items()]
+    warnings += [_moved(recording, example, names[k], plate) for k, plate in plates.items() if plate.pixels]
     warnings += [_no_subject(recording, example, names[camera]) for camera in backgrounds if camera not in made]
     if len(masks) == 2 and (share := min(hull_coverage(masks, cameras).values())) < AGREEING:
         pair = " and ".join(names[camera] for camera in masks)
@@ -81,9 +87,24 @@ def example_masks(
         )
     return ExampleMasks(
         masks=masks,
-        origins={k: FROM_FILE if k in files else FROM_CLIP if k in from_clip else FROM_PHOTOGRAPH for k in found},
+        origins={k: FROM_FILE if k in files else FROM_CLIP if k in of_clip else FROM_PHOTOGRAPH for k in found},
         left_out={camera: found[camera] for camera in wrong},
         warnings=tuple(warnings),
+    )
+
+
+def _plate_of(recording: Recording, camera: str, image: UInt8[np.ndarray, "_h _w 3"]) -> FittedPlate:
+    """The picture of the empty scene, at the place of a photograph of the subject; its light does not matter here."""
+    plate = read_still(recording, camera, recording.background[camera])
+    size = working_size(image.shape[1], image.shape[0])
+    found = fitted_plate(plate, cv2.resize(image, size, interpolation=cv2.INTER_AREA), same_light=True)
+    return found if found.pixels else FittedPlate.unseen(plate)
+
+
+def _moved(recording: Recording, example: ExamplePose, camera: str, plate: FittedPlate) -> str:
+    return (
+        f"example pose {example.name!r}: {recording.background[camera]} is {plate.pixels:.1f} pixels beside its "
+        f"picture of {camera}, and was moved; take both without touching the camera in between"
     )
 
 

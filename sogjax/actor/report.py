@@ -12,6 +12,7 @@ from sogjax.actor.silhouettes import PosedPictures
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.model.body import Body
 from sogjax.model.bones import bone_lengths
+from sogjax.quality.proportions import odd_sentence
 
 UNDETERMINED = 0.95
 """A shape parameter whose deviation is above this share of what was expected without pictures."""
@@ -128,6 +129,7 @@ def actor_report(made: FinishedActor, rig: CameraRig) -> ActorReport:
     warnings = (
         *(warning for posed in made.pictures for warning in posed.warnings),
         *_poor_silhouettes(ious),
+        *([] if (odd := odd_sentence(made.body, made.start)) is None else [odd]),
         *_poorly_seen_dofs(made),
     )
     return ActorReport(made.body.name, ious, bones, warnings, _undetermined_sizes(made))

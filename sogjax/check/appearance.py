@@ -1,7 +1,7 @@
 """Whether cameras show what they should: the place of their own still pictures, and the subject as bright as others."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -9,6 +9,8 @@ from jaxtyping import Float
 
 from sogjax.check.findings import Finding
 from sogjax.check.pictures import Moment, Picture
+from sogjax.io.recording import Recording
+from sogjax.scene.plates import FittedPlate
 
 SAME_PLACE = 0.55
 """Correlation of two pictures' fine structure above which they show the same place."""
@@ -71,6 +73,24 @@ def _structure(picture: Picture) -> Float[np.ndarray, "h w"]:
     light = np.log1p(grey.astype(np.float32))
     fine = light - cv2.GaussianBlur(light, (0, 0), 6.0)
     return (fine - fine.mean()) / max(float(fine.std()), 1e-6)
+
+
+def plate_findings(recording: Recording, plates: Mapping[int, FittedPlate]) -> list[Finding]:
+    """Pictures of the empty scene (by camera, as held against the video) that are not what the video shows.
+
+    Those that are only brighter or darker are told by `change_findings`.
+    """
+    findings = []
+    for camera, plate in plates.items():
+        name = recording.rig.names[camera]
+        path = recording.background[name]
+        scale = recording.rig.image_size(name)[0] / plate.picture.shape[1]
+        said = replace(plate, shift=(scale * plate.shift[0], scale * plate.shift[1])).said(str(path))
+        if said is not None and (plate.pixels or plate.other or not plate.fits):
+            what, _, remedy = said.rpartition("; ")
+            cause = "the camera was touched in between" if plate.pixels else ""
+            findings.append(Finding("warning", "files", what, cause, remedy, (name,)))
+    return findings
 
 
 def change_findings(names: tuple[str, ...], references: References, filmed: Mapping[int, Picture]) -> list[Finding]:

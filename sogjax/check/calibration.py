@@ -12,6 +12,12 @@ from sogjax.check.findings import Finding, listed
 from sogjax.check.pictures import Moment
 from sogjax.io.calibration.rig import CameraRig
 
+FEWEST_TO_TELL = 4
+"""Cameras: of three, a turned one puts the others beside its hull, too."""
+TURNED, CLEARLY, IN_PLACE = 0.4, 1.5, 0.15
+"""Degrees from which on a camera may be turned; how many times as far as any other it must be; and how far the usual
+one is at most. Cameras in place have 0.0, beside one that is turned 0.3; that has 0.45 to 0.65 of 0.7 degrees."""
+
 
 def unit_rig(rig: CameraRig, scale: float) -> CameraRig:
     """The rig with `scale` (metres) as its unit of length, so that a wrong unit does no harm."""
@@ -83,7 +89,7 @@ def _contradictions(
     """
     wrong = {camera: misfit for camera, misfit in misfits.items() if misfit.is_wrong}
     if not wrong:
-        return []
+        return _slightly_turned(rig, misfits, label)
     covered = mean_coverage(hulls)
     if covered < 0.6 and mean_coverage(hulls_of(mirrored_rig(rig), moments)) > covered + 0.25:
         shown = f"the pictures fit a mirrored world, not this one ({label})"
@@ -103,6 +109,21 @@ def _contradictions(
         cause = "a calibration from another day or set-up, or with axes other than OpenCV's"
         return [Finding("warning", "calibration", shown, cause, "calibrate the cameras where they stood", names)]
     return _each(rig, wrong, label, blamed)
+
+
+def _slightly_turned(rig: CameraRig, misfits: Mapping[int, Misfit], label: str) -> list[Finding]:
+    """One camera among four or more whose silhouette is a little beside the hull in which all the others lie."""
+    by_away = sorted(misfits, key=lambda camera: -misfits[camera].away)  # none is NaN: that would be wrong
+    if len(by_away) < FEWEST_TO_TELL:
+        return []
+    first, second = misfits[by_away[0]].away, misfits[by_away[1]].away
+    usual = float(np.median([misfits[camera].away for camera in by_away[1:]]))
+    if not (first >= TURNED and first > CLEARLY * second and usual <= IN_PLACE):
+        return []
+    name = rig.names[by_away[0]]
+    shown = f"{name} is turned by about {first:.1f} degrees against what the others see ({label})"
+    cause = f"the camera {name} was touched after the calibration"
+    return [Finding("warning", "calibration", shown, cause, f"calibrate {name} again, or try `sogjax adjust`", (name,))]
 
 
 def _each(rig: CameraRig, wrong: Mapping[int, Misfit], label: str, blamed: str) -> list[Finding]:

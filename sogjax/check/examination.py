@@ -8,7 +8,14 @@ from typing import Any, TypeVar
 import numpy as np
 
 from sogjax.check.agreement import Misfit, hulls_of
-from sogjax.check.appearance import change_findings, exposure, exposure_findings, place_findings, references_of
+from sogjax.check.appearance import (
+    change_findings,
+    exposure,
+    exposure_findings,
+    place_findings,
+    plate_findings,
+    references_of,
+)
 from sogjax.check.calibration import calibration_findings, unit_rig
 from sogjax.check.cameras import RigGeometry, camera_findings, rig_geometry
 from sogjax.check.findings import Finding, worst_first
@@ -18,10 +25,11 @@ from sogjax.check.motion import motion_of, pair_barcodes
 from sogjax.check.pictures import (
     Clip,
     Picture,
+    Plates,
     Progress,
     example_moments,
-    read_backgrounds,
     read_clip,
+    read_plates,
     stills_in_step,
     video_moment,
     working_picture,
@@ -62,7 +70,14 @@ class Examination:
     """The whole `frame_offset` of each camera to be written, where any was found; else empty."""
 
 
-def examined(recording: Recording, start: int, frames: int, largest_offset: int, progress: Progress) -> Examination:
+def examined(
+    recording: Recording,
+    start: int,
+    frames: int,
+    largest_offset: int,
+    progress: Progress,
+    subject: float | None = None,
+) -> Examination:
     """Look at cameras, files, frames, synchrony, silhouettes, size and exposure of a recording.
 
     Args:
@@ -71,6 +86,7 @@ def examined(recording: Recording, start: int, frames: int, largest_offset: int,
         frames: its length at most.
         largest_offset: offsets between cameras are looked for up to so many frames.
         progress: wraps the frames while they are read.
+        subject: the extent of the body that is to be tracked, metres; None: a person, unless it is smaller.
 
     Raises:
         InputError: a video that ends early, or a picture that does not open.
@@ -84,7 +100,8 @@ def examined(recording: Recording, start: int, frames: int, largest_offset: int,
     found, jumps, of_times = _times(clip, relative, largest_offset)
     offsets = [0 if camera in jumps else found.of(camera) for camera in range(len(names))]
     stills = stills_in_step(clip, offsets)
-    seen = _looks(recording, relative, geometry, stills)
+    plates = read_plates(clip)
+    seen = _looks(recording, relative, geometry, stills, plates, subject)
     findings = [
         *(Finding("note", "files", warning) for warning in recording.warnings),
         *camera_findings(rig, geometry, recording.up),
@@ -92,7 +109,7 @@ def examined(recording: Recording, start: int, frames: int, largest_offset: int,
         *clip_findings(clip, repeated),
         *of_times,
         *seen.findings,
-        *keypoint_findings(recording, start, clip.num_frames),
+        *keypoint_findings(clip, plates.usable),
     ]
     numbers = {
         "recording": str(recording.path),
@@ -143,17 +160,21 @@ class _Looks:
 
 
 def _looks(
-    recording: Recording, relative: CameraRig, geometry: RigGeometry, stills: Sequence[dict[int, Picture]]
+    recording: Recording,
+    relative: CameraRig,
+    geometry: RigGeometry,
+    stills: Sequence[dict[int, Picture]],
+    plates: Plates,
+    subject: float | None,
 ) -> _Looks:
     """Compare example poses, backgrounds and stills of the videos with each other and with the calibration."""
     names = recording.rig.names
-    backgrounds = read_backgrounds(recording)
-    photographed = example_moments(recording, backgrounds)
-    references, shown = references_of(backgrounds, photographed), _first_pictures(stills)
+    photographed = example_moments(recording, plates.given)
+    references, shown = references_of(plates.in_place, photographed), _first_pictures(stills)
     places = place_findings(names, references, shown)
     elsewhere = {names.index(name) for finding in places for name in finding.cameras}
     here = lambda by_camera: {camera: one for camera, one in by_camera.items() if camera not in elsewhere}
-    filmed = [video_moment(pictures, here(backgrounds)) for pictures in stills]
+    filmed = [video_moment(pictures, here(plates.usable)) for pictures in stills]
     changes = change_findings(names, here(references), shown)
     agreement, fits = calibration_findings(relative, photographed, filmed)
     good = [camera for camera in range(len(names)) if camera not in fits or not fits[camera].is_wrong]
@@ -163,7 +184,8 @@ def _looks(
     compared = exposure(photographed or filmed, len(names))
     of_exposure = exposure_findings(names, compared, "example poses" if photographed else "videos")
     gains = [[None if np.isnan(gain) else round(float(gain), 4) for gain in row] for row in compared.gains]
-    findings = [*places, *changes, *agreement, *scale_findings(size, geometry, unit), *of_exposure]
+    unlike = plate_findings(recording, here(plates.fitted))
+    findings = [*places, *unlike, *changes, *agreement, *scale_findings(size, geometry, unit, subject), *of_exposure]
     return _Looks(findings, fits, size, dict(zip(names, gains, strict=True)))
 
 

@@ -1,11 +1,13 @@
 """Keypoint files beside a recording: what is there, and whether the cameras agree about the people."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Float
 
 from sogjax.check.findings import Finding, listed
+from sogjax.check.pictures import Clip, Picture
+from sogjax.check.unseen_people import unseen_people_findings
 from sogjax.errors import InputError
 from sogjax.io.keypoints.load import Keypoints, load_keypoints
 from sogjax.io.recording import Recording
@@ -13,14 +15,12 @@ from sogjax.search.keypoint_people import SAME_PERSON, triangulated_people
 from sogjax.search.triangulation import Rays, distances, poses_of, rays_of
 
 
-def keypoint_findings(recording: Recording, start: int, frames: int) -> list[Finding]:
-    """What there is of keypoints, what of it cannot be used, and cameras whose keypoints are of other pictures.
+def keypoint_findings(clip: Clip, backgrounds: Mapping[int, Picture]) -> list[Finding]:
+    """What there is of keypoints, what of it cannot be used, and whose keypoints are not of these pictures.
 
-    Args:
-        recording: whose files are looked at.
-        start: the first frame that is compared.
-        frames: how many there are, of which 30 are compared at most.
+    Of the clip, 30 frames are compared at most; `backgrounds` are the pictures of the empty scene by camera.
     """
+    recording, start, frames = clip.recording, clip.frame_number(0), clip.num_frames
     try:
         keypoints = load_keypoints(recording)
     except InputError as error:
@@ -37,7 +37,9 @@ def keypoint_findings(recording: Recording, start: int, frames: int) -> list[Fin
         cause = "files of another camera, clip or picture size, or a camera whose calibration or time is wrong"
         remedy = f"run the detector on the recorded pictures of {name}, or remove its files"
         findings.append(Finding("warning", "keypoints", what, cause, remedy, (name,)))
-    if not wrong:
+    unseen = [] if wrong else unseen_people_findings(keypoints, clip, backgrounds, chosen.tolist())
+    findings += unseen
+    if not wrong and not unseen:
         seen = 100.0 * (keypoints.confidence > 0.0).any((2, 3)).mean()
         found = f"{keypoints.scheme.name} of {listed(keypoints.seeing)}: somebody in {seen:.0f} % of the pictures"
         findings.append(Finding("ok", "keypoints", found))

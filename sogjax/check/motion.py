@@ -20,6 +20,9 @@ from sogjax.check.pictures import Clip
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.model.camera import undistort
 
+STEEPEST = 50.0
+"""Tangent of the angle to the optical axis from which on a lens model is not believed."""
+
 
 @dataclass(frozen=True)
 class CameraMotion:
@@ -70,8 +73,11 @@ def _camera_motion(
     small = np.empty((len(energy), *shape), np.float32)
     for k, step in enumerate(energy):
         small[k] = cv2.resize(step, shape[::-1], interpolation=cv2.INTER_AREA)
-    small[~(present[1:] & present[:-1])] = np.nan
-    return CameraMotion(np.sqrt(small).reshape(len(small), shape[0] * shape[1]), *_world_rays(rig, name, shape))
+    rays, centre = _world_rays(rig, name, shape)
+    energy = np.sqrt(small).reshape(len(small), shape[0] * shape[1])
+    energy[:, ~rays.any(axis=1)] = 0.0
+    energy[~(present[1:] & present[:-1])] = np.nan
+    return CameraMotion(energy, rays, centre)
 
 
 def _frame_differences(grey: UInt8[np.ndarray, "frame h w"]) -> Float[np.ndarray, "step h w"]:
@@ -90,7 +96,10 @@ def _frame_differences(grey: UInt8[np.ndarray, "frame h w"]) -> Float[np.ndarray
 def _world_rays(
     rig: CameraRig, name: str, shape: tuple[int, int]
 ) -> tuple[Float[np.ndarray, "pixel 3"], Float[np.ndarray, "3"]]:
-    """Directions (world, unit vectors) of all pixels of a smaller picture of `shape`, and the camera's place."""
+    """Directions (world, unit vectors) of all pixels of a smaller picture of `shape`, and the camera's place.
+
+    Zeros where the lens model gives none, at the border of wide lenses.
+    """
     camera, (width, height) = rig.camera(name), rig.image_size(name)
     columns = (np.arange(shape[1]) + 0.5) * width / shape[1] - 0.5
     rows = (np.arange(shape[0]) + 0.5) * height / shape[0] - 0.5
@@ -98,9 +107,10 @@ def _world_rays(
     pixels = np.asarray(undistort(camera, jnp.asarray(grid, camera.intrinsics.dtype)), float)
     matrix, pose = np.asarray(camera.intrinsics, float), np.asarray(camera.camera_from_world, float)
     plane = (pixels - matrix[:2, 2]) / np.array([matrix[0, 0], matrix[1, 1]])
-    local = np.concatenate([plane, np.ones((len(plane), 1))], axis=1)
+    told = np.all(np.abs(plane) < STEEPEST, axis=1, keepdims=True)  # also not where it is NaN
+    local = np.concatenate([np.where(told, plane, 0.0), np.ones((len(plane), 1))], axis=1)
     rays = local @ pose[:3, :3]
-    return rays / np.linalg.norm(rays, axis=1, keepdims=True), -pose[:3, :3].T @ pose[:3, 3]
+    return rays / np.linalg.norm(rays, axis=1, keepdims=True) * told, -pose[:3, :3].T @ pose[:3, 3]
 
 
 NUM_PLANES = 64
@@ -143,7 +153,7 @@ def pair_barcodes(motions: Sequence[CameraMotion]) -> PairCodes:
 def _range(weights: Float[np.ndarray, "pixel"], angles: Float[np.ndarray, "pixel"]) -> tuple[float, float]:
     """The angles between which there is all motion but one per cent at either end."""
     order = np.argsort(angles)
-    share = np.cumsum(weights[order], dtype=float) / weights.sum(dtype=float)
+    share = np.cumsum(weights[order], dtype=float) / max(weights.sum(dtype=float), 1e-12)
     ends = np.searchsorted(share, [0.01, 0.99])
     low, high = angles[order][np.minimum(ends, len(order) - 1)]
     return float(low), float(max(high, low + 1e-6))

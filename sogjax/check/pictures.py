@@ -14,11 +14,14 @@ from sogjax.io.image_file import read_mask
 from sogjax.io.recording import Recording
 from sogjax.io.video import read_prepared, read_still
 from sogjax.scene.background_difference import background_difference, reduced_mask, working_size
+from sogjax.scene.plates import FittedPlate, fitted_plate
 from sogjax.scene.segmentation import first_guess, is_subject
 
 Mask = Bool[np.ndarray, "_h _w"]
 Picture = UInt8[np.ndarray, "_h _w 3"]
 """BGR, at the working size of masks."""
+SCENE_FRAMES = 9
+"""Frames of a camera whose median is taken."""
 Progress = Callable[[Iterable[Any], int, str], Iterator[Any]]
 """Wraps an iterable, given its length and a label, and yields the same."""
 
@@ -36,6 +39,8 @@ class Clip:
     """Where a camera is not missing, so that there is something to check."""
     stills: dict[int, dict[int, Picture]]
     """A few pictures by frame of this clip and by camera that is present."""
+    scene: dict[int, Picture]
+    """The median of some frames of each camera that is present in any: who moves about is not in it."""
 
     @property
     def num_frames(self) -> int:
@@ -66,17 +71,23 @@ def read_clip(recording: Recording, start: int, frames: int, progress: Progress)
     stop = min(start + frames, recording.frames.stop)
     count = stop - start
     wanted = {int(k) for k in np.linspace(0, count - 1, 4)[1:-1]}
+    for_scene = {int(k) for k in np.linspace(0, count - 1, min(SCENE_FRAMES, count))}
     sizes = [_small_size(*recording.rig.image_size(name)) for name in recording.rig.names]
     grey = tuple(np.zeros((count, height, width), np.uint8) for width, height in sizes)
     present = np.zeros((len(sizes), count), bool)
     stills: dict[int, dict[int, Picture]] = {}
+    shown: dict[int, list[Picture]] = {}
     for index, pictures in enumerate(progress(read_prepared(recording, _reduced, start, stop), count, "reading")):
         found = {camera: both for camera, both in enumerate(pictures) if both is not None}
         for camera, (small, _) in found.items():
             grey[camera][index], present[camera, index] = small, True
         if index in wanted:
             stills[index] = {camera: still for camera, (_, still) in found.items()}
-    return Clip(recording, start, grey, present, stills)
+        if index in for_scene:
+            for camera, (_, still) in found.items():
+                shown.setdefault(camera, []).append(still)
+    scene = {camera: np.median(several, axis=0).astype(np.uint8) for camera, several in shown.items()}
+    return Clip(recording, start, grey, present, stills, scene)
 
 
 def _small_size(width: int, height: int) -> tuple[int, int]:
@@ -120,13 +131,40 @@ def stills_in_step(clip: Clip, offsets: Sequence[int]) -> list[dict[int, Picture
     return stills
 
 
-def read_backgrounds(recording: Recording) -> dict[int, Picture]:
-    """The pictures of the empty scene by camera (its index in the rig)."""
-    return {
+@dataclass(frozen=True)
+class Plates:
+    """The pictures of the empty scene by camera (its index in the rig), at the working size."""
+
+    given: dict[int, Picture]
+    """As they are."""
+    fitted: dict[int, FittedPlate]
+    """As the videos would show them, of cameras whose videos show anything."""
+
+    @property
+    def in_place(self) -> dict[int, Picture]:
+        """As they are, but moved to the place of the videos: in their own light."""
+        moved = {k: plate.picture for k, plate in self.fitted.items() if plate.fits and plate.pixels}
+        return {k: moved.get(k, picture) for k, picture in self.given.items()}
+
+    @property
+    def usable(self) -> dict[int, Picture]:
+        """As the videos would show them, without those that do not fit, or in which something stands."""
+        unseen = {camera: FittedPlate.unseen(picture) for camera, picture in self.given.items()}
+        return {k: plate.picture for k, plate in (unseen | self.fitted).items() if plate.fits and not plate.other}
+
+
+def read_plates(clip: Clip) -> Plates:
+    """The pictures of the empty scene, held against what the videos show."""
+    recording = clip.recording
+    given = {
         camera: working_picture(read_still(recording, name, recording.background[name]))
         for camera, name in enumerate(recording.rig.names)
         if name in recording.background
     }
+    shown = [camera for camera in given if camera in clip.scene]
+    with ThreadPoolExecutor() as pool:
+        fitted = pool.map(lambda camera: fitted_plate(given[camera], clip.scene[camera]), shown)
+        return Plates(given, dict(zip(shown, fitted, strict=True)))
 
 
 def video_moment(pictures: dict[int, Picture], backgrounds: Mapping[int, Picture]) -> Moment:
@@ -139,7 +177,7 @@ def video_moment(pictures: dict[int, Picture], backgrounds: Mapping[int, Picture
 
 
 def example_moments(recording: Recording, backgrounds: Mapping[int, Picture]) -> list[Moment]:
-    """The first two example poses, with their masks, or masks made from backgrounds."""
+    """The first two example poses, with their masks, or masks made from backgrounds, moved to their place."""
     pictured = [example for example in recording.example_poses if example.frame is None]
     return [_example_moment(recording, example, backgrounds) for example in pictured[:2]]
 
@@ -152,7 +190,8 @@ def _example_moment(recording: Recording, example: ExamplePose, backgrounds: Map
         name = names[camera]
         picture = working_picture(read_still(recording, name, example.images[name]))
         if name not in example.masks:
-            return picture, _from_background(picture, backgrounds.get(camera))
+            plate = backgrounds.get(camera)
+            return picture, _from_background(picture, None if plate is None else _moved_to(plate, picture))
         mask = reduced_mask(read_mask(example.masks[name]))
         return picture, mask if mask.any() and not mask.all() else None
 
@@ -160,6 +199,12 @@ def _example_moment(recording: Recording, example: ExamplePose, backgrounds: Map
         found = dict(zip(shown, pool.map(look, shown), strict=True))
     masks = {camera: mask for camera, (_, mask) in found.items() if mask is not None}
     return Moment({camera: picture for camera, (picture, _) in found.items()}, masks)
+
+
+def _moved_to(plate: Picture, picture: Picture) -> Picture:
+    """A picture of the empty scene at the place of a photograph of the subject."""
+    found = fitted_plate(plate, picture, same_light=True) if plate.shape == picture.shape else FittedPlate.unseen(plate)
+    return found.picture if found.pixels else plate
 
 
 def _from_background(picture: Picture, background: Picture | None) -> Mask | None:

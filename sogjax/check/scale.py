@@ -1,7 +1,7 @@
 """How large the subject is according to the calibration, and where it stands: this shows units, vertical and floor."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import jax.numpy as jnp
 import numpy as np
@@ -15,6 +15,10 @@ from sogjax.model.rotation import axis_vector
 
 EXPECTED_HEIGHT, EXPECTED_DISTANCE = 1.7, 4.0
 """Metres: the height of a person, and the distance from the cameras to what they look at."""
+
+
+SMALLEST = 0.02
+"""Metres: animals that are filmed, and the way to them, are larger."""
 
 
 @dataclass(frozen=True)
@@ -58,34 +62,55 @@ def _ends(hull: MomentHull, camera: int, axis: Float[np.ndarray, "3"]) -> tuple[
     return base + float(low), base + float(high)
 
 
-def scale_findings(size: SubjectSize | None, geometry: RigGeometry, unit: str | None) -> list[Finding]:
-    """Whether the unit of length is right, and where the floor is; `unit` is that of recording.yaml."""
+def scale_findings(
+    size: SubjectSize | None, geometry: RigGeometry, unit: str | None, subject: float | None = None
+) -> list[Finding]:
+    """Whether the unit of length is right, and where the floor is.
+
+    Args:
+        size: of what is seen, if anything is.
+        geometry: of the cameras.
+        unit: that of recording.yaml.
+        subject: the extent of the body that is to be tracked, metres; None: nobody said, so it may be an animal.
+    """
+    expected = EXPECTED_HEIGHT if subject is None else subject
     if size is None:
-        return _by_distance(geometry, unit)
-    shown = f"the subject is {_length(size.height)} tall according to the calibration"
-    if not 0.25 <= size.height <= 4.0:  # no subject of usual size, but another unit
-        return [_wrong_unit(f"{shown}, a person about {EXPECTED_HEIGHT} m", EXPECTED_HEIGHT / size.height, unit)]
+        return _by_distance(geometry, unit, subject)
+    shown, share = f"the subject is {_length(size.height)} tall according to the calibration", size.height / expected
+    whose = f"a person about {EXPECTED_HEIGHT} m" if subject is None else f"the body {_length(subject)}"
+    if not 0.15 <= share <= 2.4:  # no subject of usual size, but another unit
+        found = _wrong_unit(f"{shown}, {whose}", 1.0 / share, unit)
+        return [_small_or_wrong(found) if subject is None and SMALLEST <= size.height < expected else found]
     findings = []
-    if 1.2 <= size.height <= 2.6:  # raised arms included
+    if 0.7 <= share <= 1.55:  # raised arms included
         findings.append(Finding("ok", "unit", shown))
     else:
         cause = "a subject that is not an adult, masks of only a part of it, or a wrong unit"
         findings.append(Finding("note", "unit", shown, cause, "measure something in the scene, and compare"))
-    if abs(size.lowest) > 0.25:
+    if abs(size.lowest) > 0.15 * expected:
         what = f"the lowest point of the subject is at {size.lowest:.2f} m along the vertical, not near 0"
         cause = "a world whose zero is not on the floor, a wrong `up`, or a subject off the floor"
         findings.append(Finding("note", "vertical", what, cause, "nothing, if intended; else level the calibration"))
     return findings
 
 
-def _by_distance(geometry: RigGeometry, unit: str | None) -> list[Finding]:
+def _by_distance(geometry: RigGeometry, unit: str | None, subject: float | None) -> list[Finding]:
     """Without a subject, the distance to what the cameras look at is used, if they look at one point."""
     if len(geometry.names) < 2 or not _look_together(geometry):
         return []
     shown = f"the cameras are {_length(geometry.scale)} from what they look at"
-    if 0.4 <= geometry.scale <= 40.0:
+    persons = 1.0 if subject is None else subject / EXPECTED_HEIGHT
+    if 0.4 * min(persons, 1.0) <= geometry.scale <= 40.0 * max(persons, 1.0):
         return [Finding("ok", "unit", f"{shown}, which is plausible; there is no silhouette to measure")]
-    return [_wrong_unit(f"{shown}, 2 to 8 m is usual", EXPECTED_DISTANCE / geometry.scale, unit)]
+    usual = "2 to 8 m is usual for people" if subject is None else f"and the body is {_length(subject)} tall"
+    found = _wrong_unit(f"{shown}, {usual}", EXPECTED_DISTANCE * persons / geometry.scale, unit)
+    return [_small_or_wrong(found) if subject is None and SMALLEST <= geometry.scale < 0.4 else found]
+
+
+def _small_or_wrong(found: Finding) -> Finding:
+    """The finding where an animal may be filmed from near: nobody said what is to be tracked."""
+    remedy = f"give the body that is to be tracked, as body=FILE, if that is right; else {found.remedy}"
+    return replace(found, severity="warning", cause=f"a small animal, or {found.cause}", remedy=remedy)
 
 
 def _wrong_unit(what: str, factor: float, unit: str | None) -> Finding:

@@ -16,6 +16,7 @@ from sogjax.io.image_file import write_image
 from sogjax.io.recording import Recording, open_recording
 from sogjax.io.recording_files import SETTINGS
 from sogjax.io.recording_settings import offsets_line, write_frame_offsets
+from sogjax.run.recordings import body_named, extent_of
 from sogjax.run.run_folder import results_folder
 from sogjax.run.terminal import alive, progress, say
 from sogjax.view.room import room_sheet
@@ -30,9 +31,10 @@ def run(config: CheckConfig) -> list[Finding]:
     """
     recording = _opened(config)
     start, frames = _stretch(config, recording)
+    subject = None if config.body is None else extent_of(body_named(config.body))
     out = Path(config.out) if config.out else Path("outputs") / recording.name / "check"
     with results_folder(out), alive("examining the recording"):
-        found = examined(recording, start, frames, config.largest_offset, progress)
+        found = examined(recording, start, frames, config.largest_offset, progress, subject)
         write_file(out / "check.json", json.dumps(found.numbers, indent=1))
         write_image(out / "check.png", _picture(recording, found))
     for finding in found.findings:

@@ -55,6 +55,9 @@ class CheckConfig:
     largest_offset: int = option(15, "largest time offset between cameras to look for, frames")
     write: bool = option(False, "write the time offsets found into recording.yaml, as frame_offset")
     cameras: list[str] | None = option(None, "cameras to examine; null: all")
+    body: str | None = option(
+        None, "body or actor that is to be tracked, by name or file, by whose size lengths are judged; null: a person"
+    )
     overwrite: bool = option(False, "accepted as by other commands; an earlier check is replaced in any case")
 
 

@@ -1,6 +1,7 @@
 """Body files: a body, or the actor fitted to one subject, as YAML that a person can read and edit."""
 
 from collections.abc import Iterator, Sequence
+from functools import cache
 from pathlib import Path
 
 import jax.numpy as jnp
@@ -30,10 +31,20 @@ def named_body(name: str) -> Path:
     Raises:
         InputError: there is no such body.
     """
-    shipped = {path.stem: path for path in sorted((Path(__file__).parent / "bodies").glob("*.yaml"))}
+    shipped = _bundled()
     if name not in shipped:
         raise InputError(f"no body {name!r} comes with sogjax; choose one of {', '.join(shipped)} or give a file")
     return shipped[name]
+
+
+def _bundled() -> dict[str, Path]:
+    return {path.stem: path for path in sorted((Path(__file__).parent / "bodies").glob("*.yaml"))}
+
+
+@cache
+def bundled_bodies() -> tuple[Body, ...]:
+    """The bodies that come with the package."""
+    return tuple(load_body(path) for path in _bundled().values())
 
 
 def load_body(path: Path) -> Body:

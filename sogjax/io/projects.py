@@ -91,7 +91,7 @@ def _pose2sim(path: Path) -> Project:
     if rate is not None and not 0.0 < rate <= FASTEST:
         raise InputError(f"{path / CONFIG}: frame_rate = {rate} is no frame rate; write 'auto' or frames per second")
     frames = _frame_range(path / CONFIG, settings.get("frame_range") if isinstance(settings, dict) else None)
-    return Project(_pose2sim_calibrations(path), "m", DEFAULT_UP, rate, frame_range=frames)
+    return Project(_pose2sim_calibrations(path), up=DEFAULT_UP, fps=rate, frame_range=frames)
 
 
 def _frame_range(path: Path, value: Any) -> tuple[int, int] | None:
@@ -110,9 +110,10 @@ def _pose2sim_calibrations(path: Path) -> tuple[Path, ...]:
     around = [folder for folder in here.parents[:2] if (folder / CONFIG).is_file()]
     for folder in (path, *around):
         inside = sorted(part for part in folder.iterdir() if part.is_dir() and "calib" in part.name.lower())
-        files = [file for part in inside for file in find_calibrations(part) if file.suffix.lower() == ".toml"]
+        files = [file for part in inside for file in find_calibrations(part)]
+        own = [file for file in files if file.suffix.lower() == ".toml"]  # made by Pose2Sim of the other one
         if files:
-            return tuple(files)
+            return tuple(own or files)
     return ()
 
 

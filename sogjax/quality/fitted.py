@@ -132,6 +132,14 @@ class MergeCosts:
 
 
 @dataclass(frozen=True)
+class Proportions:
+    """What makes the bones of an actor odd."""
+
+    most_odd: float
+    """Logarithm of how many times as long as in the starting body a bone may be, for the size of the whole."""
+
+
+@dataclass(frozen=True)
 class Fitted:
     """All numbers of the file, by its parts."""
 
@@ -141,6 +149,7 @@ class Fitted:
     pose_evidence: PoseEvidenceBounds
     pose_agreement: PoseAgreementBounds
     merge_passes: MergeCosts
+    proportions: Proportions
 
 
 @cache

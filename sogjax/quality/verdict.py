@@ -79,15 +79,20 @@ def verdicts(
     expected: Mapping[str, float],
     limits: Mapping[str, Mapping[str, Limits]] | None = None,
     begun: Mapping[str, str] | None = None,
+    odd: Mapping[str, str] | None = None,
 ) -> dict[str, Verdict]:
     """Of the actors of a run.
 
     `expected` is what actors explain in their example poses, where that is known; `limits` are those of their bodies
-    (`limits_of`); `begun` says of actors that their initial pose was not sure, which counts where there is more.
+    (`limits_of`); `begun` says of actors that their initial pose was not sure, which counts where there is more; `odd`
+    says what is odd about bodies.
     """
-    limits, begun = limits or {}, begun or {}
+    limits, begun, odd = limits or {}, begun or {}, odd or {}
     return {
-        name: _verdict(name, motion, expected.get(name), _inside(name, motions), limits.get(name, {}), begun.get(name))
+        name: _verdict(
+            *(name, motion, expected.get(name), _inside(name, motions), limits.get(name, {})),
+            *(begun.get(name), odd.get(name)),
+        )
         for name, motion in motions.items()
     }
 
@@ -99,6 +104,7 @@ def _verdict(
     inside: Sequence[str],
     limits: Mapping[str, Limits],
     begun: str | None,
+    odd: str | None,
 ) -> Verdict:
     explained = None if motion.explained is None else float(np.median(motion.explained))
     overlap = _overlaps(motion)
@@ -106,6 +112,8 @@ def _verdict(
     doubtful = doubtful_limbs(motion)
     parts = [*_limbs(doubtful), *_bent(motion, limits)]
     look = [] if wrong else [*_bad_overlaps(overlap), *_bad_stretches(motion), *parts]
+    if odd is not None:
+        look.append(odd)
     if begun is not None and (wrong or look):
         look.append(begun)
     return Verdict(

@@ -159,7 +159,7 @@ def make_actors(request: ActorRequest, report: Report = lambda _: None) -> Actor
     """
     if request.files is not None:
         return _of_files(request, request.files)
-    return SHARED.get(_key(request), lambda: new_actors(request, report))
+    return SHARED.get(actors_key(request), lambda: new_actors(request, report))
 
 
 def new_actors(request: ActorRequest, report: Report = lambda _: None) -> Actors:
@@ -256,7 +256,7 @@ def _of_keypoints(request: ActorRequest, error: InputError) -> Body:
     return actor
 
 
-def _key(request: ActorRequest) -> str:
+def actors_key(request: ActorRequest) -> str:
     """Everything that made actors depend on."""
     recording = request.recording
     pictures = [

@@ -11,12 +11,13 @@ from sogjax.errors import InputError
 from sogjax.io.background_cache import Arrays, background_origin, kept_background
 from sogjax.io.npz_file import read_npz, save_npz
 from sogjax.io.source import fingerprint
-from sogjax.io.video import read_still
 from sogjax.run.clip import Clip, SampleKind
 from sogjax.run.clip_learning import UnsuitableError, learnt_from
+from sogjax.run.plates import fitted_plates, say_plates
 from sogjax.run.shared import SHARED
 from sogjax.run.terminal import say
 from sogjax.scene.background import BackgroundImage, Origin, stack_background
+from sogjax.scene.background_difference import working_size
 from sogjax.scene.cells import CellGrid
 from sogjax.scene.foreground import BackgroundModel
 
@@ -36,8 +37,8 @@ class Background:
 
     @property
     def is_learnt(self) -> bool:
-        """Whether it was learnt from the clip."""
-        return self.cameras is not None and any(camera.origin == "clip" for camera in self.cameras)
+        """Whether it was learnt from the clip, for all cameras."""
+        return self.cameras is not None and all(camera.origin == "clip" for camera in self.cameras)
 
     def model(self, grids: Sequence[CellGrid]) -> BackgroundModel | None:
         """What the cells of frames are compared with; None: nothing is known."""
@@ -103,19 +104,40 @@ def learn_background(clip: Clip, choice: str, cache: str | None = None, more: Se
     if choice == "none":
         return Background(None, "images.background=none")
     if choice == "pictures" or (choice == "auto" and not missing):
-        plates = [(name, recording.background[name]) for name in recording.rig.names]
-        return SHARED.get(
-            json.dumps(["plates", *((name, str(path), fingerprint(path)) for name, path in plates)]),
-            lambda: Background(
-                tuple(BackgroundImage.from_photograph(read_still(recording, name, path)) for name, path in plates)
-            ),
-        )
+        return _of_plates(clip, choice, cache, more)
     learnt = _of_clip(clip, cache, more)
     if choice == "clip" and learnt.cameras is None:
         raise InputError(
             f"{recording.path}: images.background=clip, but {learnt.reason}, or set images.background=none"
         )
     return learnt
+
+
+def _of_plates(clip: Clip, choice: str, cache: str | None, more: Sequence[SampleKind]) -> Background:
+    """The background from photographs; of cameras whose photographs do not fit, from the clip, or nothing is known."""
+    recording = clip.recording
+    files = [(name, str(path), fingerprint(path)) for name, path in recording.background.items()]
+    key = [
+        "plates",
+        choice,
+        *files,
+        background_origin(recording),
+        [clip.numbers.start, clip.numbers.stop, clip.numbers.step],
+    ]
+
+    def of_plates() -> Background:
+        plates = fitted_plates(clip, more)
+        unfit = say_plates(clip, plates, choice)
+        known = {name: BackgroundImage.from_plate(plate) for name, plate in plates.items() if name not in unfit}
+        learnt = _of_clip(clip, cache, ()).cameras if unfit else None
+        for k, name in enumerate(recording.rig.names):
+            if name in unfit:
+                say(f"the background of {name} {'stays unknown' if learnt is None else 'is learnt from the clip'}")
+                nothing = BackgroundImage.nothing(*working_size(*recording.rig.image_size(name)))
+                known[name] = nothing if learnt is None else learnt[k]
+        return Background(tuple(known[name] for name in recording.rig.names))
+
+    return SHARED.get(json.dumps(key), of_plates)
 
 
 def said_if_none(clip: Clip, choice: str, background: Background) -> Background:

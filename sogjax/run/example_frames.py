@@ -30,13 +30,12 @@ from sogjax.scene.background import BackgroundImage
 NUM_TRIED, NUM_EXAMPLES = 8, 5
 """Frames in which the pose is looked for, and those of them that the actor is made of."""
 FEWEST_EXAMPLES = 2
-WAYS = (
-    "Without example poses, the background is learnt from the videos, and frames of them are taken as example poses. "
-    "Other ways, the easiest first: pictures of the empty scene (background/CAMERA.jpg); frames of your choice "
-    "(`example_poses: [0, 150]` in recording.yaml); pictures of clear poses with masks (example_poses/POSE/CAMERA.jpg, "
-    "CAMERA.mask.png); an actor file (actor=FILE)"
+PLATES_FIRST = "pictures of the empty scene (background/CAMERA.jpg); "
+OTHER_WAYS = (
+    "frames of your choice (`example_poses: [0, 150]` in recording.yaml); pictures of clear poses with masks "
+    "(example_poses/POSE/CAMERA.jpg, CAMERA.mask.png); an actor file (actor=FILE)"
 )
-"""What is done by itself where a recording has no example poses, and what else can be done."""
+"""What else can be done where a recording has no example poses, the easiest first."""
 LEAST_KNOWN, MOSTLY_KNOWN = 0.6, 0.95
 """Part of the silhouettes where the background must be, and had better be, known."""
 FEW_CAMERAS = 4
@@ -64,7 +63,7 @@ def with_examples(
     if known.cameras is None:
         raise InputError(
             f"{recording.path}: there is no actor=FILE, there are no example poses, and none can be taken from the "
-            f"videos: {known.reason}. {WAYS}"
+            f"videos: {known.reason}. {_ways(recording)}"
         )
     count = 1 if actors is None else actors
     examples = _person_examples(clip, known.cameras) if count == 1 else _people_examples(clip, known.cameras, count)
@@ -152,7 +151,19 @@ def _people_examples(clip: Clip, learnt: Sequence[BackgroundImage], actors: int)
 
 
 def _no_examples(recording: Recording, problem: str) -> InputError:
-    return InputError(f"{recording.path}: no example poses can be taken from the videos, since {problem}. {WAYS}")
+    return InputError(
+        f"{recording.path}: no example poses can be taken from the videos, since {problem}. {_ways(recording)}"
+    )
+
+
+def _ways(recording: Recording) -> str:
+    """What is done by itself where a recording has no example poses, and what else can be done."""
+    if has_plates(recording):
+        return f"Without example poses, frames of the videos are taken as such. Other ways: {OTHER_WAYS}"
+    return (
+        "Without example poses, the background is learnt from the videos, and frames of them are taken as example "
+        f"poses. Other ways, the easiest first: {PLATES_FIRST}{OTHER_WAYS}"
+    )
 
 
 def _say_chosen(frames: Sequence[int], num_seen: int | None) -> None:

@@ -16,9 +16,13 @@ from sogjax.model.body import Body, concatenate
 from sogjax.run import build
 from sogjax.run.background import Background
 from sogjax.run.clip import Clip
+from sogjax.run.example_people import LIGHT
+from sogjax.run.sampled_masks import masks_of_samples
 from sogjax.run.terminal import say
+from sogjax.search.described_pose import MIN_LANDMARKS
 from sogjax.search.keypoint_people import triangulated_people
 from sogjax.search.keypoint_pose import KeypointPose, pose_of_keypoints
+from sogjax.search.seen_people import LEAST_SEEN, seen_share
 from sogjax.settings.run import TrackConfig
 from sogjax.tracking.capacity import first_capacities
 from sogjax.tracking.culling import Capacities
@@ -29,6 +33,8 @@ LEAST_ON = 0.7
 """Share of the points that the body's landmarks must be on."""
 LEAST_POINTS = 10
 """Points that a pose must be fitted to."""
+OTHERS = 2
+"""People who are no actors, of whom it is tried whether they are."""
 MOST_ACTORS = 4
 """Actors of whom it is tried who is who."""
 CAMERAS = 3
@@ -54,7 +60,7 @@ def keypoint_poses(
         return None
     if len(bodies) > MOST_ACTORS or (len(bodies) > 1 and len(recording.rig) < CAMERAS):
         return None
-    people = np.asarray(triangulated_people(keypoints, recording.rig, len(bodies)).points[0], float)
+    people = _seen_people(clip, background, keypoints, frame, len(bodies))
     # Of each body in the place of each person.
     found = [[pose_of_keypoints(body, recording.up, keypoints.scheme, person) for person in people] for body in bodies]
     order = _who_is_who(clip, background, bodies, config, frame, found)
@@ -64,6 +70,34 @@ def keypoint_poses(
     if not all(_good(body, pose, frame) for body, pose in zip(bodies, poses, strict=True)):
         return None
     return [jnp.asarray(p.pose, b.poses["rest"].dtype) for b, p in zip(bodies, poses, strict=True) if p is not None]
+
+
+def _seen_people(
+    clip: Clip, background: Background, keypoints: Keypoints, frame: int, wanted: int
+) -> list[Float[np.ndarray, "keypoint 3"]]:
+    """The people of the keypoints of a frame, the surest first; with a background, those who stand where it is hidden.
+
+    A few more than the actors are looked at: the surest may be bystanders, or nobody.
+    """
+    recording = clip.recording
+    most = wanted + OTHERS if background.cameras is not None else wanted
+    points = np.asarray(triangulated_people(keypoints, recording.rig, most).points[0], float)
+    people = [person for person in points if np.isfinite(person).all(-1).sum() >= MIN_LANDMARKS]
+    if background.cameras is None:
+        return people
+    seen = masks_of_samples(clip, background.cameras, LIGHT, (frame,))
+    if not seen.frames:
+        return people[:wanted]
+    masks = {k: mask | seen.unknown[k] for k, mask in seen.masks[0].items()}
+    shares = [seen_share(person, seen.cameras, masks) for person in people]
+    for person, share in zip(people, shares, strict=True):
+        if share < LEAST_SEEN:
+            where = ", ".join(f"{x:.1f}" for x in np.nanmedian(person, axis=0))
+            say(
+                f"a person of the keypoints at ({where}) m is where hardly anything is seen in frame {frame} "
+                f"({share:.0%} of the keypoints are on what is not the background), and is left out"
+            )
+    return [person for person, share in zip(people, shares, strict=True) if not share < LEAST_SEEN]
 
 
 def _keypoints_of(clip: Clip, frame: int) -> Keypoints | None:
@@ -95,12 +129,13 @@ def _who_is_who(
     frame: int,
     found: list[list[KeypointPose | None]],
 ) -> tuple[int, ...] | None:
-    """The person that each body is, by how similar the pictures are; None where that is not clear."""
-    if len(bodies) == 1:
-        return (0,)
-    if any(pose is None for of_body in found for pose in of_body):
+    """The person that each body is, by how similar the pictures are; None where that is not clear, or too few are."""
+    people = [k for k in range(len(found[0])) if all(of_body[k] is not None for of_body in found)]
+    if len(people) < len(bodies):
         return None
-    orders = [*permutations(range(len(bodies)))]
+    if len(bodies) == len(people) == 1:
+        return (people[0],)
+    orders = [*permutations(people, len(bodies))]
     tracker = build.tracker(clip, background, concatenate(list(bodies)), config)
     known = on_device(next(clip.frames(frame, frame + 1)))
     poses = [np.concatenate([_pose(found[k][person]) for k, person in enumerate(order)]) for order in orders]

@@ -8,13 +8,14 @@ from typing import Any
 from sogjax.errors import counted
 from sogjax.io.frame_motions import FRAMES, ClipFacts
 from sogjax.io.frame_table import FrameLog
-from sogjax.run.actors import Actors, make_actors
+from sogjax.run.actors import Actors
 from sogjax.run.adjust_clip import Adjusted, adjust_clip
 from sogjax.run.background import Background, learn_background, said_if_none
 from sogjax.run.clock import ACTORS, ADJUSTING, BACKGROUND, BOTH_WAYS, INITIAL_POSE, PREPARING, TRACKING, WRITING
 from sogjax.run.forward import Tracked, kept_rows, track_forward
 from sogjax.run.initial_pose import InitialPose, find_initial_pose
 from sogjax.run.judge import judged_result
+from sogjax.run.kept_actors import kept_or_made
 from sogjax.run.keypoint_bias import KeypointBias, estimate_keypoint_bias
 from sogjax.run.merge import Merged, merge_backward
 from sogjax.run.relearn_background import RelearntBackground, relearn_background
@@ -84,7 +85,12 @@ def _tracked(run: Run) -> Tracked:
 
 PASSES: tuple[Pass, ...] = (
     Pass("background", PREPARING, _background, Background),
-    Pass("actors", ACTORS, lambda run: make_actors(run.actor_request, run.report_actors), Actors),
+    Pass(
+        "actors",
+        ACTORS,
+        lambda run: kept_or_made(run.actor_request, run.config.images, run.report_actors),
+        Actors,
+    ),
     Pass("initial_pose", INITIAL_POSE, _initial_pose, InitialPose, wanted=lambda run: run.tracks),
     Pass(
         "relearnt",

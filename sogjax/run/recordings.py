@@ -95,13 +95,13 @@ def check_scale(recording: Recording, bodies: Sequence[Body]) -> None:
     problem = implausible_distance(
         rig_geometry(recording.rig, recording.up),
         read_recording_settings(settings).unit,
-        max(_extent(body) for body in bodies),
+        max(extent_of(body) for body in bodies),
     )
     if problem is not None:
         raise InputError(f"{recording.path}: {problem}")
 
 
-def _extent(body: Body) -> float:
+def extent_of(body: Body) -> float:
     """The largest side of a body in its rest pose, in metres."""
     means = means_of(body, np.asarray(body.poses["rest"])[None])[0]
     radii = np.asarray(body.blob_sigmas)[:, None]

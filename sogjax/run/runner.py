@@ -6,6 +6,7 @@ from sogjax.errors import counted
 from sogjax.io.frame_motions import FRAMES
 from sogjax.io.frame_table import read_frames_log
 from sogjax.run.clock import stage
+from sogjax.run.kept_actors import kept_place
 from sogjax.run.passes import PASSES, Pass
 from sogjax.run.run import Run
 from sogjax.run.terminal import say
@@ -58,6 +59,10 @@ def _say_what_is_left(run: Run) -> None:
         say("stopped when all frames were tracked; the same command with resume=true continues")
         return
     found = read_frames_log(run.kept / FRAMES)
+    if not found and "actors" in run.records:
+        place = kept_place(run.actor_request, run.config.images) if run.makes_actors else None
+        if place is not None:
+            say(f"the actors are made; the next run takes them from {place}")
     if found is not None and len(found):
         say(
             f"stopped after {counted(len(found), 'frame')}; their motion is in {run.kept}; the same command with "

@@ -1,5 +1,6 @@
 """What is not the background in frames spread over a whole clip, in cells."""
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -46,7 +47,8 @@ class SampledMasks:
 
 def mask_samples(recording: Recording, frames: Sequence[int] | None = None) -> SampleKind:
     """The pictures, in cells (BGR), that are looked at for people: of the frames, or else spread over the clip."""
-    grids, name = cell_grids(recording, DEPTH), "masks" if frames is None else "masks of frames"
+    grids = cell_grids(recording, DEPTH)
+    name = "masks" if frames is None else f"masks_{hashlib.sha256(str([*frames]).encode()).hexdigest()[:12]}"
     numbers = tuple(spread_frames(recording.frames, MOST_LOOKED_AT) if frames is None else frames)
     return SampleKind(name, numbers, lambda camera, picture: grids[camera].averages(picture))
 

@@ -10,6 +10,7 @@ from sogjax.energy.term import Term
 from sogjax.io.frame_motions import load_motions
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
+from sogjax.quality.proportions import odd_sentence
 from sogjax.run import build
 from sogjax.run.actor_report import report_folder, write_actor_report
 from sogjax.run.actors import ActorRequest, Actors, make_actors
@@ -21,6 +22,7 @@ from sogjax.run.example_frames import check_actors
 from sogjax.run.fingerprint import run_fingerprint
 from sogjax.run.initial_pose import SOURCES, PoseSource, described_poses, pose_file
 from sogjax.run.judge import compared, kept_verdicts
+from sogjax.run.kept_actors import forget_actors
 from sogjax.run.memory import forget_programs_if_many
 from sogjax.run.recordings import chosen_frames, file_list, opened, upright
 from sogjax.run.result import RunResult
@@ -75,6 +77,8 @@ def track_to_folder(
             _ = run.adjusts  # refused before any work, where it cannot be
         run_passes(run)
         folder.finish(command, fingerprint, run.files)
+        if run.makes_actors:
+            forget_actors(run.actor_request, config.images)
     return replace(run.result, files=run.files)
 
 
@@ -133,6 +137,8 @@ def _report_actors(made: Sequence[MadeActor], recording: Recording, out: Path) -
             older.unlink()
         report = write_actor_report(folder, actor, recording.rig)
         say(f"{actor.body.name}: silhouettes and masks agree to {report.mean_iou:.2f}; see {folder / 'report.md'}")
+        if (odd := odd_sentence(actor.body, actor.start)) is not None:
+            say(f"warning: {actor.body.name}: {odd}")
 
 
 def _ended(folder: RunFolder, recording: Recording) -> RunResult:

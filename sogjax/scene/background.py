@@ -1,7 +1,7 @@
 """What cameras show when nobody stands before them: pictures, how far they vary, where they are known; as cells too."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import cv2
@@ -11,6 +11,7 @@ from jaxtyping import Array, Bool, Float, UInt8
 
 from sogjax.scene.background_difference import EDGE_NOISE
 from sogjax.scene.cells import CellGrid, stack_shape
+from sogjax.scene.plates import FittedPlate
 
 
 class BackgroundCells(eqx.Module):
@@ -50,6 +51,11 @@ class BackgroundImage:
         """The background from a photograph of the empty scene, known everywhere."""
         spread = np.hypot(NOISE_FLOOR, EDGE_NOISE * local_contrast(picture)).astype(np.float32)
         return cls(picture, spread, np.ones(picture.shape[:2], bool), "picture")
+
+    @classmethod
+    def from_plate(cls, plate: FittedPlate) -> "BackgroundImage":
+        """The background from a photograph that was held against the videos."""
+        return replace(cls.from_photograph(plate.picture), known=plate.known)
 
     @classmethod
     def nothing(cls, width: int, height: int) -> "BackgroundImage":

@@ -2,20 +2,15 @@
 
 from collections.abc import Mapping
 
-import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from sogjax.scene.background_difference import opened
+from sogjax.scene.block_shifts import FARTHEST, FEWEST_BLOCKS, block_shifts
 from sogjax.scene.clip_background import SampledCamera
 
 COMPARED = 12
 """Samples that are compared with the middle one."""
-BLOCKS = 5
-"""The picture is cut into so many columns, and as many rows as that width allows; the subject covers some of them."""
-CLEAR = 0.15
-"""Response of the phase correlation from which on a block tells its shift."""
-FEWEST_BLOCKS = 4
 
 
 def picture_shifts(images: UInt8[np.ndarray, "sample rows columns 3"]) -> Float[np.ndarray, "compared 2"]:
@@ -25,39 +20,12 @@ def picture_shifts(images: UInt8[np.ndarray, "sample rows columns 3"]) -> Float[
     its shadow matters; 0 where hardly a block has any pattern.
     """
     chosen = np.unique(np.linspace(0, len(images) - 1, min(COMPARED, len(images))).round().astype(int))
-    grey = [cv2.cvtColor(images[k], cv2.COLOR_BGR2GRAY).astype(np.float32) for k in (len(images) // 2, *chosen)]
-    size = max(grey[0].shape[1] // BLOCKS // 2, 8) * 2  # OpenCV finds half a pixel too much for odd sizes
-    window = cv2.createHanningWindow((size, size), cv2.CV_32F)
-    corners = [
-        (row, column)
-        for row in range(0, grey[0].shape[0] - size + 1, size)
-        for column in range(0, grey[0].shape[1] - size + 1, size)
-    ]
-    return np.array([_shift(grey[0], other, corners, window) for other in grey[1:]])
-
-
-def _shift(
-    first: Float[np.ndarray, "rows columns"],
-    second: Float[np.ndarray, "rows columns"],
-    corners: list[tuple[int, int]],
-    window: Float[np.ndarray, "size size"],
-) -> Float[np.ndarray, "2"]:
-    size = len(window)
-    found = []
-    for row, column in corners:
-        block = (slice(row, row + size), slice(column, column + size))
-        (right, down), response = cv2.phaseCorrelate(
-            np.ascontiguousarray(first[block]), np.ascontiguousarray(second[block]), window
-        )
-        if response > CLEAR:
-            found.append((right, down))
-    return np.median(found, axis=0) if len(found) >= FEWEST_BLOCKS else np.zeros(2)
+    found = [block_shifts(images[len(images) // 2], images[k]) for k in chosen]
+    return np.array([np.median(of_one, axis=0) if len(of_one) >= FEWEST_BLOCKS else np.zeros(2) for of_one in found])
 
 
 FEWEST_SAMPLES = 10
 """Frames: a background that is to be seen eight times needs more."""
-FARTHEST = 1.0
-"""Pixels of the working picture that a camera on a stand may shift."""
 LEAST_MOVING = 3e-3
 """Share of a picture over which something must move. Somebody who held still for 11 frames and swayed left 0.1 %,
 somebody who only lifted his arms 3 %."""

@@ -1,0 +1,63 @@
+"""The photographs of the empty scene, held against the clip: moved and matched where that is sure, else left out."""
+
+from collections.abc import Mapping, Sequence
+
+import cv2
+import numpy as np
+from jaxtyping import UInt8
+
+from sogjax.errors import InputError
+from sogjax.io.video import read_still
+from sogjax.run.clip import Clip, SampleKind, spread_frames
+from sogjax.run.terminal import say
+from sogjax.scene.background_difference import working_size
+from sogjax.scene.plates import FittedPlate, fitted_plate
+
+LOOKED_AT = 9
+"""Frames whose median is what a camera shows; somebody who moves is not in it."""
+
+
+def scene_samples(clip: Clip) -> SampleKind:
+    """The pictures that photographs of the empty scene are held against."""
+    sizes = [working_size(*clip.recording.rig.image_size(name)) for name in clip.recording.rig.names]
+    small = lambda camera, picture: cv2.resize(picture, sizes[camera], interpolation=cv2.INTER_AREA)
+    return SampleKind("scene", tuple(spread_frames(clip.numbers, LOOKED_AT)), small)
+
+
+def fitted_plates(clip: Clip, more: Sequence[SampleKind] = ()) -> dict[str, FittedPlate]:
+    """The picture of the empty scene of each camera that has one, as the videos would show it.
+
+    `more` are samples that will be needed too, and are taken on the way.
+
+    Raises:
+        InputError: a picture or video cannot be read.
+    """
+    recording, kind = clip.recording, scene_samples(clip)
+    shown = clip.sampled([kind, *more])[0]
+    found = {}
+    for camera, name in enumerate(recording.rig.names):
+        frames = [np.asarray(shown[camera][frame]) for frame in shown[camera]]
+        if name in recording.background:
+            plate = read_still(recording, name, recording.background[name])
+            found[name] = fitted_plate(plate, _median(frames)) if frames else FittedPlate.unseen(plate)
+    return found
+
+
+def _median(frames: Sequence[UInt8[np.ndarray, "rows columns 3"]]) -> UInt8[np.ndarray, "rows columns 3"]:
+    return np.median(frames, axis=0).astype(np.uint8)
+
+
+def say_plates(clip: Clip, plates: Mapping[str, FittedPlate], choice: str) -> list[str]:
+    """Say what is to be said of the pictures; returns the cameras whose pictures cannot be used.
+
+    Raises:
+        InputError: one cannot be used, and pictures were asked for (`choice`).
+    """
+    paths = clip.recording.background
+    for name, plate in plates.items():
+        said = plate.said(str(paths[name]))
+        if said is not None and not plate.fits and choice == "pictures":
+            raise InputError(f"{said}; or set images.background=auto to do without it")
+        if said is not None:
+            say(f"warning: {said}")
+    return [name for name, plate in plates.items() if not plate.fits]
