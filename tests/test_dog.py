@@ -16,7 +16,7 @@ from sogjax.io.motion import load_motion
 FRAMES = 12
 HEIGHT = 1.1
 """Metres: the cameras look at 1.2."""
-NOTHING_SHOWN = ("outputs.overlay=false", "outputs.rerun=false")
+NOTHING_SHOWN = ("outputs.overlay=false", "outputs.rerun=false", "outputs.page=false")
 
 
 def trotting(dog, frame):

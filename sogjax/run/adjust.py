@@ -28,7 +28,7 @@ from sogjax.run.run import Run
 from sogjax.run.run_files import ACTOR, CONFIG, MOTION
 from sogjax.run.run_folder import run_folder
 from sogjax.run.runner import run_passes
-from sogjax.run.track import opened_clip
+from sogjax.run.track import opened_clip, with_pictures
 from sogjax.run.write import check_pose2sim, export_endings
 from sogjax.settings.compose import as_object, without_removed
 from sogjax.settings.run import AdjustConfig, TrackConfig
@@ -160,7 +160,9 @@ def adjust_to_folder(config: AdjustConfig) -> RunResult:
     with run_folder(path, config.overwrite, command="adjust") as folder:
         folder.begin("adjust", fingerprint)
         run = Run(
-            clip=opened_clip(recording, settings).kept_in(folder.kept, settings.images.cache),
+            clip=with_pictures(
+                opened_clip(recording, settings).kept_in(folder.kept, settings.images.cache), settings, folder
+            ),
             config=settings,
             out=path,
             kept=folder.kept,

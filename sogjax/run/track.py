@@ -22,6 +22,7 @@ from sogjax.run.fingerprint import run_fingerprint
 from sogjax.run.initial_pose import SOURCES, PoseSource, described_poses, pose_file
 from sogjax.run.judge import compared, kept_verdicts
 from sogjax.run.memory import forget_programs_if_many
+from sogjax.run.page import FRAMES_ON_PAGE
 from sogjax.run.recordings import chosen_frames, file_list, opened, upright
 from sogjax.run.result import RunResult
 from sogjax.run.run import Run
@@ -62,7 +63,9 @@ def track_to_folder(
             if given is not None:
                 given.save(folder.kept)
         run = Run(
-            clip=opened_clip(recording, config).kept_in(folder.kept, config.images.cache),
+            clip=with_pictures(
+                opened_clip(recording, config).kept_in(folder.kept, config.images.cache), config, folder
+            ),
             config=config,
             out=path,
             kept=folder.kept,
@@ -111,6 +114,11 @@ def opened_clip(recording: Recording, config: TrackConfig) -> Clip:
     """The frames of a recording that the settings name, with keypoints if these count."""
     numbers = chosen_frames(recording, config.start, config.stop, config.every)
     return Clip(recording, numbers, config.images.depth, clip_keypoints(recording, config))
+
+
+def with_pictures(clip: Clip, config: TrackConfig, folder: RunFolder) -> Clip:
+    """The clip with the small pictures that the run's page shows, if it is wanted."""
+    return clip.shown_small(folder.kept, FRAMES_ON_PAGE) if config.outputs.page else clip
 
 
 def _given_actors(recording: Recording, config: TrackConfig, files: Sequence[Path]) -> Actors:

@@ -16,6 +16,7 @@ class OutputsConfig:
     motion_only: bool = option(
         False, "none of them: no overlay, no picture, no Rerun file, no other format, whatever they say", inert=True
     )
+    page: bool = option(True, "index.html, the whole result on one page for a browser", inert=True)
     overlay: bool = option(True, "overlay.mp4, the skeleton on every camera's pictures", inert=True)
     overlay_width: int = expert(1920, "width of the overlay video, px", inert=True)
     rerun: bool = option(True, "motion.rrd, for the Rerun viewer", inert=True)
