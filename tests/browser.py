@@ -54,6 +54,7 @@ class Browser:
 
     def open(self, path, size, look):
         """Open a file in a window of a size, light or dark."""
+        assert Path(path).is_file(), path
         width, height = size
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
         self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": look}])

@@ -95,8 +95,8 @@ def assert_resumed(folder, whole):
     again = load_motion(folder / "motion.npz")
     for entry in fields(Motion):
         np.testing.assert_array_equal(getattr(again, entry.name), getattr(whole, entry.name), entry.name)
-    names = ["config.yaml", "metrics.json", "motion.bvh", "motion.npz", "motion.rrd", "overlay.mp4", "run.json"]
-    names += ["index.html", "worst.png"]
+    names = ["config.yaml", "index.html", "metrics.json", "motion.bvh", "motion.npz", "motion.rrd", "overlay.mp4"]
+    names += ["run.json", "worst.png"]
     assert sorted(path.name for path in folder.iterdir()) == names
     assert look_at_source(folder / "overlay.mp4").num_frames == FRAMES
 

@@ -185,7 +185,12 @@ def test_closeups_show_the_body_in_each_frame(walk, tmp_path):
     [
         (0.86, 0.7, 0, "looks right (its example poses explain 70% of it)"),
         (0.6, 0.7, 0, "silhouettes agree to 60% only"),
-        (0.86, 0.2, 1, "explain 20% of it only (60 to 75 % is usual): look at colors.png; 1 warning in report.md"),
+        (
+            0.86,
+            0.2,
+            1,
+            "explain 20% of it only (60 to 75 % is usual): look at the colours in its report; 1 warning",
+        ),
     ],
 )
 def test_an_actor_is_judged_by_its_example_poses(iou, explained, warnings, said):

@@ -20,6 +20,7 @@ from sogjax.run.actors import Actors
 from sogjax.run.adjust_cameras import check_cameras, parts_in_question
 from sogjax.run.adjust_checks import check_length, check_window
 from sogjax.run.adjust_clip import AdjustRequest
+from sogjax.run.filter import check_cutoff
 from sogjax.run.fingerprint import RunFingerprint, digest
 from sogjax.run.forward import Tracked
 from sogjax.run.recordings import opened, upright
@@ -155,6 +156,7 @@ def adjust_to_folder(config: AdjustConfig) -> RunResult:
         every=step_of(motion.frame),
     )
     build.check(settings)
+    check_cutoff(outputs.filter, recording.fps / settings.every)
     request = AdjustRequest(config.window, config.shape, parts_in_question(config.cameras, config.offsets))
     fingerprint: RunFingerprint = {"motion": str(tracked.path), "actor": digest(tracked.actor)}
     with run_folder(path, config.overwrite, command="adjust") as folder:
@@ -181,7 +183,7 @@ def _table(motion: Motion) -> FrameTable:
     count = motion.num_frames
     return FrameTable(
         frame=np.asarray(motion.frame, int),
-        pose=motion.pose,
+        pose=motion.pose if motion.unfiltered_pose is None else motion.unfiltered_pose,
         energy=motion.energy,
         iterations=motion.iterations,
         evaluations=motion.iterations,

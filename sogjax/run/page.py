@@ -135,6 +135,9 @@ def _notes(run: Run, result: RunResult) -> list[str]:
         f"{camera} had no picture in {count} of {frames}; the others were used"
         for camera, count in result.missing.items()
     ]
+    motion = next(iter(result.motions.values()))
+    if motion.filtered_by:
+        notes.append(f"Filtered: {motion.filtered_by}. motion.npz keeps the poses before it, as unfiltered_pose.")
     if run.adjusted is not None:
         notes.append(f"{sentence(run.adjusted.numbers)} ({ADJUSTMENT.name})")
     if result.evaluation is None:

@@ -11,13 +11,14 @@ from sogjax.io.frame_motions import load_motions
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.run import build
-from sogjax.run.actor_report import report_folder, write_actor_report
+from sogjax.run.actor_report import PAGE, report_folder, write_actor_report
 from sogjax.run.actors import ActorRequest, Actors, make_actors
 from sogjax.run.background import Background
 from sogjax.run.clip import Clip
 from sogjax.run.clip_keypoints import clip_keypoints
 from sogjax.run.clock import ACTORS, StageTimes, stage
 from sogjax.run.example_frames import check_actors
+from sogjax.run.filter import check_cutoff
 from sogjax.run.fingerprint import run_fingerprint
 from sogjax.run.initial_pose import SOURCES, PoseSource, described_poses, pose_file
 from sogjax.run.judge import compared, kept_verdicts
@@ -49,6 +50,7 @@ def track_to_folder(
     files = None if config.actor is None else file_list(config.actor)
     check_actors(recording, config.actors, None if files is None else len(files))
     chosen_frames(recording, config.start, config.stop, config.every)
+    check_cutoff(config.outputs.filter, recording.fps / config.every)
     poses = pose_file(recording, config)
     path = Path(config.out or f"outputs/{recording.name}")
     with run_folder(path, config.overwrite, config.resume, command) as folder:
@@ -97,6 +99,7 @@ def track_recording(
         terms: of the energy, beside those of the settings.
         pose_sources: of the initial pose.
     """
+    check_cutoff(config.outputs.filter, recording.fps / config.every)
     forget_programs_if_many()
     config = replace(config, outputs=replace(config.outputs, motion_only=True).asked())
     with TemporaryDirectory() as folder:
@@ -137,10 +140,8 @@ def _report_actors(made: Sequence[MadeActor], recording: Recording, out: Path) -
     """Write how actors fit the frames of the videos that they were made of, for the user to judge."""
     for actor in (actor for actor in made if actor.frames):
         folder = report_folder(ACTOR.of(out, actor.body.name, len(made)))
-        for older in folder.glob("silhouettes_*.png"):
-            older.unlink()
         report = write_actor_report(folder, actor, recording.rig)
-        say(f"{actor.body.name}: silhouettes and masks agree to {report.mean_iou:.2f}; see {folder / 'report.md'}")
+        say(f"{actor.body.name}: silhouettes and masks agree to {report.mean_iou:.2f}; see {folder / PAGE}")
 
 
 def _ended(folder: RunFolder, recording: Recording) -> RunResult:

@@ -33,10 +33,8 @@ def angle_panels(motion: Motion, body: Body) -> list[Curves]:
 
 def _turning(motion: Motion, body: Body) -> dict[str, Float[np.ndarray, "frame"]]:
     """The degrees of freedom that turn, in degrees."""
-    used = np.asarray(body.skeleton.parameter_transform) != 0.0
-    slides = (used & ~np.asarray(body.skeleton.revolute)[:, None]).any(axis=0)
-    columns = zip(body.skeleton.dof_names, slides, motion.pose.T, strict=True)
-    return {name: np.degrees(np.asarray(values, float)) for name, slide, values in columns if not slide}
+    columns = zip(body.skeleton.dof_names, body.skeleton.turning, motion.pose.T, strict=True)
+    return {name: np.degrees(np.asarray(values, float)) for name, turns, values in columns if turns}
 
 
 def _paired(angles: dict[str, Float[np.ndarray, "frame"]]) -> list[Curves]:
