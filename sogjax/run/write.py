@@ -17,8 +17,10 @@ from sogjax.io.motion_data import save_motion
 from sogjax.io.projects import CONFIG as PROJECT
 from sogjax.io.recording import Recording, open_recording
 from sogjax.model.body import Body
+from sogjax.run import clock
 from sogjax.run.adjust_cameras import camera_lines, write_cameras
 from sogjax.run.adjust_clip import Adjusted, sentence
+from sogjax.run.clock import stage
 from sogjax.run.forward import show_known
 from sogjax.run.judge import worst_images, write_metrics
 from sogjax.run.page import write_page
@@ -125,7 +127,8 @@ def write_results(run: Run) -> list[Path]:
         files += _of_adjusting(run, run.adjusted, out)
     if wanted.page:  # last, as it names the others
         files.append(PAGE.of(out))
-        write_page(files[-1], run, worst, images)
+        with stage(clock.PAGE):
+            write_page(files[-1], run, worst, images)
     return files
 
 
