@@ -17,7 +17,7 @@ from sogjax.quality.limb_warnings import limits_of
 from sogjax.quality.verdict import NUM_WORST, Verdict, expected_of, verdicts
 from sogjax.run.result import RunResult
 from sogjax.run.run import Run
-from sogjax.run.run_files import WORST
+from sogjax.run.run_files import PAGE, WORST
 from sogjax.run.terminal import say
 from sogjax.search.pose_confidence import SURE
 
@@ -63,7 +63,8 @@ def compared(recording: Recording, motions: Mapping[str, Motion]) -> GroupEvalua
 
 def say_verdicts(result: RunResult) -> None:
     """Print in a line each whether the actors' motions look right; a warning where they cannot be relied on."""
-    drawn = f"; see {WORST.name}" if any(path.name == WORST.name for path in result.files) else ""
+    written = {path.name for path in result.files}
+    drawn = next((f"; see {each.name}" for each in (PAGE, WORST) if each.name in written), "")
     for name, verdict in result.verdicts.items():
         whose = f"{name}: " if len(result.verdicts) > 1 else ""
         if verdict.wrong:
