@@ -144,6 +144,14 @@ def test_two_actors_have_a_timeline_each(capsys, tracked, tmp_path):
     assert faults_of(tmp_path / "run" / "index.html") == []
 
 
+def test_a_single_frame_of_which_nothing_is_judged(capsys, tracked, tmp_path):
+    _, words = tracked
+    done(capsys, *words, f"out={tmp_path / 'run'}", "start=3", "stop=4", "outputs.confidence=false")
+    known = known_of((tmp_path / "run" / "index.html").read_text())
+    assert (known["frames"], known["actors"][0]["explained"]) == ([3], None)
+    assert faults_of(tmp_path / "run" / "index.html") == []
+
+
 def test_only_settings_that_differ_are_told():
     assert changed_settings(track_config(recording="r")) == []
     found = changed_settings(track_config(["stop=40", "solver.max_iterations=9"], recording="r"))
@@ -181,4 +189,4 @@ def test_small_pictures_that_no_pass_came_by_are_read(tracked):
     large = np.zeros((1000, 2000, 3), np.uint8)
     other = replace(small, frames=(3,))
     other.take(0, 3, cv2.circle(large, (1000, 500), 100, (255, 255, 255), -1))
-    assert other.of_frame(3)[0].shape == (360, 720, 3)
+    assert other.of_frame(3)[0].shape == (320, 640, 3)

@@ -3,6 +3,7 @@
 import platform
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields, is_dataclass
 from datetime import datetime
 from importlib.metadata import PackageNotFoundError, version
@@ -109,10 +110,12 @@ def _pictures(run: Run, worst: Mapping[int, Sequence[Any]]) -> Iterator[FramePic
         small.read_lacking()
     except InputError as error:
         say(f"warning: some pictures are not on the page: {error}")
-    for frame in sorted({*small.frames, *worst}):
-        images = worst[frame] if frame in worst else small.of_frame(frame)
-        if any(image is not None for image in images):
-            yield frame, images
+    frames = sorted({*small.frames, *worst})
+    with ThreadPoolExecutor() as threads:  # JPEGs are decoded beside each other
+        shown = threads.map(lambda frame: worst[frame] if frame in worst else small.of_frame(frame), frames)
+        for frame, images in zip(frames, shown, strict=True):
+            if any(image is not None for image in images):
+                yield frame, images
 
 
 def _numbers(run: Run, result: RunResult) -> list[tuple[object, ...]]:

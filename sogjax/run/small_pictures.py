@@ -14,7 +14,7 @@ from sogjax.view.tiles import shrink
 
 FOLDER = "pictures"
 """Their folder in that of a run that has not ended."""
-WIDTH = 720
+WIDTH = 640
 """Pixels, at most."""
 MOST_CAMERAS = 4
 _JPEG = [cv2.IMWRITE_JPEG_QUALITY, 85]

@@ -1,12 +1,13 @@
 """The page of a check: what was found of a recording, worst first, and the calibration drawn into its pictures."""
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from sogjax.errors import counted
 from sogjax.view.page.document import Picture, Section, document, figure, paragraph, table, text
 
 
+@runtime_checkable
 class Found(Protocol):
     """What the page needs of a finding (`sogjax.check.findings.Finding`)."""
 
