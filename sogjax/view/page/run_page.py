@@ -230,9 +230,10 @@ def _viewer(run: RunOnPage, drawn: Sequence[tuple[int, str]]) -> str:
         f'<input type="range" id="frame" aria-label="frame" min="{frames[0]}" max="{frames[-1]}" step="{step}" '
         f'value="{first[0]}"></div><output id="said" for="frame"></output></div>'
     )
+    whose = f" of {run.actors[0].verdict.actor}, others have other colours"
     hint = paragraph(
         "Click in a timeline or a curve, or move the slider (arrow keys work): the pictures follow. Dashed bones "
-        "belong to a limb in doubt; blue is left, red is right.",
+        f"belong to a limb in doubt; blue is left, red is right{'' if len(run.actors) == 1 else whose}.",
         "note",
     )
     return f'{hint}<div class="card viewer">{screen}{right}</div>'
