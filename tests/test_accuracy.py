@@ -46,7 +46,7 @@ MOTIONS = {
     "walk": (WALK, Measured(markers=0.0054, joints=0.0176, iterations=2.9)),
     "squat_kick": (SQUAT, Measured(markers=0.0188, joints=0.0357, iterations=7.6)),
 }
-NO_OUTPUTS = ("outputs.overlay=false", "outputs.rerun=false", "outputs.bvh=false")
+NO_OUTPUTS = ("outputs.overlay=false", "outputs.rerun=false", "outputs.page=false", "outputs.bvh=false")
 
 
 @pytest.fixture(scope="module")

@@ -3,12 +3,12 @@
 import json
 from dataclasses import dataclass, replace
 
-import cv2
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from body_cases import reference_frames, shipped
+from browser import faults_of
 from drawn_scene import DISC, draw, in_colors, moved, standing
 from rig_cases import opencv_pixels, ring_rig
 from tiny_body import make_body
@@ -141,7 +141,8 @@ def made_dog():
 
 
 def test_a_good_actor_has_nothing_to_warn_of():
-    report = actor_report(made_dog(), RIG)
+    made = made_dog()
+    report = actor_report(made, RIG)
     assert {pose: list(cameras) for pose, cameras in report.ious.items()} == {
         pose: list(RIG.names) for pose in ("stand", "turned")
     }
@@ -150,7 +151,7 @@ def test_a_good_actor_has_nothing_to_warn_of():
     for bone in report.bones:
         assert bone.after == pytest.approx(1.1 * bone.before, rel=1e-4)
     assert report.warnings == report.notes == ()
-    assert "## Notes" not in report_page(report)
+    assert "Notes" not in report_page(report, made, RIG)
 
 
 def test_what_the_pictures_did_not_tell_is_said():
@@ -171,12 +172,12 @@ def test_what_the_pictures_did_not_tell_is_said():
     left_out, poor, first, second = sorted(report.warnings, key=_kind)
     assert left_out == "example pose 'stand': cam1 is left out"
     assert "'turned'" in poor
-    assert "silhouettes_turned.png" in poor
+    assert "its picture in the report" in poor
     (sizes,) = report.notes
     assert all(f"{made.shape_names[k]} (by " in sizes for k in (3, 5))
     assert sizes.count("(by ") == 2
     assert "by 10%, without pictures 10%" in sizes
-    assert f"## Notes\n\n- {sizes}" in report_page(report)
+    assert f"<h3>Notes</h3><ul><li>{sizes}</li></ul>" in report_page(report, made, RIG)
     assert {first.split()[0], second.split()[0]} == {"root_x", "root_yaw"}
     assert "200 mm" in first + second
     assert "23 degrees" in first + second
@@ -192,24 +193,23 @@ def test_the_files_of_the_report(tmp_path):
     folder = report_folder(tmp_path / "rex.yaml")
     assert folder == tmp_path / "rex_report"
     report = write_actor_report(folder, made, RIG)
-    files = ["actor_report.json", "colors.png", "report.md", "silhouettes_stand.png", "silhouettes_turned.png"]
+    files = ["actor_report.json", "index.html"]
     assert sorted(path.name for path in folder.iterdir()) == files
     numbers = json.loads((folder / "actor_report.json").read_text())
     assert numbers == json.loads(json.dumps(report.as_dict()))
     assert numbers["mean_iou"] == pytest.approx(report.mean_iou)
-    page = (folder / "report.md").read_text()
+    page = (folder / "index.html").read_text()
     for words in (
-        "# Actor dog",
-        "silhouettes_stand.png",
-        "colors.png",
-        "cam0 | cam1 | cam2",
+        "<h1>Actor dog</h1>",
+        "pose stand",
+        "pose turned",
+        "cam2</th>",
         "left upper arm",
         "+10.0",
     ):
         assert words in page
-    for name in files:
-        if name.endswith(".png"):
-            assert cv2.imread(str(folder / name)).size > 10_000
+    assert page.count("<img") == 3
+    assert faults_of(folder / "index.html") == []
 
 
 def test_colours_of_a_sheet_tell_mask_and_body_apart():

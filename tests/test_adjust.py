@@ -111,7 +111,8 @@ def test_a_track_is_adjusted_and_its_actor_learnt(tmp_path):
     assert numbers["energy_after"] > numbers["energy_before"]
     assert numbers["joints_after_mm"] < 1.05 * numbers["joints_before_mm"]
     written = set(json.loads((out / "run.json").read_text())["files"])
-    assert {"motion.npz", "unadjusted.npz", "actor.yaml", "overlay.mp4", "metrics.json"} <= written
+    assert {"index.html", "motion.npz", "unadjusted.npz", "actor.yaml", "overlay.mp4", "metrics.json"} <= written
+    assert "(adjustment.json)" in (out / "index.html").read_text()
     motion, before = load_motion(out / "motion.npz"), load_motion(out / "unadjusted.npz")
     assert np.abs(motion.pose - before.pose).max() > 1e-3
     assert motion.explained is not None

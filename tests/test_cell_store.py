@@ -193,7 +193,13 @@ def test_a_disk_that_fills_stops_keeping_but_not_the_run(walk, tmp_path, monkeyp
 def test_tracking_with_and_without_kept_cells_gives_one_motion(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     actor = actor_file(tmp_path / "actor.yaml")
-    light = ("outputs.overlay=false", "outputs.rerun=false", "outputs.bvh=false", "solver.max_iterations=12")
+    light = (
+        "outputs.overlay=false",
+        "outputs.rerun=false",
+        "outputs.page=false",
+        "outputs.bvh=false",
+        "solver.max_iterations=12",
+    )
     words = ("track", f"recording={trackable(tmp_path / 'walk')}", f"actor={actor}", "images.depth=4", *light)
     done(capsys, *words, "out=plain")
     done(capsys, *words, "images.cache=kept cells", "out=making")

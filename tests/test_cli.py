@@ -36,7 +36,7 @@ def test_from_a_recording_to_motion_and_pictures(capsys, tmp_path, monkeypatch, 
 
     out, _ = done(capsys, *track, "out=run", "start=1", "outputs.overlay_width=320", "outputs.formats=[trc,glb]")
     formats = ["motion.bvh", "motion.glb", "motion.npz", "motion.rrd", "motion.trc"]
-    names = ["config.yaml", "metrics.json", *formats, "overlay.mp4", "worst.png"]
+    names = ["config.yaml", "index.html", "metrics.json", *formats, "overlay.mp4", "worst.png"]
     assert sorted(path.name for path in (tmp_path / "run").iterdir()) == sorted([*names, "run.json"])
     assert all((tmp_path / "run" / name).stat().st_size > 0 for name in names)
     for name in names:
@@ -72,7 +72,7 @@ def test_from_a_recording_to_motion_and_pictures(capsys, tmp_path, monkeypatch, 
     assert kept["solver"]["max_iterations"] == 20
     assert kept["start"] == 1
 
-    light = ("outputs.overlay=false", "outputs.rerun=false", "stop=3")
+    light = ("outputs.overlay=false", "outputs.rerun=false", "outputs.page=false", "stop=3")
     table, _ = done(capsys, *track, "-m", "energy.limit_weight=0,1", *light)
     rows = [line for line in table.splitlines() if line.startswith("energy.limit_weight=")]
     assert [row.split()[0] for row in rows] == ["energy.limit_weight=0", "energy.limit_weight=1"]
@@ -83,7 +83,7 @@ def test_from_a_recording_to_motion_and_pictures(capsys, tmp_path, monkeypatch, 
 @pytest.mark.slow
 def test_one_member_of_a_sweep_fails_and_the_others_go_on(capsys, tmp_path, monkeypatch, rendered, plain_logging):
     monkeypatch.chdir(tmp_path)
-    light = ("outputs.overlay=false", "outputs.rerun=false", "outputs.bvh=false", "start=3")
+    light = ("outputs.overlay=false", "outputs.rerun=false", "outputs.page=false", "outputs.bvh=false", "start=3")
     actor = f"actor={actor_file(tmp_path / 'actor.yaml')}"
     status = main(["track", "-m", f"recording={rendered}", actor, *FAST, *light, "stop=9,4"])
     out, err = capsys.readouterr()
@@ -101,7 +101,7 @@ def test_videos_of_different_length(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     recording = trackable(tmp_path / "walk")
     write_video(recording / "videos" / "right.mp4", 1, frames=2)
-    light = ("outputs.overlay=false", "outputs.rerun=false")
+    light = ("outputs.overlay=false", "outputs.rerun=false", "outputs.page=false")
     _, err = done(capsys, "track", f"recording={recording}", f"actor={actor_file(tmp_path / 'a.yaml')}", *FAST, *light)
     assert "left 4" in err
     assert "right 2" in err

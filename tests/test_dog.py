@@ -16,7 +16,7 @@ from sogjax.io.motion import load_motion
 FRAMES = 12
 HEIGHT = 1.1
 """Metres: the cameras look at 1.2."""
-NOTHING_SHOWN = ("outputs.overlay=false", "outputs.rerun=false")
+NOTHING_SHOWN = ("outputs.overlay=false", "outputs.rerun=false", "outputs.page=false")
 
 
 def trotting(dog, frame):
@@ -58,7 +58,7 @@ def test_a_dog_is_tracked_by_the_commands_from_files_alone(recording, tmp_path, 
     """The body is asked for by name, made from its pictures, found in frame 0 and followed."""
     actor, out = tmp_path / "dog.yaml", tmp_path / "out"
     done(capsys, "actor", f"recording={recording}", "body=dog", f"out={actor}")
-    assert (tmp_path / "dog_report" / "report.md").is_file()
+    assert (tmp_path / "dog_report" / "index.html").is_file()
     done(capsys, "track", f"recording={recording}", f"actor={actor}", f"out={out}", *NOTHING_SHOWN)
     motion = load_motion(out / "motion.npz")
     assert len(motion.frame) == FRAMES

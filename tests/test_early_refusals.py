@@ -96,6 +96,6 @@ def test_without_files_what_belongs_to_the_motion_is_kept():
     asked = OutputsConfig(motion_only=True, confidence=False, formats=["c3d"]).asked()
     assert (asked.confidence, asked.formats) == (False, None)
     assert OutputsConfig(motion_only=True).asked().confidence
-    files = {"motion_only", "overlay", "overlay_width", "rerun", "rerun_images", "bvh", "formats", "pose2sim"}
+    files = {"motion_only", "page", "overlay", "overlay_width", "rerun", "rerun_images", "bvh", "formats", "pose2sim"}
     telling = {key.removeprefix("outputs.") for key in telling_settings(TrackConfig()) if key.startswith("outputs.")}
     assert telling == {entry.name for entry in fields(OutputsConfig)} - files

@@ -24,7 +24,7 @@ from sogjax.tracking.frame import FrameInput
 from sogjax.tracking.frame_by_frame import track
 
 SCHEME = named_scheme("HALPE_26")
-LIGHT = ("outputs.overlay=false", "outputs.rerun=false", "outputs.bvh=false", "images.depth=4")
+LIGHT = ("outputs.overlay=false", "outputs.rerun=false", "outputs.page=false", "outputs.bvh=false", "images.depth=4")
 ARM = ("left_elbow", "left_wrist")
 
 

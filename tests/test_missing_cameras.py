@@ -26,7 +26,7 @@ from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.tracking.frame import FrameInput
 from sogjax.tracking.frame_by_frame import track
 
-LIGHT = ("outputs.overlay=false", "outputs.rerun=false", "outputs.bvh=false")
+LIGHT = ("outputs.overlay=false", "outputs.rerun=false", "outputs.page=false", "outputs.bvh=false")
 
 
 def frames_seen(recording, *span):

@@ -97,7 +97,13 @@ def test_points_are_written_where_the_next_steps_look(tmp_path, capsys):
     folder, _ = pose2sim(tmp_path / "trial")
     (folder / "initial_pose.yaml").write_text("pose: rest\nposition: [0.0, 0.0, 1.0]\nheading: 0.0\n")
     command = ["track", f"recording={folder}", "actor=human", f"out={tmp_path / 'out'}", "outputs.pose2sim=true"]
-    command += ["images.depth=4", "solver.max_iterations=1", "outputs.overlay=false", "outputs.rerun=false"]
+    command += [
+        "images.depth=4",
+        "solver.max_iterations=1",
+        "outputs.overlay=false",
+        "outputs.rerun=false",
+        "outputs.page=false",
+    ]
     body = tmp_path / "human.yaml"
     save_body(body, load_body(named_body("human")))
     command[2] = f"actor={body}"

@@ -27,7 +27,7 @@ from sogjax.tracking import frame_by_frame
 from sogjax.tracking.culling import Capacities
 
 FRAMES, KILLS = 20, 3
-LIGHT = ("outputs.overlay=false", "outputs.rerun=false", "outputs.bvh=false")
+LIGHT = ("outputs.overlay=false", "outputs.rerun=false", "outputs.page=false", "outputs.bvh=false")
 SMALL = ("images.depth=4", "solver.max_iterations=3", "solver.min_iterations=1")
 
 

@@ -48,7 +48,7 @@ def farther(monkeypatch):
 
 @pytest.mark.parametrize(("overlay", "rerun"), SHOWN.values(), ids=SHOWN)
 def test_the_motion_that_is_written_is_the_revised_one(capsys, tmp_path, request, command, overlay, rerun):
-    outputs = [f"outputs.overlay={overlay}", f"outputs.rerun={rerun}"]
+    outputs = [f"outputs.overlay={overlay}", f"outputs.rerun={rerun}", "outputs.page=false"]
     done(capsys, *command, *outputs, "tracking.both_ways=false", "out=before")
     request.getfixturevalue("farther")
     _, err = done(capsys, *command, *outputs, "out=after")
@@ -85,7 +85,15 @@ def test_frames_read_backwards_are_those_of_the_part_that_is_tracked(capsys, tmp
         return moved_farther(tracker, passed)
 
     monkeypatch.setattr(merge, "merge_passes", merge_passes)
-    done(capsys, *command, "outputs.overlay=false", "outputs.rerun=false", f"start={start}", "out=run")
+    done(
+        capsys,
+        *command,
+        "outputs.overlay=false",
+        "outputs.rerun=false",
+        "outputs.page=false",
+        f"start={start}",
+        "out=run",
+    )
     expected = [frame.cells for frame in Clip(recording, recording.frames, 4).frames(start + 2, start + 6)]
     np.testing.assert_array_equal([frame.cells for frame in seen], expected[::-1])
     motion = load_motion(tmp_path / "run" / "motion.npz")
@@ -98,7 +106,7 @@ def test_a_pass_backwards_that_fails_is_said_and_the_motion_stays(capsys, tmp_pa
         raise InputError("a frame has too many image blobs")
 
     monkeypatch.setattr(merge, "merge_passes", merge_passes)
-    shown = ["outputs.overlay=false", "outputs.rerun=false"]
+    shown = ["outputs.overlay=false", "outputs.rerun=false", "outputs.page=false"]
     _, err = done(capsys, *command, *shown, "out=run")
     assert "limbs were not searched over the clip, which stays as it was tracked: a frame has too many" in err
     assert load_motion(tmp_path / "run" / "motion.npz").num_frames == FRAMES

@@ -16,7 +16,7 @@ from sogjax.run.run_folder import LOCK, run_folder
 
 SMALL = (
     *("images.depth=4", "solver.max_iterations=2", "solver.min_iterations=1"),
-    *("outputs.overlay=false", "outputs.rerun=false"),
+    *("outputs.overlay=false", "outputs.rerun=false", "outputs.page=false"),
 )
 
 

@@ -140,7 +140,7 @@ def test_a_report_looks_for_the_truth_before_anything_else(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("word", "added"),
     [
-        ("start=0,1", ["outputs.overlay=false", "outputs.rerun=false"]),
+        ("start=0,1", ["outputs.overlay=false", "outputs.rerun=false", "outputs.page=false"]),
         ("outputs.overlay=true", []),
         ("outputs.motion_only=true", []),
     ],
@@ -161,7 +161,7 @@ def test_the_script_of_a_sweep_leaves_them_out_too(monkeypatch, capsys):
         runpy.run_path(str(script), run_name="__main__")
     assert end.value.code == 0
     assert "no overlay" in capsys.readouterr().err
-    assert seen[0][2:] == ["outputs.overlay=false", "outputs.rerun=false"]
+    assert seen[0][2:] == ["outputs.overlay=false", "outputs.rerun=false", "outputs.page=false"]
 
 
 def black_scene(folder):

@@ -17,7 +17,7 @@ from sogjax.quality.limb_warnings import Limits
 from sogjax.quality.verdict import verdicts, worst_frames
 from sogjax.run.forward import say_if_other_subject
 from sogjax.run.judge import kept_verdicts
-from sogjax.view.overlay import HEIGHT, closeups
+from sogjax.view.overlay import HEIGHT, below_each_other, closeups
 
 CAMERAS = ("left", "right")
 
@@ -174,7 +174,7 @@ def test_closeups_show_the_body_in_each_frame(walk, tmp_path):
     rig = ring_rig(6, (160, 120), distance=3.0)
     grey = np.full((120, 160, 3), 90, np.uint8)
     frames = [(int(walk.frame[k]), [grey] * 5 + [None]) for k in (2, 20)]
-    drawn = closeups(frames, rig, [walk])
+    drawn = below_each_other([*closeups(frames, rig, [walk]).values()])
     assert drawn.shape[0] == 2 * HEIGHT
     assert np.ptp(drawn, axis=(0, 1)).max() > 100
     cv2.imwrite(str(tmp_path / "closeups.png"), drawn)
@@ -185,7 +185,12 @@ def test_closeups_show_the_body_in_each_frame(walk, tmp_path):
     [
         (0.86, 0.7, 0, "looks right (its example poses explain 70% of it)"),
         (0.6, 0.7, 0, "silhouettes agree to 60% only"),
-        (0.86, 0.2, 1, "explain 20% of it only (60 to 75 % is usual): look at colors.png; 1 warning in report.md"),
+        (
+            0.86,
+            0.2,
+            1,
+            "explain 20% of it only (60 to 75 % is usual): look at the colours in its report; 1 warning",
+        ),
     ],
 )
 def test_an_actor_is_judged_by_its_example_poses(iou, explained, warnings, said):

@@ -139,7 +139,7 @@ def _poor_silhouettes(ious: Mapping[str, Mapping[str, float]]) -> list[str]:
     means = {pose: float(np.mean([*cameras.values()])) for pose, cameras in ious.items()}
     return [
         f"example pose {pose!r}: the silhouettes overlap the masks by only {mean:.2f} (IoU); look at "
-        f"silhouettes_{pose}.png, and correct a mask or give the pose's `initial_pose` in recording.yaml"
+        "its picture in the report, and correct a mask or give the pose's `initial_pose` in recording.yaml"
         for pose, mean in means.items()
         if mean < POOR_IOU
     ]
@@ -159,11 +159,9 @@ def _undetermined_sizes(made: FinishedActor) -> tuple[str, ...]:
 
 def _poorly_seen_dofs(made: FinishedActor) -> list[str]:
     skeleton = made.body.skeleton
-    used = np.asarray(skeleton.parameter_transform) != 0.0
-    slides = (used & ~np.asarray(skeleton.revolute)[:, None]).any(axis=0)
     best = np.min(np.nan_to_num(made.pose_deviations, nan=np.inf), axis=0)
     warnings = []
-    for name, deviation, slide in zip(skeleton.dof_names, best, slides, strict=True):
+    for name, deviation, slide in zip(skeleton.dof_names, best, ~skeleton.turning, strict=True):
         if deviation > (POORLY_SEEN_LENGTH if slide else POORLY_SEEN_ANGLE):
             amount = f"{1000 * deviation:.0f} mm" if slide else f"{np.degrees(deviation):.0f} degrees"
             warnings.append(

@@ -15,7 +15,7 @@ from sogjax.io.actor_file import save_body
 from sogjax.io.files import write_file
 from sogjax.io.recording import Recording
 from sogjax.model.camera import camera_of
-from sogjax.run.actor_report import report_folder, write_actor_report
+from sogjax.run.actor_report import PAGE, report_folder, write_actor_report
 from sogjax.run.actors import ActorRequest, new_actors
 from sogjax.run.build import color_space_and_radius
 from sogjax.run.recordings import opened
@@ -62,11 +62,11 @@ def run(config: ActorConfig, name: str | None = None) -> Path:
         save_body(out, made.body)
     print(f"silhouettes and masks agree to {report.mean_iou:.3f} (mean IoU)")
     if report.warnings:
-        say(f"{counted(len(report.warnings), 'warning')}: see {folder / 'report.md'}")
+        say(f"{counted(len(report.warnings), 'warning')}: see {folder / PAGE}")
     for note in report.notes:
         say(f"note: {note}")
     print(out)
-    print(folder / "report.md")
+    print(folder / PAGE)
     print(f"\nverdict: {actor_verdict(report.mean_iou, float(made.body.explained), len(report.warnings))}")
     return out
 
@@ -75,11 +75,14 @@ def actor_verdict(mean_iou: float, explained: float, num_warnings: int) -> str:
     """What is thought of an actor, from what its own example poses show: both are parts of 1."""
     found = []
     if mean_iou < GOOD_IOU:
-        found.append(f"silhouettes agree to {mean_iou:.0%} only (80 % and more is usual): look at silhouettes_*.png")
+        found.append(f"silhouettes agree to {mean_iou:.0%} only (80 % and more is usual): look at its report")
     if explained < GOOD_COLORS:
-        found.append(f"its example poses explain {explained:.0%} of it only (60 to 75 % is usual): look at colors.png")
+        found.append(
+            f"its example poses explain {explained:.0%} of it only (60 to 75 % is usual): look at the colours "
+            "in its report"
+        )
     if num_warnings:
-        found.append(f"{counted(num_warnings, 'warning')} in report.md")
+        found.append(f"{counted(num_warnings, 'warning')} in its report")
     return "; ".join(found) or f"looks right (its example poses explain {explained:.0%} of it)"
 
 

@@ -12,18 +12,20 @@ from sogjax.check.findings import SEVERITIES, Finding
 from sogjax.cli.schemas import CheckConfig
 from sogjax.errors import InputError, counted
 from sogjax.io.files import write_file
-from sogjax.io.image_file import write_image
 from sogjax.io.recording import Recording, open_recording
 from sogjax.io.recording_files import SETTINGS
 from sogjax.io.recording_settings import offsets_line, write_frame_offsets
 from sogjax.run.recordings import body_named, extent_of
 from sogjax.run.run_folder import results_folder
 from sogjax.run.terminal import alive, progress, say
+from sogjax.view.page.check_page import check_page
 from sogjax.view.room import room_sheet
+
+PAGE = "index.html"
 
 
 def run(config: CheckConfig) -> list[Finding]:
-    """Examine a recording, print the findings, and write check.json and check.png.
+    """Examine a recording, print the findings, and write check.json and the page.
 
     Raises:
         InputError: a recording that does not open, or that nothing right can be made of, once all that is wrong was
@@ -36,13 +38,14 @@ def run(config: CheckConfig) -> list[Finding]:
     with results_folder(out), alive("examining the recording"):
         found = examined(recording, start, frames, config.largest_offset, progress, subject)
         write_file(out / "check.json", json.dumps(found.numbers, indent=1))
-        write_image(out / "check.png", _picture(recording, found))
+        write_file(out / PAGE, _page(recording, found, start, frames))
+        (out / "check.png").unlink(missing_ok=True)  # of an older check
     for finding in found.findings:
         print(finding.line())
     _offer_offsets(config, recording, found)
     counts = [(sum(f.severity == kind for f in found.findings), kind) for kind in reversed(SEVERITIES)]
     shown = [counted(count, kind, "ok" if kind == "ok" else None) for count, kind in counts if count]
-    say(", ".join(shown) + f"; see {out / 'check.png'}")
+    say(", ".join(shown) + f"; see {out / PAGE}")
     if any(finding.severity == "error" for finding in found.findings):
         raise InputError(f"{recording.path}: nothing right can be made of it before what is called an error is mended")
     return found.findings
@@ -97,6 +100,14 @@ def _picture(recording: Recording, found: Examination):
         1.0 / geometry.scale,
         recording.name,
     )
+
+
+def _page(recording: Recording, found: Examination, start: int, frames: int) -> str:
+    span = f"frames {start} to {start + frames - 1}" if frames > 1 else f"frame {start}"
+    offsets = {name: offset for name, offset in found.offsets.items() if offset}
+    subtitle = f"A check of {span}, {counted(len(recording.rig), 'camera')}"
+    line = offsets_line(offsets) if offsets else ""
+    return check_page(recording.name, subtitle, found.findings, _picture(recording, found), offsets, line)
 
 
 def _offer_offsets(config: CheckConfig, recording: Recording, found: Examination) -> None:

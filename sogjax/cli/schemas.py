@@ -49,7 +49,7 @@ class CheckConfig:
     """Check a recording: calibration, synchronisation, exposure, files; say what is wrong and what to do."""
 
     recording: str = option(REQUIRED, "folder of the recording")
-    out: str = option("", "folder of check.json and check.png, overwritten if there; default: outputs/RECORDING/check")
+    out: str = option("", "folder of check.json and index.html, overwritten if there; default: outputs/RECORDING/check")
     start: int | None = option(None, "first frame to examine, counted from the recording's first; null: the middle")
     frames: int = option(90, "frames to examine, at most; somebody should be moving in them")
     largest_offset: int = option(15, "largest time offset between cameras to look for, frames")

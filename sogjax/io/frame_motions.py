@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -49,7 +50,7 @@ def motions_of(table: FrameTable, bodies: Sequence[Body], clip: ClipFacts) -> di
     found = {}
     parts = zip(bodies, dof_slices(bodies), limb_slices(bodies), strict=True)
     for actor, (body, dofs, limbs) in enumerate(parts):
-        judged = {}
+        judged: dict[str, Any] = {}
         if table.limb_doubt is not None and table.explained is not None and table.overlap is not None:
             judged = {
                 "limb_names": limb_names(body),
@@ -69,6 +70,7 @@ def motions_of(table: FrameTable, bodies: Sequence[Body], clip: ClipFacts) -> di
             iterations=np.asarray(table.iterations, int),
             converged=np.asarray(table.converged, bool),
             up=clip.up,
+            unfiltered_pose=None if table.unfiltered_pose is None else table.unfiltered_pose[:, dofs],
             **judged,
         )
     return found

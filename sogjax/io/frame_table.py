@@ -55,6 +55,9 @@ class FrameTable:
     overlap: Float[np.ndarray, "frame actor camera"] | None = column(
         "", "silhouette and foreground, intersection over union; NaN where no background is known", default=None
     )
+    unfiltered_pose: Float[np.ndarray, "frame dof"] | None = column(
+        "rad, m", "Theta before it was filtered; only where it was", default=None
+    )
     terms: Mapping[str, Float[np.ndarray, "frame"]] = column(
         "", "each term of the energy without its weight, by name", default_factory=dict
     )

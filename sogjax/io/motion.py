@@ -58,6 +58,7 @@ def motion_from_poses(
     explained: Float[np.ndarray, "frame"] | None = None,
     overlap: Float[np.ndarray, "frame camera"] | None = None,
     camera_names: Sequence[str] | None = None,
+    unfiltered_pose: Float[np.ndarray, "frame dof"] | None = None,
 ) -> Motion:
     """The motion of `body`, which stands upright in a world with the vertical `up`, through `poses`.
 
@@ -96,6 +97,7 @@ def motion_from_poses(
         explained=explained,
         overlap=overlap,
         camera_names=None if camera_names is None else np.array(camera_names, str),
+        unfiltered_pose=unfiltered_pose,
         landmark_names=np.array(body.landmarks.names, str),
         landmark_joint=np.array(body.landmarks.joints, int),
         landmark_offset=np.asarray(body.landmarks.offsets),
@@ -152,6 +154,7 @@ def checked_motion(path: Path, arrays: dict[str, np.ndarray]) -> Motion:
         actor=str(text_array(path, arrays, "actor", ())) if "actor" in arrays else "",
         **_limbs(path, arrays, frames, joints),
         **_fit(path, arrays, frames),
+        **_filtered(path, arrays, (frames, len(dof_names))),
         **_landmarks(path, arrays),
     )
     _check(path, motion)
@@ -183,6 +186,16 @@ def _fit(path: Path, arrays: dict[str, np.ndarray], frames: int) -> dict[str, An
         "explained": finite_array(path, arrays, "explained", (frames,)),
         "overlap": float_array(path, arrays, "overlap", (frames, len(names))),
         "camera_names": names,
+    }
+
+
+def _filtered(path: Path, arrays: dict[str, np.ndarray], shape: tuple[int, int]) -> dict[str, Any]:
+    """What a filter made of the poses, if one did."""
+    if "unfiltered_pose" not in arrays or "filtered_by" not in arrays:
+        return {}
+    return {
+        "filtered_by": str(text_array(path, arrays, "filtered_by", ())),
+        "unfiltered_pose": finite_array(path, arrays, "unfiltered_pose", shape),
     }
 
 

@@ -63,7 +63,10 @@ class MotionData:
     known."""
     camera_names: Shaped[np.ndarray, "camera"] | None = None
     """The cameras of the columns of `overlap`."""
-
+    filtered_by: str = ""
+    """The filter that `pose`, joints and blobs went through; empty: none."""
+    unfiltered_pose: Float[np.ndarray, "frame dof"] | None = None
+    """What `pose` was before; None where it was not filtered."""
     landmark_names: Shaped[np.ndarray, "landmark"] | None = None
     """Points fixed to joints; None where the file does not have them, as in the other two."""
     landmark_joint: Int[np.ndarray, "landmark"] | None = None

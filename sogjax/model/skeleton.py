@@ -52,6 +52,12 @@ class Skeleton(eqx.Module):
         return len(self.dof_names)
 
     @property
+    def turning(self) -> Bool[np.ndarray, "dof"]:
+        """Which degrees of freedom are angles: those that move no sliding joint."""
+        used = np.asarray(self.parameter_transform) != 0.0
+        return ~(used & ~np.asarray(self.revolute)[:, None]).any(axis=0)
+
+    @property
     def trees(self) -> tuple[int, ...]:
         """For every joint the number of its tree, which is an actor; trees are counted by their roots."""
         numbers: list[int] = []

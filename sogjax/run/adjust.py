@@ -20,6 +20,7 @@ from sogjax.run.actors import Actors
 from sogjax.run.adjust_cameras import check_cameras, parts_in_question
 from sogjax.run.adjust_checks import check_length, check_window
 from sogjax.run.adjust_clip import AdjustRequest
+from sogjax.run.filter import check_cutoff
 from sogjax.run.fingerprint import RunFingerprint, digest
 from sogjax.run.forward import Tracked
 from sogjax.run.recordings import opened, upright
@@ -28,7 +29,7 @@ from sogjax.run.run import Run
 from sogjax.run.run_files import ACTOR, CONFIG, MOTION
 from sogjax.run.run_folder import run_folder
 from sogjax.run.runner import run_passes
-from sogjax.run.track import opened_clip
+from sogjax.run.track import opened_clip, with_pictures
 from sogjax.run.write import check_pose2sim, export_endings
 from sogjax.settings.compose import as_object, without_removed
 from sogjax.settings.run import AdjustConfig, TrackConfig
@@ -155,12 +156,15 @@ def adjust_to_folder(config: AdjustConfig) -> RunResult:
         every=step_of(motion.frame),
     )
     build.check(settings)
+    check_cutoff(outputs.filter, recording.fps / settings.every)
     request = AdjustRequest(config.window, config.shape, parts_in_question(config.cameras, config.offsets))
     fingerprint: RunFingerprint = {"motion": str(tracked.path), "actor": digest(tracked.actor)}
     with run_folder(path, config.overwrite, command="adjust") as folder:
         folder.begin("adjust", fingerprint)
         run = Run(
-            clip=opened_clip(recording, settings).kept_in(folder.kept, settings.images.cache),
+            clip=with_pictures(
+                opened_clip(recording, settings).kept_in(folder.kept, settings.images.cache), settings, folder
+            ),
             config=settings,
             out=path,
             kept=folder.kept,
@@ -179,7 +183,7 @@ def _table(motion: Motion) -> FrameTable:
     count = motion.num_frames
     return FrameTable(
         frame=np.asarray(motion.frame, int),
-        pose=motion.pose,
+        pose=motion.pose if motion.unfiltered_pose is None else motion.unfiltered_pose,
         energy=motion.energy,
         iterations=motion.iterations,
         evaluations=motion.iterations,

@@ -20,6 +20,7 @@ from sogjax.io.video import read_prepared
 from sogjax.model.yuv_picture import YuvPicture
 from sogjax.run.clip_keypoints import ClipKeypoints
 from sogjax.run.clock import StageTimes
+from sogjax.run.small_pictures import FOLDER, SmallPictures
 from sogjax.run.terminal import say
 from sogjax.scene.cells import CellGrid, padded_cells, stack_shape
 from sogjax.tracking.frame import FrameInput
@@ -73,6 +74,8 @@ class Clip:
     """Where cells are kept, so that no frame is decoded twice; None: nowhere."""
     store_lasts: bool = False
     """Whether the user named the store's folder: trouble with it is an error then."""
+    small: SmallPictures | None = None
+    """Takes small pictures of some frames whenever these are decoded; None: none are wanted."""
 
     @property
     def fps(self) -> float:
@@ -94,6 +97,10 @@ class Clip:
         shape = (len(self.grids), *stack_shape(self.grids))
         store = CellStore(place, self.recording, self.depth, shape, say)
         return replace(self, store=store, store_lasts=cache is not None)
+
+    def shown_small(self, folder: Path, most: int) -> "Clip":
+        """The clip with small pictures of so many frames at most, kept in a folder."""
+        return replace(self, small=SmallPictures(self.recording, spread_frames(self.numbers, most), folder / FOLDER))
 
     def close(self) -> None:
         """Close the files of kept cells; they are opened again where they are needed."""
@@ -162,7 +169,7 @@ class Clip:
             return {kind.name: kind.prepare(camera, picture) for kind in kinds if frame in wanted[kind.name]}
 
         known = frozenset(np.asarray(every)[~needed].tolist())
-        preparation = _Preparation(self.grids, known, frozenset().union(*wanted.values()), make)
+        preparation = _Preparation(self.grids, known, frozenset().union(*wanted.values()), make, self.small)
         taken: dict[str, Samples] = {kind.name: [{} for _ in self.grids] for kind in kinds}
         for number, made in zip(
             every, read_prepared(self.recording, preparation, every.start, every.stop, planes=True), strict=False
@@ -187,7 +194,9 @@ class Clip:
         """Decode from the first to the last of some frames, and keep the cells of all of them."""
         every = range(numbers[0], numbers[-1] + 1)
         kept = np.zeros(len(every), bool) if self.store is None else self.store.kept(every)
-        preparation = _Preparation(self.grids, frozenset(np.asarray(every)[kept].tolist()), frozenset(numbers), make)
+        preparation = _Preparation(
+            self.grids, frozenset(np.asarray(every)[kept].tolist()), frozenset(numbers), make, self.small
+        )
         pictures = read_prepared(self.recording, preparation, every.start, every.stop, planes=True)
         with closing(prefetch(pictures, FRAMES_AHEAD)) as ready:
             coming = ready if times is None else times.timed("decode", ready)
@@ -260,6 +269,7 @@ class _Preparation:
     shown: frozenset[int]
     """Frames of whose pictures something is made."""
     make: PictureMaker | None
+    small: SmallPictures | None = None
 
     def __call__(self, camera: int, frame: int, image: np.ndarray | YuvPicture | None) -> _Prepared:
         if image is None:
@@ -267,7 +277,11 @@ class _Preparation:
         begin = time.perf_counter()
         cells = None if frame in self.known else padded_cells(image, self.grids[camera], stack_shape(self.grids))
         seconds = time.perf_counter() - begin
-        if self.make is None or frame not in self.shown:
+        make = self.make if frame in self.shown else None
+        small = self.small if self.small is not None and self.small.lacks(camera, frame) else None
+        if make is None and small is None:
             return _Prepared(cells, None, seconds)
         whole = image.bgr() if isinstance(image, YuvPicture) else image
-        return _Prepared(cells, self.make(camera, frame, whole), seconds)
+        if small is not None:
+            small.take(camera, frame, whole)
+        return _Prepared(cells, None if make is None else make(camera, frame, whole), seconds)

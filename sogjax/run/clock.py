@@ -23,11 +23,12 @@ Turn = Callable[[str], None]
 STARTING, RENDERING, ACTORS, INITIAL_POSE = "starting the program", "rendering", "actors", "initial pose"
 PREPARING, BACKGROUND = "background and compilation", "learning the background again"
 BEFORE, FIRST_FRAME, TRACKING = "tracking back from the initial pose", "first frame, with compilation", "tracking"
-BOTH_WAYS, ADJUSTING, WRITING = "tracking both ways", "adjusting", "writing results"
+BOTH_WAYS, ADJUSTING, FILTERING = "tracking both ways", "adjusting", "filtering"
+WRITING, PAGE = "writing results", "writing the page"
 OTHER, TOTAL = "other", "total"
 STAGES = (
     *(STARTING, RENDERING, ACTORS, INITIAL_POSE, PREPARING, BACKGROUND, BEFORE),
-    *(FIRST_FRAME, TRACKING, BOTH_WAYS, ADJUSTING, WRITING),
+    *(FIRST_FRAME, TRACKING, BOTH_WAYS, ADJUSTING, FILTERING, WRITING, PAGE),
 )
 """Stages of a clock, in the order in which they are shown; those of other names come after them."""
 STEP_STAGES = {

@@ -1,4 +1,4 @@
-"""What a run thinks of itself: its verdict in numbers and in a line, and a picture of its worst frames."""
+"""What a run thinks of itself: its verdict in numbers and in a line, and what its worst frames show."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -9,7 +9,6 @@ from typing import Any
 from sogjax.errors import InputError
 from sogjax.io.files import write_json
 from sogjax.io.ground_truth import load_ground_truth
-from sogjax.io.image_file import write_image
 from sogjax.io.motion import Motion
 from sogjax.io.recording import Recording
 from sogjax.io.video import read_frames
@@ -19,10 +18,9 @@ from sogjax.quality.proportions import odd_sentence
 from sogjax.quality.verdict import NUM_WORST, Verdict, expected_of, verdicts
 from sogjax.run.result import RunResult
 from sogjax.run.run import Run
-from sogjax.run.run_files import WORST
+from sogjax.run.run_files import PAGE, WORST
 from sogjax.run.terminal import say
 from sogjax.search.pose_confidence import SURE
-from sogjax.view.overlay import closeups
 
 
 def judged_result(run: Run) -> RunResult:
@@ -67,7 +65,8 @@ def compared(recording: Recording, motions: Mapping[str, Motion]) -> GroupEvalua
 
 def say_verdicts(result: RunResult) -> None:
     """Print in a line each whether the actors' motions look right; a warning where they cannot be relied on."""
-    drawn = f"; see {WORST.name}" if any(path.name == WORST.name for path in result.files) else ""
+    written = {path.name for path in result.files}
+    drawn = next((f"; see {each.name}" for each in (PAGE, WORST) if each.name in written), "")
     for name, verdict in result.verdicts.items():
         whose = f"{name}: " if len(result.verdicts) > 1 else ""
         if verdict.wrong:
@@ -91,16 +90,13 @@ def kept_verdicts(path: Path) -> dict[str, Verdict]:
         return {}
 
 
-def write_worst(path: Path, result: RunResult) -> bool:
-    """Write a picture of the frames that fit worst; whether that could be done, which is said otherwise."""
-    frames = _worst(result)
+def worst_images(result: RunResult) -> dict[int, list[Any]]:
+    """The pictures (BGR) of all cameras in the frames that fit worst; none where they cannot be read, which is said."""
     try:
-        drawn = closeups(_pictures(result.recording, frames), result.recording.rig, list(result.motions.values()))
+        return dict(_pictures(result.recording, _worst(result)))
     except InputError as error:
-        say(f"warning: no {path.name}: {error}")
-        return False
-    write_image(path, drawn)
-    return True
+        say(f"warning: no {WORST.name}: {error}")
+        return {}
 
 
 def _worst(result: RunResult) -> list[int]:

@@ -11,7 +11,18 @@ from sogjax.io.frame_table import FrameLog
 from sogjax.run.actors import Actors
 from sogjax.run.adjust_clip import Adjusted, adjust_clip
 from sogjax.run.background import Background, learn_background, said_if_none
-from sogjax.run.clock import ACTORS, ADJUSTING, BACKGROUND, BOTH_WAYS, INITIAL_POSE, PREPARING, TRACKING, WRITING
+from sogjax.run.clock import (
+    ACTORS,
+    ADJUSTING,
+    BACKGROUND,
+    BOTH_WAYS,
+    FILTERING,
+    INITIAL_POSE,
+    PREPARING,
+    TRACKING,
+    WRITING,
+)
+from sogjax.run.filter import Filtered, filter_frames
 from sogjax.run.forward import Tracked, kept_rows, track_forward
 from sogjax.run.initial_pose import InitialPose, find_initial_pose
 from sogjax.run.judge import judged_result
@@ -120,6 +131,14 @@ PASSES: tuple[Pass, ...] = (
         lambda run: adjust_clip(run.first_setup, run.background, run.frames, run.config.color, run.adjust),
         Adjusted,
         wanted=lambda run: run.adjusts,
+        changes_frames=True,
+    ),
+    Pass(
+        "filtered",
+        FILTERING,
+        lambda run: filter_frames(run.frames, run.config.outputs.filter, run.clip.fps, run.actors.bodies),
+        Filtered,
+        wanted=lambda run: run.config.outputs.filter is not None,
         changes_frames=True,
     ),
     Pass("result", WRITING, judged_result, wanted=lambda run: run.out is not None),

@@ -20,6 +20,7 @@ from sogjax.run.adjust_clip import Adjusted, AdjustRequest
 from sogjax.run.background import Background
 from sogjax.run.clip import Clip, SampleKind
 from sogjax.run.clock import StageTimes
+from sogjax.run.filter import filter_name
 from sogjax.run.initial_pose import SOURCES, InitialPose, PoseRequest, PoseSource
 from sogjax.run.keypoint_bias import KeypointBias
 from sogjax.run.relearn_background import RelearntBackground
@@ -173,6 +174,9 @@ class Run:
         """The motions, without anything that was thought of them."""
         setup, table, recording = self.final_setup, self.frames, self.clip.recording
         motions = motions_of(table, setup.bodies, ClipFacts.of(recording))
+        if table.unfiltered_pose is not None and self.config.outputs.filter is not None:
+            named = filter_name(self.config.outputs.filter)
+            motions = {name: replace(motion, filtered_by=named) for name, motion in motions.items()}
         image_blobs = float(self.unadjusted.num_matching.mean())
         missing = recording.num_missing(self.clip.numbers)
         return RunResult(setup.clip.recording, setup.bodies, motions, self.times, image_blobs, missing=missing)

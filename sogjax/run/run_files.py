@@ -49,6 +49,7 @@ ACTOR = RunFile("actor.yaml", "the actor, if the run made or adjusted it", of_ac
 CONFIG = RunFile("config.yaml", "all settings")
 METRICS = RunFile("metrics.json", "the verdict, and the errors where there is a truth")
 OVERLAY = RunFile("overlay.mp4", "the skeleton on every camera's pictures")
+PAGE = RunFile("index.html", "all of it on one page: verdict, timeline, pictures, curves")
 RERUN = RunFile("motion.rrd", "everything for the Rerun viewer")
 WORST = RunFile("worst.png", "the five frames that fit worst")
 UNADJUSTED = RunFile("unadjusted.npz", "the motion as it was before it was adjusted")
@@ -59,7 +60,7 @@ DESCRIPTION = RunFile("recording.yaml", "a recording.yaml that names that calibr
 GUESS = RunFile("initial_pose.png", "the best guess of an initial pose that was not sure")
 
 RUN_FILES: tuple[RunFile, ...] = (
-    *(NOTE, KEPT, *MOTIONS.values(), ACTOR, CONFIG, METRICS, OVERLAY, RERUN, WORST),
+    *(NOTE, KEPT, *MOTIONS.values(), ACTOR, CONFIG, METRICS, PAGE, OVERLAY, RERUN, WORST),
     *(UNADJUSTED, UNADJUSTED_ACTOR, ADJUSTMENT, CALIBRATION, DESCRIPTION, GUESS),
 )
 _OLDER = (RunFile("motion.partial", "", is_folder=True), RunFile("motion_*.partial", "", is_folder=True))

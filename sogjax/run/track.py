@@ -12,18 +12,20 @@ from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.quality.proportions import odd_sentence
 from sogjax.run import build
-from sogjax.run.actor_report import report_folder, write_actor_report
+from sogjax.run.actor_report import PAGE, report_folder, write_actor_report
 from sogjax.run.actors import ActorRequest, Actors, make_actors
 from sogjax.run.background import Background
 from sogjax.run.clip import Clip
 from sogjax.run.clip_keypoints import clip_keypoints
 from sogjax.run.clock import ACTORS, StageTimes, stage
 from sogjax.run.example_frames import check_actors
+from sogjax.run.filter import check_cutoff
 from sogjax.run.fingerprint import run_fingerprint
 from sogjax.run.initial_pose import SOURCES, PoseSource, described_poses, pose_file
 from sogjax.run.judge import compared, kept_verdicts
 from sogjax.run.kept_actors import forget_actors
 from sogjax.run.memory import forget_programs_if_many
+from sogjax.run.page import FRAMES_ON_PAGE
 from sogjax.run.recordings import chosen_frames, file_list, opened, upright
 from sogjax.run.result import RunResult
 from sogjax.run.run import Run
@@ -50,6 +52,7 @@ def track_to_folder(
     files = None if config.actor is None else file_list(config.actor)
     check_actors(recording, config.actors, None if files is None else len(files))
     chosen_frames(recording, config.start, config.stop, config.every)
+    check_cutoff(config.outputs.filter, recording.fps / config.every)
     poses = pose_file(recording, config)
     path = Path(config.out or f"outputs/{recording.name}")
     with run_folder(path, config.overwrite, config.resume, command) as folder:
@@ -64,7 +67,9 @@ def track_to_folder(
             if given is not None:
                 given.save(folder.kept)
         run = Run(
-            clip=opened_clip(recording, config).kept_in(folder.kept, config.images.cache),
+            clip=with_pictures(
+                opened_clip(recording, config).kept_in(folder.kept, config.images.cache), config, folder
+            ),
             config=config,
             out=path,
             kept=folder.kept,
@@ -98,6 +103,7 @@ def track_recording(
         terms: of the energy, beside those of the settings.
         pose_sources: of the initial pose.
     """
+    check_cutoff(config.outputs.filter, recording.fps / config.every)
     forget_programs_if_many()
     config = replace(config, outputs=replace(config.outputs, motion_only=True).asked())
     with TemporaryDirectory() as folder:
@@ -117,6 +123,11 @@ def opened_clip(recording: Recording, config: TrackConfig) -> Clip:
     return Clip(recording, numbers, config.images.depth, clip_keypoints(recording, config))
 
 
+def with_pictures(clip: Clip, config: TrackConfig, folder: RunFolder) -> Clip:
+    """The clip with the small pictures that the run's page shows, if it is wanted."""
+    return clip.shown_small(folder.kept, FRAMES_ON_PAGE) if config.outputs.page else clip
+
+
 def _given_actors(recording: Recording, config: TrackConfig, files: Sequence[Path]) -> Actors:
     """The actors of files; what is wrong with them, or with a rough pose of theirs, shows before any work."""
     clip = Clip(recording, recording.frames, config.images.depth)
@@ -133,10 +144,8 @@ def _report_actors(made: Sequence[MadeActor], recording: Recording, out: Path) -
     """Write how actors fit the frames of the videos that they were made of, for the user to judge."""
     for actor in (actor for actor in made if actor.frames):
         folder = report_folder(ACTOR.of(out, actor.body.name, len(made)))
-        for older in folder.glob("silhouettes_*.png"):
-            older.unlink()
         report = write_actor_report(folder, actor, recording.rig)
-        say(f"{actor.body.name}: silhouettes and masks agree to {report.mean_iou:.2f}; see {folder / 'report.md'}")
+        say(f"{actor.body.name}: silhouettes and masks agree to {report.mean_iou:.2f}; see {folder / PAGE}")
         if (odd := odd_sentence(actor.body, actor.start)) is not None:
             say(f"warning: {actor.body.name}: {odd}")
 

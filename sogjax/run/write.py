@@ -11,20 +11,36 @@ from sogjax.io.export.points import require_ezc3d, write_trc
 from sogjax.io.export.write import WRITERS, export_motion
 from sogjax.io.files import write_file, write_json
 from sogjax.io.frame_motions import ClipFacts, motions_of
+from sogjax.io.image_file import write_image
 from sogjax.io.keypoints.scheme import named_scheme
 from sogjax.io.motion_data import save_motion
 from sogjax.io.projects import CONFIG as PROJECT
 from sogjax.io.recording import Recording, open_recording
 from sogjax.model.body import Body
+from sogjax.run import clock
 from sogjax.run.adjust_cameras import camera_lines, write_cameras
 from sogjax.run.adjust_clip import Adjusted, sentence
+from sogjax.run.clock import stage
 from sogjax.run.forward import show_known
-from sogjax.run.judge import write_metrics, write_worst
+from sogjax.run.judge import worst_images, write_metrics
+from sogjax.run.page import write_page
 from sogjax.run.result_streams import ResultStreams
 from sogjax.run.run import Run
-from sogjax.run.run_files import ACTOR, ADJUSTMENT, CONFIG, GUESS, METRICS, MOTIONS, UNADJUSTED, UNADJUSTED_ACTOR, WORST
+from sogjax.run.run_files import (
+    ACTOR,
+    ADJUSTMENT,
+    CONFIG,
+    GUESS,
+    METRICS,
+    MOTIONS,
+    PAGE,
+    UNADJUSTED,
+    UNADJUSTED_ACTOR,
+    WORST,
+)
 from sogjax.run.terminal import say
 from sogjax.settings.run import OutputsConfig
+from sogjax.view.overlay import below_each_other, closeups
 
 POSE2SIM_SCHEME = "HALPE_26"
 """The scheme of the points written for Pose2Sim: its default."""
@@ -99,12 +115,21 @@ def write_results(run: Run) -> list[Path]:
     write_file(files[-1], OmegaConf.to_yaml(OmegaConf.structured(run.config)))
     files.append(METRICS.of(out))
     write_metrics(files[-1], result)
-    if not wanted.motion_only and write_worst(WORST.of(out), result):
+    images = {} if wanted.motion_only else worst_images(result)
+    worst = closeups(images.items(), result.recording.rig, list(result.motions.values()))
+    if worst:
         files.append(WORST.of(out))
+        write_image(files[-1], below_each_other([*worst.values()]))
     if GUESS.of(out).is_file():
         files.append(GUESS.of(out))
     files += grown
-    return files if run.adjusted is None else files + _of_adjusting(run, run.adjusted, out)
+    if run.adjusted is not None:
+        files += _of_adjusting(run, run.adjusted, out)
+    if wanted.page:  # last, as it names the others
+        files.append(PAGE.of(out))
+        with stage(clock.PAGE):
+            write_page(files[-1], run, worst, images)
+    return files
 
 
 def _grown(run: Run, out: Path) -> list[Path]:

@@ -16,13 +16,19 @@ class OutputsConfig:
     motion_only: bool = option(
         False, "none of them: no overlay, no picture, no Rerun file, no other format, whatever they say", inert=True
     )
+    page: bool = expert(True, "index.html, the whole result on one page for a browser", inert=True)
     overlay: bool = option(True, "overlay.mp4, the skeleton on every camera's pictures", inert=True)
     overlay_width: int = expert(1920, "width of the overlay video, px", inert=True)
-    rerun: bool = option(True, "motion.rrd, for the Rerun viewer", inert=True)
+    rerun: bool = expert(True, "motion.rrd, for the Rerun viewer", inert=True)
     rerun_images: bool = expert(True, "put the pictures into motion.rrd", inert=True)
     bvh: bool = expert(True, "motion.bvh", inert=True)
     formats: list[str] | None = option(
         None, "further formats of the motion, some of [trc,c3d,glb,csv,mot]; null: none", inert=True
+    )
+    filter: float | None = option(
+        None,
+        "Hz: low-pass filter over the whole motion, without delay (Butterworth, order 4): 3 to 6 for walking, 6 to 15 "
+        "for running, more for blows; null: none",
     )
     pose2sim: bool = option(
         False,

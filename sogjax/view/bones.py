@@ -81,7 +81,7 @@ def bones_from_motion(motion: Motion) -> Bones:
 
 def sides_of(motion: Motion) -> Int[np.ndarray, "joint"]:
     """LEFT, MIDDLE or RIGHT of every joint, by its name."""
-    return np.array([_side(str(name)) for name in motion.joint_names], int)
+    return np.array([side_of(str(name)) for name in motion.joint_names], int)
 
 
 def actor_palette(actor: int) -> UInt8[np.ndarray, "3 3"]:
@@ -94,7 +94,8 @@ def blob_palette(motion: Motion, actor: int) -> UInt8[np.ndarray, "blob 3"]:
     return actor_palette(actor)[sides_of(motion)[np.asarray(motion.blob_joint, int)]]
 
 
-def _side(name: str) -> int:
+def side_of(name: str) -> int:
+    """LEFT, MIDDLE or RIGHT, as a name says."""
     words = name.rsplit("/", 1)[-1].lower().replace("-", "_").replace(".", "_").split("_")
     if "left" in words or words[0] == "l" or words[-1] == "l":
         return LEFT

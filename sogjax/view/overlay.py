@@ -216,8 +216,8 @@ HEIGHT = 320
 
 def closeups(
     frames: Iterable[tuple[int, Sequence[np.ndarray | None]]], rig: CameraRig, motions: Sequence[Motion]
-) -> UInt8[np.ndarray, "height width 3"]:
-    """One picture (BGR), a row for each frame.
+) -> dict[int, UInt8[np.ndarray, "height _width 3"]]:
+    """A picture (BGR) of each frame, cameras side by side.
 
     Args:
         frames: the recording's numbers, with the BGR pictures of all cameras.
@@ -227,14 +227,19 @@ def closeups(
     step = max(len(rig) / CAMERAS, 1.0)
     chosen = [int(k * step) for k in range(min(CAMERAS, len(rig)))]
     overlays = {k: Overlay(rig, motions, cameras=[rig.names[k]], width=rig.image_size(rig.names[k])[0]) for k in chosen}
-    rows = []
+    rows = {}
     for frame, images in frames:
         means = [motion.blob_means[motion.frame == frame].reshape(-1, 3) for motion in motions]
         pixels = picture_points(rig, np.concatenate(means)[None].astype(np.float32))[0][:, 0]
         cuts = [_cut(overlay.draw(images, frame), pixels[k], rig.names[k]) for k, overlay in overlays.items()]
         row = np.hstack(cuts)
         write_label(row, f"frame {frame}", (6, HEIGHT - 8))
-        rows.append(row)
+        rows[frame] = row
+    return rows
+
+
+def below_each_other(rows: Sequence[UInt8[np.ndarray, "_height _width 3"]]) -> UInt8[np.ndarray, "height width 3"]:
+    """Pictures as one."""
     width = max(row.shape[1] for row in rows)
     return np.vstack([np.pad(row, ((0, 0), (0, width - row.shape[1]), (0, 0))) for row in rows])
 

@@ -92,10 +92,10 @@ def shrink(image: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     return cv2.resize(image, size, interpolation=cv2.INTER_LINEAR)
 
 
-def write_label(area: np.ndarray, text: str, corner: tuple[int, int]) -> None:
+def write_label(area: np.ndarray, text: str, corner: tuple[int, int], size: float = 0.42) -> None:
     """Write small white text on a dark rim, readable on any picture."""
     for color, thick in (((0, 0, 0), 3), ((255, 255, 255), 1)):
-        cv2.putText(area, text, corner, cv2.FONT_HERSHEY_SIMPLEX, 0.42, color, thick, cv2.LINE_AA)
+        cv2.putText(area, text, corner, cv2.FONT_HERSHEY_SIMPLEX, size, color, thick, cv2.LINE_AA)
 
 
 @dataclass(frozen=True)

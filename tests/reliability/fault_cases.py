@@ -23,7 +23,7 @@ from sogjax.io.npz_file import npy_header
 
 FIRST_FRAMES = 8
 LATER_FRAMES = 24
-LIGHT = ("outputs.overlay=false", "outputs.rerun=false")
+LIGHT = ("outputs.overlay=false", "outputs.rerun=false", "outputs.page=false")
 
 
 def killed(ward: Ward) -> Survived:

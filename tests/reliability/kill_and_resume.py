@@ -120,7 +120,7 @@ def tracking(settings: Settings) -> list[str]:
     )
     command = ["track", f"recording={cached_recording(rendered)}", "initial_pose=auto", "images.depth=6"]
     command += [] if settings.made else [f"actor={named_body('human')}"]
-    return [*command, *(f"outputs.{name}={str(settings.overlay).lower()}" for name in ("overlay", "rerun"))]
+    return [*command, *(f"outputs.{name}={str(settings.overlay).lower()}" for name in ("overlay", "rerun", "page"))]
 
 
 def started(command: list[str], folder: Path) -> subprocess.Popen:

@@ -48,7 +48,7 @@ from sogjax.settings.files import conf_dir
 from sogjax.settings.run import TrackConfig
 from sogjax.settings.wrong_values import no_such_choice, unknown_key
 
-PICTURES = ("outputs.overlay", "outputs.rerun")
+PICTURES = ("outputs.overlay", "outputs.rerun", "outputs.page")
 """Outputs of every frame, for which pictures are decoded."""
 CHECKED_MEMBERS = 100
 """Members of a sweep that are checked before it begins."""
@@ -89,7 +89,7 @@ def _swept(words: Sequence[str], added: Sequence[str] = ()) -> int:
     _check_members(words)
     if added:
         asked = " ".join(f"{key}=true" for key in PICTURES)
-        say(f"members write no overlay and no Rerun file; {asked} brings them back")
+        say(f"members write no overlay, no Rerun file and no page; {asked} brings them back")
     return run_hydra([*words, *added])
 
 

@@ -117,6 +117,7 @@ def write_mot(path: Path, motion: MotionData, up: str = "z") -> None:
     frame_time(path, motion)
     columns = {"time": motion.time, **joint_angles(motion, up)}
     header = [path.stem, "version=1", f"nRows={motion.num_frames}", f"nColumns={len(columns)}", "inDegrees=yes"]
+    header += [f"filter={motion.filtered_by}"] if motion.filtered_by else []
     rows = zip(*columns.values(), strict=True)
     lines = [*header, "endheader", "\t".join(columns), *("\t".join(f"{value:.6f}" for value in row) for row in rows)]
     write_file(path, "\n".join(lines) + "\n")

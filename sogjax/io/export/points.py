@@ -85,6 +85,8 @@ def write_c3d(path: Path, motion: MotionData, up: str = "z", markers: str | None
     parameters["UNITS"]["value"] = ["mm"]
     file.add_parameter("POINT", "X_SCREEN", _signed(forward_axis(up)))
     file.add_parameter("POINT", "Y_SCREEN", _signed(up))
+    if motion.filtered_by:
+        file.add_parameter("PROCESSING", "FILTER", [motion.filtered_by])
     file["data"]["points"] = points
     with atomic_path(path) as temporary:
         file.write(str(temporary))
@@ -122,7 +124,8 @@ def write_csv(path: Path, motion: MotionData, up: str = "z") -> None:
 def write_columns(path: Path, motion: MotionData, note: str, columns: Mapping[str, Float[np.ndarray, "frame"]]) -> None:
     """Write CSV: after a line starting with `#` with a note, and the columns' names, one row per frame."""
     with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        file.write(f"# {note}\n")
+        filtered = f", filter: {motion.filtered_by}" if motion.filtered_by else ""
+        file.write(f"# {note}{filtered}\n")
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["frame", "time", *columns])
         for frame, *row in zip(motion.frame.tolist(), motion.time.tolist(), *columns.values(), strict=True):
@@ -146,7 +149,7 @@ def write_trc(path: Path, motion: MotionData, up: str = "z", markers: str | None
         **{"OrigDataRate": rate, "OrigDataStartFrame": str(int(motion.frame[0])), "OrigNumFrames": count},
     }
     header = [
-        ["PathFileType", "4", "(X/Y/Z)", path.name],
+        ["PathFileType", "4", "(X/Y/Z)", path.name, *([f"filter: {motion.filtered_by}"] if motion.filtered_by else [])],
         [*facts],
         [*facts.values()],
         ["Frame#", "Time", *(cell for name in names for cell in (name, "", ""))],
