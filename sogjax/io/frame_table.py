@@ -55,6 +55,9 @@ class FrameTable:
     overlap: Float[np.ndarray, "frame actor camera"] | None = column(
         "", "silhouette and foreground, intersection over union; NaN where no background is known", default=None
     )
+    limb_hidden: Float[np.ndarray, "frame limb"] | None = column(
+        "", "part of the limb that things in front hide from the cameras", default=None
+    )
     terms: Mapping[str, Float[np.ndarray, "frame"]] = column(
         "", "each term of the energy without its weight, by name", default_factory=dict
     )
