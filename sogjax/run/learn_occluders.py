@@ -116,7 +116,7 @@ def learn_occluders(setup: Setup, tracked: FrameTable) -> LearntOccluders:
     cameras = [name for name, of in zip(clip.recording.rig.names, hidden, strict=True) if np.isfinite(of).any()]
     say(
         f"something stands in front of {', '.join(cameras)} and hides up to {shares.max():.0%} of the body: frames "
-        f"{numbers[first]} to {numbers[last]} are tracked again with it; `sogjax segment` shows what you paint yourself"
+        f"{numbers[first]} to {numbers[last]} are tracked again with it, and it is drawn in occluders.png"
     )
     return LearntOccluders(hidden, (first, last))
 

@@ -20,9 +20,21 @@ from sogjax.run.adjust_cameras import camera_lines, write_cameras
 from sogjax.run.adjust_clip import Adjusted, sentence
 from sogjax.run.forward import show_known
 from sogjax.run.judge import write_metrics, write_worst
+from sogjax.run.occluder_sheet import write_occluders
 from sogjax.run.result_streams import ResultStreams
 from sogjax.run.run import Run
-from sogjax.run.run_files import ACTOR, ADJUSTMENT, CONFIG, GUESS, METRICS, MOTIONS, UNADJUSTED, UNADJUSTED_ACTOR, WORST
+from sogjax.run.run_files import (
+    ACTOR,
+    ADJUSTMENT,
+    CONFIG,
+    GUESS,
+    METRICS,
+    MOTIONS,
+    OCCLUDERS,
+    UNADJUSTED,
+    UNADJUSTED_ACTOR,
+    WORST,
+)
 from sogjax.run.terminal import say
 from sogjax.settings.run import OutputsConfig
 
@@ -103,8 +115,19 @@ def write_results(run: Run) -> list[Path]:
         files.append(WORST.of(out))
     if GUESS.of(out).is_file():
         files.append(GUESS.of(out))
+    files += _occluders(run, out)
     files += grown
     return files if run.adjusted is None else files + _of_adjusting(run, run.adjusted, out)
+
+
+def _occluders(run: Run, out: Path) -> list[Path]:
+    """What was learnt to stand in front, over the pictures of the first frame in which it hides somebody."""
+    if not run.hides_something:
+        return []
+    learnt, clip = run.records["occluders"], run.clip
+    frame = clip.numbers[learnt.rows[0]]
+    title = "what was learnt to stand in front"
+    return [write_occluders(OCCLUDERS.of(out), clip.recording, clip.grids, learnt.hidden, frame, title)]
 
 
 def _grown(run: Run, out: Path) -> list[Path]:
