@@ -140,3 +140,20 @@ def test_what_was_learnt_is_kept(tmp_path):
     found = LearntOccluders.load(tmp_path)
     np.testing.assert_array_equal(found.hidden, hidden)
     assert found.rows == (3, 9)
+
+
+def test_what_hides_goes_on_a_little_where_nothing_is_told_and_not_at_the_border():
+    counts = DepthCounts.empty((1, 20, 30), 1.0, 4.0)
+    rows, columns = (part.ravel() for part in np.mgrid[8:11, 10:16])
+    cells, depths = (np.zeros(len(rows), int), rows, columns), np.full(len(rows), 3.0, np.float32)
+    for _ in range(6):
+        counts.add(cells, depths, np.full(len(rows), 0.02, np.float32))
+    beside = (np.zeros(3, int), np.arange(8, 11), np.full(3, 16))
+    for _ in range(6):
+        counts.add(beside, depths[:3], np.full(3, 0.98, np.float32))
+    hidden = np.isfinite(counts.hidden_from()[0])
+    assert hidden[8:11, 10:15].all()
+    assert hidden[9, 9]
+    assert not hidden[9, 16]  # seen
+    assert not hidden[:4].any()
+    assert not hidden[:, 20:].any()

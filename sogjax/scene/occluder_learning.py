@@ -24,6 +24,8 @@ HIDDEN = 0.5
 """Probability from which on a cell counts as hidden."""
 BEFORE = 0.2
 """Metres before the nearest place at which a body was missed: what is nearer is not known to be hidden."""
+GROWN = 2
+"""Cells by which what hides goes on where nothing was told: a body is only missed for certain in its middle."""
 _LOOK = 3
 """Cells in each direction over which likelihoods are averaged."""
 
@@ -66,6 +68,8 @@ class DepthCounts:
             if len(rows):
                 part = tuple(slice(max(at.min() - 1, 0), at.max() + 2) for at in (rows, columns))
                 hidden[camera][part] = self._of_part(self.seen[camera][part], missed[part])
+                told = (self.seen[camera] + missed).sum(axis=-1) > 0.5
+                hidden[camera] = np.where(told, hidden[camera], _nearest_around(hidden[camera]))
         return hidden
 
     def _of_part(
@@ -89,6 +93,11 @@ class DepthCounts:
         later = np.where(np.arange(bins) >= first[..., None], missed, 0.0).sum(axis=-1)
         found = is_hidden.any(axis=-1) & (later > FEWEST_MISSES - 0.5)
         return np.where(found, self.first + BIN * first, np.inf).astype(np.float32)
+
+
+def _nearest_around(hidden: Float[np.ndarray, "rows columns"]) -> Float[np.ndarray, "rows columns"]:
+    """The lowest depth around each cell."""
+    return cv2.erode(hidden, np.ones((2 * GROWN + 1, 2 * GROWN + 1), np.uint8), borderType=cv2.BORDER_REPLICATE)
 
 
 def _averaged(values: Float[np.ndarray, "rows columns layer"]) -> Float[np.ndarray, "rows columns layer"]:
