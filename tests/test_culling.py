@@ -113,7 +113,7 @@ def test_blobs_of_the_background_are_left_out_and_others_weighted(scene):
         lambda reader, rgb: reader.near_blobs(rgb, reader.odds(rgb), everywhere, 2048)
     )(reader, rgb)
     assert counts.tolist() == np.asarray(leaves).sum(axis=1).tolist()
-    weights = np.asarray(weights)[np.asarray(near.mask)]
+    weights = np.asarray(weights.foreground)[np.asarray(near.mask)]
     assert (weights > 0.0).all()
     assert weights.max() == 1.0
 

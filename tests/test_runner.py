@@ -90,14 +90,14 @@ def wanted(run):
 
 def test_the_passes_of_a_command_are_those_that_it_wants(tmp_path):
     """Of every pass it is said here which commands have it."""
-    tracking = ["initial_pose", "tracked", "merged"]
+    tracking = ["initial_pose", "tracked", "occluders", "merged"]
     assert wanted(tiny_run(out=tmp_path)) == [*tracking, "result", "files"]
     assert wanted(tiny_run()) == tracking
     given = tiny_run("adjust=true", out=tmp_path, frames_given=True, tracked=None)
     assert wanted(given) == ["adjusted", "result", "files"]
     assert wanted(tiny_run("adjust=true")) == [*tracking, "adjusted"]
     assert [each.name for each in BEFORE_TRACKING] == ["background", "actors", "initial_pose", "keypoint_bias"]
-    conditional = {"relearnt", "keypoint_bias"}  # a background learnt from the clip, keypoints
+    conditional = {"relearnt", "keypoint_bias", "retracked"}  # a learnt background, keypoints, things in front
     named = {"background", "actors", *tracking, "adjusted", "result", "files"}
     assert {each.name for each in PASSES} == named | conditional
 

@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 from command_line import done, refused
 from rig_cases import ring_rig
+from small_recording import make_recording, write_image
 
 from sogjax.io.image_file import read_mask
 from sogjax.synth.render import render_recording
@@ -65,3 +66,19 @@ def test_a_sheet_shows_every_picture_with_its_mask_tinted():
         np.testing.assert_allclose(tile[55, 65], 0.55 * 100 + 0.45 * np.array(GREEN), atol=1)
         np.testing.assert_array_equal(tile[85, 5], 100)
     assert not tiles[3].any()
+
+
+def test_a_sheet_shows_what_was_painted_to_stand_in_front(capsys, tmp_path):
+    recording = make_recording(tmp_path / "recording")
+    mask = np.zeros((48, 64), np.uint8)
+    mask[24:] = 255
+    write_image(recording / "occluders" / "left.png", mask)
+    for camera in ("left", "right"):
+        write_image(recording / "background" / f"{camera}.jpg", np.full((48, 64, 3), 90, np.uint8))
+    out, _ = done(capsys, "segment", f"recording={recording}", f"out={tmp_path / 'seen'}", "frames=[0]")
+    path = tmp_path / "seen" / "occluders.png"
+    assert str(path) in out.split()
+    sheet = cv2.imread(str(path)).astype(int)
+    blue = (sheet[..., 0] - sheet[..., 2] > 40).mean()
+    assert 0.05 < blue < 0.4  # a half of one of two pictures, below a title
+    assert "overwrite" in refused(capsys, "segment", f"recording={recording}", f"out={tmp_path / 'seen'}", "frames=[0]")

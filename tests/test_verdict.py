@@ -1,5 +1,6 @@
 """Verdicts: what a run thinks of its own motion."""
 
+import json
 from dataclasses import replace
 
 import cv2
@@ -13,8 +14,9 @@ from rig_cases import ring_rig
 
 from sogjax.cli.actor import actor_verdict
 from sogjax.io.files import write_json
+from sogjax.io.frame_motions import with_hidden
 from sogjax.quality.limb_warnings import Limits
-from sogjax.quality.verdict import verdicts, worst_frames
+from sogjax.quality.verdict import Verdict, verdicts, worst_frames
 from sogjax.run.forward import say_if_other_subject
 from sogjax.run.judge import kept_verdicts
 from sogjax.view.overlay import HEIGHT, below_each_other, closeups
@@ -127,6 +129,24 @@ def test_limbs_in_doubt_are_named(walk):
     doubt[3:9, 1] = 0.9
     motion = replace(judged(walk), limb_names=np.array(["head", "left arm"]), limb_doubt=doubt)
     assert of_one(motion).sentence == f"look at frames {walk.frame[3]}-{walk.frame[8]}, left arm"
+
+
+def test_a_limb_that_things_hide_is_named_with_the_cause_and_nobody_is_called_another_subject(walk):
+    hidden = np.zeros((walk.num_frames, 2))
+    hidden[3:9, 1] = 0.95
+    doubt = with_hidden(np.zeros_like(hidden), hidden)
+    motion = replace(
+        judged(walk), limb_names=np.array(["head", "left leg"]), limb_doubt=doubt, limb_hidden=hidden,
+        joint_limb=np.zeros(9, int),
+    )  # fmt: skip
+    found = of_one(motion)
+    assert found.sentence == f"look at frames {walk.frame[3]}-{walk.frame[8]}, left leg hidden by what stands in front"
+    assert Verdict.from_dict(json.loads(json.dumps(found.as_dict()))) == found
+    half = with_hidden(np.full_like(hidden, 0.2), hidden * 0.6)
+    assert (half == 0.2).all()  # enough is seen
+    unseen = replace(motion, explained=np.full(walk.num_frames, 0.01), limb_hidden=np.ones_like(hidden))
+    assert not of_one(unseen).wrong
+    assert of_one(replace(unseen, limb_hidden=None)).wrong
 
 
 def test_two_actors_in_one_place_are_told(walk):

@@ -11,6 +11,7 @@ from jaxtyping import Bool, UInt8
 from sogjax.errors import InputError, counted
 from sogjax.io.example_poses import ExamplePose
 from sogjax.io.image_file import read_mask
+from sogjax.io.painted import painted_masks
 from sogjax.io.recording import Recording
 from sogjax.io.video import read_still
 from sogjax.model.rotation import axis_vector
@@ -74,12 +75,13 @@ def example_masks(
     made = masks_from_backgrounds(images, backgrounds, files, cameras, up, unknown) if backgrounds else {}
     found = _subject_alone(example, names, dict(sorted({**files, **made}.items())))
     _check_found(recording, example, list(found), [camera for camera in backgrounds if camera not in found])
-    wrong = disagreeing_cameras(found, cameras)
+    hidden = {camera: mask for camera, mask in enumerate(painted_masks(recording)) if mask is not None}
+    wrong = disagreeing_cameras(found, cameras, hidden)
     masks = {camera: mask for camera, mask in found.items() if camera not in wrong}
     warnings = [_unlike(example, names[camera], share) for camera, share in wrong.items()]
     warnings += [_moved(recording, example, names[k], plate) for k, plate in plates.items() if plate.pixels]
     warnings += [_no_subject(recording, example, names[camera]) for camera in backgrounds if camera not in made]
-    if len(masks) == 2 and (share := min(hull_coverage(masks, cameras).values())) < AGREEING:
+    if len(masks) == 2 and (share := min(hull_coverage(masks, cameras, hidden).values())) < AGREEING:
         pair = " and ".join(names[camera] for camera in masks)
         warnings.append(
             f"example pose {example.name!r}: the masks of {pair} agree by only {share:.0%}; look at them with "

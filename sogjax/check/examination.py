@@ -47,10 +47,10 @@ from sogjax.check.synchronisation import (
 from sogjax.errors import InputError
 from sogjax.io.calibration.load import load_calibration
 from sogjax.io.calibration.rig import CameraRig
-from sogjax.io.example_poses import check_size, find_background, find_example_poses
+from sogjax.io.example_poses import check_size, find_background, find_example_poses, find_occluders
 from sogjax.io.projects import Project, calibrations_of, named_as_sources, named_calibration, project_in
 from sogjax.io.recording import Recording
-from sogjax.io.recording_files import BACKGROUND, EXAMPLE_POSES, RECORDING_FILES, SETTINGS
+from sogjax.io.recording_files import BACKGROUND, EXAMPLE_POSES, OCCLUDERS, RECORDING_FILES, SETTINGS
 from sogjax.io.recording_settings import RecordingSettings, read_recording_settings
 from sogjax.io.source import find_sources, look_at_source
 
@@ -228,6 +228,7 @@ def opening_problems(path: Path, first: InputError) -> list[Finding]:
             if camera in sizes:
                 tried(lambda camera=camera: check_size(sources[camera], sizes[camera], sized, camera))
         tried(lambda: find_background(BACKGROUND.of(path), sized, calibrated))
+        tried(lambda: find_occluders(OCCLUDERS.of(path), sized, calibrated))
         tried(lambda: find_example_poses(EXAMPLE_POSES.of(path), sized, calibrated, settings.example_poses, None))
     for part in RECORDING_FILES:
         tried(lambda part=part: part.checked(path))

@@ -33,7 +33,9 @@ class SegmentConfig:
 
     recording: str = option(REQUIRED, "folder of the recording")
     out: str = option(
-        REQUIRED, "folder for POSE/CAMERA.mask.png, a contact sheet per pose, POSE.png, and background/CAMERA.png"
+        REQUIRED,
+        "folder for POSE/CAMERA.mask.png, a contact sheet per pose, POSE.png, background/CAMERA.png, and "
+        "occluders.png where something was painted to stand in front",
     )
     frames: list[int] | None = option(
         None, "frames whose probability of foreground is shown; null: none, or three if there are no example poses"

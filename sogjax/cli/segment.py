@@ -13,23 +13,28 @@ from sogjax.cli.schemas import SegmentConfig
 from sogjax.errors import InputError, counted
 from sogjax.io.example_poses import ExamplePose
 from sogjax.io.image_file import write_image, write_mask
+from sogjax.io.painted import painted_masks
 from sogjax.io.recording import Recording
 from sogjax.io.recording_files import EXAMPLE_POSES
 from sogjax.io.video import read_prepared
 from sogjax.run.background import learn_background
 from sogjax.run.clip import Clip
 from sogjax.run.example_frames import with_examples
+from sogjax.run.occluder_sheet import write_occluders
 from sogjax.run.recordings import opened
 from sogjax.run.run_folder import free_path, results_folder
 from sogjax.run.terminal import alive, progress, say
 from sogjax.scene.background import BackgroundImage
 from sogjax.scene.foreground import foreground_probability
+from sogjax.scene.occluders import painted
 from sogjax.settings.method import ImagesConfig
 from sogjax.view.sheets import background_sheet
 from sogjax.view.tiles import GREEN, RED, Tile, contact_sheet
 
 BACKGROUND = "background"
 """Folder of the background's sheets."""
+OCCLUDERS = "occluders.png"
+"""The sheet of what stands in front."""
 
 
 def run(config: SegmentConfig) -> list[Path]:
@@ -49,16 +54,27 @@ def run(config: SegmentConfig) -> list[Path]:
         free_path("out", out / f"{example.name}.png", config.overwrite)
     if frames:
         free_path("out", out / BACKGROUND, config.overwrite)
+    if recording.occluders:
+        free_path("out", out / OCCLUDERS, config.overwrite)
     with results_folder(out), alive("segmenting"):
         clip = Clip(recording, recording.frames, ImagesConfig().depth)
         learnt = with_examples(clip, lambda: learn_background(clip, "auto"))[1] if examples else None
         shown = progress(examples, len(examples), "example poses")
         sheets = [_masks(recording, example, out, learnt) for example in shown]
+        if recording.occluders:
+            sheets.append(_occluders(clip, out / OCCLUDERS))
         if frames:
             sheets += _background_sheets(clip, config.background, frames, out / BACKGROUND)
     for path in sheets:
         print(path)
     return sheets
+
+
+def _occluders(clip: Clip, path: Path) -> Path:
+    """Write the sheet of what was painted to stand in front, in the cells that it is counted in."""
+    hidden = painted(painted_masks(clip.recording), clip.grids)
+    middle = clip.numbers[len(clip.numbers) // 2]
+    return write_occluders(path, clip.recording, clip.grids, hidden, middle, "what was painted to stand in front")
 
 
 def _masks(recording: Recording, example: ExamplePose, out: Path, learnt: Sequence[BackgroundImage] | None) -> Path:

@@ -11,7 +11,7 @@ from jaxtyping import Bool
 from sogjax.errors import InputError
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.io.files import visible_files
-from sogjax.io.image_file import IMAGE_SUFFIXES, read_image, read_mask
+from sogjax.io.image_file import IMAGE_SUFFIXES, read_image, read_mask, read_painted
 from sogjax.io.pose_description import PoseDescription, parse_initial_pose
 from sogjax.io.yaml_entry import Entry
 
@@ -97,6 +97,25 @@ def find_background(folder: Path, rig: CameraRig, calibrated: Iterable[str]) -> 
     images = _by_camera(folder, calibrated, mask=False)
     images = {camera: images[camera] for camera in rig.names if camera in images}
     _check_sizes(rig, images, {})
+    return images
+
+
+def find_occluders(folder: Path, rig: CameraRig, calibrated: Iterable[str]) -> dict[str, Path]:
+    """The pictures of what stands in front in `folder`, by camera of `rig` that has one.
+
+    Raises:
+        InputError: an image of no calibrated camera, of another size than its pictures, or one that does not open.
+    """
+    images = _by_camera(folder, calibrated, mask=False)
+    images = {camera: images[camera] for camera in rig.names if camera in images}
+    for camera, path in images.items():
+        height, width = read_painted(path).shape
+        if (width, height) != rig.image_size(camera):
+            wanted = "{}x{}".format(*rig.image_size(camera))
+            raise InputError(
+                f"{path}: is {width}x{height}, but the pictures of {camera!r} are {wanted}; paint what stands in front "
+                "in white over one of them, and keep its size"
+            )
     return images
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from sogjax.errors import InputError
 from sogjax.io.actor_file import load_body
@@ -24,6 +25,12 @@ FRAMES, FACTS, ACTOR = "frames", "clip.json", "actor_{}.yaml"
 """Names in the folder of a run that has not ended: the log of its frames, what they are of, and the actors."""
 PARTIAL = "run.partial"
 """The folder itself, in that of the results."""
+
+
+MOSTLY_HIDDEN = 0.7
+"""Part of a limb that must be hidden from the cameras for it to be in doubt; from half-way to all on it is wholly."""
+UNSEEN_DOUBT = 0.6
+"""Doubt of a limb that no camera sees: it is kept by prediction and limits, which is more likely wrong than right."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +52,16 @@ class ClipFacts:
         write_file(folder / FACTS, json.dumps(asdict(self)))
 
 
+def with_hidden(
+    doubt: Float[np.ndarray, "frame limb"], hidden: Float[np.ndarray, "frame limb"] | None
+) -> Float[np.ndarray, "frame limb"]:
+    """Doubts of limbs, of which those that are mostly hidden cannot be sure."""
+    if hidden is None:
+        return doubt
+    unseen = np.clip((hidden - MOSTLY_HIDDEN) / (1.0 - MOSTLY_HIDDEN), 0.0, 1.0)
+    return np.maximum(doubt, UNSEEN_DOUBT * np.minimum(2.0 * unseen, 1.0))
+
+
 def motions_of(table: FrameTable, bodies: Sequence[Body], clip: ClipFacts) -> dict[str, Motion]:
     """The motion of each actor, upright in the world; similarity, energy and iterations are those of all together."""
     found = {}
@@ -52,10 +69,12 @@ def motions_of(table: FrameTable, bodies: Sequence[Body], clip: ClipFacts) -> di
     for actor, (body, dofs, limbs) in enumerate(parts):
         judged: dict[str, Any] = {}
         if table.limb_doubt is not None and table.explained is not None and table.overlap is not None:
+            hidden = None if table.limb_hidden is None else np.asarray(table.limb_hidden[:, limbs], float)
             judged = {
                 "limb_names": limb_names(body),
                 "joint_limb": joint_limbs(body.skeleton),
-                "limb_doubt": np.asarray(table.limb_doubt[:, limbs], float),
+                "limb_doubt": with_hidden(np.asarray(table.limb_doubt[:, limbs], float), hidden),
+                "limb_hidden": hidden,
                 "explained": np.asarray(table.explained[:, actor], float),
                 "overlap": np.asarray(table.overlap[:, actor], float),
                 "camera_names": clip.cameras,

@@ -58,6 +58,9 @@ class FrameTable:
     unfiltered_pose: Float[np.ndarray, "frame dof"] | None = column(
         "rad, m", "Theta before it was filtered; only where it was", default=None
     )
+    limb_hidden: Float[np.ndarray, "frame limb"] | None = column(
+        "", "part of the limb that things in front hide from the cameras", default=None
+    )
     terms: Mapping[str, Float[np.ndarray, "frame"]] = column(
         "", "each term of the energy without its weight, by name", default_factory=dict
     )

@@ -37,6 +37,18 @@ def read_mask(path: Path) -> Bool[np.ndarray, "height width"]:
     return _decode(path, cv2.IMREAD_GRAYSCALE) > 127
 
 
+def read_painted(path: Path) -> Bool[np.ndarray, "height width"]:
+    """Where the image in `path`, grey or in colours, is painted white (brighter than half) and is not transparent.
+
+    Raises:
+        InputError: no such file, or no image.
+    """
+    image = _decode(path, cv2.IMREAD_UNCHANGED)
+    image = image.reshape(*image.shape[:2], -1).astype(np.float32) / np.iinfo(image.dtype).max
+    seen = image[..., -1] if image.shape[-1] in (2, 4) else np.ones(image.shape[:2], np.float32)
+    return image[..., :3].mean(axis=-1) * seen > 0.5 if image.shape[-1] != 2 else image[..., 0] * seen > 0.5
+
+
 def write_mask(path: Path, mask: Bool[np.ndarray, "height width"]) -> None:
     """Write a mask as PNG, white where it is true, in one piece or not at all.
 

@@ -56,6 +56,8 @@ class MotionData:
     """The limb that each joint belongs to; -1 for the trunk's."""
     limb_doubt: Float[np.ndarray, "frame limb"] | None = None
     """How likely each limb is more than 10 cm off, 0 to 1."""
+    limb_hidden: Float[np.ndarray, "frame limb"] | None = None
+    """What part of each limb things in front hide from the cameras, 0 to 1; None where nothing is known to."""
     explained: Float[np.ndarray, "frame"] | None = None
     """Part of the actor's visible area that shows its own colours and no background; None where it was not judged."""
     overlap: Float[np.ndarray, "frame camera"] | None = None

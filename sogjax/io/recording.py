@@ -11,7 +11,7 @@ from sogjax.errors import InputError
 from sogjax.io.calibration.load import load_calibration
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.io.camera_names import chosen_cameras
-from sogjax.io.example_poses import ExamplePose, check_size, find_background, find_example_poses
+from sogjax.io.example_poses import ExamplePose, check_size, find_background, find_example_poses, find_occluders
 from sogjax.io.image_file import ColorGains
 from sogjax.io.projects import (
     Project,
@@ -21,7 +21,15 @@ from sogjax.io.projects import (
     pose2sims_shifts,
     project_in,
 )
-from sogjax.io.recording_files import BACKGROUND, EXAMPLE_POSES, GROUND_TRUTH, INITIAL_POSE, SETTINGS, folder_around
+from sogjax.io.recording_files import (
+    BACKGROUND,
+    EXAMPLE_POSES,
+    GROUND_TRUTH,
+    INITIAL_POSE,
+    OCCLUDERS,
+    SETTINGS,
+    folder_around,
+)
 from sogjax.io.recording_frames import TimedImages, clip_frames, uneven
 from sogjax.io.recording_settings import DEFAULT_UP, RecordingSettings, read_recording_settings
 from sogjax.io.source import SourceInfo, find_sources, look_at_source
@@ -64,6 +72,8 @@ class Recording:
     """The factors of a camera's pictures; without an entry they stay as recorded."""
     keypoint_scheme: str | None = None
     """Name or file of the scheme that keypoint files beside it follow; None: told by their content."""
+    occluders: dict[str, Path] = field(default_factory=dict)
+    """The picture of what stands in front of each camera that has one; white hides all behind it."""
     fewest_cameras: int | None = None
     """How many cameras must have a frame that is used; None: all."""
 
@@ -124,6 +134,7 @@ def open_recording(path: Path) -> Recording:
         frame_offset=offsets,
         frame_part={camera: exact[camera] - offset for camera, offset in offsets.items() if exact[camera] != offset},
         background=find_background(BACKGROUND.of(path), rig, calibrated.names),
+        occluders=find_occluders(OCCLUDERS.of(path), rig, calibrated.names),
         example_poses=find_example_poses(
             EXAMPLE_POSES.of(path), rig, calibrated.names, settings.example_poses, frames.numbers
         ),

@@ -53,6 +53,7 @@ VIDEOS = _folder("videos", "a video of each camera", rendered=True)
 SYNCHRONIZED = _folder("synchronized_videos", "the videos of a FreeMoCap recording")
 IMAGES = _folder("images", "a folder of numbered pictures of each camera, in place of its video")
 BACKGROUND = _folder("background", "a picture of the empty scene of each camera", rendered=True)
+OCCLUDERS = _folder("occluders", "a picture of each camera, white where something in front hides all behind it")
 EXAMPLE_POSES = _folder("example_poses", "a folder of pictures and masks of each pose", rendered=True)
 KEYPOINTS = _folder("keypoints", "where a detector saw joints: `sogjax.io.keypoint_files`", rendered=True)
 POSE = _folder("pose", "the keypoints of a Pose2Sim project", rendered=True)
@@ -64,8 +65,8 @@ ACTOR = RecordingFile("actor.yaml", "the actor that runs over several recordings
 PROJECT = RecordingFile("Config.toml", "the settings of a Pose2Sim project")
 
 RECORDING_FILES = (
-    *(SETTINGS, CALIBRATION, VIDEOS, SYNCHRONIZED, IMAGES, BACKGROUND, EXAMPLE_POSES, KEYPOINTS, POSE, POSE_SYNC),
-    *(OUTPUT_DATA, INITIAL_POSE, GROUND_TRUTH, ACTOR, PROJECT),
+    *(SETTINGS, CALIBRATION, VIDEOS, SYNCHRONIZED, IMAGES, BACKGROUND, OCCLUDERS, EXAMPLE_POSES, KEYPOINTS, POSE),
+    *(POSE_SYNC, OUTPUT_DATA, INITIAL_POSE, GROUND_TRUTH, ACTOR, PROJECT),
 )
 
 

@@ -64,6 +64,13 @@ def project_points(camera: Camera, points_world: Float[Array, "n 3"]) -> tuple[F
     return pixels, depth
 
 
+def point_depths(camera: Camera, points_world: Float[Array, "n 3"]) -> Float[Array, "n"]:
+    """Depths of points along the camera's axis (metres)."""
+    return (
+        jnp.matmul(points_world, camera.camera_from_world[2, :3], precision="highest") + camera.camera_from_world[2, 3]
+    )
+
+
 def projection_jacobian(camera: Camera, points_world: Float[Array, "n 3"]) -> Float[Array, "n 2 3"]:
     """Derivatives of the pixels of points by the points (pixels per metre); 0 for points nearer than `NEAR`."""
     rotation = camera.camera_from_world[:3, :3]

@@ -40,6 +40,9 @@ class LimbConfidence(eqx.Module):
     explained: Float[Array, "actor"] | None = None
     """As `FrameFit` has it; None: not measured."""
     overlap: Float[Array, "actor camera"] | None = None
+    hidden: Float[Array, "limb"] | None = None
+    """Part of each that things in front hide from the cameras that would see it: the mean of the third of its blobs
+    of which most is hidden; None: nothing is in front."""
 
 
 def limb_confidence(
@@ -53,7 +56,8 @@ def limb_confidence(
     rate = numbers.adaptation * trust * _certainty(evidence)
     seen, known = _seen(evidence), _known(evidence, baseline)
     largest = jnp.asarray(numbers.largest_steps, known.dtype)[:, None]
-    return LimbConfidence(probability, known + rate[None] * jnp.clip(seen - known, -largest, largest))
+    hidden = None if evidence.hidden is None else -limbs.mean_of_worst(-evidence.hidden)
+    return LimbConfidence(probability, known + rate[None] * jnp.clip(seen - known, -largest, largest), hidden=hidden)
 
 
 def limb_measures(limbs: LimbBlobs, evidence: BlobEvidence, baseline: Float[Array, "2 blob"]) -> LimbMeasures:

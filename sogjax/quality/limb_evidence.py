@@ -9,12 +9,12 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, UInt8
+from jaxtyping import Array, Bool, Float, Int, UInt8
 
 from sogjax.energy.posed import Posed
 from sogjax.energy.views import Windows
 from sogjax.model.body import Body
-from sogjax.model.camera import Camera, cells_at, project
+from sogjax.model.camera import Camera, cells_at, point_depths, project
 from sogjax.model.limbs import limb_blobs
 from sogjax.model.sog import Sog
 from sogjax.scene.foreground import SubjectColors, own_color, own_density, subject_density
@@ -74,6 +74,8 @@ class BlobEvidence(NamedTuple):
     """Part of its area in all pictures that is seen."""
     explained: Float[Array, "blob"]
     """How far the samples show the blob's own colours (0 to 1), and no background; their mean."""
+    hidden: Float[Array, "blob"] | None = None
+    """Part of what no other limb hides that is hidden by things in front; None: nothing is in front."""
 
 
 def blob_evidence(
@@ -85,16 +87,20 @@ def blob_evidence(
     cell_sizes: Float[Array, "camera"],
     subject: SubjectColors,
     present: Bool[Array, "camera"] | None = None,
+    hidden_from: Float[Array, "camera rows columns"] | None = None,
 ) -> BlobEvidence:
     """The evidence for a posed body.
 
-    `windows` is None where no background is known; `present` are the cameras that have a picture (None: all).
+    `windows` is None where no background is known; `present` are the cameras that have a picture (None: all);
+    `hidden_from` are the depths from which on cells are hidden (metres; None: nothing is in front).
     """
     seen = jax.vmap(project, in_axes=(0, None))(cameras, posed.blobs)
     sigmas = jnp.where(seen.mask, seen.sigmas, 1.0)
     samples = jnp.asarray(SAMPLES, sigmas.dtype)[None, None]
     places = seen.means[:, :, None] + sigmas[:, :, None, None] * samples
-    colors, inside = jax.vmap(_colors_at)(cameras, cell_sizes, places, cells)
+    cell, inside = jax.vmap(_cells_of)(cameras, cell_sizes, places)
+    camera = np.arange(places.shape[0])[:, None, None]
+    colors = cells[camera, cell[..., 1], cell[..., 0]].astype(places.dtype) / 255.0
     if present is not None:
         inside &= present[:, None, None]
     own_colors = posed.body.blob_colors[None, :, None]
@@ -102,6 +108,12 @@ def blob_evidence(
     against = jnp.zeros(inside.shape, bool) if windows is None else _odds_at(limbs, windows, places) < BACKGROUND
     areas = jnp.where(seen.mask, seen.sigmas, 0.0) ** 2
     weights = jnp.where(inside, (areas * _visible(limbs, posed.blobs, seen, cameras))[:, :, None], 0.0)
+    hidden = None
+    if hidden_from is not None:
+        depths = jax.vmap(point_depths, in_axes=(0, None))(cameras, posed.blobs.means)
+        shown = jnp.where(depths[:, :, None] < hidden_from[camera, cell[..., 1], cell[..., 0]], weights, 0.0)
+        hidden = 1.0 - (jnp.sum(shown, axis=(0, 2)) + 1e-6) / (jnp.sum(weights, axis=(0, 2)) + 1e-6)
+        weights = shown
     whole = jnp.sum(weights, axis=(0, 2)) + 1e-6
     mean = lambda values: jnp.sum(weights * values, axis=(0, 2)) / whole
     return BlobEvidence(
@@ -109,16 +121,16 @@ def blob_evidence(
         contradicted=mean(against.astype(own.dtype)),
         seen=whole / (len(SAMPLES) * jnp.sum(areas, axis=0) + 1e-6),
         explained=mean(jnp.where(against, 0.0, alike)),
+        hidden=hidden,
     )
 
 
-def _colors_at(
-    camera: Camera, cell_size: Float[Array, ""], places: Float[Array, "blob sample 2"], cells: UInt8[Array, "_ _ 3"]
-) -> tuple[Float[Array, "blob sample 3"], Bool[Array, "blob sample"]]:
-    """The colours (sRGB, 0 to 1) at undistorted pixels of one camera, and which of these are in its picture."""
+def _cells_of(
+    camera: Camera, cell_size: Float[Array, ""], places: Float[Array, "blob sample 2"]
+) -> tuple[Int[Array, "blob sample 2"], Bool[Array, "blob sample"]]:
+    """The cells (column, row) at undistorted pixels of one camera, and which of these are in its picture."""
     cell, inside = cells_at(camera, cell_size, places.reshape(-1, 2))
-    colors = cells[cell[:, 1], cell[:, 0]].astype(places.dtype) / 255.0
-    return colors.reshape(*places.shape[:2], 3), inside.reshape(places.shape[:2])
+    return cell.reshape(*places.shape[:2], 2), inside.reshape(places.shape[:2])
 
 
 def _visible(limbs: LimbBlobs, blobs: Sog, seen: Sog, cameras: Camera) -> Float[Array, "camera blob"]:

@@ -20,6 +20,10 @@ AT_LEAST = 3
 """Frames: shorter stretches are not reported, and shorter gaps between them do not count."""
 
 
+HIDDEN = 0.7
+"""Part of a limb, mean over a stretch, whose being hidden is the cause of the doubt."""
+
+
 @dataclass(frozen=True)
 class DoubtfulLimb:
     """A limb and the frames over which it is in doubt."""
@@ -29,9 +33,13 @@ class DoubtfulLimb:
     last_frame: int
     doubt: float
     """Mean over the stretch: how likely the limb is more than 10 cm off."""
+    hidden: bool = False
+    """Whether it is in doubt since things in front hide it."""
 
     def __str__(self) -> str:
         frames = f"frames {self.first_frame} to {self.last_frame}"
+        if self.hidden:
+            return f"{self.name} hidden by what stands in front in {frames}"
         return f"{self.name} doubtful in {frames} ({100.0 * self.doubt:.0f} % likely more than 10 cm off)"
 
 
@@ -46,9 +54,16 @@ def doubtful_limbs(motion: Motion) -> tuple[DoubtfulLimb, ...]:
     """All stretches, by their first frames."""
     if motion.limb_doubt is None or motion.limb_names is None:
         return ()
+    hidden = np.zeros_like(motion.limb_doubt) if motion.limb_hidden is None else motion.limb_hidden
     found = [
-        DoubtfulLimb(str(name), int(motion.frame[first]), int(motion.frame[stop - 1]), float(doubt[first:stop].mean()))
-        for name, doubt in zip(motion.limb_names, motion.limb_doubt.T, strict=True)
+        DoubtfulLimb(
+            str(name),
+            int(motion.frame[first]),
+            int(motion.frame[stop - 1]),
+            float(doubt[first:stop].mean()),
+            bool(unseen[first:stop].mean() > HIDDEN),
+        )
+        for name, doubt, unseen in zip(motion.limb_names, motion.limb_doubt.T, hidden.T, strict=True)
         for first, stop in stretches(doubt > LIKELY_LOST, AT_LEAST, gap=AT_LEAST)
     ]
     return tuple(sorted(found, key=lambda limb: (limb.first_frame, limb.name)))

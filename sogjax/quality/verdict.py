@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from sogjax.io.motion import Motion
 from sogjax.model.body import Body
@@ -15,6 +15,8 @@ from sogjax.quality.metrics import stretches
 
 AT_LEAST = 3
 """Frames: shorter stretches are not reported."""
+NEARLY_ALL = 0.9
+"""Part of every limb whose being hidden by things leaves nothing to judge an actor by."""
 NUM_WORST = 5
 SHOWN = 4
 """Findings of each kind that the sentence names."""
@@ -106,7 +108,8 @@ def _verdict(
     begun: str | None,
     odd: str | None,
 ) -> Verdict:
-    explained = None if motion.explained is None else float(np.median(motion.explained))
+    told = _told(motion)
+    explained = None if motion.explained is None or not told.any() else float(np.median(motion.explained[told]))
     overlap = _overlaps(motion)
     wrong = [*_wrong(explained, expected, overlap), *inside]
     doubtful = doubtful_limbs(motion)
@@ -126,6 +129,13 @@ def _verdict(
         doubtful=doubtful,
         worst=worst_frames(motion),
     )
+
+
+def _told(motion: Motion) -> Bool[np.ndarray, "frame"]:
+    """Frames in which enough is seen of the actor to tell who it is: where not nearly all is hidden by things."""
+    if motion.limb_hidden is None or not motion.limb_hidden.size:
+        return np.ones(motion.num_frames, bool)
+    return motion.limb_hidden.min(axis=1) < NEARLY_ALL
 
 
 def _overlaps(motion: Motion) -> dict[str, float]:
@@ -189,7 +199,10 @@ def _bad_stretches(motion: Motion) -> list[str]:
 
 
 def _limbs(doubtful: Sequence[DoubtfulLimb]) -> list[str]:
-    return _shortened([f"look at {_frames(limb.first_frame, limb.last_frame)}, {limb.name}" for limb in doubtful])
+    cause = lambda limb: " hidden by what stands in front" if limb.hidden else ""
+    return _shortened(
+        [f"look at {_frames(limb.first_frame, limb.last_frame)}, {limb.name}{cause(limb)}" for limb in doubtful]
+    )
 
 
 def _bent(motion: Motion, limits: Mapping[str, Limits]) -> list[str]:
@@ -216,7 +229,7 @@ def _share_of_usual(motion: Motion) -> Float[np.ndarray, "frame measure"]:
         means = np.ones(motion.num_frames)
         means[known] = np.nanmean(motion.overlap[known], axis=1)
         measures.append(means / max(float(np.median(means[known])), 1e-6))
-    return np.stack(measures, axis=1)
+    return np.where(_told(motion)[:, None], np.stack(measures, axis=1), 1.0)
 
 
 def worst_frames(motion: Motion, count: int = NUM_WORST) -> tuple[int, ...]:

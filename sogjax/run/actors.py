@@ -270,6 +270,7 @@ def actors_key(request: ActorRequest) -> str:
         [
             *("actors", str(recording.path.resolve()), background_origin(recording), pictures),
             *({name: fingerprint(path) for name, path in recording.background.items()},),
+            *({name: fingerprint(path) for name, path in recording.occluders.items()},),
             *(digest(body_named(request.body)), request.color_space, request.number, request.subjects),
             request.symmetric,
         ]

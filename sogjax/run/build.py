@@ -14,6 +14,7 @@ from sogjax.energy.priors import RestPenalty
 from sogjax.energy.term import Term, Terms, added_terms
 from sogjax.energy.views import whole_image_overlap
 from sogjax.errors import InputError
+from sogjax.io.painted import painted_masks
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
@@ -23,6 +24,7 @@ from sogjax.quality.markers import MARKER_RULES, MarkerRule
 from sogjax.run.background import CHOICES, Background
 from sogjax.run.clip import Clip
 from sogjax.scene.foreground import SubjectColors, subject_colors
+from sogjax.scene.occluders import painted
 from sogjax.scene.quadtree import Candidates
 from sogjax.settings.method import ColorConfig, EnergyConfig, ImagesConfig, SolverConfig
 from sogjax.settings.run import TrackConfig
@@ -166,7 +168,7 @@ def device_cameras(recording: Recording) -> Camera:
 def image_reader(clip: Clip, background: Background, config: TrackConfig, bodies: Sequence[Body] = ()) -> ImageReader:
     """What turns the cells of a frame into image blobs, with the colours of the actors, if there are any."""
     space, radius = color_space_and_radius(config.color)
-    return ImageReader(
+    reader = ImageReader(
         candidates=Candidates.from_grids(clip.grids, device_cameras(clip.recording)),
         color_radius=radius,
         color_tolerance=config.images.color_tolerance,
@@ -175,6 +177,7 @@ def image_reader(clip: Clip, background: Background, config: TrackConfig, bodies
         background=background.model(clip.grids),
         subject=_subject(bodies) if bodies else None,
     )
+    return reader.behind(painted(painted_masks(clip.recording), clip.grids)) if clip.recording.occluders else reader
 
 
 def tracker(clip: Clip, background: Background, body: Body, config: TrackConfig, terms: Sequence[Term] = ()) -> Tracker:

@@ -109,5 +109,6 @@ def _of_recording(recording: Recording) -> RunFingerprint:
         "color_gains": {name: list(gains) for name, gains in recording.color_gains.items()},
         "the calibration": digest(recording.rig.cameras),
         "the empty background pictures": {name: fingerprint(Path(p)) for name, p in recording.background.items()},
+        "the pictures of what stands in front": {name: fingerprint(p) for name, p in recording.occluders.items()},
         **pictures,
     }

@@ -22,6 +22,7 @@ _LIMBS = {
     "baseline": "baseline",
     "explained": "explained",
     "overlap": "overlap",
+    "limb_hidden": "hidden",
 }
 """Columns of limbs, and what they are called in a `LimbConfidence`."""
 
@@ -38,14 +39,15 @@ def rows_of(frames: Sequence[TrackedFrame], numbers: Sequence[int]) -> FrameTabl
         energy=column(results, "energy"),
         **{name: column(results, name) for name in _COUNTS},
         capacities=np.array(capacities, int),
-        **{key: column(judged, name) for key, name in _LIMBS.items() if judged},
+        **limb_rows(judged),
         terms={name: np.stack([np.asarray(result.terms[name]) for result in results]) for name in results[0].terms},
     )
 
 
 def limb_rows(found: Sequence[LimbConfidence]) -> dict[str, np.ndarray]:
     """The columns that say what is thought of limbs, of frames that follow each other."""
-    return {key: np.stack([np.asarray(getattr(each, name)) for each in found]) for key, name in _LIMBS.items()}
+    known = {key: name for key, name in _LIMBS.items() if found and getattr(found[0], name) is not None}
+    return {key: np.stack([np.asarray(getattr(each, name)) for each in found]) for key, name in known.items()}
 
 
 def capacities_of(table: FrameTable, row: int | None = -1) -> Capacities:
@@ -116,7 +118,9 @@ def _result(table: FrameTable, row: int, images: Sog) -> FrameResult:
     limbs = None
     if table.is_judged:
         columns = table.arrays()
-        limbs = LimbConfidence(**{name: jnp.asarray(columns[key][row]) for key, name in _LIMBS.items()})
+        limbs = LimbConfidence(
+            **{name: jnp.asarray(columns[key][row]) for key, name in _LIMBS.items() if key in columns}
+        )
     return FrameResult(
         pose=jnp.asarray(table.pose[row]),
         energy=jnp.asarray(table.energy[row]),

@@ -68,5 +68,6 @@ def _columns(revised: Revised) -> dict[str, object]:
         "limb_doubt": revised.judged.error_probability,
         "explained": revised.judged.explained,
         "overlap": revised.judged.overlap,
+        **({} if revised.judged.hidden is None else {"limb_hidden": revised.judged.hidden}),
         **{TERM + name: value for name, value in revised.terms.items()},
     }

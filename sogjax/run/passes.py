@@ -28,6 +28,7 @@ from sogjax.run.initial_pose import InitialPose, find_initial_pose
 from sogjax.run.judge import judged_result
 from sogjax.run.kept_actors import kept_or_made
 from sogjax.run.keypoint_bias import KeypointBias, estimate_keypoint_bias
+from sogjax.run.learn_occluders import LearntOccluders, Retracked, learn_occluders, track_again
 from sogjax.run.merge import Merged, merge_backward
 from sogjax.run.relearn_background import RelearntBackground, relearn_background
 from sogjax.run.result_streams import ResultStreams
@@ -118,6 +119,20 @@ PASSES: tuple[Pass, ...] = (
         wanted=lambda run: run.tracks and run.clip.keypoints is not None,
     ),
     Pass("tracked", TRACKING, _tracked, Tracked),
+    Pass(
+        "occluders",
+        TRACKING,
+        lambda run: learn_occluders(run.setup, run.frames),
+        LearntOccluders,
+        wanted=lambda run: run.tracks,
+    ),
+    Pass(
+        "retracked",
+        TRACKING,
+        lambda run: track_again(run.setup, run.frames, run.records["occluders"]),
+        Retracked,
+        wanted=lambda run: run.hides_something,
+    ),
     Pass(
         "merged",
         BOTH_WAYS,

@@ -23,6 +23,7 @@ from sogjax.run.clock import StageTimes
 from sogjax.run.filter import filter_name
 from sogjax.run.initial_pose import SOURCES, InitialPose, PoseRequest, PoseSource
 from sogjax.run.keypoint_bias import KeypointBias
+from sogjax.run.learn_occluders import LearntOccluders
 from sogjax.run.relearn_background import RelearntBackground
 from sogjax.run.result import RunResult
 from sogjax.run.run_files import GUESS
@@ -116,9 +117,18 @@ class Run:
             found = self.first_setup
         relearnt: RelearntBackground | None = self.records.get("relearnt")
         bias: KeypointBias | None = self.records.get("keypoint_bias")
+        occluders: LearntOccluders | None = self.records.get("occluders")
         if relearnt is not None:
             found = replace(found, tracker=relearnt.in_tracker(found))
+        if occluders is not None:
+            found = replace(found, tracker=occluders.in_tracker(found.tracker))
         return found if bias is None else replace(found, tracker=bias.in_tracker(found.tracker))
+
+    @property
+    def hides_something(self) -> bool:
+        """Whether something was learnt to stand in front of the actors, in frames that this run tracks."""
+        occluders: LearntOccluders | None = self.records.get("occluders")
+        return self.tracks and occluders is not None and occluders.hidden is not None
 
     @cached_property
     def adjusts(self) -> bool:

@@ -5,17 +5,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, UInt8
 
 from sogjax.actor.frame_choice import Mask
+from sogjax.io.painted import painted_masks
 from sogjax.io.recording import Recording
 from sogjax.model.camera import Camera
 from sogjax.run.clip import Clip, SampleKind, cell_grids, spread_frames
 from sogjax.scene.background import BackgroundImage, stack_background
 from sogjax.scene.cells import CellGrid
 from sogjax.scene.foreground import SHADOW, BackgroundModel, log_odds
+from sogjax.scene.occluders import painted
 from sogjax.scene.segmentation import largest_parts
 from sogjax.scene.visual_hull import resized
 
@@ -39,7 +42,7 @@ class SampledMasks:
     pictures: list[dict[int, Picture]]
     """The cells' colours, BGR."""
     unknown: dict[int, Mask]
-    """Where nothing is known of the background."""
+    """Where nothing is known of the background, or something stands in front."""
     cameras: dict[int, Camera]
     """The cameras, for pictures of the masks' size."""
     grids: tuple[CellGrid, ...]
@@ -63,6 +66,8 @@ def masks_of_samples(
     """
     recording, grids = clip.recording, cell_grids(clip.recording, DEPTH)
     empty = BackgroundModel.from_background(stack_background(learnt, grids), shadow)
+    shown = jnp.asarray(painted(painted_masks(recording), grids) > 0.0)
+    empty = eqx.tree_at(lambda model: model.known, empty, empty.known & shown)
     sampled = clip.sampled([mask_samples(recording, frames)])[0]
     frames = sorted(set.intersection(*(set(of_camera) for of_camera in sampled)))
     pictures = [{k: of_camera[frame] for k, of_camera in enumerate(sampled)} for frame in frames]

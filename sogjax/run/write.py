@@ -23,6 +23,7 @@ from sogjax.run.adjust_clip import Adjusted, sentence
 from sogjax.run.clock import stage
 from sogjax.run.forward import show_known
 from sogjax.run.judge import worst_images, write_metrics
+from sogjax.run.occluder_sheet import write_occluders
 from sogjax.run.page import write_page
 from sogjax.run.result_streams import ResultStreams
 from sogjax.run.run import Run
@@ -33,6 +34,7 @@ from sogjax.run.run_files import (
     GUESS,
     METRICS,
     MOTIONS,
+    OCCLUDERS,
     PAGE,
     UNADJUSTED,
     UNADJUSTED_ACTOR,
@@ -122,6 +124,7 @@ def write_results(run: Run) -> list[Path]:
         write_image(files[-1], below_each_other([*worst.values()]))
     if GUESS.of(out).is_file():
         files.append(GUESS.of(out))
+    files += _occluders(run, out)
     files += grown
     if run.adjusted is not None:
         files += _of_adjusting(run, run.adjusted, out)
@@ -130,6 +133,16 @@ def write_results(run: Run) -> list[Path]:
         with stage(clock.PAGE):
             write_page(files[-1], run, worst, images)
     return files
+
+
+def _occluders(run: Run, out: Path) -> list[Path]:
+    """What was learnt to stand in front, over the pictures of the first frame in which it hides somebody."""
+    if not run.hides_something:
+        return []
+    learnt, clip = run.records["occluders"], run.clip
+    frame = clip.numbers[learnt.rows[0]]
+    title = "what was learnt to stand in front"
+    return [write_occluders(OCCLUDERS.of(out), clip.recording, clip.grids, learnt.hidden, frame, title)]
 
 
 def _grown(run: Run, out: Path) -> list[Path]:

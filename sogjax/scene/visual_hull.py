@@ -169,19 +169,22 @@ OWN_COVERAGE = 0.2
 Mask = Bool[np.ndarray, "_h _w"]
 
 
-def disagreeing_cameras(masks: Mapping[int, Mask], cameras: Mapping[int, Camera]) -> dict[int, float]:
+def disagreeing_cameras(
+    masks: Mapping[int, Mask], cameras: Mapping[int, Camera], hidden: Mapping[int, Mask] | None = None
+) -> dict[int, float]:
     """Cameras whose masks the others do not confirm, and which share of each mask the hull covers without them.
 
     Points of space that all masks hold (the visual hull) project onto the whole of every mask if the masks show one
     thing: "silhouette coherence" (Hernandez, Schmitt and Cipolla, PAMI 2007). While some mask is covered too little,
     the camera is taken out without which the rest agree best, until two are left, of which either may be wrong.
+    `hidden` is where something stands in front, by camera: there a mask says nothing.
     """
     left = list(masks)
     out: dict[int, float] = {}
-    covered = hull_coverage(masks, cameras)
+    covered = hull_coverage(masks, cameras, hidden)
     while len(left) > 2 and min(covered.values()) < AGREEING:
         rest = lambda camera: {other: masks[other] for other in left if other != camera}
-        without = {camera: hull_coverage(rest(camera), cameras) for camera in left}
+        without = {camera: hull_coverage(rest(camera), cameras, hidden) for camera in left}
         worst = max(left, key=lambda camera: sum(without[camera].values()) - OWN_COVERAGE * covered[camera])
         out[worst] = covered[worst]
         left.remove(worst)
@@ -189,14 +192,22 @@ def disagreeing_cameras(masks: Mapping[int, Mask], cameras: Mapping[int, Camera]
     return out
 
 
-def hull_coverage(masks: Mapping[int, Mask], cameras: Mapping[int, Camera]) -> dict[int, float]:
-    """The share of each mask that the visual hull of all of them covers: 1 where they agree."""
+def hull_coverage(
+    masks: Mapping[int, Mask], cameras: Mapping[int, Camera], hidden: Mapping[int, Mask] | None = None
+) -> dict[int, float]:
+    """The share of each mask that the visual hull of all of them covers: 1 where they agree.
+
+    What lies where a camera's view is `hidden` may be in the hull, whatever its mask says.
+    """
     small = {camera: reduced_mask(mask) for camera, mask in masks.items()}
     shrunk = {camera: resized(cameras[camera], (mask.shape[1], mask.shape[0])) for camera, mask in small.items()}
     cube = cube_around([*small.values()], [shrunk[camera] for camera in small])
     pixels = {camera: voxel_pixels(cube, shrunk[camera], mask.shape) for camera, mask in small.items()}
     # A thin limb may lie between the centres of voxels, so masks are widened by half of one.
     near = {camera: widened(mask, pixels[camera].footprint // 2) for camera, mask in small.items()}
+    for camera in small:
+        if hidden is not None and camera in hidden:
+            near[camera] |= reduced_mask(hidden[camera])
     hull = np.all([pixels[camera].hits(mask) for camera, mask in near.items()], axis=0)
     return {
         camera: float((pixels[camera].silhouette_of(hull) & mask).sum() / max(mask.sum(), 1))

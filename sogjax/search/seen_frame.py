@@ -10,8 +10,9 @@ import numpy as np
 from jaxtyping import Array, Float, UInt8
 
 from sogjax.energy.appearance import ColorWindows
+from sogjax.energy.views import odds_on_grid
 from sogjax.model.body import Body
-from sogjax.model.camera import Camera, project, project_points
+from sogjax.model.camera import Camera, point_depths, project, project_points
 from sogjax.model.sog import Sog
 from sogjax.scene.cells import inside_pictures
 from sogjax.scene.color_clusters import ColorClusters, cluster_odds
@@ -38,6 +39,8 @@ class SeenFrame(eqx.Module):
     """Part of the cells whose background is known."""
     found: tuple[Sog, ...] = ()
     """Blobs in the world of actors that were found: what they cover is theirs."""
+    hidden_from: Float[Array, "camera rows columns"] | None = None
+    """Depth from which on cells are hidden by what stands in front (metres); None: nothing does."""
 
     @classmethod
     def from_cells(
@@ -58,10 +61,13 @@ class SeenFrame(eqx.Module):
         inside = inside_pictures(grids, cells.shape[1:3])
         if present is not None:
             inside[~np.array(present, bool)] = 0.0
+        hidden = None if reader.occluders is None else reader.occluders.cells
+        if hidden is not None:
+            inside[np.asarray(hidden) == 0.0] = 0.0
         odds = _odds(jnp.asarray(cells), jnp.asarray(inside), reader.background, tables)
         known = 0.0 if reader.background is None else np.sum(np.asarray(reader.background.known) * inside)
         sizes = jnp.asarray([grid.cell_size for grid in grids], dtype)
-        return cls(cameras, odds, sizes, jnp.asarray(known / max(inside.sum(), 1.0), dtype))
+        return cls(cameras, odds, sizes, jnp.asarray(known / max(inside.sum(), 1.0), dtype), hidden_from=hidden)
 
     def windows(self, centre: Float[Array, "3"], radius: Float[Array, ""]) -> ColorWindows:
         """Grids around a ball (metres, world)."""
@@ -69,6 +75,11 @@ class SeenFrame(eqx.Module):
         windows = ColorWindows.in_boxes(self.odds[:, :-1], self.cell_sizes, self.cameras, boxes, (SIDE, SIDE))
         odds = jnp.where(windows.odds < 0.0, FREE_SPACE * windows.odds, windows.odds)
         windows = replace(windows, odds=odds, scale=0.5 * (boxes[:, 1, 0] - boxes[:, 0, 0]) / radius)
+        if self.hidden_from is not None:
+            depths = jax.vmap(lambda camera: point_depths(camera, centre[None])[0])(self.cameras)
+            from_depth = jax.vmap(odds_on_grid)(self.hidden_from, self.cell_sizes, self.cameras, windows.x, windows.y)
+            shown = (depths[:, None, None] < from_depth).astype(windows.free.dtype)
+            windows = replace(windows, free=shown, odds=windows.odds * shown[:, None])
         return replace(windows, free=self._free(windows))
 
     def _around(self, centre: Float[Array, "3"], radius: Float[Array, ""]) -> Float[Array, "camera 2 2"]:

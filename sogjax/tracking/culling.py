@@ -1,8 +1,9 @@
 """Which image blobs can matter to a body: those near it and of its colours (Section 6)."""
 
 import math
+from dataclasses import replace
 from functools import partial
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import equinox as eqx
 import jax
@@ -18,6 +19,7 @@ from sogjax.model.color import averaging_space, convert, from_rgb
 from sogjax.model.compiled import stage_barrier
 from sogjax.model.sog import Sog
 from sogjax.scene.foreground import BackgroundModel, SubjectColors, foreground_weights, log_odds
+from sogjax.scene.occluders import HiddenFrom, Occluders
 from sogjax.scene.quadtree import Candidates, keep_blobs, keep_blobs_of_planes, quadtree_of_planes
 
 CAPACITIES = (256, 512, 768, 1024, 1536, 2048, 3072, 4096, 6144, 8192, 16384, 32768, 65536)
@@ -72,6 +74,23 @@ def block_capacity(count: int, headroom: float = 1.0) -> int:
     return BLOCK_STEP * max(math.ceil(headroom * count / BLOCK_STEP), 1)
 
 
+class BlobWeights(NamedTuple):
+    """What image blobs count, and for whom."""
+
+    foreground: Float[Array, "*camera image"] | None
+    """Weights of `foreground_weights`; None where no background is known: all count fully."""
+    hidden_from: Float[Array, "*camera image"] | None
+    """Depth (metres) from which on a body's blobs are hidden there; None: none are."""
+
+    def where_shown(
+        self, similarities: Float[Array, "body image"], depths: Float[Array, "body"] | None
+    ) -> Float[Array, "body image"]:
+        """Similarities of one camera, 0 for body blobs at depths at which they are hidden."""
+        if self.hidden_from is None or depths is None:
+            return similarities
+        return jnp.where(depths[:, None] < self.hidden_from[None, :], similarities, 0.0)
+
+
 class ImageReader(eqx.Module):
     """Turns the cells of one frame into Sogs: how colours are read and which blobs are kept."""
 
@@ -89,6 +108,17 @@ class ImageReader(eqx.Module):
     """The empty scene, so that image blobs count by how little they look like it; None: all count fully."""
     subject: SubjectColors | None = None
     """The colours that the actors have; None: any."""
+    occluders: Occluders | None = None
+    """What stands in front; None: nothing."""
+
+    def behind(self, hidden: HiddenFrom) -> "ImageReader":
+        """The same with cells that are hidden from some depth on, beside those that it knows."""
+        if self.occluders is not None:
+            hidden = np.minimum(hidden, np.asarray(self.occluders.cells))
+        if not np.isfinite(hidden).any():
+            return self
+        occluders, candidates = Occluders.of_cells(hidden, self.candidates)
+        return replace(self, occluders=occluders, candidates=candidates)
 
     def leaves(
         self, cells: Float[Array, "camera rows columns 3"]
@@ -141,42 +171,54 @@ class ImageReader(eqx.Module):
         odds: Float[Array, "camera rows columns"] | None,
         boxes: Float[Array, "camera actor 2 2"],
         capacity: int,
-    ) -> tuple[Sog, Float[Array, "camera image"] | None, Int[Array, "camera"]]:
-        """Image blobs inside the boxes, coloured in the working space, their weights, and how many for each camera."""
+    ) -> tuple[Sog, BlobWeights, Int[Array, "camera"]]:
+        """Image blobs inside the boxes, coloured in the working space, what they count, how many for each camera."""
         planes, leaves = self._leaf_planes(cells, odds)
         keep = leaves & jax.vmap(_in_boxes)(self.candidates.means, self.candidates.sigmas, boxes)
         select = jax.vmap(keep_blobs_of_planes, in_axes=(0, 0, 0, 0, None))
         near, chosen, counts = select(self.candidates.means, self.candidates.sigmas, planes[:3], keep, capacity)
         working = convert(near.colors, averaging_space(self.color_space), self.color_space)
-        weights = None if odds is None else jnp.take_along_axis(planes[3], chosen, axis=1)
+        taken = lambda table: None if table is None else jnp.take_along_axis(table, chosen, axis=1)
+        weights = BlobWeights(
+            taken(None if odds is None else planes[3]), taken(None if self.occluders is None else self.occluders.nodes)
+        )
         return eqx.tree_at(lambda sog: sog.colors, near, working), weights, counts
 
     def matching_blobs(
-        self, near: Sog, weights: Float[Array, "camera image"] | None, body: Sog, capacity: int
+        self, near: Sog, weights: BlobWeights, body: Sog, depths: Float[Array, "camera body"] | None, capacity: int
     ) -> tuple[Sog, Float[Array, "camera body image"], Float[Array, "camera image"] | None, Int[Array, "camera"]]:
-        """The near blobs whose colour resembles some blob of the body, with all colour similarities and weights."""
+        """The near blobs whose colour resembles some blob of the body, with all colour similarities and weights.
 
-        def one_camera(image: Sog, weights: Float[Array, "image"] | None):
-            similarities = pair_color_similarities(image, body, self.color_space, self.color_radius)
+        `depths` are those of the body's blobs (metres), of which some may be hidden; None: nothing stands in front.
+        """
+
+        def one_camera(image: Sog, weights: BlobWeights, depths: Float[Array, "body"] | None):
+            similarities = weights.where_shown(
+                pair_color_similarities(image, body, self.color_space, self.color_radius), depths
+            )
             keep = jnp.any(similarities > 0.0, axis=0) & image.mask
             kept, chosen, count = keep_blobs(image.means, image.sigmas, image.colors, keep, capacity)
             similarities = jnp.where(kept.mask[None, :], similarities[:, chosen], 0.0)
-            if weights is None:
+            if weights.foreground is None:
                 return kept, similarities, None, count
-            return kept, similarities * weights[chosen], weights[chosen], count
+            of_kept = weights.foreground[chosen]
+            return kept, similarities * of_kept[None, :], of_kept, count
 
-        return jax.vmap(one_camera)(near, weights)
+        return jax.vmap(one_camera)(near, weights, depths)
 
     def compared_blobs(
-        self, near: Sog, weights: Float[Array, "camera image"] | None, body: Sog
+        self, near: Sog, weights: BlobWeights, body: Sog, depths: Float[Array, "camera body"] | None
     ) -> tuple[Sog, Float[Array, "camera body image"], Int[Array, "camera"]]:
         """The near blobs in their places, those masked out that resemble no blob of the body; the same otherwise."""
 
-        def compare(image: Sog, weights: Float[Array, "image"] | None) -> Float[Array, "body image"]:
+        def compare(
+            image: Sog, weights: BlobWeights, depths: Float[Array, "body"] | None
+        ) -> Float[Array, "body image"]:
             similarities = pair_color_similarities(image, body, self.color_space, self.color_radius)
-            return similarities if weights is None else similarities * weights[None, :]
+            similarities = weights.where_shown(similarities, depths)
+            return similarities if weights.foreground is None else similarities * weights.foreground[None, :]
 
-        similarities = stage_barrier(self.true_at_run_time, jax.vmap(compare), near, weights)
+        similarities = stage_barrier(self.true_at_run_time, jax.vmap(compare), near, weights, depths)
         mask = near.mask & jnp.any(similarities > 0.0, axis=1)
         return eqx.tree_at(lambda sog: sog.mask, near, mask), similarities, jnp.sum(mask, axis=1)
 

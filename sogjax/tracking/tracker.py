@@ -12,15 +12,17 @@ from jaxtyping import Array, Float, Int
 
 from sogjax.energy.coloring import Coloring
 from sogjax.energy.frame_energy import FrameEnergy
+from sogjax.energy.hidden import without_hidden
 from sogjax.energy.keypoint_views import KeypointViews
 from sogjax.energy.keypoints import keypoint_term_among
 from sogjax.energy.posed import History, Posed
 from sogjax.energy.term import Terms
 from sogjax.energy.views import Views, Windows
 from sogjax.model.body import Body
-from sogjax.model.camera import Camera
+from sogjax.model.camera import Camera, point_depths
 from sogjax.model.color import from_rgb
 from sogjax.model.compiled import stage_barrier
+from sogjax.model.sog import Sog
 from sogjax.quality.limb_confidence import LimbConfidence, frame_fit, limb_confidence
 from sogjax.quality.limb_evidence import LimbBlobs, blob_evidence
 from sogjax.solve.solution import Scales, Solution, Solver
@@ -98,8 +100,18 @@ class Tracker(eqx.Module):
         odds = self.reader.odds(self.rgb(frame))
         if odds is None:
             return None
-        windows = self.reader.windows(odds, self.cameras, self.boxes(state))
+        windows = self._windows(odds, self.boxes(state), self.body.posed_blobs(state.previous))
         return windows if frame.present is None else windows.of_present(jnp.asarray(frame.present))
+
+    def _windows(
+        self, odds: Float[Array, "camera rows columns"], boxes: Float[Array, "camera actor 2 2"], blobs: Sog
+    ) -> Windows:
+        """The log odds in boxes, 0 where blobs of a pose like the one sought are hidden."""
+        found, occluders = self.reader.windows(odds, self.cameras, boxes), self.reader.occluders
+        if occluders is None:
+            return found
+        actors = tuple(self.body.blob_actors.tolist())
+        return without_hidden(found, occluders.cells, self.reader.cell_sizes, self.cameras, blobs, actors)
 
     def views(
         self,
@@ -117,7 +129,8 @@ class Tracker(eqx.Module):
         odds, boxes = self.reader.odds(rgb), self.boxes(state) if boxes is None else boxes
         near_blobs = partial(self.reader.near_blobs, capacity=capacities.near)
         near, weights, num_near = stage_barrier(self.reader.true_at_run_time, near_blobs, rgb, odds, boxes)
-        windows = None if odds is None else self.reader.windows(odds, self.cameras, boxes)
+        blobs = self.body.posed_blobs(state.previous)
+        windows = None if odds is None else self._windows(odds, boxes, blobs)
         normalizers = self.normalizers
         if present is not None:
             near = eqx.tree_at(lambda sog: sog.mask, near, near.mask & present[:, None])
@@ -125,15 +138,18 @@ class Tracker(eqx.Module):
             normalizers = normalizers * jnp.mean(present, dtype=normalizers.dtype)
             windows = None if windows is None else windows.of_present(present)
         body_colors = from_rgb(self.body.blob_colors, self.reader.color_space)
-        blobs = self.body.posed_blobs(state.previous)
         body = eqx.tree_at(lambda sog: sog.colors, blobs, body_colors)
+        depths = None
+        if self.reader.occluders is not None:
+            depths = jax.vmap(point_depths, in_axes=(0, None))(self.cameras, blobs.means)
         if self.pairs == "sparse":
-            images, similarities, num_matching = self.reader.compared_blobs(near, weights, body)
+            images, similarities, num_matching = self.reader.compared_blobs(near, weights, body, depths)
+            counting = weights.foreground
         else:
-            images, similarities, weights, num_matching = self.reader.matching_blobs(
-                near, weights, body, capacities.matching
+            images, similarities, counting, num_matching = self.reader.matching_blobs(
+                near, weights, body, depths, capacities.matching
             )
-        coloring = Coloring(self.reader.color_radius, self.reader.color_space, weights)
+        coloring = Coloring(self.reader.color_radius, self.reader.color_space, counting)
         keypoints = self.keypoint_views(frame, state.previous, normalizers)
         views = Views(
             self.cameras, images, similarities, normalizers, coloring=coloring, windows=windows, keypoints=keypoints
@@ -238,7 +254,9 @@ class Tracker(eqx.Module):
         assert self.reader.subject is not None
         posed, sizes = Posed.from_pose(self.body, pose), self.reader.cell_sizes
         cells, present = jnp.asarray(frame.cells), None if frame.present is None else jnp.asarray(frame.present)
-        evidence = blob_evidence(self.limbs, posed, self.cameras, windows, cells, sizes, self.reader.subject, present)
+        hidden = None if self.reader.occluders is None else self.reader.occluders.cells
+        seen = (cells, sizes, self.reader.subject, present, hidden)
+        evidence = blob_evidence(self.limbs, posed, self.cameras, windows, *seen)
         fit = frame_fit(self.limbs, evidence, posed, self.cameras, windows)
         found = limb_confidence(self.limbs, evidence, baseline, windows is not None)
         return replace(found, explained=fit.explained, overlap=fit.overlap)

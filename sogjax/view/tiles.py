@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, UInt8
 SHEET_WIDTH = 1600
 """Largest width of a contact sheet in pixels."""
 TITLE_HEIGHT = 26
-GREEN, RED = (80, 220, 60), (60, 60, 235)
+GREEN, RED, BLUE = (80, 220, 60), (60, 60, 235), (235, 110, 40)
 """BGR."""
 
 
