@@ -122,7 +122,7 @@ def _needed(
         alone = sum(
             int((mask & ~np.any([one[k] for one in others], axis=0)).sum()) for k, mask in shown[number].items()
         )
-        if alone < ALONE * sum(int(mask.sum()) for mask in own.values()):
+        if alone < ALONE * sum(int(mask.sum()) for mask in shown[number].values()):
             kept.remove(number)
     return [parts[k] for k in kept]
 

@@ -26,8 +26,8 @@ def block_shifts(
     found = []
     for row in range(0, grey[0].shape[0] - size + 1, size):
         for column in range(0, grey[0].shape[1] - size + 1, size):
-            blocks = [np.ascontiguousarray(one[row : row + size, column : column + size]) for one in grey]
-            shift, response = cv2.phaseCorrelate(*blocks, window)
+            before, after = (np.ascontiguousarray(one[row : row + size, column : column + size]) for one in grey)
+            shift, response = cv2.phaseCorrelate(before, after, window)
             if response > CLEAR:
                 found.append(shift)
     return np.array(found).reshape(-1, 2)

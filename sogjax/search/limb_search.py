@@ -174,8 +174,8 @@ class LimbSearch:
     def _held_otherwise(self, views: Views, pose: Float[np.ndarray, "dof"]) -> "HeldOtherwise":
         tried = np.stack([self._tried(k, unit, pose) for k, unit in enumerate(self.units)]).astype(pose.dtype)
         found = held_otherwise(self.tracker, views, jnp.asarray(pose), self.arrays, jnp.asarray(tried))
-        self._carried = jax.device_get(found)
-        return self._carried
+        found = self._carried = jax.device_get(found)
+        return found
 
     def _climbed(
         self,
