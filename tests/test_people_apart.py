@@ -8,12 +8,13 @@ import pytest
 from rig_cases import opencv_pixels, recording_of, ring_rig
 
 from sogjax.actor.frame_choice import subject_cubes
-from sogjax.actor.people import PersonSeen, matched, people_apart, runs_by_place, told_apart, unlike
+from sogjax.actor.people import PersonSeen, _needed, matched, people_apart, runs_by_place, told_apart, unlike
 from sogjax.io.example_poses import ExamplePose
 from sogjax.io.pose_description import PoseDescription
 from sogjax.run.example_people import examples_of_masks, told_by_name, too_few_apart
 from sogjax.run.sampled_masks import SampledMasks
 from sogjax.scene.cells import CellGrid
+from sogjax.scene.visual_hull import VoxelPixels
 
 SIZE = (320, 240)
 RIG = ring_rig(6, SIZE, distance=4.0)
@@ -86,6 +87,28 @@ def test_advice_is_neither_followed_already_nor_refused_in_turn():
     assert "empty scene" not in too_few_apart(2, [0, 0], plates=True)
     assert "give actors=3" in too_few_apart(2, [3, 3, 3, 2])
     assert "give actors" not in too_few_apart(2, [3, 3, 1, 1, 2])
+
+
+def test_a_part_of_the_hull_that_no_camera_shows_apart_is_nobody():
+    """Two people, and what two cameras allow between them: in each it is before or behind one of both."""
+
+    class Seen(VoxelPixels):
+        def __init__(self, *columns):
+            object.__setattr__(self, "columns", columns)  # of the voxels
+
+        def silhouette_of(self, voxels):
+            shown = np.zeros((4, 8), bool)
+            for k in np.flatnonzero(voxels):
+                shown[:, self.columns[k] : self.columns[k] + 2] = True
+            return shown
+
+    parts = [np.arange(3) == k for k in range(3)]
+    pixels = {0: Seen(0, 4, 0), 1: Seen(0, 4, 4)}
+    masks = {k: pixels[k].silhouette_of(parts[0]) | pixels[k].silhouette_of(parts[1]) for k in pixels}
+    assert [part.tolist() for part in _needed(parts, masks, pixels)] == [part.tolist() for part in parts[:2]]
+    everybody = {k: Seen(0, 4, 6) for k in range(2)}
+    masks = {k: np.any([everybody[k].silhouette_of(part) for part in parts], axis=0) for k in everybody}
+    assert len(_needed(parts, masks, everybody)) == 3
 
 
 def moment(frame, *people):

@@ -24,6 +24,8 @@ LEAST_HEIGHT = 0.4
 PIECE, NEAR = 0.35, 0.35
 """A part of less than this share of another one's volume, and no farther from it than this (metres), is a piece of it:
 a forearm or a foot whose joint the background's colours hide. People who stand so near each other are seldom apart."""
+ALONE = 0.15
+"""Share of somebody's silhouettes, all cameras together, that is nobody else's."""
 HIDDEN = 0.1
 """Share of a silhouette that another one covers, above which a camera's mask is not used."""
 COLOR_BINS = 6
@@ -63,7 +65,8 @@ def people_apart(
     pixels = {k: voxel_pixels(cube, cameras[k], mask.shape) for k, mask in masks.items()}
     misses = np.sum([~pixels[k].hits(widened(masks[k] | unknown[k])) for k in masks], axis=0)
     hull = without_floor(misses <= (1 if len(masks) >= MANY else 0), up)
-    bodies = _bodies(hull.reshape(3 * (VOXELS,)), cube.spacing, int(np.argmax(np.abs(up))))
+    parts = _bodies(hull.reshape(3 * (VOXELS,)), cube.spacing, int(np.argmax(np.abs(up))))
+    bodies = _needed(parts, masks, pixels)
     regions = {k: _regions([pixels[k].silhouette_of(body) for body in bodies], pixels[k]) for k in masks}
     people = []
     for number, body in enumerate(bodies):
@@ -100,6 +103,28 @@ def _bodies(hull: Bool[np.ndarray, "x y z"], spacing: float, axis: int) -> list[
         if volume > SMALLEST_BODY * max(volumes) and height > LEAST_HEIGHT * max(heights)
     ]
     return [body.ravel() for body in _pieces_joined(large, spacing)]
+
+
+def _needed(
+    parts: Sequence[Bool[np.ndarray, "voxel"]], masks: Mapping[int, Mask], pixels: Mapping[int, VoxelPixels]
+) -> list[Bool[np.ndarray, "voxel"]]:
+    """The parts without which something in the masks would be nobody's, in their order.
+
+    Where the silhouettes of two people meet, the hull has more parts: all cameras allow somebody there, and none shows
+    him apart from the others.
+    """
+    shown = [{k: pixels[k].silhouette_of(part) & mask for k, mask in masks.items()} for part in parts]
+    kept = list(range(len(parts)))
+    for number in np.argsort([int(part.sum()) for part in parts]).tolist():
+        others = [shown[k] for k in kept if k != number]
+        if not others:
+            break
+        alone = sum(
+            int((mask & ~np.any([one[k] for one in others], axis=0)).sum()) for k, mask in shown[number].items()
+        )
+        if alone < ALONE * sum(int(mask.sum()) for mask in shown[number].values()):
+            kept.remove(number)
+    return [parts[k] for k in kept]
 
 
 def _pieces_joined(parts: list[Bool[np.ndarray, "x y z"]], spacing: float) -> list[Bool[np.ndarray, "x y z"]]:

@@ -107,10 +107,10 @@ def _world_rays(
     pixels = np.asarray(undistort(camera, jnp.asarray(grid, camera.intrinsics.dtype)), float)
     matrix, pose = np.asarray(camera.intrinsics, float), np.asarray(camera.camera_from_world, float)
     plane = (pixels - matrix[:2, 2]) / np.array([matrix[0, 0], matrix[1, 1]])
-    told = (np.abs(plane) < STEEPEST).all(axis=1)  # also not where it is NaN
-    local = np.concatenate([np.where(told[:, None], plane, 0.0), np.ones((len(plane), 1))], axis=1)
+    told = np.all(np.abs(plane) < STEEPEST, axis=1, keepdims=True)  # also not where it is NaN
+    local = np.concatenate([np.where(told, plane, 0.0), np.ones((len(plane), 1))], axis=1)
     rays = local @ pose[:3, :3]
-    return rays / np.linalg.norm(rays, axis=1, keepdims=True) * told[:, None], -pose[:3, :3].T @ pose[:3, 3]
+    return rays / np.linalg.norm(rays, axis=1, keepdims=True) * told, -pose[:3, :3].T @ pose[:3, 3]
 
 
 NUM_PLANES = 64

@@ -89,5 +89,6 @@ def _empty(
     if background is None:
         return usual
     small = cv2.resize(cv2.cvtColor(background, cv2.COLOR_BGR2GRAY), grey.shape[:0:-1], interpolation=cv2.INTER_AREA)
-    gain, offset = same_exposure(*(np.repeat(part[..., None], 3, axis=-1) for part in (usual, small.astype(float))), 1)
+    seen, empty = (np.repeat(part[..., None], 3, axis=-1) for part in (usual, small.astype(float)))
+    gain, offset = same_exposure(seen, empty, 1)
     return gain[0] * small + offset[0]

@@ -63,22 +63,25 @@ def examples_of_masks(
 ) -> tuple[ExamplePose, ...] | str:
     """What `people_examples` gives, from what is not the background in some frames."""
     moments = everybody(seen, recording.up)
-    apart = [people for people in moments if len(people) == actors]
+    apart, counts = [people for people in moments if len(people) == actors], [len(people) for people in moments]
+    another = most_seen(counts) != actors  # the number that is asked for may be that of a few specks
     if len(apart) < FEWEST_APART:
-        return too_few_apart(actors, [len(people) for people in moments], has_plates(recording))
+        return too_few_apart(actors, counts, has_plates(recording))
     told = told_apart(apart, recording.fps)
     if len(told) < max(FEWEST_APART, len(apart) // 2):
-        return (
+        alike = (
             f"the {actors} people stand apart in {counted(len(apart), 'frame')}, but their colours are too much alike "
             f"to tell who is who; {OTHERWISE}"
         )
+        return too_few_apart(actors, counts, has_plates(recording)) if another else alike
     shapes = [_shapes([moment[k] for moment in told], seen, recording.up) for k in range(actors)]
     chosen = spread_moments(suitable_moments(shapes), count)
     if len(chosen) < FEWEST_APART:
-        return (
+        hidden = (
             f"the {actors} people are never seen whole and apart from the background; "
             f"{_plates_or(has_plates(recording))}{OTHERWISE}"
         )
+        return too_few_apart(actors, counts, has_plates(recording)) if another else hidden
     by_frame = {moment[0].frame: moment for moment in told}
     frames = [moment[0].frame for moment in chosen]
     return tuple(
