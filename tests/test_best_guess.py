@@ -63,11 +63,19 @@ def test_the_first_frame_whose_trunks_are_sure_counts_whatever_the_limbs(drawn, 
 
 
 def test_where_none_is_sure_the_likeliest_is_taken_and_said(drawn, capsys, tmp_path):
-    search = Searched({0: [found(0.64), found(0.9)], 9: [found(0.95), found(0.3)]}, ("anna", "ben"))
+    search = Searched({0: [found(0.64), found(0.9, share=0.3)], 9: [found(0.95), found(0.3)]}, ("anna", "ben"))
     assert best_guess(search, tmp_path / "guess.png").frame == 0
     assert [guess.frame for guess in drawn] == [0]
     said = capsys.readouterr().err
     assert "no pose is sure in frames 0, 9: tracking begins with the likeliest (frame 0, 64 %)" in said
+
+
+def test_several_actors_who_keep_what_they_explain_beside_the_others_are_searched_in_one_frame():
+    search = Searched({0: [found(0.01), found(0.02)], 9: [found(1.0), found(1.0)]}, ("anna", "ben"))
+    assert best_guess(search).frame == 0
+    assert search.asked == [0]
+    alone = Searched({0: [found(0.01)], 9: [found(1.0)]})
+    assert best_guess(alone).frame == 9
 
 
 def test_what_shows_no_actor_or_too_few_people_is_refused(drawn):

@@ -78,7 +78,8 @@ def test_poses_on_the_device_are_as_good_as_numpys():
     known = {name: value for name, value in vars(motion).items() if value is not None}
     assert all(isinstance(value, np.ndarray | float | str) for value in known.values())
     assert vars(motion).keys() - known.keys() == {
-        *("limb_names", "joint_limb", "limb_doubt", "limb_hidden", "explained", "overlap", "camera_names")
+        *("limb_names", "joint_limb", "limb_doubt", "limb_hidden", "explained", "overlap", "camera_names"),
+        "unfiltered_pose",
     }
 
 

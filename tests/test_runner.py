@@ -96,13 +96,14 @@ def test_the_passes_of_a_command_are_those_that_it_wants(tmp_path):
     given = tiny_run("adjust=true", out=tmp_path, frames_given=True, tracked=None)
     assert wanted(given) == ["adjusted", "result", "files"]
     assert wanted(tiny_run("adjust=true")) == [*tracking, "adjusted"]
+    assert wanted(tiny_run("adjust=true", "outputs.filter=6")) == [*tracking, "adjusted", "filtered"]
     assert [each.name for each in BEFORE_TRACKING] == ["background", "actors", "initial_pose", "keypoint_bias"]
     conditional = {"relearnt", "keypoint_bias", "retracked"}  # a learnt background, keypoints, things in front
-    named = {"background", "actors", *tracking, "adjusted", "result", "files"}
+    named = {"background", "actors", *tracking, "adjusted", "filtered", "result", "files"}
     assert {each.name for each in PASSES} == named | conditional
 
 
-@pytest.mark.parametrize("words", [(), ("adjust=true",)])
+@pytest.mark.parametrize("words", [(), ("adjust=true",), ("outputs.filter=6",)])
 def test_files_grow_while_tracking_only_where_no_later_pass_changes_the_frames(tmp_path, monkeypatch, words):
     """Whichever pass that is: one is added behind the others."""
     seen = []

@@ -142,7 +142,7 @@ def _notes(run: Run, result: RunResult) -> list[str]:
     if motion.filtered_by:
         notes.append(f"Filtered: {motion.filtered_by}. motion.npz keeps the poses before it, as unfiltered_pose.")
     if run.adjusted is not None:
-        notes.append(f"{sentence(run.adjusted.numbers)} ({ADJUSTMENT.name})")
+        notes.append(f"{sentence(run.adjusted.numbers).strip().replace(chr(10), '; ')} ({ADJUSTMENT.name})")
     if result.evaluation is None:
         notes.append("There is no ground truth: what is said here rests on what the pictures show.")
     return notes

@@ -274,11 +274,13 @@ def _curves(run: RunOnPage, angles: bool) -> str:
 
 
 def _numbers(run: RunOnPage) -> str:
-    parts = [f"<div>{table((), run.numbers)}</div>"]
+    parts = [f"<div>{table((), run.numbers, 'plain')}</div>"]
     for actor in run.actors:
         if actor.errors:
             whose = f" of {actor.verdict.actor}" if len(run.actors) > 1 else ""
-            errors = table(("point", "mean", "deviation"), actor.errors)
+            head, (whole, *points) = ("point", "mean", "deviation"), actor.errors
+            every = f"<details><summary>Every point</summary>{table(head, points)}</details>" if points else ""
+            errors = table(head, [whole]) + every
             parts.append(f"<div><h3>Errors{text(whose)} against the truth, mm</h3>{errors}</div>")
     return f'{bullets(text(note) for note in run.notes)}<div class="two">{"".join(parts)}</div>'
 
@@ -290,7 +292,7 @@ def _steps(run: RunOnPage) -> str:
 
 def _settings(run: RunOnPage) -> str:
     same = paragraph("All settings are the defaults.")
-    found = table(("setting", "here", "default"), run.settings) if run.settings else same
+    found = table(("setting", "here", "default"), run.settings, "plain") if run.settings else same
     versions = ", ".join(f"{name} {number}" for name, number in run.versions)
     return f"{found}<h3>Versions</h3>{paragraph(versions)}"
 
