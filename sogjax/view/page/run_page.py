@@ -214,7 +214,10 @@ def _viewer(run: RunOnPage, drawn: Sequence[tuple[int, str]]) -> str:
             )
         )
     named = {"sure": "sure", "half": "doubtful", "lost": "likely lost"}
-    named |= {"hidden": "hidden: seen by fewer than two cameras", "revised": "revised: taken from another pass"}
+    named |= {
+        "hidden": "hidden: seen by fewer than two cameras, or behind things",
+        "revised": "revised: taken from another pass",
+    }
     key = "".join(f'<li><i class="{kind}"></i>{words}</li>' for kind, words in named.items())
     key = f'<ul class="key">{key}</ul>' if any(each.size for each in hidden) else ""
     right = f"<div>{''.join(timelines)}{key}</div>"

@@ -33,6 +33,10 @@ class SeenBlobs(NamedTuple):
     """Metres."""
 
 
+MOSTLY = 0.5
+"""Part of a limb that things in front hide, above which it counts as hidden."""
+
+
 def seen_blobs(rig: CameraRig, motion: Motion, step: int = 1) -> SeenBlobs:
     """The blobs of every `step`-th frame."""
     pixels, depths = picture_points(rig, np.asarray(motion.blob_means[::step], np.float32))
@@ -42,10 +46,7 @@ def seen_blobs(rig: CameraRig, motion: Motion, step: int = 1) -> SeenBlobs:
 
 
 def hidden_limbs(rig: CameraRig, motions: Sequence[Motion]) -> list[Bool[np.ndarray, "frame limb"]]:
-    """Of each actor, the limbs that fewer than two cameras show: others are in front, or they are outside.
-
-    Furniture is not known of.
-    """
+    """Of each actor, the limbs that fewer than two cameras show, or mostly hidden by what stands in front."""
     step = max(motions[0].num_frames // MOST_FRAMES, 1)
     seen = [seen_blobs(rig, motion, step) for motion in motions]
     joined = SeenBlobs(*(np.concatenate(parts, axis=2) for parts in zip(*seen, strict=True)))
@@ -54,9 +55,14 @@ def hidden_limbs(rig: CameraRig, motions: Sequence[Motion]) -> list[Bool[np.ndar
     shown = np.stack([_shown(rig, camera, joined, parts) for camera in range(len(rig))])
     rows = np.arange(motions[0].num_frames) // step
     return [
-        _hidden(motion, shown[:, :, first:stop])[rows]
+        _hidden(motion, shown[:, :, first:stop])[rows] | _behind_things(motion)
         for motion, first, stop in zip(motions, ends[:-1], ends[1:], strict=True)
     ]
+
+
+def _behind_things(motion: Motion) -> Bool[np.ndarray, "#frame #limb"]:
+    """The limbs that painted or learnt occluders hide mostly."""
+    return np.zeros((1, 1), bool) if motion.limb_hidden is None else np.asarray(motion.limb_hidden) > MOSTLY
 
 
 def _parts(motion: Motion) -> np.ndarray:
