@@ -2,8 +2,9 @@
 
 A pixel that never changes shows the wall, or somebody who stands still: its colour alone cannot tell. Two things do.
 What is enclosed by movement may be the subject in every camera. And where the movement is carved out of space by all
-cameras together, it is as high as a body if the whole subject moves. If it is not, the subject may only wave its arms;
-then trunk and legs stand near all that moves, and no pixel that never changes counts as background there.
+cameras together, somebody may have stood all the time, below or beside what moves: legs that stand still while the trunk bends
+over them. There, no pixel that never changes counts as background. If what moves is not as high as a body, the subject
+may only wave its arms, and trunk and legs stand farther from them.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,8 +22,10 @@ SMALLEST_ROOM = 2.6
 """Metres: the cube of space that is looked at is at least so large."""
 WHOLE_BODY = 1.6
 """Metres: what moves over less height than this may be only a part of a body. (Lifted arms alone: up to 1.5 m.)"""
-REACH = 0.6
-"""Metres on the floor from what moves to what belongs to it and stands still."""
+REACH, NEAR = 0.6, 0.25
+"""Metres on the floor from what moves to what belongs to it and stands still: from a part of a body, from a trunk."""
+CORE = 0.5
+"""Of what is as high as a body, a trunk is where it moves over so much of the height that it has where it is highest."""
 TALLEST = 2.1
 """Metres from the highest moving place down to the floor, or up from the lowest, in that case."""
 SEEING = 0.7
@@ -55,8 +58,10 @@ def moving_zones(
     }
     moving = [upright(span.hull & seen, up) for span in spans]
     blocks = [block for block in moving if block.any()]
-    if blocks and moving_height(np.any(blocks, axis=0)) * cube.spacing < WHOLE_BODY:
-        standing = from_upright(np.all(_standing(blocks, cube.spacing), axis=0), up)
+    if blocks:
+        whole = moving_height(np.any(blocks, axis=0)) * cube.spacing >= WHOLE_BODY
+        rooms = _standing(blocks, cube.spacing, *((NEAR, CORE) if whole else (REACH, 0.0)))
+        standing = from_upright(np.all(rooms, axis=0), up)
         hidden = {c: mask | pixels[c].silhouette_of(standing) for c, mask in hidden.items()}
     return zones | {c: filled(mask) for c, mask in hidden.items()}
 
@@ -102,14 +107,17 @@ def moving_height(moving: Bool[np.ndarray, "x y z"]) -> int:
     return longest
 
 
-def _standing(spans: Sequence[Bool[np.ndarray, "x y z"]], spacing: float) -> list[Bool[np.ndarray, "x y z"]]:
+def _standing(
+    spans: Sequence[Bool[np.ndarray, "x y z"]], spacing: float, reach: float, core: float
+) -> list[Bool[np.ndarray, "x y z"]]:
     """Upright pillars as high as a body in each span, around the convex outline of what moves, seen from above."""
     low, high = np.percentile(np.nonzero(np.any(spans, axis=0))[2], [2, 99])
     height = slice(max(round(high - TALLEST / spacing), 0), round(low + TALLEST / spacing))
     rooms = []
     for block in spans:
         room = np.zeros_like(block)
-        room[_convex(np.any(block, axis=2), REACH / spacing), height] = True
+        heights = block.sum(axis=2)
+        room[_convex((heights > 0) & (heights >= core * heights.max()), reach / spacing), height] = True
         rooms.append(room)
     return rooms
 
