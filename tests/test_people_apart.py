@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from rig_cases import opencv_pixels, recording_of, ring_rig
 
-from sogjax.actor.frame_choice import subject_cubes
+from sogjax.actor.frame_choice import SeenShape, seen_shape, subject_cubes
 from sogjax.actor.people import PersonSeen, _needed, matched, people_apart, runs_by_place, told_apart, unlike
 from sogjax.io.example_poses import ExamplePose
 from sogjax.io.pose_description import PoseDescription
-from sogjax.run.example_people import examples_of_masks, told_by_name, too_few_apart
+from sogjax.run.example_people import chosen_frames, examples_of_masks, told_by_name, too_few_apart
 from sogjax.run.sampled_masks import SampledMasks
 from sogjax.scene.cells import CellGrid
 from sogjax.scene.visual_hull import VoxelPixels
@@ -230,3 +230,31 @@ def test_a_frame_that_shows_other_numbers_than_it_is_listed_for_is_refused():
     assert isinstance(problem, str)
     assert "frame 0 is listed for 2 actors" in problem
     assert "1 person" in problem
+
+
+def test_what_lies_beside_most_pictures_is_nobody():
+    """A man near two cameras, which cut off his feet: beneath their pictures they would allow anything."""
+    place = 1.5 * ALONG - 1.1 * ACROSS
+    people = people_of([(box(place), RED), (box(place - 1.0 * ALONG + 0.3 * ACROSS), BLUE)])
+    assert len(people) == 2
+    man = min(people, key=lambda person: float(np.linalg.norm(person.place[:2] - place)))
+    (cube,) = subject_cubes([man.masks], CAMERAS)
+    assert cube is not None
+    shape = seen_shape(0, man.masks, NOTHING, CAMERAS, cube, UP)
+    assert shape is not None
+    assert shape.agreement > 0.9
+
+
+def shape_of(frame, agreement, side=8):
+    voxels = np.zeros((16, 16, 16), bool)
+    voxels[:side, :8, :8] = True
+    return SeenShape(frame, 1, 1.0, agreement, 0.3, 1.7, 1.0, voxels)
+
+
+def test_a_frame_in_which_one_of_two_is_seen_well_serves_for_that_one():
+    first = {frame: shape_of(frame, 0.8, 4 + frame) for frame in range(5)}
+    second = {frame: shape_of(frame, 0.8 if frame in (2, 3) else 0.2, 4 + frame) for frame in range(5)}
+    chosen = chosen_frames([first, second], 4)
+    assert chosen[1] == [2, 3]
+    assert len(chosen[0]) == 4
+    assert {2, 3} <= set(chosen[0])

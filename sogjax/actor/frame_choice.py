@@ -11,7 +11,7 @@ from scipy.ndimage import center_of_mass, label
 
 from sogjax.model.camera import Camera
 from sogjax.scene.segmentation import is_subject, largest_parts
-from sogjax.scene.visual_hull import MANY, VOXELS, Cube, cube_around, voxel_pixels
+from sogjax.scene.visual_hull import MANY, VOXELS, Cube, VoxelPixels, cube_around, voxel_pixels
 
 SMALLEST_BODY = 0.1
 """Volume of a separate part of a hull, as a share of the largest, from which on it may be somebody else."""
@@ -77,14 +77,12 @@ def seen_shape(
     of pictures of the masks' size. The subject is in the cube.
     """
     pixels = {k: voxel_pixels(cube, cameras[k], mask.shape) for k, mask in masks.items()}
-    hits = {k: pixels[k].hits(widened(masks[k] | unknown[k])) for k in masks}
-    hull = np.sum([~hit for hit in hits.values()], axis=0) <= (1 if len(masks) >= MANY else 0)
-    connected: Any = label(hull.reshape(VOXELS, VOXELS, VOXELS))
+    connected: Any = label(hull_within(masks, unknown, pixels).reshape(VOXELS, VOXELS, VOXELS))
     labels, count = connected
     volumes = np.bincount(labels.ravel())[1:]
     if not count:
         return None
-    body = labels == int(volumes.argmax()) + 1
+    body = labels == _part_shown(labels, volumes, masks, pixels)
     silhouettes = {k: pixels[k].silhouette_of(body.ravel()) for k in masks}
     return SeenShape(
         frame=frame,
@@ -96,6 +94,27 @@ def seen_shape(
         known=float(np.mean([_known_share(unknown[k], silhouettes[k]) for k in masks])),
         voxels=_about_centre(body),
     )
+
+
+def hull_within(
+    masks: Mapping[int, Mask], unknown: Mapping[int, Mask], pixels: Mapping[int, VoxelPixels]
+) -> Bool[np.ndarray, "voxel"]:
+    """The voxels that (almost) no camera rules out, of those in enough pictures: beside a picture all is allowed."""
+    misses = np.sum([~pixels[k].hits(widened(mask | unknown[k])) for k, mask in masks.items()], axis=0)
+    shown = np.sum([pixels[k].inside for k in masks], axis=0)
+    return (misses <= (1 if len(masks) >= MANY else 0)) & (shown >= max(2, LEAST_PARTS * len(masks)))
+
+
+def _part_shown(
+    labels: Int[np.ndarray, "x y z"],
+    volumes: Int[np.ndarray, "part"],
+    masks: Mapping[int, Mask],
+    pixels: Mapping[int, VoxelPixels],
+) -> int:
+    """The label of the part of a hull that covers most of the masks; what no camera shows apart may be larger."""
+    large = (np.flatnonzero(volumes > SMALLEST_BODY * volumes.max()) + 1).tolist()
+    covered = lambda part: sum(int((pixels[k].silhouette_of(part) & mask).sum()) for k, mask in masks.items())
+    return large[0] if len(large) == 1 else max(large, key=lambda number: covered((labels == number).ravel()))
 
 
 def spread_choice(shapes: Sequence[SeenShape], count: int) -> list[SeenShape]:

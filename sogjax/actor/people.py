@@ -13,9 +13,9 @@ from jaxtyping import Bool, Float, Int, UInt8
 from scipy.ndimage import binary_dilation, distance_transform_edt, gaussian_filter, label
 from scipy.optimize import linear_sum_assignment
 
-from sogjax.actor.frame_choice import SMALLEST_BODY, Mask, widened
+from sogjax.actor.frame_choice import SMALLEST_BODY, Mask, hull_within
 from sogjax.model.camera import Camera
-from sogjax.scene.visual_hull import MANY, VOXELS, Cube, VoxelPixels, voxel_pixels, without_floor
+from sogjax.scene.visual_hull import VOXELS, Cube, VoxelPixels, voxel_pixels, without_floor
 
 GAP = 0.25
 """Vertical gap between the parts of one body that is closed, metres: a belt in the background's colours."""
@@ -63,8 +63,7 @@ def people_apart(
     `pictures` are the cells' colours; the cameras are those of pictures of that size. All people are in the cube.
     """
     pixels = {k: voxel_pixels(cube, cameras[k], mask.shape) for k, mask in masks.items()}
-    misses = np.sum([~pixels[k].hits(widened(masks[k] | unknown[k])) for k in masks], axis=0)
-    hull = without_floor(misses <= (1 if len(masks) >= MANY else 0), up)
+    hull = without_floor(hull_within(masks, unknown, pixels), up)
     parts = _bodies(hull.reshape(3 * (VOXELS,)), cube.spacing, int(np.argmax(np.abs(up))))
     bodies = _needed(parts, masks, pixels)
     regions = {k: _regions([pixels[k].silhouette_of(body) for body in bodies], pixels[k]) for k in masks}

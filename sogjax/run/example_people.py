@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool
 
-from sogjax.actor.frame_choice import Mask, SeenShape, seen_shape, spread_moments, subject_cubes
+from sogjax.actor.frame_choice import Mask, SeenShape, seen_shape, spread_choice, spread_moments, subject_cubes
 from sogjax.actor.people import PersonSeen, matched, people_apart, told_apart
 from sogjax.errors import counted
 from sogjax.io.example_poses import ExamplePose, frame_name
@@ -75,17 +75,18 @@ def examples_of_masks(
         )
         return too_few_apart(actors, counts, has_plates(recording)) if another else alike
     shapes = [_shapes([moment[k] for moment in told], seen, recording.up) for k in range(actors)]
-    chosen = spread_moments(suitable_moments(shapes), count)
-    if len(chosen) < FEWEST_APART:
+    chosen = chosen_frames(shapes, count)
+    if min(map(len, chosen)) < FEWEST_APART:
         hidden = (
             f"the {actors} people are never seen whole and apart from the background; "
             f"{_plates_or(has_plates(recording))}{OTHERWISE}"
         )
         return too_few_apart(actors, counts, has_plates(recording)) if another else hidden
     by_frame = {moment[0].frame: moment for moment in told}
-    frames = [moment[0].frame for moment in chosen]
     return tuple(
-        _example(recording, person_name(k), by_frame[frame][k], seen.grids) for k in range(actors) for frame in frames
+        _example(recording, person_name(k), by_frame[frame][k], seen.grids)
+        for k, frames in enumerate(chosen)
+        for frame in frames
     )
 
 
@@ -171,6 +172,19 @@ def everybody(seen: SampledMasks, up: str) -> list[list[PersonSeen]]:
         [] if cube is None else people_apart(frame, masks, seen.unknown, pictures, seen.cameras, cube, axis_vector(up))
         for frame, masks, pictures, cube in rows
     ]
+
+
+def chosen_frames(shapes: Sequence[Mapping[int, SeenShape]], count: int) -> list[list[int]]:
+    """At most `count` frames of each person, ascending, from the shapes of each by frame.
+
+    First those that suit everybody, since tracking may begin there; where these are few, a person's own in addition.
+    """
+    together = [moment[0].frame for moment in spread_moments(suitable_moments(shapes), count)]
+    chosen = []
+    for of_person in shapes:
+        own = [shape for frame, shape in of_person.items() if shape.agreement > AGREEING and frame not in together]
+        chosen.append(sorted([*together, *(shape.frame for shape in spread_choice(own, count - len(together)))]))
+    return chosen
 
 
 def suitable_moments(shapes: Sequence[Mapping[int, SeenShape]]) -> list[Moment]:
