@@ -2,8 +2,8 @@
 
 A pixel that never changes shows the wall, or somebody who stands still: its colour alone cannot tell. Two things do.
 What is enclosed by movement may be the subject in every camera. And where the movement is carved out of space by all
-cameras together, somebody may have stood all the time, below or beside what moves: legs that stand still while the trunk bends
-over them. There, no pixel that never changes counts as background. If what moves is not as high as a body, the subject
+cameras together, somebody may have stood all the time, below or beside what moves: legs that stand still while the trunk
+bends over them. There, no pixel that never changes counts as background. If what moves is not as high as a body, the subject
 may only wave its arms, and trunk and legs stand farther from them.
 """
 
@@ -25,7 +25,7 @@ WHOLE_BODY = 1.6
 REACH, NEAR = 0.6, 0.25
 """Metres on the floor from what moves to what belongs to it and stands still: from a part of a body, from a trunk."""
 CORE = 0.5
-"""Of what is as high as a body, a trunk is where it moves over so much of the height that it has where it is highest."""
+"""Of what is as high as a body, a trunk is where it moves over this part of the greatest height."""
 TALLEST = 2.1
 """Metres from the highest moving place down to the floor, or up from the lowest, in that case."""
 SEEING = 0.7
