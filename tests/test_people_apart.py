@@ -169,7 +169,7 @@ def test_each_person_has_example_poses_in_the_same_frames():
     assert not isinstance(examples, str)
     assert [example.actor for example in examples] == ["person_1"] * 3 + ["person_2"] * 3
     frames = [example.frame for example in examples]
-    assert frames[:3] == frames[3:] == sorted(frames[:3])
+    assert frames[:3] == frames[3:] == sorted(frames[:3], key=str)
     assert examples[0].name == f"frame_{frames[0]}"
     for one, other in zip(examples[:3], examples[3:], strict=True):
         assert one.within is not None

@@ -2,9 +2,9 @@
 
 A pixel that never changes shows the wall, or somebody who stands still: its colour alone cannot tell. Two things do.
 What is enclosed by movement may be the subject in every camera. And where the movement is carved out of space by all
-cameras together, somebody may have stood all the time, below or beside what moves: legs that stand still while the trunk
-bends over them. There, no pixel that never changes counts as background. If what moves is not as high as a body, the subject
-may only wave its arms, and trunk and legs stand farther from them.
+cameras together, somebody may have stood all the time, below or beside what moves: legs that stand still while the
+trunk bends over them. There, no pixel that never changes counts as background. If what moves is not as high as a body,
+the subject may only wave its arms, and trunk and legs stand farther from them.
 """
 
 from collections.abc import Mapping, Sequence
