@@ -2,58 +2,40 @@
 
 from sogjax.quality.verdict import Verdict
 
+WRONG = {
+    "not the subject": "Use the actor of the person who is seen, in the clothes that are worn (actor=, or leave it out, "
+    "and it is made of the videos); look whether red and blue are exchanged in the pictures.",
+    "not where somebody": "Look at the first frame: if the skeleton does not stand on the person there, write a rough "
+    "pose into initial_pose.yaml or begin elsewhere (start=); then run `sogjax check` for the calibration.",
+    "inside each other": "Two actors were found on one person: give the actors of those who are there, or begin where "
+    "they stand apart (start=).",
+}
+LOOK = {
+    "overlaps to": "A camera that overlaps less than the others was touched, shows much that is in front of the actor, "
+    "or has another tint: `sogjax check` says which; cameras=[...] leaves it out, `sogjax adjust ... cameras=true` "
+    "moves it back.",
+    "silhouettes overlap": "Silhouettes overlap too little everywhere: look at the actor's silhouettes below, and make "
+    "the actor again with more or better example poses if it is too thick, too thin, too long or too short.",
+    "fits badly": "Look at the stretches in which the body fits badly; start= and stop= leave them out.",
+    "at its limit": "A joint at its limit is drawn to something dark or alike behind it: light from behind, another "
+    "background, a cap or shoes of another colour.",
+    "initial pose": "The initial pose was not sure: if its frame is wrong, write a rough one into initial_pose.yaml.",
+}
+"""What to do, by words of a finding: where nothing of a motion can be relied on, and where some can."""
+
 
 def remedies(verdict: Verdict) -> tuple[str, ...]:
     """What to do, the first thing first; one sentence where nothing was found."""
+    table = WRONG if verdict.wrong else LOOK
+    found = [what for words, what in table.items() if any(words in each for each in verdict.findings)]
     if verdict.wrong:
-        return _where_wrong(verdict)
-    found = []
+        return tuple(found)
     if verdict.doubtful:
         names = ", ".join(dict.fromkeys(limb.name for limb in verdict.doubtful))
-        found.append(
+        found.insert(
+            0,
             f"Look at the pictures of these stretches: if the skeleton leaves the {names}, more cameras on other "
             "sides, pictures of the empty scene (background/CAMERA.jpg) and clothes that differ from the room help; "
-            "if it only came too late in a fast move, a higher frame rate does."
+            "if it only came too late in a fast move, a higher frame rate does.",
         )
-    if any("overlaps to" in each for each in verdict.findings):
-        found.append(
-            "A camera that overlaps less than the others was touched, shows much that is in front of the actor, or has "
-            "another tint: `sogjax check` says which; cameras=[...] leaves it out, `sogjax adjust ... cameras=true` "
-            "moves it back."
-        )
-    if any("silhouettes overlap" in each for each in verdict.findings):
-        found.append(
-            "Silhouettes overlap too little everywhere: look at the actor's silhouettes below, and make the actor "
-            "again with more or better example poses if it is too thick, too thin, too long or too short."
-        )
-    if any("fits badly" in each for each in verdict.findings):
-        found.append("Look at the stretches in which the body fits badly; start= and stop= leave them out.")
-    if any("at its limit" in each for each in verdict.findings):
-        found.append(
-            "A joint at its limit is drawn to something dark or alike behind it: light from behind, another "
-            "background, a cap or shoes of another colour."
-        )
-    if any("initial pose" in each for each in verdict.findings):
-        found.append("The initial pose was not sure: if its frame is wrong, write a rough one into initial_pose.yaml.")
     return tuple(found) or ("Nothing. Look at a few frames below all the same, then go on to the next steps.",)
-
-
-def _where_wrong(verdict: Verdict) -> tuple[str, ...]:
-    """Of motions of which nothing can be relied on."""
-    found = []
-    if any("not the subject" in each for each in verdict.findings):
-        found.append(
-            "Use the actor of the person who is seen, in the clothes that are worn (actor=, or leave it out, and it is "
-            "made of the videos); look whether red and blue are exchanged in the pictures."
-        )
-    if any("not where somebody" in each for each in verdict.findings):
-        found.append(
-            "Look at the first frame: if the skeleton does not stand on the person there, write a rough pose into "
-            "initial_pose.yaml or begin elsewhere (start=); then run `sogjax check` for the calibration."
-        )
-    if any("inside each other" in each for each in verdict.findings):
-        found.append(
-            "Two actors were found on one person: give the actors of those who are there, or begin where they stand "
-            "apart (start=)."
-        )
-    return tuple(found)

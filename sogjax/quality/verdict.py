@@ -92,8 +92,13 @@ def verdicts(
     limits, begun, odd = limits or {}, begun or {}, odd or {}
     return {
         name: _verdict(
-            *(name, motion, expected.get(name), _inside(name, motions), limits.get(name, {})),
-            *(begun.get(name), odd.get(name)),
+            name,
+            motion,
+            expected=expected.get(name),
+            inside=_inside(name, motions),
+            limits=limits.get(name, {}),
+            begun=begun.get(name),
+            odd=odd.get(name),
         )
         for name, motion in motions.items()
     }

@@ -9,6 +9,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import cv2
 import numpy as np
 from jaxtyping import UInt8
 
@@ -22,6 +23,7 @@ from sogjax.run.clip_keypoints import ClipKeypoints
 from sogjax.run.clock import StageTimes
 from sogjax.run.small_pictures import FOLDER, SmallPictures
 from sogjax.run.terminal import say
+from sogjax.scene.background_difference import working_size
 from sogjax.scene.cells import CellGrid, padded_cells, stack_shape
 from sogjax.tracking.frame import FrameInput
 
@@ -43,6 +45,13 @@ class SampleKind:
     """Ascending."""
     prepare: Callable[[int, np.ndarray], UInt8[np.ndarray, "_rows _columns 3"]]
     """Makes what is taken of a camera's picture (BGR)."""
+
+    @classmethod
+    def at_working_size(cls, name: str, recording: Recording, frames: Sequence[int]) -> "SampleKind":
+        """Pictures at the size at which backgrounds are learnt and compared."""
+        sizes = [working_size(*recording.rig.image_size(camera)) for camera in recording.rig.names]
+        small = lambda camera, picture: cv2.resize(picture, sizes[camera], interpolation=cv2.INTER_AREA)
+        return cls(name, tuple(frames), small)
 
 
 def spread_frames(frames: range, most: int) -> list[int]:

@@ -4,7 +4,6 @@ import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
-import cv2
 import numpy as np
 from jaxtyping import Bool
 
@@ -35,8 +34,7 @@ def background_samples(recording: Recording) -> SampleKind:
     sizes = [working_size(*recording.rig.image_size(name)) for name in recording.rig.names]
     room = MOST_BYTES // (3 * sum(width * height for width, height in sizes))
     frames = spread_frames(recording.frames, int(np.clip(room, MOST_SAMPLES // 2, MOST_SAMPLES)))
-    small = lambda camera, picture: cv2.resize(picture, sizes[camera], interpolation=cv2.INTER_AREA)
-    return SampleKind("background", tuple(frames), small)
+    return SampleKind.at_working_size("background", recording, frames)
 
 
 def learnt_from(

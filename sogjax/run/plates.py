@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 
-import cv2
 import numpy as np
 from jaxtyping import UInt8
 
@@ -10,7 +9,6 @@ from sogjax.errors import InputError
 from sogjax.io.video import read_still
 from sogjax.run.clip import Clip, SampleKind, spread_frames
 from sogjax.run.terminal import say
-from sogjax.scene.background_difference import working_size
 from sogjax.scene.plates import FittedPlate, fitted_plate
 
 LOOKED_AT = 9
@@ -19,9 +17,7 @@ LOOKED_AT = 9
 
 def scene_samples(clip: Clip) -> SampleKind:
     """The pictures that photographs of the empty scene are held against."""
-    sizes = [working_size(*clip.recording.rig.image_size(name)) for name in clip.recording.rig.names]
-    small = lambda camera, picture: cv2.resize(picture, sizes[camera], interpolation=cv2.INTER_AREA)
-    return SampleKind("scene", tuple(spread_frames(clip.numbers, LOOKED_AT)), small)
+    return SampleKind.at_working_size("scene", clip.recording, spread_frames(clip.numbers, LOOKED_AT))
 
 
 def fitted_plates(clip: Clip, more: Sequence[SampleKind] = ()) -> dict[str, FittedPlate]:

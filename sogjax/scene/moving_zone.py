@@ -60,7 +60,8 @@ def moving_zones(
     blocks = [block for block in moving if block.any()]
     if blocks:
         whole = moving_height(np.any(blocks, axis=0)) * cube.spacing >= WHOLE_BODY
-        rooms = _standing(blocks, cube.spacing, *((NEAR, CORE) if whole else (REACH, 0.0)))
+        reach, core = (NEAR, CORE) if whole else (REACH, 0.0)
+        rooms = _standing(blocks, cube.spacing, reach, core)
         standing = from_upright(np.all(rooms, axis=0), up)
         hidden = {c: mask | pixels[c].silhouette_of(standing) for c, mask in hidden.items()}
     return zones | {c: filled(mask) for c, mask in hidden.items()}
