@@ -3,8 +3,8 @@
 from sogjax.quality.verdict import Verdict
 
 WRONG = {
-    "not the subject": "Use the actor of the person who is seen, in the clothes that are worn (actor=, or leave it out, "
-    "and it is made of the videos); look whether red and blue are exchanged in the pictures.",
+    "not the subject": "Use the actor of the person who is seen, in the clothes that are worn (actor=, or leave it "
+    "out, and it is made of the videos); look whether red and blue are exchanged in the pictures.",
     "not where somebody": "Look at the first frame: if the skeleton does not stand on the person there, write a rough "
     "pose into initial_pose.yaml or begin elsewhere (start=); then run `sogjax check` for the calibration.",
     "inside each other": "Two actors were found on one person: give the actors of those who are there, or begin where "
