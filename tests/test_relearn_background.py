@@ -1,8 +1,12 @@
 """When a background is learnt a second time."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
-from sogjax.run.relearn_background import frames_to_learn_from
+from sogjax.run.relearn_background import frames_to_learn_from, without_body
+from sogjax.scene.background import BackgroundImage
 
 SAMPLES = [*range(0, 300, 30)]
 
@@ -24,3 +28,17 @@ def test_samples_that_are_not_tracked_are_told(capsys):
     samples = [*range(0, 600, 30)]
     assert frames_to_learn_from(0.5, samples, range(0, 600, 20)) == samples[::2]
     assert "of 20 frames to learn the background from, 10 are tracked" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("stays", "alike", "known"), [(9, True, False), (9, False, True), (4, True, True)])
+def test_what_a_background_took_from_a_body_that_stays_is_unknown(stays, alike, known):
+    """Covered by the body in so many of twelve samples, which show what was taken for background, or something else."""
+    picture = np.full((4, 6, 3), 90, np.uint8)
+    first = BackgroundImage(picture, np.full((4, 6), 2.0, np.float32), np.ones((4, 6), bool), "clip")
+    shown = {frame: picture + np.uint8(0 if alike else 60) for frame in range(12)}
+    body = np.zeros((4, 6), bool)
+    body[1:3, 2:4] = True
+    found = without_body(first, shown, {frame: body & (frame < stays) for frame in range(12)})
+    assert (found.known[body] == known).all()
+    assert found.known[~body].all()
+    assert without_body(replace(first, origin="picture"), shown, dict.fromkeys(range(12), body)).known.all()

@@ -39,8 +39,9 @@ BORDER = 0.15
 
 SAME = 16
 """Grey levels, of the channel that differs most: within, what the first background shows is what the body showed."""
-MOSTLY = 0.6
-"""Part of the samples in which the body covers a pixel: showing the same in so many, it was taken for background."""
+STAYS, MOSTLY = 0.5, 0.6
+"""Parts of the samples in which the body covers a pixel, and of these in which the first background shows the same: then
+the body was taken for background. Who passes by uncovers enough."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +132,8 @@ def without_body(
         if not covered[frame].all():
             count += covered[frame]
             same += covered[frame] & (np.abs(picture - shown[frame]).max(axis=-1) <= SAME)
-    taken = (count >= FEWEST_AGREEING) & (same >= MOSTLY * count)
+    stays = count >= max(FEWEST_AGREEING, STAYS * len(shown))
+    taken = stays & (same >= MOSTLY * count)
     return replace(first, known=first.known & ~taken)
 
 
