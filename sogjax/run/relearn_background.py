@@ -36,12 +36,11 @@ MUCH_UNKNOWN = 0.015
 BORDER = 0.15
 """Metres around a blob that are left out, too: the body may be a little off. With 0.25 too little is left to learn."""
 
-
 SAME = 16
 """Grey levels, of the channel that differs most: within, what the first background shows is what the body showed."""
 STAYS, MOSTLY = 0.5, 0.6
-"""Parts of the samples in which the body covers a pixel, and of these in which the first background shows the same: then
-the body was taken for background. Who passes by uncovers enough."""
+"""Parts of the samples in which the body covers a pixel, and of these in which the first background shows the same:
+then the body was taken for background. Who passes by uncovers enough."""
 
 
 @dataclass(frozen=True)
