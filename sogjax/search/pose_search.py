@@ -16,8 +16,8 @@ from sogjax.model.limbs import limbs, with_other_limb
 from sogjax.model.rotation import axis_vector
 from sogjax.scene.color_clusters import ColorClusters
 from sogjax.search.mirrored import look_alikes
-from sogjax.search.placed_body import centred, headings, means_of, turned_to, turns_with_vertical
-from sogjax.search.places import Place, places
+from sogjax.search.placed_body import centred, centres_of, headings, means_of, turned_to, turns_with_vertical
+from sogjax.search.places import APART, Place, places
 from sogjax.search.search_energy import LARGEST_ANGLE, LARGEST_TRANSLATION, SearchEnergy, climbed, scores
 from sogjax.search.seen_frame import SeenFrame
 from sogjax.solve.solution import Scales
@@ -32,7 +32,7 @@ UPRIGHT = 0.8
 SLENDER = 1.5
 """A body less slender says nothing of its direction."""
 NUM_AT_PLACE, FIRST_ITERATIONS = (16, 8, 4, 4), 8
-"""Starts that are climbed a little way: at the best place, the next and so on."""
+"""Starts that are climbed a little way: at the best place, the next and so on; actors share those of the first two."""
 NUM_SECOND, SECOND_ITERATIONS = 6, 10
 """Those of them whose limbs are tried another way, and how far these are climbed."""
 NUM_LAST, LAST_ITERATIONS = 4, 25
@@ -100,15 +100,15 @@ def search(searcher: PoseSearch, frame: SeenFrame, count: int = NUM_LAST, report
     found = [place for place in found if place.score >= POOR * found[0].score] or found[:1]
     placed = PlacedSearch.of_places(searcher, frame, np.stack([place.centre for place in found]))
     tried = _starts(searcher, found)
-    tried = placed.climbed(_spread_best(searcher.body, placed.scored(tried)), FIRST_ITERATIONS)
-    tried = _best(searcher.body, tried, NUM_SECOND)
+    tried = placed.climbed(_spread_best(searcher, placed.scored(tried)), FIRST_ITERATIONS)
+    tried = _best(searcher, tried, NUM_SECOND)
     report(0.3)
     for share in (0.6, 0.85):
-        tried = _best(searcher.body, with_better_limbs(placed, tried), NUM_LAST)
+        tried = _best(searcher, with_better_limbs(placed, tried), NUM_LAST)
         report(share)
     tried = placed.climbed(_with_look_alikes(placed, tried), LAST_ITERATIONS)
     report(1.0)
-    best = _best(searcher.body, tried, count)
+    best = _best(searcher, tried, count)
     return [Optimum(pose, float(value)) for pose, value in zip(best.poses, best.values, strict=True)]
 
 
@@ -218,19 +218,33 @@ def _with_look_alikes(placed: PlacedSearch, tried: Hypotheses) -> Hypotheses:
     return Hypotheses.of([tried, Hypotheses(others, np.full(len(others), tried.where[0]), np.zeros(len(others)))])
 
 
-def _spread_best(body: Body, tried: Hypotheses) -> Hypotheses:
+def _spread_best(searcher: PoseSearch, tried: Hypotheses) -> Hypotheses:
     """The best at each place, not too many of them nearly the same; more at the better places."""
-    chosen = []
-    for place, count in zip(np.unique(tried.where), NUM_AT_PLACE, strict=False):
+    counts, chosen = np.array(NUM_AT_PLACE), []
+    shared = min(searcher.among, len(counts))
+    counts[:shared] = np.ceil(counts[:shared].mean())
+    for place, count in zip(np.unique(tried.where), counts, strict=False):
         here = tried[tried.where == place]
         likely = here[np.argsort(-here.values)[: 8 * count]]
-        chosen.append(_best(body, likely, count))
+        chosen.append(likely[different(searcher.body, likely.poses, likely.values, count)])
     return Hypotheses.of(chosen)
 
 
-def _best(body: Body, tried: Hypotheses, count: int) -> Hypotheses:
-    """The best different ones, best first."""
-    return tried[different(body, tried.poses, tried.values, count)]
+def _best(searcher: PoseSearch, tried: Hypotheses, count: int) -> Hypotheses:
+    """The best different ones, best first.
+
+    Of several actors each may fit best in another one's place: then no more than its share of them is in one place,
+    so that what explains everybody is among them.
+    """
+    body, most = searcher.body, -(-count // searcher.among)
+    order = different(body, tried.poses, tried.values, len(tried.values) if searcher.among > 1 else count)
+    centres = centres_of(body, tried.poses[order])
+    near = np.linalg.norm(centres[:, None] - centres[None], axis=-1) < APART
+    kept = list[int]()
+    for k in range(len(order)):
+        if near[k, kept].sum() < most and len(kept) < count:
+            kept.append(k)
+    return tried[order[np.array(kept, int)]]
 
 
 def different(
