@@ -62,7 +62,8 @@ def moving_zones(
         whole = moving_height(np.any(blocks, axis=0)) * cube.spacing >= WHOLE_BODY
         reach, core = (NEAR, CORE) if whole else (REACH, 0.0)
         rooms = _standing(blocks, cube.spacing, reach, core)
-        standing = from_upright(np.all(rooms, axis=0), up)
+        together = np.all if whole else np.any  # who does not walk is there, too, while somebody else moves
+        standing = from_upright(together(rooms, axis=0), up)
         hidden = {c: mask | pixels[c].silhouette_of(standing) for c, mask in hidden.items()}
     return zones | {c: filled(mask) for c, mask in hidden.items()}
 

@@ -8,6 +8,7 @@ from jaxtyping import Array, Bool, Float
 
 from sogjax.energy.appearance import ColorWindows
 from sogjax.energy.posed import Posed
+from sogjax.energy.views import odds_on_grid
 from sogjax.model.limbs import limb_blobs
 from sogjax.search.placed_body import centres_of
 from sogjax.search.pose_search import PlacedSearch, PoseSearch
@@ -37,19 +38,32 @@ class CellEvidence(eqx.Module):
     """Part of what the body covers in which no other actor is seen; never NaN."""
     limbs: Float[Array, "limb"]
     """What is lost without a limb, for its size, as a part of what the whole body gains for its own."""
+    known: Float[Array, ""]
+    """Part of what the body covers whose background is known."""
 
 
 def cell_evidence(searcher: PoseSearch, frame: SeenFrame, pose: Float[np.ndarray, "dof"]) -> CellEvidence:
     """What the cells of a frame say for a pose."""
     placed = PlacedSearch.of_places(searcher, frame, centres_of(searcher.body, pose[None]))
-    return _cell_evidence(placed.energy, placed.windows, jnp.asarray(limb_blobs(searcher.body)), jnp.asarray(pose))
+    here = jax.tree.map(lambda leaf: leaf[0], placed.windows)
+    known = _known(frame, here)
+    return _cell_evidence(placed.energy, here, known, jnp.asarray(limb_blobs(searcher.body)), jnp.asarray(pose))
+
+
+@eqx.filter_jit
+def _known(frame: SeenFrame, windows: ColorWindows) -> Float[Array, "camera column row"]:
+    """1 where the background is known, -1 where it is not, 0 outside the pictures."""
+    return jax.vmap(odds_on_grid)(frame.known, frame.cell_sizes, frame.cameras, windows.x, windows.y)
 
 
 @eqx.filter_jit
 def _cell_evidence(
-    energy: SearchEnergy, windows: ColorWindows, limbs: Bool[Array, "limb blob"], pose: Array
+    energy: SearchEnergy,
+    here: ColorWindows,
+    known: Float[Array, "camera column row"],
+    limbs: Bool[Array, "limb blob"],
+    pose: Array,
 ) -> CellEvidence:
-    here = jax.tree.map(lambda leaf: leaf[0], windows)
     objective, appearance = energy.of_windows(here), energy.appearance(here)
     posed = Posed.from_pose(energy.body, pose)
     cover, gain = appearance.covered(posed, objective.frame)
@@ -75,4 +89,5 @@ def _cell_evidence(
         gain=where_seen(total(gain * here.free) / whole),
         visible=visible,
         limbs=of_limb,
+        known=jnp.sum(cover * jnp.maximum(known, 0.0)) / (jnp.sum(cover * jnp.abs(known)) + 1e-6),
     )

@@ -100,13 +100,10 @@ class Followed:
     energies: Float[np.ndarray, "frame hypothesis"]
 
 
-def judged(
-    body: Body, paths: Followed, best: int, seen: CellEvidence, known: float, exchange: float, share: float
-) -> Path:
+def judged(body: Body, paths: Followed, best: int, seen: CellEvidence, exchange: float, share: float) -> Path:
     """One of the hypotheses that were followed, with how likely it and its parts are right.
 
-    `known` is the part of the background that is known; `exchange` how far it is behind that this is another actor, and
-    `share` what others leave of the energy.
+    `exchange` is how far it is behind that this is another actor, and `share` what others leave of the energy.
     """
     means = means_of(body, paths.poses[0])
     apart = np.linalg.norm(means - means[best], axis=-1)
@@ -115,7 +112,7 @@ def judged(
         others = apart[:, blobs].mean(axis=1) >= DIFFERENT
         behind = lambda energies: min(_margin(energies, best, others), exchange)
         margin, later = behind(paths.energies[0]), behind(paths.energies.mean(axis=0))
-        return _evidence(seen, float(paths.energies[0, best]), margin, later, known, share)
+        return _evidence(seen, float(paths.energies[0, best]), margin, later, share)
 
     whole = evidence(np.ones(body.num_blobs, bool))
     likely = pose_confidence(whole)
@@ -136,9 +133,7 @@ def _margin(energies: Float[np.ndarray, "hypothesis"], best: int, others: Bool[n
     return float(behind / max(abs(energies[best]), 1e-6))
 
 
-def _evidence(
-    seen: CellEvidence, energy: float, margin: float, later_margin: float, known: float, share: float
-) -> PoseEvidence:
+def _evidence(seen: CellEvidence, energy: float, margin: float, later_margin: float, share: float) -> PoseEvidence:
     visible = max(float(np.mean(seen.visible)), LEAST_SEEN)
     shown = np.isfinite(np.asarray(seen.foreground))
     mean = lambda values: float(np.mean(np.asarray(values)[shown])) if shown.any() else 0.0
@@ -151,7 +146,7 @@ def _evidence(
         not_background=1.0 - mean(seen.background),
         gain=mean(seen.gain),
         worst_limb=float(np.min(seen.limbs, initial=1.0)),
-        known=known,
+        known=float(seen.known),
         share=share,
     )
 

@@ -105,8 +105,7 @@ def _paths_together(actors: list[Sought]) -> list[Path]:
         actor, pose = actors[k], first[k]
         frame = actor.given(0, [(actors[j], first[j]) for j in range(len(actors)) if j != k])
         seen = cell_evidence(actor.searcher, frame, pose)
-        known = float(actor.frames[0].known)
-        return judged(actor.searcher.body, followed[k], best[k], seen, known, combined.exchange[k], combined.shares[k])
+        return judged(actor.searcher.body, followed[k], best[k], seen, combined.exchange[k], combined.shares[k])
 
     return [judge(k) for k in range(len(actors))]
 

@@ -32,7 +32,7 @@ class PoseEvidence:
     worst_limb: float
     """What the limb explains that explains least, for its size, as a part of what the body does."""
     known: float
-    """Part of the pictures whose background is known."""
+    """Part of what the body covers whose background is known."""
     share: float = 1.0
     """What is left of the energy beside the other actors, as a part of the most that is found where they are not."""
 

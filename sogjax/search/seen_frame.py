@@ -35,8 +35,8 @@ class SeenFrame(eqx.Module):
     odds: Float[Array, "camera cluster rows columns"]
     """Log odds of each cluster of blobs against the background; the last cluster is the body as a whole."""
     cell_sizes: Float[Array, "camera"]
-    known: Float[Array, ""]
-    """Part of the cells whose background is known."""
+    known: Float[Array, "camera rows columns"]
+    """1 for cells whose background is known, -1 for others, 0 where nothing is seen."""
     found: tuple[Sog, ...] = ()
     """Blobs in the world of actors that were found: what they cover is theirs."""
     hidden_from: Float[Array, "camera rows columns"] | None = None
@@ -65,9 +65,9 @@ class SeenFrame(eqx.Module):
         if hidden is not None:
             inside[np.asarray(hidden) == 0.0] = 0.0
         odds = _odds(jnp.asarray(cells), jnp.asarray(inside), reader.background, tables)
-        known = 0.0 if reader.background is None else np.sum(np.asarray(reader.background.known) * inside)
+        known = np.zeros(inside.shape) if reader.background is None else np.asarray(reader.background.known)
         sizes = jnp.asarray([grid.cell_size for grid in grids], dtype)
-        return cls(cameras, odds, sizes, jnp.asarray(known / max(inside.sum(), 1.0), dtype), hidden_from=hidden)
+        return cls(cameras, odds, sizes, jnp.asarray((2.0 * known - 1.0) * inside, dtype), hidden_from=hidden)
 
     def windows(self, centre: Float[Array, "3"], radius: Float[Array, ""]) -> ColorWindows:
         """Grids around a ball (metres, world)."""
