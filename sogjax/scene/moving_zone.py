@@ -61,9 +61,8 @@ def moving_zones(
     if blocks:
         whole = moving_height(np.any(blocks, axis=0)) * cube.spacing >= WHOLE_BODY
         reach, core = (NEAR, CORE) if whole else (REACH, 0.0)
-        rooms = _standing(blocks, cube.spacing, reach, core)
-        together = np.all if whole else np.any  # who does not walk is there, too, while somebody else moves
-        standing = from_upright(together(rooms, axis=0), up)
+        rooms = _standing(blocks if whole else moving, cube.spacing, reach, core)
+        standing = from_upright(np.all(rooms, axis=0) if whole else _early_and_late(np.stack(rooms)), up)
         hidden = {c: mask | pixels[c].silhouette_of(standing) for c, mask in hidden.items()}
     return zones | {c: filled(mask) for c, mask in hidden.items()}
 
@@ -122,6 +121,12 @@ def _standing(
         room[_convex((heights > 0) & (heights >= core * heights.max()), reach / spacing), height] = True
         rooms.append(room)
     return rooms
+
+
+def _early_and_late(rooms: Bool[np.ndarray, "span x y z"]) -> Bool[np.ndarray, "x y z"]:
+    """What is near something that moves early and late, half of the clip apart: who only waves pauses, too."""
+    first, last = rooms.argmax(axis=0), len(rooms) - 1 - rooms[::-1].argmax(axis=0)
+    return rooms.any(axis=0) & (last - first >= len(rooms) // 2)
 
 
 def _convex(plan: Bool[np.ndarray, "x y"], border: float) -> Bool[np.ndarray, "x y"]:
