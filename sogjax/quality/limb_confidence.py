@@ -94,7 +94,7 @@ def _certainty(evidence: BlobEvidence) -> Float[Array, "blob"]:
 CLEARLY = 0.3
 """Log odds from which a cell is foreground, and below minus which it is background; others do not count."""
 LEAST_TOLD = 0.25
-"""Part of an actor's silhouette that must be either for a camera to be compared, where most cameras tell so much."""
+"""Part of an actor's silhouette that must be either for a camera to be compared."""
 
 
 class FrameFit(eqx.Module):
@@ -103,8 +103,8 @@ class FrameFit(eqx.Module):
     explained: Float[Array, "actor"]
     """Part of its visible area that shows its blobs' own colours, and no background where that is known."""
     overlap: Float[Array, "actor camera"]
-    """Intersection over union of its silhouette and the foreground around it; NaN where no background is known, or
-    too little for a camera to tell what most others do."""
+    """Intersection over union of its silhouette and the foreground around it; NaN where too little of the background
+    is known."""
 
 
 def frame_fit(
@@ -123,5 +123,4 @@ def frame_fit(
     total = lambda values: jnp.sum(values, axis=(2, 3))
     both, either = total(covered * shown), total(shown) + total(covered * empty)
     told = both + total(covered * empty) > LEAST_TOLD * total(covered)
-    told |= jnp.median(told.astype(explained.dtype), axis=0, keepdims=True) < 0.5
     return FrameFit(explained, jnp.where(told & (either > 0.0), both / jnp.maximum(either, 1e-6), jnp.nan).T)

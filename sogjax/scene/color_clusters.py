@@ -1,5 +1,6 @@
 """Clusters of blobs of a body by their colours, and what cells say for each cluster against the background."""
 
+import math
 from dataclasses import dataclass
 
 import jax
@@ -12,6 +13,7 @@ from sogjax.model.body import Body
 from sogjax.scene.foreground import (
     COLOR_BINS,
     LARGEST,
+    SUBJECT_UNKNOWN,
     TEMPER,
     BackgroundModel,
     background_surprise,
@@ -79,11 +81,13 @@ def cluster_odds(
     inside: Float[Array, "camera rows columns"],
     background: BackgroundModel | None,
     tables: Float[Array, "cluster bin bin bin"],
+    most_unlike: float = LARGEST,
 ) -> Float[Array, "camera cluster rows columns"]:
     """Log odds of each cluster of blobs against the background in every cell, within `LARGEST`.
 
     Where the background is not known, what the picture shows elsewhere stands for it: a colour that is everywhere says
-    little. `inside` is 1 for the cells of the pictures, 0 for padding.
+    little. `inside` is 1 for the cells of the pictures, 0 for padding. A cell that is neither the background nor has
+    any of a cluster's colours says `most_unlike` at most: it may be somebody else.
     """
     unknown = picture_surprise(cells, inside)
     surprise, temper = unknown, jnp.full_like(unknown, TEMPER * UNKNOWN_BACKGROUND)
@@ -92,7 +96,8 @@ def cluster_odds(
         temper = jnp.where(background.known, TEMPER, temper)
     bins = color_bins(cells)
     densities = jax.lax.map(lambda table: table[bins], tables)
-    odds = jnp.moveaxis(temper[None] * (surprise[None] + densities), 0, 1)
+    own = most_unlike + TEMPER * (densities - math.log(SUBJECT_UNKNOWN))
+    odds = jnp.moveaxis(jnp.minimum(temper[None] * (surprise[None] + densities), own), 0, 1)
     return jnp.clip(odds, -LARGEST, LARGEST) * inside[:, None]
 
 

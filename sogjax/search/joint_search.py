@@ -20,6 +20,7 @@ from sogjax.search.pose_search import (
     search,
     unreported,
     with_better_limbs,
+    with_look_alikes,
 )
 from sogjax.search.seen_frame import SeenFrame
 
@@ -97,7 +98,7 @@ def _paths_together(actors: list[Sought]) -> list[Path]:
         combined = best_combination(_weighed(actors))
     if len(actors) > 1:
         at = [actor.poses[row] for actor, row in zip(actors, combined.chosen, strict=True)]
-        actors = [_with_limbs_beside(actors, k, at) for k in range(len(actors))]
+        actors = [_beside_others(actors, k, at) for k in range(len(actors))]
     followed, best = _followed(actors, [0] * len(actors) if len(actors) > 1 else combined.chosen)
     first = [paths.poses[0, row] for paths, row in zip(followed, best, strict=True)]
 
@@ -138,14 +139,14 @@ def _searched_again(actors: Sequence[Sought], k: int, combined: Combination) -> 
     )
 
 
-def _with_limbs_beside(actors: Sequence[Sought], k: int, at: Sequence[Float[np.ndarray, "dof"]]) -> Sought:
-    """An actor with the best way to hold its limbs beside the others first, then other ways, then its other optima.
+def _beside_others(actors: Sequence[Sought], k: int, at: Sequence[Float[np.ndarray, "dof"]]) -> Sought:
+    """An actor as it fits best beside the others first, then with other limbs and turned, then its other optima.
 
     Alone, a limb is often held where another actor's limb is seen.
     """
     actor, others = actors[k], [(other, at[j]) for j, other in enumerate(actors) if j != k]
     placed, tried = _placed(actor.searcher, actor.given(0, others), at[k][None])
-    held = with_better_limbs(placed, tried)
+    held = with_look_alikes(placed, with_better_limbs(placed, tried))
     poses = np.concatenate([held.poses, actor.poses]).astype(np.float32)
     values = np.concatenate([held.values, actor.scored(actor.given(0, others))])
     values[np.argmax(held.values)] = values.max() + 1.0  # first, whatever those in another place are worth

@@ -92,6 +92,7 @@ def unreported(share: float) -> None:
 def search(searcher: PoseSearch, frame: SeenFrame, count: int = NUM_LAST, report: Report = unreported) -> list[Optimum]:
     """The best different poses of a body in one frame, best first; none, if nothing looks like it.
 
+    What looks like the best is among them; of several actors that is asked once it is known where the others are.
     `report` is called with the share of the work that is done.
     """
     found = places(frame, searcher.up, NUM_PLACES, searcher.among)
@@ -106,7 +107,7 @@ def search(searcher: PoseSearch, frame: SeenFrame, count: int = NUM_LAST, report
     for share in (0.6, 0.85):
         tried = _best(searcher, with_better_limbs(placed, tried), NUM_LAST)
         report(share)
-    tried = placed.climbed(_with_look_alikes(placed, tried), LAST_ITERATIONS)
+    tried = placed.climbed(tried, LAST_ITERATIONS) if searcher.among > 1 else with_look_alikes(placed, tried)
     report(1.0)
     best = _best(searcher, tried, count)
     return [Optimum(pose, float(value)) for pose, value in zip(best.poses, best.values, strict=True)]
@@ -212,10 +213,12 @@ def _drawn(body: Body, limb: Int[np.ndarray, "limb"], count: int) -> Float[np.nd
     return poses
 
 
-def _with_look_alikes(placed: PlacedSearch, tried: Hypotheses) -> Hypotheses:
-    """The poses, and what looks like the best of them."""
-    others = look_alikes(placed.searcher.body, tried.poses[0])
-    return Hypotheses.of([tried, Hypotheses(others, np.full(len(others), tried.where[0]), np.zeros(len(others)))])
+def with_look_alikes(placed: PlacedSearch, tried: Hypotheses) -> Hypotheses:
+    """The poses, and what looks like the best of them, climbed."""
+    best = int(np.argmax(tried.values))
+    others = look_alikes(placed.searcher.body, tried.poses[best])
+    alike = Hypotheses(others, np.full(len(others), tried.where[best]), np.zeros(len(others)))
+    return placed.climbed(Hypotheses.of([tried, alike]), LAST_ITERATIONS)
 
 
 def _spread_best(searcher: PoseSearch, tried: Hypotheses) -> Hypotheses:

@@ -24,6 +24,9 @@ SIDE = 40
 FREE_SPACE = 0.4
 """What the odds of a cell count that is rather background: a limb that is a little beside its place must not lose more
 than one that hides in the trunk."""
+SOMEBODY = 0.5
+"""The odds, at most, of a cell that is not the background and has none of an actor's colours: it may be somebody else.
+With twice as much, an actor fits a bystander as well as himself."""
 COVERED = 2.0
 """Density of what hides the background, as in the foreground term."""
 
@@ -124,4 +127,4 @@ def _is_tuple(value: object) -> bool:
 
 @eqx.filter_jit
 def _odds(cells: Array, inside: Array, background: BackgroundModel | None, tables: Array) -> Array:
-    return cluster_odds(cells.astype(tables.dtype) / 255.0, inside.astype(tables.dtype), background, tables)
+    return cluster_odds(cells.astype(tables.dtype) / 255.0, inside.astype(tables.dtype), background, tables, SOMEBODY)
