@@ -96,8 +96,8 @@ def test_mot_is_what_opensim_reads(capsys, tmp_path, body):
     assert row[names.index("knee_angle_l")] == pytest.approx(np.rad2deg(0.5), abs=DEGREES)
 
 
-def test_an_arm_that_circles_comes_back_to_its_angles(body):
-    """Round the place where two of them mean nothing, and back down: no turn is left over. The pelvis counts turns."""
+def test_angles_of_an_arm_that_circles_do_not_jump_by_a_turn(body):
+    """Round the place where two of them mean nothing, and back down: whole turns may be left over."""
     names, around = body.skeleton.dof_names, np.linspace(0.0, 2.0 * np.pi, 40)
     pose = np.zeros((41, body.skeleton.num_dofs), np.float32)
     pose[1:, names.index("left_shoulder_raise")] = np.pi / 2 + 0.3 * np.cos(around)
@@ -107,8 +107,10 @@ def test_an_arm_that_circles_comes_back_to_its_angles(body):
     motion = motion_from_poses(body.rotated(jnp.asarray(world_from_upright("z"), jnp.float32)), pose, 25.0, up="z")
     angles = joint_angles(motion)
     for name in ("arm_flex_l", "arm_add_l", "arm_rot_l"):
-        assert angles[name][-1] == pytest.approx(angles[name][0], abs=DEGREES)
-        assert np.abs(angles[name]).max() <= 180.0
+        left_over = angles[name][-1] - angles[name][0]
+        assert left_over == pytest.approx(360.0 * round(left_over / 360.0), abs=DEGREES)
+        assert np.abs(np.diff(angles[name])).max() <= 180.0
+        assert abs(np.median(angles[name])) <= 180.0
     assert abs(angles["pelvis_rotation"][-1] - angles["pelvis_rotation"][0]) == pytest.approx(720.0, abs=1.0)
 
 

@@ -89,11 +89,17 @@ class DemoConfig:
 
 @dataclass
 class EvaluateConfig:
-    """Compare a motion with ground truth (Section 6)."""
+    """Compare a motion with ground truth (Section 6), or with another system's motion."""
 
     motion: Any = option(REQUIRED, "motion.npz, or a list of them with several actors")
-    truth: str = option(REQUIRED, "ground_truth.npz, or the folder of a recording that has one")
+    truth: str = option(
+        REQUIRED,
+        "ground_truth.npz, or the folder of a recording that has one; or another system's .mot .sto .trc .c3d .bvh",
+    )
     out: str | None = option(None, "metrics.json to write; null: only print")
+    offset: float | None = option(
+        None, "seconds to add to the times of another system; null: found by cross-correlation"
+    )
     markers: str = option(
         "scaled",
         "markers go with the closest blob's joint; scaled: distances in the blob's sigmas | closest: as in Section 6",

@@ -27,7 +27,7 @@ def _both_sides(names: dict[str, str]) -> dict[str, str]:
 
 OPENSIM_NAMES = {"root": "Hip", "neck": "Neck"} | _both_sides(_JOINTS)
 """The names that OpenSim models for video have (Pose2Sim's), by those of the default body's bones."""
-_OPENSIM_ENDS = {"head_top": "Head"} | _both_sides(_ENDS)
+OPENSIM_ENDS = {"head_top": "Head"} | _both_sides(_ENDS)
 """The names that these models have of landmarks where a body ends."""
 _EVERY_BONE = "all"
 
@@ -54,9 +54,9 @@ def marker_points(
     kept = [k for k, name in enumerate(bones.names) if markers == _EVERY_BONE or not rolls(name)]
     names = [OPENSIM_NAMES.get(bones.names[k], bones.names[k]) for k in kept]
     known = [] if motion.landmark_names is None else motion.landmark_names.tolist()
-    ends = [name for name in _OPENSIM_ENDS if name in known]
+    ends = [name for name in OPENSIM_ENDS if name in known]
     places = [motion.joint(name).astype(float) @ world_turn(up, to).T for name in ends]
-    return names + [_OPENSIM_ENDS[name] for name in ends], np.stack([*positions[:, kept].swapaxes(0, 1), *places], 1)
+    return names + [OPENSIM_ENDS[name] for name in ends], np.stack([*positions[:, kept].swapaxes(0, 1), *places], 1)
 
 
 def write_c3d(path: Path, motion: MotionData, up: str = "z", markers: str | None = None) -> None:
