@@ -17,8 +17,8 @@ from sogjax.io.motion import motion_from_poses
 from sogjax.io.motion_data import save_motion
 from sogjax.io.reference.load import load_reference
 from sogjax.quality.angle_errors import angle_error, multiple_correlation
-from sogjax.quality.reference_evaluation import evaluate_against_reference
-from sogjax.quality.time_offset import time_offset
+from sogjax.quality.reference.evaluation import evaluate_against_reference
+from sogjax.quality.reference.time_offset import time_offset
 
 DEGREES, METRES = 0.05, 1e-4
 

@@ -148,7 +148,6 @@ def test_the_ground_truth_names_markers_and_landmarks(folder):
     assert 0.015 < errors.std() < 0.035
 
 
-@pytest.mark.slow
 def test_true_angles_are_those_of_the_true_joints(folder):
     """The knee's angle is that between thigh and shank, told by the places of hip, knee and ankle alone."""
     truth = load_ground_truth(folder / "ground_truth.npz")
@@ -162,6 +161,7 @@ def test_true_angles_are_those_of_the_true_joints(folder):
         np.testing.assert_allclose(np.abs(bent), np.degrees(np.arccos(cosine)), atol=1.5)
 
 
+@pytest.mark.slow
 def test_the_same_settings_make_the_same_files_with_any_number_of_processes(folder, tmp_path):
     again = render_recording(SMALL, tmp_path / "again", workers=2)
     files = sorted(path.relative_to(folder) for path in folder.rglob("*") if path.is_file())

@@ -11,7 +11,7 @@ from sogjax.io.motion import Motion
 from sogjax.io.recording_files import GROUND_TRUTH
 from sogjax.io.reference.load import READERS, is_reference, load_reference
 from sogjax.quality.evaluation import GroupEvaluation, evaluate_motions
-from sogjax.quality.reference_evaluation import ReferenceEvaluation, evaluate_against_reference
+from sogjax.quality.reference.evaluation import ReferenceEvaluation, evaluate_against_reference
 from sogjax.run.build import marker_rule
 from sogjax.run.recordings import file_list
 from sogjax.run.run_folder import free_path
