@@ -141,6 +141,9 @@ class ExportConfig:
         "points of a .trc or .c3d; null: joint centres, toes, heels, hands, head top | all: every bone, too | "
         "a keypoint scheme by name or file: HALPE_26 for Pose2Sim's next steps",
     )
+    dialect: str | None = option(
+        None, "of a .bvh: null, the body's own joints in metres | lafan1, for robots: 22 joints by LAFAN1's names in cm"
+    )
     angles: bool = option(False, "a .csv holds joint angles in degrees instead of positions, as a .mot always does")
     overwrite: bool = option(False, OVERWRITE)
 
@@ -170,7 +173,10 @@ SCHEMAS: dict[str, type] = {
 }
 """The commands and their schemas."""
 
-MOTIONS = (".bvh", ".c3d", ".csv", ".glb", ".mot", ".motion", ".npz", ".trc", ".yaml", ".yml")
+MOTIONS = (
+    *(".bvh", ".c3d", ".csv", ".glb", ".lafan1.bvh", ".lengths.csv", ".mot", ".motion", ".npz", ".trc"),
+    *(".yaml", ".yml"),
+)
 CALIBRATIONS = (".toml", ".calibration")
 FORMATS = tuple(ending[1:] for ending in MOTIONS if ending not in (".motion", ".npz", ".yaml", ".yml"))
 """The formats that `outputs.formats` may name."""

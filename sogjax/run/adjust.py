@@ -30,7 +30,7 @@ from sogjax.run.run_files import ACTOR, CONFIG, MOTION
 from sogjax.run.run_folder import run_folder
 from sogjax.run.runner import run_passes
 from sogjax.run.track import opened_clip, with_pictures
-from sogjax.run.write import check_pose2sim, export_endings
+from sogjax.run.write import check_formats, check_pose2sim, export_endings
 from sogjax.settings.compose import as_object, without_removed
 from sogjax.settings.run import AdjustConfig, TrackConfig
 
@@ -145,6 +145,7 @@ def adjust_to_folder(config: AdjustConfig) -> RunResult:
     motion = tracked.motion
     check_length(motion.num_frames)
     check_window(len(recording.rig), tracked.actor.num_blobs, motion.num_frames, config.window)
+    check_formats(outputs, [tracked.actor])
     if outputs.pose2sim:
         check_pose2sim(recording, (int(motion.frame[0]), int(motion.frame[-1])), [tracked.actor], config.overwrite)
     check_cameras(recording, motion, config.cameras, config.offsets)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.ndimage import binary_closing, binary_opening, label
+from scipy.ndimage import binary_closing, binary_opening
 
 from sogjax.io.export.bvh import Figure
 from sogjax.io.export.two_bones import middle_joint, shortest_turns
@@ -46,7 +46,7 @@ def standing_feet(figure: Figure, seconds: float) -> tuple[Figure, str]:
     The figure's legs are UpLeg, Leg, Foot and Toe of either side; `seconds` is the time from frame to frame.
     """
     corrected = replace(figure, rotations=figure.rotations.copy(), positions=figure.positions.copy())
-    found: list[tuple[int, Bool[np.ndarray, "frame"]]] = []
+    found: list[tuple[int, np.ndarray]] = []
     for side in ("Left", "Right"):
         leg = [figure.bones.names.index(side + name) for name in ("UpLeg", "Leg", "Foot", "Toe")]
         points = [_point(figure.positions[:, joint], seconds) for joint in leg[2:]]
@@ -65,8 +65,16 @@ def contacts(height: Float[np.ndarray, "frame"], speed: Float[np.ndarray, "frame
     Heights are metres above the floor, speeds metres a second.
     """
     begins = (height < BEGIN_HEIGHT) & (speed < BEGIN_SPEED)
-    parts, _ = label((height < END_HEIGHT) & (speed < END_SPEED))
-    return np.isin(parts, np.setdiff1d(parts[begins], 0))
+    rests = np.zeros_like(begins)
+    for run in _runs((height < END_HEIGHT) & (speed < END_SPEED)):
+        rests[run] = begins[run].any()
+    return rests
+
+
+def _runs(chosen: Bool[np.ndarray, "frame"]) -> list[Int[np.ndarray, "_run"]]:
+    """The numbers of frames that are chosen one after the other."""
+    frames = np.flatnonzero(chosen)
+    return [run for run in np.split(frames, np.flatnonzero(np.diff(frames) > 1) + 1) if len(run)]
 
 
 def _point(places: Float[np.ndarray, "frame 3"], seconds: float) -> _Point:
@@ -89,27 +97,26 @@ def _point(places: Float[np.ndarray, "frame 3"], seconds: float) -> _Point:
 
 def _held(
     places: Float[np.ndarray, "frame 3"], rests: Bool[np.ndarray, "frame"], shortest: int
-) -> list[Int[np.ndarray, "run"]]:
+) -> list[Int[np.ndarray, "_run"]]:
     """The frames of each contact, in their order: those that lie within a radius of where it mostly is.
 
     What is farther off, before and after, may be contacts of their own; a few frames lie between them.
     """
-    parts, number = label(rests)
-    runs: list[np.ndarray] = []
-    for run in (np.flatnonzero(parts == k + 1) for k in range(number)):
+    held: list[np.ndarray] = []
+    for run in _runs(rests):
         off = np.linalg.norm(places[run] - np.median(places[run], axis=0), axis=-1)
         far = np.flatnonzero(off > RADIUS)
         if not len(far):
-            runs += [run] if len(run) >= shortest else []
+            held += [run] if len(run) >= shortest else []
             continue
         middle = int(off.argmin())
         first = int(far[far < middle].max(initial=-1)) + 1
         end = int(far[far > middle].min(initial=len(run)))
         around = np.zeros_like(rests)
         around[run[: max(first - shortest, 0)]] = around[run[end + shortest :]] = True
-        others = _held(places, around, shortest)
-        runs += sorted([*others, *([run[first:end]] if end - first >= shortest else [])], key=lambda each: each[0])
-    return runs
+        held += _held(places, around, shortest)
+        held += [run[first:end]] if end - first >= shortest else []
+    return sorted(held, key=lambda run: int(run[0]))
 
 
 def _speed(places: Float[np.ndarray, "frame 3"], seconds: float) -> Float[np.ndarray, "frame"]:

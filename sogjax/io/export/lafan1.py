@@ -4,7 +4,6 @@ Centimetres, Y up, 22 joints by LAFAN1's names in its order. A bone's X points a
 backward (arms) or up (feet) where the body stands straight. Only the root has channels of position.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,20 +11,17 @@ import numpy as np
 from jaxtyping import Float
 
 from sogjax.errors import InputError
-from sogjax.io.export.bones import Bones, bone_frames, bones_of, frame_time, in_parents, world_turn
+from sogjax.io.export.bones import Bones, frame_time, in_parents
 from sogjax.io.export.bvh import Dialect, Figure, write_figure
 from sogjax.io.export.feet import standing_feet
-from sogjax.io.export.two_bones import middle_joint, shortest_turns
+from sogjax.io.export.lafan1_spine import FORWARD, HIPS, TRUNK, spine_frames
+from sogjax.io.export.named_bones import NamedBones, median_in
 from sogjax.io.motion_data import MotionData
 
 DIALECT = Dialect(order="ZYX", unit=100.0)
 SIDES = ("left", "right")
-_UP, _FORWARD = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
-_TRUNK = np.stack([_UP, _FORWARD, np.cross(_UP, _FORWARD)], axis=1)
 _MOST_CHANGE = 0.005
 """Metres that a bone's length may change and still be written as constant."""
-_BULGE = 0.02
-"""Metres: a spine bends backward where its own joints do not tell."""
 
 
 @dataclass(frozen=True)
@@ -87,125 +83,38 @@ def write_lafan1(path: Path, motion: MotionData, up: str = "z") -> str:
     return said
 
 
-def figure_of(path: Path, motion: MotionData, up: str) -> Figure:
-    """The motion by LAFAN1's joints, before anything is done to its feet.
+def figure_of(where: Path | str, motion: MotionData, up: str) -> Figure:
+    """The motion by LAFAN1's joints, before anything is done to its feet; `where` begins sentences about it.
 
     Raises:
         InputError: a body without one of them, or with bones whose lengths change.
     """
-    body = _Body(path, motion, up)
-    frames = {"Hips": (body.turns("root") @ _TRUNK, body.places("root"))}
-    frames |= _spine(path, body)
-    frames |= {name: (body.turns(name.lower()) @ _TRUNK, body.places(name.lower())) for name in ("Neck", "Head")}
+    body = NamedBones(where, motion, up)
+    frames = {"Hips": (body.turns(HIPS) @ TRUNK, body.places(HIPS))}
+    frames |= spine_frames(body)
+    frames |= {name: (body.turns(name.lower()) @ TRUNK, body.places(name.lower())) for name in ("Neck", "Head")}
     for joint in (*_LEGS, *_ARMS):
         frames[joint.name] = (body.turns(joint.frame) @ _axes(body, joint), body.places(joint.at))
     order = {name: index for index, name in enumerate(NAMES)}
     bones = Bones(NAMES, tuple(order[_PARENTS[name]] if name in _PARENTS else -1 for name in NAMES), ())
     rotations, positions = (np.stack([frames[name][k] for name in NAMES], axis=1) for k in (0, 1))
-    return Figure(bones, rotations, _constant(path, bones, rotations, positions), _ends(body, frames))
+    return Figure(bones, rotations, _constant(where, bones, rotations, positions), _ends(body, frames))
 
 
-class _Body:
-    """Bones and landmarks of a motion by name, in a world with y up."""
-
-    def __init__(self, path: Path, motion: MotionData, up: str) -> None:
-        self.path, self.motion, self.turn = path, motion, world_turn(up, "y")
-        self.bones = bones_of(motion)
-        self._rotations, self._positions = bone_frames(motion, self.bones, up, "y")
-
-    def bone(self, name: str) -> int:
-        """The index of a bone; `root` is the one that has none above it.
-
-        Raises:
-            InputError: there is none.
-        """
-        if name.startswith("above:"):
-            return self.bones.parents[self.bone(name.removeprefix("above:"))]
-        if name == "root" and self.bones.parents.count(-1) == 1:
-            return self.bones.parents.index(-1)
-        if name not in self.bones.names:
-            whose = f" of {self.motion.actor}" if self.motion.actor else ""
-            raise InputError(
-                f"{self.path}: the lafan1 dialect is that of a person, but the motion{whose} has no joint {name}; "
-                "leave dialect out"
-            )
-        return self.bones.names.index(name)
-
-    def turns(self, name: str) -> Float[np.ndarray, "frame 3 3"]:
-        return self._rotations[:, self.bone(name)]
-
-    def places(self, name: str) -> Float[np.ndarray, "frame 3"]:
-        if name != "root" and name not in self.bones.names and self.knows(name):
-            return self.motion.joint(name).astype(float) @ self.turn.T
-        return self._positions[:, self.bone(name)]
-
-    def knows(self, name: str) -> bool:
-        """Whether there is a bone or landmark of this name."""
-        landmarks = [] if self.motion.landmark_names is None else self.motion.landmark_names.tolist()
-        return name in self.bones.names or name in landmarks
-
-
-def _axes(body: _Body, joint: _Joint) -> Float[np.ndarray, "3 3"]:
+def _axes(body: NamedBones, joint: _Joint) -> Float[np.ndarray, "3 3"]:
     """A joint's own axes in those of the bone that it turns with."""
     toe = not joint.until
-    along = _FORWARD if toe else np.array([0.0, -1.0, 0.0])
+    along = FORWARD if toe else np.array([0.0, -1.0, 0.0])
     if joint.until and body.knows(joint.until):
-        along = _median_in(body.turns(joint.frame), body.places(joint.until) - body.places(joint.at))
+        along = median_in(body.turns(joint.frame), body.places(joint.until) - body.places(joint.at))
     x = along / np.linalg.norm(along)
     y = np.array(joint.beside) - np.dot(joint.beside, x) * x
     y = y / np.linalg.norm(y)
     return np.stack([x, y, np.cross(x, y)], axis=1)
 
 
-def _median_in(
-    rotations: Float[np.ndarray, "frame 3 3"], vectors: Float[np.ndarray, "frame 3"]
-) -> Float[np.ndarray, "3"]:
-    """The median of vectors in turning frames."""
-    return np.median(np.einsum("tji,tj->ti", rotations, vectors), axis=0)
-
-
-def _spine(path: Path, body: _Body) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Rotations and places of Spine, Spine1 and Spine2, of the body's own joints between hips and neck.
-
-    Spine2 is the bone that carries the neck. Of more than three, all between the first and the last become one joint,
-    which lies where two bones of constant length meet; where there are fewer, bones are divided.
-
-    Raises:
-        InputError: the neck hangs from the hips.
-    """
-    root, chain = body.bone("root"), [body.bone("above:neck")]
-    while chain[0] not in (root, -1):
-        chain.insert(0, body.bones.parents[chain[0]])
-    names = [body.bones.names[bone] for bone in chain[1:]]
-    if not names:
-        raise InputError(f"{path}: the lafan1 dialect has a spine, but the motion's neck hangs from its root")
-    turns, places = body.turns, body.places
-    if len(names) < 3:
-        return _divided(body, names)
-    first, middle, last = names[0], names[len(names) // 2], names[-1]
-    spans = [np.linalg.norm(places(b) - places(a), axis=-1).max() for a, b in ((first, middle), (middle, last))]
-    back = -_BULGE * turns(first) @ _FORWARD
-    meet = middle_joint(places(first), places(middle) + back, places(last), (float(spans[0]), float(spans[1])))
-    found = {"Spine2": (turns(last) @ _TRUNK, places(last))}
-    for name, bone, begin, end in (("Spine", first, places(first), meet), ("Spine1", middle, meet, places(last))):
-        straight = turns(bone) @ _median_in(turns(bone), end - begin)
-        found[name] = (shortest_turns(straight, end - begin) @ turns(bone) @ _TRUNK, begin)
-    return found
-
-
-def _divided(body: _Body, names: Sequence[str]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """The three where the body has one or two: the bone below the last of them is divided."""
-    last = names[-1]
-    below = names[0] if len(names) == 2 else "root"
-    lower, upper = body.places(below), body.places(last)
-    own = body.turns(below) @ _TRUNK
-    parts = {"Spine": 0.0, "Spine1": 1.0 / 2.0} if len(names) == 2 else {"Spine": 1.0 / 3.0, "Spine1": 2.0 / 3.0}
-    placed = {name: (own, (1.0 - part) * lower + part * upper) for name, part in parts.items()}
-    return placed | {"Spine2": (body.turns(last) @ _TRUNK, upper)}
-
-
 def _constant(
-    path: Path,
+    where: Path | str,
     bones: Bones,
     rotations: Float[np.ndarray, "frame bone 3 3"],
     positions: Float[np.ndarray, "frame bone 3"],
@@ -223,14 +132,14 @@ def _constant(
         offset = np.median(offsets[:, bone], axis=0)
         if np.abs(offsets[:, bone] - offset).max() > _MOST_CHANGE:
             raise InputError(
-                f"{path}: the lafan1 dialect has bones of constant length, but the one above {bones.names[bone]} "
+                f"{where}: the lafan1 dialect has bones of constant length, but the one above {bones.names[bone]} "
                 "changes its own; leave dialect out"
             )
         placed[:, bone] = placed[:, above] + rotations[:, above] @ offset
     return placed
 
 
-def _ends(body: _Body, frames: dict[str, tuple[np.ndarray, np.ndarray]]) -> Float[np.ndarray, "bone 3"]:
+def _ends(body: NamedBones, frames: dict[str, tuple[np.ndarray, np.ndarray]]) -> Float[np.ndarray, "bone 3"]:
     """Where head, hands and toes end, in their own frames; metres."""
     usual = {"Head": 0.15, "LeftToe": 0.05, "RightToe": 0.05}
     landmarks = {"Head": "head_top", "LeftHand": "left_hand", "RightHand": "right_hand"}
@@ -238,5 +147,5 @@ def _ends(body: _Body, frames: dict[str, tuple[np.ndarray, np.ndarray]]) -> Floa
     for name, landmark in landmarks.items():
         if body.knows(landmark):
             turns, places = frames[name]
-            ends[NAMES.index(name)] = _median_in(turns, body.places(landmark) - places)
+            ends[NAMES.index(name)] = median_in(turns, body.places(landmark) - places)
     return ends
