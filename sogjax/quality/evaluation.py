@@ -9,11 +9,10 @@ import numpy as np
 from jaxtyping import Int
 
 from sogjax.errors import InputError, counted
-from sogjax.io.export.angles import has_angles, joint_angles
 from sogjax.io.files import write_json
 from sogjax.io.ground_truth import GroundTruth
 from sogjax.io.motion import Motion
-from sogjax.quality.angle_errors import AngleError, angle_errors, angle_table, angles_dict
+from sogjax.quality.angle_errors import AngleError, angle_table, angles_dict
 from sogjax.quality.limb_warnings import DoubtfulLimb, doubtful_limbs
 from sogjax.quality.markers import MARKER_RULES, MarkerRule, PointErrors, common_frames, joint_errors, marker_errors
 from sogjax.quality.metrics import (
@@ -26,6 +25,7 @@ from sogjax.quality.metrics import (
     summarize,
 )
 from sogjax.quality.swaps import Swap, identity_swaps
+from sogjax.quality.true_angles import errors_of_angles
 
 MM = 1000.0
 TABLE_ROW = "{:<24}{:>8}{:>8}{:>8}{:>8}{:>8}{:>7}{:>7}"
@@ -204,18 +204,8 @@ def evaluate_motion(
         rule,
         by_rule,
         doubtful_limbs(motion),
-        _angles(motion, rows, truth, truth_rows),
+        errors_of_angles(motion, rows, truth, truth_rows),
     )
-
-
-def _angles(
-    motion: Motion, rows: Int[np.ndarray, "common"], truth: GroundTruth, truth_rows: Int[np.ndarray, "common"]
-) -> tuple[AngleError, ...]:
-    """Errors of joint angles; none where the truth has no angles, or the motion is that of another kind of body."""
-    if truth.angles is None or not has_angles(motion):
-        return ()
-    true = dict(zip(truth.angle_names, np.asarray(truth.angles, float)[truth_rows].T, strict=True))
-    return angle_errors(joint_angles(motion.of_rows(rows), motion.up), true)
 
 
 def evaluate_motions(

@@ -59,7 +59,7 @@ class TrackedMotion:
             InputError: files that are missing, unreadable, or of another recording or body.
         """
         path = _motion_file(Path(motion))
-        config = _config(CONFIG.of(path.parent))
+        config = kept_config(CONFIG.of(path.parent))
         file = _actor_file(path, config, actor)
         found = cls(path, load_motion(path), load_body(file), config, (path, file))
         check_recording(found.path, found.motion, recording)
@@ -78,7 +78,7 @@ def _motion_file(path: Path) -> Path:
     return file
 
 
-def _config(path: Path) -> TrackConfig:
+def kept_config(path: Path) -> TrackConfig:
     """The settings of the run beside a motion."""
     if not path.is_file():
         return TrackConfig()

@@ -13,9 +13,10 @@ from sogjax.io.motion import Motion
 from sogjax.io.reference.reference_motion import ReferenceMotion
 from sogjax.quality.angle_errors import AngleError, angle_errors, angle_table, angles_dict
 from sogjax.quality.evaluation import TABLE_ROW, points_dict, summary_row
+from sogjax.quality.line_angles import angles_between
 from sogjax.quality.markers import PointErrors
 from sogjax.quality.metrics import summarize
-from sogjax.quality.reference.angles import angles_between, same_way
+from sogjax.quality.reference.angles import same_way
 from sogjax.quality.reference.names import common_names, our_points
 from sogjax.quality.reference.places import calibrated_angles, placed_errors, point_errors
 from sogjax.quality.reference.times import at_times, check_time, common_rows, distances, found_offset, resampled
