@@ -1,5 +1,7 @@
 """Degrees by joint and plane over runs: what was put into a truth comes out, with joint angles and without."""
 
+from dataclasses import asdict, replace
+
 import numpy as np
 import pytest
 from body_cases import shipped
@@ -10,6 +12,10 @@ from sogjax.io.ground_truth import GroundTruth
 from sogjax.io.motion import motion_from_poses
 from sogjax.quality.evaluation import evaluate_motion
 from sogjax.study.degrees import RunAngles, angles_of_run, degrees_tables, truths_of
+from sogjax.study.experiment import Experiment, ExperimentConfig, RowConfig
+from sogjax.study.record import RunRecord
+from sogjax.study.summary import summarized
+from sogjax.study.table import degrees_table
 
 DEGREES = 0.05
 
@@ -76,3 +82,18 @@ def test_what_is_no_run_is_refused(tmp_path):
         angles_of_run(tmp_path)
     with pytest.raises(InputError, match="1 for 2 runs"):
         truths_of(["a", "b"], ["c"])
+
+
+def test_the_reports_table_has_a_row_for_each_joint_and_plane(squatting):
+    """Two recordings of a row are averaged; what has no joint angles is left out."""
+    motion, true = squatting
+    angles = evaluate_motion(motion, truth_of(true, ["r_hip", "r_knee", "r_ankle"], True)).angles
+    lines = evaluate_motion(motion, truth_of(true, ["r_hip", "r_knee", "r_ankle"], False)).angles
+    twice = [replace(error, mean_abs_centred=4.0) if error.joint == "knee" else error for error in angles]
+    record = lambda errors: RunRecord({}, "here", frame=[0], error_mm=[1.0], angles=[asdict(each) for each in errors])
+    rows = {"12": {"walk": record(angles), "run": record(twice)}, "4": {"walk": record(lines)}}
+    config = ExperimentConfig(title="T", question="Q?", axis="cameras", reference="12", rows={"12": RowConfig()})
+    found = summarized(rows, "12", dict.fromkeys(rows, ("", None)))
+    table = degrees_table(Experiment("small", config), found).splitlines()
+    assert table[0].endswith("| 12 |")
+    assert "| knee sagittal | 2.0 (1.00) |" in table

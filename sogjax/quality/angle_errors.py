@@ -11,6 +11,8 @@ NAN = float("nan")
 LEAST_RANGE = 5.0
 """Degrees: of an angle that hardly moves a ratio of ranges, and how alike two curves are, say nothing."""
 SAGITTAL, FRONTAL, TRANSVERSE = "sagittal", "frontal", "transverse"
+BETWEEN_BONES = "between bones"
+"""Stands for the plane where an angle is that between lines that join joints."""
 PLANES: dict[str, tuple[str, str]] = {
     **{"hip_flexion": ("hip", SAGITTAL), "hip_adduction": ("hip", FRONTAL), "hip_rotation": ("hip", TRANSVERSE)},
     "knee_angle": ("knee", SAGITTAL),
@@ -63,7 +65,7 @@ def angle_error(name: str, ours: Float[np.ndarray, "frame"], true: Float[np.ndar
     apart = (ours - true + 180.0) % 360.0 - 180.0
     offset = float(apart.mean())
     centred = np.abs(apart - offset)
-    joint, plane = PLANES.get(base_name(name), (base_name(name), "between bones"))
+    joint, plane = PLANES.get(base_name(name), (base_name(name), BETWEEN_BONES))
     moves = np.ptp(true) >= LEAST_RANGE
     return AngleError(
         name=name,

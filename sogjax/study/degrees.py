@@ -10,7 +10,7 @@ from sogjax.errors import InputError
 from sogjax.io.frame_motions import load_motions
 from sogjax.io.ground_truth import load_ground_truth
 from sogjax.io.recording_files import GROUND_TRUTH
-from sogjax.quality.angle_errors import AngleError, angle_table
+from sogjax.quality.angle_errors import BETWEEN_BONES, AngleError, angle_table
 from sogjax.quality.evaluation import evaluate_motions
 from sogjax.run.adjust import kept_config
 from sogjax.run.recordings import opened
@@ -30,7 +30,7 @@ class RunAngles:
     @property
     def by_lines(self) -> bool:
         """Whether they are of angles between the lines that join the joints, as the truth has no joint angles."""
-        return any(error.plane == "between bones" for error in self.errors)
+        return any(error.plane == BETWEEN_BONES for error in self.errors)
 
 
 def angles_of_run(run: Path, truth: Path | None = None) -> RunAngles:
