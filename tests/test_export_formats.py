@@ -273,7 +273,9 @@ def test_lengths_of_segments_lie_beside_a_trc(capsys, tmp_path):
     assert found["shank", "RKnee"] == (0.41, 0.0)
     assert found["pelvis", "RHip"] == (0.176, 0.0)
     assert found["torso", "LShoulder"][1] > 0.01
+    done(capsys, "export", source, f"to={tmp_path / 'walk.mot'}")  # whose lengths are the same
     (tmp_path / "walk.trc").unlink()
+    (tmp_path / "walk.lengths.csv").write_text("another's\n")
     assert "walk.lengths.csv: already exists" in refused(capsys, "export", source, f"to={tmp_path / 'walk.trc'}")
     assert not (tmp_path / "walk.trc").exists()
 

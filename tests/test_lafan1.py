@@ -17,6 +17,8 @@ from sogjax.io.export.two_bones import middle_joint, shortest_turns
 from sogjax.io.export.write import export_motion
 from sogjax.io.motion import motion_from_poses
 from sogjax.io.motion_data import save_motion
+from sogjax.io.reference.load import load_reference
+from sogjax.quality.reference.evaluation import evaluate_against_reference
 from sogjax.run.run_files import MOTIONS
 from sogjax.run.write import check_formats
 from sogjax.settings.run import OutputsConfig
@@ -221,3 +223,13 @@ def test_the_command_and_the_names_of_a_runs_files(capsys, body, tmp_path):
     kind = MOTIONS[".lafan1.bvh"]
     assert kind.of(tmp_path, "anna", 2).name == "motion_anna.lafan1.bvh"
     assert kind.matches("motion_anna.lafan1.bvh")
+
+
+def test_the_angles_of_the_file_are_those_of_the_motion(dancing, tmp_path):
+    """Read as another system's motion: its bones' axes differ, its angles do not."""
+    write_lafan1(tmp_path / "a.bvh", dancing)
+    found = evaluate_against_reference(dancing, load_reference(tmp_path / "a.bvh"), offset=0.0)
+    assert {"knee_angle_l", "hip_flexion_r", "arm_add_l", "lumbar_bending"} <= {each.name for each in found.angles}
+    assert max(each.mean_abs for each in found.angles) < 0.2
+    assert np.nanmax(found.joints.errors) < METRES
+    assert any("Spine1" in note for note in found.notes)

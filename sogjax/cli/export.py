@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import jax.numpy as jnp
 
@@ -92,7 +93,10 @@ def _export_one(config: ExportConfig, source: Path, out: Path) -> None:
     if config.angles and out.suffix.lower() not in (".csv", ".mot"):
         raise InputError("angles=true: only .csv and .mot hold angles; leave it out, or write to=NAME.csv")
     motion = _read_motion(config, source)
-    beside = [free_path("to", out.with_suffix(each), config.overwrite) for each in endings_beside(out.suffix, motion)]
+    beside = [out.with_suffix(ending) for ending in endings_beside(out.suffix.lower(), motion)]
+    beside = [path for path in beside if not _is_there(motion, path)]
+    for path in beside:
+        free_path("to", path, config.overwrite)
     if write_points is not None:
         write_points(out, motion, config.up or motion.up, config.markers)
     elif config.angles and out.suffix.lower() == ".csv":
@@ -106,6 +110,15 @@ def _export_one(config: ExportConfig, source: Path, out: Path) -> None:
     for path in beside:
         export_motion(motion, path)
         print(path)
+
+
+def _is_there(motion: Motion, path: Path) -> bool:
+    """Whether a file holds already what would be written."""
+    if not path.is_file():
+        return False
+    with TemporaryDirectory() as folder:
+        export_motion(motion, Path(folder) / path.name)
+        return (Path(folder) / path.name).read_bytes() == path.read_bytes()
 
 
 def _read_motion(config: ExportConfig, path: Path) -> Motion:

@@ -10,6 +10,8 @@ _SIDES_BONES = {
     **{"UpLeg": ("hip", "thigh"), "Leg": ("knee", "shank"), "Foot": ("ankle", "foot")},
     **{"Arm": ("shoulder", "upper_arm"), "ForeArm": ("elbow", "forearm"), "Hand": ("wrist", "hand")},
 }
+_SPINE = ("Spine", "Spine1", "Spine2", "Spine3")
+"""Links of other skeletons' spines, which begin elsewhere than ours."""
 _BONES = {"Hips": ("pelvis", "pelvis"), "Spine2": ("", "chest"), "Neck": ("neck", ""), "Head": ("head", "head")} | {
     f"{side.title()}{name}": (f"{side}_{joint}", f"{side}_{segment}")
     for side in SIDES
@@ -33,8 +35,8 @@ def point_named(name: str, of_bones: bool) -> str:
     """
     plain = name.rsplit(":", 1)[-1].strip()
     known = {bone: point for bone, (point, _) in _BONES.items() if point} | _TOES if of_bones else _MARKERS
-    if plain in known:
-        return known[plain]
+    if plain in known or plain in _SPINE:
+        return known.get(plain, plain)
     lower = plain.lower().replace(" ", "_")
     return {"l_": "left_", "r_": "right_"}.get(lower[:2], lower[:2]) + lower[2:]
 
