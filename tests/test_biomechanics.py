@@ -6,9 +6,10 @@ import pytest
 from body_cases import shipped
 from command_line import done, refused
 from motion_cases import walking_motion
+from scipy.spatial.transform import Rotation
 
 from sogjax.errors import InputError
-from sogjax.io.export.angles import joint_angles
+from sogjax.io.export.angles import joint_angles, segment_angles
 from sogjax.io.export.points import marker_points
 from sogjax.io.motion import motion_from_poses
 from sogjax.io.motion_data import save_motion
@@ -110,6 +111,19 @@ def test_an_arm_that_circles_comes_back_to_its_angles(body):
         assert angles[name][-1] == pytest.approx(angles[name][0], abs=DEGREES)
         assert np.abs(angles[name]).max() <= 180.0
     assert abs(angles["pelvis_rotation"][-1] - angles["pelvis_rotation"][0]) == pytest.approx(720.0, abs=1.0)
+
+
+def test_an_arm_swung_round_twice_has_turned_by_720_degrees():
+    """By hand: two turns about Z (to the right), after which the arm is held 40 degrees off and 20 turned."""
+    flexed = np.linspace(0.0, 720.0, 61)
+    fixed = np.tile([40.0, 20.0], (61, 1))
+    in_opensim = Rotation.from_euler("ZXY", np.column_stack([flexed, fixed]), degrees=True).as_matrix()
+    body_from_opensim = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # forward, left, up
+    arm = body_from_opensim @ in_opensim @ body_from_opensim.T
+    angles = segment_angles({"chest": np.tile(np.eye(3), (61, 1, 1)), "right_upper_arm": arm}, "z")
+    whole_turns = 360.0 * np.round((angles["arm_flex_r"] - flexed).mean() / 360.0)
+    np.testing.assert_allclose(angles["arm_flex_r"] - whole_turns, flexed, atol=DEGREES)
+    np.testing.assert_allclose(np.stack([angles["arm_add_r"], angles["arm_rot_r"]], axis=1), fixed, atol=DEGREES)
 
 
 def test_angles_as_csv_and_what_has_none(capsys, tmp_path, body):

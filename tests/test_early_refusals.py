@@ -12,7 +12,7 @@ from sogjax.cli.schemas import CALIBRATIONS, FORMATS, MOTIONS
 from sogjax.cli.words import check_endings, composed
 from sogjax.errors import InputError
 from sogjax.io.export.write import WRITERS
-from sogjax.run.adjust import _config
+from sogjax.run.adjust import kept_config
 from sogjax.run.initial_pose import NAMES
 from sogjax.settings.compose import track_config
 from sogjax.settings.option import help_lines, telling_settings
@@ -77,7 +77,7 @@ def test_a_setting_that_there_was_once_is_refused_with_the_reason(capsys, key):
 def test_the_configuration_of_an_older_run_is_read_without_what_is_no_setting_any_more(tmp_path):
     old = {"solver": {"method": "lbfgs", "grow": 1.2}, "tracking": {"repair": False}, "outputs": {"worst": True}}
     (tmp_path / "config.yaml").write_text(yaml.safe_dump({"recording": "r", "stop": 9} | old))
-    assert _config(tmp_path / "config.yaml") == track_config(recording="r", stop=9, solver={"method": "lbfgs"})
+    assert kept_config(tmp_path / "config.yaml") == track_config(recording="r", stop=9, solver={"method": "lbfgs"})
 
 
 def test_the_help_tells_the_names_that_an_initial_pose_can_have():

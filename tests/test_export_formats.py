@@ -17,7 +17,7 @@ from tiny_body import make_body, random_poses
 from sogjax.errors import InputError
 from sogjax.io.export.bones import bones_of
 from sogjax.io.export.points import OPENSIM_NAMES
-from sogjax.io.export.write import export_motion
+from sogjax.io.export.write import WRITERS, export_motion
 from sogjax.io.motion import load_motion, motion_from_poses
 from sogjax.io.motion_data import per_frame_fields, save_motion
 
@@ -255,3 +255,56 @@ def test_bones_are_listed_after_those_above_them(motion):
     bones = bones_of(motion)
     assert all(above < bone for bone, above in enumerate(bones.parents))
     assert bones.names[0] == "root"
+
+
+def test_lengths_of_segments_lie_beside_a_trc(capsys, tmp_path):
+    """A thigh of 0.43 m in the body file; the trunk's length changes as it bends."""
+    body = shipped("human")
+    pose = np.zeros((3, body.skeleton.num_dofs), np.float32)
+    pose[1, body.skeleton.dof_names.index("spine_bend")] = 0.8
+    pose[:, body.skeleton.dof_names.index("left_knee")] = [0.0, 0.5, 1.0]
+    save_motion(tmp_path / "motion.npz", motion_from_poses(body, pose, 25.0))
+    source = f"motion={tmp_path / 'motion.npz'}"
+    out, _ = done(capsys, "export", source, f"to={tmp_path / 'walk.trc'}")
+    assert out.splitlines() == [str(tmp_path / "walk.lengths.csv"), str(tmp_path / "walk.trc")]
+    rows = list(csv.DictReader((tmp_path / "walk.lengths.csv").read_text().splitlines()[1:]))
+    found = {(row["measurement"], row["from"]): (float(row["length"]), float(row["range"])) for row in rows}
+    assert found["thigh", "LHip"] == (0.43, 0.0)
+    assert found["shank", "RKnee"] == (0.41, 0.0)
+    assert found["pelvis", "RHip"] == (0.176, 0.0)
+    assert found["torso", "LShoulder"][1] > 0.01
+    done(capsys, "export", source, f"to={tmp_path / 'walk.mot'}")  # whose lengths are the same
+    (tmp_path / "walk.trc").unlink()
+    (tmp_path / "walk.lengths.csv").write_text("another's\n")
+    assert "walk.lengths.csv: already exists" in refused(capsys, "export", source, f"to={tmp_path / 'walk.trc'}")
+    assert not (tmp_path / "walk.trc").exists()
+
+
+def test_a_table_marks_what_is_hidden(motion, tmp_path):
+    """Each limb's confidence is no more than the part of it that is seen; unknown is none."""
+    count = motion.num_frames
+    doubt, hidden = np.full((count, 2), 0.1), np.zeros((count, 2))
+    hidden[2, 0], doubt[3, 1] = 1.0, np.nan
+    judged = dataclasses.replace(
+        motion, limb_names=np.array(["left arm", "head"]), limb_doubt=doubt, limb_hidden=hidden
+    )
+    export_motion(judged, tmp_path / "a.csv")
+    rows = list(csv.DictReader((tmp_path / "a.csv").read_text().splitlines()[1:]))
+    read = np.array([[float(row[f"{limb}.confidence"]) for limb in ("left arm", "head")] for row in rows])
+    expected = np.full((count, 2), 0.9)
+    expected[2, 0] = expected[3, 1] = 0.0
+    np.testing.assert_allclose(read, expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("ending", sorted({*WRITERS} - {".npz"}))
+def test_no_file_holds_what_is_not_a_number(tmp_path, ending):
+    body = shipped("human")
+    motion = motion_from_poses(body, np.zeros((3, body.skeleton.num_dofs), np.float32), 25.0)
+    path = tmp_path / f"a{ending}"
+    export_motion(motion, path)
+    assert b"nan" not in path.read_bytes().lower() or ending in (".glb", ".c3d")
+    path.unlink()
+    motion.world_from_joint[1] = np.nan
+    with pytest.raises(InputError, match="not finite in frame 1"):
+        export_motion(motion, path)
+    assert not path.exists()

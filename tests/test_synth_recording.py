@@ -148,6 +148,19 @@ def test_the_ground_truth_names_markers_and_landmarks(folder):
     assert 0.015 < errors.std() < 0.035
 
 
+def test_true_angles_are_those_of_the_true_joints(folder):
+    """The knee's angle is that between thigh and shank, told by the places of hip, knee and ankle alone."""
+    truth = load_ground_truth(folder / "ground_truth.npz")
+    for side in ("left", "right"):
+        hip, knee, ankle = (
+            truth.joints[:, truth.joint_names.index(f"{side}_{name}")] for name in ("hip", "knee", "ankle")
+        )
+        thigh, shank = knee - hip, ankle - knee
+        cosine = (thigh * shank).sum(-1) / np.linalg.norm(thigh, axis=-1) / np.linalg.norm(shank, axis=-1)
+        bent = truth.angles[:, truth.angle_names.index(f"knee_angle_{side[0]}")]
+        np.testing.assert_allclose(np.abs(bent), np.degrees(np.arccos(cosine)), atol=1.5)
+
+
 @pytest.mark.slow
 def test_the_same_settings_make_the_same_files_with_any_number_of_processes(folder, tmp_path):
     again = render_recording(SMALL, tmp_path / "again", workers=2)

@@ -283,7 +283,7 @@ def test_a_body_to_start_from_with_something_wrong(capsys, recording, tmp_path):
     [
         ("solver.method=foo", ("solver.method=foo", "conditioned_ascent", "bfgs")),
         ("solver=foo", ("solver=foo", "lbfgs")),
-        ("outputs.formats=[trc,fbx]", ("outputs.formats=fbx", "bvh, c3d, csv, glb, mot, trc")),
+        ("outputs.formats=[trc,fbx]", ("outputs.formats=fbx", "bvh, c3d, csv, glb, lafan1.bvh, lengths.csv, mot, trc")),
         ("color.space=foo", ("color.space=foo", "hsv_cylinder")),
         ("color.radius=0", ("color.radius=0",)),
         ("energy.pairs=foo", ("energy.pairs=foo", "dense", "sparse")),

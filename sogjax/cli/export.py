@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import jax.numpy as jnp
 
@@ -12,7 +13,7 @@ from sogjax.io.calibration.load import load_calibration, save_calibration
 from sogjax.io.calibration.rig import METRES, CameraRig
 from sogjax.io.export.angles import write_angles_csv
 from sogjax.io.export.points import write_c3d, write_trc
-from sogjax.io.export.write import export_motion, write_initial_pose
+from sogjax.io.export.write import DIALECTS, endings_beside, export_motion, write_initial_pose
 from sogjax.io.frame_motions import load_one_motion
 from sogjax.io.motion import Motion
 from sogjax.io.motion_data import DEFAULT_UP
@@ -32,6 +33,8 @@ def run(config: ExportConfig) -> Path:
         InputError: a motion or calibration that cannot be opened, an unknown ending, or a file that already exists.
     """
     out = free_path("to", config.to, config.overwrite)
+    if config.dialect is not None and (config.dialect not in DIALECTS or out.suffix.lower() != ".bvh"):
+        raise InputError(f"dialect={config.dialect}: a .bvh may be of {', '.join(DIALECTS)}; leave it out of others")
     if (config.motion is None) == (config.calibration is None):
         raise InputError("export needs motion=... or calibration=..., one of them (see sogjax export --help)")
     if config.calibration is not None:
@@ -90,6 +93,10 @@ def _export_one(config: ExportConfig, source: Path, out: Path) -> None:
     if config.angles and out.suffix.lower() not in (".csv", ".mot"):
         raise InputError("angles=true: only .csv and .mot hold angles; leave it out, or write to=NAME.csv")
     motion = _read_motion(config, source)
+    beside = [out.with_suffix(ending) for ending in endings_beside(out.suffix.lower(), motion)]
+    beside = [path for path in beside if not _is_there(motion, path)]
+    for path in beside:
+        free_path("to", path, config.overwrite)
     if write_points is not None:
         write_points(out, motion, config.up or motion.up, config.markers)
     elif config.angles and out.suffix.lower() == ".csv":
@@ -97,7 +104,21 @@ def _export_one(config: ExportConfig, source: Path, out: Path) -> None:
     elif out.suffix.lower() == ".motion":
         write_skeletool_motion(out, motion, _actor(config, out))
     else:
-        export_motion(motion, out, config.up)
+        said = export_motion(motion, out, config.up, config.dialect)
+        if said is not None:
+            print(said)
+    for path in beside:
+        export_motion(motion, path)
+        print(path)
+
+
+def _is_there(motion: Motion, path: Path) -> bool:
+    """Whether a file holds already what would be written."""
+    if not path.is_file():
+        return False
+    with TemporaryDirectory() as folder:
+        export_motion(motion, Path(folder) / path.name)
+        return (Path(folder) / path.name).read_bytes() == path.read_bytes()
 
 
 def _read_motion(config: ExportConfig, path: Path) -> Motion:

@@ -89,11 +89,17 @@ class DemoConfig:
 
 @dataclass
 class EvaluateConfig:
-    """Compare a motion with ground truth (Section 6)."""
+    """Compare a motion with ground truth (Section 6), or with another system's motion."""
 
     motion: Any = option(REQUIRED, "motion.npz, or a list of them with several actors")
-    truth: str = option(REQUIRED, "ground_truth.npz, or the folder of a recording that has one")
+    truth: str = option(
+        REQUIRED,
+        "ground_truth.npz, or the folder of a recording that has one; or another system's .mot .sto .trc .c3d .bvh",
+    )
     out: str | None = option(None, "metrics.json to write; null: only print")
+    offset: float | None = option(
+        None, "seconds to add to the times of another system; null: found by cross-correlation"
+    )
     markers: str = option(
         "scaled",
         "markers go with the closest blob's joint; scaled: distances in the blob's sigmas | closest: as in Section 6",
@@ -135,6 +141,9 @@ class ExportConfig:
         "points of a .trc or .c3d; null: joint centres, toes, heels, hands, head top | all: every bone, too | "
         "a keypoint scheme by name or file: HALPE_26 for Pose2Sim's next steps",
     )
+    dialect: str | None = option(
+        None, "of a .bvh: null, the body's own joints in metres | lafan1, for robots: 22 joints by LAFAN1's names in cm"
+    )
     angles: bool = option(False, "a .csv holds joint angles in degrees instead of positions, as a .mot always does")
     overwrite: bool = option(False, OVERWRITE)
 
@@ -164,7 +173,10 @@ SCHEMAS: dict[str, type] = {
 }
 """The commands and their schemas."""
 
-MOTIONS = (".bvh", ".c3d", ".csv", ".glb", ".mot", ".motion", ".npz", ".trc", ".yaml", ".yml")
+MOTIONS = (
+    *(".bvh", ".c3d", ".csv", ".glb", ".lafan1.bvh", ".lengths.csv", ".mot", ".motion", ".npz", ".trc"),
+    *(".yaml", ".yml"),
+)
 CALIBRATIONS = (".toml", ".calibration")
 FORMATS = tuple(ending[1:] for ending in MOTIONS if ending not in (".motion", ".npz", ".yaml", ".yml"))
 """The formats that `outputs.formats` may name."""

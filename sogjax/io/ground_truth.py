@@ -1,4 +1,4 @@
-"""Ground truth of a recording: markers and joints in the calibration's world."""
+"""Ground truth of a recording: markers and joints in the calibration's world, and joint angles."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +22,9 @@ class GroundTruth:
     marker_names: tuple[str, ...] = ()
     joints: Float[np.ndarray, "frame joint 3"] | None = None
     joint_names: tuple[str, ...] = ()
+    angles: Float[np.ndarray, "frame angle"] | None = None
+    """Degrees, by the names and conventions of `sogjax.io.export.angles`; NaN where one is not known."""
+    angle_names: tuple[str, ...] = ()
 
     @property
     def num_frames(self) -> int:
@@ -31,7 +34,7 @@ class GroundTruth:
     @property
     def subjects(self) -> tuple[str, ...]:
         """The subjects that the names are prefixed with, sorted; empty where there is only one."""
-        names = (*self.marker_names, *self.joint_names)
+        names = (*self.marker_names, *self.joint_names, *self.angle_names)
         return tuple(sorted({name.split("/", 1)[0] for name in names if "/" in name}))
 
     def subject(self, name: str) -> "GroundTruth":
@@ -42,10 +45,11 @@ class GroundTruth:
         """
         markers, marker_names = _select(self.markers, self.marker_names, f"{name}/")
         joints, joint_names = _select(self.joints, self.joint_names, f"{name}/")
+        angles, angle_names = _select(self.angles, self.angle_names, f"{name}/")
         if not marker_names and not joint_names:
             known = ", ".join(self.subjects) or "none, the names carry no prefix"
             raise InputError(f"the ground truth has no subject {name!r}; its subjects are: {known}")
-        return GroundTruth(self.fps, markers, marker_names, joints, joint_names)
+        return GroundTruth(self.fps, markers, marker_names, joints, joint_names, angles, angle_names)
 
 
 def load_ground_truth(path: Path) -> GroundTruth:
@@ -67,7 +71,13 @@ def load_ground_truth(path: Path) -> GroundTruth:
     if markers is not None and joints is not None and len(markers) != len(joints):
         counts = f"'markers' has {counted(len(markers), 'frame')} and 'joints' {len(joints)}"
         raise InputError(f"{path}: {counts}; make them equal")
-    return GroundTruth(fps, markers, marker_names, joints, joint_names)
+    angles, angle_names = _points(path, arrays, "angles", "angle_names", ())
+    points = next(each for each in (markers, joints) if each is not None)
+    if angles is not None and len(angles) != len(points):
+        raise InputError(
+            f"{path}: 'angles' has {counted(len(angles), 'frame')} and the points {len(points)}; make them equal"
+        )
+    return GroundTruth(fps, markers, marker_names, joints, joint_names, angles, angle_names)
 
 
 def save_ground_truth(path: Path, truth: GroundTruth) -> None:
@@ -77,27 +87,29 @@ def save_ground_truth(path: Path, truth: GroundTruth) -> None:
         arrays |= {"markers": truth.markers, "marker_names": np.array(truth.marker_names, str)}
     if truth.joints is not None:
         arrays |= {"joints": truth.joints, "joint_names": np.array(truth.joint_names, str)}
+    if truth.angles is not None:
+        arrays |= {"angles": truth.angles, "angle_names": np.array(truth.angle_names, str)}
     save_npz(path, arrays)
 
 
 def _points(
-    path: Path, arrays: dict[str, np.ndarray], key: str, names_key: str
-) -> tuple[Float[np.ndarray, "frame point 3"] | None, tuple[str, ...]]:
+    path: Path, arrays: dict[str, np.ndarray], key: str, names_key: str, each: tuple[int, ...] = (3,)
+) -> tuple[Float[np.ndarray, "frame point *each"] | None, tuple[str, ...]]:
     if key not in arrays:
         return None, ()
-    points = float_array(path, arrays, key, (None, None, 3))
+    points = float_array(path, arrays, key, (None, None, *each))
     names = tuple(text_array(path, arrays, names_key, (points.shape[1],)).tolist())
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
-        raise InputError(f"{path}: {names_key!r} holds {twice!r} twice; give every point its own name")
+        raise InputError(f"{path}: {names_key!r} holds {twice!r} twice; give each its own name")
     if np.isinf(points).any():
-        raise InputError(f"{path}: {key!r} holds infinite numbers; write NaN where a point is not known")
+        raise InputError(f"{path}: {key!r} holds infinite numbers; write NaN where one is not known")
     return points, names
 
 
 def _select(
-    points: Float[np.ndarray, "frame point 3"] | None, names: tuple[str, ...], prefix: str
-) -> tuple[Float[np.ndarray, "frame chosen 3"] | None, tuple[str, ...]]:
+    points: Float[np.ndarray, "frame point *each"] | None, names: tuple[str, ...], prefix: str
+) -> tuple[Float[np.ndarray, "frame chosen *each"] | None, tuple[str, ...]]:
     chosen = [index for index, name in enumerate(names) if name.startswith(prefix)]
     if points is None or not chosen:
         return None, ()

@@ -12,6 +12,7 @@ from sogjax.errors import InputError, counted
 from sogjax.io.files import write_json
 from sogjax.io.ground_truth import GroundTruth
 from sogjax.io.motion import Motion
+from sogjax.quality.angle_errors import AngleError, angle_table, angles_dict
 from sogjax.quality.limb_warnings import DoubtfulLimb, doubtful_limbs
 from sogjax.quality.markers import MARKER_RULES, MarkerRule, PointErrors, common_frames, joint_errors, marker_errors
 from sogjax.quality.metrics import (
@@ -24,6 +25,7 @@ from sogjax.quality.metrics import (
     summarize,
 )
 from sogjax.quality.swaps import Swap, identity_swaps
+from sogjax.quality.true_angles import errors_of_angles
 
 MM = 1000.0
 TABLE_ROW = "{:<24}{:>8}{:>8}{:>8}{:>8}{:>8}{:>7}{:>7}"
@@ -46,6 +48,8 @@ class Evaluation:
     """The markers attached by either rule; empty where the truth has none."""
     doubtful: tuple[DoubtfulLimb, ...] = ()
     """What tracking itself doubted, without knowing the truth."""
+    angles: tuple[AngleError, ...] = ()
+    """Joint angles, where the truth has them and the motion those joints."""
 
     def __str__(self) -> str:
         return self.table(details=False)
@@ -74,6 +78,7 @@ class Evaluation:
             "markers": points_dict(self.markers),
             "markers_by_rule": {rule: rule_dict([points]) for rule, points in self.markers_by_rule.items()},
             "joints": points_dict(self.joints),
+            "angles": angles_dict(self.angles) if self.angles else None,
             "lost": [in_mm(asdict(point), "mean") for point in self.lost],
             "doubtful": [asdict(limb) for limb in self.doubtful],
         }
@@ -98,6 +103,7 @@ class Evaluation:
         lines += [
             f"lost: {p.name} in frames {p.first_frame} to {p.last_frame}, {MM * p.mean:.0f} mm" for p in self.lost
         ]
+        lines += angle_table(self.angles) if details else []
         return "\n".join(lines)
 
     def _about_markers(self) -> list[str]:
@@ -177,7 +183,7 @@ def evaluate_motion(
     Raises:
         InputError: nothing can be compared.
     """
-    rows, _ = common_frames(motion, truth)
+    rows, truth_rows = common_frames(motion, truth)
     frames = np.asarray(motion.frame, int)[rows]
     by_rule = {each: found for each in MARKER_RULES if (found := marker_errors(motion, truth, each)) is not None}
     markers = by_rule.get(rule)
@@ -189,7 +195,17 @@ def evaluate_motion(
         )
     points = markers or joints
     lost = lost_points(points.errors, points.names, frames) if points else ()
-    return Evaluation(name, frames, markers, joints, lost, rule, by_rule, doubtful_limbs(motion))
+    return Evaluation(
+        name,
+        frames,
+        markers,
+        joints,
+        lost,
+        rule,
+        by_rule,
+        doubtful_limbs(motion),
+        errors_of_angles(motion, rows, truth, truth_rows),
+    )
 
 
 def evaluate_motions(

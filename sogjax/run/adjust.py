@@ -30,7 +30,7 @@ from sogjax.run.run_files import ACTOR, CONFIG, MOTION
 from sogjax.run.run_folder import run_folder
 from sogjax.run.runner import run_passes
 from sogjax.run.track import opened_clip, with_pictures
-from sogjax.run.write import check_pose2sim, export_endings
+from sogjax.run.write import check_formats, check_pose2sim, export_endings
 from sogjax.settings.compose import as_object, without_removed
 from sogjax.settings.run import AdjustConfig, TrackConfig
 
@@ -59,7 +59,7 @@ class TrackedMotion:
             InputError: files that are missing, unreadable, or of another recording or body.
         """
         path = _motion_file(Path(motion))
-        config = _config(CONFIG.of(path.parent))
+        config = kept_config(CONFIG.of(path.parent))
         file = _actor_file(path, config, actor)
         found = cls(path, load_motion(path), load_body(file), config, (path, file))
         check_recording(found.path, found.motion, recording)
@@ -78,7 +78,7 @@ def _motion_file(path: Path) -> Path:
     return file
 
 
-def _config(path: Path) -> TrackConfig:
+def kept_config(path: Path) -> TrackConfig:
     """The settings of the run beside a motion."""
     if not path.is_file():
         return TrackConfig()
@@ -145,6 +145,7 @@ def adjust_to_folder(config: AdjustConfig) -> RunResult:
     motion = tracked.motion
     check_length(motion.num_frames)
     check_window(len(recording.rig), tracked.actor.num_blobs, motion.num_frames, config.window)
+    check_formats(outputs, [tracked.actor])
     if outputs.pose2sim:
         check_pose2sim(recording, (int(motion.frame[0]), int(motion.frame[-1])), [tracked.actor], config.overwrite)
     check_cameras(recording, motion, config.cameras, config.offsets)

@@ -35,7 +35,7 @@ from sogjax.run.result_streams import ResultStreams
 from sogjax.run.run import Run
 from sogjax.run.setup import compile_beforehand
 from sogjax.run.terminal import say
-from sogjax.run.write import check_pose2sim, write_results
+from sogjax.run.write import check_formats, check_pose2sim, write_results
 
 
 @dataclass(frozen=True)
@@ -66,6 +66,7 @@ def _initial_pose(run: Run) -> InitialPose:
 
     What the actors do not lend themselves to is refused before.
     """
+    check_formats(run.config.outputs, run.actors.bodies)
     if run.config.outputs.pose2sim:
         numbers = run.clip.numbers
         check_pose2sim(run.clip.recording, (numbers[0], numbers[-1]), run.actors.bodies, run.config.overwrite)

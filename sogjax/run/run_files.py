@@ -26,13 +26,19 @@ class RunFile:
 
     def of(self, folder: Path, actor: str = "", num_actors: int = 1) -> Path:
         """Its path in a folder: `motion.npz`, or with several actors `motion_NAME.npz`."""
-        stem, ending = Path(self.name).stem, Path(self.name).suffix
+        stem, ending = self._parts
         return folder / (f"{stem}_{actor}{ending}" if self.of_actors and num_actors > 1 else self.name)
 
     def matches(self, name: str) -> bool:
         """Whether a file of this name is one, of whatever actor."""
-        stem, ending = Path(self.name).stem, Path(self.name).suffix
+        stem, ending = self._parts
         return name == self.name or (self.of_actors and name.startswith(f"{stem}_") and name.endswith(ending))
+
+    @property
+    def _parts(self) -> tuple[str, str]:
+        """Stem and ending, which may have several words: `.lafan1.bvh`."""
+        stem, dot, ending = self.name.partition(".")
+        return stem, dot + ending
 
     def found(self, folder: Path) -> set[Path]:
         """The files of this name that are there."""

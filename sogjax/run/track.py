@@ -33,7 +33,7 @@ from sogjax.run.run_files import ACTOR, METRICS, MOTION
 from sogjax.run.run_folder import RunFolder, run_folder
 from sogjax.run.runner import run_passes
 from sogjax.run.terminal import say
-from sogjax.run.write import check_pose2sim, export_endings
+from sogjax.run.write import check_formats, check_pose2sim, export_endings
 from sogjax.settings.run import TrackConfig
 
 
@@ -133,6 +133,7 @@ def _given_actors(recording: Recording, config: TrackConfig, files: Sequence[Pat
     clip = Clip(recording, recording.frames, config.images.depth)
     request = ActorRequest(clip, lambda: Background(None), files, number=config.actors)
     actors = make_actors(request)
+    check_formats(config.outputs, actors.bodies)
     if config.outputs.pose2sim:
         numbers = chosen_frames(recording, config.start, config.stop, config.every)
         check_pose2sim(recording, (numbers[0], numbers[-1]), actors.bodies, config.overwrite)

@@ -3,16 +3,18 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 from omegaconf import OmegaConf
 
 from sogjax.errors import InputError
 from sogjax.io.actor_file import save_body
 from sogjax.io.export.points import require_ezc3d, write_trc
-from sogjax.io.export.write import WRITERS, export_motion
+from sogjax.io.export.write import NEEDS, WRITERS, endings_beside, export_motion
 from sogjax.io.files import write_file, write_json
 from sogjax.io.frame_motions import ClipFacts, motions_of
 from sogjax.io.image_file import write_image
 from sogjax.io.keypoints.scheme import named_scheme
+from sogjax.io.motion import motion_from_poses
 from sogjax.io.motion_data import save_motion
 from sogjax.io.projects import CONFIG as PROJECT
 from sogjax.io.recording import Recording, open_recording
@@ -64,6 +66,17 @@ def export_endings(wanted: OutputsConfig) -> list[str]:
     return [f".{name}" for name in dict.fromkeys(formats)]
 
 
+def check_formats(wanted: OutputsConfig, bodies: Sequence[Body]) -> None:
+    """Check that the bodies have what the formats need.
+
+    Raises:
+        InputError: one has not.
+    """
+    for needs in (NEEDS[ending] for ending in export_endings(wanted) if ending in NEEDS):
+        for body in bodies:
+            needs(motion_from_poses(body, np.zeros((1, body.skeleton.num_dofs), np.float32), 1.0))
+
+
 def pose2sim_file(recording: Recording, frames: tuple[int, int], actor: str = "") -> Path:
     """Where Pose2Sim's next steps look for the points of a trial; `frames`: first and last."""
     person = f"_{actor}" if actor else ""
@@ -105,9 +118,12 @@ def write_results(run: Run) -> list[Path]:
         files.append(ACTOR.of(out, actor.name, len(made)))
         save_body(files[-1], actor)
     for name, motion in result.motions.items():
-        for ending in [".npz", *export_endings(wanted)]:
+        asked = [".npz", *export_endings(wanted)]
+        beside = [other for ending in asked for other in endings_beside(ending, motion)]
+        for ending in dict.fromkeys([*asked, *beside]):
             files.append(MOTIONS[ending].of(out, name, count))
-            export_motion(motion, files[-1])
+            if (said := export_motion(motion, files[-1])) is not None:
+                say(f"{files[-1]}: {said}")
         if wanted.pose2sim:
             span = int(motion.frame[0]), int(motion.frame[-1])
             path = pose2sim_file(result.recording, span, name if count > 1 else "")

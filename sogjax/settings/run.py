@@ -23,7 +23,7 @@ class OutputsConfig:
     rerun_images: bool = expert(True, "put the pictures into motion.rrd", inert=True)
     bvh: bool = expert(True, "motion.bvh", inert=True)
     formats: list[str] | None = option(
-        None, "further formats of the motion, some of [trc,c3d,glb,csv,mot]; null: none", inert=True
+        None, "further formats of the motion, some of [trc,c3d,glb,csv,mot,lafan1.bvh]; null: none", inert=True
     )
     filter: float | None = option(
         None,

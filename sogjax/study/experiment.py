@@ -66,6 +66,8 @@ class ExperimentConfig:
     """What holds of the comparison on any recordings."""
     iterations_by_recording: bool = False
     """Whether the iterations on each recording are shown, too."""
+    degrees: bool = False
+    """Whether errors of joint angles are shown by joint and plane, too."""
     paper_note: str = ""
     """What the paper's figures were measured on."""
     remark: str = ""

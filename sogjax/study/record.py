@@ -68,6 +68,8 @@ class RunRecord:
     std_mm: float = float("nan")
     """Over all distances of `error_mm`."""
     closest_std_mm: float = float("nan")
+    angles: list[dict[str, Any]] = field(default_factory=list)
+    """Errors of joint angles, all actors': the fields of `AngleError`."""
     lost: int = 0
     """Stretches of frames with a lost marker."""
     swaps: int = 0

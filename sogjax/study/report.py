@@ -21,7 +21,7 @@ from sogjax.study.script import machine_line
 from sogjax.study.settings import ReportConfig
 from sogjax.study.study import Study
 from sogjax.study.summary import RowSummary
-from sogjax.study.table import findings, iterations_table, markdown_table, recordings_table
+from sogjax.study.table import degrees_table, findings, iterations_table, markdown_table, recordings_table
 
 PACKAGES = ("sogjax", "jax", "jaxlib", "optimistix", "equinox", "numpy", "opencv-python-headless", "matplotlib")
 
@@ -144,6 +144,8 @@ def _of_method(experiment: Experiment, method: str, rows: Sequence[RowSummary]) 
         parts = [] if method else [markdown_table(experiment, worked)]
     if experiment.config.iterations_by_recording:
         parts += [f"Iterations per frame on each recording{of}:", iterations_table(experiment, worked)]
+    degrees = degrees_table(experiment, worked) if experiment.config.degrees else ""
+    parts += [f"Joint angles{of}:", degrees] if degrees else []
     title = f"**{method[:1].upper()}{method[1:]}** (`{' '.join(experiment.methods[method]) or 'preset=default'}`): "
     said = " ".join(findings(experiment, worked))
     return [*parts, *([f"{title if method else ''}{said}"] if said else []), *failed]

@@ -153,6 +153,7 @@ def _evaluated(record: RunRecord, source: Source) -> RunRecord:
         std_mm=_deviation(errors),
         closest_mm=_rounded_means(closest),
         closest_std_mm=_deviation(closest),
+        angles=[asdict(error) for part in evaluation.evaluations.values() for error in part.angles],
         lost=sum(len(part.lost) for part in evaluation.evaluations.values()),
         swaps=len(evaluation.swaps),
     )

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import t as student
 
+from sogjax.quality.angle_errors import BETWEEN_BONES, AngleError
 from sogjax.study.record import RunRecord
 
 BLOCK = 10
@@ -119,6 +120,8 @@ class RowSummary:
     by_recording: Mapping[str, float]
     """The mean error on each."""
     iterations_by_recording: Mapping[str, float]
+    angles: Sequence[AngleError]
+    """Errors of joint angles on all recordings whose truth has any."""
     failed: Sequence[str]
 
 
@@ -167,6 +170,7 @@ def _summary(name: str, records: Records, reference: Records | None, paper: tupl
         rates=_mean_rates(runs),
         by_recording={source: _mean(record.errors) for source, record in done.items()},
         iterations_by_recording={source: _mean(record.iterations) for source, record in done.items()},
+        angles=[AngleError(**error) for run in runs for error in run.angles if error["plane"] != BETWEEN_BONES],
         failed=tuple(f"{source}: {record.failed}" for source, record in records.items() if record.failed),
     )
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from sogjax.quality.angle_errors import by_plane, pooled
 from sogjax.study.experiment import Experiment
 from sogjax.study.summary import RowSummary
 
@@ -57,6 +58,28 @@ def recordings_table(experiment: Experiment, rows: Sequence[RowSummary]) -> str:
 def iterations_table(experiment: Experiment, rows: Sequence[RowSummary]) -> str:
     """The iterations per frame of every row on every recording."""
     return _by_recording(experiment, rows, lambda row: row.iterations_by_recording)
+
+
+def degrees_table(experiment: Experiment, rows: Sequence[RowSummary]) -> str:
+    """For each joint and plane the error of angles without the offset in degrees, and the ratio of ranges of motion.
+
+    Empty where no recording's truth has joint angles.
+    """
+    known = [row for row in rows if row.angles]
+    by_row = [{plane: pooled(errors) for plane, errors in by_plane(row.angles).items()} for row in known]
+    planes = list(dict.fromkeys(plane for found in by_row for plane in found))
+    lines = [[f"{experiment.config.axis}: centred error, degrees (ratio of ranges)", *(row.name for row in known)]]
+    for plane in planes:
+        numbers = [found.get(plane) for found in by_row]
+        lines.append([" ".join(plane), *("" if each is None else _degrees(each) for each in numbers)])
+    cells = [" | ".join(map(in_cell, line)) for line in lines]
+    cells.insert(1, "|".join(["---"] * (1 + len(known))))
+    return "\n".join(f"| {line} |" for line in cells) if planes else ""
+
+
+def _degrees(numbers: Mapping[str, float]) -> str:
+    error, ratio = numbers["mean_abs_centred"], numbers["range_ratio"]
+    return f"{error:.1f}" + (f" ({ratio:.2f})" if np.isfinite(ratio) else "")
 
 
 def _by_recording(

@@ -7,9 +7,12 @@ from pathlib import Path
 
 from sogjax.errors import InputError
 from sogjax.io.cache_folder import default_cache_dir
+from sogjax.io.ground_truth import save_ground_truth
+from sogjax.io.npz_file import read_npz
+from sogjax.io.recording_files import GROUND_TRUTH
 from sogjax.synth.detector import DetectorSettings
 from sogjax.synth.keypoints import write_simulated
-from sogjax.synth.render import Progress, render_recording, silent
+from sogjax.synth.render import Progress, ground_truth_of, render_recording, silent
 from sogjax.synth.settings import SynthSettings
 from sogjax.synth.stage import stage_of
 
@@ -41,13 +44,21 @@ def cached_recording(settings: SynthSettings, cache_dir: Path | None = None, pro
     settings.check()
     folder = (cache_dir or default_cache_dir()) / "recordings" / cache_name(settings)
     if folder.is_dir() and any(folder.iterdir()):
-        return folder
+        return _with_angles(settings, folder)
     try:
         return render_recording(settings, folder, progress)
     except (InputError, OSError):
         if folder.is_dir() and any(folder.iterdir()):  # another process was faster
             return folder
         raise
+
+
+def _with_angles(settings: SynthSettings, folder: Path) -> Path:
+    """A kept recording, whose truth is completed where it was rendered before truths had joint angles."""
+    path = GROUND_TRUTH.of(folder)
+    if path.is_file() and "angles" not in read_npz(path):
+        save_ground_truth(path, ground_truth_of(stage_of(settings)))
+    return folder
 
 
 def cached_keypoints(settings: SynthSettings, detector: DetectorSettings, cache_dir: Path | None = None) -> Path:

@@ -21,6 +21,7 @@ from sogjax.synth.keypoints import keypoint_folder, write_simulated
 from sogjax.synth.landmarks import LANDMARKS, MARKERS, landmark_points, marker_vertices
 from sogjax.synth.settings import SynthSettings
 from sogjax.synth.stage import Stage, stage_of
+from sogjax.synth.true_angles import true_angles
 
 Progress = Callable[[Iterable, int, str], Iterable]
 """Wraps an iterable, given its length and a label, and yields the same."""
@@ -117,7 +118,7 @@ def _description(stage: Stage) -> dict:
 
 
 def ground_truth_of(stage: Stage) -> GroundTruth:
-    """True markers and joints of every frame."""
+    """True markers, joints and joint angles of every frame."""
     several = stage.settings.actors > 1
     prefixes = [f"{name}/" if several else "" for name in stage.settings.actor_names]
     vertices = [marker_vertices(person) for person in stage.people]
@@ -127,12 +128,15 @@ def ground_truth_of(stage: Stage) -> GroundTruth:
         placed = list(zip(stage.people, poses, vertices, strict=True))
         markers.append(np.concatenate([person.posed(pose).vertices[v] for person, pose, v in placed]))
         joints.append(np.concatenate([landmark_points(p.anatomy, pose) for p, pose, _ in placed]))
+    angles, angle_names = true_angles([each.anatomy for each in stage.people], stage.poses, prefixes, len(joints))
     return GroundTruth(
         fps=stage.settings.fps,
         markers=np.stack(markers),
         marker_names=tuple(prefix + name for prefix in prefixes for name in MARKERS),
         joints=np.stack(joints),
         joint_names=tuple(prefix + name for prefix in prefixes for name in LANDMARKS),
+        angles=angles,
+        angle_names=angle_names,
     )
 
 

@@ -4,6 +4,7 @@ Each angle is that of a bone relative to the one above it, both straight in the 
 forward, Y up, Z to the right) the relative rotation is R = Rz Rx Ry; the hand's is R = Rx Rz Ry.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,10 +24,10 @@ _OPENSIM_FROM_BODY = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0
 
 @dataclass(frozen=True)
 class _Pair:
-    """A bone relative to the one above it, named by the joints whose frames they are."""
+    """A segment relative to the one above it."""
 
     above: str | None
-    """The upper bone; None: the ground."""
+    """The upper segment; None: the ground."""
     below: str
     order: str
     """The axes about which it turns, one after the other."""
@@ -36,18 +37,18 @@ class _Pair:
 
 def _of_side(side: str) -> list[_Pair]:
     end, mirrored = f"_{side[0]}", 1.0 if side == "right" else -1.0
-    joint = lambda name: f"{side}_{name}"
+    own = lambda name: f"{side}_{name}"
     pair = lambda above, below, order, *names: _Pair(
-        above, joint(below), order, tuple((name + end, axis, sign) for name, axis, sign in names)
+        above, own(below), order, tuple((name + end, axis, sign) for name, axis, sign in names)
     )
     return [
-        pair("root_roll", "hip_twist", "ZXY", *_three("hip_flexion", "hip_adduction", "hip_rotation", mirrored)),
-        pair(joint("hip_twist"), "knee", "ZXY", ("knee_angle", "Z", -1.0)),
-        pair(joint("knee"), "ankle_roll", "ZXY", ("ankle_angle", "Z", 1.0), ("subtalar_angle", "X", mirrored)),
-        pair("spine5_twist", "upper_arm_roll", "ZXY", *_three("arm_flex", "arm_add", "arm_rot", mirrored)),
-        pair(joint("upper_arm_roll"), "elbow", "ZXY", ("elbow_flex", "Z", 1.0)),
-        pair(joint("elbow"), "forearm_roll2", "ZXY", ("pro_sup", "Y", mirrored)),
-        pair(joint("forearm_roll2"), "wrist_side", "XZY", ("wrist_flex", "X", mirrored), ("wrist_dev", "Z", 1.0)),
+        pair("pelvis", "thigh", "ZXY", *_three("hip_flexion", "hip_adduction", "hip_rotation", mirrored)),
+        pair(own("thigh"), "shank", "ZXY", ("knee_angle", "Z", -1.0)),
+        pair(own("shank"), "foot", "ZXY", ("ankle_angle", "Z", 1.0), ("subtalar_angle", "X", mirrored)),
+        pair("chest", "upper_arm", "ZXY", *_three("arm_flex", "arm_add", "arm_rot", mirrored)),
+        pair(own("upper_arm"), "forearm", "ZXY", ("elbow_flex", "Z", 1.0)),
+        pair(own("forearm"), "forearm_end", "ZXY", ("pro_sup", "Y", mirrored)),
+        pair(own("forearm_end"), "hand", "XZY", ("wrist_flex", "X", mirrored), ("wrist_dev", "Z", 1.0)),
     ]
 
 
@@ -56,50 +57,79 @@ def _three(about_z: str, about_x: str, about_y: str, mirrored: float = 1.0) -> t
 
 
 _PAIRS = (
-    _Pair(None, "root_roll", "ZXY", _three("pelvis_tilt", "pelvis_list", "pelvis_rotation")),
+    _Pair(None, "pelvis", "ZXY", _three("pelvis_tilt", "pelvis_list", "pelvis_rotation")),
     *_of_side("right"),
     *_of_side("left"),
-    _Pair("root_roll", "spine5_twist", "ZXY", _three("lumbar_extension", "lumbar_bending", "lumbar_rotation")),
-    _Pair("spine5_twist", "head_twist", "ZXY", _three("neck_extension", "neck_bending", "neck_rotation")),
+    _Pair("pelvis", "chest", "ZXY", _three("lumbar_extension", "lumbar_bending", "lumbar_rotation")),
+    _Pair("chest", "head", "ZXY", _three("neck_extension", "neck_bending", "neck_rotation")),
 )
+_SIDES_JOINTS = {
+    **{"thigh": "hip_twist", "shank": "knee", "foot": "ankle_roll", "upper_arm": "upper_arm_roll"},
+    **{"forearm": "elbow", "forearm_end": "forearm_roll2", "hand": "wrist_side"},
+}
+SEGMENT_JOINTS = {"pelvis": "root_roll", "chest": "spine5_twist", "head": "head_twist"} | {
+    f"{side}_{segment}": f"{side}_{joint}" for side in ("left", "right") for segment, joint in _SIDES_JOINTS.items()
+}
+"""The joints of the default body whose frames its segments are."""
+PLACE = ("pelvis_tx", "pelvis_ty", "pelvis_tz")
+
+
+def has_angles(motion: MotionData) -> bool:
+    """Whether angles between the body's segments are known, not only those of its root in the ground."""
+    joints = motion.joint_names.tolist()
+    has = lambda segment: SEGMENT_JOINTS[segment] in joints
+    return has("pelvis") and any(has(pair.above) and has(pair.below) for pair in _PAIRS if pair.above is not None)
 
 
 def joint_angles(motion: MotionData, up: str = "z") -> dict[str, Float[np.ndarray, "frame"]]:
     """Angles (degrees) and the pelvis' place (metres, Y up as in TRC) by OpenSim's names.
 
-    Angles lie within half a turn; those of the pelvis go on from frame to frame.
-
     Raises:
         InputError: the body has none of the joints that they are angles of.
     """
     joints = motion.joint_names.tolist()
-    pairs = [pair for pair in _PAIRS if {pair.above or pair.below, pair.below} <= set(joints)]
-    if not pairs or pairs[0].above is not None:
+    known = {segment: joints.index(joint) for segment, joint in SEGMENT_JOINTS.items() if joint in joints}
+    if "pelvis" not in known:
         raise InputError(
             "joint angles are known of bodies with the joints of the default one (root_roll, left_knee, ...)"
         )
-    place = ("pelvis_tx", "pelvis_ty", "pelvis_tz")
+    frames = motion.world_from_joint.astype(float)
+    angles = segment_angles({segment: frames[:, joint, :3, :3] for segment, joint in known.items()}, up)
+    place = world_turn(up, "y") @ frames[:, known["pelvis"], :3, 3].T
+    first = [name for name, _, _ in _PAIRS[0].names]
+    return {name: angles[name] for name in first} | dict(zip(PLACE, place, strict=True)) | angles
+
+
+def segment_angles(
+    world_from_segment: Mapping[str, Float[np.ndarray, "frame 3 3"]], up: str = "z"
+) -> dict[str, Float[np.ndarray, "frame"]]:
+    """Angles (degrees) by OpenSim's names, of the segments that are known (the names of `SEGMENT_JOINTS`).
+
+    The segments' axes are the world's where the body stands straight. Angles go on from frame to frame without jumps of
+    a turn, most of them within half a turn of 0.
+    """
+    opensim_from_bone = _OPENSIM_FROM_BODY @ world_from_upright(up).T
     columns: dict[str, np.ndarray] = {}
-    for pair in pairs:
-        frames = motion.world_from_joint[:, joints.index(pair.below)].astype(float)
-        turned = _turned(motion, joints, pair, up)
-        angles = euler_angles(turned, pair.order)
-        if pair.above is None:  # a person who turns round and round; others would stay a turn off after 90 degrees
-            angles = np.unwrap(angles, axis=0, period=360.0)
-        columns |= {name: sign * angles[:, pair.order.index(axis)] for name, axis, sign in pair.names}
+    for pair in _PAIRS:
+        if pair.below not in world_from_segment or (pair.above or pair.below) not in world_from_segment:
+            continue
+        below = world_from_segment[pair.below]
         if pair.above is None:
-            columns |= dict(zip(place, world_turn(up, "y") @ frames[:, :3, 3].T, strict=True))
+            turned = world_turn(up, "y") @ below @ opensim_from_bone.T
+        else:
+            relative = np.swapaxes(world_from_segment[pair.above], -1, -2) @ below
+            turned = opensim_from_bone @ relative @ opensim_from_bone.T
+        angles = unwrapped(euler_angles(turned, pair.order))
+        columns |= {name: sign * angles[:, pair.order.index(axis)] for name, axis, sign in pair.names}
     return columns
 
 
-def _turned(motion: MotionData, joints: list[str], pair: _Pair, up: str) -> Float[np.ndarray, "frame 3 3"]:
-    """The lower bone's axes in the upper one's, or in the ground's, all with OpenSim's axes."""
-    opensim_from_bone = _OPENSIM_FROM_BODY @ world_from_upright(up).T
-    rotation = lambda name: motion.world_from_joint[:, joints.index(name), :3, :3].astype(float)
-    if pair.above is None:
-        return world_turn(up, "y") @ rotation(pair.below) @ opensim_from_bone.T
-    relative = np.swapaxes(rotation(pair.above), -1, -2) @ rotation(pair.below)
-    return opensim_from_bone @ relative @ opensim_from_bone.T
+def unwrapped(degrees: Float[np.ndarray, "frame *angle"]) -> Float[np.ndarray, "frame *angle"]:
+    """Angles that go on from frame to frame instead of jumping by a turn; their medians lie within half a turn of 0."""
+    if len(degrees) == 0:
+        return degrees
+    whole = np.unwrap(degrees, axis=0, period=360.0)
+    return whole - 360.0 * np.round(np.median(whole, axis=0) / 360.0)
 
 
 def write_angles_csv(path: Path, motion: MotionData, up: str = "z") -> None:

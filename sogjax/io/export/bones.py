@@ -92,9 +92,25 @@ def frame_time(path: Path, motion: MotionData) -> float:
 
 
 def check_frames(path: Path, motion: MotionData) -> None:
-    """Check that there is anything to write."""
+    """Check that there is anything to write, and all of it finite.
+
+    Raises:
+        InputError: no frames, or as `check_finite`.
+    """
     if motion.num_frames == 0:
         raise InputError(f"{path}: the motion has no frames; export one that has")
+    check_finite(path, motion)
+
+
+def check_finite(path: Path, motion: MotionData) -> None:
+    """Check that the motion is known in every frame.
+
+    Raises:
+        InputError: it is not.
+    """
+    unknown = motion.frame[~np.isfinite(motion.world_from_joint).all(axis=(1, 2, 3))]
+    if len(unknown):
+        raise InputError(f"{path}: the motion has numbers that are not finite in frame {unknown[0]}; track it again")
 
 
 def _chains(motion: MotionData) -> list[list[int]]:

@@ -1,6 +1,6 @@
 """BVH, the hierarchy and channels that Blender and most animation programs read.
 
-Y is up, +Z is where a body in its rest pose looks, lengths are metres, angles degrees.
+Y is up, +Z is where a body in its rest pose looks, angles are degrees, lengths metres unless a dialect has others.
 """
 
 from collections.abc import Iterator
@@ -10,28 +10,62 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from sogjax.io.export.bones import CONSTANT, bone_frames, bones_of, euler_angles, frame_time, in_parents, world_turn
+from sogjax.io.export.bones import (
+    CONSTANT,
+    Bones,
+    bone_frames,
+    bones_of,
+    euler_angles,
+    frame_time,
+    in_parents,
+    world_turn,
+)
 from sogjax.io.files import write_file
 from sogjax.io.motion_data import MotionData
 
 
+@dataclass(frozen=True)
+class Figure:
+    """Bones over time, in a world with y up; metres."""
+
+    bones: Bones
+    rotations: Float[np.ndarray, "frame bone 3 3"]
+    """World from bone."""
+    positions: Float[np.ndarray, "frame bone 3"]
+    """Where each bone begins."""
+    ends: Float[np.ndarray, "bone 3"]
+    """Where a bone without children ends, in its own frame."""
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """What one program's BVH files have otherwise than another's."""
+
+    order: str = "ZXY"
+    """The axes that a joint turns about, each turned by the ones before it."""
+    unit: float = 1.0
+    """Lengths in the file of one metre."""
+
+
 @dataclass
 class _Bone:
-    """A BVH joint: a chain of one-axis joints of one origin, in BVH's axes, relative to the parent bone."""
+    """A BVH joint, relative to the parent bone; in the file's unit."""
 
     name: str
     is_root: bool
     positions: Float[np.ndarray, "frame 3"]
     angles: Float[np.ndarray, "frame 3"]
-    """Degrees about Z, X, Y, each turned by the ones before it, without jumps of a turn."""
+    """Degrees about the dialect's axes, without jumps of a turn."""
     end: Float[np.ndarray, "3"]
     """Where the bone ends, if it has no children."""
+    least: float
+    """What an offset must change for it to have channels."""
     children: list["_Bone"] = field(default_factory=list)
 
     @property
     def moves(self) -> bool:
         """Whether it needs position channels."""
-        return self.is_root or bool(np.ptp(self.positions, axis=0).max() > CONSTANT)
+        return self.is_root or bool(np.ptp(self.positions, axis=0).max() > self.least)
 
     @property
     def offset(self) -> Float[np.ndarray, "3"]:
@@ -48,36 +82,54 @@ def write_bvh(path: Path, motion: MotionData, up: str = "z") -> None:
         InputError: no frames, unevenly spaced frames, or a path that cannot be written.
     """
     seconds = frame_time(path, motion)
-    root = _root_bone(motion, up)
+    write_figure(path, _figure(motion, up), seconds, Dialect())
+
+
+def write_figure(path: Path, figure: Figure, seconds: float, dialect: Dialect) -> None:
+    """Write bones, one row for each `seconds`.
+
+    Raises:
+        InputError: a path that cannot be written.
+    """
+    root = _root_bone(figure, dialect)
     bones = list(_depth_first(root))
     channels = [np.concatenate([bone.positions, bone.angles], 1) if bone.moves else bone.angles for bone in bones]
     lines = [
         "HIERARCHY",
-        *_hierarchy(root),
+        *_hierarchy(root, dialect.order),
         "MOTION",
-        f"Frames: {motion.num_frames}",
+        f"Frames: {len(figure.positions)}",
         f"Frame Time: {seconds:.9f}",
     ]
     lines += [_numbers(row) for row in np.concatenate(channels, axis=1)]
     write_file(path, "\n".join(lines) + "\n")
 
 
-def _root_bone(motion: MotionData, up: str) -> _Bone:
-    """The tree of bones."""
+def _figure(motion: MotionData, up: str) -> Figure:
+    """A motion's own bones."""
     found = bones_of(motion)
     rotations, positions = bone_frames(motion, found, up, "y")
-    turns, offsets = in_parents(found, rotations, positions)
+    _, offsets = in_parents(found, rotations, positions)
     blobs = motion.blob_means[0].astype(float) @ world_turn(up, "y").T
-    bones: list[_Bone] = []
-    for index, (name, above) in enumerate(zip(found.names, found.parents, strict=True)):
+    ends = []
+    for index in range(len(found.names)):
         of_bone = np.isin(motion.blob_joint, found.chains[index])
-        attached = (blobs[of_bone] - positions[0, index]) @ rotations[0, index]
+        ends.append(_end((blobs[of_bone] - positions[0, index]) @ rotations[0, index], offsets[0, index]))
+    return Figure(found, rotations, positions, np.stack(ends))
+
+
+def _root_bone(figure: Figure, dialect: Dialect) -> _Bone:
+    """The tree of bones."""
+    turns, offsets = in_parents(figure.bones, figure.rotations, figure.positions)
+    bones: list[_Bone] = []
+    for index, (name, above) in enumerate(zip(figure.bones.names, figure.bones.parents, strict=True)):
         bone = _Bone(
             name=name,
             is_root=above < 0,
-            positions=offsets[:, index],
-            angles=np.unwrap(euler_angles(turns[:, index], "ZXY"), axis=0, period=360.0),
-            end=_end(attached, offsets[0, index]),
+            positions=dialect.unit * offsets[:, index],
+            angles=np.unwrap(euler_angles(turns[:, index], dialect.order), axis=0, period=360.0),
+            end=dialect.unit * figure.ends[index],
+            least=dialect.unit * CONSTANT,
         )
         bones.append(bone)
         if above >= 0:
@@ -102,7 +154,7 @@ def _common_root(roots: list[_Bone]) -> _Bone:
     still = np.zeros_like(roots[0].positions)
     for root in roots:
         root.is_root = False
-    return _Bone("world", True, still, still, np.zeros(3), roots)
+    return _Bone("world", True, still, still, np.zeros(3), roots[0].least, roots)
 
 
 def _depth_first(bone: _Bone) -> Iterator[_Bone]:
@@ -111,13 +163,13 @@ def _depth_first(bone: _Bone) -> Iterator[_Bone]:
         yield from _depth_first(child)
 
 
-def _hierarchy(bone: _Bone) -> list[str]:
-    """The lines that define a bone and what hangs from it."""
+def _hierarchy(bone: _Bone, order: str) -> list[str]:
+    """The lines that define a bone, whose channels have this order, and what hangs from it."""
     channels = ["Xposition", "Yposition", "Zposition"] if bone.moves else []
-    channels += ["Zrotation", "Xrotation", "Yrotation"]
+    channels += [f"{axis}rotation" for axis in order]
     inner = [f"OFFSET {_numbers(bone.offset)}", f"CHANNELS {len(channels)} {' '.join(channels)}"]
     for child in bone.children:
-        inner += _hierarchy(child)
+        inner += _hierarchy(child, order)
     if not bone.children:
         inner += ["End Site", "{", f"  OFFSET {_numbers(bone.end)}", "}"]
     kind = "ROOT" if bone.is_root else "JOINT"

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sogjax.errors import InputError
-from sogjax.io.export.bones import bone_frames, bones_of, frame_time, world_turn
+from sogjax.io.export.bones import bone_frames, bones_of, check_finite, frame_time, world_turn
 from sogjax.io.files import atomic_path
 from sogjax.io.keypoints.scheme import named_scheme
 from sogjax.io.motion_data import MotionData
@@ -27,7 +27,7 @@ def _both_sides(names: dict[str, str]) -> dict[str, str]:
 
 OPENSIM_NAMES = {"root": "Hip", "neck": "Neck"} | _both_sides(_JOINTS)
 """The names that OpenSim models for video have (Pose2Sim's), by those of the default body's bones."""
-_OPENSIM_ENDS = {"head_top": "Head"} | _both_sides(_ENDS)
+OPENSIM_ENDS = {"head_top": "Head"} | _both_sides(_ENDS)
 """The names that these models have of landmarks where a body ends."""
 _EVERY_BONE = "all"
 
@@ -54,9 +54,9 @@ def marker_points(
     kept = [k for k, name in enumerate(bones.names) if markers == _EVERY_BONE or not rolls(name)]
     names = [OPENSIM_NAMES.get(bones.names[k], bones.names[k]) for k in kept]
     known = [] if motion.landmark_names is None else motion.landmark_names.tolist()
-    ends = [name for name in _OPENSIM_ENDS if name in known]
+    ends = [name for name in OPENSIM_ENDS if name in known]
     places = [motion.joint(name).astype(float) @ world_turn(up, to).T for name in ends]
-    return names + [_OPENSIM_ENDS[name] for name in ends], np.stack([*positions[:, kept].swapaxes(0, 1), *places], 1)
+    return names + [OPENSIM_ENDS[name] for name in ends], np.stack([*positions[:, kept].swapaxes(0, 1), *places], 1)
 
 
 def write_c3d(path: Path, motion: MotionData, up: str = "z", markers: str | None = None) -> None:
@@ -121,8 +121,22 @@ def write_csv(path: Path, motion: MotionData, up: str = "z") -> None:
     write_columns(path, motion, f"unit: m, time: s, up: {up}", dict(zip(names, flat.T, strict=True)))
 
 
+def limb_confidence(motion: MotionData) -> dict[str, Float[np.ndarray, "frame"]]:
+    """How sure each limb's place is, 0 to 1: how likely within 10 cm, but no more than the part of it that is seen."""
+    if motion.limb_names is None or motion.limb_doubt is None:
+        return {}
+    seen = np.ones_like(motion.limb_doubt) if motion.limb_hidden is None else 1.0 - motion.limb_hidden
+    sure = np.nan_to_num(np.clip(np.minimum(1.0 - motion.limb_doubt, seen), 0.0, 1.0))
+    return {f"{name}.confidence": sure[:, limb] for limb, name in enumerate(map(str, motion.limb_names))}
+
+
 def write_columns(path: Path, motion: MotionData, note: str, columns: Mapping[str, Float[np.ndarray, "frame"]]) -> None:
-    """Write CSV: after a line starting with `#` with a note, and the columns' names, one row per frame."""
+    """Write CSV: after a line starting with `#` with a note, and the columns' names, one row per frame.
+
+    The last columns are the confidence of each limb that was judged.
+    """
+    check_finite(path, motion)
+    columns = {**columns, **limb_confidence(motion)}
     with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         filtered = f", filter: {motion.filtered_by}" if motion.filtered_by else ""
         file.write(f"# {note}{filtered}\n")

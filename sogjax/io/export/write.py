@@ -9,39 +9,72 @@ import numpy as np
 import yaml
 
 from sogjax.errors import InputError
-from sogjax.io.export.angles import write_mot
+from sogjax.io.export.angles import joint_angles, write_mot
 from sogjax.io.export.bones import bones_of
 from sogjax.io.export.bvh import write_bvh
 from sogjax.io.export.glb import write_glb
+from sogjax.io.export.lafan1 import figure_of, write_lafan1
+from sogjax.io.export.lengths import ENDING as LENGTHS
+from sogjax.io.export.lengths import segment_lengths, write_lengths
 from sogjax.io.export.points import write_c3d, write_csv, write_trc
 from sogjax.io.files import write_file
 from sogjax.io.motion_data import MotionData, save_motion
 
-WRITERS: dict[str, Callable[[Path, MotionData, str], None]] = {
+WRITERS: dict[str, Callable[[Path, MotionData, str], str | None]] = {
     ".bvh": write_bvh,
+    ".lafan1.bvh": write_lafan1,
     ".c3d": write_c3d,
     ".csv": write_csv,
+    LENGTHS: write_lengths,
     ".glb": write_glb,
     ".mot": write_mot,
     ".npz": lambda path, motion, up: save_motion(path, replace(motion, up=up)),
     ".trc": write_trc,
 }
-"""What writes a motion, by the file's ending; the last argument is the vertical of the motion's world."""
+"""What writes a motion, by the file's ending, the longest that fits; the last argument is the vertical of the motion's
+world. A sentence that a writer returns is for the user."""
+DIALECTS = {"lafan1": ".lafan1.bvh"}
+"""The endings of dialects, by their names: the first word of the ending."""
+WITH_LENGTHS = (".trc", ".mot")
+"""The formats beside which the lengths of segments are written, where the body has them."""
+NEEDS: dict[str, Callable[[MotionData], object]] = {
+    ".lafan1.bvh": lambda motion: figure_of("the format lafan1.bvh", motion, motion.up),
+    ".mot": lambda motion: joint_angles(motion, motion.up),
+}
+"""What refuses a body that a format cannot hold, by the file's ending."""
 
 
-def export_motion(motion: MotionData, path: Path, up: str | None = None) -> None:
+def export_motion(motion: MotionData, path: Path, up: str | None = None, dialect: str | None = None) -> str | None:
     """Write `motion` in the format that the ending of `path` names.
 
-    `up` is the vertical of the motion's world, where it is not what the motion says.
+    Args:
+        motion: what to write.
+        path: the file; `.lafan1.bvh` is a `.bvh` of that dialect.
+        up: the vertical of the motion's world, where it is not what the motion says.
+        dialect: one of `DIALECTS`, of a file whose ending does not say it.
+
+    Returns:
+        What is to be said of the file, if anything.
 
     Raises:
         InputError: an ending that no writer knows, or what the writer refuses.
     """
-    writer = WRITERS.get(path.suffix.lower())
-    if writer is None:
+    ending = ending_of(path) if dialect is None else DIALECTS[dialect]
+    if ending is None:
         known = " ".join(sorted(WRITERS))
         raise InputError(f"{path}: no writer for the extension {path.suffix!r}; use one of: {known}")
-    writer(path, motion, up or motion.up)
+    return WRITERS[ending](path, motion, up or motion.up)
+
+
+def endings_beside(ending: str, motion: MotionData) -> list[str]:
+    """The formats that are written with that of an ending."""
+    return [LENGTHS] if ending in WITH_LENGTHS and segment_lengths(motion) else []
+
+
+def ending_of(path: Path) -> str | None:
+    """The ending of a file by which its writer is found; None where there is none."""
+    fitting = [ending for ending in WRITERS if path.name.lower().endswith(ending)]
+    return max(fitting, key=len, default=None)
 
 
 def write_initial_pose(path: Path, motions: Sequence[MotionData], frame: int | None = None) -> None:

@@ -1,0 +1,151 @@
+"""BVH as the LAFAN1 data set has it, which tools that bring human motion to robots read.
+
+Centimetres, Y up, 22 joints by LAFAN1's names in its order. A bone's X points along it; Y points forward (trunk, legs),
+backward (arms) or up (feet) where the body stands straight. Only the root has channels of position.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from sogjax.errors import InputError
+from sogjax.io.export.bones import Bones, frame_time, in_parents
+from sogjax.io.export.bvh import Dialect, Figure, write_figure
+from sogjax.io.export.feet import standing_feet
+from sogjax.io.export.lafan1_spine import FORWARD, HIPS, TRUNK, spine_frames
+from sogjax.io.export.named_bones import NamedBones, median_in
+from sogjax.io.motion_data import MotionData
+
+DIALECT = Dialect(order="ZYX", unit=100.0)
+SIDES = ("left", "right")
+_MOST_CHANGE = 0.005
+"""Metres that a bone's length may change and still be written as constant."""
+
+
+@dataclass(frozen=True)
+class _Joint:
+    """A joint of a limb, and the joints of the body that it is made of."""
+
+    name: str
+    above: str
+    at: str
+    """The bone, or landmark, that it begins at."""
+    until: str
+    """Where its bone ends, another bone or a landmark."""
+    frame: str
+    """The bone that it turns with; `above:NAME` is the one above NAME."""
+    beside: tuple[float, float, float]
+    """Where its Y points where the body stands straight, with Y up and Z forward."""
+
+
+def _of_side(side: str) -> list[_Joint]:
+    leg, foot, arm = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0)
+    name = lambda bone: f"{side.title()}{bone}"
+    own = lambda joint: f"{side}_{joint}"
+    return [
+        _Joint(name("UpLeg"), "Hips", own("hip"), own("knee"), own("hip"), leg),
+        _Joint(name("Leg"), name("UpLeg"), own("knee"), own("ankle"), own("knee"), leg),
+        _Joint(name("Foot"), name("Leg"), own("ankle"), own("toe"), own("ankle"), foot),
+        _Joint(name("Toe"), name("Foot"), own("toe"), "", own("ankle"), foot),
+        _Joint(name("Shoulder"), "Spine2", own("clavicle"), own("shoulder"), own("clavicle"), arm),
+        _Joint(name("Arm"), name("Shoulder"), own("shoulder"), own("elbow"), f"above:{own('elbow')}", arm),
+        _Joint(name("ForeArm"), name("Arm"), own("elbow"), own("wrist"), own("elbow"), arm),
+        _Joint(name("Hand"), name("ForeArm"), own("wrist"), own("hand"), own("wrist"), arm),
+    ]
+
+
+_LEGS = [joint for side in SIDES for joint in _of_side(side)[:4]]
+_ARMS = [joint for side in SIDES for joint in _of_side(side)[4:]]
+NAMES = (
+    *("Hips", *(joint.name for joint in _LEGS)),
+    *("Spine", "Spine1", "Spine2", "Neck", "Head", *(joint.name for joint in _ARMS)),
+)
+_PARENTS = {joint.name: joint.above for joint in (*_LEGS, *_ARMS)} | {
+    **{"Spine": "Hips", "Spine1": "Spine", "Spine2": "Spine1", "Neck": "Spine2", "Head": "Neck"},
+}
+
+
+def write_lafan1(path: Path, motion: MotionData, up: str = "z") -> str:
+    """Write `motion`, whose world has the vertical `up`; feet that stand keep their place.
+
+    Returns:
+        A sentence: how far standing feet slid, before and after.
+
+    Raises:
+        InputError: a body without one of the joints, or with bones whose lengths change; no frames, or unevenly spaced
+            ones; a path that cannot be written.
+    """
+    seconds = frame_time(path, motion)
+    figure, said = standing_feet(figure_of(path, motion, up), seconds)
+    write_figure(path, figure, seconds, DIALECT)
+    return said
+
+
+def figure_of(where: Path | str, motion: MotionData, up: str) -> Figure:
+    """The motion by LAFAN1's joints, before anything is done to its feet; `where` begins sentences about it.
+
+    Raises:
+        InputError: a body without one of them, or with bones whose lengths change.
+    """
+    body = NamedBones(where, motion, up)
+    frames = {"Hips": (body.turns(HIPS) @ TRUNK, body.places(HIPS))}
+    frames |= spine_frames(body)
+    frames |= {name: (body.turns(name.lower()) @ TRUNK, body.places(name.lower())) for name in ("Neck", "Head")}
+    for joint in (*_LEGS, *_ARMS):
+        frames[joint.name] = (body.turns(joint.frame) @ _axes(body, joint), body.places(joint.at))
+    order = {name: index for index, name in enumerate(NAMES)}
+    bones = Bones(NAMES, tuple(order[_PARENTS[name]] if name in _PARENTS else -1 for name in NAMES), ())
+    rotations, positions = (np.stack([frames[name][k] for name in NAMES], axis=1) for k in (0, 1))
+    return Figure(bones, rotations, _constant(where, bones, rotations, positions), _ends(body, frames))
+
+
+def _axes(body: NamedBones, joint: _Joint) -> Float[np.ndarray, "3 3"]:
+    """A joint's own axes in those of the bone that it turns with."""
+    toe = not joint.until
+    along = FORWARD if toe else np.array([0.0, -1.0, 0.0])
+    if joint.until and body.knows(joint.until):
+        along = median_in(body.turns(joint.frame), body.places(joint.until) - body.places(joint.at))
+    x = along / np.linalg.norm(along)
+    y = np.array(joint.beside) - np.dot(joint.beside, x) * x
+    y = y / np.linalg.norm(y)
+    return np.stack([x, y, np.cross(x, y)], axis=1)
+
+
+def _constant(
+    where: Path | str,
+    bones: Bones,
+    rotations: Float[np.ndarray, "frame bone 3 3"],
+    positions: Float[np.ndarray, "frame bone 3"],
+) -> Float[np.ndarray, "frame bone 3"]:
+    """Positions with constant offsets of the bones from those above them.
+
+    Raises:
+        InputError: one changes by more than rounding.
+    """
+    _, offsets = in_parents(bones, rotations, positions)
+    placed = positions.copy()
+    for bone, above in enumerate(bones.parents):
+        if above < 0:
+            continue
+        offset = np.median(offsets[:, bone], axis=0)
+        if np.abs(offsets[:, bone] - offset).max() > _MOST_CHANGE:
+            raise InputError(
+                f"{where}: the lafan1 dialect has bones of constant length, but the one above {bones.names[bone]} "
+                "changes its own; leave dialect out"
+            )
+        placed[:, bone] = placed[:, above] + rotations[:, above] @ offset
+    return placed
+
+
+def _ends(body: NamedBones, frames: dict[str, tuple[np.ndarray, np.ndarray]]) -> Float[np.ndarray, "bone 3"]:
+    """Where head, hands and toes end, in their own frames; metres."""
+    usual = {"Head": 0.15, "LeftToe": 0.05, "RightToe": 0.05}
+    landmarks = {"Head": "head_top", "LeftHand": "left_hand", "RightHand": "right_hand"}
+    ends = np.array([[usual.get(name, 0.08), 0.0, 0.0] for name in NAMES])
+    for name, landmark in landmarks.items():
+        if body.knows(landmark):
+            turns, places = frames[name]
+            ends[NAMES.index(name)] = median_in(turns, body.places(landmark) - places)
+    return ends
