@@ -11,13 +11,15 @@ from scipy.cluster.vq import kmeans2
 
 from sogjax.model.body import Body
 from sogjax.scene.foreground import (
-    COLOR_BINS,
+    COARSER,
     LARGEST,
     SUBJECT_UNKNOWN,
     TEMPER,
+    UNKNOWN_BACKGROUND,
     BackgroundModel,
     background_surprise,
     color_bins,
+    color_surprise,
     subject_colors,
 )
 
@@ -27,12 +29,8 @@ SLOTS = 8
 """Blobs of a cluster, at most: a colour of more blobs is several clusters, so that one program serves all actors."""
 SPARE = 4
 """Clusters beside as many as the blobs would fill."""
-PICTURE_SMOOTHING = 0.05
-"""Share of any colour in the colours of a picture whose background is not known."""
 ALIKE = 0.1
 """Difference of a channel up to which colours are taken for the same, in what speaks against a body."""
-UNKNOWN_BACKGROUND = 0.6
-"""What colours count where the background is not known, as a part of what they count where it is."""
 
 
 @dataclass(frozen=True)
@@ -124,15 +122,5 @@ def picture_surprise(
     cells: Float[Array, "camera rows columns 3"], inside: Float[Array, "camera rows columns"]
 ) -> Float[Array, "camera rows columns"]:
     """Minus the logarithm of the density of each cell's colour among those of its picture."""
-    coarse = COLOR_BINS // 2
-
-    def of_camera(colors: Float[Array, "rows columns 3"], counted: Float[Array, "rows columns"]) -> Array:
-        index = tuple(part // 2 for part in color_bins(colors))
-        table = jnp.zeros((coarse,) * 3, colors.dtype).at[index].add(counted)
-        for axis in range(3):
-            smaller, larger = jnp.roll(table, 1, axis), jnp.roll(table, -1, axis)
-            table = 0.5 * table + 0.25 * (smaller + larger)
-        density = table / jnp.maximum(jnp.sum(counted), 1.0) * coarse**3
-        return -jnp.log((1.0 - PICTURE_SMOOTHING) * density + PICTURE_SMOOTHING)[index]
-
-    return jax.vmap(of_camera)(cells, inside)
+    camera = jnp.arange(cells.shape[0])[:, None, None]
+    return color_surprise(cells, inside)[camera, *(part // COARSER for part in color_bins(cells))]

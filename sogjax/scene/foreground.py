@@ -1,5 +1,6 @@
 """Foreground against background: what the colour of a cell says about whether somebody is seen there."""
 
+from dataclasses import replace
 from typing import Any
 
 import cv2
@@ -26,6 +27,14 @@ SUBJECT_UNKNOWN = 0.3
 """Share of a subject whose colours are none of its blobs': any colour."""
 COLOR_BINS = 32
 """Bins of each channel in the table of a subject's colours."""
+COARSER = 2
+"""Those bins in which the colours of a picture are counted, in each channel."""
+PICTURE_SMOOTHING = 0.05
+"""Share of any colour in the colours of a picture whose background is not known."""
+UNKNOWN_BACKGROUND = 0.6
+"""What colours count where the background is not known, as a part of what they count where it is."""
+LARGEST_UNKNOWN = 1.0
+"""`LARGEST` there."""
 TEMPER = 0.5
 """Part of the logarithm that counts: neighbouring cells err together."""
 _LIGHT_STEPS = (0.15, 0.08, 0.05)
@@ -95,10 +104,17 @@ class BackgroundModel(eqx.Module):
     volume: Cells
     """Logarithm of the Gaussian's volume in colours."""
     known: Bool[Array, "camera rows columns"]
+    unknown: Bool[Array, "camera rows columns"]
+    """The other cells that are in the picture."""
+    elsewhere: Float[Array, "camera bin bin bin"]
+    """What `color_surprise` says of the known background: it stands for what is unknown."""
 
     def filled_by(self, other: "BackgroundModel") -> "BackgroundModel":
         """This background, with what another one of the same cells knows where this one knows nothing."""
-        return jax.tree.map(lambda own, others: jnp.where(self.known, own, others), self, other)
+        filled = jax.tree.map(
+            lambda own, others: jnp.where(self.known, own, others), *(replace(m, elsewhere=None) for m in (self, other))
+        )
+        return replace(filled, unknown=self.unknown & other.unknown, elsewhere=self.elsewhere)
 
     @classmethod
     def from_background(cls, background: BackgroundCells, shadow: float = SHADOW) -> "BackgroundModel":
@@ -108,35 +124,63 @@ class BackgroundModel(eqx.Module):
         """
         dtype = jnp.result_type(float)
         variance = jnp.maximum(jnp.asarray(background.spread, dtype), SMALLEST_SPREAD) ** 2
-        red, green, blue = (jnp.asarray(background.colors[..., k], dtype) / 255.0 for k in range(3))
-        return cls._of((red, green, blue), variance, shadow, jnp.asarray(background.known))
+        colors, known = jnp.asarray(background.colors, dtype) / 255.0, jnp.asarray(background.known)
+        red, green, blue = (colors[..., k] for k in range(3))
+        unknown = (jnp.asarray(background.spread) > 0.0) & ~known
+        elsewhere = color_surprise(colors, known.astype(dtype))
+        nothing = jnp.zeros_like(variance)
+        empty = cls((red, green, blue), nothing, nothing, nothing, known, unknown, elsewhere)
+        return empty._with_variance(variance, shadow)
 
-    @classmethod
-    def _of(
-        cls, planes: tuple[Cells, Cells, Cells], variance: Cells, shadow: float, known: Bool[Array, "..."]
-    ) -> "BackgroundModel":
-        length = sum(plane * plane for plane in planes)
+    def _with_variance(self, variance: Cells, shadow: float) -> "BackgroundModel":
+        length = sum(plane * plane for plane in self.planes)
         volume = jnp.log(_NORMAL * variance * jnp.sqrt(variance + shadow**2 * length))
-        return cls(planes, 1.0 / variance, 1.0 / (variance / shadow**2 + length), volume, known)
+        return replace(self, precision=1.0 / variance, shade=1.0 / (variance / shadow**2 + length), volume=volume)
 
     def blurred(self, spread: float) -> "BackgroundModel":
         """This background, each channel of which is known no better than to a standard deviation."""
-        return self._of(self.planes, jnp.maximum(1.0 / self.precision, spread**2), SHADOW, self.known)
+        return self._with_variance(jnp.maximum(1.0 / self.precision, spread**2), SHADOW)
 
 
 def log_odds(
     cells: Float[Array, "camera rows columns 3"], empty: BackgroundModel, subject: SubjectColors | None
 ) -> Float[Array, "camera rows columns"]:
-    """Logarithm of foreground over background, within `LARGEST`; 0 where the background is unknown.
+    """Logarithm of foreground over background, within `LARGEST`.
 
     Each is the density of the cell's colour: a place of the subject's own colours says little either way. Colours are
-    sRGB, 0 to 1; slow changes of the light are taken out first. A subject that is None may have any colours.
+    sRGB, 0 to 1; slow changes of the light are taken out first. A subject that is None may have any colours. Where the
+    background is unknown, what the picture shows elsewhere stands for it, within `LARGEST_UNKNOWN`: wood is more likely
+    the floor than a sleeve. It says nothing of a subject of any colours.
     """
     seen = [cells[..., k] for k in range(3)]
     odds = _surprise(seen, empty)
-    if subject is not None:
-        odds = odds + subject_density(cells, subject)
-    return jnp.where(empty.known, jnp.clip(TEMPER * odds, -LARGEST, LARGEST), 0.0)
+    if subject is None:
+        return jnp.where(empty.known, jnp.clip(TEMPER * odds, -LARGEST, LARGEST), 0.0)
+    density = subject_density(cells, subject)
+    index = tuple(part // COARSER for part in color_bins(cells))
+    camera = jnp.arange(cells.shape[0])[:, None, None]
+    elsewhere = TEMPER * UNKNOWN_BACKGROUND * (empty.elsewhere[camera, *index] + density)
+    unknown = jnp.where(empty.unknown, jnp.clip(elsewhere, -LARGEST_UNKNOWN, LARGEST_UNKNOWN), 0.0)
+    return jnp.where(empty.known, jnp.clip(TEMPER * (odds + density), -LARGEST, LARGEST), unknown)
+
+
+def color_surprise(
+    cells: Float[Array, "camera rows columns 3"], counted: Float[Array, "camera rows columns"]
+) -> Float[Array, "camera bin bin bin"]:
+    """Minus the logarithm of the density of colours among the cells of each picture that count; 0 if none does."""
+    coarse = COLOR_BINS // COARSER
+
+    def of_camera(colors: Float[Array, "rows columns 3"], counted: Float[Array, "rows columns"]) -> Array:
+        index = tuple(part // COARSER for part in color_bins(colors))
+        table = jnp.zeros((coarse,) * 3, colors.dtype).at[index].add(counted)
+        for axis in range(3):
+            smaller, larger = jnp.roll(table, 1, axis), jnp.roll(table, -1, axis)
+            table = 0.5 * table + 0.25 * (smaller + larger)
+        total = jnp.sum(counted)
+        density = jnp.where(total > 0.0, table / jnp.maximum(total, 1.0) * coarse**3, 1.0)
+        return -jnp.log((1.0 - PICTURE_SMOOTHING) * density + PICTURE_SMOOTHING)
+
+    return jax.vmap(of_camera)(cells, counted)
 
 
 def background_surprise(
