@@ -26,7 +26,7 @@ FREE_SPACE = 0.4
 than one that hides in the trunk."""
 SOMEBODY = 0.5
 """The odds, at most, of a cell that is not the background and has none of an actor's colours: it may be somebody else.
-With twice as much, an actor fits a bystander as well as himself."""
+With `LARGEST`, an actor fits a bystander as well as himself."""
 COVERED = 2.0
 """Density of what hides the background, as in the foreground term."""
 
