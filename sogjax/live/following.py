@@ -1,0 +1,161 @@
+"""Following the actors from set to set: tracked, lost, searched for beside, found again."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+
+from sogjax.live.searching import Found, HeldFrame, SearchBeside
+from sogjax.live.stepping import LiveStep, Moment
+from sogjax.model.body import Body, dof_slices
+from sogjax.quality.fitted import fitted_numbers
+from sogjax.quality.verdict import expected_of
+from sogjax.run.terminal import say
+from sogjax.tracking.frame import TrackedFrame
+
+DOUBTED_AFTER = 0.6
+"""Seconds for which too little of an actor must be explained before it is searched for beside the tracker."""
+GONE_AFTER = 1.0
+"""Seconds for which hardly anything must be explained before nobody is in view."""
+GONE = 0.3
+"""Part of what is expected to be explained below which nobody is there."""
+REST, LONGEST_REST = 2.0, 30.0
+"""Seconds after a search that was in vain, doubled each time up to the second."""
+
+
+@dataclass(frozen=True)
+class Solved:
+    """What was found in one set."""
+
+    tracked: TrackedFrame
+    world_from_joint: Float[np.ndarray, "joint 4 4"]
+    well: bool
+    """Whether as much as is to be expected is explained."""
+
+
+@dataclass
+class Following:
+    """The actors while sets come; times are seconds.
+
+    Args:
+        step: the tracker's step.
+        bodies: the actors, as they stand in the world.
+        search: runs beside; None: nothing is searched for.
+        start: the pose with which a replay begins, where it is known.
+    """
+
+    step: LiveStep
+    bodies: Sequence[Body]
+    search: SearchBeside | None = None
+    start: Float[np.ndarray, "dof"] | None = None
+    losses: int = 0
+    restarts: int = 0
+    report: Callable[[str], object] = field(default=say)
+
+    def __post_init__(self) -> None:
+        self._moment: Moment | None = None if self.start is None else self.step.start(self.start)
+        self._bad_since: float | None = None
+        self._gone_since: float | None = None
+        self._rest, self._not_before = REST, float("-inf")
+        self._number, self._nobody_said = -1, False
+        expected = expected_of(self.bodies)
+        bounds = fitted_numbers().verdict
+        of = lambda body: (
+            bounds.other_subject * expected[body.name] if body.name in expected else bounds.least_explained
+        )
+        self._least = np.array([of(body) for body in self.bodies])
+
+    def follow(
+        self,
+        cells: UInt8[np.ndarray, "camera rows columns 3"],
+        present: Bool[np.ndarray, "camera"],
+        exposed: float,
+        number: int | None = None,
+    ) -> Solved | None:
+        """Find the actors in a set; None: nobody is tracked.
+
+        `number` is the frame of a replay, which begins again where it falls.
+        """
+        if number is not None and number < self._number:
+            self._begin_again()
+        self._number = -1 if number is None else number
+        if self.search is not None and self.search.busy:
+            self.search.hold(HeldFrame(cells, present, exposed))
+            self._take_over(self.search.taken(), exposed)
+        if self._moment is None:
+            self._ask(exposed, "nobody is in view: searching beside" if not self._nobody_said else None)
+            self._nobody_said = True
+            return None
+        self._moment, tracked, joints = self.step(self._moment, cells, present, exposed)
+        well = self._judge(tracked, exposed)
+        return None if self._moment is None else Solved(tracked, joints, well)
+
+    def explained(self, tracked: TrackedFrame) -> Float[np.ndarray, "actor"]:
+        """The part of each actor that is explained."""
+        limbs = tracked.result.limbs
+        if limbs is None or limbs.explained is None:
+            return np.ones(len(self.bodies))
+        return np.asarray(limbs.explained, float)
+
+    def _judge(self, tracked: TrackedFrame, now: float) -> bool:
+        """Whether the actors are still there; starts a search where they are not."""
+        explained = self.explained(tracked)
+        well = bool((explained >= self._least).all())
+        gone = bool((explained < GONE * self._least).all())
+        self._bad_since = None if well else now if self._bad_since is None else self._bad_since
+        self._gone_since = None if not gone else now if self._gone_since is None else self._gone_since
+        if well:
+            self._rest = REST
+        if self._gone_since is not None and now - self._gone_since > GONE_AFTER:
+            self.losses += 1
+            self._moment, self._bad_since, self._gone_since, self._nobody_said = None, None, None, False
+            self._not_before = now
+        elif self._bad_since is not None and now - self._bad_since > DOUBTED_AFTER and now >= self._not_before:
+            told = ", ".join(
+                f"{body.name} {share:.0%}" for body, share in zip(self.bodies, explained.tolist(), strict=True)
+            )
+            if self._ask(
+                now, f"too little is explained ({told}): searching beside; is this who the actor was made of?"
+            ):
+                self.losses += 1
+        return well
+
+    def _ask(self, now: float, said: str | None) -> bool:
+        """Begin a search, unless one runs, or the last one was in vain a moment ago."""
+        if self.search is None or self.search.busy or now < self._not_before:
+            return False
+        if said is not None:
+            self.report(said)
+        self.search.begin()
+        return True
+
+    def _take_over(self, found: Found | None, now: float) -> None:
+        """Go on with what a search found, if it explains more than what is tracked."""
+        if found is None:
+            return
+        if found.moment is None or (self._moment is not None and self._bad_since is None):
+            self._not_before, self._rest = now + self._rest, min(2.0 * self._rest, LONGEST_REST)
+            return
+        self._moment, self._bad_since, self._gone_since = found.moment, None, None
+        self._not_before, self._rest = now + self._rest, min(2.0 * self._rest, LONGEST_REST)
+        self._nobody_said = False
+        self.report(f"found {', '.join(body.name for body in self.bodies)}: {found.sentence}")
+
+    def _begin_again(self) -> None:
+        """A replay has come to its end: nobody walked from there to its beginning."""
+        self.restarts += 1
+        if self.search is not None:
+            self.search.forget()
+        self._bad_since = self._gone_since = None
+        self._moment = None if self.start is None else self.step.start(self.start)
+
+
+def actor_parts(bodies: Sequence[Body]) -> list[tuple[Body, slice, slice]]:
+    """Each actor with its degrees of freedom and its joints in the pose and joints of all."""
+    parts, first = [], 0
+    for body, dofs in zip(bodies, dof_slices(bodies), strict=True):
+        stop = first + body.skeleton.num_joints
+        parts.append((body, dofs, slice(first, stop)))
+        first = stop
+    return parts

@@ -1,0 +1,178 @@
+"""The search beside the running tracker: a thread finds a pose in frames that were held, then catches up."""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from threading import Event, Lock, Thread
+from time import sleep
+
+import numpy as np
+from jaxtyping import Bool, UInt8
+
+from sogjax.errors import InputError
+from sogjax.live.stepping import LiveStep, Moment
+from sogjax.run.clip_search import NUM_FOLLOWED, SECONDS, ClipSearch, Guess, agreed, likeliest
+from sogjax.run.terminal import say
+from sogjax.search.found_pose import Path
+from sogjax.tracking.frame import FrameInput
+
+MOST_HELD = 256_000_000
+"""Bytes of cells that are held while a search goes on; beyond, every other frame is let go."""
+LIKELIEST_AFTER = 3
+"""Searches that are not sure, after which the likeliest pose is taken."""
+
+
+@dataclass(frozen=True)
+class HeldFrame:
+    """What was seen at one moment."""
+
+    cells: UInt8[np.ndarray, "camera rows columns 3"]
+    present: Bool[np.ndarray, "camera"]
+    exposed: float
+
+
+@dataclass(frozen=True)
+class Found:
+    """What came of a search."""
+
+    moment: Moment | None
+    """The tracker's memory after the last held frame; None: nobody was found."""
+    sentence: str = ""
+
+
+class SearchBeside:
+    """Searches in a thread of its own, one search at a time.
+
+    The frames since a search began are held, at most so many bytes. What was found in the first of them is tracked
+    through the others, until it has caught up with the present.
+
+    Args:
+        search: of poses in frames.
+        step: by which what was found is tracked; another one than the running tracker's, if that makes room meanwhile.
+        rest: called in the thread before it begins, such as to make it less urgent.
+    """
+
+    def __init__(self, search: ClipSearch, step: LiveStep, rest: Callable[[], object] = lambda: None) -> None:
+        self._search, self.step, self._rest = search, step, rest
+        self._held: deque[HeldFrame] = deque()
+        self._lock, self._found = Lock(), None
+        self._thread: Thread | None = None
+        self._stopped, self._every, self._place = Event(), 1, 0
+        self._unsure = 0
+        self.count = 0
+        """Searches that were begun."""
+
+    @property
+    def busy(self) -> bool:
+        """Whether one goes on, or its result was not taken yet."""
+        return self._thread is not None
+
+    def begin(self) -> None:
+        """Begin a search in the frames that are held from now on."""
+        self._held.clear()
+        self._every, self._place, self._found = 1, 0, None
+        self._stopped = Event()
+        self.count += 1
+        self._thread = Thread(target=self._run, args=(self._stopped,), name="search", daemon=True)
+        self._thread.start()
+
+    def hold(self, frame: HeldFrame) -> None:
+        """Hold a frame for the search; while memory is short only some are."""
+        with self._lock:
+            self._place += 1
+            if self._place % self._every:
+                return
+            self._held.append(frame)
+            if len(self._held) * frame.cells.nbytes > MOST_HELD:
+                self._held = deque(list(self._held)[::2])
+                self._every *= 2
+
+    def taken(self) -> Found | None:
+        """The result, once; None: there is none yet. The tracker goes on with it in this very frame's successor."""
+        with self._lock:
+            if self._found is None:
+                return None
+            found, self._found, self._thread = self._found, None, None
+            self._held.clear()
+            return found
+
+    def try_out(self, frames: list[FrameInput]) -> None:
+        """Search in frames here and now, so that everything is compiled when it matters."""
+        self._search.paths_in(frames)
+
+    def forget(self) -> None:
+        """Stop a search and drop what it held."""
+        self._stopped.set()
+        with self._lock:
+            self._held.clear()
+            self._found = self._thread = None
+
+    def close(self) -> None:
+        """Stop, and wait a little for the thread to end."""
+        thread = self._thread
+        self.forget()
+        if thread is not None:
+            thread.join(5.0)
+
+    def _run(self, stopped: Event) -> None:
+        self._rest()
+        try:
+            found = self._searched(stopped)
+        except InputError as error:
+            say(f"searching: {error}")
+            found = Found(None)
+        with self._lock:
+            if not stopped.is_set():
+                self._found = found if found is not None else Found(None)
+
+    def _searched(self, stopped: Event) -> Found | None:
+        first = self._spaced(0, stopped)
+        if first is None:
+            return None
+        paths = self._search.paths_in(first)
+        guesses = agreed(self._search.bodies, (0, NUM_FOLLOWED - 1), paths, lambda: self._second(stopped))
+        seen = [guess for guess in guesses if all(pose.energy > 0.0 for pose in guess.poses)]
+        if not seen:
+            return Found(None)
+        best = likeliest(seen)
+        sure, shown = best.sure, f"{100.0 * best.confidence:.0f} %"
+        if not sure:
+            self._unsure += 1
+            if self._unsure < LIKELIEST_AFTER:
+                return Found(None)
+        self._unsure = 0
+        moment = self._caught_up(best, stopped)
+        return None if moment is None else Found(moment, f"{'sure' if sure else 'not sure'} ({shown})")
+
+    def _second(self, stopped: Event) -> list[Path] | None:
+        """A search that is to agree with the first one, beginning with its last frame; None: it was stopped."""
+        later = self._spaced(NUM_FOLLOWED - 1, stopped)
+        return None if later is None else self._search.paths_in(later)
+
+    def _spaced(self, skipped: int, stopped: Event) -> list[FrameInput] | None:
+        """Frames of the first search's spacing in time, waited for; None: the search was stopped."""
+        while not stopped.is_set():
+            with self._lock:
+                held = list(self._held)
+            if held and held[-1].exposed - held[0].exposed >= (skipped + NUM_FOLLOWED - 1) * SECONDS:
+                times = np.array([frame.exposed for frame in held])
+                wanted = times[0] + SECONDS * np.arange(skipped, skipped + NUM_FOLLOWED)
+                chosen = [held[int(np.abs(times - time).argmin())] for time in wanted]
+                return [FrameInput(frame.cells, frame.present) for frame in chosen]
+            sleep(0.02)
+        return None
+
+    def _caught_up(self, guess: Guess, stopped: Event) -> Moment | None:
+        """What was found, tracked through the held frames up to the present; None: the search was stopped."""
+        moment = self.step.start(np.concatenate([np.asarray(each.pose) for each in guess.poses]))
+        with self._lock:
+            done = self._held[0].exposed + (guess.frame - 0.5) * SECONDS
+        while not stopped.is_set():
+            with self._lock:
+                while self._held and self._held[0].exposed <= done:
+                    self._held.popleft()
+                if not self._held:
+                    return moment
+                frame = self._held[0]
+            moment, done = self.step(moment, frame.cells, frame.present, frame.exposed)[0], frame.exposed
+        return None

@@ -1,0 +1,199 @@
+"""A live session: cameras, slot, tracker and outlets tied together, from the first picture to the figures."""
+
+import os
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from sogjax.live.assembler import GIVEN_UP, Assembler
+from sogjax.live.camera_threads import CameraThreads
+from sogjax.live.figures import Figures, Stamps
+from sogjax.live.following import Following, Solved, actor_parts
+from sogjax.live.json_lines import Publisher
+from sogjax.live.outlet import Outlet
+from sogjax.live.pictures import Camera, FrameSet
+from sogjax.live.recorder import MotionRecorder, VideoRecorder
+from sogjax.live.slot import Slot
+from sogjax.live.state import ActorState, LiveState
+from sogjax.run.setup import Setup
+from sogjax.run.terminal import say
+from sogjax.scene.cells import stack_shape
+
+PUBLISHED_BEHIND, RECORDED_BEHIND = 4, 512
+"""States that wait for publishers, and for the disk, at most."""
+TOLD_EVERY = 10.0
+"""Seconds from one line on the terminal to the next."""
+SILENT = 2.0
+"""Seconds without any picture after which that is said."""
+
+
+@dataclass
+class Session:
+    """What a live session is made of; `states` runs it.
+
+    Its memory does not grow: all between the threads has a size, and the motion goes to the disk.
+    """
+
+    setup: Setup
+    cameras: Sequence[Camera]
+    following: Following
+    period: float
+    """Seconds from one frame to the next."""
+    first: int = 0
+    """The number of the first frame."""
+    wait: float = 0.5
+    begin: Callable[[], object] = lambda: None
+    """Lets the cameras begin, where they do not by themselves."""
+    publishers: dict[str, Publisher] = field(default_factory=dict)
+    slow_publishers: dict[str, Publisher] = field(default_factory=dict)
+    """Those that may take longer than a frame, each in a thread of its own."""
+    motion: MotionRecorder | None = None
+    videos: VideoRecorder | None = None
+    seconds: float | None = None
+    """How long it takes; None: until it is stopped, or the cameras end."""
+    figures: Figures = field(default_factory=Figures)
+
+    def __post_init__(self) -> None:
+        self.slot = Slot(Assembler(len(self.cameras), self.period), self._on_set)
+        self._parts = actor_parts(self.setup.bodies)
+        self._began: float | None = None
+        self._last_exposed = 0.0
+        self._frame = self.first - 1
+        self._given_up: frozenset[int] = frozenset()
+        self._outlets: list[Outlet[Any]] = []
+        self._took = 0.0
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The cameras."""
+        return self.setup.clip.recording.rig.names
+
+    def states(self) -> Iterator[LiveState]:
+        """The actors from moment to moment, until the cameras end or the iterator is closed.
+
+        Raises:
+            InputError: the cameras cannot go on.
+        """
+        self.slot.assembler.wait = self.wait
+        recording = self.setup.clip.recording
+        gains = [recording.color_gains.get(name) for name in self.names]
+        with ExitStack() as stack:
+            self._outlets = [stack.enter_context(outlet) for outlet in self._made_outlets()]
+            for publisher in (*self.publishers.values(), *self.slow_publishers.values()):
+                stack.callback(publisher.close)
+            if self.following.search is not None:
+                stack.callback(self.following.search.close)
+            if self.videos is not None:
+                stack.enter_context(self.videos)
+            keeps = lambda: self.videos is not None
+            stack.enter_context(CameraThreads(self.cameras, self.setup.clip.grids, self.slot, gains, keeps))
+            self.begin()
+            yield from self._solved_sets()
+
+    def report(self) -> dict[str, Any]:
+        """All figures, for `live.json`."""
+        assembler, names = self.slot.assembler, self.names
+        by_camera = lambda counts: {name: counts[k] for k, name in enumerate(names)}
+        slowest = max(range(len(names)), key=lambda k: (assembler.missing[k], assembler.last[k]))
+        dropped = {outlet.name: outlet.dropped for outlet in self._outlets}
+        found = self.figures.as_dict(self._took) | {
+            "sets": self.slot.handed_over,
+            "lost": {
+                "late_or_missing_pictures": by_camera(assembler.missing),
+                "of_these_late": by_camera(assembler.late),
+                "overwritten_sets": self.slot.overwritten,
+                "unsolved_sets": self.figures.unsolved,
+                "not_passed_on": dropped,
+            },
+            "last_to_arrive": by_camera(assembler.last),
+            "slowest_camera": names[slowest],
+            "restarts": self.following.restarts,
+            "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+        }
+        found["losses"] = self.following.losses
+        found["searches"] = 0 if self.following.search is None else self.following.search.count
+        return found
+
+    def _made_outlets(self) -> list[Outlet[Any]]:
+        made: list[Outlet[Any]] = [Outlet("publisher", self._publish, PUBLISHED_BEHIND)]
+        made += [Outlet(name, each.send, 1) for name, each in self.slow_publishers.items()]
+        if self.motion is not None:
+            made.append(Outlet("motion", self.motion.take, RECORDED_BEHIND))
+        return made
+
+    def _publish(self, state: LiveState) -> None:
+        for each in self.publishers.values():
+            each.send(state)
+        stamps = state.stamps
+        sent = Stamps(stamps.exposed, stamps.arrived, stamps.handed_over, stamps.begun, stamps.solved, time.monotonic())
+        self.figures.add(sent, state.tracked_frame is not None)
+
+    def _solved_sets(self) -> Iterator[LiveState]:
+        begin = told = heard = time.monotonic()
+        silence_said = False
+        try:
+            while self.seconds is None or time.monotonic() - begin < self.seconds:
+                found = self.slot.take(0.2)
+                now = time.monotonic()
+                if found is None:
+                    if self.slot.ended:
+                        break
+                    if now - heard > SILENT and not silence_said:
+                        say(f"no camera has given a picture for {SILENT:g} s; waiting")
+                        silence_said = True
+                    continue
+                heard, silence_said = now, False
+                state = self._solved(found, now)
+                for outlet in self._outlets:
+                    outlet.put(state)
+                self._say_cameras()
+                if now - told >= TOLD_EVERY:
+                    told = now
+                    say(self.figures.line(self.slot.overwritten))
+                yield state
+        finally:
+            self._took = time.monotonic() - begin
+
+    def _solved(self, found: FrameSet, begun: float) -> LiveState:
+        grids = self.setup.clip.grids
+        cells, present = found.stacked(len(grids), stack_shape(grids))
+        solved = self.following.follow(cells, present, found.exposed, found.number)
+        frame = self._frame_of(found.exposed)
+        stamps = Stamps(found.exposed, found.arrived, found.handed_over, begun, time.monotonic(), time.monotonic())
+        actors = () if solved is None else self._actors(solved)
+        tracked = None if solved is None else solved.tracked
+        return LiveState(frame, stamps, tuple(present.tolist()), actors, tracked)
+
+    def _actors(self, solved: Solved) -> tuple[ActorState, ...]:
+        limbs, explained = solved.tracked.result.limbs, self.following.explained(solved.tracked)
+        doubt = np.zeros(0) if limbs is None else np.asarray(limbs.error_probability)
+        pose = np.asarray(solved.tracked.result.pose)
+        return tuple(
+            ActorState(body.name, solved.well, pose[dofs], solved.world_from_joint[joints], float(share), doubt)
+            for (body, dofs, joints), share in zip(self._parts, explained, strict=True)
+        )
+
+    def _frame_of(self, exposed: float) -> int:
+        """The number of the frame that was taken at a time: they never fall, nor stay."""
+        self._began = exposed if self._began is None else self._began
+        self._frame = max(self.first + round((exposed - self._began) / self.period), self._frame + 1)
+        return self._frame
+
+    def _on_set(self, found: FrameSet) -> None:
+        if self.videos is not None:
+            self.videos.put(found)
+
+    def _say_cameras(self) -> None:
+        """Tell which cameras are not waited for any more, and which are back."""
+        now = self.slot.assembler.given_up
+        for camera in sorted(now - self._given_up):
+            late = self.slot.assembler.late[camera]
+            why = "its pictures come too late" if late >= GIVEN_UP else "it gives no pictures"
+            say(f"camera {self.names[camera]}: {why}; it does not count until it is in time again")
+        for camera in sorted(self._given_up - now):
+            say(f"camera {self.names[camera]}: is in time again")
+        self._given_up = now
