@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from sogjax.io.files import write_json
-from sogjax.live.learn_background import learn_place
-from sogjax.live.session import Session
-from sogjax.live.start import actors_of, checked, recording_of, session_of
+from sogjax.realtime.learn_background import learn_place
+from sogjax.realtime.session import Session
+from sogjax.realtime.start import actors_of, checked, recording_of, session_of
 from sogjax.run.run_files import LIVE, MOTION
 from sogjax.run.run_folder import free_path
 from sogjax.run.terminal import say

@@ -4,8 +4,8 @@ import time
 from collections.abc import Callable
 from threading import Condition
 
-from sogjax.live.assembler import Assembler
-from sogjax.live.pictures import FrameSet, Seen
+from sogjax.realtime.assembler import Assembler
+from sogjax.realtime.pictures import FrameSet, Seen
 
 
 class Slot:

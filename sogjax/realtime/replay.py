@@ -12,7 +12,7 @@ import numpy as np
 from sogjax.errors import InputError
 from sogjax.io.recording import Recording
 from sogjax.io.video import read_prepared
-from sogjax.live.pictures import Picture, Taken
+from sogjax.realtime.pictures import Picture, Taken
 from sogjax.run.recordings import with_cameras
 from sogjax.settings.live import FaultsConfig
 

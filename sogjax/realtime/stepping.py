@@ -17,7 +17,7 @@ from sogjax.tracking.tracker import Tracker
 LONGEST_PAUSE = 3.0
 """A motion goes on for so many of its last steps at most, where no pictures came for longer."""
 ROOM = 2
-"""Times the room that suits the first frame: to make more takes seconds."""
+"""Times the usual room that is kept ready."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,8 @@ class LiveStep:
 
     tracker: Tracker
     capacities: Capacities | None = None
+    spare: Capacities | None = None
+    """Room for a frame that needs more; compiled beforehand, as making more takes seconds."""
 
     def start(self, pose: Float[np.ndarray | Array, "dof"]) -> Moment:
         """Before the first frame, from a rough pose of it."""
@@ -61,7 +63,8 @@ class LiveStep:
         step = None if moment.exposed is None else exposed - moment.exposed
         ratio = 1.0 if step is None or not moment.step else min(max(step / moment.step, 0.0), LONGEST_PAUSE)
         if self.capacities is None:
-            self.capacities = _more(first_capacities(self.tracker, moment.state, frame))
+            self.capacities = first_capacities(self.tracker, moment.state, frame)
+            self.spare = _more(self.capacities)
         while True:
             used = self.capacities
             state, result, joints = _step(self.tracker, moment.state, frame, jnp.asarray(ratio, jnp.float32), used)
@@ -69,10 +72,16 @@ class LiveStep:
             near, matching = int(found.num_near.max()), int(found.num_matching.max())
             if used.hold(near, matching, int(found.num_blocks)):
                 break
-            self.capacities = larger_capacities(used, near, matching, int(found.num_blocks))
-            say("more is seen than ever before: the tracker makes room, which takes some seconds")
+            self._make_room(used, near, matching, int(found.num_blocks))
         tracked = TrackedFrame(0, found, used, self.tracker.reader.color_space, time.perf_counter() - begin)
         return Moment(state, exposed, step), tracked, world_from_joint
+
+    def _make_room(self, used: Capacities, near: int, matching: int, blocks: int) -> None:
+        if self.spare is not None and self.spare != used and self.spare.hold(near, matching, blocks):
+            self.capacities = self.spare
+            return
+        say("more is seen than ever before: the tracker makes room, which takes some seconds")
+        self.capacities = larger_capacities(used, near, matching, blocks)
 
 
 @eqx.filter_jit

@@ -17,10 +17,10 @@ from sogjax.io.motion import FRAMES_AT_ONCE
 from sogjax.io.recording import Recording
 from sogjax.io.recording_files import BACKGROUND, SETTINGS, VIDEOS
 from sogjax.io.video import VideoWriter
-from sogjax.live.pictures import FrameSet, Picture
-from sogjax.live.state import LiveState
 from sogjax.model.body import Body
 from sogjax.model.yuv_picture import YuvPicture
+from sogjax.realtime.pictures import FrameSet, Picture
+from sogjax.realtime.state import LiveState
 from sogjax.run.frames import rows_of
 from sogjax.run.run_files import MOTION
 from sogjax.run.terminal import say

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 
 from sogjax.errors import InputError
-from sogjax.live.stepping import LiveStep, Moment
+from sogjax.realtime.stepping import LiveStep, Moment
 from sogjax.run.clip_search import NUM_FOLLOWED, SECONDS, ClipSearch, Guess, agreed, likeliest
 from sogjax.run.terminal import say
 from sogjax.search.found_pose import Path

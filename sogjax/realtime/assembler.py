@@ -6,7 +6,7 @@ It knows no clock and no threads: whoever calls it says what time it is.
 from collections import Counter, deque
 from dataclasses import dataclass, field
 
-from sogjax.live.pictures import FrameSet, Seen
+from sogjax.realtime.pictures import FrameSet, Seen
 
 GIVEN_UP = 10
 """Sets in a row without a camera, after which it is not waited for any more."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
-from sogjax.live.figures import Stamps
+from sogjax.realtime.figures import Stamps
 from sogjax.tracking.frame import TrackedFrame
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import cv2
 
 from sogjax.errors import InputError
-from sogjax.live.pictures import Taken
+from sogjax.realtime.pictures import Taken
 from sogjax.run.terminal import say
 
 TRIED_AGAIN = 2.0

@@ -17,17 +17,19 @@ from sogjax.io.image_file import read_image
 from sogjax.io.recording import Recording, open_place
 from sogjax.io.recording_files import IMAGES, SYNCHRONIZED, VIDEOS
 from sogjax.io.source import videos_in
-from sogjax.live.following import Following
-from sogjax.live.json_lines import JsonLines, Publisher
-from sogjax.live.opened_camera import OpenedCamera, checked_sources
-from sogjax.live.recorder import MotionRecorder, VideoRecorder
-from sogjax.live.replay import replay_cameras
-from sogjax.live.searching import SearchBeside
-from sogjax.live.session import Session
-from sogjax.live.stepping import LiveStep
-from sogjax.live.vmc import Vmc
-from sogjax.live.warm_up import drawn_frame, warm_up, warm_up_step
 from sogjax.model.body import Body
+from sogjax.realtime.following import Following
+from sogjax.realtime.json_lines import JsonLines, Publisher
+from sogjax.realtime.lab_stream import LabStream
+from sogjax.realtime.opened_camera import OpenedCamera, checked_sources
+from sogjax.realtime.recorder import MotionRecorder, VideoRecorder
+from sogjax.realtime.replay import replay_cameras
+from sogjax.realtime.rerun_live import RerunLive
+from sogjax.realtime.searching import SearchBeside
+from sogjax.realtime.session import Publishers, Session
+from sogjax.realtime.stepping import LiveStep
+from sogjax.realtime.vmc import Vmc
+from sogjax.realtime.warm_up import drawn_frame, warm_up, warm_up_step
 from sogjax.run import build
 from sogjax.run.actors import Actors
 from sogjax.run.background import Background, learn_background
@@ -56,6 +58,7 @@ def checked(config: LiveConfig) -> None:
     """
     build.check(track_settings_of(config))
     build.at_least("wait", config.wait, 0.0)
+    build.at_least("speed", config.speed, 0.01)
     if config.seconds is not None:
         build.at_least("seconds", config.seconds, 0.0)
     if config.fps is not None:
@@ -131,7 +134,8 @@ def _replayed(recording: Recording, actors: Sequence[Body], config: LiveConfig, 
     run_passes(run, [each for each in BEFORE_TRACKING if not config.search or each.name != "initial_pose"])
     pose = None if config.search else np.asarray(run.initial_pose.pose)
     first = recording.first_frame if config.search else run.initial_pose.frame
-    publishers = publishers_of(run.setup, config)
+    period = 1.0 / (recording.fps * config.speed)
+    publishers = publishers_of(run.setup, config, period)
     cameras, beginning = replay_cameras(recording, config.faults, first, config.speed, config.loop)
     following = _following(run.setup, run.background, settings, terms, pose)
     seen = next(clip.frames(first, first + 1))
@@ -139,8 +143,7 @@ def _replayed(recording: Recording, actors: Sequence[Body], config: LiveConfig, 
         warm_up(following, drawn_frame(run.setup, run.background))
     else:
         warm_up_step(following, seen, run.initial_pose.pose)
-    period = 1.0 / (recording.fps * config.speed)
-    return Session(run.setup, cameras, following, period, first, begin=beginning.now, **publishers)
+    return Session(run.setup, cameras, following, period, first, begin=beginning.now, publishers=publishers)
 
 
 def _from_cameras(recording: Recording, actors: Sequence[Body], config: LiveConfig, terms: Sequence[Term]) -> Session:
@@ -149,14 +152,14 @@ def _from_cameras(recording: Recording, actors: Sequence[Body], config: LiveConf
     try:
         background = background_of(recording, config)
         setup = tracking_setup(Clip(recording, range(0), config.images.depth), background, actors, settings, terms)
-        publishers = publishers_of(setup, config)
+        publishers = publishers_of(setup, config, 1.0 / recording.fps)
         following = _following(setup, background, settings, terms, None)
         warm_up(following, drawn_frame(setup, background))
     except BaseException:
         for camera in cameras:
             camera.release()
         raise
-    return Session(setup, cameras, following, 1.0 / recording.fps, **publishers)
+    return Session(setup, cameras, following, 1.0 / recording.fps, publishers=publishers)
 
 
 def opened_cameras(recording: Recording, sources: Any) -> list[OpenedCamera]:
@@ -197,7 +200,7 @@ def background_of(recording: Recording, config: LiveConfig) -> Background:
     return Background(tuple(of(name) for name in recording.rig.names))
 
 
-def publishers_of(setup: Setup, config: LiveConfig) -> dict[str, dict[str, Publisher]]:
+def publishers_of(setup: Setup, config: LiveConfig, period: float) -> Publishers:
     """Who is told: those that are quick, and those that take longer.
 
     Raises:
@@ -210,7 +213,11 @@ def publishers_of(setup: Setup, config: LiveConfig) -> dict[str, dict[str, Publi
         quick["vmc"] = Vmc(config.vmc, setup.bodies, recording.up)
     if config.json is not None:
         quick["json"] = JsonLines(config.json, setup.bodies, recording.rig.names)
-    return {"publishers": quick, "slow_publishers": slow}
+    if config.lsl is not None:
+        quick["lsl"] = LabStream(config.lsl, setup.bodies, 1.0 / period)
+    if config.rerun is not None:
+        slow["rerun"] = RerunLive(config.rerun, recording, setup.bodies)
+    return Publishers(quick, slow)
 
 
 def _following(

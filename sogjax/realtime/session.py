@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from sogjax.live.assembler import GIVEN_UP, Assembler
-from sogjax.live.camera_threads import CameraThreads
-from sogjax.live.figures import Figures, Stamps
-from sogjax.live.following import Following, Solved, actor_parts
-from sogjax.live.json_lines import Publisher
-from sogjax.live.outlet import Outlet
-from sogjax.live.pictures import Camera, FrameSet
-from sogjax.live.recorder import MotionRecorder, VideoRecorder
-from sogjax.live.slot import Slot
-from sogjax.live.state import ActorState, LiveState
+from sogjax.realtime.assembler import GIVEN_UP, Assembler
+from sogjax.realtime.camera_threads import CameraThreads
+from sogjax.realtime.figures import Figures, Stamps
+from sogjax.realtime.following import Following, Solved, actor_parts
+from sogjax.realtime.json_lines import Publisher
+from sogjax.realtime.outlet import Outlet
+from sogjax.realtime.pictures import Camera, FrameSet
+from sogjax.realtime.recorder import MotionRecorder, VideoRecorder
+from sogjax.realtime.slot import Slot
+from sogjax.realtime.state import ActorState, LiveState
 from sogjax.run.setup import Setup
 from sogjax.run.terminal import say
 from sogjax.scene.cells import stack_shape
@@ -29,6 +29,16 @@ TOLD_EVERY = 10.0
 """Seconds from one line on the terminal to the next."""
 SILENT = 2.0
 """Seconds without any picture after which that is said."""
+
+
+@dataclass(frozen=True)
+class Publishers:
+    """Who is told, by name."""
+
+    quick: dict[str, Publisher]
+    """One after the other, in one thread."""
+    slow: dict[str, Publisher]
+    """Those that may take longer than a frame, each in a thread of its own."""
 
 
 @dataclass
@@ -48,9 +58,7 @@ class Session:
     wait: float = 0.5
     begin: Callable[[], object] = lambda: None
     """Lets the cameras begin, where they do not by themselves."""
-    publishers: dict[str, Publisher] = field(default_factory=dict)
-    slow_publishers: dict[str, Publisher] = field(default_factory=dict)
-    """Those that may take longer than a frame, each in a thread of its own."""
+    publishers: Publishers = field(default_factory=lambda: Publishers({}, {}))
     motion: MotionRecorder | None = None
     videos: VideoRecorder | None = None
     seconds: float | None = None
@@ -83,7 +91,7 @@ class Session:
         gains = [recording.color_gains.get(name) for name in self.names]
         with ExitStack() as stack:
             self._outlets = [stack.enter_context(outlet) for outlet in self._made_outlets()]
-            for publisher in (*self.publishers.values(), *self.slow_publishers.values()):
+            for publisher in (*self.publishers.quick.values(), *self.publishers.slow.values()):
                 stack.callback(publisher.close)
             if self.following.search is not None:
                 stack.callback(self.following.search.close)
@@ -120,13 +128,13 @@ class Session:
 
     def _made_outlets(self) -> list[Outlet[Any]]:
         made: list[Outlet[Any]] = [Outlet("publisher", self._publish, PUBLISHED_BEHIND)]
-        made += [Outlet(name, each.send, 1) for name, each in self.slow_publishers.items()]
+        made += [Outlet(name, each.send, 1) for name, each in self.publishers.slow.items()]
         if self.motion is not None:
             made.append(Outlet("motion", self.motion.take, RECORDED_BEHIND))
         return made
 
     def _publish(self, state: LiveState) -> None:
-        for each in self.publishers.values():
+        for each in self.publishers.quick.values():
             each.send(state)
         stamps = state.stamps
         sent = Stamps(stamps.exposed, stamps.arrived, stamps.handed_over, stamps.begun, stamps.solved, time.monotonic())

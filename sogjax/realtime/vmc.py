@@ -15,10 +15,10 @@ from pythonosc.osc_message_builder import OscMessageBuilder
 from scipy.spatial.transform import Rotation
 
 from sogjax.errors import InputError
-from sogjax.live.addresses import Address, Datagrams
-from sogjax.live.state import ActorState, LiveState
 from sogjax.model.body import Body
 from sogjax.model.rotation import world_from_upright
+from sogjax.realtime.addresses import Address, Datagrams
+from sogjax.realtime.state import ActorState, LiveState
 
 PORT = 39539
 LARGEST = 1500

@@ -2,12 +2,14 @@
 
 import cv2
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from sogjax.live.following import Following
 from sogjax.model.body import Body
 from sogjax.model.camera import project
+from sogjax.realtime.following import Following
+from sogjax.realtime.stepping import LiveStep
 from sogjax.run.background import Background
 from sogjax.run.clip_search import NUM_FOLLOWED
 from sogjax.run.setup import Setup
@@ -67,15 +69,16 @@ def warm_up_step(following: Following, frame: FrameInput, pose: Float[np.ndarray
     cells, step = np.asarray(frame.cells), following.step
     present = np.ones(len(cells), bool)
     moment = step.start(np.asarray(pose))
-    for number in range(3):
+    for number in range(2):
         moment = step(moment, cells, present, float(number))[0]
+    LiveStep(step.tracker, step.spare)(moment, cells, present, 2.0)
     if following.search is not None:
-        following.search.step.capacities = step.capacities
+        following.search.step.capacities, following.search.step.spare = step.capacities, step.spare
 
 
 def _draw(cells: np.ndarray, setup: Setup, body: Body, pose: Float[np.ndarray, "dof"]) -> None:
     """Draw a body's blobs over the cells of all cameras, the far ones first."""
-    blobs = body.posed_blobs(pose)
+    blobs = body.posed_blobs(jnp.asarray(pose))
     colors = np.rint(255.0 * np.asarray(body.blob_colors)).astype(int)
     for k, grid in enumerate(setup.clip.grids):
         camera = jax.tree.map(lambda leaf, k=k: leaf[k], setup.tracker.cameras)

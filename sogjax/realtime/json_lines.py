@@ -7,9 +7,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from sogjax.live.addresses import Address, Datagrams
-from sogjax.live.state import ActorState, LiveState
 from sogjax.model.body import Body
+from sogjax.realtime.addresses import Address, Datagrams
+from sogjax.realtime.state import ActorState, LiveState
 
 VERSION = 1
 PORT = 39540

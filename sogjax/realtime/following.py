@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from sogjax.live.searching import Found, HeldFrame, SearchBeside
-from sogjax.live.stepping import LiveStep, Moment
 from sogjax.model.body import Body, dof_slices
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.verdict import expected_of
+from sogjax.realtime.searching import Found, HeldFrame, SearchBeside
+from sogjax.realtime.stepping import LiveStep, Moment
 from sogjax.run.terminal import say
 from sogjax.tracking.frame import TrackedFrame
 

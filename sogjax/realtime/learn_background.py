@@ -9,8 +9,8 @@ from sogjax.errors import InputError
 from sogjax.io.image_file import write_image
 from sogjax.io.recording import Recording
 from sogjax.io.recording_files import BACKGROUND
-from sogjax.live.opened_camera import OpenedCamera
-from sogjax.live.start import opened_cameras
+from sogjax.realtime.opened_camera import OpenedCamera
+from sogjax.realtime.start import opened_cameras
 from sogjax.run.terminal import say
 from sogjax.settings.live import LiveConfig
 

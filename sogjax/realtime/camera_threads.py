@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 from threading import Lock, Thread
 
 from sogjax.io.image_file import ColorGains, evened
-from sogjax.live.pictures import Camera, Picture, Seen
-from sogjax.live.slot import Slot
 from sogjax.model.yuv_picture import YuvPicture
+from sogjax.realtime.pictures import Camera, Picture, Seen
+from sogjax.realtime.slot import Slot
 from sogjax.scene.cells import CellGrid, padded_cells, stack_shape
 
 
