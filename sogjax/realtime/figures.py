@@ -32,7 +32,7 @@ class Durations:
         """How many were counted."""
         return int(self.counts.sum())
 
-    def percentile(self, percent: float) -> float:
+    def percentile(self, percent: float | int) -> float:
         """What so many percent are not longer than, in seconds; 0 where none was counted."""
         if not self.number:
             return 0.0

@@ -183,8 +183,8 @@ class _CameraVideo:
                         continue
                     if item is not None:
                         last = np.asarray(item.bgr() if isinstance(item, YuvPicture) else item)
-                    for _ in range(before + 1):
-                        writer.write(last)
+                    for _ in range(before + 1 if last is not None else 0):
+                        writer.write(np.asarray(last))
                         self._count += 1
                     before = 0
                 if not self._count:

@@ -7,6 +7,7 @@ left and z up. So (x, y, z) becomes (-y, z, x).
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
@@ -48,7 +49,7 @@ BONES: tuple[tuple[str, str | None, str], ...] = _TRUNK + tuple(
 )
 """Unity's bones that are tracked, the bone above each, and what the names of its joints begin with; the last of these
 turns with all of them. The upper chest stays as it is, since many avatars have none."""
-_PLACED = {"UpperArm": "shoulder_"}
+_PLACED = {"UpperArm": "shoulder_", "LowerArm": "elbow"}
 """Bones that begin at other joints than those that turn them."""
 _FINGERS = {"Thumb": 0.03, "Index": 0.025, "Middle": 0.005, "Ring": -0.015, "Little": -0.03}
 """How far forward of the middle of the hand a finger begins; metres."""
@@ -106,7 +107,7 @@ class Avatar:
             )
         bones = tuple(_bones(body))
         turn = UNITY_FROM_UPRIGHT @ world_from_upright(up).T
-        frames = np.asarray(body.skeleton.world_from_joint(body.poses["tpose"]), float)
+        frames = np.asarray(body.skeleton.world_from_joint(jnp.asarray(body.poses["tpose"])), float)
         origins = frames[[bone.begins for bone in bones], :3, 3] @ turn.T
         above = np.array([bone.above for bone in bones])
         offsets = origins - np.where(above[:, None] < 0, 0.0, origins[above])
