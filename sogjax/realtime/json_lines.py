@@ -3,7 +3,7 @@
 import json
 import sys
 import time
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -16,6 +16,7 @@ PORT = 39540
 """Where lines are sent unless told otherwise."""
 
 
+@runtime_checkable
 class Publisher(Protocol):
     """Passes states on."""
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import UInt8
@@ -25,6 +25,7 @@ class Taken:
     """The frame of a replayed recording."""
 
 
+@runtime_checkable
 class Camera(Protocol):
     """Gives the pictures of one camera as they come; used by one thread."""
 

@@ -35,7 +35,7 @@ from sogjax.run.actors import Actors
 from sogjax.run.background import Background, learn_background
 from sogjax.run.clip import Clip
 from sogjax.run.clip_search import ClipSearch
-from sogjax.run.passes import BEFORE_TRACKING
+from sogjax.run.passes import PASSES
 from sogjax.run.recordings import body_named, file_list, opened, with_cameras
 from sogjax.run.run import Run
 from sogjax.run.runner import run_passes
@@ -48,6 +48,10 @@ from sogjax.settings.run import TrackConfig
 
 USUAL_RATE = 30.0
 """Pictures per second of cameras of which nothing is known."""
+UP_TO_TRACKING = PASSES[: [each.name for each in PASSES].index("tracked")]
+"""The passes of a replay before it begins: its place is then as well known as to a run over the recording."""
+FROM_THE_POSE = ("initial_pose", "relearnt", "keypoint_bias")
+"""Those of them that need a first pose."""
 
 
 def checked(config: LiveConfig) -> None:
@@ -131,7 +135,7 @@ def _replayed(recording: Recording, actors: Sequence[Body], config: LiveConfig, 
     settings = track_settings_of(config)
     clip = Clip(recording, recording.frames, config.images.depth)
     run = Run(clip, settings, terms=terms, records={"actors": Actors(tuple(actors))})
-    run_passes(run, [each for each in BEFORE_TRACKING if not config.search or each.name != "initial_pose"])
+    run_passes(run, [each for each in UP_TO_TRACKING if not config.search or each.name not in FROM_THE_POSE])
     pose = None if config.search else np.asarray(run.initial_pose.pose)
     first = recording.first_frame if config.search else run.initial_pose.frame
     period = 1.0 / (recording.fps * config.speed)
