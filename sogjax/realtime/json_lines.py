@@ -12,7 +12,7 @@ from sogjax.realtime.addresses import Address, Datagrams
 from sogjax.realtime.state import ActorState, LiveState
 
 VERSION = 1
-PORT = 39540
+PORT = 39550
 """Where lines are sent unless told otherwise."""
 
 
