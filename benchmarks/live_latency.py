@@ -73,7 +73,8 @@ def row(recording: Recording, count: int, settings: Settings) -> str:
     latency, (width, height) = found["latency_ms"], fewer.rig.image_size(names[0])
     share = found["lost"]["overwritten_sets"] / max(found["sets"], 1)
     times = " | ".join(f"{latency[key]:.0f}" for key in ("p50", "p95", "p99", "max"))
-    return f"| {count} | {width}x{height} | {recording.fps:.0f} | {found['poses_per_second']:.1f} | {times} | {share:.0%} |"
+    cells = (f"{count}", f"{width}x{height}", f"{recording.fps:.0f}", f"{found['poses_per_second']:.1f}", times)
+    return f"| {' | '.join(cells)} | {share:.0%} |"
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Sequence
+from importlib import import_module
 
 import numpy as np
 
@@ -22,7 +23,7 @@ class LabStream:
 
     def __init__(self, name: str, bodies: Sequence[Body], rate: float) -> None:
         try:
-            import pylsl
+            pylsl = import_module("pylsl")
         except (ImportError, RuntimeError) as error:
             raise InputError(f"lsl={name}: needs the extra lsl; pip install 'sogjax[lsl]'") from error
         self._clock, self._sizes = pylsl.local_clock, [body.skeleton.num_joints for body in bodies]
