@@ -58,7 +58,7 @@ class Following:
         self._bad_since: float | None = None
         self._gone_since: float | None = None
         self._rest, self._not_before = REST, float("-inf")
-        self._number, self._nobody_said = -1, False
+        self._number, self._nobody_said, self._lost = -1, False, False
         expected = expected_of(self.bodies)
         bounds = fitted_numbers().verdict
         of = lambda body: (
@@ -106,9 +106,9 @@ class Following:
         self._bad_since = None if well else now if self._bad_since is None else self._bad_since
         self._gone_since = None if not gone else now if self._gone_since is None else self._gone_since
         if well:
-            self._rest = REST
+            self._rest, self._lost = REST, False
         if self._gone_since is not None and now - self._gone_since > GONE_AFTER:
-            self.losses += 1
+            self._note_loss()
             self._moment, self._bad_since, self._gone_since, self._nobody_said = None, None, None, False
             self._not_before = now
         elif self._bad_since is not None and now - self._bad_since > DOUBTED_AFTER and now >= self._not_before:

@@ -1,17 +1,19 @@
 """The search beside the running tracker: a thread finds a pose in frames that were held, then catches up."""
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from threading import Event, Lock, Thread
 from time import sleep
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, UInt8
 
 from sogjax.errors import InputError
+from sogjax.model.body import Body
 from sogjax.realtime.stepping import LiveStep, Moment
-from sogjax.run.clip_search import NUM_FOLLOWED, SECONDS, ClipSearch, Guess, agreed, likeliest
+from sogjax.run.clip_search import NUM_FOLLOWED, SECONDS, Guess, agreed, likeliest
 from sogjax.run.terminal import say
 from sogjax.search.found_pose import Path
 from sogjax.tracking.frame import FrameInput
@@ -40,6 +42,20 @@ class Found:
     sentence: str = ""
 
 
+@runtime_checkable
+class FindsPoses(Protocol):
+    """Searches frames for bodies; a `ClipSearch` does."""
+
+    @property
+    def bodies(self) -> Sequence[Body]:
+        """Who is searched for."""
+        ...
+
+    def paths_in(self, frames: Sequence[FrameInput]) -> list[Path]:
+        """The best poses of all actors in the first of some frames and in the others."""
+        ...
+
+
 class SearchBeside:
     """Searches in a thread of its own, one search at a time.
 
@@ -52,7 +68,7 @@ class SearchBeside:
         rest: called in the thread before it begins, such as to make it less urgent.
     """
 
-    def __init__(self, search: ClipSearch, step: LiveStep, rest: Callable[[], object] = lambda: None) -> None:
+    def __init__(self, search: FindsPoses, step: LiveStep, rest: Callable[[], object] = lambda: None) -> None:
         self._search, self.step, self._rest = search, step, rest
         self._held: deque[HeldFrame] = deque()
         self._lock, self._found = Lock(), None
