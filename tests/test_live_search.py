@@ -52,7 +52,7 @@ def frames_until(following, cells, stop, begin=0, most=400):
         solved = following.follow(cells[min(k, len(cells) - 1)], ALL, k * PERIOD)
         if stop(solved):
             return k, solved
-        time.sleep(0.01)
+        time.sleep(0.5 * PERIOD)
     raise AssertionError("never")
 
 

@@ -1,5 +1,6 @@
 """Following the actors from set to set: tracked, lost, searched for beside, found again."""
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -7,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from sogjax.model.body import Body, dof_slices
+from sogjax.model.limbs import limb_names
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.verdict import expected_of
 from sogjax.realtime.searching import Found, HeldFrame, SearchBeside
@@ -20,6 +22,12 @@ GONE_AFTER = 1.0
 """Seconds for which hardly anything must be explained before nobody is in view."""
 GONE = 0.3
 """Part of what is expected to be explained below which nobody is there."""
+LOST_LIMB = 0.7
+"""How likely a limb must be more than 10 cm off for a search."""
+BETTER = 0.002
+"""Share by which what a search found must explain a frame better than what is tracked."""
+ENERGIES = 64
+"""Frames whose energies are kept, to be compared with."""
 REST, LONGEST_REST = 2.0, 30.0
 """Seconds after a search that was in vain, doubled each time up to the second."""
 
@@ -55,6 +63,8 @@ class Following:
 
     def __post_init__(self) -> None:
         self._moment: Moment | None = None if self.start is None else self.step.start(self.start)
+        self._energies: deque[tuple[float, float]] = deque(maxlen=ENERGIES)
+        self._limbs = [name for body in self.bodies for name in limb_names(body)]
         self._bad_since: float | None = None
         self._gone_since: float | None = None
         self._rest, self._not_before = REST, float("-inf")
@@ -88,6 +98,7 @@ class Following:
             self._nobody_said = True
             return None
         self._moment, tracked, joints = self.step(self._moment, cells, present, exposed)
+        self._energies.append((exposed, float(tracked.result.energy)))
         well = self._judge(tracked, exposed)
         return None if self._moment is None else Solved(tracked, joints, well)
 
@@ -99,27 +110,38 @@ class Following:
         return np.asarray(limbs.explained, float)
 
     def _judge(self, tracked: TrackedFrame, now: float) -> bool:
-        """Whether the actors are still there; starts a search where they are not."""
+        """Whether the actors are still there; starts a search where they, or limbs of theirs, are not."""
         explained = self.explained(tracked)
-        well = bool((explained >= self._least).all())
-        gone = bool((explained < GONE * self._least).all())
-        self._bad_since = None if well else now if self._bad_since is None else self._bad_since
-        self._gone_since = None if not gone else now if self._gone_since is None else self._gone_since
-        if well:
+        well, gone = bool((explained >= self._least).all()), bool((explained < GONE * self._least).all())
+        lost = self._lost_limb(tracked)
+        since = lambda holds, before: None if not holds else now if before is None else before
+        self._bad_since = since(not well or lost is not None, self._bad_since)
+        self._gone_since = since(gone, self._gone_since)
+        if self._bad_since is None:
             self._rest, self._lost = REST, False
         if self._gone_since is not None and now - self._gone_since > GONE_AFTER:
             self._note_loss()
             self._moment, self._bad_since, self._gone_since, self._nobody_said = None, None, None, False
             self._not_before = now
-        elif self._bad_since is not None and now - self._bad_since > DOUBTED_AFTER and now >= self._not_before:
-            told = ", ".join(
-                f"{body.name} {share:.0%}" for body, share in zip(self.bodies, explained.tolist(), strict=True)
+        elif self._bad_since is not None and now - self._bad_since > DOUBTED_AFTER:
+            named = zip(self.bodies, explained.tolist(), strict=True)
+            told = (
+                f"too little is explained ({', '.join(f'{body.name} {share:.0%}' for body, share in named)}); is this "
             )
-            if self._ask(
-                now, f"too little is explained ({told}): searching beside; is this who the actor was made of?"
-            ):
-                self.losses += 1
+            told = f"{lost} is in doubt" if well else f"{told}who the actor was made of?"
+            if self._ask(now, f"{told}: searching beside"):
+                self._note_loss()
         return well
+
+    def _lost_limb(self, tracked: TrackedFrame) -> str | None:
+        """The limb that is most likely lost; None: none is."""
+        limbs = tracked.result.limbs
+        doubt = np.zeros(0) if limbs is None else np.asarray(limbs.error_probability)
+        return self._limbs[int(doubt.argmax())] if len(doubt) and doubt.max() >= LOST_LIMB else None
+
+    def _note_loss(self) -> None:
+        self.losses += not self._lost
+        self._lost = True
 
     def _ask(self, now: float, said: str | None) -> bool:
         """Begin a search, unless one runs, or the last one was in vain a moment ago."""
@@ -131,15 +153,14 @@ class Following:
         return True
 
     def _take_over(self, found: Found | None, now: float) -> None:
-        """Go on with what a search found, if it explains more than what is tracked."""
+        """Go on with what a search found, if it explains its last frame better than what is tracked."""
         if found is None:
             return
-        if found.moment is None or (self._moment is not None and self._bad_since is None):
-            self._not_before, self._rest = now + self._rest, min(2.0 * self._rest, LONGEST_REST)
-            return
-        self._moment, self._bad_since, self._gone_since = found.moment, None, None
         self._not_before, self._rest = now + self._rest, min(2.0 * self._rest, LONGEST_REST)
-        self._nobody_said = False
+        before = next((energy for exposed, energy in self._energies if exposed == found.exposed), float("-inf"))
+        if found.moment is None or (self._moment is not None and found.energy < before + BETTER * abs(before)):
+            return
+        self._moment, self._bad_since, self._gone_since, self._nobody_said = found.moment, None, None, False
         self.report(f"found {', '.join(body.name for body in self.bodies)}: {found.sentence}")
 
     def _begin_again(self) -> None:
@@ -148,6 +169,7 @@ class Following:
         if self.search is not None:
             self.search.forget()
         self._bad_since = self._gone_since = None
+        self._energies.clear()
         self._moment = None if self.start is None else self.step.start(self.start)
 
 

@@ -20,6 +20,8 @@ from sogjax.tracking.frame import FrameInput
 
 MOST_HELD = 256_000_000
 """Bytes of cells that are held while a search goes on; beyond, every other frame is let go."""
+NEARLY, HURRY = 3, 6
+"""Frames behind the present with which a search has caught up; one of so many that it is behind is left out."""
 LIKELIEST_AFTER = 3
 """Searches that are not sure, after which the likeliest pose is taken."""
 
@@ -40,6 +42,10 @@ class Found:
     moment: Moment | None
     """The tracker's memory after the last held frame; None: nobody was found."""
     sentence: str = ""
+    exposed: float = 0.0
+    """When that frame was taken."""
+    energy: float = 0.0
+    """Of the pose that was found in it (Eq. 10)."""
 
 
 @runtime_checkable
@@ -157,8 +163,7 @@ class SearchBeside:
             if self._unsure < LIKELIEST_AFTER:
                 return Found(None)
         self._unsure = 0
-        moment = self._caught_up(best, stopped)
-        return None if moment is None else Found(moment, f"{'sure' if sure else 'not sure'} ({shown})")
+        return self._caught_up(best, stopped, f"{'sure' if sure else 'not sure'} ({shown})")
 
     def _second(self, stopped: Event) -> list[Path] | None:
         """A search that is to agree with the first one, beginning with its last frame; None: it was stopped."""
@@ -178,17 +183,20 @@ class SearchBeside:
             sleep(0.02)
         return None
 
-    def _caught_up(self, guess: Guess, stopped: Event) -> Moment | None:
+    def _caught_up(self, guess: Guess, stopped: Event, sentence: str) -> Found | None:
         """What was found, tracked through the held frames up to the present; None: the search was stopped."""
         moment = self.step.start(np.concatenate([np.asarray(each.pose) for each in guess.poses]))
+        energy = float("-inf")
         with self._lock:
             done = self._held[0].exposed + (guess.frame - 0.5) * SECONDS
         while not stopped.is_set():
             with self._lock:
                 while self._held and self._held[0].exposed <= done:
                     self._held.popleft()
-                if not self._held:
-                    return moment
-                frame = self._held[0]
-            moment, done = self.step(moment, frame.cells, frame.present, frame.exposed)[0], frame.exposed
+                behind = len(self._held)
+                if (behind <= NEARLY and energy > float("-inf")) or not behind:
+                    return Found(moment, sentence, done, energy)
+                frame = self._held[behind // HURRY]  # the more it is behind, the more frames are left out
+            moment, tracked, _ = self.step(moment, frame.cells, frame.present, frame.exposed)
+            done, energy = frame.exposed, float(tracked.result.energy)
         return None

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sogjax.realtime.assembler import GIVEN_UP, Assembler
+from sogjax.realtime.assembler import Assembler
 from sogjax.realtime.camera_threads import CameraThreads
 from sogjax.realtime.figures import Figures, Stamps
 from sogjax.realtime.following import Following, Solved, actor_parts
@@ -200,7 +200,7 @@ class Session:
         now = self.slot.assembler.given_up
         for camera in sorted(now - self._given_up):
             late = self.slot.assembler.late[camera]
-            why = "its pictures come too late" if late >= GIVEN_UP else "it gives no pictures"
+            why = "its pictures come too late" if late else "it gives no pictures"
             say(f"camera {self.names[camera]}: {why}; it does not count until it is in time again")
         for camera in sorted(self._given_up - now):
             say(f"camera {self.names[camera]}: is in time again")
