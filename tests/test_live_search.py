@@ -28,7 +28,7 @@ class StandInSearch:
     seconds: float = 0.2
     given: list = field(default_factory=list)
 
-    def paths_in(self, frames):
+    def paths_in(self, frames, report=None):
         self.given.append(frames)
         time.sleep(self.seconds)
         pose = self.poses.pop(0)

@@ -16,12 +16,15 @@ from sogjax.realtime.stepping import LiveStep, Moment
 from sogjax.run.clip_search import NUM_FOLLOWED, SECONDS, Guess, agreed, likeliest
 from sogjax.run.terminal import say
 from sogjax.search.found_pose import Path
+from sogjax.search.pose_search import Report, unreported
 from sogjax.tracking.frame import FrameInput
 
 MOST_HELD = 256_000_000
 """Bytes of cells that are held while a search goes on; beyond, every other frame is let go."""
 NEARLY, HURRY = 3, 6
 """Frames behind the present with which a search has caught up; one of so many that it is behind is left out."""
+LONGEST_END = 30.0
+"""Seconds that a search may take to notice that it was stopped: a thread that computes must not outlive the program."""
 LIKELIEST_AFTER = 3
 """Searches that are not sure, after which the likeliest pose is taken."""
 
@@ -57,9 +60,13 @@ class FindsPoses(Protocol):
         """Who is searched for."""
         ...
 
-    def paths_in(self, frames: Sequence[FrameInput]) -> list[Path]:
-        """The best poses of all actors in the first of some frames and in the others."""
+    def paths_in(self, frames: Sequence[FrameInput], report: Report = unreported) -> list[Path]:
+        """The best poses of all actors in the first of some frames and in the others; `report` is called on the way."""
         ...
+
+
+class _StoppedError(Exception):
+    """A search that nobody waits for any more."""
 
 
 class SearchBeside:
@@ -79,6 +86,7 @@ class SearchBeside:
         self._held: deque[HeldFrame] = deque()
         self._lock, self._found = Lock(), None
         self._thread: Thread | None = None
+        self._threads: list[Thread] = []
         self._stopped, self._every, self._place = Event(), 1, 0
         self._unsure = 0
         self.count = 0
@@ -96,6 +104,7 @@ class SearchBeside:
         self._stopped = Event()
         self.count += 1
         self._thread = Thread(target=self._run, args=(self._stopped,), name="search", daemon=True)
+        self._threads = [each for each in self._threads if each.is_alive()] + [self._thread]
         self._thread.start()
 
     def hold(self, frame: HeldFrame) -> None:
@@ -131,15 +140,16 @@ class SearchBeside:
 
     def close(self) -> None:
         """Stop, and wait a little for the thread to end."""
-        thread = self._thread
         self.forget()
-        if thread is not None:
-            thread.join(5.0)
+        for thread in self._threads:
+            thread.join(LONGEST_END)
 
     def _run(self, stopped: Event) -> None:
         self._rest()
         try:
             found = self._searched(stopped)
+        except _StoppedError:
+            return
         except InputError as error:
             say(f"searching: {error}")
             found = Found(None)
@@ -151,7 +161,7 @@ class SearchBeside:
         first = self._spaced(0, stopped)
         if first is None:
             return None
-        paths = self._search.paths_in(first)
+        paths = self._search.paths_in(first, lambda _: _go_on(stopped))
         guesses = agreed(self._search.bodies, (0, NUM_FOLLOWED - 1), paths, lambda: self._second(stopped))
         seen = [guess for guess in guesses if all(pose.energy > 0.0 for pose in guess.poses)]
         if not seen:
@@ -168,7 +178,7 @@ class SearchBeside:
     def _second(self, stopped: Event) -> list[Path] | None:
         """A search that is to agree with the first one, beginning with its last frame; None: it was stopped."""
         later = self._spaced(NUM_FOLLOWED - 1, stopped)
-        return None if later is None else self._search.paths_in(later)
+        return None if later is None else self._search.paths_in(later, lambda _: _go_on(stopped))
 
     def _spaced(self, skipped: int, stopped: Event) -> list[FrameInput] | None:
         """Frames of the first search's spacing in time, waited for; None: the search was stopped."""
@@ -200,3 +210,8 @@ class SearchBeside:
             moment, tracked, _ = self.step(moment, frame.cells, frame.present, frame.exposed)
             done, energy = frame.exposed, float(tracked.result.energy)
         return None
+
+
+def _go_on(stopped: Event) -> None:
+    if stopped.is_set():
+        raise _StoppedError
