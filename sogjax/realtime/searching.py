@@ -150,8 +150,8 @@ class SearchBeside:
             found = self._searched(stopped)
         except _StoppedError:
             return
-        except InputError as error:
-            say(f"searching: {error}")
+        except Exception as error:  # the tracker goes on without
+            say(f"searching: {error if isinstance(error, InputError) else repr(error)}")
             found = Found(None)
         with self._lock:
             if not stopped.is_set():
