@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,6 +17,7 @@ from sogjax.realtime.json_lines import Publisher
 from sogjax.realtime.outlet import Outlet
 from sogjax.realtime.pictures import Camera, FrameSet
 from sogjax.realtime.recorder import MotionRecorder, VideoRecorder
+from sogjax.realtime.replay import Pace
 from sogjax.realtime.slot import Slot
 from sogjax.realtime.state import ActorState, LiveState
 from sogjax.run.setup import Setup
@@ -56,8 +57,8 @@ class Session:
     first: int = 0
     """The number of the first frame."""
     wait: float = 0.5
-    begin: Callable[[], object] = lambda: None
-    """Lets the cameras begin, where they do not by themselves."""
+    pace: Pace | None = None
+    """Of a replay, which begins when all is ready."""
     publishers: Publishers = field(default_factory=lambda: Publishers({}, {}))
     motion: MotionRecorder | None = None
     videos: VideoRecorder | None = None
@@ -99,7 +100,8 @@ class Session:
                 stack.enter_context(self.videos)
             keeps = lambda: self.videos is not None
             stack.enter_context(CameraThreads(self.cameras, self.setup.clip.grids, self.slot, gains, keeps))
-            self.begin()
+            if self.pace is not None:
+                self.pace.begin()
             yield from self._solved_sets()
 
     def report(self) -> dict[str, Any]:
@@ -119,6 +121,7 @@ class Session:
             },
             "last_to_arrive": by_camera(assembler.last),
             "slowest_camera": names[slowest],
+            "replay_stood_still_seconds": 0.0 if self.pace is None else round(self.pace.slipped, 3),
             "restarts": self.following.restarts,
             "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
         }

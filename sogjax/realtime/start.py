@@ -140,14 +140,14 @@ def _replayed(recording: Recording, actors: Sequence[Body], config: LiveConfig, 
     first = recording.first_frame if config.search else run.initial_pose.frame
     period = 1.0 / (recording.fps * config.speed)
     publishers = publishers_of(run.setup, config, period)
-    cameras, beginning = replay_cameras(recording, config.faults, first, config.speed, config.loop)
+    cameras, pace = replay_cameras(recording, config.faults, first, config.speed, config.loop)
     following = _following(run.setup, run.background, settings, terms, pose)
     seen = next(clip.frames(first, first + 1))
     if config.search:
         warm_up(following, drawn_frame(run.setup, run.background))
     else:
         warm_up_step(following, seen, run.initial_pose.pose)
-    return Session(run.setup, cameras, following, period, first, begin=beginning.now, publishers=publishers)
+    return Session(run.setup, cameras, following, period, first, pace=pace, publishers=publishers)
 
 
 def _from_cameras(recording: Recording, actors: Sequence[Body], config: LiveConfig, terms: Sequence[Term]) -> Session:
