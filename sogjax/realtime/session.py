@@ -73,6 +73,8 @@ class Session:
         self._last_exposed = 0.0
         self._frame = self.first - 1
         self._given_up: frozenset[int] = frozenset()
+        """As was said last."""
+        self._said: dict[int, float] = {}
         self._outlets: list[Outlet[Any]] = []
         self._took = 0.0
 
@@ -199,12 +201,14 @@ class Session:
             self.videos.put(found)
 
     def _say_cameras(self) -> None:
-        """Tell which cameras are not waited for any more, and which are back."""
-        now = self.slot.assembler.given_up
-        for camera in sorted(now - self._given_up):
+        """Tell which cameras are not waited for any more, and which are back; of each not too often."""
+        given_up, now = self.slot.assembler.given_up, time.monotonic()
+        for camera in sorted(given_up ^ self._given_up):
+            if now - self._said.get(camera, float("-inf")) < TOLD_EVERY:
+                continue
+            self._said[camera] = now
             late = self.slot.assembler.late[camera]
             why = "its pictures come too late" if late else "it gives no pictures"
-            say(f"camera {self.names[camera]}: {why}; it does not count until it is in time again")
-        for camera in sorted(self._given_up - now):
-            say(f"camera {self.names[camera]}: is in time again")
-        self._given_up = now
+            gone = f"{why}; it does not count until it is in time again"
+            say(f"camera {self.names[camera]}: {gone if camera in given_up else 'is in time again'}")
+            self._given_up ^= {camera}

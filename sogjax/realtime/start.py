@@ -29,7 +29,7 @@ from sogjax.realtime.searching import SearchBeside
 from sogjax.realtime.session import Publishers, Session
 from sogjax.realtime.stepping import LiveStep
 from sogjax.realtime.vmc import Vmc
-from sogjax.realtime.warm_up import drawn_frame, warm_up, warm_up_step
+from sogjax.realtime.warm_up import drawn_frame, standing, warm_up, warm_up_step
 from sogjax.run import build
 from sogjax.run.actors import Actors
 from sogjax.run.background import Background, learn_background
@@ -144,7 +144,7 @@ def _replayed(recording: Recording, actors: Sequence[Body], config: LiveConfig, 
     following = _following(run.setup, run.background, settings, terms, pose)
     seen = next(clip.frames(first, first + 1))
     if config.search:
-        warm_up(following, drawn_frame(run.setup, run.background))
+        warm_up(following, drawn_frame(run.setup, run.background), standing(run.setup))
     else:
         warm_up_step(following, seen, run.initial_pose.pose)
     return Session(run.setup, cameras, following, period, first, pace=pace, publishers=publishers)
@@ -158,7 +158,7 @@ def _from_cameras(recording: Recording, actors: Sequence[Body], config: LiveConf
         setup = tracking_setup(Clip(recording, range(0), config.images.depth), background, actors, settings, terms)
         publishers = publishers_of(setup, config, 1.0 / recording.fps)
         following = _following(setup, background, settings, terms, None)
-        warm_up(following, drawn_frame(setup, background))
+        warm_up(following, drawn_frame(setup, background), standing(setup))
     except BaseException:
         for camera in cameras:
             camera.release()

@@ -1,5 +1,7 @@
 """Compiling before anybody is in view: a frame is drawn in which the actors stand in the middle of the place."""
 
+from collections.abc import Sequence
+
 import cv2
 import jax
 import jax.numpy as jnp
@@ -55,13 +57,12 @@ def where_all_look(camera_from_world: Float[np.ndarray, "camera 4 4"]) -> Float[
     return np.linalg.solve(across.sum(axis=0) + weak, np.einsum("cij,cj->i", across, centres) + weak @ centres.mean(0))
 
 
-def warm_up(following: Following, frame: FrameInput) -> None:
-    """Compile all that is needed to find and to follow the actors, with a frame in which they stand."""
+def warm_up(following: Following, frame: FrameInput, poses: Sequence[Float[np.ndarray, "_dof"]]) -> None:
+    """Compile all that is needed to find and to follow the actors, with a frame in which they stand in `poses`."""
     with alive("getting ready"):
         if following.search is not None:
             following.search.try_out([frame] * NUM_FOLLOWED)
-        pose = np.concatenate([np.asarray(body.poses["rest"]) for body in following.bodies])
-        warm_up_step(following, frame, pose)
+        warm_up_step(following, frame, np.concatenate([*poses]))
 
 
 def warm_up_step(following: Following, frame: FrameInput, pose: Float[np.ndarray | Array, "dof"]) -> None:
