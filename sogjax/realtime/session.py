@@ -71,7 +71,7 @@ class Session:
         self._parts = actor_parts(self.setup.bodies)
         self._began: float | None = None
         self._last_exposed = 0.0
-        self._frame = self.first - 1
+        self._frame, self._number, self._passes = self.first - 1, self.first - 1, 0
         self._given_up: frozenset[int] = frozenset()
         """As was said last."""
         self._said: dict[int, float] = {}
@@ -175,7 +175,7 @@ class Session:
         grids = self.setup.clip.grids
         cells, present = found.stacked(len(grids), stack_shape(grids))
         solved = self.following.follow(cells, present, found.exposed, found.number)
-        frame = self._frame_of(found.exposed)
+        frame = self._frame_of(found)
         stamps = Stamps(found.exposed, found.arrived, found.handed_over, begun, time.monotonic(), time.monotonic())
         actors = () if solved is None else self._actors(solved)
         tracked = None if solved is None else solved.tracked
@@ -190,10 +190,17 @@ class Session:
             for (body, dofs, joints), share in zip(self._parts, explained, strict=True)
         )
 
-    def _frame_of(self, exposed: float) -> int:
-        """The number of the frame that was taken at a time: they never fall, nor stay."""
-        self._began = exposed if self._began is None else self._began
-        self._frame = max(self.first + round((exposed - self._began) / self.period), self._frame + 1)
+    def _frame_of(self, found: FrameSet) -> int:
+        """The number of a set's frame, by its time or as a replay counts, on and on: they never fall, nor stay."""
+        if found.number is None:
+            self._began = found.exposed if self._began is None else self._began
+            frame = self.first + round((found.exposed - self._began) / self.period)
+        else:
+            frames = self.setup.clip.recording.frames
+            self._passes += found.number < self._number
+            self._number = found.number
+            frame = found.number + self._passes * len(frames)
+        self._frame = max(frame, self._frame + 1)
         return self._frame
 
     def _on_set(self, found: FrameSet) -> None:
