@@ -24,6 +24,8 @@ GONE = 0.3
 """Part of what is expected to be explained below which nobody is there."""
 LOST_LIMB = 0.7
 """How likely a limb must be more than 10 cm off for a search."""
+SLOW = 2.0
+"""Periods from one tracked frame to the next from which on no search runs beside the tracker, unless nobody is there."""
 BETTER = 0.002
 """Share by which what a search found must explain a frame better than what is tracked."""
 ENERGIES = 64
@@ -51,12 +53,14 @@ class Following:
         bodies: the actors, as they stand in the world.
         search: runs beside; None: nothing is searched for.
         start: the pose with which a replay begins, where it is known.
+        period: of the cameras; None: not known.
     """
 
     step: LiveStep
     bodies: Sequence[Body]
     search: SearchBeside | None = None
     start: Float[np.ndarray, "dof"] | None = None
+    period: float | None = None
     losses: int = 0
     restarts: int = 0
     report: Callable[[str], object] = field(default=say)
@@ -65,6 +69,8 @@ class Following:
         self._moment: Moment | None = None if self.start is None else self.step.start(self.start)
         self._energies: deque[tuple[float, float]] = deque(maxlen=ENERGIES)
         self._limbs = [name for body in self.bodies for name in limb_names(body)]
+        self._exposed: float | None = None
+        self._interval = 0.0
         self._bad_since: float | None = None
         self._gone_since: float | None = None
         self._rest, self._not_before = REST, float("-inf")
@@ -90,6 +96,8 @@ class Following:
         if number is not None and number < self._number:
             self._begin_again()
         self._number = -1 if number is None else number
+        self._interval += 0.1 * (exposed - (self._exposed or exposed) - self._interval)
+        self._exposed = exposed
         if self.search is not None and self.search.busy:
             self.search.hold(HeldFrame(cells, present, exposed))
             self._take_over(self.search.taken(), exposed)
@@ -123,7 +131,7 @@ class Following:
             self._note_loss()
             self._moment, self._bad_since, self._gone_since, self._nobody_said = None, None, None, False
             self._not_before = now
-        elif self._bad_since is not None and now - self._bad_since > DOUBTED_AFTER:
+        elif self._bad_since is not None and now - self._bad_since > DOUBTED_AFTER and not self._is_slow:
             named = zip(self.bodies, explained.tolist(), strict=True)
             told = (
                 f"too little is explained ({', '.join(f'{body.name} {share:.0%}' for body, share in named)}); is this "
@@ -132,6 +140,11 @@ class Following:
             if self._ask(now, f"{told}: searching beside"):
                 self._note_loss()
         return well
+
+    @property
+    def _is_slow(self) -> bool:
+        """Whether the machine holds so few frames that a search would only take more of them away."""
+        return self.period is not None and self._interval > SLOW * self.period
 
     def _lost_limb(self, tracked: TrackedFrame) -> str | None:
         """The limb that is most likely lost; None: none is."""

@@ -141,7 +141,7 @@ def _replayed(recording: Recording, actors: Sequence[Body], config: LiveConfig, 
     period = 1.0 / (recording.fps * config.speed)
     publishers = publishers_of(run.setup, config, period)
     cameras, pace = replay_cameras(recording, config.faults, first, config.speed, config.loop)
-    following = _following(run.setup, run.background, settings, terms, pose)
+    following = _following(run.setup, run.background, settings, terms, pose, period)
     seen = next(clip.frames(first, first + 1))
     if config.search:
         warm_up(following, drawn_frame(run.setup, run.background), standing(run.setup))
@@ -157,7 +157,7 @@ def _from_cameras(recording: Recording, actors: Sequence[Body], config: LiveConf
         background = background_of(recording, config)
         setup = tracking_setup(Clip(recording, range(0), config.images.depth), background, actors, settings, terms)
         publishers = publishers_of(setup, config, 1.0 / recording.fps)
-        following = _following(setup, background, settings, terms, None)
+        following = _following(setup, background, settings, terms, None, 1.0 / recording.fps)
         warm_up(following, drawn_frame(setup, background), standing(setup))
     except BaseException:
         for camera in cameras:
@@ -225,11 +225,16 @@ def publishers_of(setup: Setup, config: LiveConfig, period: float) -> Publishers
 
 
 def _following(
-    setup: Setup, background: Background, settings: TrackConfig, terms: Sequence[Term], pose: np.ndarray | None
+    setup: Setup,
+    background: Background,
+    settings: TrackConfig,
+    terms: Sequence[Term],
+    pose: np.ndarray | None,
+    period: float,
 ) -> Following:
     search = ClipSearch(setup.clip, background, setup.bodies, settings, terms)
     beside = SearchBeside(search, LiveStep(setup.tracker), less_urgent)
-    return Following(LiveStep(setup.tracker), setup.bodies, beside, pose)
+    return Following(LiveStep(setup.tracker), setup.bodies, beside, pose, period)
 
 
 def less_urgent() -> None:
