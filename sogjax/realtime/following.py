@@ -25,7 +25,7 @@ GONE = 0.3
 LOST_LIMB = 0.7
 """How likely a limb must be more than 10 cm off for a search."""
 SLOW = 2.0
-"""Periods from one tracked frame to the next from which on no search runs beside the tracker, unless nobody is there."""
+"""Periods from one frame to the next from which on limbs are not searched for beside the tracker."""
 BETTER = 0.002
 """Share by which what a search found must explain a frame better than what is tracked."""
 ENERGIES = 64

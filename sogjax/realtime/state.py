@@ -26,7 +26,7 @@ class ActorState:
 
 @dataclass(frozen=True)
 class LiveState:
-    """All actors at one moment."""
+    """All actors at one moment, and when its pictures were taken, solved and sent."""
 
     frame: int
     """Counted at the rate of the cameras; of a replay the recording's number, in its first pass."""

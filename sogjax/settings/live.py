@@ -12,11 +12,11 @@ from sogjax.settings.run import OVERWRITE
 class FaultsConfig:
     """What goes wrong with the cameras of a replay: a test bench."""
 
-    drop: float = option(0.0, "share of the pictures of each camera that never arrive, 0 to 1")
-    delay: Any = option(None, "{CAMERA:SECONDS}: pictures that arrive late; null: none")
-    jitter: float = option(0.0, "s: standard deviation of the time by which each picture arrives later")
-    gone: Any = option(None, "{CAMERA:[FROM,TO]}: seconds of the replay in which a camera gives nothing; null: none")
-    seed: int = option(0, "of what is drawn at random")
+    drop: float = expert(0.0, "share of the pictures of each camera that never arrive, 0 to 1")
+    delay: Any = expert(None, "{CAMERA:SECONDS}: pictures that arrive late; null: none")
+    jitter: float = expert(0.0, "s: standard deviation of the time by which each picture arrives later")
+    gone: Any = expert(None, "{CAMERA:[FROM,TO]}: seconds of the replay in which a camera gives nothing; null: none")
+    seed: int = expert(0, "of what is drawn at random")
 
 
 @dataclass
@@ -31,9 +31,9 @@ class LiveConfig:
         "{CAMERA:SOURCE}: a device number, or what OpenCV opens: an address (rtsp://, http://) or a GStreamer pipeline",
     )
     replay: bool = option(False, "replay the recording at its own rate, in place of cameras")
-    speed: float = option(1.0, "of a replay, as a multiple of the recording's rate")
+    speed: float = expert(1.0, "of a replay, as a multiple of the recording's rate")
     loop: bool = option(False, "a replay begins again when it has ended")
-    search: bool = option(
+    search: bool = expert(
         False, "search for the first pose of a replay while it runs, as with cameras; false: before it begins"
     )
     fps: float | None = option(None, "pictures per second of the cameras; null: the recording's, else 30")
@@ -48,7 +48,7 @@ class LiveConfig:
     rerun: str | None = option(
         None, "viewer: open Rerun's viewer | HOST:PORT of one that is open | FILE.rrd to write; null: none"
     )
-    lsl: str | None = option(None, "name of a Lab Streaming Layer stream of joint positions (extra `lsl`); null: none")
+    lsl: str | None = expert(None, "name of a Lab Streaming Layer stream of joint positions (extra `lsl`); null: none")
     cameras: list[str] | None = option(None, "cameras to use; null: all")
     overwrite: bool = option(False, OVERWRITE)
     wait: float = expert(0.5, "how long a late camera is waited for, in frames")
