@@ -10,6 +10,7 @@ from rendered_person import rendered_person
 import sogjax
 from sogjax.io.motion import load_motion
 from sogjax.io.recording import open_recording
+from sogjax.realtime.slot import Slot
 
 SMALL = ("solver.max_iterations=5", "images.depth=6", "images.background=none")
 
@@ -43,6 +44,26 @@ def test_the_command_leaves_motion_figures_and_a_recording(capsys, tmp_path, mon
     np.testing.assert_array_equal(kept.rig.cameras.intrinsics, given.rig.cameras.intrinsics)
     assert "overwrite" in refused(capsys, *live)
     assert "record=kept" in refused(capsys, *live, "record=kept", "overwrite=true")
+
+
+def test_ctrl_c_keeps_the_motion(capsys, tmp_path, monkeypatch, rendered):
+    monkeypatch.chdir(tmp_path)
+    actor, take, sets = actor_file(tmp_path / "actor.yaml"), Slot.take, []
+
+    def interrupted(slot, timeout):
+        if len(sets) >= 3:
+            raise KeyboardInterrupt
+        if (found := take(slot, timeout)) is not None:
+            sets.append(found)
+        return found
+
+    monkeypatch.setattr(Slot, "take", interrupted)
+    live = ("live", f"recording={rendered}", f"actor={actor}", "replay=true", "speed=0.2", "loop=true", *SMALL)
+    _, err = done(capsys, *live, "out=run")
+    assert "stopped by Ctrl-C" in err
+    assert load_motion(tmp_path / "run" / "motion.npz").num_frames == 3
+    assert json.loads((tmp_path / "run" / "live.json").read_text())["poses"] == 3
+    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["live.json", "motion.npz"]
 
 
 def test_python_iterates_over_states(rendered, tmp_path):

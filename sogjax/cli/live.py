@@ -1,6 +1,7 @@
 """`sogjax live`: tracks while pictures arrive, and passes every pose on."""
 
 import time
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -36,8 +37,9 @@ def run(config: LiveConfig) -> dict[str, Any]:
     session = session_of(recording, actors, config, out)
     say("live: Ctrl-C ends it and keeps the motion")
     try:
-        for _ in session.states():
-            pass
+        with closing(session.states()) as states:
+            for _ in states:
+                pass
     except KeyboardInterrupt:
         say("stopped by Ctrl-C; the motion is kept")
     finally:

@@ -14,6 +14,7 @@ from sogjax.errors import InputError
 from sogjax.model.body import Body
 from sogjax.realtime.stepping import LiveStep, Moment
 from sogjax.run.clip_search import NUM_FOLLOWED, SECONDS, Guess, agreed, likeliest
+from sogjax.run.memory import return_freed_memory
 from sogjax.run.terminal import say
 from sogjax.search.found_pose import Path
 from sogjax.search.pose_search import Report, unreported
@@ -153,6 +154,7 @@ class SearchBeside:
         except Exception as error:  # the tracker goes on without
             say(f"searching: {error if isinstance(error, InputError) else repr(error)}")
             found = Found(None)
+        return_freed_memory()
         with self._lock:
             if not stopped.is_set():
                 self._found = found if found is not None else Found(None)

@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from typing import Any
@@ -83,7 +83,7 @@ class Session:
         """The cameras."""
         return self.setup.clip.recording.rig.names
 
-    def states(self) -> Iterator[LiveState]:
+    def states(self) -> Generator[LiveState, None, None]:
         """The actors from moment to moment, until the cameras end or the iterator is closed.
 
         Raises:
@@ -145,7 +145,7 @@ class Session:
         sent = Stamps(stamps.exposed, stamps.arrived, stamps.handed_over, stamps.begun, stamps.solved, time.monotonic())
         self.figures.add(sent, state.tracked_frame is not None)
 
-    def _solved_sets(self) -> Iterator[LiveState]:
+    def _solved_sets(self) -> Generator[LiveState, None, None]:
         begin = told = heard = time.monotonic()
         silence_said = False
         try:
