@@ -62,6 +62,7 @@ def checked(config: LiveConfig) -> None:
     """
     build.check(track_settings_of(config))
     build.at_least("wait", config.wait, 0.0)
+    build.at_least("iterations", config.iterations, 1)
     build.at_least("speed", config.speed, 0.01)
     if config.seconds is not None:
         build.at_least("seconds", config.seconds, 0.0)
@@ -75,8 +76,9 @@ def checked(config: LiveConfig) -> None:
 
 def track_settings_of(config: LiveConfig) -> TrackConfig:
     """The settings of a track that a live session shares with one."""
-    shared = {key: getattr(config, key) for key in ("color", "images", "energy", "solver", "tracking", "cameras")}
-    return TrackConfig(recording=config.recording, actor=config.actor, **shared)
+    shared = {key: getattr(config, key) for key in ("color", "images", "energy", "tracking", "cameras")}
+    solver = replace(config.solver, max_iterations=min(config.solver.max_iterations, config.iterations))
+    return TrackConfig(recording=config.recording, actor=config.actor, solver=solver, **shared)
 
 
 def recording_of(config: LiveConfig) -> Recording:

@@ -51,6 +51,9 @@ class LiveConfig:
     lsl: str | None = expert(None, "name of a Lab Streaming Layer stream of joint positions (extra `lsl`); null: none")
     cameras: list[str] | None = option(None, "cameras to use; null: all")
     overwrite: bool = option(False, OVERWRITE)
+    iterations: int = expert(
+        8, "most iterations of the solver at a time: the next frame goes on from there, and none makes others late"
+    )
     wait: float = expert(0.5, "how long a late camera is waited for, in frames")
     faults: FaultsConfig = group(FaultsConfig, "")
     color: ColorConfig = group(ColorConfig, "")
