@@ -7,6 +7,7 @@ from sogjax.io.image_file import ColorGains, evened
 from sogjax.model.yuv_picture import YuvPicture
 from sogjax.realtime.pictures import Camera, Picture, Seen
 from sogjax.realtime.slot import Slot
+from sogjax.realtime.urgency import CAMERA, yield_to_others
 from sogjax.scene.cells import CellGrid, padded_cells, stack_shape
 
 
@@ -51,6 +52,7 @@ class CameraThreads:
     def _run(self, number: int) -> None:
         camera, grid, shape = self._cameras[number], self._grids[number], stack_shape(tuple(self._grids))
         problem: BaseException | None = None
+        yield_to_others(CAMERA)
         try:
             while (taken := camera.read()) is not None:
                 picture = self._evened(number, taken.picture)

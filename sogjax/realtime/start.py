@@ -1,9 +1,6 @@
 """From settings to a session: the cameras, the actors, what is known of the place, and who is told."""
 
-import os
-import threading
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -28,6 +25,7 @@ from sogjax.realtime.rerun_live import RerunLive
 from sogjax.realtime.searching import SearchBeside
 from sogjax.realtime.session import Publishers, Session
 from sogjax.realtime.stepping import LiveStep
+from sogjax.realtime.urgency import SEARCH, yield_to_others
 from sogjax.realtime.vmc import Vmc
 from sogjax.realtime.warm_up import drawn_frame, standing, warm_up, warm_up_step
 from sogjax.run import build
@@ -235,11 +233,5 @@ def _following(
     period: float,
 ) -> Following:
     search = ClipSearch(setup.clip, background, setup.bodies, settings, terms)
-    beside = SearchBeside(search, LiveStep(setup.tracker), less_urgent)
+    beside = SearchBeside(search, LiveStep(setup.tracker), lambda: yield_to_others(SEARCH))
     return Following(LiveStep(setup.tracker), setup.bodies, beside, pose, period)
-
-
-def less_urgent() -> None:
-    """Let the calling thread yield to the others, where the system can."""
-    with suppress(AttributeError, OSError):
-        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), 10)
