@@ -6,6 +6,7 @@ Every field carries its help text; `--help` prints it. Symbols in brackets are t
 from dataclasses import dataclass
 from typing import Any
 
+from sogjax.settings.live import LiveConfig
 from sogjax.settings.option import REQUIRED, group, option
 from sogjax.settings.run import OVERWRITE, ActorConfig, AdjustConfig, OutputsConfig, TrackConfig
 from sogjax.study.settings import ReportConfig
@@ -160,6 +161,7 @@ SCHEMAS: dict[str, type] = {
     "demo": DemoConfig,
     "track": TrackConfig,
     "adjust": AdjustConfig,
+    "live": LiveConfig,
     "actor": ActorConfig,
     "body": BodyConfig,
     "segment": SegmentConfig,

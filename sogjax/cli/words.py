@@ -18,6 +18,7 @@ SWEPT = "track"
 """The command that `-m` runs for several values."""
 PATH_KEYS = (
     *("recording", "out", "actor", "body", "motion", "truth", "to", "calibration", "from", "dof", "images.cache"),
+    *("record", "json", "rerun"),
     "hydra.sweep.dir",
 )
 """Options whose values are paths, which may need quotes in Hydra's grammar."""

@@ -155,6 +155,50 @@ def open_recording(path: Path) -> Recording:
     )
 
 
+def open_place(path: Path) -> Recording:
+    """A recording without pictures: what is known of a place before its cameras begin.
+
+    It has a calibration and, perhaps, recording.yaml, pictures of the background, and of what stands in front.
+
+    Raises:
+        InputError: something is missing, unreadable, or does not fit together; or no size of the pictures is known.
+    """
+    if not path.is_dir():
+        raise InputError(f"{path}: there is no such folder; give one with the calibration of the cameras")
+    given, project = read_recording_settings(SETTINGS.of(path)), project_in(path)
+    settings = project.filled_in(given)
+    rig = load_calibration(_calibration(path, settings, project), settings.unit)
+    _check_by_camera(path, settings, rig)
+    chosen = rig.names if settings.cameras is None else tuple(settings.cameras)
+    strange = [name for name in chosen if name not in rig.names]
+    if strange:
+        raise InputError(
+            f"{SETTINGS.of(path)}: cameras: there is no camera {strange[0]!r} in the calibration; its cameras are: "
+            f"{', '.join(rig.names)}"
+        )
+    used = rig.select(chosen)
+    if np.isnan(np.asarray(used.cameras.image_size)).any():
+        raise InputError(f"{path}: the calibration does not say the size of the pictures; add it (image size, pixels)")
+    return Recording(
+        path=path,
+        name=path.resolve().name,
+        rig=used,
+        fps=settings.fps or 0.0,
+        up=settings.up or DEFAULT_UP,
+        first_frame=0,
+        num_frames=0,
+        sources={},
+        frame_offset=dict.fromkeys(used.names, 0),
+        background=find_background(BACKGROUND.of(path), used, rig.names),
+        occluders=find_occluders(OCCLUDERS.of(path), used, rig.names),
+        example_poses=(),
+        initial_poses=None,
+        ground_truth=None,
+        warnings=tuple(_doubts(path, given, used, project)),
+        color_gains={name: settings.color_gains[name] for name in used.names if name in settings.color_gains},
+    )
+
+
 def _calibrated(path: Path, settings: RecordingSettings, project: Project) -> tuple[CameraRig, dict[str, Path]]:
     """All calibrated cameras, and the videos or folders of images of those that are used."""
     calibration = _calibration(path, settings, project)

@@ -1,6 +1,6 @@
 """Searching the frames of a clip for the poses of its actors, without any hint."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -110,19 +110,9 @@ class ClipSearch:
         Raises:
             InputError: no camera has the frame.
         """
-        paths = self.paths(frame, lambda share: report(0.5 * share))
-        found, other = Guess(frame, [path.found for path in paths]), self._followed_frames(frame)[-1]
-        if found.sure or other == frame or not all(pose.energy > 0.0 for pose in found.poses):
-            return [found]
-        second = Guess(other, [path.found for path in self.paths(other, lambda share: report(0.5 + 0.5 * share))])
-        agreed = [
-            agreements(body, path, there, len(self.bodies))
-            for body, path, there in zip(self.bodies, paths, second.poses, strict=True)
-        ]
-        return [
-            replace(guess, poses=[pose.with_agreements(*each) for pose, each in zip(guess.poses, agreed, strict=True)])
-            for guess in (found, second)
-        ]
+        paths, other = self.paths(frame, lambda share: report(0.5 * share)), self._followed_frames(frame)[-1]
+        second = lambda: None if other == frame else self.paths(other, lambda share: report(0.5 + 0.5 * share))
+        return agreed(self.bodies, (frame, other), paths, second)
 
     def paths(self, frame: int, report: Report = unreported) -> list[found_pose.Path]:
         """The best poses of all actors in a frame and those that come next, by what is seen there.
@@ -136,7 +126,10 @@ class ClipSearch:
 
     def _search(self, frame: int, report: Report) -> list[found_pose.Path]:
         numbers = self._followed_frames(frame)
-        frames = [*self.clip.frames(numbers.start, numbers.stop, numbers.step)]
+        return self.paths_in([*self.clip.frames(numbers.start, numbers.stop, numbers.step)], report)
+
+    def paths_in(self, frames: Sequence[FrameInput], report: Report = unreported) -> list[found_pose.Path]:
+        """The best poses of all actors in the first of some frames and in the others, by what is seen there."""
         make = lambda searcher, k: self._seen(searcher, frames[k])
         return search_poses(self._searchers, make, len(frames), report)
 
@@ -186,6 +179,28 @@ class ClipSearch:
         return SeenFrame.from_cells(
             self._cameras, self._reader, np.asarray(frame.cells), searcher.clusters, present.tolist()
         )
+
+
+def agreed(
+    bodies: Sequence[Body],
+    frames: tuple[int, int],
+    paths: Sequence[found_pose.Path],
+    second: Callable[[], Sequence[found_pose.Path] | None],
+) -> list[Guess]:
+    """The guess of a frame and, unless it is sure by itself, that of a second search in the last frame of its paths.
+
+    `second` searches there; None: it cannot.
+    """
+    found = Guess(frames[0], [path.found for path in paths])
+    if found.sure or not all(pose.energy > 0.0 for pose in found.poses) or (later := second()) is None:
+        return [found]
+    other = Guess(frames[1], [path.found for path in later])
+    parts = zip(bodies, paths, other.poses, strict=True)
+    agreed = [agreements(body, path, there, len(bodies)) for body, path, there in parts]
+    return [
+        replace(guess, poses=[pose.with_agreements(*each) for pose, each in zip(guess.poses, agreed, strict=True)])
+        for guess in (found, other)
+    ]
 
 
 def best_guess(search: ClipSearch, picture: Path | None = None) -> Guess:

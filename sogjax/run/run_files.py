@@ -64,11 +64,12 @@ ADJUSTMENT = RunFile("adjustment.json", "what adjusting changed")
 CALIBRATION = RunFile("calibration_adjusted.toml", "the cameras where adjusting found them")
 DESCRIPTION = RunFile("recording.yaml", "a recording.yaml that names that calibration and time offsets", certain=False)
 GUESS = RunFile("initial_pose.png", "the best guess of an initial pose that was not sure")
+LIVE = RunFile("live.json", "the figures of live tracking: latencies, and what was lost why", certain=False)
 OCCLUDERS = RunFile("occluders.png", "what was learnt to stand in front, where something was")
 
 RUN_FILES: tuple[RunFile, ...] = (
     *(NOTE, KEPT, *MOTIONS.values(), ACTOR, CONFIG, METRICS, PAGE, OVERLAY, RERUN, WORST),
-    *(UNADJUSTED, UNADJUSTED_ACTOR, ADJUSTMENT, CALIBRATION, DESCRIPTION, GUESS, OCCLUDERS),
+    *(UNADJUSTED, UNADJUSTED_ACTOR, ADJUSTMENT, CALIBRATION, DESCRIPTION, GUESS, OCCLUDERS, LIVE),
 )
 _OLDER = (RunFile("motion.partial", "", is_folder=True), RunFile("motion_*.partial", "", is_folder=True))
 """Frames so far of runs of earlier versions."""

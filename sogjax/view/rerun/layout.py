@@ -55,6 +55,17 @@ def iterations_layout(recording: Recording, eye: rrb.EyeControls3D, with_picture
     return _blueprint(top, rrb.TimeSeriesView(origin="/curves/energy", name="Energy"), ITERATION)
 
 
+def live_layout(plots: Mapping[str, str], eye: rrb.EyeControls3D) -> rrb.Blueprint:
+    """The scene as it comes, the curves below."""
+    scene = rrb.Spatial3DView(origin="/world", name="Scene", eye_controls=eye)
+    return rrb.Blueprint(
+        rrb.Vertical(scene, _plots(plots), row_shares=[3, 1]),
+        rrb.TimePanel(state="collapsed", timeline=FRAME),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.BlueprintPanel(state="collapsed"),
+    )
+
+
 def _plots(plots: Mapping[str, str]) -> rrb.Horizontal:
     """Plots with their titles, side by side."""
     return rrb.Horizontal(*(rrb.TimeSeriesView(origin=f"/curves/{plot}", name=title) for plot, title in plots.items()))

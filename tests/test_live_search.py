@@ -1,0 +1,112 @@
+"""Searching beside: who comes in is found, the tracker catches up with the present, and memory stays bounded."""
+
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+from drawn_scene import standing
+from walking_dog import FRAMES, HEIGHT
+
+from sogjax.realtime import searching
+from sogjax.realtime.following import Following
+from sogjax.realtime.searching import HeldFrame, SearchBeside
+from sogjax.realtime.stepping import LiveStep
+from sogjax.run.clip_search import NUM_FOLLOWED, SECONDS
+from sogjax.search.found_pose import FoundPose, Path
+
+PERIOD = 0.04
+ALL = np.ones(5, bool)
+
+
+@dataclass
+class StandInSearch:
+    """Finds the poses that it was told to find, in the first of the frames, after a while."""
+
+    bodies: tuple
+    poses: list
+    seconds: float = 0.2
+    given: list = field(default_factory=list)
+
+    def paths_in(self, frames, report=None):
+        self.given.append(frames)
+        time.sleep(self.seconds)
+        pose = self.poses.pop(0) if len(self.poses) > 1 else self.poses[0]
+        if pose is None:
+            return [Path.of_nothing(self.bodies[0], len(frames))]
+        found = FoundPose(pose, 2.0, 0.5, True, 1.0)
+        return [Path(found, np.repeat(pose[None], len(frames), axis=0))]
+
+
+@pytest.fixture(scope="module")
+def step(walking_dog):
+    found = LiveStep(walking_dog[0])
+    pose = np.array(standing(walking_dog[0].body, HEIGHT))
+    found(found.start(pose), np.asarray(walking_dog[1][0]), ALL, 0.0)
+    return found
+
+
+def frames_until(following, cells, stop, begin=0, most=400):
+    """Feed frames, the last one again and again, at their rate; the frame at which `stop` holds."""
+    for k in range(begin, begin + most):
+        solved = following.follow(cells[min(k, len(cells) - 1)], ALL, k * PERIOD)
+        if stop(solved):
+            return k, solved
+        time.sleep(0.5 * PERIOD)
+    raise AssertionError("never")
+
+
+def test_who_comes_in_is_found_and_followed_up_to_the_present(walking_dog, step, capsys):
+    tracker, cells, offline = walking_dog
+    cells = [np.asarray(each) for each in cells]
+    search = StandInSearch((tracker.body,), [None, np.array(offline.poses[0])])
+    beside = SearchBeside(search, LiveStep(tracker, step.capacities, step.spare))
+    following = Following(step, (tracker.body,), beside)
+    following._rest = 0.1
+    frame, solved = frames_until(following, cells, lambda solved: solved is not None)
+    beside.close()
+    assert len(search.given) == 2  # the first one was in vain
+    spaced = search.given[1]
+    assert len(spaced) == NUM_FOLLOWED
+    assert frame * PERIOD > 2 * (NUM_FOLLOWED - 1) * SECONDS
+    # The dog has walked on since: the pose is that of the last frame, not of the one that was searched.
+    np.testing.assert_allclose(solved.tracked.result.pose[:3], offline.poses[-1][:3], atol=0.02)
+    said = capsys.readouterr().err
+    assert "nobody is in view" in said
+    assert "found" in said
+
+
+def test_who_leaves_is_nobody_and_is_found_again(walking_dog, step):
+    tracker, cells, offline = walking_dog
+    cells = [np.asarray(each) for each in cells]
+    empty = [np.full_like(cells[0], 40)]
+    beside = SearchBeside(
+        StandInSearch((tracker.body,), [None, np.array(offline.poses[-1])]),
+        LiveStep(tracker, step.capacities, step.spare),
+    )
+    following = Following(step, (tracker.body,), beside, start=np.array(offline.poses[0]))
+    for k in range(FRAMES):
+        assert following.follow(cells[k], ALL, k * PERIOD) is not None
+    last, _ = frames_until(following, empty, lambda solved: solved is None, FRAMES)
+    assert following.losses == 1
+    back, solved = frames_until(following, cells[-1:], lambda solved: solved is not None, last + 1)
+    beside.close()
+    assert solved is not None
+    assert back > last
+
+
+def test_what_is_held_while_searching_stays_within_its_bytes(walking_dog, step, monkeypatch):
+    tracker, cells, _ = walking_dog
+    cells = np.asarray(cells[0])
+    monkeypatch.setattr(searching, "MOST_HELD", 20 * cells.nbytes)
+    beside = SearchBeside(StandInSearch((tracker.body,), [None], seconds=0.5), step)
+    beside.begin()
+    held = []
+    for k in range(200):
+        beside.hold(HeldFrame(cells, ALL, k * PERIOD))
+        held.append(len(beside._held))
+    assert max(held) <= 20
+    kept = [frame.exposed for frame in beside._held]
+    assert kept[0] == 0.0
+    assert kept[-1] > 150 * PERIOD  # still up to the present
+    beside.close()

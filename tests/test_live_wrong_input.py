@@ -1,0 +1,159 @@
+"""What is wrong with a live session is one sentence before any work; what can go on goes on."""
+
+import socket
+from threading import Thread
+
+import numpy as np
+import pytest
+from command_line import actor_file, refused, trackable
+from small_recording import SIZE, toml_camera, write_calibration, write_image, write_video
+
+from sogjax.errors import InputError
+from sogjax.io.recording import open_place
+from sogjax.io.recording_files import BACKGROUND
+from sogjax.realtime.addresses import Address, Datagrams
+from sogjax.realtime.opened_camera import OpenedCamera
+from sogjax.realtime.start import checked, recording_of
+from sogjax.settings.compose import composed_config
+from sogjax.settings.live import LiveConfig
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    """A calibration of two cameras, and nothing else."""
+    monkeypatch.chdir(tmp_path)
+    folder = tmp_path / "studio"
+    folder.mkdir()
+    write_calibration(folder, *(toml_camera(name) for name in ("left", "right")))
+    (folder / "recording.yaml").write_text("up: z\n")
+    return folder
+
+
+def live(capsys, place, *words):
+    return refused(capsys, "live", f"recording={place}", f"actor={actor_file(place.parent / 'a.yaml')}", *words)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "name the cameras"),
+        (("sources={third:0}",), "there is no camera 'third'"),
+        (("sources={left:0,right:0}",), "left and right are both 0"),
+        (("sources={left:nowhere.mp4}",), "camera left: nowhere.mp4 does not open"),
+        (("sources={left:0}", "replay=true"), "exclude each other"),
+        (("sources={left:0}", "fps=0"), "fps=0"),
+        (("sources={left:0}", "speed=0"), "speed=0"),
+    ],
+)
+def test_wrong_cameras(capsys, place, words, said):
+    assert said in live(capsys, place, *words)
+    assert not (place.parent / "outputs").exists()
+
+
+def test_a_camera_of_another_size_than_calibrated(capsys, place):
+    write_video(place.parent / "large.mp4", size=(96, 64))
+    sentence = live(capsys, place, f"sources={{left:{place.parent / 'large.mp4'}}}")
+    assert "96x64" in sentence
+    assert "64x48" in sentence
+
+
+def test_no_actor(capsys, place):
+    write_video(place.parent / "left.mp4")
+    sentence = refused(capsys, "live", f"recording={place}", f"sources={{left:{place.parent / 'left.mp4'}}}")
+    assert "needs an actor" in sentence
+
+
+def test_a_replay_with_faults_of_no_camera(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    recording = trackable(tmp_path / "walk")
+    words = ("replay=true", "images.background=none", "faults.delay={third:0.1}")
+    assert "there is no camera 'third'" in live(capsys, recording, *words)
+
+
+@pytest.mark.parametrize("text", ["127.0.0.1:0", "127.0.0.1:70000", "nobody.invalid:39539", "127.0.0.1:port"])
+def test_no_address(text):
+    with pytest.raises(InputError, match=text):
+        Address.of("vmc", text, 39539)
+
+
+def test_an_address_is_this_machine_and_the_usual_port_unless_told_otherwise():
+    assert Address.of("vmc", "39540", 39539) == Address("127.0.0.1", 39540)
+    assert Address.of("vmc", "localhost", 39539) == Address("localhost", 39539)
+
+
+def test_where_nobody_listens_datagrams_are_lost_and_nothing_else(tmp_path):
+    datagrams = Datagrams(str(tmp_path / "none.sock"))
+    for _ in range(3):
+        datagrams.send(b"line\n")
+    datagrams.close()
+    assert datagrams.unheard == 3
+
+
+def test_lines_reach_a_local_socket(tmp_path):
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
+        listener.bind(str(tmp_path / "lines.sock"))
+        datagrams = Datagrams(str(tmp_path / "lines.sock"))
+        datagrams.send(b"line\n")
+        assert listener.recv(100) == b"line\n"
+        datagrams.close()
+
+
+def test_no_viewer_answers():
+    from sogjax.view.rerun.live import _answering, _opened_viewer
+
+    with socket.socket() as used:
+        used.bind(("127.0.0.1", 0))
+        with pytest.raises(InputError, match="no viewer answers"):
+            _answering(f"127.0.0.1:{used.getsockname()[1]}")
+    with socket.socket() as used:
+        try:
+            used.bind(("127.0.0.1", 9876))
+        except OSError:
+            pytest.skip("the port of Rerun's viewer is in use on this machine")
+        used.listen()
+        with pytest.raises(InputError, match="9876 is in use"):
+            _opened_viewer()
+
+
+def test_a_place_needs_no_videos(place):
+    write_image(BACKGROUND.of(place) / "left.png", np.full((SIZE[1], SIZE[0], 3), 90, np.uint8))
+    recording = open_place(place)
+    assert recording.rig.names == ("left", "right")
+    assert [*recording.background] == ["left"]
+    config = composed_config(LiveConfig, "live", {"recording": place, "sources": {"left": 1}, "fps": 50.0}.items())
+    checked(config)
+    assert recording_of(config).rig.names == ("left",)
+    assert recording_of(config).fps == 50.0
+
+
+def test_a_calibration_without_sizes_is_refused_for_cameras(place):
+    write_calibration(place, toml_camera("left", size=None))
+    with pytest.raises(InputError, match="size"):
+        open_place(place)
+
+
+def test_a_file_as_a_camera_ends(tmp_path):
+    write_video(tmp_path / "left.mp4", frames=3)
+    camera = OpenedCamera("left", str(tmp_path / "left.mp4"), SIZE)
+    assert [camera.read() is not None for _ in range(4)] == [True, True, True, False]
+    camera.release()
+
+
+def test_a_camera_that_stops_is_opened_again(tmp_path, capsys, monkeypatch):
+    """While it is away nobody waits for it; closing it ends the waiting."""
+    write_video(tmp_path / "left.mp4", frames=3)
+    camera = OpenedCamera("left", str(tmp_path / "left.mp4"), SIZE)
+    monkeypatch.setattr("sogjax.realtime.opened_camera.TRIED_AGAIN", 0.05)
+    monkeypatch.setattr("pathlib.Path.is_file", lambda path: False)
+    numbers = [camera.read() for _ in range(7)]
+    assert all(taken is not None for taken in numbers)
+    err = capsys.readouterr().err
+    assert "stopped; the others go on" in err
+    assert "is back" in err
+    monkeypatch.setattr("sogjax.realtime.opened_camera.TRIED_AGAIN", 60.0)
+    thread = Thread(target=lambda: [camera.read() for _ in range(9)])
+    thread.start()
+    camera.close()
+    thread.join(2.0)
+    assert not thread.is_alive()
+    camera.release()
