@@ -123,14 +123,14 @@ def test_the_tracker_goes_on_with_the_capacities_that_it_stopped_with(capsys, tm
 def test_a_searched_pose_and_a_made_actor_are_kept(capsys, tmp_path, monkeypatch, recording):
     """Exactly, not as rounded in an actor's file; neither is looked for again."""
     body = load_body(actor_file(tmp_path / "a.yaml")).rotated(jnp.asarray(turn(0.3)))
-    monkeypatch.setattr(passes, "make_actors", lambda *_: Actors((body,)))
+    monkeypatch.setattr(passes, "kept_or_made", lambda *_: Actors((body,)))
     words = ["track", f"recording={recording}", *SMALL, *LIGHT]
     done(capsys, *words, "out=whole")
     with monkeypatch.context() as context:
         stop_after(context, 10)
         main([*words, "out=run"])
     never = lambda *_: pytest.fail("looked for again")
-    monkeypatch.setattr(passes, "make_actors", never)
+    monkeypatch.setattr(passes, "kept_or_made", never)
     monkeypatch.setattr(initial_pose, "from_file", never)
     monkeypatch.setattr(passes, "find_initial_pose", never)
     done(capsys, *words, "out=run", "resume=true")

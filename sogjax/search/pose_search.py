@@ -226,7 +226,7 @@ def _spread_best(searcher: PoseSearch, tried: Hypotheses) -> Hypotheses:
     counts, chosen = np.array(NUM_AT_PLACE), []
     shared = min(searcher.among, len(counts))
     counts[:shared] = np.ceil(counts[:shared].mean())
-    for place, count in zip(np.unique(tried.where), counts, strict=False):
+    for place, count in zip(np.unique(tried.where), counts.tolist(), strict=False):
         here = tried[tried.where == place]
         likely = here[np.argsort(-here.values)[: 8 * count]]
         chosen.append(likely[different(searcher.body, likely.poses, likely.values, count)])
