@@ -111,10 +111,13 @@ class BackgroundModel(eqx.Module):
 
     def filled_by(self, other: "BackgroundModel") -> "BackgroundModel":
         """This background, with what another one of the same cells knows where this one knows nothing."""
-        filled = jax.tree.map(
-            lambda own, others: jnp.where(self.known, own, others), *(replace(m, elsewhere=None) for m in (self, other))
-        )
-        return replace(filled, unknown=self.unknown & other.unknown, elsewhere=self.elsewhere)
+        filled = lambda own, others: jnp.where(self.known, own, others)
+        known, unknown = self.known | other.known, self.unknown & other.unknown
+        parts = {
+            name: jax.tree.map(filled, getattr(self, name), getattr(other, name))
+            for name in ("planes", "precision", "shade", "volume")
+        }
+        return replace(self, **parts, known=known, unknown=unknown)
 
     @classmethod
     def from_background(cls, background: BackgroundCells, shadow: float = SHADOW) -> "BackgroundModel":
