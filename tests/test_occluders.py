@@ -156,7 +156,7 @@ def test_a_search_hears_nothing_from_hidden_cells(dog):
     assert np.all(np.asarray(known.visible)[:2] < 0.9)
     assert np.all(np.asarray(known.visible)[2:] > 0.99)
     heard = [np.asarray(of(tracker, colors).gain) for colors in BOARDS]
-    assert np.all(np.abs(heard[0] - heard[1])[:2] > 0.1)  # a search that does not know of the boards hears them
+    assert np.all(np.abs(heard[0] - heard[1])[:2] > 0.3)  # a search that does not know of the boards hears them
 
 
 def test_a_hull_reaches_behind_what_stands_in_front():

@@ -11,7 +11,6 @@ from scipy.cluster.vq import kmeans2
 
 from sogjax.model.body import Body
 from sogjax.scene.foreground import (
-    COARSER,
     LARGEST,
     SUBJECT_UNKNOWN,
     TEMPER,
@@ -21,6 +20,7 @@ from sogjax.scene.foreground import (
     color_bins,
     color_surprise,
     subject_colors,
+    surprise_of,
 )
 
 NUM_COLORS = 6
@@ -122,5 +122,4 @@ def picture_surprise(
     cells: Float[Array, "camera rows columns 3"], inside: Float[Array, "camera rows columns"]
 ) -> Float[Array, "camera rows columns"]:
     """Minus the logarithm of the density of each cell's colour among those of its picture."""
-    camera = jnp.arange(cells.shape[0])[:, None, None]
-    return color_surprise(cells, inside)[camera, *(part // COARSER for part in color_bins(cells))]
+    return surprise_of(cells, color_surprise(cells, inside))

@@ -160,9 +160,7 @@ def log_odds(
     if subject is None:
         return jnp.where(empty.known, jnp.clip(TEMPER * odds, -LARGEST, LARGEST), 0.0)
     density = subject_density(cells, subject)
-    index = tuple(part // COARSER for part in color_bins(cells))
-    camera = jnp.arange(cells.shape[0])[:, None, None]
-    elsewhere = TEMPER * UNKNOWN_BACKGROUND * (empty.elsewhere[camera, *index] + density)
+    elsewhere = TEMPER * UNKNOWN_BACKGROUND * (surprise_of(cells, empty.elsewhere) + density)
     unknown = jnp.where(empty.unknown, jnp.clip(elsewhere, -LARGEST_UNKNOWN, LARGEST_UNKNOWN), 0.0)
     return jnp.where(empty.known, jnp.clip(TEMPER * (odds + density), -LARGEST, LARGEST), unknown)
 
@@ -184,6 +182,14 @@ def color_surprise(
         return -jnp.log((1.0 - PICTURE_SMOOTHING) * density + PICTURE_SMOOTHING)
 
     return jax.vmap(of_camera)(cells, counted)
+
+
+def surprise_of(
+    cells: Float[Array, "camera rows columns 3"], table: Float[Array, "camera bin bin bin"]
+) -> Float[Array, "camera rows columns"]:
+    """What the table of `color_surprise` says of each cell's colour."""
+    camera = jnp.arange(cells.shape[0])[:, None, None]
+    return table[camera, *(part // COARSER for part in color_bins(cells))]
 
 
 def background_surprise(
