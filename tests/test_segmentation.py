@@ -111,6 +111,27 @@ def test_masks_of_a_body_with_its_shadow(num_cameras):
             assert iou(mask, truth[k]) > 0.82, k
 
 
+def test_legs_that_never_moved_are_told_from_an_unknown_floor_by_their_colours():
+    """The lower half of a person is in the picture of the empty scene too, so nothing is known around it."""
+    rig = ring_rig(6, distance=3.0)
+    body = in_colors(shipped("human"))
+    pose = standing(body, 0.9)
+    middle = float(jnp.median(posed(body, jnp.asarray(pose))[0].means[:, 2])) - 0.2
+    truth, drawn = draw(body, pose, rig, masks=True, disc=FLESH), draw(body, pose, rig, disc=FLESH)
+    images, plates, unknown = {}, {}, {}
+    for k, name in enumerate(rig.names):
+        empty, mask = scene(seed=k, contrast=10.0), truth[k]
+        row = int(opencv_pixels(rig, name, np.array([[0.0, 0.0, middle]]))[0, 1])
+        still = mask & (np.arange(len(mask)) > row)[:, None]
+        assert still.sum() > 0.2 * mask.sum()
+        unknown[k] = cv2.dilate(still.astype(np.uint8), np.ones((21, 21))) > 0
+        images[k] = photo(np.where(mask[..., None], drawn[k], empty), k)
+        plates[k] = photo(np.where(still[..., None], drawn[k], empty), 50 + k)
+    cameras = {k: rig.camera(name) for k, name in enumerate(rig.names)}
+    masks = masks_from_backgrounds(images, plates, {}, cameras, UP, unknown)
+    assert min(iou(masks[k], truth[k]) for k in images) > 0.8
+
+
 def test_a_plate_of_another_place_gives_no_mask():
     rig = ring_rig(2)
     images = {k: photo(scene(seed=k, contrast=60.0)) for k in range(2)}

@@ -63,8 +63,9 @@ def masks_from_backgrounds(
         differences = dict(zip(backgrounds, found, strict=True))
         guesses = {camera: first_guess(difference) for camera, difference in differences.items()}
         guesses = {camera: guess for camera, guess in guesses.items() if is_subject(guess)}
-        guesses |= _seen_together({c: differences[c] for c in guesses}, guesses, known, cameras, up)
-        cuts = pool.map(lambda camera: cut_out(differences[camera], guesses[camera]), guesses)
+        better, hull = _seen_together({c: differences[c] for c in guesses}, guesses, known, cameras, up)
+        guesses |= better
+        cuts = pool.map(lambda camera: cut_out(differences[camera], guesses[camera], hull.get(camera)), guesses)
         sized = {camera: _enlarged(mask, images[camera]) for camera, mask in zip(guesses, cuts, strict=True)}
     return {camera: mask for camera, mask in sized.items() if is_subject(mask)}
 
@@ -75,15 +76,20 @@ def first_guess(difference: Difference) -> Bool[np.ndarray, "rows columns"]:
     return largest_parts(different | (without_holes(different) & difference.changed))
 
 
-def cut_out(difference: Difference, guess: Bool[np.ndarray, "rows columns"]) -> Bool[np.ndarray, "rows columns"]:
-    """A guess with its outline corrected by OpenCV's grabCut, in the box around it."""
-    rows, columns = np.nonzero(guess)
+def cut_out(difference: Difference, guess: Mask, hull: Mask | None = None) -> Mask:
+    """A guess with its outline corrected by OpenCV's grabCut, in the box around it.
+
+    What is unknown in the silhouette of the other cameras' `hull` is left to grabCut, too: shoes that never left the
+    floor are as unknown as it, and only their colours tell them from it.
+    """
+    unknown = np.zeros_like(guess) if hull is None else difference.unknown & hull
+    rows, columns = np.nonzero(guess | unknown)
     border = 12 + int(0.08 * max(np.ptp(rows), np.ptp(columns)))
     box = (
         slice(max(rows.min() - border, 0), rows.max() + border),
         slice(max(columns.min() - border, 0), columns.max() + border),
     )
-    labels = _labels(guess[box].astype(np.uint8), difference.change[box], difference.unexplained[box])
+    labels = _labels(guess[box], difference.change[box], difference.unexplained[box], unknown[box])
     subject = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
     if subject.all():  # grabCut needs both; a box without background is one that the subject fills
         return guess
@@ -104,12 +110,12 @@ def largest_parts(mask: Bool[np.ndarray, "rows columns"]) -> Bool[np.ndarray, "r
     return np.isin(labels, np.flatnonzero(areas >= SMALLEST_PART * areas.max()) + 1)
 
 
-def _labels(guess: UInt8[np.ndarray, "rows columns"], change: np.ndarray, unexplained: np.ndarray) -> np.ndarray:
-    """What grabCut may change: pixels near the guess's outline that the difference leaves open."""
-    labels = np.where(guess > 0, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
-    labels[(cv2.erode(guess, disc(5)) > 0) & (unexplained > 10.0)] = cv2.GC_FGD
-    far = cv2.dilate(guess, disc(9)) == 0
-    labels[far | ((change < UNCHANGED) & (guess == 0))] = cv2.GC_BGD
+def _labels(guess: Mask, change: np.ndarray, unexplained: np.ndarray, unknown: Mask) -> UInt8[np.ndarray, "_h _w"]:
+    """What grabCut may change: pixels near the guess's outline that the difference leaves open, and unknown ones."""
+    inside, around = guess.astype(np.uint8), widened(guess, 4) | unknown
+    labels = np.where(guess, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
+    labels[(cv2.erode(inside, disc(5)) > 0) & (unexplained > 10.0)] = cv2.GC_FGD
+    labels[~around | ((change < UNCHANGED) & ~guess)] = cv2.GC_BGD
     return labels
 
 
@@ -119,22 +125,23 @@ def _seen_together(
     known: Mapping[int, Mask],
     cameras: Mapping[int, Camera],
     up: Float[np.ndarray, "3"],
-) -> dict[int, Mask]:
-    """Better guesses from all cameras together; empty if their regions do not meet."""
+) -> tuple[dict[int, Mask], dict[int, Mask]]:
+    """Better guesses from all cameras together, and their hull's silhouettes; empty if their regions do not meet."""
     small_known = {camera: reduced_mask(mask) for camera, mask in known.items()}
     subjects = {**guesses, **small_known}
     if len(subjects) < 2 or not guesses:
-        return {}
+        return {}, {}
     regions = {c: differences[c].open | guesses[c] if c in guesses else small_known[c] for c in subjects}
     small = {c: resized(cameras[c], (mask.shape[1], mask.shape[0])) for c, mask in subjects.items()}
-    seen = {c: differences[c].changed | guesses[c] if c in guesses else small_known[c] for c in subjects}
-    cube = cube_around([largest_parts(seen[c]) for c in subjects], [small[c] for c in subjects])
+    cube = cube_around([largest_parts(regions[c]) for c in subjects], [small[c] for c in subjects])
     pixels = {c: voxel_pixels(cube, small[c], mask.shape) for c, mask in subjects.items()}
     misses = np.sum([~pixels[c].hits(widened(region, 1)) for c, region in regions.items()], axis=0)
     hull = misses <= (1 if len(subjects) >= MANY else 0)
     above_floor = without_floor(hull, up)
     better = {c: _confirmed(differences[c], pixels[c], hull, above_floor) for c in guesses}
-    return {camera: guess for camera, guess in better.items() if is_subject(guess)}
+    return {c: guess for c, guess in better.items() if is_subject(guess)}, {
+        c: pixels[c].silhouette_of(hull) for c in guesses
+    }
 
 
 def _confirmed(difference: Difference, pixels: VoxelPixels, hull: np.ndarray, above_floor: np.ndarray) -> Mask:
