@@ -142,9 +142,11 @@ def test_what_was_learnt_is_kept(tmp_path):
     assert found.rows == (3, 9)
 
 
-def test_what_hides_goes_on_a_little_where_nothing_is_told_and_not_at_the_border():
+def test_what_hides_goes_on_a_little_where_nobody_was_seen_and_not_at_the_border():
     counts = DepthCounts.empty((1, 20, 30), 1.0, 4.0)
     rows, columns = (part.ravel() for part in np.mgrid[8:11, 10:16])
+    once = (np.zeros(2, int), np.array([12, 18]), np.full(2, 12))
+    counts.add(once, np.full(2, 3.0, np.float32), np.full(2, 0.02, np.float32))
     cells, depths = (np.zeros(len(rows), int), rows, columns), np.full(len(rows), 3.0, np.float32)
     for _ in range(6):
         counts.add(cells, depths, np.full(len(rows), 0.02, np.float32))
@@ -154,6 +156,8 @@ def test_what_hides_goes_on_a_little_where_nothing_is_told_and_not_at_the_border
     hidden = np.isfinite(counts.hidden_from()[0])
     assert hidden[8:11, 10:15].all()
     assert hidden[9, 9]
+    assert hidden[12, 12]  # missed once only, but near what hides
+    assert not hidden[18, 12]
     assert not hidden[9, 16]  # seen
     assert not hidden[:4].any()
     assert not hidden[:, 20:].any()

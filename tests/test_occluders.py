@@ -119,7 +119,7 @@ def test_image_blobs_end_where_the_thing_in_front_does(dog):
 def test_a_hidden_limb_is_said_to_be_hidden_and_not_contradicted(dog):
     tracker, rig, pose, _ = dog
     names = limb_names(tracker.body)
-    everywhere = [np.arange(120)[:, None] * np.ones((1, 160)) > 62 for _ in range(5)]
+    everywhere = [np.arange(120)[:, None] * np.ones((1, 160)) > 70 for _ in range(5)]
     cells = with_board(rig, draw(tracker.body, pose, rig), everywhere, BOARDS[1])
     unknown = jnp.full((2, tracker.body.num_blobs), jnp.nan)
 

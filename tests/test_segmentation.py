@@ -116,7 +116,7 @@ def test_legs_that_never_moved_are_told_from_an_unknown_floor_by_their_colours()
     rig = ring_rig(6, distance=3.0)
     body = in_colors(shipped("human"))
     pose = standing(body, 0.9)
-    middle = float(jnp.median(posed(body, jnp.asarray(pose))[0].means[:, 2])) - 0.2
+    middle = float(np.median(np.asarray(posed(body, jnp.asarray(pose))[0].means)[:, 2])) - 0.2
     truth, drawn = draw(body, pose, rig, masks=True, disc=FLESH), draw(body, pose, rig, disc=FLESH)
     images, plates, unknown = {}, {}, {}
     for k, name in enumerate(rig.names):

@@ -82,6 +82,8 @@ def test_silhouettes_that_overlap_less_than_usual_must_be_looked_at(walk):
     motion.overlap[:, 1] = 0.3
     motion = replace(motion, overlap=np.repeat(motion.overlap, (2, 1), axis=1), camera_names=np.array(["a", "b", "c"]))
     assert of_one(motion).sentence == "look at c: overlaps to 30%, others to 70%"
+    motion.overlap[2:, 2] = np.nan  # hidden by what stands in front, but at the beginning
+    assert of_one(motion).sentence == "looks right"
 
 
 def test_frames_that_fit_badly_are_named(walk):

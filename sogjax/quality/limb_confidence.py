@@ -95,7 +95,7 @@ def _certainty(evidence: BlobEvidence) -> Float[Array, "blob"]:
 CLEARLY = LARGEST_UNKNOWN
 """Log odds from which a cell is foreground, and below minus which it is background; others do not count, and none whose
 background is unknown."""
-LEAST_TOLD = 0.25
+LEAST_TOLD = 0.5
 """Part of an actor's silhouette that must be either for a camera to be compared."""
 
 

@@ -144,10 +144,11 @@ def _told(motion: Motion) -> Bool[np.ndarray, "frame"]:
 
 
 def _overlaps(motion: Motion) -> dict[str, float]:
+    """Of the cameras that tell it in at least half of the frames."""
     if motion.overlap is None or motion.camera_names is None:
         return {}
     columns = zip(motion.camera_names.tolist(), np.asarray(motion.overlap, float).T, strict=True)
-    return {name: float(np.nanmedian(column)) for name, column in columns if np.isfinite(column).any()}
+    return {name: float(np.nanmedian(column)) for name, column in columns if np.isfinite(column).mean() >= 0.5}
 
 
 def _wrong(explained: float | None, expected: float | None, overlap: Mapping[str, float]) -> list[str]:

@@ -112,7 +112,8 @@ def learn_occluders(setup: Setup, tracked: FrameTable) -> LearntOccluders:
     matter = np.flatnonzero(shares > MATTERS)
     if len(matter) < max(LEAST_ROWS * len(rows), 2):
         return LearntOccluders(None)
-    first, last = rows[matter[0]], rows[matter[-1]]
+    between = rows.step - 1  # frames that were not looked at are like their neighbours
+    first, last = max(rows[matter[0]] - between, 0), min(rows[matter[-1]] + between, len(tracked) - 1)
     cameras = [name for name, of in zip(clip.recording.rig.names, hidden, strict=True) if np.isfinite(of).any()]
     say(
         f"something stands in front of {', '.join(cameras)} and hides up to {shares.max():.0%} of the body: frames "

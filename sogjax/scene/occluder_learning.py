@@ -25,7 +25,7 @@ HIDDEN = 0.5
 BEFORE = 0.2
 """Metres before the nearest place at which a body was missed: what is nearer is not known to be hidden."""
 GROWN = 2
-"""Cells by which what hides goes on where nothing was told: a body is only missed for certain in its middle."""
+"""Cells by which what hides goes on where a body was never seen: it is only missed for certain in its middle."""
 _LOOK = 3
 """Cells in each direction over which likelihoods are averaged."""
 
@@ -68,8 +68,8 @@ class DepthCounts:
             if len(rows):
                 part = tuple(slice(max(at.min() - 1, 0), at.max() + 2) for at in (rows, columns))
                 hidden[camera][part] = self._of_part(self.seen[camera][part], missed[part])
-                told = (self.seen[camera] + missed).sum(axis=-1) > 0.5
-                hidden[camera] = np.where(told, hidden[camera], _nearest_around(hidden[camera]))
+                shown = self.seen[camera].sum(axis=-1) > 0.5
+                hidden[camera] = np.where(shown, hidden[camera], _nearest_around(hidden[camera]))
         return hidden
 
     def _of_part(
