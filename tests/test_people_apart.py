@@ -44,11 +44,11 @@ def seen_boxes(boxes):
     return masks, pictures
 
 
-def people_of(boxes, frame=0):
+def people_of(boxes, frame=0, count=0):
     masks, pictures = seen_boxes(boxes)
     (cube,) = subject_cubes([masks], CAMERAS)
     assert cube is not None
-    return people_apart(frame, masks, NOTHING, pictures, CAMERAS, cube, UP)
+    return people_apart(frame, masks, NOTHING, pictures, CAMERAS, cube, UP, count)
 
 
 def test_two_people_are_two_parts_with_their_own_places_regions_and_colours():
@@ -65,6 +65,26 @@ def test_two_people_are_two_parts_with_their_own_places_regions_and_colours():
     for k in both:
         overlap = (first.masks[k] & masks[k]).sum() / (first.masks[k] | masks[k]).sum()
         assert overlap > 0.9
+
+
+def test_people_who_touch_are_cut_apart_where_two_are_asked_for():
+    arm = np.array([[*along * ALONG, z] for along in (-0.45, 0.45) for z in (1.2, 1.3)])
+    boxes = [(box(-0.45 * ALONG), RED), (arm, RED), (box(0.45 * ALONG, high=1.6), BLUE)]
+    assert len(people_of(boxes)) == 1
+    people = people_of(boxes, count=2)
+    first, second = sorted(people, key=lambda person: float(person.place[:2] @ ALONG))
+    np.testing.assert_allclose(first.place[:2], -0.45 * ALONG, atol=0.1)
+    np.testing.assert_allclose(second.place[:2], 0.45 * ALONG, atol=0.1)
+    assert unlike(first.colors, second.colors) > 0.6
+    assert first.regions
+    assert not {0, 3} & set(first.regions), "cameras 0 and 3 see one behind the other"
+
+
+def test_one_person_is_not_cut_in_two():
+    arms = np.array([[*along * ALONG, z] for along in (-0.8, 0.8) for z in (1.3, 1.45)])
+    assert len(people_of([(box((0.0, 0.0)), RED), (arms, RED)], count=2)) == 1
+    legs = [(box(side * ALONG, high=0.9, half=0.1), RED) for side in (-0.3, 0.3)]
+    assert len(people_of([*legs, (box((0.0, 0.0), low=0.8), RED)], count=2)) == 1
 
 
 def test_shadows_on_the_floor_join_nobody():

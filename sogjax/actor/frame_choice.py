@@ -15,8 +15,8 @@ from sogjax.scene.visual_hull import MANY, VOXELS, Cube, VoxelPixels, cube_aroun
 
 SMALLEST_BODY = 0.1
 """Volume of a separate part of a hull, as a share of the largest, from which on it may be somebody else."""
-LEAST_PARTS = 0.5
-"""Least share of the cameras that must show the subject."""
+LEAST_PARTS, LEAST_BESIDE = 0.5, 0.25
+"""Least share of the cameras that must show the subject; somebody beside others, who hide him from the rest."""
 SHAPE_VOXELS = 16
 """Voxels along each side of the cube in which shapes are compared."""
 
@@ -49,12 +49,14 @@ class SeenShape:
         return self.height**2 * self.agreement**2 * self.whole * self.known * (0.1 + self.clear) / self.num_bodies
 
 
-def subject_cubes(masks: Sequence[Mapping[int, Mask]], cameras: Mapping[int, Camera]) -> list[Cube | None]:
+def subject_cubes(
+    masks: Sequence[Mapping[int, Mask]], cameras: Mapping[int, Camera], least: float = LEAST_PARTS
+) -> list[Cube | None]:
     """A cube around the subject in each frame, all of one size; None where too few cameras show one."""
     cubes: list[Cube | None] = []
     for seen in masks:
         shown = {k: mask for k, mask in seen.items() if is_subject(mask)}
-        enough = len(shown) >= max(2, LEAST_PARTS * len(cameras))
+        enough = len(shown) >= max(2, least * len(cameras))
         cubes.append(
             cube_around([largest_parts(m) for m in shown.values()], [cameras[k] for k in shown]) if enough else None
         )

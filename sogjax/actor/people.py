@@ -14,6 +14,7 @@ from scipy.ndimage import binary_dilation, distance_transform_edt, gaussian_filt
 from scipy.optimize import linear_sum_assignment
 
 from sogjax.actor.frame_choice import SMALLEST_BODY, Mask, hull_within
+from sogjax.actor.touching_people import cut_apart
 from sogjax.model.camera import Camera
 from sogjax.scene.visual_hull import VOXELS, Cube, VoxelPixels, voxel_pixels, without_floor
 
@@ -26,8 +27,8 @@ PIECE, NEAR = 0.35, 0.35
 a forearm or a foot whose joint the background's colours hide. People who stand so near each other are seldom apart."""
 ALONE = 0.15
 """Share of somebody's silhouettes, all cameras together, that is nobody else's."""
-HIDDEN = 0.1
-"""Share of a silhouette that another one covers, above which a camera's mask is not used."""
+HIDDEN, TOUCHED = 0.1, 0.35
+"""Share of a silhouette that is also another one's, above which a camera's mask is not used; of people who touch."""
 COLOR_BINS = 6
 """Bins of each channel in the histogram of somebody's colours."""
 
@@ -56,17 +57,27 @@ def people_apart(
     cameras: Mapping[int, Camera],
     cube: Cube,
     up: Float[np.ndarray, "3"],
+    count: int = 0,
 ) -> list[PersonSeen]:
     """The people who stand apart from each other in one frame, in no particular order.
 
     By camera, `masks` say what is not the background, shadows or not, `unknown` where nothing is known of it, and
-    `pictures` are the cells' colours; the cameras are those of pictures of that size. All people are in the cube.
+    `pictures` are the cells' colours; the cameras are those of pictures of that size. All people are in the cube. Where
+    fewer than `count` stand apart, those who touch are cut apart, if they look like so many.
     """
     pixels = {k: voxel_pixels(cube, cameras[k], mask.shape) for k, mask in masks.items()}
     hull = without_floor(hull_within(masks, unknown, pixels), up)
     parts = _bodies(hull.reshape(3 * (VOXELS,)), cube.spacing, int(np.argmax(np.abs(up))))
     bodies = _needed(parts, masks, pixels)
-    regions = {k: _regions([pixels[k].silhouette_of(body) for body in bodies], pixels[k]) for k in masks}
+    most = HIDDEN
+    if len(bodies) < count:
+        bodies, most = cut_apart(bodies, count, cube.spacing, up), TOUCHED
+    regions = {
+        k: _regions(
+            [pixels[k].silhouette_of(body) for body in bodies], _depths(bodies, cube, cameras[k]), pixels[k], most
+        )
+        for k in masks
+    }
     people = []
     for number, body in enumerate(bodies):
         own = {k: region for k in masks if (region := regions[k][number]) is not None}
@@ -138,17 +149,27 @@ def _pieces_joined(parts: list[Bool[np.ndarray, "x y z"]], spacing: float) -> li
     return list(bodies.values())
 
 
-def _regions(silhouettes: Sequence[Mask], pixels: VoxelPixels) -> list[Mask | None]:
-    """Around each silhouette of one camera, what is nearer to it than to the others; None: others cover too much."""
+def _depths(bodies: Sequence[Bool[np.ndarray, "voxel"]], cube: Cube, camera: Camera) -> list[float]:
+    """The depth of each body's middle in a camera's picture, metres."""
+    pose = np.asarray(camera.camera_from_world, float)
+    return [float(pose[2, :3] @ cube.points[body].mean(axis=0) + pose[2, 3]) for body in bodies]
+
+
+def _regions(silhouettes: Sequence[Mask], away: Sequence[float], pixels: VoxelPixels, most: float) -> list[Mask | None]:
+    """Around each silhouette of one camera, what is nearer to it than to the others; None: too much is others', too.
+
+    Cells of two silhouettes belong to who is nearer to the camera (`away`, metres).
+    """
     width = 2 * pixels.footprint + 2
     distances = [cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 3) for mask in silhouettes]
+    ranked = [distance + 1e-3 * rank for distance, rank in zip(distances, np.argsort(np.argsort(away)), strict=True)]
     regions: list[Mask | None] = []
     for number, (mask, distance) in enumerate(zip(silhouettes, distances, strict=True)):
-        others = [other for k, other in enumerate(distances) if k != number]
-        nearest = np.min(others, axis=0) if others else np.full(mask.shape, np.inf)
+        others = [k for k in range(len(distances)) if k != number]
+        nearest = np.min([distances[k] for k in others], axis=0) if others else np.full(mask.shape, np.inf)
+        own = np.all([ranked[number] < ranked[k] for k in others], axis=0)
         covered = float((mask & (nearest <= 1.0)).sum() / max(mask.sum(), 1))
-        shown = mask.any() and covered <= HIDDEN
-        regions.append((distance <= width) & (distance < nearest) if shown else None)
+        regions.append((distance <= width) & own if mask.any() and covered <= most else None)
     return regions
 
 

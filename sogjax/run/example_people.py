@@ -7,7 +7,15 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool
 
-from sogjax.actor.frame_choice import Mask, SeenShape, seen_shape, spread_choice, spread_moments, subject_cubes
+from sogjax.actor.frame_choice import (
+    LEAST_BESIDE,
+    Mask,
+    SeenShape,
+    seen_shape,
+    spread_choice,
+    spread_moments,
+    subject_cubes,
+)
 from sogjax.actor.people import PersonSeen, matched, people_apart, told_apart
 from sogjax.errors import counted
 from sogjax.io.example_poses import ExamplePose, frame_name
@@ -63,6 +71,8 @@ def examples_of_masks(
 ) -> tuple[ExamplePose, ...] | str:
     """What `people_examples` gives, from what is not the background in some frames."""
     moments = everybody(seen, recording.up)
+    if sum(len(people) == actors for people in moments) < FEWEST_APART:
+        moments = everybody(seen, recording.up, actors)
     apart, counts = [people for people in moments if len(people) == actors], [len(people) for people in moments]
     another = most_seen(counts) != actors  # the number that is asked for may be that of a few specks
     if len(apart) < FEWEST_APART:
@@ -164,12 +174,14 @@ def too_few_apart(actors: int, counts: Sequence[int], plates: bool = False) -> s
     )
 
 
-def everybody(seen: SampledMasks, up: str) -> list[list[PersonSeen]]:
-    """The people in each of some frames; none, where too few cameras show any."""
+def everybody(seen: SampledMasks, up: str, count: int = 0) -> list[list[PersonSeen]]:
+    """The people in each of some frames; none, where too few cameras show any. `count` as in `people_apart`."""
     cubes = subject_cubes(seen.masks, seen.cameras)
     rows = zip(seen.frames, seen.masks, seen.pictures, cubes, strict=True)
     return [
-        [] if cube is None else people_apart(frame, masks, seen.unknown, pictures, seen.cameras, cube, axis_vector(up))
+        []
+        if cube is None
+        else people_apart(frame, masks, seen.unknown, pictures, seen.cameras, cube, axis_vector(up), count)
         for frame, masks, pictures, cube in rows
     ]
 
@@ -197,7 +209,7 @@ def suitable_moments(shapes: Sequence[Mapping[int, SeenShape]]) -> list[Moment]:
 def _shapes(person: Sequence[PersonSeen], seen: SampledMasks, up: str) -> dict[int, SeenShape]:
     """What the silhouettes of one person tell, by frame; cameras in which others hide him show nothing of him."""
     shapes: dict[int, SeenShape] = {}
-    cubes = subject_cubes([one.masks for one in person], seen.cameras)
+    cubes = subject_cubes([one.masks for one in person], seen.cameras, LEAST_BESIDE)
     for one, cube in zip(person, cubes, strict=True):
         if cube is None:
             continue
