@@ -1,8 +1,10 @@
 """What is wrong with a live session is one sentence before any work; what can go on goes on."""
 
 import socket
+import time
 from threading import Thread
 
+import cv2
 import numpy as np
 import pytest
 from command_line import actor_file, refused, trackable
@@ -39,6 +41,7 @@ def live(capsys, place, *words):
         ((), "name the cameras"),
         (("sources={third:0}",), "there is no camera 'third'"),
         (("sources={left:0,right:0}",), "left and right are both 0"),
+        (("sources={left:/dev/null,right:/dev/../dev/null}",), "left and right are both"),
         (("sources={left:nowhere.mp4}",), "camera left: nowhere.mp4 does not open"),
         (("sources={left:0}", "replay=true"), "exclude each other"),
         (("sources={left:0}", "fps=0"), "fps=0"),
@@ -139,12 +142,58 @@ def test_a_file_as_a_camera_ends(tmp_path):
     camera.release()
 
 
-def test_a_camera_that_stops_is_opened_again(tmp_path, capsys, monkeypatch):
-    """While it is away nobody waits for it; closing it ends the waiting."""
-    write_video(tmp_path / "left.mp4", frames=3)
+def test_a_file_gives_its_pictures_at_its_own_rate(tmp_path):
+    write_video(tmp_path / "left.mp4", frames=6)  # 20 frames a second
     camera = OpenedCamera("left", str(tmp_path / "left.mp4"), SIZE)
-    monkeypatch.setattr("sogjax.realtime.opened_camera.TRIED_AGAIN", 0.05)
+    times = [taken.arrived for taken in iter(camera.read, None)]
+    np.testing.assert_allclose(np.diff(times), 0.05, atol=0.03)
+    camera.release()
+
+
+@pytest.fixture
+def device(tmp_path, monkeypatch):
+    """A path at which videos are opened as devices are: as if they were no files."""
     monkeypatch.setattr("pathlib.Path.is_file", lambda path: False)
+    monkeypatch.setattr("sogjax.realtime.opened_camera.TRIED_AGAIN", 0.05)
+    return tmp_path / "left.mp4"
+
+
+def test_a_cameras_first_picture_is_not_one_from_before_all_was_ready(device):
+    write_video(device, frames=3)
+    first, second = first_two(device)
+    taken = OpenedCamera("left", str(device), SIZE).read()
+    assert taken is not None
+    assert not np.array_equal(first, second)
+    np.testing.assert_array_equal(taken.picture, second)
+
+
+def first_two(path):
+    capture = cv2.VideoCapture(str(path))
+    return [capture.read()[1] for _ in range(2)]
+
+
+def test_a_camera_that_comes_back_with_another_size_is_said_once_and_not_used(device, monkeypatch):
+    said, taken = [], []
+    monkeypatch.setattr("sogjax.realtime.opened_camera.say", said.append)
+    write_video(device, frames=1)
+    camera = OpenedCamera("left", str(device), SIZE)
+    write_video(device, frames=2, size=(96, 64))
+    thread = Thread(target=lambda: taken.append(camera.read()))
+    thread.start()
+    time.sleep(0.4)
+    assert not taken
+    write_video(device.with_name("right.mp4"), frames=2)
+    device.with_name("right.mp4").rename(device)
+    thread.join(2.0)
+    assert taken[0] is not None
+    assert ["stopped" in said[0], "96x64" in said[1], "is back" in said[2]] == [True] * 3
+    assert len(said) == 3
+
+
+def test_a_camera_that_stops_is_opened_again(device, capsys, monkeypatch):
+    """While it is away nobody waits for it; closing it ends the waiting."""
+    write_video(device, frames=3)
+    camera = OpenedCamera("left", str(device), SIZE)
     numbers = [camera.read() for _ in range(7)]
     assert all(taken is not None for taken in numbers)
     err = capsys.readouterr().err
