@@ -83,11 +83,8 @@ class Figures:
     poses: int = 0
     unsolved: int = 0
     """Sets in which nobody was tracked."""
-    began: float | None = None
     last: float | None = None
-    losses: int = 0
-    """Times that the actors were lost."""
-    searches: int = 0
+    """When the last one was sent, if the actors have been tracked since."""
 
     def add(self, stamps: Stamps, tracked: bool) -> None:
         """Count a frame."""
@@ -104,7 +101,6 @@ class Figures:
         if self.last is not None:
             self.intervals.add(stamps.sent - self.last)
         self.last = stamps.sent
-        self.began = stamps.sent if self.began is None else self.began
 
     def as_dict(self, seconds: float) -> dict[str, Any]:
         """All of them; `seconds` is how long the run took."""
@@ -121,8 +117,6 @@ class Figures:
             },
             "interval_ms": self.intervals.as_dict(),
             "jitter_ms": round(1e3 * self.intervals.deviation(), 2),
-            "losses": self.losses,
-            "searches": self.searches,
         }
 
     def line(self, overwritten: int) -> str:

@@ -93,14 +93,14 @@ class Session:
         recording = self.setup.clip.recording
         gains = [recording.color_gains.get(name) for name in self.names]
         with ExitStack() as stack:
-            self._outlets = [stack.enter_context(outlet) for outlet in self._made_outlets()]
             for publisher in (*self.publishers.quick.values(), *self.publishers.slow.values()):
-                stack.callback(publisher.close)
+                stack.callback(publisher.close)  # once the outlets, which end before, have passed all on
+            self._outlets = [stack.enter_context(outlet) for outlet in self._made_outlets()]
             if self.following.search is not None:
                 stack.callback(self.following.search.close)
             if self.videos is not None:
                 stack.enter_context(self.videos)
-            keeps = lambda: self.videos is not None
+            keeps = self.videos is not None
             stack.enter_context(CameraThreads(self.cameras, self.setup.clip.grids, self.slot, gains, keeps))
             if self.pace is not None:
                 self.pace.begin()
@@ -112,7 +112,9 @@ class Session:
         by_camera = lambda counts: {name: counts[k] for k, name in enumerate(names)}
         slowest = max(range(len(names)), key=lambda k: (assembler.missing[k], assembler.last[k]))
         dropped = {outlet.name: outlet.dropped for outlet in self._outlets}
-        found = self.figures.as_dict(self._took) | {
+        return self.figures.as_dict(self._took) | {
+            "losses": self.following.losses,
+            "searches": 0 if self.following.search is None else self.following.search.count,
             "sets": self.slot.handed_over,
             "lost": {
                 "late_or_missing_pictures": by_camera(assembler.missing),
@@ -127,9 +129,6 @@ class Session:
             "restarts": self.following.restarts,
             "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
         }
-        found["losses"] = self.following.losses
-        found["searches"] = 0 if self.following.search is None else self.following.search.count
-        return found
 
     def _made_outlets(self) -> list[Outlet[Any]]:
         made: list[Outlet[Any]] = [Outlet("publisher", self._publish, PUBLISHED_BEHIND)]
