@@ -7,10 +7,11 @@ from threading import Thread
 import cv2
 import numpy as np
 import pytest
-from command_line import actor_file, refused, trackable
+from command_line import actor_file, done, refused, trackable
 from small_recording import SIZE, toml_camera, write_calibration, write_image, write_video
 
 from sogjax.errors import InputError
+from sogjax.io.image_file import read_image
 from sogjax.io.recording import open_place
 from sogjax.io.recording_files import BACKGROUND
 from sogjax.realtime.addresses import Address, Datagrams
@@ -46,6 +47,9 @@ def live(capsys, place, *words):
         (("sources={left:0}", "replay=true"), "exclude each other"),
         (("sources={left:0}", "fps=0"), "fps=0"),
         (("sources={left:0}", "speed=0"), "speed=0"),
+        (("sources={left:nowhere.mp4}", "vmc=127.0.0.1:0"), "the port must be"),
+        (("sources={left:nowhere.mp4}", "json=nobody.invalid:1"), "the host 'nobody.invalid' is not known"),
+        (("sources={left:nowhere.mp4}", "record=studio"), "record=studio: holds a recording"),
     ],
 )
 def test_wrong_cameras(capsys, place, words, said):
@@ -66,11 +70,21 @@ def test_no_actor(capsys, place):
     assert "needs an actor" in sentence
 
 
-def test_a_replay_with_faults_of_no_camera(capsys, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        ("delay={third:0.1}", "there is no camera 'third'"),
+        ("delay={left:soon}", "left has soon; should be {CAMERA:SECONDS}"),
+        ("delay={left:-1}", "left has -1"),
+        ("delay=0.1", "should be {CAMERA:SECONDS}"),
+        ("gone={left:[10]}", "should be {CAMERA:[FROM,TO]}"),
+        ("drop=1", "faults.drop=1"),
+    ],
+)
+def test_a_replay_with_faults_that_cannot_be(capsys, tmp_path, monkeypatch, fault, said):
     monkeypatch.chdir(tmp_path)
     recording = trackable(tmp_path / "walk")
-    words = ("replay=true", "images.background=none", "faults.delay={third:0.1}")
-    assert "there is no camera 'third'" in live(capsys, recording, *words)
+    assert said in live(capsys, recording, "replay=true", "images.background=none", f"faults.{fault}")
 
 
 @pytest.mark.parametrize("text", ["127.0.0.1:0", "127.0.0.1:70000", "nobody.invalid:39539", "127.0.0.1:port"])
@@ -127,6 +141,18 @@ def test_a_place_needs_no_videos(place):
     checked(config)
     assert recording_of(config).rig.names == ("left",)
     assert recording_of(config).fps == 50.0
+
+
+def test_the_background_is_learnt_in_place_of_the_old_one(place, monkeypatch, capsys):
+    monkeypatch.setattr("sogjax.realtime.learn_background.SECONDS", 0.3)
+    write_video(place.parent / "left.mp4", frames=12)
+    write_image(BACKGROUND.of(place) / "left.jpg", np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
+    words = ("live", f"recording={place}", "sources={left:left.mp4}", "learn_background=true")
+    assert "overwrite=true" in refused(capsys, *words)
+    done(capsys, *words, "overwrite=true")
+    (path,) = BACKGROUND.of(place).iterdir()
+    assert path.name == "left.png"
+    assert read_image(path).any()
 
 
 def test_a_calibration_without_sizes_is_refused_for_cameras(place):

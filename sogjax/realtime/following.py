@@ -30,8 +30,9 @@ BETTER = 0.002
 """Share by which what a search found must explain a frame better than what is tracked."""
 ENERGIES = 64
 """Frames whose energies are kept, to be compared with."""
-REST, LONGEST_REST = 2.0, 30.0
-"""Seconds after a search that was in vain, doubled each time up to the second."""
+REST, LONGEST_REST, LONGEST_WITHOUT = 2.0, 30.0, 4.0
+"""Seconds after a search that was in vain, doubled each time up to the second, or while nobody is tracked to the third:
+who enters must not wait."""
 
 
 @dataclass(frozen=True)
@@ -169,7 +170,8 @@ class Following:
         """Go on with what a search found, if it explains its last frame better than what is tracked."""
         if found is None:
             return
-        self._not_before, self._rest = now + self._rest, min(2.0 * self._rest, LONGEST_REST)
+        longest = LONGEST_REST if self._moment is not None else LONGEST_WITHOUT
+        self._not_before, self._rest = now + min(self._rest, longest), min(2.0 * self._rest, LONGEST_REST)
         before = next((energy for exposed, energy in self._energies if exposed == found.exposed), float("-inf"))
         if found.moment is None or (self._moment is not None and found.energy < before + BETTER * abs(before)):
             return
