@@ -188,3 +188,15 @@ def test_of_a_walk_that_repeats_itself_the_nearest_stride_is_taken():
     offset, alike = time_offset([wave], t, [wave], t + 0.1)
     assert offset == pytest.approx(-0.1, abs=0.005)
     assert alike > 0.99
+
+
+def test_a_heading_that_differs_by_half_a_turn_has_that_offset_and_no_other_error():
+    """On either side of half a turn differences have opposite signs; one frame is a whole turn off besides."""
+    true = np.linspace(-20.0, 20.0, 41)
+    ours = true + 180.0 + np.where(np.arange(41) % 2, 1.0, -1.0)
+    ours[20] += 360.0
+    error = angle_error("pelvis_rotation", ours, true)
+    assert error is not None
+    assert abs(error.offset) == pytest.approx(180.0, abs=0.1)
+    assert error.mean_abs_centred == pytest.approx(1.0, abs=0.05)
+    assert error.range_ratio == pytest.approx(42.0 / 40.0, abs=0.06)
