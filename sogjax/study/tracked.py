@@ -22,13 +22,13 @@ from sogjax.synth.cache import cached_recording
 from sogjax.synth.settings import SynthSettings
 
 
-def track_rendered(settings: SynthSettings, overrides: Sequence[str] = ()) -> RunResult:
+def track_rendered(settings: SynthSettings) -> RunResult:
     """Track a rendered recording, made now if it is not there yet, and evaluate it; no results are written.
 
     Its averaged pictures are kept beside it, so that further runs do not decode them again.
     """
     cache = f"images.cache={json.dumps(str(default_cache_dir() / 'cells'))}"
-    return track_folder(cached_recording(settings, progress=progress), [cache, *overrides])
+    return track_folder(cached_recording(settings, progress=progress), [cache])
 
 
 def track_folder(folder: Path, overrides: Sequence[str] = ()) -> RunResult:
