@@ -1,6 +1,8 @@
 """`sogjax live` and `sogjax.live` on a rendered recording: what they print, leave and give."""
 
 import json
+import threading
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -104,6 +106,9 @@ def test_python_iterates_over_states(rendered, tmp_path):
     assert [state.frame for state in found] == sorted({state.frame for state in found})
     person = found[-1].actors[0]
     assert person.world_from_joint.shape == (actor.skeleton.num_joints, 4, 4)
+    with closing(sogjax.live(recording, actor, replay=True, speed=0.2, loop=True, images={"depth": 6})) as looped:
+        assert next(looped).frame == 0
+    assert not [thread for thread in threading.enumerate() if thread.name.startswith("camera")]
     with pytest.raises(sogjax.InputError, match="out"):
         sogjax.live(recording, actor, replay=True, out="x")
     with pytest.raises(sogjax.InputError, match="did you mean"):
