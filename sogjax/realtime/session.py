@@ -1,6 +1,5 @@
 """A live session: cameras, slot, tracker and outlets tied together, from the first picture to the figures."""
 
-import os
 import time
 from collections.abc import Generator, Sequence
 from contextlib import ExitStack
@@ -9,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from sogjax.io.threads import usable_cores
 from sogjax.realtime.assembler import Assembler
 from sogjax.realtime.camera_threads import CameraThreads
 from sogjax.realtime.figures import Figures, Stamps
@@ -127,7 +127,7 @@ class Session:
             "slowest_camera": names[slowest],
             "replay_stood_still_seconds": 0.0 if self.pace is None else round(self.pace.slipped, 3),
             "restarts": self.following.restarts,
-            "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+            "cores": usable_cores(),
         }
 
     def _made_outlets(self) -> list[Outlet[Any]]:
