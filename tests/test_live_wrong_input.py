@@ -8,6 +8,8 @@ import cv2
 import numpy as np
 import pytest
 from command_line import actor_file, done, refused, trackable
+from rig_cases import recording_of as recording_with
+from rig_cases import ring_rig
 from small_recording import SIZE, toml_camera, write_calibration, write_image, write_video
 
 from sogjax.errors import InputError
@@ -115,12 +117,12 @@ def test_lines_reach_a_local_socket(tmp_path):
 
 
 def test_no_viewer_answers():
-    from sogjax.view.rerun.live import _answering, _opened_viewer
+    from sogjax.view.rerun.live import LiveScene, _opened_viewer
 
     with socket.socket() as used:
         used.bind(("127.0.0.1", 0))
-        with pytest.raises(InputError, match="no viewer answers"):
-            _answering(f"127.0.0.1:{used.getsockname()[1]}")
+        with pytest.raises(InputError, match=r"^rerun=127.0.0.1:\d+: no viewer answers"):
+            LiveScene(f"127.0.0.1:{used.getsockname()[1]}", recording_with(ring_rig(2), 8), [])
     with socket.socket() as used:
         try:
             used.bind(("127.0.0.1", 9876))
