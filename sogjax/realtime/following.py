@@ -134,11 +134,9 @@ class Following:
             self._not_before = now
         elif self._bad_since is not None and now - self._bad_since > DOUBTED_AFTER and not self._is_slow:
             named = zip(self.bodies, explained.tolist(), strict=True)
-            told = (
-                f"too little is explained ({', '.join(f'{body.name} {share:.0%}' for body, share in named)}); is this "
-            )
-            told = f"{lost} is in doubt" if well else f"{told}who the actor was made of?"
-            if self._ask(now, f"{told}: searching beside"):
+            shares = ", ".join(f"{body.name} {share:.0%}" for body, share in named)
+            doubt = f"{lost} is in doubt" if well else f"too little is explained ({shares}), as of somebody else"
+            if self._ask(now, f"{doubt}: searching beside"):
                 self._note_loss()
         return well
 

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Generator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -140,9 +140,7 @@ class Session:
     def _publish(self, state: LiveState) -> None:
         for each in self.publishers.quick.values():
             each.send(state)
-        stamps = state.stamps
-        sent = Stamps(stamps.exposed, stamps.arrived, stamps.handed_over, stamps.begun, stamps.solved, time.monotonic())
-        self.figures.add(sent, state.tracked_frame is not None)
+        self.figures.add(replace(state.stamps, sent=time.monotonic()), state.tracked_frame is not None)
 
     def _solved_sets(self) -> Generator[LiveState, None, None]:
         begin = told = heard = time.monotonic()
