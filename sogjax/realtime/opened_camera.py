@@ -50,10 +50,8 @@ class OpenedCamera:
     def read(self) -> Taken | None:
         """The next picture, with the time when it came; None: the file has ended, or the camera was closed."""
         while not self._closed.is_set():
-            picture = self._next()
-            if picture is not None:
-                now = time.monotonic()
-                return Taken(picture, now, now)
+            if (taken := self._next()) is not None:
+                return taken
             if self._is_file:
                 return None
             say(f"camera {self._name}: {self._source} stopped; the others go on, and it is opened again")
@@ -68,18 +66,22 @@ class OpenedCamera:
         """Give the device back; called by the thread that reads, when it ends."""
         self._capture.release()
 
-    def _next(self) -> np.ndarray | None:
-        """The next picture of the calibrated size; None: there is none."""
+    def _next(self) -> Taken | None:
+        """The next picture of the calibrated size, and when it came, before it was decoded; None: there is none."""
         picture, self._first = self._first, None
+        if picture is None and not self._capture.grab():
+            return None
+        now = time.monotonic()
         if picture is None:
-            ok, picture = self._capture.read()
+            ok, picture = self._capture.retrieve()
             if not ok or (picture.shape[1], picture.shape[0]) != self._size:
                 return None
         if self._is_file:
             seconds = 1e-3 * self._capture.get(cv2.CAP_PROP_POS_MSEC)
-            self._begin = time.monotonic() - seconds if self._begin is None else self._begin
-            self._closed.wait(max(self._begin + seconds - time.monotonic(), 0.0))
-        return picture
+            self._begin = now - seconds if self._begin is None else self._begin
+            self._closed.wait(max(self._begin + seconds - now, 0.0))
+            now = time.monotonic()
+        return Taken(picture, now, now)
 
     def _open_again(self) -> None:
         said = ""
