@@ -53,8 +53,4 @@ def _num_colors(picture: UInt8[np.ndarray, "h w 3"]) -> int:
 
 def drawn_frames(motions: Sequence[Motion], frame: int) -> list[Motion]:
     """The motions that have a frame (the recording's number), of that frame only."""
-    return [_only(motion, motion.frame == frame) for motion in motions if frame in motion.frame]
-
-
-def _only(motion: Motion, rows: np.ndarray) -> Motion:
-    return motion.of_rows(rows)
+    return [motion.of_rows(motion.frame == frame) for motion in motions if frame in motion.frame]
