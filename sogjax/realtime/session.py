@@ -28,6 +28,8 @@ PUBLISHED_BEHIND, RECORDED_BEHIND = 4, 512
 """States that wait for publishers, and for the disk, at most."""
 TOLD_EVERY = 10.0
 """Seconds from one line on the terminal to the next."""
+TOO_FAST = 1.05
+"""Pictures a second, as a multiple of what was said of the cameras, above which that is said to be wrong."""
 SILENT = 2.0
 """Seconds without any picture after which that is said."""
 
@@ -76,7 +78,7 @@ class Session:
         """As was said last."""
         self._said: dict[int, float] = {}
         self._outlets: list[Outlet[Any]] = []
-        self._took = 0.0
+        self._took, self._rate_said = 0.0, False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -164,6 +166,7 @@ class Session:
                 if now - told >= TOLD_EVERY:
                     told = now
                     say(self.figures.line(self.slot.overwritten))
+                    self._say_rate(now - begin)
                 yield state
         finally:
             self._took = time.monotonic() - begin
@@ -203,6 +206,16 @@ class Session:
     def _on_set(self, found: FrameSet) -> None:
         if self.videos is not None:
             self.videos.put(found)
+
+    def _say_rate(self, seconds: float) -> None:
+        """Tell once if cameras are faster than was said of them: their sets are then numbered too far."""
+        rate = self.slot.handed_over / seconds
+        if self.pace is None and not self._rate_said and rate * self.period > TOO_FAST:
+            self._rate_said = True
+            say(
+                f"the cameras give {rate:.1f} pictures a second, not {1.0 / self.period:.4g}: the motion would be too "
+                f"slow; give fps={rate:.0f}"
+            )
 
     def _say_cameras(self) -> None:
         """Tell which cameras are not waited for any more, and which are back; of each not too often."""
