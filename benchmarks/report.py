@@ -79,43 +79,25 @@ def parts() -> dict[str, Callable[[Scene], Iterable[Quantity]]]:
         "decoding": lambda scene: decoding_quantities(scene.recording, scene.frames),
         "end_to_end": end_to_end_quantities,
         "growth": lambda _: growth_quantities(),
-        "process": of_processes,
-        "start_up": of_starts,
-        "sweep": of_sweeps,
-        "long": of_long_clips,
+        "process": with_actor(lambda _, actor: process_quantities(actor)),
+        "start_up": with_actor(lambda _, actor: start_up_quantities(actor)),
+        "sweep": with_actor(lambda scene, actor: sweep_quantities(actor, scene.frames)),
+        "long": with_actor(lambda scene, actor: long_quantities(scene.folder, actor)),
     }
 
 
-def of_processes(scene: Scene) -> Iterator[Quantity]:
-    """Start-up and memory, with the scene's actor in a file."""
-    with TemporaryDirectory() as folder:
-        actor = Path(folder) / "actor.yaml"
-        save_body(actor, scene.bodies[0])
-        yield from process_quantities(actor)
+def with_actor(
+    measure: Callable[[Scene, Path], Iterable[Quantity]],
+) -> Callable[[Scene], Iterator[Quantity]]:
+    """A measurement that is given the scene's actor as a file."""
 
+    def measured(scene: Scene) -> Iterator[Quantity]:
+        with TemporaryDirectory() as folder:
+            actor = Path(folder) / "actor.yaml"
+            save_body(actor, scene.bodies[0])
+            yield from measure(scene, actor)
 
-def of_starts(scene: Scene) -> Iterator[Quantity]:
-    """From commands to their first results, with the scene's actor in a file."""
-    with TemporaryDirectory() as folder:
-        actor = Path(folder) / "actor.yaml"
-        save_body(actor, scene.bodies[0])
-        yield from start_up_quantities(actor)
-
-
-def of_sweeps(scene: Scene) -> Iterator[Quantity]:
-    """What a sweep costs in single runs, with the scene's actor in a file."""
-    with TemporaryDirectory() as folder:
-        actor = Path(folder) / "actor.yaml"
-        save_body(actor, scene.bodies[0])
-        yield from sweep_quantities(actor, scene.frames)
-
-
-def of_long_clips(scene: Scene) -> Iterator[Quantity]:
-    """How memory grows with the length of a clip, with the scene's actor in a file."""
-    with TemporaryDirectory() as folder:
-        actor = Path(folder) / "actor.yaml"
-        save_body(actor, scene.bodies[0])
-        yield from long_quantities(scene.folder, actor)
+    return measured
 
 
 def row(quantity: Quantity) -> str:

@@ -5,6 +5,7 @@ from puppet import PUPPET
 from small_recording import make_recording
 
 from sogjax.cli.main import main
+from sogjax.run import forward
 
 INITIAL_POSE = "pose: rest\nposition: [0.0, 0.0, 1.0]\nheading: 0.0\n"
 
@@ -22,6 +23,19 @@ def actor_file(path, change=lambda content: None):
     change(content)
     path.write_text(yaml.safe_dump(content))
     return path
+
+
+def interrupt_at(monkeypatch, frame):
+    """Ctrl-C reaches the main thread, where the tracker's step runs, after the frame at that place."""
+    whole = forward.frames_done
+
+    def frames_done(*arguments, **named):
+        for done in whole(*arguments, **named):
+            if done.tracked.index == frame:
+                raise KeyboardInterrupt
+            yield done
+
+    monkeypatch.setattr(forward, "frames_done", frames_done)
 
 
 def refused(capsys, *arguments):

@@ -66,6 +66,11 @@ def write_image(path, image):
     assert cv2.imwrite(str(path), image)
 
 
+def snapshot(folder):
+    """Every file below a folder with its content."""
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
 def make_recording(folder, cameras=("left", "right"), settings="up: z\n", frames=4):
     """Write a recording with videos, and return its folder."""
     folder.mkdir(parents=True, exist_ok=True)

@@ -272,7 +272,7 @@ def test_what_has_no_truth_is_refused(tmp_path, recording, motion):
         ({}, "no example poses"),
         ({"out": "anna.yaml"}, "make_actor writes no file"),
         ({"symetric": False}, "did you mean symmetric"),
-        ({"body": "cat"}, "no body 'cat'"),
+        ({"body": "cat"}, "cat: there is no such file, and no such body"),
     ],
 )
 def test_actors_that_cannot_be_made_are_refused(recording, settings, sentence):

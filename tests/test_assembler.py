@@ -133,9 +133,10 @@ def test_an_outlet_never_makes_its_giver_wait_and_keeps_the_newest():
     assert outlet.dropped == 50 - len(taken)
 
 
-def test_an_outlet_that_fails_says_so_once(capsys):
+@pytest.mark.parametrize("error", [OSError("no space"), AttributeError("a mistake of ours")])
+def test_an_outlet_that_fails_says_so_once(capsys, error):
     def consume(item):
-        raise OSError("no space")
+        raise error
 
     with Outlet("motion", consume, 2) as outlet:
         for k in range(5):

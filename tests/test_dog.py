@@ -1,12 +1,12 @@
 """A subject that is no person goes through the same commands: a drawn dog, from files to files."""
 
-import cv2
 import numpy as np
 import pytest
 from body_cases import posed, shipped
 from command_line import done
 from drawn_scene import draw, in_colors, moved, standing
 from rig_cases import ring_rig
+from small_recording import write_image
 
 from sogjax.io.actor_file import load_body
 from sogjax.io.calibration.tables import write_toml
@@ -36,21 +36,16 @@ def recording(tmp_path_factory):
     poses = [trotting(dog, frame) for frame in range(FRAMES)]
     for frame, pose in enumerate(poses):
         for name, image in zip(rig.names, draw(dog, pose, rig), strict=True):
-            write(folder / "images" / name / f"{frame:06d}.png", image)
+            write_image(folder / "images" / name / f"{frame:06d}.png", image)
     views = zip(rig.names, draw(dog, poses[0], rig), draw(dog, poses[0], rig, masks=True), strict=True)
     for name, image, mask in views:
-        write(folder / "example_poses" / "stand" / f"{name}.png", image)
-        write(folder / "example_poses" / "stand" / f"{name}.mask.png", mask.astype(np.uint8) * 255)
+        write_image(folder / "example_poses" / "stand" / f"{name}.png", image)
+        write_image(folder / "example_poses" / "stand" / f"{name}.mask.png", mask.astype(np.uint8) * 255)
     write_toml(folder / "calibration.toml", rig)
     (folder / "recording.yaml").write_text("fps: 25\nup: z\n")
     points = np.stack([np.asarray(posed(dog, pose)[1], float) for pose in poses])
     save_ground_truth(folder / "ground_truth.npz", GroundTruth(25.0, points, dog.landmarks.names))
     return folder
-
-
-def write(path, image):
-    path.parent.mkdir(parents=True, exist_ok=True)
-    assert cv2.imwrite(str(path), image)
 
 
 @pytest.mark.slow

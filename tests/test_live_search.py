@@ -10,7 +10,7 @@ from walking_dog import FRAMES, HEIGHT
 
 from sogjax.realtime import searching
 from sogjax.realtime.following import Following
-from sogjax.realtime.searching import HeldFrame, SearchBeside
+from sogjax.realtime.searching import Found, HeldFrame, SearchBeside
 from sogjax.realtime.stepping import LiveStep
 from sogjax.run.clip_search import NUM_FOLLOWED, SECONDS
 from sogjax.search.found_pose import FoundPose, Path
@@ -93,6 +93,15 @@ def test_who_leaves_is_nobody_and_is_found_again(walking_dog, step):
     beside.close()
     assert solved is not None
     assert back > last
+
+
+@pytest.mark.parametrize(("tracked", "seconds"), [(False, 4.0), (True, 30.0)])
+def test_after_searches_in_vain_who_enters_does_not_wait_long(walking_dog, step, tracked, seconds):
+    tracker, _, offline = walking_dog
+    following = Following(step, (tracker.body,), start=np.array(offline.poses[0]) if tracked else None)
+    for _ in range(6):
+        following._take_over(Found(None), now=0.0)
+    assert following._not_before == seconds
 
 
 def test_what_is_held_while_searching_stays_within_its_bytes(walking_dog, step, monkeypatch):

@@ -1,14 +1,19 @@
 """What is wrong with a live session is one sentence before any work; what can go on goes on."""
 
 import socket
+import time
 from threading import Thread
 
+import cv2
 import numpy as np
 import pytest
-from command_line import actor_file, refused, trackable
+from command_line import actor_file, done, refused, trackable
+from rig_cases import recording_of as recording_with
+from rig_cases import ring_rig
 from small_recording import SIZE, toml_camera, write_calibration, write_image, write_video
 
 from sogjax.errors import InputError
+from sogjax.io.image_file import read_image
 from sogjax.io.recording import open_place
 from sogjax.io.recording_files import BACKGROUND
 from sogjax.realtime.addresses import Address, Datagrams
@@ -39,10 +44,14 @@ def live(capsys, place, *words):
         ((), "name the cameras"),
         (("sources={third:0}",), "there is no camera 'third'"),
         (("sources={left:0,right:0}",), "left and right are both 0"),
+        (("sources={left:/dev/null,right:/dev/../dev/null}",), "left and right are both"),
         (("sources={left:nowhere.mp4}",), "camera left: nowhere.mp4 does not open"),
         (("sources={left:0}", "replay=true"), "exclude each other"),
         (("sources={left:0}", "fps=0"), "fps=0"),
         (("sources={left:0}", "speed=0"), "speed=0"),
+        (("sources={left:nowhere.mp4}", "vmc=127.0.0.1:0"), "the port must be"),
+        (("sources={left:nowhere.mp4}", "json=nobody.invalid:1"), "the host 'nobody.invalid' is not known"),
+        (("sources={left:nowhere.mp4}", "record=studio"), "record=studio: holds a recording"),
     ],
 )
 def test_wrong_cameras(capsys, place, words, said):
@@ -63,11 +72,21 @@ def test_no_actor(capsys, place):
     assert "needs an actor" in sentence
 
 
-def test_a_replay_with_faults_of_no_camera(capsys, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        ("delay={third:0.1}", "there is no camera 'third'"),
+        ("delay={left:soon}", "left has soon; should be {CAMERA:SECONDS}"),
+        ("delay={left:-1}", "left has -1"),
+        ("delay=0.1", "should be {CAMERA:SECONDS}"),
+        ("gone={left:[10]}", "should be {CAMERA:[FROM,TO]}"),
+        ("drop=1", "faults.drop=1"),
+    ],
+)
+def test_a_replay_with_faults_that_cannot_be(capsys, tmp_path, monkeypatch, fault, said):
     monkeypatch.chdir(tmp_path)
     recording = trackable(tmp_path / "walk")
-    words = ("replay=true", "images.background=none", "faults.delay={third:0.1}")
-    assert "there is no camera 'third'" in live(capsys, recording, *words)
+    assert said in live(capsys, recording, "replay=true", "images.background=none", f"faults.{fault}")
 
 
 @pytest.mark.parametrize("text", ["127.0.0.1:0", "127.0.0.1:70000", "nobody.invalid:39539", "127.0.0.1:port"])
@@ -86,7 +105,6 @@ def test_where_nobody_listens_datagrams_are_lost_and_nothing_else(tmp_path):
     for _ in range(3):
         datagrams.send(b"line\n")
     datagrams.close()
-    assert datagrams.unheard == 3
 
 
 def test_lines_reach_a_local_socket(tmp_path):
@@ -99,12 +117,12 @@ def test_lines_reach_a_local_socket(tmp_path):
 
 
 def test_no_viewer_answers():
-    from sogjax.view.rerun.live import _answering, _opened_viewer
+    from sogjax.view.rerun.live import LiveScene, _opened_viewer
 
     with socket.socket() as used:
         used.bind(("127.0.0.1", 0))
-        with pytest.raises(InputError, match="no viewer answers"):
-            _answering(f"127.0.0.1:{used.getsockname()[1]}")
+        with pytest.raises(InputError, match=r"^rerun=127.0.0.1:\d+: no viewer answers"):
+            LiveScene(f"127.0.0.1:{used.getsockname()[1]}", recording_with(ring_rig(2), 8), [])
     with socket.socket() as used:
         try:
             used.bind(("127.0.0.1", 9876))
@@ -126,6 +144,18 @@ def test_a_place_needs_no_videos(place):
     assert recording_of(config).fps == 50.0
 
 
+def test_the_background_is_learnt_in_place_of_the_old_one(place, monkeypatch, capsys):
+    monkeypatch.setattr("sogjax.realtime.learn_background.SECONDS", 0.3)
+    write_video(place.parent / "left.mp4", frames=12)
+    write_image(BACKGROUND.of(place) / "left.jpg", np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
+    words = ("live", f"recording={place}", "sources={left:left.mp4}", "learn_background=true")
+    assert "overwrite=true" in refused(capsys, *words)
+    done(capsys, *words, "overwrite=true")
+    (path,) = BACKGROUND.of(place).iterdir()
+    assert path.name == "left.png"
+    assert read_image(path).any()
+
+
 def test_a_calibration_without_sizes_is_refused_for_cameras(place):
     write_calibration(place, toml_camera("left", size=None))
     with pytest.raises(InputError, match="size"):
@@ -139,12 +169,58 @@ def test_a_file_as_a_camera_ends(tmp_path):
     camera.release()
 
 
-def test_a_camera_that_stops_is_opened_again(tmp_path, capsys, monkeypatch):
-    """While it is away nobody waits for it; closing it ends the waiting."""
-    write_video(tmp_path / "left.mp4", frames=3)
+def test_a_file_gives_its_pictures_at_its_own_rate(tmp_path):
+    write_video(tmp_path / "left.mp4", frames=6)  # 20 frames a second
     camera = OpenedCamera("left", str(tmp_path / "left.mp4"), SIZE)
-    monkeypatch.setattr("sogjax.realtime.opened_camera.TRIED_AGAIN", 0.05)
+    times = [taken.arrived for taken in iter(camera.read, None)]
+    np.testing.assert_allclose(np.diff(times), 0.05, atol=0.03)
+    camera.release()
+
+
+@pytest.fixture
+def device(tmp_path, monkeypatch):
+    """A path at which videos are opened as devices are: as if they were no files."""
     monkeypatch.setattr("pathlib.Path.is_file", lambda path: False)
+    monkeypatch.setattr("sogjax.realtime.opened_camera.TRIED_AGAIN", 0.05)
+    return tmp_path / "left.mp4"
+
+
+def test_a_cameras_first_picture_is_not_one_from_before_all_was_ready(device):
+    write_video(device, frames=3)
+    first, second = first_two(device)
+    taken = OpenedCamera("left", str(device), SIZE).read()
+    assert taken is not None
+    assert not np.array_equal(first, second)
+    np.testing.assert_array_equal(taken.picture, second)
+
+
+def first_two(path):
+    capture = cv2.VideoCapture(str(path))
+    return [capture.read()[1] for _ in range(2)]
+
+
+def test_a_camera_that_comes_back_with_another_size_is_said_once_and_not_used(device, monkeypatch):
+    said, taken = [], []
+    monkeypatch.setattr("sogjax.realtime.opened_camera.say", said.append)
+    write_video(device, frames=1)
+    camera = OpenedCamera("left", str(device), SIZE)
+    write_video(device, frames=2, size=(96, 64))
+    thread = Thread(target=lambda: taken.append(camera.read()))
+    thread.start()
+    time.sleep(0.4)
+    assert not taken
+    write_video(device.with_name("right.mp4"), frames=2)
+    device.with_name("right.mp4").rename(device)
+    thread.join(2.0)
+    assert taken[0] is not None
+    assert ["stopped" in said[0], "96x64" in said[1], "is back" in said[2]] == [True] * 3
+    assert len(said) == 3
+
+
+def test_a_camera_that_stops_is_opened_again(device, capsys, monkeypatch):
+    """While it is away nobody waits for it; closing it ends the waiting."""
+    write_video(device, frames=3)
+    camera = OpenedCamera("left", str(device), SIZE)
     numbers = [camera.read() for _ in range(7)]
     assert all(taken is not None for taken in numbers)
     err = capsys.readouterr().err

@@ -8,11 +8,10 @@ import cv2
 import numpy as np
 import pytest
 from browser import SIZES, Browser, faults_of
-from command_line import actor_file, done, trackable
+from command_line import actor_file, done, interrupt_at, trackable
 
 from sogjax.cli.main import main
 from sogjax.io.recording import open_recording
-from sogjax.run import forward
 from sogjax.run.clip import Clip
 from sogjax.run.page import changed_settings
 from sogjax.run.small_pictures import SmallPictures
@@ -107,15 +106,8 @@ def test_pictures_follow_clicks_keys_and_links(tracked):
 
 def test_a_resumed_run_shows_the_frames_before_it_was_stopped(capsys, monkeypatch, tracked, tmp_path):
     _, words = tracked
-    whole, last = forward.frames_done, 10
-
-    def frames_done(*arguments, **named):
-        for frame in whole(*arguments, **named):
-            if frame.tracked.index == last:
-                raise KeyboardInterrupt
-            yield frame
-
-    monkeypatch.setattr(forward, "frames_done", frames_done)
+    last = 10
+    interrupt_at(monkeypatch, last)
     assert main([*words, f"out={tmp_path / 'run'}"]) == 130
     monkeypatch.undo()
     done(capsys, *words, f"out={tmp_path / 'run'}", "resume=true")

@@ -1,7 +1,5 @@
 """What the timeline of a page marks: limbs that too few cameras see, and those that another pass found."""
 
-from dataclasses import replace
-
 import numpy as np
 from body_cases import shipped
 from rig_cases import ring_rig
@@ -65,10 +63,10 @@ def test_limbs_that_another_pass_moved_are_revised():
 def test_marked_stretches_are_drawn():
     motion = standing(frames=20)
     marked = np.zeros((20, len(NAMES)), bool)
-    plain = timeline(motion, Marks.none(motion), None)
+    none = np.zeros_like(marked)
     marked[5:9, 1] = True
-    hidden, revised = (
-        timeline(motion, replace(Marks.none(motion), **{kind: marked}), None) for kind in ("hidden", "revised")
+    plain, hidden, revised = (
+        timeline(motion, marks, None) for marks in (Marks(none, none), Marks(marked, none), Marks(none, marked))
     )
     assert "<pattern" not in plain
     assert hidden.count("<pattern") == 2  # of a large and a small screen

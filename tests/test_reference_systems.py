@@ -10,6 +10,7 @@ from body_cases import shipped
 from command_line import done, refused
 from scipy.spatial.transform import Rotation
 
+from sogjax.errors import InputError
 from sogjax.io.export.angles import joint_angles, write_mot
 from sogjax.io.export.bvh import write_bvh
 from sogjax.io.export.points import write_c3d, write_trc
@@ -188,3 +189,32 @@ def test_of_a_walk_that_repeats_itself_the_nearest_stride_is_taken():
     offset, alike = time_offset([wave], t, [wave], t + 0.1)
     assert offset == pytest.approx(-0.1, abs=0.005)
     assert alike > 0.99
+
+
+def test_a_heading_that_differs_by_half_a_turn_has_that_offset_and_no_other_error():
+    """On either side of half a turn differences have opposite signs; one frame is a whole turn off besides."""
+    true = np.linspace(-20.0, 20.0, 41)
+    ours = true + 180.0 + np.where(np.arange(41) % 2, 1.0, -1.0)
+    ours[20] += 360.0
+    error = angle_error("pelvis_rotation", ours, true)
+    assert error is not None
+    assert abs(error.offset) == pytest.approx(180.0, abs=0.1)
+    assert error.mean_abs_centred == pytest.approx(1.0, abs=0.05)
+    assert error.range_ratio == pytest.approx(42.0 / 40.0, abs=0.06)
+
+
+def test_who_turns_round_and_round_does_not_hide_the_offset():
+    """The heading is as like itself at any lag; the knee tells."""
+    t = np.arange(0.0, 4.0, 0.02)
+    heading, knee = 300.0 * t, 30.0 * np.sin(2.1 * t**1.6)
+    offset, alike = time_offset([heading, knee], t, [heading, knee], t + 2.3)
+    assert offset == pytest.approx(-2.3, abs=0.005)
+    assert alike > 0.999
+
+
+def test_a_truth_with_nothing_but_gaps_is_refused(motion, tmp_path):
+    write_mot(tmp_path / "a.mot", motion)
+    reference = load_reference(tmp_path / "a.mot")
+    unknown = {name: np.full_like(values, np.nan) for name, values in reference.angles.items()}
+    with pytest.raises(InputError, match="fewer than two frames"):
+        evaluate_against_reference(motion, dataclasses.replace(reference, angles=unknown, points={}))

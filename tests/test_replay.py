@@ -1,6 +1,7 @@
 """A replayed recording: its pictures come at their times, late, or not at all, as the seed says."""
 
 import time
+from dataclasses import replace
 from threading import Thread
 
 import numpy as np
@@ -55,6 +56,13 @@ def test_frames_come_at_their_times_and_are_the_recordings(recording):
         assert of_camera[-1].arrived - begin >= (FRAMES - 1) * PERIOD
     both = zip(*found.values(), strict=True)
     assert all(left.exposed == right.exposed for left, right in both)
+
+
+def test_pictures_come_as_filmed_for_whoever_evens_them_out(recording):
+    gains = dict.fromkeys(recording.rig.names, (2.0, 1.0, 0.5))
+    plain, found = (taken(each)[0]["left"] for each in (recording, replace(recording, color_gains=gains)))
+    for one, other in zip(plain, found, strict=True):
+        np.testing.assert_array_equal(bgr(one.picture), bgr(other.picture))
 
 
 def test_a_late_camera_is_late_and_the_others_are_not(recording):

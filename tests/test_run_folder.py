@@ -7,6 +7,7 @@ import sys
 import pytest
 from command_line import actor_file, done, refused, trackable
 from motion_cases import walking_motion
+from small_recording import snapshot
 
 from sogjax.errors import InputError
 from sogjax.io.motion import load_motion
@@ -31,10 +32,6 @@ def contents(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-def contents_of_all(folder):
-    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-
-
 def test_results_stay_unless_they_are_to_be_overwritten(capsys, tmp_path, command):
     done(capsys, *command)
     before = contents(tmp_path / "run")
@@ -47,10 +44,10 @@ def test_results_stay_unless_they_are_to_be_overwritten(capsys, tmp_path, comman
 
 
 def test_a_recording_is_no_place_for_results(capsys, tmp_path, command):
-    before = contents_of_all(tmp_path / "walk")
+    before = snapshot(tmp_path / "walk")
     sentence = refused(capsys, *command[:-1], f"out={tmp_path / 'walk'}", "overwrite=true")
     assert f"out={tmp_path / 'walk' / 'results'}" in sentence
-    assert contents_of_all(tmp_path / "walk") == before
+    assert snapshot(tmp_path / "walk") == before
 
 
 def test_nothing_of_an_older_run_is_left_but_what_is_not_its_own(capsys, tmp_path, command):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import yaml
 from command_line import actor_file, refused, trackable
-from small_recording import make_recording, toml_camera, write_calibration, write_image
+from small_recording import make_recording, snapshot, toml_camera, write_calibration, write_image
 
 from sogjax.errors import InputError
 from sogjax.io.actor_file import load_body
@@ -25,11 +25,6 @@ from sogjax.io.yaml_entry import read_yaml
 
 LEADING_OUT = ("../../x", "..", "a/b", "/etc/passwd", "..\\x", "a\0b", "x" * 300, ".hidden", "a\nb", "é" * 80)
 PLAIN = ("cam01", "left camera", "Kamera (1)", "カメラ1", "a.b-c_d")
-
-
-def snapshot(folder):
-    """Every file below a folder with its content."""
-    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 @pytest.mark.parametrize("name", LEADING_OUT)

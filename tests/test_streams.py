@@ -5,14 +5,14 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from command_line import actor_file, trackable
+from command_line import actor_file, interrupt_at, trackable
 
 from sogjax.cli.main import main
 from sogjax.errors import InputError
 from sogjax.io.frame_motions import load_one_motion
 from sogjax.io.motion import Motion, load_motion
 from sogjax.io.source import look_at_source
-from sogjax.run import clip, forward
+from sogjax.run import clip
 from sogjax.view.overlay import OverlayVideo
 
 FRAMES, LAST_GOOD = 14, 10
@@ -27,16 +27,8 @@ def command(tmp_path, monkeypatch):
 
 
 def interrupt_the_step(monkeypatch):
-    """Ctrl-C reaches the main thread, where the step runs."""
-    whole = forward.frames_done
-
-    def frames_done(*arguments, **named):
-        for done in whole(*arguments, **named):
-            if done.tracked.index == LAST_GOOD:
-                raise KeyboardInterrupt
-            yield done
-
-    monkeypatch.setattr(forward, "frames_done", frames_done)
+    """Ctrl-C."""
+    interrupt_at(monkeypatch, LAST_GOOD)
     return 130
 
 

@@ -22,7 +22,6 @@ from sogjax.run.run import Run
 from sogjax.run.runner import run_passes
 from sogjax.run.track import opened_clip
 from sogjax.tracking.capacity import first_capacities
-from sogjax.tracking.culling import Capacities, capacity_for
 from sogjax.tracking.frame import AnyFrame, on_device
 from sogjax.tracking.tracker import Tracker
 
@@ -63,7 +62,7 @@ def make_tracker(
     run_passes(run, BEFORE_TRACKING)
     tracker = replace(run.setup.tracker, initial_pose=jnp.asarray(run.initial_pose.pose))
     frame = on_device(next(clip.frames(run.initial_pose.frame, run.initial_pose.frame + 1)))
-    return replace(tracker, capacities=_with_more_room(first_capacities(tracker, tracker.start(), frame)))
+    return replace(tracker, capacities=first_capacities(tracker, tracker.start(), frame).times(ROOM))
 
 
 def read_cells(
@@ -96,7 +95,3 @@ def read_cells(
     build.at_least("every", every, 1)
     clip = Clip(recording, chosen_frames(recording, start, stop, every), grids[0].depth, keypoints)
     return (frame.cells if frame[1:] == (None, None) else frame for frame in map(on_device, clip.frames()))
-
-
-def _with_more_room(first: Capacities) -> Capacities:
-    return Capacities(capacity_for(ROOM * first.near), capacity_for(ROOM * first.matching), ROOM * first.blocks)

@@ -25,6 +25,7 @@ from sogjax.energy.overlap import overlaps
 from sogjax.energy.similarity import Similarity
 from sogjax.energy.views import Views, whole_image_overlap
 from sogjax.errors import InputError
+from sogjax.io.threads import usable_cores
 from sogjax.model.camera import Camera, project
 from sogjax.model.sog import Sog
 from sogjax.run.compilation_cache import why_not_kept
@@ -177,8 +178,7 @@ def _say_machine() -> None:
     """Print what jax computes on."""
     devices = jax.devices()
     _line("devices", ", ".join(f"{device.platform} {device.device_kind}" for device in devices))
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    _line("processor cores", str(cores))
+    _line("processor cores", str(usable_cores()))
 
 
 def say_programs(folder: str | None) -> None:

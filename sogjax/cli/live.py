@@ -1,11 +1,13 @@
 """`sogjax live`: tracks while pictures arrive, and passes every pose on."""
 
+import sys
 import time
-from contextlib import closing
+from contextlib import closing, redirect_stdout
 from pathlib import Path
 from typing import Any
 
 from sogjax.io.files import write_json
+from sogjax.realtime.json_lines import TERMINAL
 from sogjax.realtime.learn_background import learn_place
 from sogjax.realtime.session import Session
 from sogjax.realtime.start import actors_of, checked, recording_of, session_of
@@ -44,8 +46,10 @@ def run(config: LiveConfig) -> dict[str, Any]:
         say("stopped by Ctrl-C; the motion is kept")
     finally:
         files = finish(session, out)
-    _print(session.report(), files)
-    return session.report()
+    report = session.report()
+    with redirect_stdout(sys.stderr if config.json == TERMINAL else sys.stdout):  # lines of JSON stay by themselves
+        _print(report, files)
+    return report
 
 
 def finish(session: Session, out: Path) -> list[Path]:

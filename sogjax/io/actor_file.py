@@ -33,7 +33,7 @@ def named_body(name: str) -> Path:
     """
     shipped = _bundled()
     if name not in shipped:
-        raise InputError(f"no body {name!r} comes with sogjax; choose one of {', '.join(shipped)} or give a file")
+        raise InputError(f"{name}: there is no such file, and no such body comes with sogjax: {', '.join(shipped)}")
     return shipped[name]
 
 

@@ -97,8 +97,8 @@ class ArrayLog:
             left = left[self._file.write(left) :]
 
 
-def read_log(folder: Path, mapped: bool = False) -> Arrays:
-    """The constant arrays and the columns of the rows; `mapped` columns are read from disk where they are used.
+def read_log(folder: Path) -> Arrays:
+    """The constant arrays and the columns of the rows.
 
     Raises:
         InputError: no such folder, or files that do not open.
@@ -106,13 +106,13 @@ def read_log(folder: Path, mapped: bool = False) -> Arrays:
     constant = read_npz(folder / CONSTANT)
     path = folder / ROWS
     try:
-        rows = _whole_rows(path, mapped)
+        rows = _whole_rows(path)
     except (OSError, ValueError, EOFError) as error:
         raise InputError(f"{path}: is not readable ({error}); track again") from error
     return constant | {name: rows[name] for name in rows.dtype.names or ()}
 
 
-def _whole_rows(path: Path, mapped: bool) -> np.ndarray:
+def _whole_rows(path: Path) -> np.ndarray:
     """The rows that the header counts, without those lost to a power failure."""
     with path.open("rb") as file:
         shape, dtype = npy_header(file)
@@ -120,6 +120,4 @@ def _whole_rows(path: Path, mapped: bool) -> np.ndarray:
     if len(shape) != 1:
         raise ValueError("it holds no rows of numbers")
     count = min(shape[0], (path.stat().st_size - begin) // max(dtype.itemsize, 1))
-    if mapped and count:
-        return np.memmap(path, dtype, "r", begin, (count,))
     return np.fromfile(path, dtype, count, offset=begin)

@@ -12,8 +12,7 @@ import numpy as np
 
 from sogjax.errors import InputError
 from sogjax.io.cache_folder import OFF, default_cache_dir, named_folder, sweep
-from sogjax.io.files import atomic_path
-from sogjax.io.npz_file import read_npz
+from sogjax.io.npz_file import read_npz, save_npz
 from sogjax.io.recording import Recording
 from sogjax.io.source import fingerprint
 
@@ -90,7 +89,7 @@ def kept_background(
     kept = {NOTE: np.array(made_from)} | arrays
     if chosen is None:
         with contextlib.suppress(InputError):
-            _write(path, kept)
+            save_npz(path, kept)
             sweep(folder, "*-background.npz", LARGEST)
         return arrays
     try:
@@ -98,13 +97,8 @@ def kept_background(
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputError(f"images.cache={chosen}: no folder can be made there ({reason}); choose another") from error
-    _write(path, kept)
+    save_npz(path, kept)
     return arrays
-
-
-def _write(path: Path, arrays: Arrays) -> None:
-    with atomic_path(path) as temporary, temporary.open("wb") as file:
-        np.savez_compressed(file, **arrays)  # pyright: ignore[reportArgumentType]
 
 
 def _file(folder: Path, recording: Recording) -> Path:

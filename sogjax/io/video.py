@@ -1,6 +1,5 @@
 """The images of a recording, time step by time step, and the writer of videos."""
 
-import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack
@@ -17,6 +16,7 @@ from sogjax.io.files import atomic_path
 from sogjax.io.image_file import evened, read_image
 from sogjax.io.recording import Recording
 from sogjax.io.source import ImageStream, open_source, open_with_least_work
+from sogjax.io.threads import usable_cores
 from sogjax.io.video_file import frame_times
 from sogjax.model.yuv_picture import YuvPicture
 
@@ -63,7 +63,7 @@ def _decoded_ahead(
 ) -> Iterator[list[Item]]:
     if start == stop:
         return
-    cameras, workers = recording.rig.names, os.cpu_count() or 1
+    cameras, workers = recording.rig.names, usable_cores()
     threads = max(1, workers // len(cameras))
     with ExitStack() as stack:
         pool = stack.enter_context(ThreadPoolExecutor(min(len(cameras), workers)))

@@ -60,10 +60,12 @@ def angle_error(name: str, ours: Float[np.ndarray, "frame"], true: Float[np.ndar
     both = np.isfinite(ours) & np.isfinite(true)
     if not both.any():
         return None
-    ours, true = ours[both], true[both]
-    # Past an angle that means nothing (gimbal lock) one of the two may be a turn off.
-    apart = (ours - true + 180.0) % 360.0 - 180.0
-    offset = float(apart.mean())
+    true, apart = true[both], (ours - true)[both]
+    # Past an angle that means nothing (gimbal lock) one of the two may be a turn off: counted from the mean direction,
+    # as a heading that differs by half a turn lies on either side of it.
+    middle = np.degrees(np.angle(np.exp(1j * np.radians(apart)).mean()))
+    apart = middle + (apart - middle + 180.0) % 360.0 - 180.0
+    ours, offset = true + apart, float(apart.mean())
     centred = np.abs(apart - offset)
     joint, plane = PLANES.get(base_name(name), (base_name(name), BETWEEN_BONES))
     moves = np.ptp(true) >= LEAST_RANGE
@@ -76,7 +78,7 @@ def angle_error(name: str, ours: Float[np.ndarray, "frame"], true: Float[np.ndar
         mean_abs_centred=float(centred.mean()),
         rms_centred=float(np.sqrt((centred**2).mean())),
         range_ratio=float(np.ptp(ours) / np.ptp(true)) if moves else NAN,
-        cmc=multiple_correlation(true + apart, true) if moves else NAN,
+        cmc=multiple_correlation(ours, true) if moves else NAN,
         num_values=int(both.sum()),
     )
 

@@ -168,7 +168,6 @@ def evaluate_motion(
     motion: Motion,
     truth: GroundTruth,
     name: str = "",
-    joint_mapping: Mapping[str, str] | None = None,
     rule: MarkerRule = "scaled",
 ) -> Evaluation:
     """Compare one motion with the truth of its subject (names without a prefix).
@@ -177,7 +176,6 @@ def evaluate_motion(
         motion: the tracked motion.
         truth: what it should be; see `GroundTruth.subject` where there are several subjects.
         name: title of the result.
-        joint_mapping: truth's joint to motion's joint, for names that do not say it themselves.
         rule: how markers are attached; the result gives the mean by the other rule as well.
 
     Raises:
@@ -187,11 +185,11 @@ def evaluate_motion(
     frames = np.asarray(motion.frame, int)[rows]
     by_rule = {each: found for each in MARKER_RULES if (found := marker_errors(motion, truth, each)) is not None}
     markers = by_rule.get(rule)
-    joints = joint_errors(motion, truth, joint_mapping)
+    joints = joint_errors(motion, truth)
     if markers is None and joints is None:
         raise InputError(
             f"none of the truth's joints ({', '.join(map(str, truth.joint_names))}) is a joint of the "
-            "motion; give a joint mapping"
+            "motion; name the truth's after these"
         )
     points = markers or joints
     lost = lost_points(points.errors, points.names, frames) if points else ()
@@ -211,7 +209,6 @@ def evaluate_motion(
 def evaluate_motions(
     motions: Mapping[str, Motion],
     truth: GroundTruth,
-    joint_mapping: Mapping[str, str] | None = None,
     rule: MarkerRule = "scaled",
 ) -> GroupEvaluation:
     """Compare actors' motions, by name, with a truth whose names have the prefixes `NAME/`.
@@ -224,7 +221,7 @@ def evaluate_motions(
     """
     alone = len(motions) == 1 and not truth.subjects
     evaluations = {
-        name: evaluate_motion(motion, truth if alone else truth.subject(name), name, joint_mapping, rule)
+        name: evaluate_motion(motion, truth if alone else truth.subject(name), name, rule)
         for name, motion in motions.items()
     }
     if not any(evaluation.num_labelled for evaluation in evaluations.values()):

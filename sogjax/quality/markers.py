@@ -1,6 +1,5 @@
 """Virtual markers on a tracked body (Section 6), and distances of markers and joints to the truth."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -115,22 +114,19 @@ def marker_errors(motion: Motion, truth: GroundTruth, rule: MarkerRule = "scaled
     )
 
 
-def joint_errors(motion: Motion, truth: GroundTruth, mapping: Mapping[str, str] | None = None) -> PointErrors | None:
+def joint_errors(motion: Motion, truth: GroundTruth) -> PointErrors | None:
     """Distances of joint centres to the truth's, for the joints that both have; None where there are none.
 
     A truth's joint is the motion's joint of the same name, or the one-axis joints whose names start with it
     (`left_shoulder` is `left_shoulder_flexion`) if those share one place; `l_` and `r_` read as `left_` and
     `right_`.
-
-    `mapping` is from the truth's names to the motion's, for what the names do not say themselves.
-
-    Raises:
-        InputError: the mapping names a joint that one of the two does not have.
     """
     if truth.joints is None:
         return None
     rows, truth_rows = common_frames(motion, truth)
-    pairs = joint_pairs(motion, tuple(map(str, truth.joint_names)), mapping or {})
+    names = list(map(str, motion.joint_names))
+    found = ((k, _joint_named(motion, names, str(name))) for k, name in enumerate(truth.joint_names))
+    pairs = [(k, joint) for k, joint in found if joint is not None]
     if not pairs:
         return None
     theirs = np.asarray(truth.joints, float)[truth_rows][:, [k for k, _ in pairs]]
@@ -140,21 +136,6 @@ def joint_errors(motion: Motion, truth: GroundTruth, mapping: Mapping[str, str] 
         compared_with=tuple(str(motion.joint_names[j]) for _, j in pairs),
         errors=np.linalg.norm(ours - theirs, axis=-1),
     )
-
-
-def joint_pairs(motion: Motion, truth_names: tuple[str, ...], mapping: Mapping[str, str]) -> list[tuple[int, int]]:
-    """(truth's joint, motion's joint) for all that can be compared, in the truth's order."""
-    names = list(map(str, motion.joint_names))
-    for theirs, ours in mapping.items():
-        if theirs not in truth_names or ours not in names:
-            missing, where = (theirs, "truth") if theirs not in truth_names else (ours, "motion")
-            raise InputError(f"joint mapping {theirs}: {ours}: the {where} has no joint {missing!r}; correct it")
-    found = []
-    for k, name in enumerate(truth_names):
-        joint = names.index(mapping[name]) if name in mapping else _joint_named(motion, names, name)
-        if joint is not None:
-            found.append((k, joint))
-    return found
 
 
 def _joint_named(motion: Motion, names: list[str], truth_name: str) -> int | None:

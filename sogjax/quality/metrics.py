@@ -83,16 +83,15 @@ def lost_points(
     names: tuple[str, ...],
     frames: np.ndarray,
     distance: float = LOST_DISTANCE,
-    num_frames: int = LOST_FRAMES,
 ) -> tuple[LostPoint, ...]:
-    """Stretches of at least `num_frames` frames over which a point is farther than `distance` metres.
+    """Stretches of at least `LOST_FRAMES` frames over which a point is farther than `distance` metres.
 
     Frames in which the truth lacks the point neither end nor lengthen a stretch.
     """
     lost = []
     for k, name in enumerate(names):
         present = np.flatnonzero(np.isfinite(errors[:, k]))
-        for first, last in stretches(errors[present, k] > distance, num_frames):
+        for first, last in stretches(errors[present, k] > distance, LOST_FRAMES):
             rows = present[first:last]
             mean = float(errors[rows, k].mean())
             lost.append(LostPoint(name, int(frames[rows[0]]), int(frames[rows[-1]]), mean))

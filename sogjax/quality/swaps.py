@@ -26,9 +26,7 @@ class Swap:
     last_frame: int
 
 
-def identity_swaps(
-    motions: Mapping[str, Motion], truth: GroundTruth, num_frames: int = SWAP_FRAMES
-) -> tuple[Swap, ...]:
+def identity_swaps(motions: Mapping[str, Motion], truth: GroundTruth) -> tuple[Swap, ...]:
     """Where motions follow the wrong subject: the assignment of least distance is not the one by name.
 
     The distance of a subject to a motion is the mean over the subject's markers (else joints) of the distance
@@ -45,7 +43,7 @@ def identity_swaps(
             if i != j:
                 swaps += [
                     Swap(name, other, int(frames[first]), int(frames[end - 1]))
-                    for first, end in stretches(assignment[:, i] == j, num_frames)
+                    for first, end in stretches(assignment[:, i] == j, SWAP_FRAMES)
                 ]
     return tuple(sorted(swaps, key=lambda swap: (swap.first_frame, swap.motion)))
 

@@ -1,6 +1,7 @@
 """Where messages go: an address and port, the path of a local socket; nothing here listens."""
 
 import socket
+from contextlib import suppress
 from dataclasses import dataclass
 
 from sogjax.errors import InputError
@@ -43,8 +44,6 @@ class Datagrams:
     """
 
     def __init__(self, target: Address | str) -> None:
-        self.unheard = 0
-        """Datagrams that could not be delivered."""
         if isinstance(target, str) and not hasattr(socket, "AF_UNIX"):
             raise InputError(f"json={target}: this system has no local sockets; give HOST:PORT")
         if isinstance(target, str) and len(target.encode()) > 100:
@@ -57,11 +56,9 @@ class Datagrams:
         self._target = target if isinstance(target, str) else (target.host, target.port)
 
     def send(self, content: bytes) -> None:
-        """Send one datagram; where nobody listens it is lost, and counted."""
-        try:
+        """Send one datagram; where nobody listens it is lost."""
+        with suppress(OSError):
             self._socket.sendto(content, self._target)
-        except OSError:
-            self.unheard += 1
 
     def close(self) -> None:
         """Close the socket."""

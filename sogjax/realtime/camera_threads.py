@@ -1,6 +1,6 @@
 """A thread for each camera: it takes pictures as they come, averages them to cells, and passes them on."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from threading import Lock, Thread
 
 from sogjax.io.image_file import ColorGains, evened
@@ -19,7 +19,7 @@ class CameraThreads:
         grids: how the pictures of each are cut into cells.
         slot: where they go.
         gains: by which the colours of some cameras are evened out; None: they stay.
-        keeps: whether the pictures themselves are passed on, too.
+        keeps: whether the pictures themselves are passed on, too, as they came.
     """
 
     def __init__(
@@ -28,7 +28,7 @@ class CameraThreads:
         grids: Sequence[CellGrid],
         slot: Slot,
         gains: Sequence[ColorGains | None] | None = None,
-        keeps: Callable[[], bool] = lambda: False,
+        keeps: bool = False,
     ) -> None:
         self._cameras, self._grids, self._slot, self._keeps = cameras, grids, slot, keeps
         self._gains = gains or [None] * len(cameras)
@@ -57,7 +57,7 @@ class CameraThreads:
             while (taken := camera.read()) is not None:
                 picture = self._evened(number, taken.picture)
                 cells = padded_cells(picture, grid, shape)
-                kept = picture if self._keeps() else None
+                kept = taken.picture if self._keeps else None
                 self._slot.put(Seen(number, cells, taken.exposed, taken.arrived, taken.number, kept))
         except BaseException as error:  # told to whoever takes sets
             problem = error

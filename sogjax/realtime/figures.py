@@ -10,6 +10,10 @@ SHORTEST, GROWTH, BINS = 1e-4, 1.01, 1400
 """Seconds of the first bin, what each next one is longer by, and how many there are: up to 110 s, to 1 %."""
 
 
+STAGES = ("waiting", "queueing", "solving")
+"""For the pictures of other cameras, for the tracker, and in it."""
+
+
 @dataclass
 class Durations:
     """How long something took, counted in bins."""
@@ -65,6 +69,12 @@ class Stamps:
     solved: float
     sent: float
 
+    @property
+    def stages(self) -> dict[str, float]:
+        """Seconds of each stage."""
+        times = (self.arrived, self.handed_over, self.begun, self.solved)
+        return {stage: end - begin for stage, begin, end in zip(STAGES, times, times[1:], strict=False)}
+
 
 @dataclass
 class Figures:
@@ -73,21 +83,14 @@ class Figures:
     latency: Durations = field(default_factory=Durations)
     """From the arrival of the first picture to sending."""
     from_exposure: Durations = field(default_factory=Durations)
-    waiting: Durations = field(default_factory=Durations)
-    """For the pictures of the other cameras."""
-    queueing: Durations = field(default_factory=Durations)
-    """For the tracker."""
-    solving: Durations = field(default_factory=Durations)
+    stages: dict[str, Durations] = field(default_factory=lambda: {stage: Durations() for stage in STAGES})
     intervals: Durations = field(default_factory=Durations)
     """From one message to the next."""
     poses: int = 0
     unsolved: int = 0
     """Sets in which nobody was tracked."""
-    began: float | None = None
     last: float | None = None
-    losses: int = 0
-    """Times that the actors were lost."""
-    searches: int = 0
+    """When the last one was sent, if the actors have been tracked since."""
 
     def add(self, stamps: Stamps, tracked: bool) -> None:
         """Count a frame."""
@@ -98,13 +101,11 @@ class Figures:
         self.poses += 1
         self.latency.add(stamps.sent - stamps.arrived)
         self.from_exposure.add(stamps.sent - stamps.exposed)
-        self.waiting.add(stamps.handed_over - stamps.arrived)
-        self.queueing.add(stamps.begun - stamps.handed_over)
-        self.solving.add(stamps.solved - stamps.begun)
+        for stage, seconds in stamps.stages.items():
+            self.stages[stage].add(seconds)
         if self.last is not None:
             self.intervals.add(stamps.sent - self.last)
         self.last = stamps.sent
-        self.began = stamps.sent if self.began is None else self.began
 
     def as_dict(self, seconds: float) -> dict[str, Any]:
         """All of them; `seconds` is how long the run took."""
@@ -114,15 +115,9 @@ class Figures:
             "poses_per_second": round(self.poses / max(seconds, 1e-6), 2),
             "latency_ms": self.latency.as_dict(),
             "latency_from_exposure_ms": self.from_exposure.as_dict(),
-            "stages_ms": {
-                "waiting": self.waiting.as_dict(),
-                "queueing": self.queueing.as_dict(),
-                "solving": self.solving.as_dict(),
-            },
+            "stages_ms": {stage: taken.as_dict() for stage, taken in self.stages.items()},
             "interval_ms": self.intervals.as_dict(),
             "jitter_ms": round(1e3 * self.intervals.deviation(), 2),
-            "losses": self.losses,
-            "searches": self.searches,
         }
 
     def line(self, overwritten: int) -> str:

@@ -30,8 +30,9 @@ BETTER = 0.002
 """Share by which what a search found must explain a frame better than what is tracked."""
 ENERGIES = 64
 """Frames whose energies are kept, to be compared with."""
-REST, LONGEST_REST = 2.0, 30.0
-"""Seconds after a search that was in vain, doubled each time up to the second."""
+REST, LONGEST_REST, LONGEST_WITHOUT = 2.0, 30.0, 4.0
+"""Seconds after a search that was in vain, doubled each time up to the second, or while nobody is tracked to the third:
+who enters must not wait."""
 
 
 @dataclass(frozen=True)
@@ -133,11 +134,9 @@ class Following:
             self._not_before = now
         elif self._bad_since is not None and now - self._bad_since > DOUBTED_AFTER and not self._is_slow:
             named = zip(self.bodies, explained.tolist(), strict=True)
-            told = (
-                f"too little is explained ({', '.join(f'{body.name} {share:.0%}' for body, share in named)}); is this "
-            )
-            told = f"{lost} is in doubt" if well else f"{told}who the actor was made of?"
-            if self._ask(now, f"{told}: searching beside"):
+            shares = ", ".join(f"{body.name} {share:.0%}" for body, share in named)
+            doubt = f"{lost} is in doubt" if well else f"too little is explained ({shares}), as of somebody else"
+            if self._ask(now, f"{doubt}: searching beside"):
                 self._note_loss()
         return well
 
@@ -169,7 +168,8 @@ class Following:
         """Go on with what a search found, if it explains its last frame better than what is tracked."""
         if found is None:
             return
-        self._not_before, self._rest = now + self._rest, min(2.0 * self._rest, LONGEST_REST)
+        longest = LONGEST_REST if self._moment is not None else LONGEST_WITHOUT
+        self._not_before, self._rest = now + min(self._rest, longest), min(2.0 * self._rest, LONGEST_REST)
         before = next((energy for exposed, energy in self._energies if exposed == found.exposed), float("-inf"))
         if found.moment is None or (self._moment is not None and found.energy < before + BETTER * abs(before)):
             return

@@ -12,6 +12,7 @@ from sogjax.realtime.addresses import Address, Datagrams
 from sogjax.realtime.state import ActorState, LiveState
 
 VERSION = 1
+TERMINAL = "-"
 PORT = 39550
 """Where lines are sent unless told otherwise."""
 
@@ -29,6 +30,15 @@ class Publisher(Protocol):
         ...
 
 
+def address_of(target: str) -> Address | str:
+    """The address of `HOST:PORT`, or the path of a socket.
+
+    Raises:
+        InputError: such an address is not known.
+    """
+    return target if "/" in target or "\\" in target else Address.of("json", target, PORT)
+
+
 class JsonLines:
     """Sends every state as one line: to an address, a local datagram socket, or the terminal (`-`).
 
@@ -44,9 +54,8 @@ class JsonLines:
     def __init__(self, target: str, bodies: tuple[Body, ...], cameras: tuple[str, ...]) -> None:
         self._bodies, self._cameras = {body.name: body for body in bodies}, cameras
         self._datagrams = None
-        if target != "-":
-            is_path = "/" in target or "\\" in target
-            self._datagrams = Datagrams(target if is_path else Address.of("json", target, PORT))
+        if target != TERMINAL:
+            self._datagrams = Datagrams(address_of(target))
 
     def send(self, state: LiveState) -> None:
         """Send one line."""

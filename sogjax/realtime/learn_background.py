@@ -37,10 +37,11 @@ def learn_place(recording: Recording, config: LiveConfig) -> list[Path]:
     finally:
         for camera in cameras:
             camera.release()
-    for path in recording.background.values():
-        path.unlink(missing_ok=True)
     for name, of_camera in pictures.items():
         write_image(paths[name], np.median(np.stack(of_camera), axis=0).round().astype(np.uint8))
+    for name, path in recording.background.items():
+        if path.resolve() != paths[name].resolve():
+            path.unlink(missing_ok=True)
     print(*paths.values(), sep="\n")
     return list(paths.values())
 

@@ -56,6 +56,7 @@ class Outlet(Generic[Item]):
                 continue
             try:
                 self._consume(item)
-            except (InputError, OSError) as error:
+            except Exception as error:
                 self.failed = True
-                say(f"{self.name}: stopped, the others go on: {error}")
+                said = error if isinstance(error, (InputError, OSError)) else repr(error)
+                say(f"{self.name}: stopped, the others go on: {said}")

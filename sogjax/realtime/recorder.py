@@ -5,17 +5,19 @@ from collections import deque
 from collections.abc import Sequence
 from pathlib import Path
 from threading import Condition, Thread
+from typing import Any
 
 import numpy as np
 import yaml
 
 from sogjax.errors import InputError
+from sogjax.io.calibration.load import save_calibration
 from sogjax.io.files import write_file
 from sogjax.io.frame_motions import ClipFacts, motions_of
 from sogjax.io.frame_table import FrameLog, read_frames_log
 from sogjax.io.motion import FRAMES_AT_ONCE
 from sogjax.io.recording import Recording
-from sogjax.io.recording_files import BACKGROUND, SETTINGS, VIDEOS
+from sogjax.io.recording_files import BACKGROUND, CALIBRATION, OCCLUDERS, SETTINGS, VIDEOS
 from sogjax.io.video import VideoWriter
 from sogjax.model.body import Body
 from sogjax.model.yuv_picture import YuvPicture
@@ -26,6 +28,8 @@ from sogjax.run.run_files import MOTION
 from sogjax.run.terminal import say
 
 LOG = "frames"
+RATE_OFF = 0.02
+"""Part by which cameras may be slower or faster than was said of them."""
 PICTURES_BEHIND = 16
 """Pictures of a camera that wait for its video, at most."""
 
@@ -79,7 +83,8 @@ class MotionRecorder:
 class VideoRecorder:
     """Writes a video of each camera, within a `with` block, and what makes a recording of them.
 
-    Every set is a frame; where a camera has no picture its last one stands again and is listed as missing.
+    Every set is a frame; where a camera has no picture its last one stands again and is listed as missing. Pictures are
+    kept as they came, which cells are made of again.
 
     Args:
         folder: of the new recording.
@@ -97,6 +102,8 @@ class VideoRecorder:
         self._writers = [_CameraVideo(VIDEOS.of(folder) / f"{name}.mp4", fps) for name in recording.rig.names]
         self._missing: list[list[list[int]]] = [[] for _ in recording.rig.names]
         self._frames = 0
+        self._times = (0.0, 0.0)
+        """When the first and the last frame of cameras were taken."""
 
     def __enter__(self) -> "VideoRecorder":
         for writer in self._writers:
@@ -113,7 +120,17 @@ class VideoRecorder:
                     spans[-1][1] = self._frames
                 else:
                     spans.append([self._frames, self._frames])
+        if found.number is None:
+            self._times = (self._times[0] if self._frames else found.exposed, found.exposed)
         self._frames += 1
+
+    def _rate(self) -> float:
+        """Frames per second: those of cameras as they came, if that is not what was said of them."""
+        first, last = self._times
+        if last <= first or abs((found := (self._frames - 1) / (last - first)) / self._fps - 1.0) < RATE_OFF:
+            return float(self._fps)
+        say(f"record={self._folder}: the cameras gave {found:.2f} pictures a second, not {self._fps:g}; so it is noted")
+        return round(found, 3)
 
     def __exit__(self, *error: object) -> None:
         """Finish the videos, and make them a recording."""
@@ -125,20 +142,18 @@ class VideoRecorder:
         say(f"record={self._folder}: {self._frames} frames; track them again with recording={self._folder}")
 
     def _describe(self) -> None:
-        recording, given = self._recording, SETTINGS.of(self._recording.path)
-        for path in sorted(recording.path.iterdir()):
-            if path.is_file() and path.suffix in (".toml", ".yml", ".yaml", ".json", ".xml", ".calibration", ".pkl"):
-                shutil.copyfile(path, self._folder / path.name)
-        if recording.background:
-            BACKGROUND.of(self._folder).mkdir(exist_ok=True)
-        for path in recording.background.values():
-            shutil.copyfile(path, BACKGROUND.of(self._folder) / path.name)
-        kept = yaml.safe_load(given.read_text(encoding="utf-8")) if given.is_file() else {}
-        content = {key: kept[key] for key in ("unit", "calibration") if key in (kept or {})}
-        content |= {"up": recording.up, "fps": float(self._fps), "cameras": [*recording.rig.names]}
+        recording = self._recording
+        save_calibration(CALIBRATION.of(self._folder), recording.rig)
+        for place, pictures in ((BACKGROUND, recording.background), (OCCLUDERS, recording.occluders)):
+            for path in pictures.values():
+                place.of(self._folder).mkdir(exist_ok=True)
+                shutil.copyfile(path, place.of(self._folder) / path.name)
+        content: dict[str, Any] = {"up": recording.up, "fps": self._rate()}
         missing = {name: spans for name, spans in zip(recording.rig.names, self._missing, strict=True) if spans}
         if missing:
             content |= {"missing": missing, "fewest_cameras": 1}
+        if recording.color_gains:
+            content["color_gains"] = {name: [*gains] for name, gains in recording.color_gains.items()}
         write_file(SETTINGS.of(self._folder), yaml.safe_dump(content, sort_keys=False))
 
 

@@ -3,8 +3,8 @@
 import math
 import time
 from collections import Counter, deque
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from itertools import chain, count
 from threading import Condition, Event
 from typing import Any
@@ -19,7 +19,7 @@ from sogjax.run.recordings import with_cameras
 from sogjax.settings.live import FaultsConfig
 
 KEPT = 64
-"""Frames that a camera may be behind the others, by a delay."""
+"""Times of frames that are kept: a camera is at most one behind the others."""
 
 
 @dataclass(frozen=True)
@@ -40,21 +40,32 @@ class Faults:
         Raises:
             InputError: a number out of range, or a camera that there is not.
         """
-        for key in ("delay", "gone"):
-            strange = [str(name) for name in getattr(config, key) or {} if str(name) not in names]
-            if strange:
-                raise InputError(f"faults.{key}: there is no camera {strange[0]!r}; there are {', '.join(names)}")
-        if not 0.0 <= config.drop < 1.0 or config.jitter < 0.0:
+        if not 0.0 <= config.drop < 1.0 or not config.jitter >= 0.0:
             raise InputError(
                 f"faults.drop={config.drop} faults.jitter={config.jitter}: the first is a share below 1, the second "
                 "seconds; correct them"
             )
-        of = lambda values, default: {str(name): value for name, value in (values or {}).items()}.get(
-            names[camera], default
-        )
-        first, last = (float(value) for value in of(config.gone, (0.0, 0.0)))
-        delay = float(of(config.delay, 0.0))
+        (delay,) = _of_camera("delay", config.delay, names, camera, ("SECONDS",))
+        first, last = _of_camera("gone", config.gone, names, camera, ("FROM", "TO"))
         return cls(config.drop, delay, config.jitter, (first, last), (config.seed, camera))
+
+
+def _of_camera(
+    key: str, values: Any, names: tuple[str, ...], camera: int, meaning: tuple[str, ...]
+) -> tuple[float, ...]:
+    """The seconds that are given for a camera, as many as have a meaning; 0 where none are."""
+    given = {} if values is None else values
+    form = f"{{CAMERA:{meaning[0] if len(meaning) == 1 else '[' + ','.join(meaning) + ']'}}}"
+    if not isinstance(given, Mapping):
+        raise InputError(f"faults.{key}={values}: should be {form}, in seconds")
+    strange = [str(name) for name in given if str(name) not in names]
+    if strange:
+        raise InputError(f"faults.{key}: there is no camera {strange[0]!r}; there are {', '.join(names)}")
+    value = {str(name): value for name, value in given.items()}.get(names[camera], [0.0] * len(meaning))
+    seconds = value if isinstance(value, list | tuple) else [value]
+    if len(seconds) != len(meaning) or not all(isinstance(each, int | float) and each >= 0.0 for each in seconds):
+        raise InputError(f"faults.{key}: {names[camera]} has {value}; should be {form}, in seconds from 0 on")
+    return tuple(map(float, seconds))
 
 
 class Pace:
@@ -135,7 +146,8 @@ class ReplayCamera:
         loop: bool = False,
     ) -> None:
         self._name, self._pace, self._faults = camera, pace, faults
-        self._recording, self._loop, self._first = with_cameras(recording, [camera]), loop, first
+        as_filmed = replace(recording, color_gains={})  # whoever gets the pictures evens them out
+        self._recording, self._loop, self._first = with_cameras(as_filmed, [camera]), loop, first
         self._closed, self._pictures = Event(), self._frames()
 
     @property
@@ -202,8 +214,16 @@ def replay_cameras(
     """
     names = recording.rig.names
     pace = Pace(len(names), 1.0 / (recording.fps * speed))
-    faults = [Faults.of_camera(config, names, camera) for camera in range(len(names))]
     return [
         ReplayCamera(recording, name, pace, of_camera, first=first, loop=loop)
-        for name, of_camera in zip(names, faults, strict=True)
+        for name, of_camera in zip(names, faults_of(config, names), strict=True)
     ], pace
+
+
+def faults_of(config: FaultsConfig, names: tuple[str, ...]) -> list[Faults]:
+    """What goes wrong with each of the cameras.
+
+    Raises:
+        InputError: a number out of range, or a camera that there is not.
+    """
+    return [Faults.of_camera(config, names, camera) for camera in range(len(names))]

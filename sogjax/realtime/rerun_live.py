@@ -28,14 +28,9 @@ class RerunLive:
         """Log a state."""
         stamps = state.stamps
         self._begin = stamps.exposed if self._begin is None else self._begin
-        stages = {
-            "waiting": stamps.handed_over - stamps.arrived,
-            "queueing": stamps.begun - stamps.handed_over,
-            "solving": stamps.solved - stamps.begun,
-            "so far": time.monotonic() - stamps.arrived,
-        }
+        stages = {**stamps.stages, "so_far": time.monotonic() - stamps.arrived}
         actors = [(actor.world_from_joint, actor.tracked) for actor in state.actors]
-        latencies = {stage.replace(" ", "_"): 1e3 * seconds for stage, seconds in stages.items()}
+        latencies = {stage: 1e3 * seconds for stage, seconds in stages.items()}
         self._scene.log(state.frame, stamps.exposed - self._begin, actors, latencies)
 
     def close(self) -> None:

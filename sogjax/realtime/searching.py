@@ -200,6 +200,8 @@ class SearchBeside:
         moment = self.step.start(np.concatenate([np.asarray(each.pose) for each in guess.poses]))
         energy = float("-inf")
         with self._lock:
+            if not self._held:  # forgotten
+                return None
             done = self._held[0].exposed + (guess.frame - 0.5) * SECONDS
         while not stopped.is_set():
             with self._lock:

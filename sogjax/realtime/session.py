@@ -1,14 +1,14 @@
 """A live session: cameras, slot, tracker and outlets tied together, from the first picture to the figures."""
 
-import os
 import time
 from collections.abc import Generator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
+from sogjax.io.threads import usable_cores
 from sogjax.realtime.assembler import Assembler
 from sogjax.realtime.camera_threads import CameraThreads
 from sogjax.realtime.figures import Figures, Stamps
@@ -28,6 +28,8 @@ PUBLISHED_BEHIND, RECORDED_BEHIND = 4, 512
 """States that wait for publishers, and for the disk, at most."""
 TOLD_EVERY = 10.0
 """Seconds from one line on the terminal to the next."""
+TOO_FAST = 1.05
+"""Pictures a second, as a multiple of what was said of the cameras, above which that is said to be wrong."""
 SILENT = 2.0
 """Seconds without any picture after which that is said."""
 
@@ -76,7 +78,7 @@ class Session:
         """As was said last."""
         self._said: dict[int, float] = {}
         self._outlets: list[Outlet[Any]] = []
-        self._took = 0.0
+        self._took, self._rate_said = 0.0, False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -93,14 +95,14 @@ class Session:
         recording = self.setup.clip.recording
         gains = [recording.color_gains.get(name) for name in self.names]
         with ExitStack() as stack:
-            self._outlets = [stack.enter_context(outlet) for outlet in self._made_outlets()]
             for publisher in (*self.publishers.quick.values(), *self.publishers.slow.values()):
-                stack.callback(publisher.close)
+                stack.callback(publisher.close)  # once the outlets, which end before, have passed all on
+            self._outlets = [stack.enter_context(outlet) for outlet in self._made_outlets()]
             if self.following.search is not None:
                 stack.callback(self.following.search.close)
             if self.videos is not None:
                 stack.enter_context(self.videos)
-            keeps = lambda: self.videos is not None
+            keeps = self.videos is not None
             stack.enter_context(CameraThreads(self.cameras, self.setup.clip.grids, self.slot, gains, keeps))
             if self.pace is not None:
                 self.pace.begin()
@@ -112,7 +114,9 @@ class Session:
         by_camera = lambda counts: {name: counts[k] for k, name in enumerate(names)}
         slowest = max(range(len(names)), key=lambda k: (assembler.missing[k], assembler.last[k]))
         dropped = {outlet.name: outlet.dropped for outlet in self._outlets}
-        found = self.figures.as_dict(self._took) | {
+        return self.figures.as_dict(self._took) | {
+            "losses": self.following.losses,
+            "searches": 0 if self.following.search is None else self.following.search.count,
             "sets": self.slot.handed_over,
             "lost": {
                 "late_or_missing_pictures": by_camera(assembler.missing),
@@ -125,11 +129,8 @@ class Session:
             "slowest_camera": names[slowest],
             "replay_stood_still_seconds": 0.0 if self.pace is None else round(self.pace.slipped, 3),
             "restarts": self.following.restarts,
-            "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+            "cores": usable_cores(),
         }
-        found["losses"] = self.following.losses
-        found["searches"] = 0 if self.following.search is None else self.following.search.count
-        return found
 
     def _made_outlets(self) -> list[Outlet[Any]]:
         made: list[Outlet[Any]] = [Outlet("publisher", self._publish, PUBLISHED_BEHIND)]
@@ -141,9 +142,7 @@ class Session:
     def _publish(self, state: LiveState) -> None:
         for each in self.publishers.quick.values():
             each.send(state)
-        stamps = state.stamps
-        sent = Stamps(stamps.exposed, stamps.arrived, stamps.handed_over, stamps.begun, stamps.solved, time.monotonic())
-        self.figures.add(sent, state.tracked_frame is not None)
+        self.figures.add(replace(state.stamps, sent=time.monotonic()), state.tracked_frame is not None)
 
     def _solved_sets(self) -> Generator[LiveState, None, None]:
         begin = told = heard = time.monotonic()
@@ -167,6 +166,7 @@ class Session:
                 if now - told >= TOLD_EVERY:
                     told = now
                     say(self.figures.line(self.slot.overwritten))
+                    self._say_rate(now - begin)
                 yield state
         finally:
             self._took = time.monotonic() - begin
@@ -206,6 +206,16 @@ class Session:
     def _on_set(self, found: FrameSet) -> None:
         if self.videos is not None:
             self.videos.put(found)
+
+    def _say_rate(self, seconds: float) -> None:
+        """Tell once if cameras are faster than was said of them: their sets are then numbered too far."""
+        rate = self.slot.handed_over / seconds
+        if self.pace is None and not self._rate_said and rate * self.period > TOO_FAST:
+            self._rate_said = True
+            say(
+                f"the cameras give {rate:.1f} pictures a second, not {1.0 / self.period:.4g}: the motion would be too "
+                f"slow; give fps={rate:.0f}"
+            )
 
     def _say_cameras(self) -> None:
         """Tell which cameras are not waited for any more, and which are back; of each not too often."""

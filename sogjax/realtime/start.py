@@ -10,22 +10,24 @@ import numpy as np
 from sogjax.energy.term import Term
 from sogjax.errors import InputError
 from sogjax.io.frame_motions import ClipFacts
-from sogjax.io.image_file import read_image
 from sogjax.io.recording import Recording, open_place
 from sogjax.io.recording_files import IMAGES, SYNCHRONIZED, VIDEOS
 from sogjax.io.source import videos_in
+from sogjax.io.video import read_still
 from sogjax.model.body import Body
+from sogjax.realtime.addresses import Address
 from sogjax.realtime.following import Following
-from sogjax.realtime.json_lines import JsonLines, Publisher
+from sogjax.realtime.json_lines import TERMINAL, JsonLines, Publisher, address_of
 from sogjax.realtime.lab_stream import LabStream
 from sogjax.realtime.opened_camera import OpenedCamera, checked_sources
 from sogjax.realtime.recorder import MotionRecorder, VideoRecorder
-from sogjax.realtime.replay import replay_cameras
+from sogjax.realtime.replay import faults_of, replay_cameras
 from sogjax.realtime.rerun_live import RerunLive
 from sogjax.realtime.searching import SearchBeside
 from sogjax.realtime.session import Publishers, Session
 from sogjax.realtime.stepping import LiveStep
 from sogjax.realtime.urgency import SEARCH, yield_to_others
+from sogjax.realtime.vmc import PORT as VMC_PORT
 from sogjax.realtime.vmc import Vmc
 from sogjax.realtime.warm_up import drawn_frame, standing, warm_up, warm_up_step
 from sogjax.run import build
@@ -70,6 +72,10 @@ def checked(config: LiveConfig) -> None:
         raise InputError("replay=true sources=...: exclude each other; leave one of them out")
     if config.learn_background and config.replay:
         raise InputError("learn_background=true: needs cameras (sources=), a recording learns its own")
+    if config.vmc is not None:
+        Address.of("vmc", config.vmc, VMC_PORT)
+    if config.json not in (None, TERMINAL):
+        address_of(config.json)
 
 
 def track_settings_of(config: LiveConfig) -> TrackConfig:
@@ -121,13 +127,14 @@ def session_of(
     Raises:
         InputError: a camera that does not open, an address that is not known, or no initial pose of a replay.
     """
+    faults_of(config.faults, recording.rig.names)
+    rate = recording.fps * (config.speed if config.replay else 1.0)
+    videos = None if config.record is None else VideoRecorder(Path(config.record), recording, rate)
     session = (_replayed if config.replay else _from_cameras)(recording, actors, config, terms)
-    session.wait, session.seconds = config.wait, config.seconds
+    session.wait, session.seconds, session.videos = config.wait, config.seconds, videos
     if out is not None:
         facts = ClipFacts(1.0 / session.period, recording.up, recording.rig.names)
         session.motion = MotionRecorder(out, session.setup.bodies, facts)
-    if config.record is not None:
-        session.videos = VideoRecorder(Path(config.record), recording, 1.0 / session.period)
     return session
 
 
@@ -199,7 +206,7 @@ def background_of(recording: Recording, config: LiveConfig) -> Background:
     of = lambda name: (
         BackgroundImage.nothing(*working_size(*recording.rig.image_size(name)))
         if name in missing
-        else BackgroundImage.from_photograph(read_image(recording.background[name]))
+        else BackgroundImage.from_photograph(read_still(recording, name, recording.background[name]))
     )
     return Background(tuple(of(name) for name in recording.rig.names))
 

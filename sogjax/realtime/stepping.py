@@ -10,7 +10,7 @@ from jaxtyping import Array, Bool, Float, UInt8
 
 from sogjax.run.terminal import say
 from sogjax.tracking.capacity import first_capacities, larger_capacities
-from sogjax.tracking.culling import Capacities, capacity_for
+from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import FrameInput, FrameResult, TrackedFrame, TrackState, on_host
 from sogjax.tracking.tracker import Tracker
 
@@ -64,7 +64,7 @@ class LiveStep:
         ratio = 1.0 if step is None or not moment.step else min(max(step / moment.step, 0.0), LONGEST_PAUSE)
         if self.capacities is None:
             self.capacities = first_capacities(self.tracker, moment.state, frame)
-            self.spare = _more(self.capacities)
+            self.spare = self.capacities.times(ROOM)
         while True:
             used = self.capacities
             state, result, joints = _step(self.tracker, moment.state, frame, jnp.asarray(ratio, jnp.float32), used)
@@ -92,7 +92,3 @@ def _step(
     before = state.previous - ratio * (state.previous - state.before_previous)
     state, result = tracker.step(replace(state, before_previous=before), frame, capacities)
     return state, result, tracker.body.skeleton.world_from_joint(result.pose)
-
-
-def _more(first: Capacities) -> Capacities:
-    return Capacities(capacity_for(ROOM * first.near), capacity_for(ROOM * first.matching), ROOM * first.blocks)

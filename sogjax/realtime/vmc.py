@@ -22,8 +22,8 @@ from sogjax.realtime.addresses import Address, Datagrams
 from sogjax.realtime.state import ActorState, LiveState
 
 PORT = 39539
-LARGEST = 1500
-"""Bytes of a datagram that no network takes apart."""
+LARGEST = 1472
+"""Bytes of a datagram that no network takes apart: a packet of 1500, less the heads of IP and UDP."""
 UNITY_FROM_UPRIGHT = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 
 _TRUNK = (
@@ -152,15 +152,18 @@ class Vmc:
 
     def __init__(self, target: str, bodies: tuple[Body, ...], up: str) -> None:
         address = Address.of("vmc", target, PORT)
+        if address.port + len(bodies) > 65536:
+            raise InputError(f"vmc={target}: {len(bodies)} actors need as many ports up to 65535; give a lower one")
         self._avatars = [Avatar.of(body, up) for body in bodies]
         self._sockets = [Datagrams(Address(address.host, address.port + k)) for k in range(len(bodies))]
-        self._num_actors = len(bodies)
+        self._begin: float | None = None
 
     def send(self, state: LiveState) -> None:
         """Send the bones of all actors; of those that are not tracked only that they are not."""
-        actors = state.actors or (None,) * self._num_actors
+        actors, exposed = state.actors or (None,) * len(self._avatars), state.stamps.exposed
+        self._begin = exposed if self._begin is None else self._begin
         for actor, avatar, datagrams in zip(actors, self._avatars, self._sockets, strict=True):
-            for packet in packets_of(actor, avatar, state.stamps.exposed):
+            for packet in packets_of(actor, avatar, exposed - self._begin):
                 datagrams.send(packet)
 
     def close(self) -> None:
@@ -170,7 +173,7 @@ class Vmc:
 
 
 def packets_of(actor: ActorState | None, avatar: Avatar, seconds: float) -> Iterator[bytes]:
-    """The messages about an actor in bundles; `seconds` is the time that is told."""
+    """The messages about an actor in bundles; `seconds` since the first are told: OSC's numbers are short."""
     tracked = actor is not None and actor.tracked
     messages = [_message("/VMC/Ext/OK", int(tracked)), _message("/VMC/Ext/T", float(seconds))]
     if actor is not None and tracked:

@@ -1,6 +1,5 @@
 """Learning the backgrounds of a recording's cameras from its clip: reading samples, and refusing unsuitable clips."""
 
-import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
@@ -8,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from sogjax.io.recording import Recording
+from sogjax.io.threads import usable_cores
 from sogjax.model.rotation import axis_vector
 from sogjax.run.clip import Clip, SampleKind, spread_frames
 from sogjax.run.terminal import say
@@ -59,7 +59,7 @@ def learnt_from(
     few = next((k for k, of_camera in enumerate(samples) if len(of_camera) < FEWEST_SAMPLES), None)
     if few is not None:
         raise _too_few(f"{len(samples[few]) or len(kind.frames)} frames of {names[few]}")
-    with ThreadPoolExecutor(min(len(names), os.cpu_count() or 1)) as pool:
+    with ThreadPoolExecutor(min(len(names), usable_cores())) as pool:
         sampled = dict(enumerate(pool.map(SampledCamera.from_images, samples)))
         if not moves(sampled):
             raise UnsuitableError(

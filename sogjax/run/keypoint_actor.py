@@ -15,6 +15,7 @@ from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.model.rotation import world_from_upright
 from sogjax.model.shape import ShapeModel
+from sogjax.run.recordings import upright
 from sogjax.run.terminal import say
 from sogjax.search.keypoint_people import triangulated_people
 from sogjax.search.keypoint_pose import KeypointPose, pose_of_keypoints, shape_of_keypoints
@@ -75,9 +76,9 @@ def with_rough_poses(recording: Recording, body: Body) -> Recording:
     seen = seen_points(recording, frames) if frames and len({example.actor for example in examples}) == 1 else None
     if seen is None:
         return recording
-    upright = _upright(body, recording)
-    poses = {frame: seen.pose(upright, recording.up, row) for row, frame in enumerate(seen.frames)}
-    told = {frame: _rough(upright, pose) for frame, pose in poses.items() if pose is not None}
+    placed = upright(body, recording)
+    poses = {frame: seen.pose(placed, recording.up, row) for row, frame in enumerate(seen.frames)}
+    told = {frame: _rough(placed, pose) for frame, pose in poses.items() if pose is not None}
     say(f"rough poses of {len(told)} of {counted(len(frames), 'example pose')} from keypoints")
     hinted = (replace(e, initial_pose=told.get(e.frame, e.initial_pose) if e.frame is not None else e.initial_pose)
               for e in examples)  # fmt: skip
@@ -101,7 +102,7 @@ def keypoint_actor(recording: Recording, body: Body, space: str, symmetric: bool
     seen = seen_points(recording)
     if seen is None:
         return None
-    model = ShapeModel.from_body(_upright(body, recording), symmetric)
+    model = ShapeModel.from_body(upright(body, recording), symmetric)
     params = shape_of_keypoints(model, seen.scheme, seen.points)
     if params is None:
         return None
@@ -121,7 +122,3 @@ def _rough(body: Body, found: KeypointPose) -> PoseDescription:
     points = np.asarray(body.posed_landmarks(jnp.asarray(found.pose, body.landmarks.offsets.dtype)), float)
     places = zip(body.landmarks.names, points.tolist(), strict=True)
     return PoseDescription(landmarks={name: (x, y, z) for name, (x, y, z) in places})
-
-
-def _upright(body: Body, recording: Recording) -> Body:
-    return body.rotated(jnp.asarray(world_from_upright(recording.up), body.blob_sigmas.dtype))

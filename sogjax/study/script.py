@@ -1,7 +1,6 @@
 """What the scripts of `experiments/` and `benchmarks/` share: settings, wrong input, the line about the machine."""
 
 import datetime
-import os
 import platform
 import sys
 from collections.abc import Callable, Sequence
@@ -11,6 +10,7 @@ from typing import TypeVar
 import jax
 
 from sogjax.errors import InputError, counted
+from sogjax.io.threads import usable_cores
 from sogjax.run.compilation_cache import use_compilation_cache, use_compiler_options
 from sogjax.settings.compose import composed_config, pair_of
 from sogjax.settings.option import help_lines
@@ -51,10 +51,9 @@ def machine_line() -> str:
 
 def machine_facts() -> str:
     """Processor, cores, versions and date."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return (
-        f"{_processor()}, {counted(cores, 'core')}, {jax.default_backend()}, Python {platform.python_version()}, "
-        f"jax {jax.__version__}, {datetime.date.today()}"
+        f"{_processor()}, {counted(usable_cores(), 'core')}, {jax.default_backend()}, "
+        f"Python {platform.python_version()}, jax {jax.__version__}, {datetime.date.today()}"
     )
 
 

@@ -39,8 +39,6 @@ def bootstrap_interval(
     *,
     block: int = BLOCK,
     draws: int = DRAWS,
-    level: float = LEVEL,
-    seed: int = 0,
 ) -> Interval:
     """Interval of the mean of all frames of all clips: Student's t with the standard error of a bootstrap.
 
@@ -56,9 +54,9 @@ def bootstrap_interval(
     if count < 2:
         return Interval(float("nan"), float("nan"))
     sums, lengths = np.array([clip.sum() for clip in present]), np.array([len(clip) for clip in present], float)
-    drawn = np.random.default_rng(seed).integers(count, size=(draws, count))
+    drawn = np.random.default_rng(0).integers(count, size=(draws, count))
     means = sums[drawn].sum(axis=1) / lengths[drawn].sum(axis=1)
-    half = student.ppf(0.5 + level / 2.0, count - 1) * means.std() * (count / (count - 1)) ** 0.5
+    half = student.ppf(0.5 + LEVEL / 2.0, count - 1) * means.std() * (count / (count - 1)) ** 0.5
     mean = sums.sum() / lengths.sum()
     return Interval(float(mean - half), float(mean + half))
 

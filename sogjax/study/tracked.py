@@ -1,12 +1,10 @@
 """Recordings tracked and evaluated without results on disk, and actors that are made once and kept."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from sogjax.io.actor_file import load_body, save_body
-from sogjax.io.cache_folder import default_cache_dir
 from sogjax.model.body import Body
 from sogjax.run.actors import ActorRequest, make_actors
 from sogjax.run.background import learn_background
@@ -14,21 +12,9 @@ from sogjax.run.clip import Clip
 from sogjax.run.judge import compared
 from sogjax.run.recordings import opened
 from sogjax.run.result import RunResult
-from sogjax.run.terminal import progress
 from sogjax.run.track import opened_clip, track_recording
 from sogjax.settings.compose import track_config
 from sogjax.settings.method import ImagesConfig
-from sogjax.synth.cache import cached_recording
-from sogjax.synth.settings import SynthSettings
-
-
-def track_rendered(settings: SynthSettings, overrides: Sequence[str] = ()) -> RunResult:
-    """Track a rendered recording, made now if it is not there yet, and evaluate it; no results are written.
-
-    Its averaged pictures are kept beside it, so that further runs do not decode them again.
-    """
-    cache = f"images.cache={json.dumps(str(default_cache_dir() / 'cells'))}"
-    return track_folder(cached_recording(settings, progress=progress), [cache, *overrides])
 
 
 def track_folder(folder: Path, overrides: Sequence[str] = ()) -> RunResult:

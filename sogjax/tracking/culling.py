@@ -55,6 +55,14 @@ class Capacities(eqx.Module):
         """Whether there is room for so many image blobs and blocks of pairs."""
         return near <= self.near and matching <= self.matching and blocks <= self.blocks
 
+    def times(self, factor: int) -> "Capacities":
+        """So many times the room.
+
+        Raises:
+            InputError: more image blobs than the largest capacity.
+        """
+        return Capacities(capacity_for(factor * self.near), capacity_for(factor * self.matching), factor * self.blocks)
+
 
 def capacity_for(count: int, headroom: float = 1.0) -> int:
     """The smallest of `CAPACITIES` that holds `headroom` times `count` blobs, or at least `count`.

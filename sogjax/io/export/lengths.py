@@ -1,6 +1,5 @@
 """Lengths of an actor's segments between markers, for scaling a model, as CSV."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +8,7 @@ from jaxtyping import Float
 from sogjax.errors import InputError
 from sogjax.io.export.bones import check_frames
 from sogjax.io.export.points import OPENSIM_ENDS, OPENSIM_NAMES
-from sogjax.io.files import atomic_path
+from sogjax.io.files import csv_text, write_file
 from sogjax.io.motion_data import MotionData
 
 ENDING = ".lengths.csv"
@@ -49,6 +48,5 @@ def write_lengths(path: Path, motion: MotionData, up: str = "z") -> None:
     ]
     if not rows:
         raise InputError(f"{path}: the motion's body has none of the landmarks that lengths are measured between")
-    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        file.write("# unit: m; length: median over the frames, range: how far it changes (bones: 0)\n")
-        csv.writer(file, lineterminator="\n").writerows([("measurement", "from", "to", "length", "range"), *rows])
+    note = "# unit: m; length: median over the frames, range: how far it changes (bones: 0)\n"
+    write_file(path, note + csv_text([("measurement", "from", "to", "length", "range"), *rows]))

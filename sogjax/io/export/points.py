@@ -1,6 +1,5 @@
 """Points of a motion as other programs' marker files and tables hold them: C3D, TRC, CSV."""
 
-import csv
 import importlib
 import re
 from collections.abc import Mapping
@@ -12,7 +11,7 @@ from jaxtyping import Float
 
 from sogjax.errors import InputError
 from sogjax.io.export.bones import bone_frames, bones_of, check_finite, frame_time, world_turn
-from sogjax.io.files import atomic_path
+from sogjax.io.files import atomic_path, csv_text, write_file
 from sogjax.io.keypoints.scheme import named_scheme
 from sogjax.io.motion_data import MotionData
 from sogjax.model.rotation import forward_axis
@@ -137,13 +136,10 @@ def write_columns(path: Path, motion: MotionData, note: str, columns: Mapping[st
     """
     check_finite(path, motion)
     columns = {**columns, **limb_confidence(motion)}
-    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        filtered = f", filter: {motion.filtered_by}" if motion.filtered_by else ""
-        file.write(f"# {note}{filtered}\n")
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["frame", "time", *columns])
-        for frame, *row in zip(motion.frame.tolist(), motion.time.tolist(), *columns.values(), strict=True):
-            writer.writerow([frame, *(f"{value:.6f}" for value in row)])
+    filtered = f", filter: {motion.filtered_by}" if motion.filtered_by else ""
+    values = zip(motion.frame.tolist(), motion.time.tolist(), *columns.values(), strict=True)
+    rows = ([frame, *(f"{value:.6f}" for value in row)] for frame, *row in values)
+    write_file(path, f"# {note}{filtered}\n" + csv_text([["frame", "time", *columns], *rows]))
 
 
 def write_trc(path: Path, motion: MotionData, up: str = "z", markers: str | None = None) -> None:

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -10,20 +9,12 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from sogjax.errors import InputError
+from sogjax.io.bvh_bones import MAX_BYTES, BvhBone, read_bones
 from sogjax.io.files import read_text
 from sogjax.io.reference.reference_motion import ReferenceMotion, checked
 
-MAX_BYTES = 512 * 2**20
 _LARGEST_PERSON = 4.0
 """A skeleton that is more across at rest is not in metres but in centimetres."""
-
-
-@dataclass
-class _Joint:
-    name: str
-    parent: int
-    offset: Float[np.ndarray, "3"] = field(default_factory=lambda: np.zeros(3))
-    channels: tuple[str, ...] = ()
 
 
 def read_bvh(path: Path) -> ReferenceMotion:
@@ -32,11 +23,11 @@ def read_bvh(path: Path) -> ReferenceMotion:
     Raises:
         InputError: the file is no BVH, or damaged.
     """
-    head, found, rest = read_text(path, MAX_BYTES).partition("MOTION")
+    joints = read_bones(path)
+    rest = read_text(path, MAX_BYTES).partition("\nMOTION")[2]
     numbers = re.match(r"\s*Frames:\s*(\d+)\s*Frame Time:\s*(\S+)", rest)
-    joints = _joints(path, head.split())
-    if not found or numbers is None or not joints:
-        raise InputError(f"{path}: has no HIERARCHY, 'Frames:' and 'Frame Time:'; is this a BVH?")
+    if numbers is None or not joints:
+        raise InputError(f"{path}: has no ROOT, 'Frames:' and 'Frame Time:'; is this a whole BVH?")
     width = sum(len(joint.channels) for joint in joints)
     try:
         step = float(numbers[2])
@@ -52,44 +43,8 @@ def read_bvh(path: Path) -> ReferenceMotion:
     return checked(ReferenceMotion(path, 1.0 / step, step * np.arange(len(values)), points, turns=turns, notes=notes))
 
 
-def _joints(path: Path, words: Sequence[str]) -> list[_Joint]:
-    """The joints, parents before their children; ends of bones are left out."""
-    joints: list[_Joint] = []
-    above: list[int] = []
-    pending, k = -1, 0
-    try:
-        while k < len(words):
-            word = words[k]
-            if word in ("ROOT", "JOINT"):
-                joints.append(_Joint(words[k + 1], above[-1] if above else -1))
-                pending, k = len(joints) - 1, k + 2
-            elif word == "End":
-                pending, k = -2, k + 2
-            elif word == "{":
-                above.append(pending)
-                k += 1
-            elif word == "}":
-                above.pop()
-                k += 1
-            elif word == "OFFSET":
-                if above[-1] >= 0:
-                    joints[above[-1]].offset = np.array(words[k + 1 : k + 4], float)
-                k += 4
-            elif word == "CHANNELS":
-                count = int(words[k + 1])
-                joints[above[-1]].channels = tuple(words[k + 2 : k + 2 + count])
-                k += 2 + count
-            else:
-                k += 1
-    except (IndexError, ValueError):
-        raise InputError(
-            f"{path}: its HIERARCHY is damaged near {' '.join(words[k : k + 4])!r}; export it again"
-        ) from None
-    return joints
-
-
 def _frames(
-    joints: Sequence[_Joint], values: Float[np.ndarray, "frame channel"]
+    joints: Sequence[BvhBone], values: Float[np.ndarray, "frame channel"]
 ) -> tuple[dict[str, Float[np.ndarray, "frame 3 3"]], Float[np.ndarray, "frame joint 3"]]:
     """World rotations by joint and positions, by forward kinematics.
 
@@ -120,7 +75,7 @@ def _frames(
     return dict(zip(names, turns, strict=True)), np.stack(places, axis=1)
 
 
-def _across(joints: Sequence[_Joint]) -> float:
+def _across(joints: Sequence[BvhBone]) -> float:
     """How far apart a skeleton's joints are at most, in the file's unit, without turning any."""
     places: list[np.ndarray] = []
     for joint in joints:

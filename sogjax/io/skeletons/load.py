@@ -5,9 +5,10 @@ from pathlib import Path
 import jax.numpy as jnp
 
 from sogjax.errors import InputError
+from sogjax.io import bvh_bones
 from sogjax.io.actor_file import body_from
 from sogjax.io.calibration.rig import METRES
-from sogjax.io.skeletons import bvh_hierarchy, skeletool
+from sogjax.io.skeletons import skeletool
 from sogjax.io.skeletons.bvh_hierarchy import read_bvh_hierarchy
 from sogjax.io.skeletons.skeletool import read_skeletool_skeleton
 from sogjax.io.yaml_entry import Entry
@@ -27,7 +28,7 @@ def read_skeleton(path: Path, dof: Path | None = None, unit: str | None = None, 
     head = _head(path)
     if head.startswith(skeletool.HEADER):
         rows, prescribed = read_skeletool_skeleton(path, dof), "mm"
-    elif head.startswith(bvh_hierarchy.HEADER):
+    elif head.startswith(bvh_bones.HEADER):
         if dof is not None:
             raise InputError(f"{dof}: belongs to a .skeleton of Skeletool, but {path} is not one; leave it out")
         rows, prescribed = read_bvh_hierarchy(path), "m"

@@ -12,6 +12,8 @@ FINEST_STEP = 0.01
 AS_GOOD = 0.005
 """Lags whose correlation is so little below the best one are as good; a walk is like itself a stride later."""
 LEAST_CORRELATION = 0.5
+MOVES = 0.1
+"""Part of the largest deviation of a signal below which one counts less than the others: it may be noise."""
 
 
 def time_offset(
@@ -22,8 +24,9 @@ def time_offset(
 ) -> tuple[float, float]:
     """Seconds to add to their time, and the correlation there; of lags that are as good the smallest.
 
-    The signals are pairs of the same quantity; either may count the other way. At least half of the shorter motion
-    overlaps. NaN is left out.
+    The signals are pairs of the same quantity; either may count the other way, and all that move count alike: a heading
+    that goes round and round is as like itself at any lag. At least half of the shorter motion overlaps. NaN is left
+    out.
     """
     step = max(float(np.median(np.diff(each))) for each in (our_time, their_time))
     step = max(step / 2.0, FINEST_STEP)
@@ -44,11 +47,12 @@ def time_offset(
 def _even(
     signals: Sequence[Float[np.ndarray, "frame"]], time: Float[np.ndarray, "frame"], step: float
 ) -> tuple[Float[np.ndarray, "signal sample"], float]:
-    """The signals at even times, NaN before and after they are known, and the first of these times."""
+    """The signals at even times, NaN before and after they are known, in their deviations; the first of these times."""
     even = np.arange(time[0], time[-1] + 1e-9, step)
     known = [np.isfinite(signal) for signal in signals]
-    filled = [np.interp(even, time[k], s[k], np.nan, np.nan) for s, k in zip(signals, known, strict=True)]
-    return np.stack(filled), float(time[0])
+    filled = np.stack([np.interp(even, time[k], s[k], np.nan, np.nan) for s, k in zip(signals, known, strict=True)])
+    spread = np.nanstd(filled, axis=1, keepdims=True)
+    return filled / np.maximum(spread, max(MOVES * spread.max(), 1e-9)), float(time[0])
 
 
 def _overlap(one: np.ndarray, other: np.ndarray, lag: int) -> int:

@@ -19,7 +19,11 @@ def check_time(motion: Motion, reference: ReferenceMotion, offset: float) -> Non
         InputError: they do not.
     """
     if reference.time[-1] + offset < motion.time[0] or reference.time[0] + offset > motion.time[-1]:
-        raise _no_common_time(motion, reference, offset)
+        first, last = reference.time[0] + offset, reference.time[-1] + offset
+        raise InputError(
+            f"{reference.path}: has no time in common with the motion, which lasts from {motion.time[0]:.2f} to "
+            f"{motion.time[-1]:.2f} s (its own is {first:.2f} to {last:.2f} s); give offset=SECONDS to add to it"
+        )
 
 
 def common_rows(
@@ -32,16 +36,12 @@ def common_rows(
     """
     rows = np.any([np.isfinite(values.reshape(len(values), -1)).all(axis=-1) for values in theirs], axis=0)
     if rows.sum() < 2:
-        raise _no_common_time(motion, reference, offset)
+        check_time(motion, reference, offset)
+        raise InputError(
+            f"{reference.path}: has values in fewer than two frames of the motion, of what both know; give one with "
+            "fewer gaps, or offset=SECONDS to add to its times"
+        )
     return np.asarray(rows)
-
-
-def _no_common_time(motion: Motion, reference: ReferenceMotion, offset: float) -> InputError:
-    first, last = reference.time[0] + offset, reference.time[-1] + offset
-    return InputError(
-        f"{reference.path}: has no time in common with the motion, which lasts from {motion.time[0]:.2f} to "
-        f"{motion.time[-1]:.2f} s (its own is {first:.2f} to {last:.2f} s); give offset=SECONDS to add to it"
-    )
 
 
 def found_offset(

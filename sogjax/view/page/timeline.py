@@ -28,13 +28,6 @@ class Marks:
     revised: Bool[np.ndarray, "frame limb"]
     """Taken from another pass over the clip."""
 
-    @classmethod
-    def none(cls, motion: Motion) -> "Marks":
-        """No stretch is marked."""
-        limbs = 0 if motion.limb_names is None else len(motion.limb_names)
-        empty = np.zeros((motion.num_frames, limbs), bool)
-        return cls(empty, empty)
-
 
 def timeline(motion: Motion, marks: Marks, expected: float | None) -> str:
     """The timeline of one actor in both sizes, of which the style shows one; `expected` is what examples explain."""

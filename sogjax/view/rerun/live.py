@@ -85,6 +85,8 @@ class LiveScene:
                 return
             host, port = _opened_viewer() if target == "viewer" else _answering(target)
             self._stream.connect_grpc(f"rerun+http://{host}:{port}/proxy")
+        except InputError:
+            raise
         except (RuntimeError, OSError, ValueError) as error:
             reason = str(error).splitlines()[0]
             raise InputError(

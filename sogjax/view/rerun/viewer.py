@@ -12,8 +12,9 @@ from jaxtyping import UInt8
 
 from sogjax.io.motion import Motion
 
-ATTEMPTS, LONGEST = 3, 120
-"""A viewer on a busy machine may take its picture before the file is loaded; seconds that it may take."""
+ATTEMPTS, LONGEST, SIZE = 3, 120, "1600x1000"
+"""A viewer on a busy machine may take its picture before the file is loaded; seconds that it may take; pixels of the
+picture."""
 FEWEST_COLORS = 2000
 """A picture in which the file was loaded has as many; the empty window has fewer."""
 
@@ -27,11 +28,11 @@ def view_command(path: Path, web: bool = False) -> list[str]:
     return [*command, "--serve-web"] if web else command
 
 
-def rerun_screenshot(path: Path, size: str = "1600x1000") -> UInt8[np.ndarray, "h w 3"] | None:
+def rerun_screenshot(path: Path) -> UInt8[np.ndarray, "h w 3"] | None:
     """What Rerun's viewer shows of a file (BGR), drawn without a window; None: it cannot draw here."""
     with tempfile.TemporaryDirectory() as folder:
         picture = Path(folder) / "picture.png"
-        words = ["--headless", "--screenshot-to", str(picture), "--window-size", size, "--port", "auto"]
+        words = ["--headless", "--screenshot-to", str(picture), "--window-size", SIZE, "--port", "auto"]
         for _ in range(ATTEMPTS):
             try:
                 command = [*view_command(path), *words]
@@ -52,8 +53,4 @@ def _num_colors(picture: UInt8[np.ndarray, "h w 3"]) -> int:
 
 def drawn_frames(motions: Sequence[Motion], frame: int) -> list[Motion]:
     """The motions that have a frame (the recording's number), of that frame only."""
-    return [_only(motion, motion.frame == frame) for motion in motions if frame in motion.frame]
-
-
-def _only(motion: Motion, rows: np.ndarray) -> Motion:
-    return motion.of_rows(rows)
+    return [motion.of_rows(motion.frame == frame) for motion in motions if frame in motion.frame]
