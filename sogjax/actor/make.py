@@ -26,9 +26,12 @@ from sogjax.io.example_poses import ExamplePose
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
+from sogjax.model.compiled import compiled_hastily
 from sogjax.model.rotation import world_from_upright
 from sogjax.model.shape import ShapeModel
 from sogjax.scene.background import BackgroundImage
+
+_shaped = compiled_hastily(ShapeModel.shaped)
 
 POSE_FOUND = 0.5
 """Least IoU of masks and silhouettes, the mean over the cameras. Good fits have 0.8 to 0.9."""
@@ -119,7 +122,7 @@ def make_actor(
     report("shape")
     views = stack_views(silhouette_views(pictures, rig, body.num_blobs, FINE_DEPTH))
     estimate = estimate_shape(model, jnp.stack(poses), views, silhouettes_of(pictures, rig), terms)
-    shaped = model.shaped(estimate.shape_params)
+    shaped = _shaped(model, estimate.shape_params)
     _check_fit(recording, shaped, estimate, pictures, rig)
     if best is not None:
         _check_frames(recording, shaped, estimate, pictures, rig)

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import cv2
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, UInt8
@@ -19,6 +18,7 @@ from sogjax.io.example_poses import ExamplePose
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, camera_of
+from sogjax.model.compiled import compiled_hastily
 from sogjax.quality.limb_confidence import frame_fit
 from sogjax.quality.limb_evidence import LimbBlobs, blob_evidence
 from sogjax.scene.foreground import subject_colors
@@ -136,7 +136,7 @@ def _explained(
     return float(_fit(body, LimbBlobs.from_body(body), pose, rig, *arrays))
 
 
-@eqx.filter_jit
+@compiled_hastily
 def _fit(
     body: Body, limbs: LimbBlobs, pose: Array, rig: Camera, cells: Array, sides: Array, present: Array, colors: Array
 ) -> Float[Array, ""]:

@@ -25,6 +25,7 @@ from sogjax.energy.priors import limit_penalty, pose_spread
 from sogjax.energy.term import Terms
 from sogjax.energy.views import Views
 from sogjax.model.camera import Camera, undistort, undistorted_sizes
+from sogjax.model.compiled import compiled_hastily
 from sogjax.model.shape import ShapeModel
 from sogjax.solve.ascent import ConditionedAscent
 from sogjax.solve.gauss_newton import GaussNewton
@@ -48,7 +49,7 @@ def silhouettes_of(pictures: Sequence[PosedPictures], rig: Camera) -> Silhouette
     return Silhouettes(jax.tree.map(repeated, rig), undistorted, sigmas, as_dtype(coverage), jnp.asarray(mask))
 
 
-@eqx.filter_jit
+@compiled_hastily
 def _undistorted(
     rig: Camera, means: Float[Array, "pose camera cell 2"], sigmas: Float[Array, "pose camera cell"]
 ) -> tuple[Float[Array, "pose camera cell 2"], Float[Array, "pose camera cell"]]:
