@@ -25,6 +25,8 @@ from sogjax.cli.main import main as sogjax
 TRACING = "/jax/core/compile/jaxpr_trace_duration"
 LOWERING = "/jax/core/compile/jaxpr_to_mlir_module_duration"
 COMPILING = "/jax/core/compile/backend_compile_duration"
+TABLE = "program "
+"""How the table begins."""
 SMALL = 0.1
 """Seconds below which all programs share a row."""
 
@@ -94,7 +96,7 @@ def _timed(call: Callable[..., Any], programs: dict[str, Program]) -> Callable[.
 def print_table(programs: dict[str, Program]) -> None:
     """The slowest programs, one a row, then all others and the sum."""
     heads = f"{'times':>6}{'trace':>10}{'lower':>10}{'compile':>10}{'beside':>10}{'calls':>8}{'run':>10}"
-    print(f"{'program':<32}{heads}")
+    print(f"{TABLE:<32}{heads}")
     rows = sorted(programs.items(), key=lambda item: -item[1].seconds - sum(item[1].calls))
     small = [program for _, program in rows if program.seconds + sum(program.calls) < SMALL]
     for name, program in rows:
