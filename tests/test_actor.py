@@ -1,5 +1,6 @@
 """Actors from example pictures: colours projected back, sizes fitted to silhouettes."""
 
+import threading
 from dataclasses import replace
 
 import cv2
@@ -12,6 +13,7 @@ from drawn_scene import draw, in_colors, moved, standing
 from rig_cases import opencv_pixels, recording_of, ring_rig
 from tiny_body import make_body
 
+from sogjax.actor import silhouette_fit
 from sogjax.actor.colors import ColoredView, back_projected_colors, colored
 from sogjax.actor.make import make_actor, subjects_of
 from sogjax.energy.frame_energy import standard_terms
@@ -24,6 +26,8 @@ from sogjax.model.shape import ShapeModel
 COLOR = 0.02
 """A byte is 0.004; discs have edges."""
 TRUE_SCALE = 1.08
+TRACED_IN = []
+"""The threads in which the climb of the shape was traced."""
 FLESH = 1.5
 """Radius of the flesh around a blob of sigma 1 in the example pictures, where blobs overlap."""
 COLORS = np.array([[0.9, 0.2, 0.1], [0.1, 0.7, 0.3], [0.2, 0.3, 0.9]])
@@ -148,8 +152,19 @@ def made(tmp_path_factory):
         write_example(folder, "trot", truth, trot, rig),
     )
     recording = replace(recording_of(rig, 1), example_poses=examples)
-    actor = make_actor(recording, dog, None, "hsv_cylinder", standard_terms())
+    energy = silhouette_fit.still_energy
+    with pytest.MonkeyPatch.context() as patch:
+        traced = lambda *given: TRACED_IN.append(threading.current_thread()) or energy(*given)
+        patch.setattr(silhouette_fit, "still_energy", traced)
+        actor = make_actor(recording, dog, None, "hsv_cylinder", standard_terms())
     return actor, truth, {"stand": stand, "trot": trot}
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("made")
+def test_the_shape_is_compiled_beside_the_search_for_poses():
+    assert TRACED_IN
+    assert threading.main_thread() not in TRACED_IN
 
 
 @pytest.mark.slow

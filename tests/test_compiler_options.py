@@ -1,4 +1,4 @@
-"""The level at which XLA optimises is ours, unless somebody names one or another device may be used."""
+"""How XLA compiles is ours, unless somebody names one or another device may be used."""
 
 import pytest
 
@@ -12,19 +12,27 @@ def flags_as_before(monkeypatch):
     monkeypatch.setattr(compiler_options, "entry_points", lambda group: ())
 
 
-def test_the_level_is_set_once_beside_other_flags(monkeypatch):
+OURS = " ".join(f"{option}={value}" for option, value in compiler_options.COMPILER_OPTIONS.items())
+
+
+def test_the_options_are_set_once_beside_others(monkeypatch):
     monkeypatch.setenv(COMPILER_VARIABLE, "--xla_dump_to=there")
     for _ in range(2):
         use_compiler_options()
-        assert (
-            compiler_options.os.environ[COMPILER_VARIABLE] == "--xla_dump_to=there --xla_backend_optimization_level=1"
-        )
+        assert compiler_options.os.environ[COMPILER_VARIABLE] == f"--xla_dump_to=there {OURS}"
 
 
 def test_a_level_that_somebody_names_stays(monkeypatch):
     monkeypatch.setenv(COMPILER_VARIABLE, "--xla_backend_optimization_level=3")
     use_compiler_options()
-    assert compiler_options.os.environ[COMPILER_VARIABLE] == "--xla_backend_optimization_level=3"
+    chosen = compiler_options.os.environ[COMPILER_VARIABLE].split()
+    assert [option for option in chosen if "level" in option] == ["--xla_backend_optimization_level=3"]
+
+
+def test_another_jaxlib_is_told_the_level_alone(monkeypatch):
+    monkeypatch.setattr(compiler_options, "version", lambda package: "9.0.0")
+    use_compiler_options()
+    assert compiler_options.os.environ[COMPILER_VARIABLE] == "--xla_backend_optimization_level=1"
 
 
 def test_nothing_is_changed_where_another_device_may_be_used(monkeypatch):

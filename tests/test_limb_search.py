@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -18,9 +19,11 @@ from sogjax.energy.posed import History
 from sogjax.energy.views import Windows
 from sogjax.model.body import concatenate
 from sogjax.model.limbs import limb_names
-from sogjax.search.limb_search import Units, drawn_ways, look_alikes, units_of
+from sogjax.search import limb_search
+from sogjax.search.limb_search import LimbSearch, Units, compile_search, drawn_ways, look_alikes, units_of
 from sogjax.search.merge_passes import merge_passes
 from sogjax.search.placed_body import means_of
+from sogjax.tracking.frame_by_frame import track
 
 HUMAN = shipped("human")
 
@@ -126,6 +129,22 @@ def test_a_lost_limb_that_nobody_doubts_is_found_in_a_key_frame(walking_dog):
     for row in (4, 5, 6):
         off = means_of(tracker.body, found.frames[row].pose[None]) - means_of(tracker.body, right.poses[[row]])
         assert np.linalg.norm(off, axis=-1).max() < 0.02
+
+
+def test_what_is_compiled_beforehand_is_what_the_search_for_limbs_takes(walking_dog, monkeypatch):
+    """Tracking tells of its first frame once, before it compiles its step."""
+    tracker, cells, right = walking_dog
+    told, traces = [], []
+    monkeypatch.setattr(limb_search, "look_alikes", lambda *given: traces.append(1) or look_alikes(*given))
+    monkeypatch.setattr(limb_search, "held_otherwise", eqx.filter_jit(limb_search.held_otherwise.__wrapped__))
+    tracked = track(tracker, jnp.asarray(right.poses[0]), cells[:2], told=lambda *given: told.append(given))
+    capacities = [frame.capacities for frame in tracked]
+    assert [given[2] for given in told] == capacities[:1]
+    compile_search(tracker, *told[0])
+    assert traces
+    traces.clear()
+    LimbSearch.of(tracker).better_pose(cells[1], replace(right, capacities=capacities[0]), 1)
+    assert not traces
 
 
 @pytest.mark.slow

@@ -12,6 +12,7 @@ from sogjax.io.recording import open_recording
 from sogjax.io.video import read_still
 from sogjax.run.background import learn_background
 from sogjax.run.clip import Clip
+from sogjax.run.plates import median_picture
 from sogjax.scene.plates import fitted_plate
 from sogjax.synth.render import render_recording
 from sogjax.synth.settings import SynthSettings
@@ -149,3 +150,9 @@ def test_a_plate_of_another_place_is_not_used(walk, tmp_path, capsys):
     assert not np.array_equal(found.required()[2].picture, other)
     with pytest.raises(InputError, match=r"cam02\.png does not show"):
         background_of(wrong, "pictures")
+
+
+@pytest.mark.parametrize("count", [1, 2, 8, 9])
+def test_the_median_of_pictures_is_numpys_rounded_down(count):
+    frames = [*np.random.default_rng(count).integers(0, 256, (count, 5, 7, 3), np.uint8)]
+    np.testing.assert_array_equal(median_picture(frames), np.median(frames, axis=0).astype(np.uint8))

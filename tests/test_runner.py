@@ -107,7 +107,7 @@ def test_the_passes_of_a_command_are_those_that_it_wants(tmp_path):
 def test_files_grow_while_tracking_only_where_no_later_pass_changes_the_frames(tmp_path, monkeypatch, words):
     """Whichever pass that is: one is added behind the others."""
     seen = []
-    monkeypatch.setattr(passes, "track_forward", lambda *given: seen.append(given[-1]) or stand_in_tracked(run).table)
+    monkeypatch.setattr(passes, "track_forward", lambda *given: seen.append(given[5]) or stand_in_tracked(run).table)
     for further in ((), (Pass("smoothed", "", stand_in_tracked, changes_frames=True),)):
         run = tiny_run(*words, out=tmp_path, initial_pose=InitialPose(0, np.zeros(DOG.skeleton.num_dofs), "given"))
         with monkeypatch.context() as context:

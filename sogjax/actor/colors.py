@@ -17,6 +17,7 @@ from sogjax.io.video import read_frames
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, camera_of, distort, project, project_points
 from sogjax.model.color import averaging_space, from_rgb, linear_light, to_rgb
+from sogjax.model.compiled import compiled_hastily
 from sogjax.model.sog import Sog
 from sogjax.search.placed_body import means_of
 
@@ -53,11 +54,11 @@ def back_projected_colors(body: Body, views: Sequence[ColoredView], color_space:
             samples[blob].append(colors)
     stacked = [np.concatenate(parts) for parts in samples]
     space = averaging_space(color_space)
-    converted = np.asarray(from_rgb(jnp.asarray(np.concatenate(stacked), jnp.float32), space))
+    converted = np.asarray(_from_rgb(jnp.asarray(np.concatenate(stacked), jnp.float32), space))
     parts = np.split(converted, np.cumsum([len(part) for part in stacked])[:-1])
     seen = np.array([len(part) >= MIN_SAMPLES for part in parts])
     means = np.stack([_robust_mean(part) if enough else np.zeros(3) for part, enough in zip(parts, seen, strict=True)])
-    return _filled(body, np.asarray(to_rgb(jnp.asarray(means, jnp.float32), space), float), seen)
+    return _filled(body, np.asarray(_to_rgb(jnp.asarray(means, jnp.float32), space), float), seen)
 
 
 def blob_samples(body: Body, view: ColoredView) -> list[Float[np.ndarray, "n 3"]]:
@@ -103,6 +104,7 @@ def _seen_blobs(body: Body, camera: Camera, pose: Float[Array, "dof"]) -> tuple[
 
 
 _distorted = eqx.filter_jit(distort)
+_from_rgb, _to_rgb = compiled_hastily(from_rgb), compiled_hastily(to_rgb)
 
 
 def _robust_mean(colors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "3"]:

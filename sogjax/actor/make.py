@@ -1,6 +1,7 @@
 """An actor from a recording's example poses: a named body, scaled to the subject and coloured."""
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import jax
@@ -18,17 +19,20 @@ from sogjax.actor.posed_examples import (
     found_best,
     rough_poses,
 )
-from sogjax.actor.silhouette_fit import Estimate, estimate_shape, silhouettes_of
-from sogjax.actor.silhouettes import FINE_DEPTH, PosedPictures, load_pictures, silhouette_views, stack_views
+from sogjax.actor.silhouette_fit import Estimate, compile_estimate, estimate_shape, silhouettes_of
+from sogjax.actor.silhouettes import PosedPictures, load_pictures, silhouette_views, stack_views
 from sogjax.energy.term import Terms
 from sogjax.errors import InputError
 from sogjax.io.example_poses import ExamplePose
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
+from sogjax.model.compiled import compiled_hastily
 from sogjax.model.rotation import world_from_upright
 from sogjax.model.shape import ShapeModel
 from sogjax.scene.background import BackgroundImage
+
+_shaped = compiled_hastily(ShapeModel.shaped)
 
 POSE_FOUND = 0.5
 """Least IoU of masks and silhouettes, the mean over the cameras. Good fits have 0.8 to 0.9."""
@@ -111,15 +115,20 @@ def make_actor(
     upright = body.rotated(jnp.asarray(turn, body.blob_sigmas.dtype))
     model = ShapeModel.from_body(upright, symmetric)
     pictures = [load_pictures(recording, e, report, learnt) for e in progress(examples, len(examples), "masks")]
-    poses = rough_poses(recording, upright, list(zip(examples, pictures, strict=True)), rig, terms, report, progress)
-    if best is not None and len(examples) > best:
+    views, silhouettes = silhouette_views(pictures, rig, body.num_blobs), silhouettes_of(pictures, rig)
+    shown, chooses = list(zip(examples, pictures, views, strict=True)), best is not None and len(examples) > best
+    with ThreadPoolExecutor(1) as beside:
+        if not chooses:
+            beside.submit(compile_estimate, model, stack_views(views), silhouettes, terms)
+        poses = rough_poses(upright, shown, rig, recording.up, terms, report, progress)
+    if best is not None and chooses:
         kept = found_best(upright, poses, pictures, rig, best)
         examples, pictures, poses = [examples[k] for k in kept], [pictures[k] for k in kept], [poses[k] for k in kept]
+        views, silhouettes = [views[k] for k in kept], silhouettes_of(pictures, rig)
         report(f"uses {', '.join(example.name for example in examples)}")
     report("shape")
-    views = stack_views(silhouette_views(pictures, rig, body.num_blobs, FINE_DEPTH))
-    estimate = estimate_shape(model, jnp.stack(poses), views, silhouettes_of(pictures, rig), terms)
-    shaped = model.shaped(estimate.shape_params)
+    estimate = estimate_shape(model, jnp.stack(poses), stack_views(views), silhouettes, terms)
+    shaped = _shaped(model, estimate.shape_params)
     _check_fit(recording, shaped, estimate, pictures, rig)
     if best is not None:
         _check_frames(recording, shaped, estimate, pictures, rig)

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import cv2
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, UInt8
@@ -12,13 +11,14 @@ from jaxtyping import Array, Bool, Float, UInt8
 from sogjax.actor.colors import ColoredView
 from sogjax.actor.coverage import silhouette_iou
 from sogjax.actor.example_pose import consistent_ways, poses_from_silhouettes, side_colors, starts_at
-from sogjax.actor.silhouettes import COARSE_DEPTH, PosedPictures, silhouette_views, subject_centre
+from sogjax.actor.silhouettes import PosedPictures, subject_centre
 from sogjax.energy.posed import Posed
 from sogjax.energy.term import Terms
+from sogjax.energy.views import Views
 from sogjax.io.example_poses import ExamplePose
-from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, camera_of
+from sogjax.model.compiled import compiled_hastily
 from sogjax.quality.limb_confidence import frame_fit
 from sogjax.quality.limb_evidence import LimbBlobs, blob_evidence
 from sogjax.scene.foreground import subject_colors
@@ -34,23 +34,21 @@ spoils the shape for all: a cartwheel's frames were at 0.65 to 0.71 where those 
 
 
 def rough_poses(
-    recording: Recording,
     body: Body,
-    shown: Sequence[tuple[ExamplePose, PosedPictures]],
+    shown: Sequence[tuple[ExamplePose, PosedPictures, Views]],
     rig: Camera,
+    up: str,
     terms: Terms,
     report: Report,
     progress: Progress,
 ) -> list[Float[Array, "dof"]]:
     """The rough poses of an upright body in the example pictures; front and back are told apart by all together."""
-    coarse = silhouette_views([posed for _, posed in shown], rig, body.num_blobs, COARSE_DEPTH)
     ways, colors = [], []
-    triples = [(*pair, views) for pair, views in zip(shown, coarse, strict=True)]
-    for example, posed, views in progress(triples, len(triples), "example poses"):
+    for example, posed, views in progress(shown, len(shown), "example poses"):
         report(f"pose of {example.name}")
-        starts = _starts(body, example, posed, rig, recording.up)
-        ways.append(poses_from_silhouettes(body, views, starts, terms, recording.up))
-        colors.append([side_colors(body, colored_views(posed, rig, way.pose), recording.up) for way in ways[-1]])
+        starts = _starts(body, example, posed, rig, up)
+        ways.append(poses_from_silhouettes(body, views, starts, terms, up))
+        colors.append([side_colors(body, colored_views(posed, rig, way.pose), up) for way in ways[-1]])
     chosen = consistent_ways([[way.energy for way in of_example] for of_example in ways], colors)
     return [of_example[k].pose for of_example, k in zip(ways, chosen, strict=True)]
 
@@ -136,7 +134,7 @@ def _explained(
     return float(_fit(body, LimbBlobs.from_body(body), pose, rig, *arrays))
 
 
-@eqx.filter_jit
+@compiled_hastily
 def _fit(
     body: Body, limbs: LimbBlobs, pose: Array, rig: Camera, cells: Array, sides: Array, present: Array, colors: Array
 ) -> Float[Array, ""]:

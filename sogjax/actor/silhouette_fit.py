@@ -9,7 +9,6 @@ silhouettes themselves, which say exactly where limbs end.
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 import cv2
 import equinox as eqx
@@ -25,6 +24,7 @@ from sogjax.energy.priors import limit_penalty, pose_spread
 from sogjax.energy.term import Terms
 from sogjax.energy.views import Views
 from sogjax.model.camera import Camera, undistort, undistorted_sizes
+from sogjax.model.compiled import compiled_hastily
 from sogjax.model.shape import ShapeModel
 from sogjax.solve.ascent import ConditionedAscent
 from sogjax.solve.gauss_newton import GaussNewton
@@ -48,7 +48,7 @@ def silhouettes_of(pictures: Sequence[PosedPictures], rig: Camera) -> Silhouette
     return Silhouettes(jax.tree.map(repeated, rig), undistorted, sigmas, as_dtype(coverage), jnp.asarray(mask))
 
 
-@eqx.filter_jit
+@compiled_hastily
 def _undistorted(
     rig: Camera, means: Float[Array, "pose camera cell 2"], sigmas: Float[Array, "pose camera cell"]
 ) -> tuple[Float[Array, "pose camera cell 2"], Float[Array, "pose camera cell"]]:
@@ -182,17 +182,21 @@ class SilhouetteFit(eqx.Module):
         return jnp.sqrt(2.0 * NOISE * jnp.maximum(jnp.diag(jnp.linalg.pinv(curvature, hermitian=True)), 0.0))
 
 
-def fitted(fit: SilhouetteFit, start: Float[Array, "param"], pose_scales: Scales) -> Solution:
+def fitted(
+    fit: SilhouetteFit, start: Float[Array, "param"], pose_scales: Scales, max_iterations: int = MAX_ITERATIONS
+) -> Solution:
     """The best poses and shape near a start."""
     num_shape = fit.model.num_shape_params
     scales = scales_with_shape(pose_scales, fit.num_poses, num_shape)
-    return _fitted(fit, start, scales)
+    return _fitted(fit, start, scales, jnp.asarray(max_iterations))
 
 
 @eqx.filter_jit
-def _fitted(fit: SilhouetteFit, start: Float[Array, "param"], scales: Scales) -> Solution:
+def _fitted(
+    fit: SilhouetteFit, start: Float[Array, "param"], scales: Scales, max_iterations: Int[Array, ""]
+) -> Solution:
     solver = GaussNewton(
-        epsilon=EPSILON, max_iterations=MAX_ITERATIONS, first_damping=0.1, smallest_damping=DAMPING, common_damping=0.0
+        epsilon=EPSILON, max_iterations=max_iterations, first_damping=0.1, smallest_damping=DAMPING, common_damping=0.0
     )
     return solver.maximize(fit, start, scales)
 
@@ -239,21 +243,28 @@ def estimate_shape(
     views: Views,
     silhouettes: Silhouettes,
     terms: Terms,
+    max_iterations: tuple[int, int] = (CLIMB_ITERATIONS, MAX_ITERATIONS),
 ) -> Estimate:
     """The poses and the one shape that fit all masks best, from rough poses.
 
-    `views` and `silhouettes` have a leading axis for the poses.
+    `views` and `silhouettes` have a leading axis for the poses; `max_iterations` are those of the climb and of the fit.
     """
     scales = pose_scales(model.body.skeleton)
     no_shape = jnp.zeros(model.num_shape_params, poses.dtype)
-    start = climbed_together(model, poses, no_shape, views, terms)
+    start = climbed_together(model, poses, no_shape, views, terms, max_iterations[0])
     fit = SilhouetteFit(model, silhouettes)
-    solution = fitted(fit, start, scales)
+    solution = fitted(fit, start, scales, max_iterations[1])
     poses_deviation, shape_deviation = fit.split(_deviations(fit, solution.params))
     best_poses, shape = fit.split(solution.params)
     return Estimate(
         best_poses, shape, poses_deviation, shape_deviation, -solution.value, solution.iterations, solution.converged
     )
+
+
+def compile_estimate(model: ShapeModel, views: Views, silhouettes: Silhouettes, terms: Terms) -> None:
+    """Compile beforehand what `estimate_shape` needs, while other work goes on."""
+    num_poses = silhouettes.mask.shape[0]
+    estimate_shape(model, jnp.tile(model.body.poses["rest"], (num_poses, 1)), views, silhouettes, terms, (0, 0))
 
 
 _deviations = eqx.filter_jit(SilhouetteFit.deviations)
@@ -270,7 +281,7 @@ def climbed_together(
     """The mean of Eq. 9 over the example poses, climbed; the poses one after the other, then the shape."""
     scales = scales_with_shape(pose_scales(model.body.skeleton), poses.shape[0], shape_params.shape[0])
     start = jnp.concatenate([poses.reshape(-1), shape_params])
-    return _climb(model, start, poses.shape[0], views, terms, scales, max_iterations)
+    return _climb(model, start, poses.shape[0], views, terms, scales, jnp.asarray(max_iterations))
 
 
 @eqx.filter_jit
@@ -281,7 +292,7 @@ def _climb(
     views: Views,
     terms: Terms,
     scales: Scales,
-    max_iterations: Any,
+    max_iterations: Int[Array, ""],
 ) -> Float[Array, "param"]:
     num_pose_params = num_poses * model.body.skeleton.num_dofs
 

@@ -5,7 +5,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -18,6 +17,7 @@ from sogjax.io.example_poses import ExamplePose
 from sogjax.io.recording import Recording
 from sogjax.io.video import read_frames, read_still
 from sogjax.model.camera import Camera, camera_of
+from sogjax.model.compiled import compiled_hastily
 from sogjax.model.sog import Sog
 from sogjax.scene.background import BackgroundImage
 from sogjax.scene.cells import CellGrid, stack_cells
@@ -28,8 +28,8 @@ from sogjax.tracking.culling import capacity_for
 BACKGROUND_SIMILARITY = -0.15
 """d(c_i, c_j) of the body's colour with the background's. Eq. 7 has 0 there; then a blob could grow without end.
 At -0.15 a blob of sigma r / 1.35 fits a disc of radius r best."""
-COARSE_DEPTH, FINE_DEPTH = 7, 8
-"""Depths of the quad-tree of a silhouette, for finding a pose and for fitting the shape."""
+DEPTH = 7
+"""Depth of the quad-tree of a silhouette; the edges are fitted to cells of their own."""
 SILHOUETTE_TOLERANCE = 0.15
 
 
@@ -90,20 +90,21 @@ def _check_picture(path: Path, image: UInt8[np.ndarray, "_h _w 3"], size: tuple[
         )
 
 
-def silhouette_views(pictures: Sequence[PosedPictures], rig: Camera, num_blobs: int, depth: int) -> list[Views]:
+def silhouette_views(pictures: Sequence[PosedPictures], rig: Camera, num_blobs: int) -> list[Views]:
     """The masks of each example pose as Sogs: blobs of the subject match the body, others repel it a little.
 
     A camera without a picture shows nothing. All have one shape, so that one program serves them.
     """
     sizes = np.asarray(rig.image_size).astype(int)
-    grids = tuple(CellGrid.from_depth(int(width), int(height), depth) for width, height in sizes)
+    grids = tuple(CellGrid.from_depth(int(width), int(height), DEPTH) for width, height in sizes)
     candidates, normalizers = Candidates.from_grids(grids, rig), whole_image_overlap(rig.image_size)
     cells = [jnp.asarray(_white_cells(posed, sizes, grids)) for posed in pictures]
-    capacity = capacity_for(max(int(np.max(_num_leaves(of_pose, candidates))) for of_pose in cells))
+    leaves = [_leaves(of_pose, candidates) for of_pose in cells]
+    capacity = capacity_for(max(int(np.asarray(chosen).sum(axis=1).max()) for _, chosen in leaves))
     views = []
-    for posed, of_pose in zip(pictures, cells, strict=True):
+    for posed, of_pose in zip(pictures, leaves, strict=True):
         present = jnp.asarray(np.array([k in posed.masks for k in range(len(grids))]))
-        images, similarities = _silhouette_sogs(of_pose, candidates, present, capacity, num_blobs)
+        images, similarities = _silhouette_sogs(*of_pose, candidates, present, capacity, num_blobs)
         views.append(Views(rig, images, similarities, normalizers))
     return views
 
@@ -119,26 +120,25 @@ def _white_cells(
     return stack_cells(white, grids)
 
 
-def _leaves(cells: UInt8[Array, "camera rows columns 3"], candidates: Candidates) -> tuple[Array, Array]:
+@compiled_hastily
+def _leaves(
+    cells: UInt8[Array, "camera rows columns 3"], candidates: Candidates
+) -> tuple[Float[Array, "camera candidate 3"], Bool[Array, "camera candidate"]]:
+    """The mean colours of all candidates for a blob, and which of them are chosen."""
     tolerance = jnp.asarray(SILHOUETTE_TOLERANCE, candidates.sigmas.dtype)
     return jax.vmap(quadtree, in_axes=(0, 0, None))(cells.astype(tolerance.dtype) / 255.0, candidates, tolerance)
 
 
-@eqx.filter_jit
-def _num_leaves(cells: UInt8[Array, "camera rows columns 3"], candidates: Candidates) -> Int[Array, "camera"]:
-    return jnp.sum(_leaves(cells, candidates)[1], axis=1)
-
-
-@eqx.filter_jit
+@compiled_hastily
 def _silhouette_sogs(
-    cells: UInt8[Array, "camera rows columns 3"],
+    colors: Float[Array, "camera candidate 3"],
+    leaves: Bool[Array, "camera candidate"],
     candidates: Candidates,
     present: Bool[Array, "camera"],
     capacity: int,
     num_blobs: int,
 ) -> tuple[Sog, Float[Array, "camera body image"]]:
     """The image blobs and how each matches the colour of the body's blobs."""
-    colors, leaves = _leaves(cells, candidates)
     leaves = leaves & present[:, None]
     select = jax.vmap(keep_blobs, in_axes=(0, 0, 0, 0, None))
     images, _, _ = select(candidates.means, candidates.sigmas, colors, leaves, capacity)

@@ -1,10 +1,14 @@
-"""What XLA on a CPU compiles badly, written as it compiles well: stages, choices, products of many small matrices."""
+"""What XLA on a CPU compiles badly, written as it compiles well: stages, choices, products of many small matrices.
+
+And programs that run once, which are compiled in a hurry.
+"""
 
 from collections.abc import Callable
 from functools import reduce
 from operator import add
 from typing import ParamSpec, TypeVar
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -12,6 +16,14 @@ from jaxtyping import Array, Bool, Float, Int
 
 Arguments = ParamSpec("Arguments")
 Results = TypeVar("Results")
+
+
+def compiled_hastily(function: Callable[Arguments, Results]) -> Callable[Arguments, Results]:
+    """The function as a program that is compiled without optimisation: for what runs once or twice in a command.
+
+    It is there in a third of the time, and takes up to five times as long to run.
+    """
+    return eqx.filter_jit(function, compiler_options={"xla_backend_optimization_level": 0})  # pyright: ignore[reportCallIssue]
 
 
 def stage_barrier(

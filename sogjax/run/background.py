@@ -11,6 +11,7 @@ from sogjax.errors import InputError
 from sogjax.io.background_cache import Arrays, background_origin, kept_background
 from sogjax.io.npz_file import read_npz, save_npz
 from sogjax.io.source import fingerprint
+from sogjax.model.compiled import compiled_hastily
 from sogjax.run.clip import Clip, SampleKind
 from sogjax.run.clip_learning import UnsuitableError, learnt_from
 from sogjax.run.plates import fitted_plates, say_plates
@@ -23,6 +24,7 @@ from sogjax.scene.foreground import BackgroundModel
 
 CHOICES = ("auto", "pictures", "clip", "none")
 FILE = "background.npz"
+_model = compiled_hastily(lambda cells: BackgroundModel.from_background(cells))
 _ORIGINS: tuple[Origin, ...] = ("picture", "clip")
 
 
@@ -44,7 +46,7 @@ class Background:
         """What the cells of frames are compared with; None: nothing is known."""
         if self.cameras is None:
             return None
-        return BackgroundModel.from_background(stack_background(self.cameras, grids))
+        return _model(stack_background(self.cameras, grids))
 
     def required(self) -> tuple[BackgroundImage, ...]:
         """The background of every camera.

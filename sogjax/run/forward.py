@@ -4,8 +4,10 @@ import json
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -31,7 +33,7 @@ from sogjax.run.result_streams import ResultStreams
 from sogjax.run.setup import Setup
 from sogjax.run.terminal import progress, say
 from sogjax.tracking.frame import FrameInput, TrackedFrame
-from sogjax.tracking.frame_by_frame import track
+from sogjax.tracking.frame_by_frame import Told, track
 
 FRAMES_BEHIND = 8
 """Tracked frames that wait to be written, at most."""
@@ -147,6 +149,7 @@ def track_forward(
     log: FrameLog | None = None,
     kept: FrameTable | None = None,
     streams: ResultStreams | None = None,
+    beforehand: Told = lambda *_: None,
 ) -> FrameTable:
     """All frames of the clip, tracked from the initial pose.
 
@@ -157,6 +160,7 @@ def track_forward(
         log: where rows are kept as they come.
         kept: rows of an earlier process, in the log already; after them the run is resumed.
         streams: files that show the frames, written as they come.
+        beforehand: what is done beside tracking from the first frame on, for later passes.
 
     Raises:
         InputError: a video ends early, a picture has too many image blobs, or a file cannot be written.
@@ -169,9 +173,11 @@ def track_forward(
         stage(FIRST_FRAME) as turn,
         log or nullcontext(),
         streams or nullcontext(),
+        ThreadPoolExecutor(1) as beside,
         Writer(found.consume, FRAMES_BEHIND) as writer,
     ):
-        for done in frames_done(setup, start, known, found, (kept is None or first_row == 0)):
+        shown, told = kept is None or first_row == 0, partial(beside.submit, beforehand)
+        for done in frames_done(setup, start, known, found, shown, told):
             writer.put(done)
             if done.tracked.index == first_row:
                 turn(TRACKING)
@@ -209,7 +215,12 @@ def say_if_other_subject(bodies: Sequence[Body], explained: Float[np.ndarray, "a
 
 
 def frames_done(
-    setup: Setup, start: InitialPose, known: FrameTable | None, found: FramesFound, shown: bool
+    setup: Setup,
+    start: InitialPose,
+    known: FrameTable | None,
+    found: FramesFound,
+    shown: bool,
+    told: Told = lambda *_: None,
 ) -> Iterator[FrameDone]:
     """The frames from the first one that is shown on, with what is made of their pictures; `times` are noted."""
     numbers, streams, times = setup.clip.numbers[found.row :], found.streams, found.times
@@ -223,7 +234,7 @@ def frames_done(
 
     coming = inputs(setup.clip.read(numbers, make, times)) if len(numbers) else iter(())
     with_images = streams is not None and streams.show_blobs
-    tracked_frames = continued(setup.tracker, start.pose, known, coming, shown, with_images)
+    tracked_frames = continued(setup.tracker, start.pose, known, coming, shown, with_images, told)
     for tracked in times.timed("whole", tracked_frames):
         if tracked.seconds > 0.0:  # not where a frame was tracked before
             times.add("step", tracked.seconds)

@@ -13,7 +13,7 @@ from sogjax.model.sog import Sog
 from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import FrameInput, FrameResult, TrackedFrame, TrackState, on_device
-from sogjax.tracking.frame_by_frame import image_blobs, track
+from sogjax.tracking.frame_by_frame import Told, image_blobs, track
 from sogjax.tracking.tracker import Tracker
 
 _COUNTS = ("iterations", "evaluations", "converged", "num_near", "num_matching", "num_blocks")
@@ -87,6 +87,7 @@ def continued(
     frames: Iterable[FrameInput],
     shown: bool,
     with_images: bool,
+    told: Told = lambda *_: None,
 ) -> Iterator[TrackedFrame]:
     """Frames tracked after those that are known.
 
@@ -97,10 +98,11 @@ def continued(
         frames: what is seen; from the first frame on if known ones are `shown`, else from the first unknown one on.
         shown: whether the known frames come again, with the poses that are known.
         with_images: whether their image blobs are computed again.
+        told: is told of the first frame, if none is known.
     """
     coming = iter(frames)
     if known is None:
-        yield from track(tracker, jnp.asarray(start), coming)
+        yield from track(tracker, jnp.asarray(start), coming, told=told)
         return
     if shown:
         seen = islice(coming, len(known))

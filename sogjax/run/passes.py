@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from sogjax.errors import counted
@@ -36,6 +37,7 @@ from sogjax.run.run import Run
 from sogjax.run.setup import compile_beforehand
 from sogjax.run.terminal import say
 from sogjax.run.write import check_formats, check_pose2sim, write_results
+from sogjax.search.limb_search import compile_search
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,8 @@ def _tracked(run: Run) -> Tracked:
         streams = ResultStreams(run.out, run.clip, run.setup.bodies, run.config.outputs)
     if rows is not None:
         say(f"{run.out}: {len(rows)} of {counted(len(run.clip.numbers), 'frame')} are done; resuming after them")
-    table = track_forward(run.setup, run.initial_pose, run.times, log, rows, streams)
+    beforehand = partial(compile_search, run.setup.tracker) if run.config.tracking.both_ways else lambda *_: None
+    table = track_forward(run.setup, run.initial_pose, run.times, log, rows, streams, beforehand)
     if streams is not None:
         run.shown = (table, streams.files)
     return Tracked(table)

@@ -26,7 +26,8 @@ from sogjax.search.other_pass import Pass
 from sogjax.search.placed_body import means_of
 from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.tracking.capacity import views_near
-from sogjax.tracking.frame import AnyFrame, on_device
+from sogjax.tracking.culling import Capacities
+from sogjax.tracking.frame import AnyFrame, FrameInput, TrackState, on_device
 from sogjax.tracking.tracker import Tracker
 
 NUM_DRAWN = 24
@@ -160,9 +161,9 @@ class LimbSearch:
         """
         self._turn += 1
         first = pose = passed.poses[row]
-        views = views_near(self.tracker, on_device(frame), jnp.asarray(pose), passed.capacities, REACH)
+        views = self.views(on_device(frame), pose, passed.capacities)
         for _ in range(MOST_ROUNDS):
-            found = self._held_otherwise(views, pose)
+            found = self.held_otherwise(views, pose)
             if self._turn < self._pause_until:
                 return None
             better = self._climbed(views, first, pose, found, passed.energy)
@@ -171,7 +172,12 @@ class LimbSearch:
             pose = better
         return None if pose is first else pose
 
-    def _held_otherwise(self, views: Views, pose: Float[np.ndarray, "dof"]) -> "HeldOtherwise":
+    def views(self, frame: FrameInput, pose: Float[np.ndarray, "dof"], capacities: Capacities) -> Views:
+        """What the cameras see where limbs may be held."""
+        return views_near(self.tracker, frame, jnp.asarray(pose), capacities, REACH)
+
+    def held_otherwise(self, views: Views, pose: Float[np.ndarray, "dof"]) -> "HeldOtherwise":
+        """Ways to hold limbs around a pose; some of the next frame's are those found here."""
         tried = np.stack([self._tried(k, unit, pose) for k, unit in enumerate(self.units)]).astype(pose.dtype)
         found = held_otherwise(self.tracker, views, jnp.asarray(pose), self.arrays, jnp.asarray(tried))
         found = self._carried = jax.device_get(found)
@@ -235,6 +241,14 @@ class LimbSearch:
         if self._carried is not None:
             before[:, unit.all_dofs] = self._carried.poses[number, 1:][:, unit.all_dofs]
         return np.concatenate([before, drawn])
+
+
+def compile_search(tracker: Tracker, state: TrackState, frame: FrameInput, capacities: Capacities) -> None:
+    """Compile beforehand what a search for limbs needs, in a frame, while other work goes on."""
+    search = LimbSearch.of(tracker)
+    if search is not None and tracker.limbs is not None:
+        pose = np.asarray(state.previous)
+        search.held_otherwise(search.views(frame, pose, capacities), pose)
 
 
 MOST_WHOLE = 3

@@ -1,6 +1,7 @@
 """The pose of a body in one frame without a hint: places, turns and named poses tried at once, the best refined."""
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import equinox as eqx
@@ -101,7 +102,10 @@ def search(searcher: PoseSearch, frame: SeenFrame, count: int = NUM_LAST, report
     found = [place for place in found if place.score >= POOR * found[0].score] or found[:1]
     placed = PlacedSearch.of_places(searcher, frame, np.stack([place.centre for place in found]))
     tried = _starts(searcher, found)
-    tried = placed.climbed(_spread_best(searcher, placed.scored(tried)), FIRST_ITERATIONS)
+    with ThreadPoolExecutor(1) as beside:
+        beside.submit(placed.climbed, tried[np.arange(1)], 0)  # what climbs is compiled meanwhile
+        scored = placed.scored(tried)
+    tried = placed.climbed(_spread_best(searcher, scored), FIRST_ITERATIONS)
     tried = _best(searcher, tried, NUM_SECOND)
     report(0.3)
     for share in (0.6, 0.85):

@@ -9,11 +9,15 @@ from sogjax.solve.solution import Objective, Params, Scales, Solution
 
 
 class AscentState(eqx.Module):
-    """State before iteration `iteration`: the pose it starts from, with its value and gradient."""
+    """State before iteration `iteration`: the pose it starts from, with its value and gradient.
+
+    Before iteration -1 nothing is known: that one looks at the start, so that a program holds the objective once.
+    """
 
     params: Params
     value: Float[Array, ""]
     gradient: Params
+    first_sizes: Params
     step_sizes: Params
     best_params: Params
     best_value: Float[Array, ""]
@@ -41,48 +45,53 @@ class ConditionedAscent(eqx.Module):
     def maximize(self, objective: Objective, start: Params, scales: Scales) -> Solution:
         """Climb from `start`; the best parameters seen are returned."""
         value_and_gradient = jax.value_and_grad(objective)
-        value, gradient = value_and_gradient(start)
-        first_sizes = scales.first_step_sizes(gradient)
+        unknown, nowhere = jnp.asarray(-jnp.inf, start.dtype), jnp.zeros_like(start)
         state = AscentState(
             params=start,
-            value=value,
-            gradient=gradient,
-            step_sizes=first_sizes,
+            value=unknown,
+            gradient=nowhere,
+            first_sizes=nowhere,
+            step_sizes=nowhere,
             best_params=start,
-            best_value=value,
-            iteration=jnp.asarray(0),
+            best_value=unknown,
+            iteration=jnp.asarray(-1),
             converged=jnp.asarray(False),
-            finite=_all_finite(value, gradient),
+            finite=jnp.asarray(True),
         )
 
         def unfinished(state: AscentState) -> Bool[Array, ""]:
             return ~state.converged & state.finite & (state.iteration < self.max_iterations)
 
         def climb(state: AscentState) -> AscentState:
+            at_start = state.iteration < 0
             step = jnp.clip(state.gradient * state.step_sizes, -scales.step_bounds, scales.step_bounds)
             params = state.params + step
             value, gradient = value_and_gradient(params)
-            better = value > state.best_value
+            first_sizes = jnp.where(at_start, scales.first_step_sizes(gradient), state.first_sizes)
+            step_sizes = jnp.where(at_start, first_sizes, self._next_step_sizes(state, gradient))
+            better = at_start | (value > state.best_value)
+            small = jnp.linalg.norm(step) < self.epsilon
             return AscentState(
                 params=params,
                 value=value,
                 gradient=gradient,
-                step_sizes=self._next_step_sizes(state, gradient, first_sizes),
+                first_sizes=first_sizes,
+                step_sizes=step_sizes,
                 best_params=jnp.where(better, params, state.best_params),
                 best_value=jnp.where(better, value, state.best_value),
                 iteration=state.iteration + 1,
-                converged=(jnp.linalg.norm(step) < self.epsilon) & (state.iteration + 1 >= self.min_iterations),
+                converged=~at_start & small & (state.iteration + 1 >= self.min_iterations),
                 finite=_all_finite(value, gradient),
             )
 
         end = jax.lax.while_loop(unfinished, climb, state)
         return Solution(end.best_params, end.best_value, end.iteration, end.iteration + 1, end.converged & end.finite)
 
-    def _next_step_sizes(self, state: AscentState, gradient: Params, first_sizes: Params) -> Params:
+    def _next_step_sizes(self, state: AscentState, gradient: Params) -> Params:
         """Eq. 12."""
         same_sign = gradient * state.gradient > 0.0
         sizes = state.step_sizes * jnp.where(same_sign, self.grow, self.shrink)
-        return jnp.maximum(sizes, self.smallest_step_size * first_sizes)
+        return jnp.maximum(sizes, self.smallest_step_size * state.first_sizes)
 
 
 def gradient_ascent(epsilon: float = 0.002, min_iterations: int = 10, max_iterations: int = 400) -> ConditionedAscent:

@@ -31,7 +31,10 @@ class LeastSquares(eqx.Module):
 
 
 class GaussNewtonState(eqx.Module):
-    """State before an iteration: the best parameters so far, the model there, and the damping to try next."""
+    """State before an iteration: the best parameters so far, the model there, and the damping to try next.
+
+    Before iteration -1 there is no model: that one looks at the start, so that a program holds the objective once.
+    """
 
     params: Params
     model: QuadraticModel
@@ -68,33 +71,34 @@ class GaussNewton(eqx.Module):
         """
         if not isinstance(objective, CurvedObjective):
             raise TypeError("Gauss-Newton needs an objective with a method `quadratic` (CurvedObjective)")
-        model = objective.quadratic(start)
         state = GaussNewtonState(
             params=start,
-            model=model,
+            model=QuadraticModel.unknown(start),
             damping=jnp.asarray(self.first_damping, start.dtype),
-            iteration=jnp.asarray(0),
+            iteration=jnp.asarray(-1),
             converged=jnp.asarray(False),
-            finite=model.finite(),
+            finite=jnp.asarray(True),
         )
 
         def unfinished(state: GaussNewtonState) -> Bool[Array, ""]:
             return ~state.converged & state.finite & (state.iteration < self.max_iterations)
 
         def climb(state: GaussNewtonState) -> GaussNewtonState:
+            at_start = state.iteration < 0
             step = state.model.step(state.damping, self.common_damping, scales.step_bounds)
             tried = objective.quadratic(state.params + step)
-            better = (tried.value > state.model.value) & tried.finite()
+            better = at_start | ((tried.value > state.model.value) & tried.finite())
             keep = lambda new, old: jnp.where(better, new, old)
             small = jnp.linalg.norm(step) < self.epsilon
             gain = (tried.value - state.model.value) / state.model.expected_gain(step)
+            damping = self._next_damping(state.damping, jnp.where(better, gain, -1.0))
             return GaussNewtonState(
                 params=keep(state.params + step, state.params),
                 model=jax.tree.map(keep, tried, state.model),
-                damping=self._next_damping(state.damping, jnp.where(better, gain, -1.0)),
+                damping=jnp.where(at_start, state.damping, damping),
                 iteration=state.iteration + 1,
-                converged=small & (state.iteration + 1 >= self.min_iterations),
-                finite=jnp.all(jnp.isfinite(step)),
+                converged=~at_start & small & (state.iteration + 1 >= self.min_iterations),
+                finite=jnp.all(jnp.isfinite(step)) & (~at_start | tried.finite()),
             )
 
         end = jax.lax.while_loop(unfinished, climb, state)

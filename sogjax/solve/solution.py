@@ -22,6 +22,12 @@ class QuadraticModel(eqx.Module):
     curvature: Float[Array, "param param"]
     """Positive semi-definite where the model is to be climbed."""
 
+    @classmethod
+    def unknown(cls, params: Params) -> "QuadraticModel":
+        """The model of an objective that was not looked at yet: lower than any other, and no way to go."""
+        size, dtype = params.shape[0], params.dtype
+        return cls(jnp.asarray(-jnp.inf, dtype), jnp.zeros_like(params), jnp.eye(size, dtype=dtype))
+
     def __add__(self, other: "QuadraticModel") -> "QuadraticModel":
         return jax.tree.map(jnp.add, self, other)
 

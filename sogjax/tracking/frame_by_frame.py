@@ -1,7 +1,7 @@
 """Tracking frame by frame (Section 5.3): one compiled step for every frame; and what it would say of known poses."""
 
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import equinox as eqx
 import jax
@@ -17,6 +17,8 @@ from sogjax.tracking.frame import AnyFrame, FrameInput, TrackedFrame, TrackState
 from sogjax.tracking.tracker import Tracker
 
 _step = eqx.filter_jit(Tracker.step)
+Told = Callable[[TrackState, FrameInput, Capacities], object]
+"""Is told of the first frame, and the capacities for it, before the step is compiled."""
 
 
 def track(
@@ -24,6 +26,7 @@ def track(
     start: Float[Array, "dof"] | TrackState,
     frames: Iterable[AnyFrame],
     capacities: Capacities | None = None,
+    told: Told = lambda *_: None,
 ) -> Iterator[TrackedFrame]:
     """Track the frames one after the other from a rough pose of the first one, or from where another run stopped.
 
@@ -41,6 +44,7 @@ def track(
         known = on_device(frame)
         if capacities is None:
             capacities = first_capacities(tracker, state, known)
+            told(state, known, capacities)
         while True:
             next_state, result = _step(tracker, state, known, capacities)
             needed = jax.device_get((result.num_near, result.num_matching, result.num_blocks))
