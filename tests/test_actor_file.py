@@ -279,5 +279,5 @@ def test_exponents_without_a_point_are_numbers(tmp_path):
 
 def test_named_bodies():
     assert named_body("human").is_file()
-    with pytest.raises(InputError, match=r"'cat'.* human"):
+    with pytest.raises(InputError, match=r"cat: .* dog, human"):
         named_body("cat")

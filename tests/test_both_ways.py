@@ -63,6 +63,7 @@ def test_a_lost_limb_comes_back_from_the_other_side(walking_dog):
     assert off(np.stack([found.frames[row].pose for row in rows])) < 0.015
 
 
+@pytest.mark.slow
 def test_what_holds_then_is_said_with_it(walking_dog):
     tracker, cells, right = walking_dog
     passed, limb = with_lost_limb(walking_dog)

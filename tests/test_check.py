@@ -315,6 +315,7 @@ def test_inverse_poses_are_recognised(tmp_path):
     assert any("camera to world" in finding.cause for finding in found)
 
 
+@pytest.mark.slow
 def test_cameras_that_look_backwards_are_recognised(tmp_path):
     recording = copied(tmp_path / "walk")
     faulty.looking_backwards(recording)

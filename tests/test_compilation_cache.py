@@ -63,6 +63,7 @@ def test_work_goes_on_where_kept_programs_are_not_taken(tmp_path):
     assert hits({VARIABLE: str(kept)}) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("room", [0, 64])
 def test_one_start_on_a_full_disk_does_not_switch_it_off_for_good(tmp_path, room):
     kept = tmp_path / "kept"

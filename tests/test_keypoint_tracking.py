@@ -65,6 +65,7 @@ def tracked(tracker, rig, start, true, seen):
     return np.asarray([*track(tracker, jnp.asarray(start), frames)][-1].result.pose)
 
 
+@pytest.mark.slow
 def test_a_limb_that_was_lost_is_led_back(scene):
     tracker, rig, true, lost = scene
     assert arm_error(tracker, lost, true) > 0.3

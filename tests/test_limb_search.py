@@ -131,6 +131,7 @@ def test_a_lost_limb_that_nobody_doubts_is_found_in_a_key_frame(walking_dog):
         assert np.linalg.norm(off, axis=-1).max() < 0.02
 
 
+@pytest.mark.slow
 def test_what_is_compiled_beforehand_is_what_the_search_for_limbs_takes(walking_dog, monkeypatch):
     """Tracking tells of its first frame once, before it compiles its step."""
     tracker, cells, right = walking_dog

@@ -37,7 +37,7 @@ def counts_of(looks):
 def test_a_cell_is_hidden_from_where_the_body_was_missed_and_not_before():
     assert counts_of([(3.0, 0.02)] * 3) == pytest.approx(2.85, abs=0.1)
     assert counts_of([(2.9, 0.95)] * 3 + [(3.4, 0.02)] * 4) == pytest.approx(3.2, abs=0.25)
-    assert counts_of([(3.0, 0.02)] * 2) == np.inf  # too few misses
+    assert counts_of([(3.0, 0.02)]) == np.inf  # too few misses
     assert counts_of([(3.0, 0.95)] * 5) == np.inf  # seen
     assert counts_of([(3.0, 0.02)] * 3 + [(3.5, 0.95)] * 6) == np.inf  # seen behind: a thing cannot hide only there
     assert counts_of([(3.0, 0.5)] * 3) == np.inf  # nothing is told

@@ -69,6 +69,7 @@ def test_a_run_stopped_while_its_revised_files_are_written(capsys, tmp_path, mon
     assert names("run") == names("whole")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("both_ways", [True, False], ids=["both ways", "forwards"])
 def test_a_run_stopped_while_its_adjusted_files_are_written(
     capsys, tmp_path, monkeypatch, command, farther, higher, both_ways

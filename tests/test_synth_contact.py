@@ -228,6 +228,7 @@ def test_people_who_talk_move_their_hands_and_turn_a_little():
         assert 3.0 < np.rad2deg(np.ptp(ahead)) < 40.0
 
 
+@pytest.mark.slow
 def test_a_couple_turns_round_once_with_hands_together_on_feet_that_stand():
     acts = motions("couple", 2)
     between = lambda t: np.subtract(*(act(float(t)).position[:2] for act in acts))

@@ -16,9 +16,9 @@ BIN = 0.1
 """Metres of depth that count as one."""
 SEEN_BEFORE, SEEN_BEHIND = 0.95, 0.03
 """How likely foreground is seen where a body is before, and behind, what hides."""
-NOTHING = 19.0
+NOTHING = 5.0
 """How much likelier it is beforehand that a cell hides nothing than that it does."""
-FEWEST_MISSES = 3
+FEWEST_MISSES = 2
 """Times that a body must have been missed in a cell; looks that are not independent count once."""
 HIDDEN = 0.5
 """Probability from which on a cell counts as hidden."""
