@@ -124,6 +124,7 @@ def test_a_pose_is_sure_only_if_every_condition_is_met():
         assert pose_confidence(replace(good, **{name: 0.0})) < 0.99 * SURE
     # Where no background is known, less of what is seen looks like foreground.
     assert pose_confidence(replace(good, foreground=0.5)) < 0.5
+    assert 0.0 <= pose_confidence(replace(good, margin=-100.0)) < 1e-9  # no overflow
     assert pose_confidence(replace(good, foreground=0.5, known=0.0)) > SURE
 
 

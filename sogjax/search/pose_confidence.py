@@ -89,4 +89,4 @@ def agreed_confidence(agreement: Agreement) -> float:
 
 def _likely(excesses: Iterable[float]) -> float:
     """0.99 where the least excess is 0, so that every bound is just met; a half where one is missed by its scale."""
-    return float(1.0 / (1.0 + np.exp(-4.6 * (1.0 + min([*excesses, 10.0])))))
+    return float(1.0 / (1.0 + np.exp(-4.6 * (1.0 + np.clip(min(excesses), -10.0, 10.0)))))
