@@ -40,7 +40,7 @@ class Settings:
     """What is tracked, as `key=value` on the command line."""
 
     sequences: list[str] = field(default_factory=list)
-    """Rows of the experiment `sequences`; none: all."""
+    """Rows of the experiments `sequences` and `together`; none: all of `sequences`."""
     cameras: list[int] = field(default_factory=lambda: [4, 12])
     backgrounds: list[str] = field(default_factory=lambda: ["pictures"])
     cases: list[str] = field(default_factory=lambda: [*CASES])
@@ -60,7 +60,8 @@ def main() -> None:
     unknown = [case for case in settings.cases if case not in CASES]
     if unknown:
         raise InputError(f"cases: {unknown[0]}: is none of {', '.join(CASES)}")
-    synth = {name: synth_settings({"frames": MOST_FRAMES, **chosen}) for name, chosen in yardsticks([]).items()}
+    rows = {**yardsticks(), **yardsticks(settings.sequences)}
+    synth = {name: synth_settings({"frames": MOST_FRAMES, **chosen}) for name, chosen in rows.items()}
     trials, found = VerdictTrials(Path(settings.out), synth, settings.frames, tuple(settings.settings)), []
     for background in settings.backgrounds:
         for case in settings.cases:

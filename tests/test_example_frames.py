@@ -39,7 +39,7 @@ def test_frames_are_chosen_for_worth_and_for_shapes_not_seen_before():
 
 @pytest.mark.parametrize(
     ("values", "words"),
-    [({"num_bodies": 2}, "2 people"), ({"known": 0.3}, "same place"), ({"agreement": 0.2}, "nobody")],
+    [({"num_bodies": 2}, "2 people"), ({"known": 0.1}, "same place"), ({"agreement": 0.2}, "nobody")],
 )
 def test_clips_that_show_no_one_person_apart_are_refused(values, words):
     shapes = [shape(k, k % 8) for k in range(9)]

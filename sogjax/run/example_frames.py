@@ -36,7 +36,7 @@ OTHER_WAYS = (
     "(example_poses/POSE/CAMERA.jpg, CAMERA.mask.png); an actor file (actor=FILE)"
 )
 """What else can be done where a recording has no example poses, the easiest first."""
-LEAST_KNOWN, MOSTLY_KNOWN = 0.6, 0.95
+LEAST_KNOWN, MOSTLY_KNOWN = 0.2, 0.95
 """Part of the silhouettes where the background must be, and had better be, known."""
 FEW_CAMERAS = 4
 """Fewer of them see too little of a body."""
