@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sogjax.model.body import Body
+from sogjax.model.compiled import compiled_hastily
+from sogjax.model.skeleton import Skeleton
 
 SAME_PLACE = 1e-4
 """Metres. One-axis joints nearer than this to their parent make one joint with it."""
@@ -18,6 +20,7 @@ COMMON_NAMES = {
     ("knee", "ankle"): "shank",
 }
 WIDTHS = {"shoulder width": "shoulder", "hip width": "hip"}
+_world_from_joint = compiled_hastily(Skeleton.world_from_joint)
 
 
 @dataclass
@@ -89,7 +92,7 @@ def _passes_through(body: Body, places: list[_Place], k: int) -> bool:
     row = _base(place.name)
     if row == _base(places[place.parent].name) == _base(child.name):
         return True
-    direction = np.asarray(body.skeleton.offsets[child.joints[0]], float)
+    direction = np.asarray(body.skeleton.offsets, float)[child.joints[0]]
     axes = np.asarray(body.skeleton.axes, float)[place.joints]
     return bool((np.abs(axes @ direction) > ALONG * np.linalg.norm(direction)).all())
 
@@ -122,7 +125,7 @@ def _bone_name(top: str, end: str) -> str:
 
 
 def _widths(body: Body, places: list[_Place]) -> dict[str, float]:
-    frames = np.asarray(body.skeleton.world_from_joint(body.poses["rest"]), float)
+    frames = np.asarray(_world_from_joint(body.skeleton, body.poses["rest"]), float)
     at = {place.name: frames[place.joints[0], :3, 3] for place in places}
     return {
         width: float(np.linalg.norm(at[f"left_{part}"] - at[f"right_{part}"]))
