@@ -15,13 +15,14 @@ from sogjax.model.limbs import limbs, with_other_limb
 from sogjax.scene.cells import CellGrid, stack_cells
 from sogjax.scene.quadtree import Candidates
 from sogjax.scene.visual_hull import nearest_point
+from sogjax.search import pose_search
 from sogjax.search.combination import Optima, best_combination
 from sogjax.search.found_pose import TRUNK, FoundPose
 from sogjax.search.joint_search import search_poses
 from sogjax.search.mirrored import look_alikes, other_side, sides_apart
 from sogjax.search.placed_body import turns_with_vertical
 from sogjax.search.pose_confidence import SURE, Agreement, PoseEvidence, agreed_confidence, pose_confidence
-from sogjax.search.pose_search import PoseSearch
+from sogjax.search.pose_search import Hypotheses, PlacedSearch, PoseSearch, with_better_limbs
 from sogjax.search.seen_frame import SeenFrame
 from sogjax.tracking.culling import ImageReader
 
@@ -115,6 +116,14 @@ def test_variants_differ_in_one_limb_only_and_are_all_different():
     np.testing.assert_array_equal(variants[0], pose)
     apart = np.abs(variants[:, None, limb] - variants[None, :, limb]).max(-1)
     assert np.all(apart[~np.eye(len(variants), dtype=bool)] > 1e-3)
+
+
+def test_a_body_without_limbs_is_searched_as_a_whole(monkeypatch):
+    monkeypatch.setattr(pose_search, "limbs", lambda skeleton: [])
+    placed = object.__new__(PlacedSearch)
+    object.__setattr__(placed, "searcher", PoseSearch.of_body(shipped("dog"), (), "z"))
+    tried = Hypotheses(np.zeros((2, 3), np.float32), np.zeros(2, int), np.zeros(2, np.float32))
+    assert with_better_limbs(placed, tried) is tried
 
 
 def test_a_pose_is_sure_only_if_every_condition_is_met():

@@ -192,6 +192,8 @@ def with_better_limbs(placed: PlacedSearch, tried: Hypotheses) -> Hypotheses:
     """The poses, and each with one limb held in other ways, climbed if that looks promising."""
     body, variants, source = placed.searcher.body, [], []
     every_limb = limbs(body.skeleton)
+    if not every_limb:
+        return tried
     for k, pose in enumerate(tried.poses):
         for j, limb in enumerate(every_limb):
             others = np.concatenate([tried.poses, _drawn(body, limb, NUM_DRAWN)])
