@@ -178,10 +178,13 @@ def test_who_takes_long_misses_states_and_the_delay_does_not_grow(dog, step):
     assert delays[-1] < 3.0 * PERIOD + max(delays[0], 0.1)
 
 
-def test_cameras_that_are_faster_than_said_are_told_once(dog, step, monkeypatch, capsys):
-    monkeypatch.setattr("sogjax.realtime.session.TOLD_EVERY", 3.0 * PERIOD)
+def test_cameras_that_are_faster_than_said_are_told_once(dog, step, capsys):
     session = session_of(dog, step, period=1.5 * PERIOD)
-    assert [*session.states()]
+    session.slot.handed_over = 30
+    session._say_rate(30 * 1.5 * PERIOD)
+    assert not capsys.readouterr().err
+    session._say_rate(30 * PERIOD)
+    session._say_rate(30 * PERIOD)
     assert capsys.readouterr().err.count("pictures a second, not 13.33: the motion would be too slow; give fps=") == 1
 
 
