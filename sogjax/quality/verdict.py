@@ -82,20 +82,22 @@ def verdicts(
     limits: Mapping[str, Mapping[str, Limits]] | None = None,
     begun: Mapping[str, str] | None = None,
     odd: Mapping[str, str] | None = None,
+    inside: Mapping[str, Sequence[str]] | None = None,
 ) -> dict[str, Verdict]:
     """Of the actors of a run.
 
     `expected` is what actors explain in their example poses, where that is known; `limits` are those of their bodies
     (`limits_of`); `begun` says of actors that their initial pose was not sure, which counts where there is more; `odd`
-    says what is odd about bodies.
+    says what is odd about bodies, `inside` where limbs are in each other (`passages`).
     """
-    limits, begun, odd = limits or {}, begun or {}, odd or {}
+    limits, begun, odd, inside = limits or {}, begun or {}, odd or {}, inside or {}
     return {
         name: _verdict(
             name,
             motion,
             expected=expected.get(name),
-            inside=_inside(name, motions),
+            others=_inside(name, motions),
+            inside=inside.get(name, ()),
             limits=limits.get(name, {}),
             begun=begun.get(name),
             odd=odd.get(name),
@@ -108,6 +110,7 @@ def _verdict(
     name: str,
     motion: Motion,
     expected: float | None,
+    others: Sequence[str],
     inside: Sequence[str],
     limits: Mapping[str, Limits],
     begun: str | None,
@@ -116,9 +119,9 @@ def _verdict(
     told = _told(motion)
     explained = None if motion.explained is None or not told.any() else float(np.median(motion.explained[told]))
     overlap = _overlaps(motion)
-    wrong = [*_wrong(explained, expected, overlap), *inside]
+    wrong = [*_wrong(explained, expected, overlap), *others]
     doubtful = doubtful_limbs(motion)
-    parts = [*_limbs(doubtful), *_bent(motion, limits)]
+    parts = [*_limbs(doubtful), *_shortened([*inside]), *_bent(motion, limits)]
     look = [] if wrong else [*_bad_overlaps(overlap), *_bad_stretches(motion), *parts]
     if odd is not None:
         look.append(odd)

@@ -14,6 +14,7 @@ from sogjax.io.recording import Recording
 from sogjax.io.video import read_frames
 from sogjax.quality.evaluation import GroupEvaluation, evaluate_motions
 from sogjax.quality.limb_warnings import limits_of
+from sogjax.quality.passages import passages
 from sogjax.quality.proportions import odd_sentence
 from sogjax.quality.verdict import NUM_WORST, Verdict, expected_of, verdicts
 from sogjax.run.result import RunResult
@@ -28,10 +29,11 @@ def judged_result(run: Run) -> RunResult:
     result = run.result_so_far
     limits = {body.name: limits_of(body) for body in result.bodies}
     odd = {body.name: said for body in result.bodies if (said := odd_sentence(body)) is not None}
+    inside = {body.name: passages(body, result.motions[body.name]) for body in result.bodies}
     return replace(
         result,
         evaluation=compared(result.recording, result.motions),
-        verdicts=verdicts(result.motions, expected_of(result.bodies), limits, _doubtful_begin(run), odd),
+        verdicts=verdicts(result.motions, expected_of(result.bodies), limits, _doubtful_begin(run), odd, inside),
     )
 
 

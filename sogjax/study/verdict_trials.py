@@ -21,6 +21,7 @@ from sogjax.model.body import Body
 from sogjax.quality.limb_warnings import Limits, limits_of
 from sogjax.quality.markers import joint_errors
 from sogjax.quality.metrics import mean_per_frame, stretches
+from sogjax.quality.passages import passages
 from sogjax.quality.verdict import Verdict, expected_of, verdicts
 from sogjax.run.recordings import opened, with_cameras
 from sogjax.run.track import track_recording
@@ -145,7 +146,8 @@ class VerdictTrials:
             return [JudgedRun(trial, "", kept["refused"])]
         motions = {name: load_motion(place / f"{name}.npz") for name in kept["expected"]}
         expected = {name: value for name, value in kept["expected"].items() if value}
-        found = verdicts(motions, expected, self._limits(trial, kept))
+        inside = {body.name: passages(body, motions[body.name]) for body in self._bodies(trial)}
+        found = verdicts(motions, expected, self._limits(trial, kept), inside=inside)
         truth = self._truth(trial.sequence)
         return [judged_run(trial, name, motion, truth, found[name]) for name, motion in motions.items()]
 
