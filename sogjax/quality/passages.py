@@ -37,7 +37,7 @@ def _by_parts(
     """The deepest of all capsules of each pair of parts, in metres, by what to say of them."""
     members, limbs, ends = limb_blobs(body), limb_names(body), np.asarray(solid.ends)[:, 0]
     part = lambda capsule: next((limbs[k] for k in np.flatnonzero(members[:, ends[capsule]])), "the trunk")
-    deepest: dict[str, Float[np.ndarray, frame]] = {}
+    deepest: dict[str, np.ndarray] = {}
     for pair, column in zip(np.asarray(solid.pairs).tolist(), deeper.T, strict=True):
         if column.max(initial=0.0) > DEEP:
             one, two = sorted((part(pair[0]), part(pair[1])), key=lambda name: (name == "the trunk", name))
