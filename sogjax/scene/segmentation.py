@@ -139,9 +139,8 @@ def _seen_together(
     hull = misses <= (1 if len(subjects) >= MANY else 0)
     above_floor = without_floor(hull, up)
     better = {c: _confirmed(differences[c], pixels[c], hull, above_floor) for c in guesses}
-    return {c: guess for c, guess in better.items() if is_subject(guess)}, {
-        c: pixels[c].silhouette_of(hull) for c in guesses
-    }
+    silhouettes = {c: pixels[c].silhouette_of(hull) for c in guesses}
+    return {c: guess for c, guess in better.items() if is_subject(guess)}, silhouettes
 
 
 def _confirmed(difference: Difference, pixels: VoxelPixels, hull: np.ndarray, above_floor: np.ndarray) -> Mask:
