@@ -1,6 +1,7 @@
 """Pictures of the empty scene held against the videos: moved, matched in tone, or found unfit."""
 
 import re
+import shutil
 from dataclasses import replace
 
 import cv2
@@ -12,7 +13,7 @@ from sogjax.io.recording import open_recording
 from sogjax.io.video import read_still
 from sogjax.run.background import learn_background
 from sogjax.run.clip import Clip
-from sogjax.run.plates import median_picture
+from sogjax.run.plates import median_picture, with_example_plates
 from sogjax.scene.plates import fitted_plate
 from sogjax.synth.render import render_recording
 from sogjax.synth.settings import SynthSettings
@@ -114,8 +115,12 @@ def faulty(folder, tmp_path, camera, picture):
     return replace(recording, background={**recording.background, camera: path})
 
 
+def clip_of(recording):
+    return Clip(recording, recording.frames, 8)
+
+
 def background_of(recording, choice="auto"):
-    return learn_background(Clip(recording, recording.frames, 8), choice)
+    return learn_background(clip_of(recording), choice)
 
 
 def test_a_run_takes_plates_that_agree_as_they_are(walk, capsys):
@@ -156,3 +161,33 @@ def test_a_plate_of_another_place_is_not_used(walk, tmp_path, capsys):
 def test_the_median_of_pictures_is_numpys_rounded_down(count):
     frames = [*np.random.default_rng(count).integers(0, 256, (count, 5, 7, 3), np.uint8)]
     np.testing.assert_array_equal(median_picture(frames), np.median(frames, axis=0).astype(np.uint8))
+
+
+def test_pictures_of_example_poses_show_the_empty_scene_outside_of_their_masks(walk, tmp_path):
+    folder = tmp_path / "posed"
+    shutil.copytree(walk, folder)
+    plates = {path.stem: cv2.imread(str(path)) for path in sorted((folder / "background").iterdir())}
+    shutil.rmtree(folder / "background")
+    for name, plate in plates.items():
+        mask = np.zeros(plate.shape[:2], np.uint8)
+        mask[: plate.shape[0] // 2] = 255
+        posed = folder / "example_poses" / "stand"
+        posed.mkdir(parents=True, exist_ok=True)
+        cv2.imwrite(str(posed / f"{name}.jpg"), plate)
+        cv2.imwrite(str(posed / f"{name}.mask.png"), mask)
+    found, added = with_example_plates(clip_of(open_recording(folder)), None)
+    assert 0.3 < added < 0.5
+    for camera, name in zip(found, plates, strict=True):
+        assert not camera.known[: len(camera.known) // 2].any()
+        shown = cv2.resize(plates[name], camera.known.shape[::-1], interpolation=cv2.INTER_AREA)
+        assert np.abs(camera.picture.astype(int) - shown)[camera.known].mean() < 3.0
+
+
+def test_cameras_without_a_plate_are_said_and_the_others_keep_theirs(walk, tmp_path, capsys):
+    folder = tmp_path / "some"
+    shutil.copytree(walk, folder)
+    first = sorted((folder / "background").iterdir())[0]
+    first.unlink()
+    found = background_of(open_recording(folder))
+    assert f"the background of {first.stem}" in capsys.readouterr().err
+    assert all(camera.known.all() for camera in found.cameras[1:])

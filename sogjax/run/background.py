@@ -14,7 +14,7 @@ from sogjax.io.source import fingerprint
 from sogjax.model.compiled import compiled_hastily
 from sogjax.run.clip import Clip, SampleKind
 from sogjax.run.clip_learning import UnsuitableError, learnt_from
-from sogjax.run.plates import fitted_plates, say_plates
+from sogjax.run.plates import fitted_plates, say_plates, with_example_plates
 from sogjax.run.shared import SHARED
 from sogjax.run.terminal import say
 from sogjax.scene.background import BackgroundImage, Origin, stack_background
@@ -24,6 +24,9 @@ from sogjax.scene.foreground import BackgroundModel
 
 CHOICES = ("auto", "pictures", "clip", "none")
 FILE = "background.npz"
+MUCH_UNKNOWN = 0.015
+"""Share of the pictures from which on more is looked for, and the background learnt again; a subject covers some 0.05
+of them."""
 _model = compiled_hastily(lambda cells: BackgroundModel.from_background(cells))
 _ORIGINS: tuple[Origin, ...] = ("picture", "clip")
 
@@ -39,8 +42,8 @@ class Background:
 
     @property
     def is_learnt(self) -> bool:
-        """Whether it was learnt from the clip, for all cameras."""
-        return self.cameras is not None and all(camera.origin == "clip" for camera in self.cameras)
+        """Whether it was learnt from the clip, for some camera."""
+        return self.cameras is not None and any(camera.origin == "clip" for camera in self.cameras)
 
     def model(self, grids: Sequence[CellGrid]) -> BackgroundModel | None:
         """What the cells of frames are compared with; None: nothing is known."""
@@ -82,7 +85,8 @@ class Background:
 def learn_background(clip: Clip, choice: str, cache: str | None = None, more: Sequence[SampleKind] = ()) -> Background:
     """The background of every camera, as `images.background` asks for.
 
-    With `auto`, photographs count if every camera has one, else the clip, if it is suitable.
+    With `auto`, photographs count, and the clip for cameras without one, if it is suitable; where it leaves much open,
+    photographs of example poses fill it outside of their masks.
 
     Args:
         clip: its recording has the photographs, or is learnt from.
@@ -105,9 +109,11 @@ def learn_background(clip: Clip, choice: str, cache: str | None = None, more: Se
         )
     if choice == "none":
         return Background(None, "images.background=none")
-    if choice == "pictures" or (choice == "auto" and not missing):
+    if choice == "pictures" or (choice == "auto" and recording.background):
         return _of_plates(clip, choice, cache, more)
     learnt = _of_clip(clip, cache, more)
+    if choice == "auto":
+        return _with_examples(clip, learnt)
     if choice == "clip" and learnt.cameras is None:
         raise InputError(
             f"{recording.path}: images.background=clip, but {learnt.reason}, or set images.background=none"
@@ -129,7 +135,8 @@ def _of_plates(clip: Clip, choice: str, cache: str | None, more: Sequence[Sample
 
     def of_plates() -> Background:
         plates = fitted_plates(clip, more)
-        unfit = say_plates(clip, plates, choice)
+        without = [name for name in recording.rig.names if name not in plates]
+        unfit = [*say_plates(clip, plates, choice), *without]
         known = {name: BackgroundImage.from_plate(plate) for name, plate in plates.items() if name not in unfit}
         learnt = _of_clip(clip, cache, ()).cameras if unfit else None
         for k, name in enumerate(recording.rig.names):
@@ -140,6 +147,17 @@ def _of_plates(clip: Clip, choice: str, cache: str | None, more: Sequence[Sample
         return Background(tuple(known[name] for name in recording.rig.names))
 
     return SHARED.get(json.dumps(key), of_plates)
+
+
+def _with_examples(clip: Clip, learnt: Background) -> Background:
+    """What was learnt, filled by the photographs of example poses where it leaves much open."""
+    if learnt.cameras is not None and 1.0 - np.mean([camera.known.mean() for camera in learnt.cameras]) < MUCH_UNKNOWN:
+        return learnt
+    cameras, added = with_example_plates(clip, learnt.cameras)
+    if not added:
+        return learnt
+    say(f"pictures of example poses, outside of their masks, show {added:.0%} more of the empty scene")
+    return Background(cameras, learnt.reason)
 
 
 def said_if_none(clip: Clip, choice: str, background: Background) -> Background:

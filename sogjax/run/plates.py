@@ -1,19 +1,31 @@
-"""The photographs of the empty scene, held against the clip: moved and matched where that is sure, else left out."""
+"""The photographs of the empty scene, held against the clip: moved and matched where that is sure, else left out.
+
+Photographs of example poses show the empty scene, too, outside of the subject's mask.
+"""
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
 
+import cv2
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Float, UInt8
 
 from sogjax.errors import InputError
+from sogjax.io.image_file import read_mask
+from sogjax.io.recording import Recording
 from sogjax.io.video import read_still
 from sogjax.run.clip import Clip, SampleKind, spread_frames
 from sogjax.run.terminal import say
+from sogjax.scene.background import BackgroundImage
+from sogjax.scene.background_difference import disc, working_size
 from sogjax.scene.plates import FittedPlate, fitted_plate
 
 LOOKED_AT = 9
 """Frames whose median is what a camera shows; somebody who moves is not in it."""
+BORDER = 0.02
+"""Around a mask, what is not used of a picture, as a part of its longer side: masks are rough, shadows begin there."""
 
 
 def scene_samples(clip: Clip) -> SampleKind:
@@ -72,3 +84,81 @@ def say_plates(clip: Clip, plates: Mapping[str, FittedPlate], choice: str) -> li
         if said is not None:
             say(f"warning: {said}")
     return [name for name, plate in plates.items() if not plate.fits]
+
+
+def with_example_plates(
+    clip: Clip, learnt: Sequence[BackgroundImage] | None
+) -> tuple[tuple[BackgroundImage, ...] | None, float]:
+    """The background with what photographs of example poses show of the empty scene, where it is not known else.
+
+    Only pictures with masks count, as far as they agree with the clip. Also returns what part of the pictures they
+    add; with nothing to add, what was given comes back.
+
+    Raises:
+        InputError: a picture, mask or video cannot be read.
+    """
+    recording = clip.recording
+    names = [name for name in recording.rig.names if _masked_pictures(recording, name)]
+    given = None if learnt is None else tuple(learnt)
+    if not names:
+        return given, 0.0
+    shown = clip.sampled([scene_samples(clip)])[0]
+
+    def filled(camera: int) -> BackgroundImage:
+        name, frames = recording.rig.names[camera], list(map(np.asarray, shown[camera].values()))
+        own = given[camera] if given else _nothing(recording, name)
+        return _filled(own, _example_plates(recording, name, frames)) if frames and name in names else own
+
+    with ThreadPoolExecutor() as pool:
+        found = tuple(pool.map(filled, range(len(shown))))
+    known = lambda cameras: float(np.mean([camera.known.mean() for camera in cameras]))
+    added = known(found) - (known(given) if given else 0.0)
+    return (found, added) if added else (given, 0.0)
+
+
+def _nothing(recording: Recording, camera: str) -> BackgroundImage:
+    return replace(BackgroundImage.nothing(*working_size(*recording.rig.image_size(camera))), origin="picture")
+
+
+def _masked_pictures(recording: Recording, camera: str) -> list[tuple[Path, Path]]:
+    """The pictures of example poses of a camera, with their masks."""
+    return [
+        (example.images[camera], example.masks[camera])
+        for example in recording.example_poses
+        if camera in example.images and camera in example.masks
+    ]
+
+
+def _example_plates(
+    recording: Recording, camera: str, frames: Sequence[UInt8[np.ndarray, "rows columns 3"]]
+) -> list[FittedPlate]:
+    """The pictures of example poses that fit, without their subject, at the size of the frames."""
+    scene, found = median_picture(frames), []
+    size = (scene.shape[1], scene.shape[0])
+    border = disc(2 * round(BORDER * max(size)) + 1)
+    for picture, mask in _masked_pictures(recording, camera):
+        subject = cv2.resize(read_mask(mask).astype(np.uint8), size, interpolation=cv2.INTER_AREA)
+        plate = fitted_plate(
+            cv2.resize(read_still(recording, camera, picture), size, interpolation=cv2.INTER_AREA), scene
+        )
+        away = tuple(round(part) for part in plate.shift)
+        subject = np.roll(cv2.dilate(subject, border), away[::-1], (0, 1)) > 0
+        if plate.fits:
+            found.append(replace(plate, known=plate.known & ~subject))
+    return found
+
+
+def _filled(own: BackgroundImage, plates: Sequence[FittedPlate]) -> BackgroundImage:
+    """A background with the median of some pictures where it is not known and they are."""
+    if not plates:
+        return own
+    there = np.any([plate.known for plate in plates], axis=0) & ~own.known
+    shown: Float[np.ndarray, "rows columns 3"] = np.zeros((*there.shape, 3))
+    values = np.ma.masked_array(
+        [plate.picture[there] for plate in plates],
+        [np.repeat(~plate.known[there][:, None], 3, axis=1) for plate in plates],
+    )
+    shown[there] = np.ma.median(values, axis=0)
+    added = BackgroundImage.from_photograph(np.rint(shown).astype(np.uint8))
+    picture = np.where(there[..., None], added.picture, own.picture)
+    return BackgroundImage(picture, np.where(there, added.spread, own.spread), own.known | there, own.origin)

@@ -17,7 +17,7 @@ from jaxtyping import Array, Bool, Float, UInt8
 from sogjax.errors import InputError
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
-from sogjax.run.background import Background
+from sogjax.run.background import MUCH_UNKNOWN, Background
 from sogjax.run.clip_learning import LeftOut, UnsuitableError, background_samples, learnt_from
 from sogjax.run.initial_pose import InitialPose
 from sogjax.run.setup import Setup
@@ -31,8 +31,6 @@ from sogjax.tracking.tracker import Tracker
 from sogjax.view.projection import picture_points
 
 FOLDER, FIRST = "relearnt", "first"
-MUCH_UNKNOWN = 0.015
-"""Share of the pictures from which on the background is learnt again; a subject covers some 0.05 of them."""
 BORDER = 0.15
 """Metres around a blob that are left out, too: the body may be a little off. With 0.25 too little is left to learn."""
 
@@ -106,9 +104,10 @@ def relearn_background(
         raise InputError(f"{setup.clip.recording.path}: no background can be learnt, since {reason}") from reason
     shown = setup.clip.sampled([background_samples(setup.clip.recording)])[0]
     masks = body_masks(setup.clip.recording, body, poses, border=0.0)
-    known = zip(background.required(), shown, masks.values(), strict=True)
-    without = [without_body(first, *of_camera) for first, *of_camera in known]
-    return RelearntBackground(Background(learnt), Background(tuple(without)))
+    firsts = background.required()
+    without = [without_body(*of_camera) for of_camera in zip(firsts, shown, masks.values(), strict=True)]
+    again = [first if first.origin == "picture" else one for first, one in zip(firsts, learnt, strict=True)]
+    return RelearntBackground(Background(tuple(again)), Background(tuple(without)))
 
 
 def without_body(
