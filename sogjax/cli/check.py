@@ -9,6 +9,7 @@ from typing import NoReturn
 from sogjax.check.calibration import unit_rig
 from sogjax.check.examination import Examination, examined, opening_problems
 from sogjax.check.findings import SEVERITIES, Finding
+from sogjax.check.page import check_page
 from sogjax.cli.schemas import CheckConfig
 from sogjax.errors import InputError, counted
 from sogjax.io.files import write_file
@@ -18,7 +19,6 @@ from sogjax.io.recording_settings import offsets_line, write_frame_offsets
 from sogjax.run.recordings import body_named, extent_of
 from sogjax.run.run_folder import results_folder
 from sogjax.run.terminal import alive, progress, say
-from sogjax.view.page.check_page import check_page
 from sogjax.view.room import room_sheet
 
 PAGE = "index.html"

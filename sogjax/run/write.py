@@ -25,7 +25,6 @@ from sogjax.run.adjust_clip import Adjusted, sentence
 from sogjax.run.clock import stage
 from sogjax.run.forward import show_known
 from sogjax.run.judge import worst_images, write_metrics
-from sogjax.run.occluder_sheet import write_occluders
 from sogjax.run.page import write_page
 from sogjax.run.result_streams import ResultStreams
 from sogjax.run.run import Run
@@ -45,6 +44,7 @@ from sogjax.run.run_files import (
 from sogjax.run.terminal import say
 from sogjax.settings.run import OutputsConfig
 from sogjax.view.overlay import below_each_other, closeups
+from sogjax.view.sheets import write_occluders
 
 POSE2SIM_SCHEME = "HALPE_26"
 """The scheme of the points written for Pose2Sim: its default."""

@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from sogjax.scene.background_difference import opened
-from sogjax.scene.block_shifts import FARTHEST, FEWEST_BLOCKS, block_shifts
 from sogjax.scene.clip_background import SampledCamera
+from sogjax.scene.plates import FARTHEST, FEWEST_BLOCKS, block_shifts
 
 COMPARED = 12
 """Samples that are compared with the middle one."""
