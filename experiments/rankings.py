@@ -16,8 +16,7 @@ from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.run.recordings import upright
 from sogjax.settings.compose import track_config
-from sogjax.study.limb_errors import LimbErrors, limb_errors
-from sogjax.study.true_poses import true_poses
+from sogjax.study.true_poses import LimbErrors, limb_errors, true_poses
 
 KEPT, REGAINED, SEARCH, OBJECTIVE, LEFT, UNKNOWN = "kept", "regained", "search", "objective", "left", "unknown"
 VERDICTS = {

@@ -38,10 +38,10 @@ from sogjax.run.track import opened_clip, track_recording
 from sogjax.settings.compose import track_config
 from sogjax.settings.run import TrackConfig
 from sogjax.study.experiment import yardsticks
-from sogjax.study.limb_errors import limb_of
 from sogjax.study.script import machine_line, run_script, settings_from
 from sogjax.study.source import Source, rendered_source, source_named
 from sogjax.study.table import ruled_table
+from sogjax.study.true_poses import limb_of
 
 METRES, DEGREES = 0.01, 2.0
 """By which an initial pose is moved: the root, in a drawn direction, and every angle, up or down."""

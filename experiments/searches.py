@@ -23,10 +23,10 @@ from sogjax.run.memory import forget_programs_if_many
 from sogjax.run.terminal import say
 from sogjax.run.track import opened_clip
 from sogjax.settings.compose import track_config
-from sogjax.study.limb_errors import LimbErrors, limb_errors
 from sogjax.study.record import key_of, program_digest
 from sogjax.study.source import Source
 from sogjax.study.study import Study
+from sogjax.study.true_poses import LimbErrors, limb_errors
 
 RIGHT = 0.10
 """Metres, mean over the joints: a pose farther off is wrong."""

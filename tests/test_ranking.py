@@ -13,8 +13,7 @@ from tiny_body import make_body
 from sogjax.io.ground_truth import GroundTruth
 from sogjax.io.motion import motion_from_poses
 from sogjax.model.body import Attachments
-from sogjax.study.limb_errors import LimbErrors, limb_of
-from sogjax.study.true_poses import true_poses
+from sogjax.study.true_poses import LimbErrors, limb_of, true_poses
 
 NAMES = ("left arm", "trunk")
 

@@ -7,7 +7,7 @@ import pytest
 from first_pose import least_share, reliability, reliability_chart, sure_table, write_searches, wrong_table
 from searches import FoundError, Search, Trial, drawn_trials, kind_of, other_side
 
-from sogjax.study.limb_errors import LimbErrors
+from sogjax.study.true_poses import LimbErrors
 
 LIMBS = ("trunk", "left arm", "right arm", "left leg", "right leg")
 TRIAL = Trial(3, "walk", {"motion": "walk"}, 4, 0, True, 17)

@@ -18,7 +18,7 @@ from sogjax.errors import InputError
 from sogjax.io.ground_truth import GroundTruth
 from sogjax.io.motion import motion_from_poses
 from sogjax.quality.verdict import verdicts
-from sogjax.study.limb_errors import limb_errors
+from sogjax.study.true_poses import limb_errors
 from sogjax.synth.settings import SynthSettings
 
 NAMES = ("left_elbow", "right_elbow", "root_tx")
