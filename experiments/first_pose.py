@@ -25,7 +25,9 @@ from sogjax.study.experiment import yardsticks
 from sogjax.study.script import machine_line, run_script, settings_from
 from sogjax.study.study import Study
 from sogjax.study.table import ruled_table
-from sogjax.view.charts import INK, MM, REFERENCE, WRONG, grid, new_figure, png
+from sogjax.view.charts import INK, REFERENCE, WRONG, grid, new_figure, png
+
+MM = 1000.0
 
 
 @dataclass(frozen=True)

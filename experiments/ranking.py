@@ -34,7 +34,9 @@ from sogjax.run.recordings import file_list, opened
 from sogjax.run.terminal import say
 from sogjax.study.script import HELP, machine_line, run_script, settings_from
 from sogjax.study.table import ruled_table
-from sogjax.view.charts import MM, PERCENT, REFERENCE, WRONG, grid, new_figure, png
+from sogjax.view.charts import REFERENCE, WRONG, grid, new_figure, png
+
+MM, PERCENT = 1000.0, 100.0
 
 
 def ranking_chart(rankings: Sequence[Ranking]) -> bytes:

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MM, PERCENT = 1000.0, 100.0
 INK, REFERENCE, WRONG = "#1f77b4", "#444444", "#d62728"
 """Colours of what was measured, of what it is compared with, and of what is wrong or failed."""
 
