@@ -8,6 +8,7 @@ Actors are made with all cameras. What was done is kept in `out` and not done ag
 parts. Tables are printed, and written as tables.md and results.csv.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 
@@ -15,9 +16,27 @@ from sogjax.errors import InputError
 from sogjax.io.files import csv_text, write_file
 from sogjax.run.terminal import say
 from sogjax.study.experiment import synth_settings, yardsticks
-from sogjax.study.few_cameras import CASES, Result, Trial, Trials, each_table, together_table
+from sogjax.study.few_cameras import CASES, Result, Trial, Trials, together_table
 from sogjax.study.script import command_line, machine_line, run_script, settings_from
 from sogjax.study.source import MOST_FRAMES
+
+
+def each_table(done: Mapping[Trial, Result], kinds: Sequence[tuple[int, str]]) -> str:
+    """One row for a sequence: millimetres, and lost stretches where there are any, as Markdown."""
+    kinds = list(dict.fromkeys(kinds))
+    heads = " | ".join(f"{count}, {case}" for count, case in kinds)
+    lines = [f"| sequence (mm, lost) | {heads} |", "|---" * (1 + len(kinds)) + "|"]
+    for sequence in dict.fromkeys(trial.sequence for trial in done):
+        cells = [_cell(done.get(Trial(sequence, count, case))) for count, case in kinds]
+        lines.append(f"| {sequence} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def _cell(result: Result | None) -> str:
+    if result is None:
+        return ""
+    return f"{result.mean:.1f}" + (f", {result.lost}" if result.lost else "")
+
 
 ROBUSTNESS = ["twice the noise", "20 % outliers", "10 % exchanges", "a third missing"]
 

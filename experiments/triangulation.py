@@ -7,7 +7,10 @@ disagree left out; then gaps are filled and all is filtered (6 Hz). With recordi
 folder. The settings that begin with `keypoint` are those of `sogjax synth`. Keypoints that were simulated are kept.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
+
+import numpy as np
 
 from sogjax.errors import InputError
 from sogjax.io.ground_truth import load_ground_truth
@@ -18,9 +21,17 @@ from sogjax.run.terminal import progress, say
 from sogjax.study.experiment import Experiment, synth_settings
 from sogjax.study.few_cameras import evenly
 from sogjax.study.script import machine_line, run_script, settings_from
-from sogjax.study.triangulation_trials import JointErrors, together, triangulation_errors
+from sogjax.study.triangulation_trials import JointErrors, triangulation_errors
 from sogjax.synth.cache import cached_keypoints, cached_recording
 from sogjax.synth.detector import DetectorSettings
+
+
+def together(rows: Sequence[JointErrors]) -> JointErrors:
+    """Several recordings in one row: means, and the sum of the lost stretches."""
+    mean = lambda name: float(np.mean([getattr(row, name) for row in rows]))
+    lost, joints = sum(row.lost for row in rows), min(row.joints for row in rows)
+    return JointErrors(mean("found"), mean("missing"), mean("filtered"), mean("worst"), lost, joints)
+
 
 FRAMES = 60
 

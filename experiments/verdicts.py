@@ -12,6 +12,8 @@ refused is tried again. Tables are printed, and written as tables.md.
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from verdict_trials import CASES, JudgedRun, VerdictTrial, VerdictTrials, share
+
 from sogjax.errors import InputError
 from sogjax.io.files import write_file
 from sogjax.run.memory import forget_programs_if_many
@@ -19,7 +21,6 @@ from sogjax.run.terminal import say
 from sogjax.study.experiment import synth_settings, yardsticks
 from sogjax.study.script import command_line, machine_line, run_script, settings_from
 from sogjax.study.source import MOST_FRAMES
-from sogjax.study.verdict_trials import CASES, JudgedRun, VerdictTrial, VerdictTrials, share
 
 OWN = next(iter(CASES))
 COLUMNS = (

@@ -191,7 +191,6 @@ def test_the_colours_of_the_subject_are_found(made):
     actor, truth, _ = made
     error = np.linalg.norm(np.asarray(actor.body.blob_colors - truth.blob_colors), axis=1)
     assert np.median(error) < 0.1
-    assert 0.0 < float(actor.estimate.mismatch) < 0.2
 
 
 @pytest.mark.slow

@@ -1,7 +1,7 @@
 """The actor's report: silhouettes against masks, bone lengths, what was not determined, and the files."""
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -14,9 +14,11 @@ from rig_cases import opencv_pixels, ring_rig
 from tiny_body import make_body
 
 from sogjax.actor.coverage import body_silhouette, overlap_ratio, silhouette_iou
+from sogjax.actor.make import MadeActor
 from sogjax.actor.report import actor_report
+from sogjax.actor.silhouette_fit import Estimate
 from sogjax.actor.silhouettes import PosedPictures
-from sogjax.model.body import Attachments, Body
+from sogjax.model.body import Attachments
 from sogjax.model.bones import bone_lengths
 from sogjax.model.shape import ShapeModel
 from sogjax.run.actor_report import report_folder, report_page, write_actor_report
@@ -103,21 +105,6 @@ def test_bones_of_the_human_body_keep_their_length_in_every_pose():
     assert min(found.values()) > 0.02
 
 
-@dataclass
-class Made:
-    """What the report needs of an actor."""
-
-    body: Body
-    start: Body
-    upright_body: Body
-    example_poses: dict
-    pictures: tuple
-    shape_names: tuple
-    shape_deviations: np.ndarray
-    shape_priors: np.ndarray
-    pose_deviations: np.ndarray
-
-
 RIG = ring_rig(3, (160, 120), distance=1.6)
 
 
@@ -133,11 +120,12 @@ def made_dog():
         images, masks = draw(body, pose, RIG), draw(body, pose, RIG, masks=True)
         pictures.append(PosedPictures(name, dict(enumerate(images)), dict(enumerate(masks))))
     dofs = body.skeleton.num_dofs
-    names = ("whole", *(group.name for group in body.shape_groups))
-    return Made(
-        body, start, body, {name: jnp.asarray(pose) for name, pose in poses.items()}, tuple(pictures), names,
-        np.full(len(names), 0.02), np.full(len(names), 0.1), np.full((2, dofs), 0.02),
-    )  # fmt: skip
+    model = replace(model, spread=jnp.full(model.num_shape_params, 0.1))
+    given = jnp.stack([jnp.asarray(pose) for pose in poses.values()])
+    estimate = Estimate(given, shape, jnp.full((2, dofs), 0.02), jnp.full(model.num_shape_params, 0.02))
+    return MadeActor(
+        body, start, body, dict(zip(poses, given, strict=True)), {}, tuple(pictures), RIG.cameras, model, estimate
+    )
 
 
 def test_a_good_actor_has_nothing_to_warn_of():
@@ -156,18 +144,19 @@ def test_a_good_actor_has_nothing_to_warn_of():
 
 def test_what_the_pictures_did_not_tell_is_said():
     made = made_dog()
-    made.shape_deviations[3], made.shape_deviations[5] = 0.099, np.nan
-    elbow = list(made.body.skeleton.dof_names).index("root_yaw")
-    made.pose_deviations[:, elbow] = (0.5, 0.4)
-    place = list(made.body.skeleton.dof_names).index("root_x")
-    made.pose_deviations[0, place], made.pose_deviations[1, place] = np.nan, 0.2
-    once = list(made.body.skeleton.dof_names).index("root_roll")
-    made.pose_deviations[0, once] = 3.0
+    elbow, place, once = (list(made.body.skeleton.dof_names).index(f"root_{part}") for part in ("yaw", "x", "roll"))
+    of_poses = made.estimate.pose_deviations.at[:, elbow].set(jnp.array([0.5, 0.4])).at[0, once].set(3.0)
+    estimate = replace(
+        made.estimate,
+        shape_deviations=made.estimate.shape_deviations.at[3].set(0.099).at[5].set(np.nan),
+        pose_deviations=of_poses.at[:, place].set(jnp.array([np.nan, 0.2])),
+    )
     masks = {k: np.roll(mask, 40, axis=1) for k, mask in made.pictures[1].masks.items()}
-    made.pictures = (
+    pictures = (
         replace(made.pictures[0], warnings=("example pose 'stand': cam1 is left out",)),
         replace(made.pictures[1], masks=masks),
     )
+    made = replace(made, estimate=estimate, pictures=pictures)
     report = actor_report(made, RIG)
     left_out, poor, first, second = sorted(report.warnings, key=_kind)
     assert left_out == "example pose 'stand': cam1 is left out"

@@ -23,8 +23,8 @@ from sogjax.io.motion import motion_from_poses
 from sogjax.io.motion_data import save_motion
 from sogjax.io.recording import open_recording
 from sogjax.refine.adjustment import adjusted
-from sogjax.refine.camera_choice import CamerasModel, Part, free_moves
 from sogjax.refine.camera_moves import MOVE, TIME, Sights, moved_cameras, velocities_of
+from sogjax.refine.camera_search import CamerasModel, Part, free_moves
 from sogjax.refine.clip_shape import ClipShape
 from sogjax.refine.frame_models import frame_model, shape_rates
 from sogjax.refine.pictures import Reader

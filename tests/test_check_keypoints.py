@@ -8,9 +8,8 @@ from command_line import done
 from project_cases import pose2sim
 from rig_cases import opencv_pixels, recording_of, ring_rig
 
-from sogjax.check.keypoints import agreement, suspects
+from sogjax.check.keypoints import agreement, suspects, unseen_people_findings
 from sogjax.check.pictures import read_clip, read_plates
-from sogjax.check.unseen_people import unseen_people_findings
 from sogjax.io.keypoints.load import Keypoints, load_keypoints
 from sogjax.io.keypoints.scheme import named_scheme
 from sogjax.io.recording import open_recording

@@ -5,13 +5,13 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 from body_cases import shipped
+from degrees import RunAngles, angles_of_run, degrees_tables, truths_of
 
 from sogjax.errors import InputError
 from sogjax.io.export.angles import joint_angles
 from sogjax.io.ground_truth import GroundTruth
 from sogjax.io.motion import motion_from_poses
 from sogjax.quality.evaluation import evaluate_motion
-from sogjax.study.degrees import RunAngles, angles_of_run, degrees_tables, truths_of
 from sogjax.study.experiment import Experiment, ExperimentConfig, RowConfig
 from sogjax.study.record import RunRecord
 from sogjax.study.summary import summarized

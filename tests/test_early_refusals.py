@@ -14,10 +14,9 @@ from sogjax.errors import InputError
 from sogjax.io.export.write import WRITERS
 from sogjax.run.adjust import kept_config
 from sogjax.run.initial_pose import NAMES
-from sogjax.settings.compose import track_config
+from sogjax.settings.compose import REMOVED, track_config
 from sogjax.settings.option import help_lines, telling_settings
 from sogjax.settings.run import OutputsConfig, TrackConfig
-from sogjax.settings.wrong_values import REMOVED
 
 
 def test_the_endings_are_those_of_the_writers():

@@ -3,10 +3,11 @@
 import json
 
 import pytest
+from few_cameras import each_table
 
 from sogjax.errors import InputError
 from sogjax.study import few_cameras
-from sogjax.study.few_cameras import KINDS, Result, Trial, Trials, each_table, few_cameras_section
+from sogjax.study.few_cameras import KINDS, Result, Trial, Trials, few_cameras_section
 from sogjax.study.study import Study
 from sogjax.synth.settings import SynthSettings
 

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import pytest
 from command_line import actor_file, trackable
+from verdict_trials import VerdictTrials
 
 from sogjax.io.actor_file import load_body, save_body
 from sogjax.run.actors import Actors
 from sogjax.study import tracked
 from sogjax.study.few_cameras import Trials
-from sogjax.study.verdict_trials import VerdictTrials
 from sogjax.synth.settings import SynthSettings
 
 NAMES = ["ben", "anna"]
@@ -22,8 +22,8 @@ def source(tmp_path, monkeypatch):
     made = [replace(body, name=name) for name in NAMES]
     monkeypatch.setattr(tracked, "make_actors", lambda request: Actors(tuple(made)))
     folder = trackable(tmp_path / "two")
-    for module in ("few_cameras", "verdict_trials"):
-        monkeypatch.setattr(f"sogjax.study.{module}.cached_recording", lambda _: folder)
+    for module in ("sogjax.study.few_cameras", "verdict_trials"):
+        monkeypatch.setattr(f"{module}.cached_recording", lambda _: folder)
     return folder
 
 

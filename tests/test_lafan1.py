@@ -11,9 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from sogjax.errors import InputError
 from sogjax.io.export.bones import world_turn
-from sogjax.io.export.feet import contacts, standing_feet
+from sogjax.io.export.feet import contacts, middle_joint, shortest_turns, standing_feet
 from sogjax.io.export.lafan1 import NAMES, figure_of, write_lafan1
-from sogjax.io.export.two_bones import middle_joint, shortest_turns
 from sogjax.io.export.write import export_motion
 from sogjax.io.motion import motion_from_poses
 from sogjax.io.motion_data import save_motion

@@ -5,6 +5,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 import yaml
+from limb_doubt import fitted_weights, regained_table, write_weights
 from scipy.special import expit
 
 from sogjax.quality.fitted import PATH, PoseEvidenceBounds, fitted_numbers, read_fitted
@@ -13,11 +14,8 @@ from sogjax.study.limb_calibration import (
     area_table,
     area_under_roc,
     calibration_table,
-    fitted_weights,
     limb_curve,
-    regained_table,
     said_of,
-    write_weights,
 )
 from sogjax.study.limb_trials import PLAIN, JudgedLimb, LimbTrial
 

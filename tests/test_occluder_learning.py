@@ -15,7 +15,7 @@ from sogjax.run.clip import Clip
 from sogjax.run.learn_occluders import LearntOccluders, Look
 from sogjax.run.setup import Setup
 from sogjax.scene.cells import stack_cells
-from sogjax.scene.occluder_learning import DepthCounts, cells_covered
+from sogjax.scene.occluders import DepthCounts, cells_covered
 from sogjax.tracking.frame import FrameInput
 
 DEPTH, LOOKS = 6, 14

@@ -5,15 +5,15 @@ from dataclasses import replace
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from climbs import Climbed, Pair
+from ranking import limbs_table, oracle_table, verdicts_table, write_csv
+from rankings import Ranking
 from tiny_body import make_body
 
 from sogjax.io.ground_truth import GroundTruth
 from sogjax.io.motion import motion_from_poses
 from sogjax.model.body import Attachments
-from sogjax.study.climbs import Climbed, Pair
-from sogjax.study.ranking import limbs_table, oracle_table, verdicts_table, write_csv
-from sogjax.study.true_poses import true_poses
-from sogjax.study.verdicts import LimbErrors, Ranking, limb_of
+from sogjax.study.true_poses import LimbErrors, limb_of, true_poses
 
 NAMES = ("left arm", "trunk")
 

@@ -6,11 +6,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from body_cases import shipped
+from repeatability import Outcome, Repeated, moved_pose, outcome_of, repeated_table, write_repeated
 
 from sogjax.errors import InputError
 from sogjax.quality.evaluation import Evaluation, GroupEvaluation
 from sogjax.quality.markers import PointErrors
-from sogjax.study.repeatability import Outcome, Repeated, moved_pose, outcome_of, repeated_table, write_repeated
 
 JOINTS = ("left_wrist", "left_elbow", "right_ankle")
 

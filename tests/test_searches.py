@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from first_pose import least_share, reliability, reliability_chart, sure_table, write_searches, wrong_table
+from searches import FoundError, Search, Trial, drawn_trials, kind_of, other_side
 
-from sogjax.study.search_tables import least_share, reliability, sure_table, write_searches, wrong_table
-from sogjax.study.searches import FoundError, Search, Trial, drawn_trials, kind_of, other_side
-from sogjax.study.verdicts import LimbErrors
-from sogjax.view.charts import reliability_chart
+from sogjax.study.true_poses import LimbErrors
 
 LIMBS = ("trunk", "left arm", "right arm", "left leg", "right leg")
 TRIAL = Trial(3, "walk", {"motion": "walk"}, 4, 0, True, 17)

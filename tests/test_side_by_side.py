@@ -4,10 +4,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import side_by_side
 from tiny_body import make_body
 
 from sogjax.errors import InputError
-from sogjax.study import iterations as side_by_side
 from sogjax.study.experiment import Experiment, ExperimentConfig, RowConfig
 from sogjax.study.record import RunRecord
 from sogjax.study.source import Source

@@ -3,9 +3,9 @@
 from types import SimpleNamespace
 
 import pytest
+from iterations import check_showable
 
 from sogjax.errors import InputError
-from sogjax.study.iterations import check_showable
 from sogjax.study.source import Source
 
 

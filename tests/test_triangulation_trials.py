@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 from rig_cases import opencv_pixels, recording_of, ring_rig
+from triangulation import together
 
 from sogjax.io.ground_truth import GroundTruth
 from sogjax.io.keypoints.load import Keypoints
 from sogjax.io.keypoints.scheme import named_scheme
-from sogjax.study.triangulation_trials import filled, filtered, together, triangulation_errors
+from sogjax.study.triangulation_trials import filled, filtered, triangulation_errors
 
 FRAMES = 30
 NAMES = ("left_knee", "right_knee", "left_wrist", "right_wrist", "neck", "pelvis", "chest")

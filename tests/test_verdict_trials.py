@@ -8,17 +8,17 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
+import verdict_trials
 from motion_cases import walking_motion
 from small_recording import make_recording
 from tiny_body import make_body
+from verdict_trials import CASES, VerdictTrial, VerdictTrials, judged_run, scaled
 
 from sogjax.errors import InputError
 from sogjax.io.ground_truth import GroundTruth
 from sogjax.io.motion import motion_from_poses
 from sogjax.quality.verdict import verdicts
-from sogjax.study import verdict_trials
-from sogjax.study.verdict_trials import CASES, VerdictTrial, VerdictTrials, judged_run, scaled
-from sogjax.study.verdicts import limb_errors
+from sogjax.study.true_poses import limb_errors
 from sogjax.synth.settings import SynthSettings
 
 NAMES = ("left_elbow", "right_elbow", "root_tx")

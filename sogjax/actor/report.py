@@ -1,16 +1,14 @@
 """How good an actor is: silhouettes against masks, bone lengths, and what the pictures did not determine."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
-from jaxtyping import Array, Float
 
 from sogjax.actor.coverage import silhouette_iou
-from sogjax.actor.silhouettes import PosedPictures
+from sogjax.actor.make import MadeActor
 from sogjax.io.calibration.rig import CameraRig
-from sogjax.model.body import Body
 from sogjax.model.bones import bone_lengths
 from sogjax.quality.proportions import odd_sentence
 
@@ -20,56 +18,6 @@ POORLY_SEEN_ANGLE, POORLY_SEEN_LENGTH = 0.35, 0.05
 """Radians and metres: deviation of a degree of freedom in the pose that shows it best."""
 POOR_IOU = 0.75
 """Mean IoU of a pose below which the pose, or a mask, is likely to be wrong."""
-
-
-@runtime_checkable
-class FinishedActor(Protocol):
-    """What the report needs of an actor that was made (`sogjax.actor.make.MadeActor`)."""
-
-    @property
-    def body(self) -> Body:
-        """The actor."""
-        ...
-
-    @property
-    def start(self) -> Body:
-        """The body before its sizes were estimated."""
-        ...
-
-    @property
-    def upright_body(self) -> Body:
-        """The actor in the recording's world, which `example_poses` refer to."""
-        ...
-
-    @property
-    def example_poses(self) -> Mapping[str, Float[Array, "dof"]]:
-        """The pose of each example."""
-        ...
-
-    @property
-    def pictures(self) -> Sequence[PosedPictures]:
-        """The pictures, in the order of `example_poses`."""
-        ...
-
-    @property
-    def shape_names(self) -> Sequence[str]:
-        """Names of the shape parameters (logarithms of scale factors)."""
-        ...
-
-    @property
-    def shape_deviations(self) -> Float[np.ndarray, "shape"]:
-        """Standard deviations of the shape parameters, with pictures."""
-        ...
-
-    @property
-    def shape_priors(self) -> Float[np.ndarray, "shape"]:
-        """Standard deviations of the shape parameters, without pictures."""
-        ...
-
-    @property
-    def pose_deviations(self) -> Float[np.ndarray, "pose dof"]:
-        """Standard deviations of the poses (radians, metres)."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -115,7 +63,7 @@ class ActorReport:
         }
 
 
-def actor_report(made: FinishedActor, rig: CameraRig) -> ActorReport:
+def actor_report(made: MadeActor, rig: CameraRig) -> ActorReport:
     """Compare the actor with its pictures."""
     ious = {
         posed.name: {
@@ -145,7 +93,7 @@ def _poor_silhouettes(ious: Mapping[str, Mapping[str, float]]) -> list[str]:
     ]
 
 
-def _undetermined_sizes(made: FinishedActor) -> tuple[str, ...]:
+def _undetermined_sizes(made: MadeActor) -> tuple[str, ...]:
     """One sentence for all of them, as most recordings have a few hidden or small parts."""
     rows = zip(made.shape_names, made.shape_deviations, made.shape_priors, strict=True)
     found = [
@@ -157,7 +105,7 @@ def _undetermined_sizes(made: FinishedActor) -> tuple[str, ...]:
     return (f"some sizes {kept}; they are uncertain: {', '.join(found)}",) if found else ()
 
 
-def _poorly_seen_dofs(made: FinishedActor) -> list[str]:
+def _poorly_seen_dofs(made: MadeActor) -> list[str]:
     skeleton = made.body.skeleton
     best = np.min(np.nan_to_num(made.pose_deviations, nan=np.inf), axis=0)
     warnings = []

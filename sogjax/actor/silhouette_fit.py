@@ -231,10 +231,6 @@ class Estimate(eqx.Module):
     """Standard deviations, radians and metres."""
     shape_deviations: Float[Array, "shape"]
     """Standard deviations of the logarithms of scale factors."""
-    mismatch: Float[Array, ""]
-    """What was minimised: the area where body and masks differ as a part of the masks' area, with the priors."""
-    iterations: Int[Array, ""]
-    converged: Bool[Array, ""]
 
 
 def estimate_shape(
@@ -249,16 +245,15 @@ def estimate_shape(
 
     `views` and `silhouettes` have a leading axis for the poses; `max_iterations` are those of the climb and of the fit.
     """
-    scales = pose_scales(model.body.skeleton)
-    no_shape = jnp.zeros(model.num_shape_params, poses.dtype)
-    start = climbed_together(model, poses, no_shape, views, terms, max_iterations[0])
+    scales, num_poses = pose_scales(model.body.skeleton), poses.shape[0]
+    start = jnp.concatenate([poses.reshape(-1), jnp.zeros(model.num_shape_params, poses.dtype)])
+    with_shape = scales_with_shape(scales, num_poses, model.num_shape_params)
+    start = _climb(model, start, num_poses, views, terms, with_shape, jnp.asarray(max_iterations[0]))
     fit = SilhouetteFit(model, silhouettes)
     solution = fitted(fit, start, scales, max_iterations[1])
     poses_deviation, shape_deviation = fit.split(_deviations(fit, solution.params))
     best_poses, shape = fit.split(solution.params)
-    return Estimate(
-        best_poses, shape, poses_deviation, shape_deviation, -solution.value, solution.iterations, solution.converged
-    )
+    return Estimate(best_poses, shape, poses_deviation, shape_deviation)
 
 
 def compile_estimate(model: ShapeModel, views: Views, silhouettes: Silhouettes, terms: Terms) -> None:
@@ -268,20 +263,6 @@ def compile_estimate(model: ShapeModel, views: Views, silhouettes: Silhouettes, 
 
 
 _deviations = eqx.filter_jit(SilhouetteFit.deviations)
-
-
-def climbed_together(
-    model: ShapeModel,
-    poses: Float[Array, "pose dof"],
-    shape_params: Float[Array, "shape"],
-    views: Views,
-    terms: Terms,
-    max_iterations: int = CLIMB_ITERATIONS,
-) -> Float[Array, "param"]:
-    """The mean of Eq. 9 over the example poses, climbed; the poses one after the other, then the shape."""
-    scales = scales_with_shape(pose_scales(model.body.skeleton), poses.shape[0], shape_params.shape[0])
-    start = jnp.concatenate([poses.reshape(-1), shape_params])
-    return _climb(model, start, poses.shape[0], views, terms, scales, jnp.asarray(max_iterations))
 
 
 @eqx.filter_jit
@@ -294,6 +275,7 @@ def _climb(
     scales: Scales,
     max_iterations: Int[Array, ""],
 ) -> Float[Array, "param"]:
+    """The mean of Eq. 9 over the example poses, climbed; the poses one after the other, then the shape."""
     num_pose_params = num_poses * model.body.skeleton.num_dofs
 
     def objective(params: Float[Array, "param"]) -> Float[Array, ""]:

@@ -2,23 +2,22 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
 
 from sogjax.check.calibration import unit_rig
 from sogjax.check.examination import Examination, examined, opening_problems
 from sogjax.check.findings import SEVERITIES, Finding
+from sogjax.check.page import check_page
 from sogjax.cli.schemas import CheckConfig
 from sogjax.errors import InputError, counted
 from sogjax.io.files import write_file
 from sogjax.io.recording import Recording, open_recording
 from sogjax.io.recording_files import SETTINGS
 from sogjax.io.recording_settings import offsets_line, write_frame_offsets
-from sogjax.run.recordings import body_named, extent_of
+from sogjax.run.recordings import body_named, extent_of, with_cameras
 from sogjax.run.run_folder import results_folder
 from sogjax.run.terminal import alive, progress, say
-from sogjax.view.page.check_page import check_page
 from sogjax.view.room import room_sheet
 
 PAGE = "index.html"
@@ -62,13 +61,7 @@ def _opened(config: CheckConfig) -> Recording:
             if len(problems) > 1 or problems[0].cause:
                 _say_all(path, problems)
         raise
-    if not config.cameras:
-        return recording
-    unknown = [name for name in config.cameras if name not in recording.rig.names]
-    if unknown:
-        known = ", ".join(recording.rig.names)
-        raise InputError(f"cameras={','.join(config.cameras)}: there is no camera {', '.join(unknown)}, only {known}")
-    return replace(recording, rig=recording.rig.select(tuple(config.cameras)))
+    return with_cameras(recording, config.cameras or None)
 
 
 def _say_all(path: Path, problems: Sequence[Finding]) -> NoReturn:

@@ -11,7 +11,7 @@ import re
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.metadata import PackageNotFoundError, requires
 from pathlib import Path
 
 import equinox as eqx
@@ -29,6 +29,7 @@ from sogjax.io.threads import usable_cores
 from sogjax.model.camera import Camera, project
 from sogjax.model.sog import Sog
 from sogjax.run.compilation_cache import why_not_kept
+from sogjax.run.fingerprint import installed_version
 from sogjax.solve.optimistix import OptimistixSolver
 from sogjax.solve.solution import Scales
 
@@ -157,21 +158,14 @@ def _line(what: str, value: str) -> None:
 def _packages() -> Iterator[str]:
     _line("python", f"{platform.python_version()} ({platform.system()} {platform.machine()})")
     for name in ("sogjax", *_named_packages().get("", ()), *INDIRECT):
-        found = _version(name)
+        found = installed_version(name)
         _line(name, found or "missing")
         if found is None:
             yield f"{name} is missing; install sogjax again with pip"
     for name in CLASHING:
-        if _version(name) is not None:
-            _line(name, f"{_version(name)}, overwrites opencv-python-headless")
+        if installed_version(name) is not None:
+            _line(name, f"{installed_version(name)}, overwrites opencv-python-headless")
             yield f"{name} is installed over opencv-python-headless; uninstall both, then install the latter"
-
-
-def _version(name: str) -> str | None:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return None
 
 
 def _say_machine() -> None:
@@ -194,7 +188,7 @@ def say_programs(folder: str | None) -> None:
 def _say_extras() -> None:
     """Print which extras are there; tracking alone needs none."""
     for extra, packages in sorted(_named_packages().items()):
-        missing = [name for name in packages if _version(name) is None]
+        missing = [name for name in packages if installed_version(name) is None]
         remedy = f"without {', '.join(missing)}; pip install 'sogjax[{extra}]' adds it"
         if extra:
             _line(f"extra [{extra}]", remedy if missing else "there")

@@ -20,7 +20,6 @@ from sogjax.io.video import read_prepared
 from sogjax.run.background import learn_background
 from sogjax.run.clip import Clip
 from sogjax.run.example_frames import with_examples
-from sogjax.run.occluder_sheet import write_occluders
 from sogjax.run.recordings import opened
 from sogjax.run.run_folder import free_path, results_folder
 from sogjax.run.terminal import alive, progress, say
@@ -28,7 +27,7 @@ from sogjax.scene.background import BackgroundImage
 from sogjax.scene.foreground import foreground_probability
 from sogjax.scene.occluders import painted
 from sogjax.settings.method import ImagesConfig
-from sogjax.view.sheets import background_sheet
+from sogjax.view.sheets import background_sheet, write_occluders
 from sogjax.view.tiles import GREEN, RED, Tile, contact_sheet
 
 BACKGROUND = "background"

@@ -8,7 +8,6 @@ import os
 from contextlib import ExitStack
 from io import BytesIO
 from pathlib import Path
-from types import TracebackType
 
 import numpy as np
 
@@ -65,14 +64,6 @@ class ArrayLog:
     def close(self) -> None:
         """Close the file; what was written stays."""
         self._file.close()
-
-    def __enter__(self) -> "ArrayLog":
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self.close()
 
     @property
     def _end(self) -> int:

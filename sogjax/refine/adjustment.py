@@ -11,9 +11,8 @@ from jaxtyping import Bool, Float, Int
 
 from sogjax.model.body import Body
 from sogjax.model.rotation import axis_vector
-from sogjax.refine.camera_choice import Part
 from sogjax.refine.camera_moves import MOVE, velocities_of
-from sogjax.refine.camera_search import FoundCameras, found_cameras
+from sogjax.refine.camera_search import FoundCameras, Part, found_cameras
 from sogjax.refine.climb import Climbed, climbed
 from sogjax.refine.clip_energy import ClipEnergy, Weights
 from sogjax.refine.clip_priors import floor_height, step_of, undersides

@@ -146,8 +146,7 @@ def adjust_to_folder(config: AdjustConfig) -> RunResult:
     check_length(motion.num_frames)
     check_window(len(recording.rig), tracked.actor.num_blobs, motion.num_frames, config.window)
     check_formats(outputs, [tracked.actor])
-    if outputs.pose2sim:
-        check_pose2sim(recording, (int(motion.frame[0]), int(motion.frame[-1])), [tracked.actor], config.overwrite)
+    check_pose2sim(outputs, recording, motion.frame.tolist(), [tracked.actor], config.overwrite)
     check_cameras(recording, motion, config.cameras, config.offsets)
     first = int(motion.frame[0]) - recording.first_frame
     settings = replace(

@@ -13,8 +13,7 @@ from sogjax.run.clip import Clip, SampleKind, spread_frames
 from sogjax.run.terminal import say
 from sogjax.scene.background import BackgroundImage
 from sogjax.scene.background_difference import working_size
-from sogjax.scene.clip_background import MOST_SAMPLES, SampledCamera, learnt_background
-from sogjax.scene.clip_steadiness import FEWEST_SAMPLES, moves, shaking
+from sogjax.scene.clip_background import FEWEST_SAMPLES, MOST_SAMPLES, SampledCamera, learnt_background, moves, shaking
 from sogjax.scene.moving_zone import moving_zones
 
 MOST_BYTES = 2**30

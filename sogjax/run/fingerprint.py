@@ -3,7 +3,7 @@
 import hashlib
 import sys
 from collections.abc import Sequence
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +63,14 @@ def difference(before: RunFingerprint, now: RunFingerprint) -> str | None:
             short = not key.startswith("the ") and len(f"{was}{is_now}") <= SHOWN
             return f"{key} was {was}, now it is {is_now}" if short else f"{key} changed"
     return None
+
+
+def installed_version(package: str) -> str | None:
+    """The version of a package; None: it is not installed."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
 
 
 def digest(arrays: Any) -> str:

@@ -20,8 +20,7 @@ from sogjax.run.frames import continued, rows_of
 from sogjax.run.setup import Setup
 from sogjax.run.terminal import progress, say
 from sogjax.scene.foreground import TEMPER, own_color
-from sogjax.scene.occluder_learning import DepthCounts, cells_covered
-from sogjax.scene.occluders import HiddenFrom
+from sogjax.scene.occluders import DepthCounts, HiddenFrom, cells_covered
 from sogjax.search.placed_body import means_of
 from sogjax.tracking.frame import FrameInput, TrackedFrame
 from sogjax.tracking.tracker import Tracker

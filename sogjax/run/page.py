@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields, is_dataclass
 from datetime import datetime
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,7 @@ from sogjax.model.limbs import limbs
 from sogjax.quality.evaluation import points_dict
 from sogjax.run.adjust_clip import sentence
 from sogjax.run.clock import seconds_so_far
+from sogjax.run.fingerprint import installed_version
 from sogjax.run.result import RunResult
 from sogjax.run.run import Run
 from sogjax.run.run_files import ADJUSTMENT, MOTION, RERUN, RUN_FILES
@@ -49,6 +49,7 @@ def write_page(path: Path, run: Run, worst: Mapping[int, Picture], images: Mappi
     names = " and ".join(result.motions)
     what = "adjusted" if run.adjusted is not None else "tracked"
     cameras = counted(len(result.recording.rig), "camera")
+    python = f"{platform.python_version()} ({platform.system()} {platform.machine()})"
     page = RunOnPage(
         title=result.recording.name,
         subtitle=f"{names} {what} in {span}, {cameras}, {datetime.now():%d %B %Y}",
@@ -61,7 +62,7 @@ def write_page(path: Path, run: Run, worst: Mapping[int, Picture], images: Mappi
         numbers=_numbers(run, result),
         notes=_notes(run, result),
         settings=changed_settings(run.config),
-        versions=[(name, found) for name in PACKAGES if (found := _version(name))] + [("python", _python())],
+        versions=[(name, found) for name in PACKAGES if (found := installed_version(name))] + [("python", python)],
         files=_files(out),
         commands=_commands(run, out, result),
         links=_links(out),
@@ -194,14 +195,3 @@ def _links(out: Path) -> dict[str, str]:
     reports = sorted(out.glob("actor*_report/index.html"))
     words = lambda path: path.parent.name.removesuffix("_report").replace("_", " ")
     return {f"How the {words(path)} was made": path.relative_to(out).as_posix() for path in reports}
-
-
-def _version(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return ""
-
-
-def _python() -> str:
-    return f"{platform.python_version()} ({platform.system()} {platform.machine()})"

@@ -69,9 +69,7 @@ def _initial_pose(run: Run) -> InitialPose:
     What the actors do not lend themselves to is refused before.
     """
     check_formats(run.config.outputs, run.actors.bodies)
-    if run.config.outputs.pose2sim:
-        numbers = run.clip.numbers
-        check_pose2sim(run.clip.recording, (numbers[0], numbers[-1]), run.actors.bodies, run.config.overwrite)
+    check_pose2sim(run.config.outputs, run.clip.recording, run.clip.numbers, run.actors.bodies, run.config.overwrite)
     _ = run.adjusts
     with ThreadPoolExecutor(1) as beside:
         compiling = beside.submit(lambda: compile_beforehand(run.setup))

@@ -134,9 +134,8 @@ def _given_actors(recording: Recording, config: TrackConfig, files: Sequence[Pat
     request = ActorRequest(clip, lambda: Background(None), files, number=config.actors)
     actors = make_actors(request)
     check_formats(config.outputs, actors.bodies)
-    if config.outputs.pose2sim:
-        numbers = chosen_frames(recording, config.start, config.stop, config.every)
-        check_pose2sim(recording, (numbers[0], numbers[-1]), actors.bodies, config.overwrite)
+    numbers = chosen_frames(recording, config.start, config.stop, config.every)
+    check_pose2sim(config.outputs, recording, numbers, actors.bodies, config.overwrite)
     described_poses(recording, [upright(body, recording) for body in actors.bodies], config)
     return actors
 

@@ -25,7 +25,6 @@ from sogjax.run.adjust_clip import Adjusted, sentence
 from sogjax.run.clock import stage
 from sogjax.run.forward import show_known
 from sogjax.run.judge import worst_images, write_metrics
-from sogjax.run.occluder_sheet import write_occluders
 from sogjax.run.page import write_page
 from sogjax.run.result_streams import ResultStreams
 from sogjax.run.run import Run
@@ -45,6 +44,7 @@ from sogjax.run.run_files import (
 from sogjax.run.terminal import say
 from sogjax.settings.run import OutputsConfig
 from sogjax.view.overlay import below_each_other, closeups
+from sogjax.view.sheets import write_occluders
 
 POSE2SIM_SCHEME = "HALPE_26"
 """The scheme of the points written for Pose2Sim: its default."""
@@ -83,16 +83,20 @@ def pose2sim_file(recording: Recording, frames: tuple[int, int], actor: str = ""
     return recording.path / "pose-3d" / f"{recording.name}{person}_{frames[0]}-{frames[1]}.trc"
 
 
-def check_pose2sim(recording: Recording, frames: tuple[int, int], bodies: Sequence[Body], replaced: bool) -> None:
-    """Check that points can be written into a Pose2Sim project; `frames`: first and last.
+def check_pose2sim(
+    wanted: OutputsConfig, recording: Recording, frames: Sequence[int], bodies: Sequence[Body], replaced: bool
+) -> None:
+    """Check that points of the frames can be written into a Pose2Sim project, if they are wanted.
 
     Raises:
         InputError: the recording is none, or has them already, or a body lacks one of the points.
     """
+    if not wanted.pose2sim:
+        return
     if not (recording.path / PROJECT).is_file():
         raise InputError(f"outputs.pose2sim=true: {recording.path} is no Pose2Sim project (no {PROJECT}); leave it out")
     for body in bodies:
-        path = pose2sim_file(recording, frames, body.name if len(bodies) > 1 else "")
+        path = pose2sim_file(recording, (frames[0], frames[-1]), body.name if len(bodies) > 1 else "")
         if path.exists() and not replaced:
             raise InputError(f"{path}: already exists; move it away, or give overwrite=true to replace it")
         lacking = set(named_scheme(POSE2SIM_SCHEME).landmarks) - {*body.landmarks.names, *body.skeleton.names}

@@ -194,20 +194,3 @@ def together_table(done: Mapping[Trial, Result], kinds: Sequence[tuple[int, str]
         cells = (count, case, mean("mean"), mean("worst"), total("lost"), *alone)
         lines.append("| " + " | ".join(map(str, cells)) + " |")
     return "\n".join(lines)
-
-
-def each_table(done: Mapping[Trial, Result], kinds: Sequence[tuple[int, str]]) -> str:
-    """One row for a sequence: millimetres, and lost stretches where there are any, as Markdown."""
-    kinds = list(dict.fromkeys(kinds))
-    heads = " | ".join(f"{count}, {case}" for count, case in kinds)
-    lines = [f"| sequence (mm, lost) | {heads} |", "|---" * (1 + len(kinds)) + "|"]
-    for sequence in dict.fromkeys(trial.sequence for trial in done):
-        cells = [_cell(done.get(Trial(sequence, count, case))) for count, case in kinds]
-        lines.append(f"| {sequence} | {' | '.join(cells)} |")
-    return "\n".join(lines)
-
-
-def _cell(result: Result | None) -> str:
-    if result is None:
-        return ""
-    return f"{result.mean:.1f}" + (f", {result.lost}" if result.lost else "")

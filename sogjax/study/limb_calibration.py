@@ -1,29 +1,23 @@
 """How well limbs that are lost are told from others: logistic regression, ROC, shares found against those said."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Sequence
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
-import yaml
 from jaxtyping import Bool, Float
-from scipy.optimize import minimize
 from scipy.special import expit
 from scipy.stats import rankdata
 
 from sogjax.errors import InputError
-from sogjax.io.files import atomic_path
 from sogjax.quality.fitted import Weights, fitted_numbers
 from sogjax.quality.limb_confidence import FAR
 from sogjax.study.document import Picture, Section
-from sogjax.study.limb_trials import FOLLOWED, PLAIN, JudgedLimb, LimbTrial, LimbTrials
+from sogjax.study.limb_trials import PLAIN, JudgedLimb, LimbTrial, LimbTrials
 from sogjax.study.study import Study
 from sogjax.study.table import ruled_table
 from sogjax.view.charts import LimbCurve, limb_chart
 
 BINS = (0.0, 0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0)
-RIDGE = 1e-4
 
 
 WeightsOf = Callable[[JudgedLimb], Weights]
@@ -50,43 +44,6 @@ def score(limb: JudgedLimb, weights: Weights) -> Float[np.ndarray, "frame"]:
 def lost(limbs: Sequence[JudgedLimb]) -> Bool[np.ndarray, "value"]:
     """Which limbs are farther off than `FAR`, over all frames."""
     return np.concatenate([limb.error for limb in limbs]) > FAR
-
-
-def fitted_weights(limbs: Sequence[JudgedLimb]) -> Weights:
-    """The weights that suit some limbs best (maximum likelihood, with a little of a ridge); no measure may reassure."""
-    rows = np.concatenate([np.stack([np.ones_like(limb.worse), limb.worse, limb.contradicted]) for limb in limbs], 1)
-    sign = np.where(lost(limbs), 1.0, -1.0)
-
-    def loss(weights: Float[np.ndarray, "3"]) -> tuple[float, Float[np.ndarray, "3"]]:
-        margin = sign * (weights @ rows)
-        value = np.mean(np.logaddexp(0.0, -margin)) + RIDGE * np.sum(weights[1:] ** 2)
-        return float(value), -rows @ (sign * expit(-margin)) / len(sign) + 2.0 * RIDGE * np.array(
-            [0.0, 1.0, 1.0]
-        ) * weights
-
-    bounds = [(None, None), (0.0, None), (0.0, None)]
-    return Weights(*minimize(loss, np.zeros(3), jac=True, bounds=bounds).x.tolist())
-
-
-def write_weights(path: Path, found: Mapping[str, Sequence[JudgedLimb]], trials: str) -> None:
-    """Write weights that were fitted to limbs into the file of fitted numbers, rounded to one decimal.
-
-    Args:
-        path: the file.
-        found: the limbs to fit to, by `with_background` and `without_background`; what is absent keeps its weights.
-        trials: what was tracked, which the file will say.
-    """
-    text = path.read_text(encoding="utf-8")
-    content = yaml.safe_load(text)
-    part = content["limb_weights"]
-    for name, limbs in found.items():
-        part["values"][name] = {key: round(value, 1) + 0.0 for key, value in asdict(fitted_weights(limbs)).items()}
-    counts = [f"{name}: {len(lost(limbs))} limbs, {int(lost(limbs).sum())} lost" for name, limbs in found.items()]
-    part["recordings"] = "; ".join([trials, *counts])
-    header = "".join(line for line in text.splitlines(keepends=True) if line.startswith("#"))
-    with atomic_path(path) as temporary:
-        written = yaml.safe_dump(content, sort_keys=False, width=120, allow_unicode=True, default_flow_style=None)
-        temporary.write_text(header + written, encoding="utf-8")
 
 
 def area_under_roc(said: Float[np.ndarray, "value"], lost: Bool[np.ndarray, "value"]) -> float:
@@ -131,21 +88,6 @@ def calibration_table(limbs: Sequence[JudgedLimb], weights: WeightsOf = committe
         if part.any():
             shares = [f"{100.0 * values[part].mean():.1f} %" for values in (said, wrong)]
             lines.append([f"{100.0 * low:.0f} to {100.0 * high:.0f} %", str(int(part.sum())), *shares])
-    return ruled_table(lines)
-
-
-def regained_table(
-    limbs: Sequence[JudgedLimb], groups: dict[str, Callable[[JudgedLimb], bool]], weights: WeightsOf = committed
-) -> str:
-    """How many limbs that were displaced on purpose came back by themselves, and how many others were noticed."""
-    lines = [["", "displaced", f"back after {FOLLOWED} frames", "of the others in doubt then"]]
-    for name, belongs in groups.items():
-        group = [limb for limb in limbs if limb.kind == f"{limb.name} displaced" and belongs(limb)]
-        if group:
-            left = [limb for limb in group if limb.error[-1] > FAR]
-            noticed = [said_of([limb], weights)[0][-1] > 0.5 for limb in left]
-            back = f"{100.0 * (1.0 - len(left) / len(group)):.1f} %"
-            lines.append([name, str(len(group)), back, f"{100.0 * np.mean(noticed):.0f} %" if left else ""])
     return ruled_table(lines)
 
 

@@ -24,8 +24,7 @@ from sogjax.settings.compose import track_config
 from sogjax.study.record import key_of, program_digest
 from sogjax.study.source import Source
 from sogjax.study.study import Study
-from sogjax.study.true_poses import true_poses
-from sogjax.study.verdicts import limb_errors
+from sogjax.study.true_poses import limb_errors, true_poses
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import FrameInput, TrackState
 from sogjax.tracking.frame_by_frame import track

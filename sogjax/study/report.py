@@ -3,11 +3,11 @@
 import platform
 import time
 from collections.abc import Callable, Sequence
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from sogjax.errors import InputError
 from sogjax.io.recording_files import GROUND_TRUTH
+from sogjax.run.fingerprint import installed_version
 from sogjax.run.run_folder import results_folder
 from sogjax.run.terminal import say
 from sogjax.study.document import Section, write_html, write_markdown
@@ -69,32 +69,17 @@ def methods_section() -> Section:
     return Section("The two methods", [text, settings_table()])
 
 
-def own_section() -> Section:
-    """What heads the experiments with one method."""
-    return Section(
-        "Experiments with our method", ["The sections that follow start from the default, `preset=default`."]
-    )
-
-
 def versions_section() -> Section:
     """The packages, and where the settings of each run are."""
     return Section(
         "Versions",
         [
-            "\n".join(f"- {name} {installed_version(name)}" for name in PACKAGES)
+            "\n".join(f"- {name} {installed_version(name) or 'not installed'}" for name in PACKAGES)
             + f"\n- Python {platform.python_version()}",
             "What rows do not set is the default; `runs.csv` lists every run, and `runs/KEY.json` holds it with all of "
             "its settings.",
         ],
     )
-
-
-def installed_version(package: str) -> str:
-    """The version of a package, or that it is not installed."""
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return version("sogjax") if package == "sogjax" else "not installed"
 
 
 def _recordings(done: Sequence[Done]) -> str:
@@ -188,7 +173,8 @@ def experiment_sections(experiments: Sequence[Experiment], study: Study, done: l
     own = [experiment_section(one, study, done) for one in experiments if not one.compares_methods]
     if not compared:
         return own
-    return [methods_section(), *compared, *([own_section()] if own else []), *own]
+    heading = "The sections that follow start from the default, `preset=default`."
+    return [methods_section(), *compared, *([Section("Experiments with our method", [heading])] if own else []), *own]
 
 
 def _check_truth(recordings: Sequence[str]) -> None:

@@ -14,7 +14,6 @@ from sogjax.quality.evaluation import Evaluation, GroupEvaluation, evaluate_moti
 from sogjax.quality.markers import PointErrors
 from sogjax.quality.metrics import mean_per_frame
 from sogjax.run import build
-from sogjax.run.clock import StageTimes
 from sogjax.run.memory import forget_programs_if_many
 from sogjax.run.result import RunResult
 from sogjax.run.terminal import say
@@ -122,7 +121,7 @@ def _speed(record: RunRecord, source: Source, config: TrackConfig, cameras: tupl
         converged=motion.converged.tolist(),
         milliseconds=[1000.0 * seconds for seconds in best.times.seconds["step"]],
         image_blobs=best.image_blobs,
-        rates=_rates(best.times) | {ALL: motion.num_frames / seconds},
+        rates={stage: best.times.frames_per_second(stage) for stage in STAGES} | {ALL: motion.num_frames / seconds},
         pose=np.concatenate([motion.pose for motion in best.motions.values()], axis=1).tolist(),
     )
     return _evaluated(record, source)
@@ -132,10 +131,6 @@ def _timed(source: Source, cameras: tuple[str, ...], config: TrackConfig) -> tup
     """A run, and its seconds on the clock."""
     begin = time.perf_counter()
     return track_recording(source.seen_by(cameras), source.actors, config).result_so_far, time.perf_counter() - begin
-
-
-def _rates(times: StageTimes) -> dict[str, float]:
-    return {stage: times.frames_per_second(stage) for stage in STAGES}
 
 
 def _evaluated(record: RunRecord, source: Source) -> RunRecord:

@@ -44,10 +44,8 @@ def markdown_table(experiment: Experiment, rows: Sequence[RowSummary]) -> str:
     columns = {title: cell for title, cell in columns.items() if title != "the paper" or not experiment.config.methods}
     texts = {title: [cell(row) if _done(row) else "" for row in rows] for title, cell in columns.items()}
     texts = {title: cells for title, cells in texts.items() if any(cell not in _NOTHING for cell in cells)}
-    lines = [f"| {in_cell(experiment.config.axis)} | " + " | ".join(texts) + " |", "|---" * (1 + len(texts)) + "|"]
-    for k, row in enumerate(rows):
-        lines.append(f"| {in_cell(row.name)} | " + " | ".join(cells[k] for cells in texts.values()) + " |")
-    return "\n".join(lines)
+    lines = [[row.name, *(cells[k] for cells in texts.values())] for k, row in enumerate(rows)]
+    return ruled_table([[experiment.config.axis, *texts], *lines])
 
 
 def recordings_table(experiment: Experiment, rows: Sequence[RowSummary]) -> str:
@@ -72,9 +70,7 @@ def degrees_table(experiment: Experiment, rows: Sequence[RowSummary]) -> str:
     for plane in planes:
         numbers = [found.get(plane) for found in by_row]
         lines.append([" ".join(plane), *("" if each is None else _degrees(each) for each in numbers)])
-    cells = [" | ".join(map(in_cell, line)) for line in lines]
-    cells.insert(1, "|".join(["---"] * (1 + len(known))))
-    return "\n".join(f"| {line} |" for line in cells) if planes else ""
+    return ruled_table(lines) if planes else ""
 
 
 def _degrees(numbers: Mapping[str, float]) -> str:
@@ -86,11 +82,8 @@ def _by_recording(
     experiment: Experiment, rows: Sequence[RowSummary], values_of: Callable[[RowSummary], Mapping[str, float]]
 ) -> str:
     names = list(dict.fromkeys(name for row in rows for name in row.by_recording))
-    lines = [" | ".join([in_cell(experiment.config.axis), *names]), "|".join(["---"] * (1 + len(names)))]
-    for row in rows:
-        values = values_of(row)
-        lines.append(" | ".join([in_cell(row.name), *(f"{values[n]:.1f}" if n in values else "" for n in names)]))
-    return "\n".join(f"| {line} |" for line in lines)
+    cells = lambda values: [f"{values[name]:.1f}" if name in values else "" for name in names]
+    return ruled_table([[experiment.config.axis, *names], *([row.name, *cells(values_of(row))] for row in rows)])
 
 
 def difference_words(row: RowSummary) -> str:
@@ -149,12 +142,8 @@ def _waiting(row: RowSummary) -> str:
     return f"{1000.0 / row.rates.get('decode', float('nan')):.1f}"
 
 
-def in_cell(text: str) -> str:
-    """The text without what would end a cell of a table."""
-    return text.replace("|", "\\|")
-
-
 def ruled_table(lines: Sequence[Sequence[object]]) -> str:
     """A table in Markdown of cells, whose first line are the titles."""
     ruled = [lines[0], ["---"] * len(lines[0]), *lines[1:]]
-    return "\n".join(f"| {' | '.join(in_cell(str(cell)) for cell in line)} |" for line in ruled)
+    in_cell = lambda cell: str(cell).replace("|", "\\|")  # which would end it
+    return "\n".join(f"| {' | '.join(map(in_cell, line))} |" for line in ruled)

@@ -76,13 +76,6 @@ def triangulation_errors(
     )
 
 
-def together(rows: Sequence[JointErrors]) -> JointErrors:
-    """Several recordings in one row: means, and the sum of the lost stretches."""
-    mean = lambda name: float(np.mean([getattr(row, name) for row in rows]))
-    lost, joints = sum(row.lost for row in rows), min(row.joints for row in rows)
-    return JointErrors(mean("found"), mean("missing"), mean("filtered"), mean("worst"), lost, joints)
-
-
 def filled(points: Float[np.ndarray, "frame point 3"]) -> Float[np.ndarray, "frame point 3"]:
     """Points without gaps: short ones on a line, longer ones by the last known place, the beginning by the first."""
     result = interpolated(points, LONGEST_GAP)

@@ -9,19 +9,16 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MM, PERCENT = 1000.0, 100.0
 INK, REFERENCE, WRONG = "#1f77b4", "#444444", "#d62728"
 """Colours of what was measured, of what it is compared with, and of what is wrong or failed."""
 
 DPI = 90
-
-Curve = Float[np.ndarray, "frame"]
 
 
 @dataclass(frozen=True)
@@ -50,7 +47,7 @@ def mean_chart(panels: Sequence[Means], *, axis: str, value: str, paper: Mapping
     ratios = [2.0] * len(panels) + [1.0] * bool(paper)
     members = dict.fromkeys(name for panel in panels for name in panel.members)
     colors = {name: f"C{1 + number % 9}" for number, name in enumerate(members)}
-    figure = _figure(max(7.2, 1.5 * sum(ratios)) + 0.9 * bool(members), 2.8)
+    figure = new_figure(max(7.2, 1.5 * sum(ratios)) + 0.9 * bool(members), 2.8)
     drawn = figure.subplots(1, len(ratios), squeeze=False, width_ratios=ratios)[0]
     lines = {}
     for axes, panel in zip(drawn, panels, strict=False):
@@ -66,7 +63,7 @@ def mean_chart(panels: Sequence[Means], *, axis: str, value: str, paper: Mapping
         _label_rows(drawn[-1], list(paper), axis, value, "the paper")
     if lines:
         figure.legend(lines.values(), lines, loc="outside right center", fontsize=6, frameon=False)
-    return _png(figure)
+    return png(figure)
 
 
 def _label_rows(axes: "Axes", names: Sequence[str], axis: str, value: str, title: str) -> None:
@@ -75,7 +72,7 @@ def _label_rows(axes: "Axes", names: Sequence[str], axis: str, value: str, title
     axes.set_xticks(range(len(names)), names, rotation=30 if crowded else 0, ha="right" if crowded else "center")
     axes.set(xlabel=axis, ylabel=value, ylim=(0.0, 1.06 * axes.get_ylim()[1]))  # room for a whole marker at the top
     axes.set_title(title, fontsize=9)
-    _grid(axes)
+    grid(axes)
 
 
 @dataclass(frozen=True)
@@ -92,7 +89,7 @@ class Bars:
 def bar_chart(panels: Sequence[Bars], *, value: str) -> bytes:
     """Bars by row and method, a panel below the other; `value` says what they are, with their unit."""
     longest = max(len(panel.rows) for panel in panels)
-    figure = _figure(min(max(6.0, 0.45 * longest), 90.0), 3.2 * len(panels))
+    figure = new_figure(min(max(6.0, 0.45 * longest), 90.0), 3.2 * len(panels))
     every = 1 + longest // 200  # the names of more rows would overlap
     for axes, panel in zip(figure.subplots(len(panels), 1, squeeze=False)[:, 0], panels, strict=True):
         places, width = np.arange(len(panel.rows)), 0.8 / len(panel.values)
@@ -105,8 +102,8 @@ def bar_chart(panels: Sequence[Bars], *, value: str) -> bytes:
         axes.set_ylabel(value)
         axes.set_title(panel.title, fontsize=9)
         axes.set_axisbelow(True)
-        _grid(axes, legend=any(panel.values))
-    return _png(figure)
+        grid(axes, legend=any(panel.values))
+    return png(figure)
 
 
 @dataclass(frozen=True)
@@ -126,7 +123,7 @@ class LimbCurve:
 
 def limb_chart(curves: Mapping[str, LimbCurve]) -> bytes:
     """The ROC curve, and shares that were found lost against those that were said, for groups of frames by name."""
-    figure = _figure(8.4, 3.8)
+    figure = new_figure(8.4, 3.8)
     roc, shares = figure.subplots(1, 2)
     for name, curve in curves.items():
         roc.plot(curve.false_alarms, curve.noticed, linewidth=1.4, label=f"{name}: {curve.area:.3f}")
@@ -137,98 +134,19 @@ def limb_chart(curves: Mapping[str, LimbCurve]) -> bytes:
     roc.legend(title="area under the curve", fontsize=7, title_fontsize=7, frameon=False, loc="lower right")
     shares.plot([0.0, 1.0], [0.0, 1.0], "--", color=REFERENCE, linewidth=0.8)
     shares.set(xlim=(0.0, 1.0), ylim=(0.0, 1.02), xlabel="probability said", ylabel="share found lost")
-    _grid(roc, "both")
-    _grid(shares, "both")
-    return _png(figure)
+    grid(roc, "both")
+    grid(shares, "both")
+    return png(figure)
 
 
-@dataclass(frozen=True)
-class RankedCurves:
-    """What the true pose is worth more than the tracked one, under one set of terms."""
-
-    title: str
-    frames: Int[np.ndarray, "frame"]
-    gain: Curve
-    """The share of the energy by which the true pose is worth more."""
-    gain_by_term: Mapping[str, Curve]
-    """What each term adds to it."""
-    errors: Mapping[str, Curve]
-    """Metres, by whose pose."""
-    limbs: Mapping[str, tuple[Curve, Curve]]
-    """Metres: the tracked pose's and the optimum's error of each limb that differs."""
-
-
-def ranking_chart(columns: Sequence[RankedCurves]) -> bytes:
-    """Differences of energies, joint errors and errors of limbs over the frames, a column for each set of terms."""
-    figure = _figure(5.2 * len(columns), 7.4)
-    panels = figure.subplots(3, len(columns), squeeze=False, sharex=True, sharey="row")
-    for (worth, errors, limbs), content in zip(panels.T, columns, strict=True):
-        gain = PERCENT * content.gain
-        worth.set_title(content.title, fontsize=9)
-        worth.axhline(0.0, color=REFERENCE, linewidth=0.8)
-        worth.fill_between(content.frames, 0.0, gain, where=gain < 0.0, color=WRONG, alpha=0.25, linewidth=0)
-        worth.plot(content.frames, gain, color="black", linewidth=1.6, label="energy")
-        for name, curve in content.gain_by_term.items():
-            worth.plot(content.frames, PERCENT * curve, linewidth=1.0, label=name)
-        for name, curve in content.errors.items():
-            errors.plot(content.frames, MM * curve, label=name, linewidth=1.2)
-        for number, (name, (tracked, optimum)) in enumerate(content.limbs.items()):
-            limbs.plot(content.frames, MM * tracked, "-", color=f"C{number}", label=name, linewidth=1.2)
-            limbs.plot(content.frames, MM * optimum, "--", color=f"C{number}", linewidth=1.0)
-        worth.set_ylabel("true pose is worth more, %")
-        errors.set_ylabel("mean joint error, mm")
-        limbs.set(xlabel="frame", ylabel="limb (line: tracked, dashed:\noptimum at the truth), mm")
-        _grid(worth, legend=True)
-        _grid(errors, legend=bool(content.errors))
-        _grid(limbs, legend=bool(content.limbs))
-    return _png(figure)
-
-
-@dataclass(frozen=True)
-class Reliability:
-    """Poses that searches found, in the order of their confidence."""
-
-    confidence: Float[np.ndarray, "search"]
-    error: Float[np.ndarray, "search"]
-    """Metres, mean over the joints."""
-    sure: Bool[np.ndarray, "search"]
-    right: Bool[np.ndarray, "search"]
-    bins: Sequence[tuple[int, int]]
-    """The first search of each bin and the one after its last."""
-    limit: float
-    """Metres, above which a pose is wrong."""
-
-
-def reliability_chart(found: Reliability) -> bytes:
-    """Errors over confidence, and the share of right poses in bins of confidence."""
-    figure = _figure(8.4, 3.6)
-    errors, shares = figure.subplots(1, 2)
-    confidence = np.maximum(found.confidence, 1e-4)  # the axis is logarithmic
-    for chosen, marker, label in ((found.sure, "o", "sure"), (~found.sure, "x", "not sure")):
-        for right, color in ((True, INK), (False, WRONG)):
-            those = chosen & (found.right == right)
-            words = f"{label}, {'right' if right else 'wrong'}: {int(those.sum())}"
-            errors.plot(confidence[those], MM * found.error[those], marker, color=color, markersize=4, label=words)
-    errors.axhline(MM * found.limit, color=REFERENCE, linewidth=0.8, linestyle="--")
-    errors.set(xscale="log", yscale="log", xlabel="confidence", ylabel="mean joint error, mm")
-    middles = [float(np.median(confidence[first:stop])) for first, stop in found.bins]
-    right = [float(found.right[first:stop].mean()) for first, stop in found.bins]
-    shares.plot(middles, right, "o-", color=INK, markersize=4)
-    for middle, share, (first, stop) in zip(middles, right, found.bins, strict=True):
-        shares.annotate(f"{stop - first}", (middle, share), xytext=(0, 5), textcoords="offset points", fontsize=6)
-    shares.set(xscale="log", ylim=(0.0, 1.08), xlabel="confidence (median of a bin)", ylabel="share of right poses")
-    _grid(errors, "both", legend=True)
-    _grid(shares, "both")
-    return _png(figure)
-
-
-def _grid(axes: "Axes", which: str = "y", legend: bool = False) -> None:
+def grid(axes: "Axes", which: str = "y", legend: bool = False) -> None:
+    """Lines of a grid behind the curves, and a legend on request."""
     axes.grid(axis=which, color="#e4e4e4")  # pyright: ignore[reportArgumentType]
     if legend:
         axes.legend(fontsize=7, frameon=False)
 
 
-def _figure(width: float, height: float) -> "Figure":
+def new_figure(width: float, height: float) -> "Figure":
     """An empty figure of a size in inches, which needs no display."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
@@ -237,7 +155,8 @@ def _figure(width: float, height: float) -> "Figure":
         return Figure(figsize=(width, height), dpi=DPI, layout="constrained")
 
 
-def _png(figure: "Figure") -> bytes:
+def png(figure: "Figure") -> bytes:
+    """A figure as the bytes of its file."""
     stream = io.BytesIO()
     figure.savefig(stream, format="png")
     return stream.getvalue()

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
+from typing import Any
 
 import cv2
 import numpy as np
@@ -202,10 +202,8 @@ class OverlayVideo:
         for frame, pictures in zip(motions[0].frame, tiles, strict=True):
             self._video.write(overlay.draw(pictures, int(frame)))
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._video.__exit__(kind, error, traceback)
+    def __exit__(self, *error: Any) -> None:
+        self._video.__exit__(*error)
 
 
 CAMERAS = 4

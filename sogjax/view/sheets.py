@@ -1,13 +1,19 @@
-"""Sheets of pictures: the background of a camera, the silhouettes of an estimated body, and the body itself."""
+"""Sheets of pictures: a camera's background, what stands in front, silhouettes of a body, and the body itself."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from sogjax.view.tiles import RED, Tile, contact_sheet
+from sogjax.io.image_file import write_image
+from sogjax.io.recording import Recording
+from sogjax.io.video import read_frames
+from sogjax.scene.cells import CellGrid
+from sogjax.scene.occluders import HiddenFrom
+from sogjax.view.tiles import BLUE, RED, Tile, contact_sheet
 
 Picture = UInt8[np.ndarray, "_h _w 3"]
 """BGR."""
@@ -123,3 +129,35 @@ def _discs(
         cv2.circle(canvas, centre, fixed(radii[k]), (blue, green, red), -1, cv2.LINE_AA, bits)
         cv2.circle(canvas, centre, fixed(radii[k]), (40, 40, 40), 1, cv2.LINE_AA, bits)
     return canvas
+
+
+def write_occluders(
+    path: Path, recording: Recording, grids: Sequence[CellGrid], hidden: HiddenFrom, frame: int, title: str
+) -> Path:
+    """Write the pictures of a frame with the cells that hide something; returns the path.
+
+    Raises:
+        InputError: a picture cannot be read, or the file cannot be written.
+    """
+    images = next(iter(read_frames(recording, frame, frame + 1)))
+    tiles = []
+    for name, image, grid, of_camera in zip(recording.rig.names, images, grids, hidden, strict=True):
+        inside = of_camera[: grid.rows, : grid.columns]
+        shown = np.zeros((grid.height, grid.width, 3), np.uint8) if image is None else np.asarray(image)
+        tiles.append(Tile(shown, [(_pixels(np.isfinite(inside), grid), BLUE)], f"{name}: {_told(inside)}"))
+    write_image(path, contact_sheet(tiles, f"{recording.name}, frame {frame}: {title}"))
+    return path
+
+
+def _pixels(cells: Bool[np.ndarray, "rows columns"], grid: CellGrid) -> Bool[np.ndarray, "height width"]:
+    side = grid.cell_size
+    return np.repeat(np.repeat(cells, side, axis=0), side, axis=1)[: grid.height, : grid.width]
+
+
+def _told(hidden: Float[np.ndarray, "rows columns"]) -> str:
+    known = hidden[np.isfinite(hidden)]
+    if not known.size:
+        return "nothing"
+    share = known.size / hidden.size
+    what = "all" if not known.any() else f"what is behind {np.median(known[known > 0.0]):.1f} m (median)"
+    return f"{share:.1%} of the cells hide {what}"

@@ -44,9 +44,9 @@ from sogjax.run.result import Numbers, row_numbers
 from sogjax.run.shared import SHARED
 from sogjax.run.shared_pose import SWEEP_SOURCES, of_initial_pose
 from sogjax.run.terminal import say
+from sogjax.settings.compose import no_such_choice, unknown_key
 from sogjax.settings.files import conf_dir
 from sogjax.settings.run import TrackConfig
-from sogjax.settings.wrong_values import no_such_choice, unknown_key
 
 PICTURES = ("outputs.overlay", "outputs.rerun", "outputs.page")
 """Outputs of every frame, for which pictures are decoded."""

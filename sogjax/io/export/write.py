@@ -14,9 +14,7 @@ from sogjax.io.export.bones import bones_of
 from sogjax.io.export.bvh import write_bvh
 from sogjax.io.export.glb import write_glb
 from sogjax.io.export.lafan1 import figure_of, write_lafan1
-from sogjax.io.export.lengths import ENDING as LENGTHS
-from sogjax.io.export.lengths import segment_lengths, write_lengths
-from sogjax.io.export.points import write_c3d, write_csv, write_trc
+from sogjax.io.export.points import LENGTHS, segment_lengths, write_c3d, write_csv, write_lengths, write_trc
 from sogjax.io.files import write_file
 from sogjax.io.motion_data import MotionData, save_motion
 

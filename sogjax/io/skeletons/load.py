@@ -7,9 +7,11 @@ import jax.numpy as jnp
 from sogjax.errors import InputError
 from sogjax.io import bvh_bones
 from sogjax.io.actor_file import body_from
+from sogjax.io.actor_rows import WORLD
+from sogjax.io.bvh_bones import BvhBone, read_bones
 from sogjax.io.calibration.rig import METRES
 from sogjax.io.skeletons import skeletool
-from sogjax.io.skeletons.bvh_hierarchy import read_bvh_hierarchy
+from sogjax.io.skeletons.rows import SkeletonRows, attach_blobs
 from sogjax.io.skeletons.skeletool import read_skeletool_skeleton
 from sogjax.io.yaml_entry import Entry
 from sogjax.model.body import Body
@@ -49,3 +51,39 @@ def _head(path: Path) -> str:
             return file.read(4096).decode("utf-8-sig", errors="replace").lstrip()
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from error
+
+
+def read_bvh_hierarchy(path: Path) -> SkeletonRows:
+    """The skeleton of a BVH file, with blobs along its bones and a landmark at every joint.
+
+    Raises:
+        InputError: the file cannot be read, or its hierarchy is damaged.
+    """
+    rows = SkeletonRows(path.stem)
+    last: list[str] = []
+    for bone in read_bones(path):
+        last.append(_add_joints(rows, bone, WORLD if bone.parent < 0 else last[bone.parent]))
+        if bone.end is not None:
+            rows.ends[last[-1]] = bone.end
+    attach_blobs(rows)
+    return rows
+
+
+def _add_joints(rows: SkeletonRows, bone: BvhBone, parent: str) -> str:
+    """One joint per channel, positions first: BVH moves a bone before turning it, in any order of channels.
+
+    Returns:
+        The last of them.
+    """
+    offset = bone.offset
+    for channel in sorted(bone.channels, key=lambda channel: not channel.endswith("position")):
+        axis, kind = channel[0].lower(), "prismatic" if channel.endswith("position") else "revolute"
+        name = f"{bone.name}_{'t' if kind == 'prismatic' else 'r'}{axis}"
+        rows.add_joint(name, parent, offset, axis, kind)
+        rows.dofs.append({"name": name, "limits": "none", "joints": {name: 1.0}})
+        parent, offset = name, [0.0] * 3
+    if not bone.channels:
+        rows.add_joint(f"{bone.name}_fixed", parent, offset, "x", "revolute")
+        parent = f"{bone.name}_fixed"
+    rows.landmarks.append({"name": bone.name, "joint": parent, "offset": [0.0] * 3})
+    return parent

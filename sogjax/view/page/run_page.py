@@ -16,7 +16,6 @@ from sogjax.model.body import Body
 from sogjax.model.rotation import world_from_upright
 from sogjax.quality.remedies import remedies
 from sogjax.quality.verdict import Verdict
-from sogjax.view.page.curves import SIDES, angle_panels, speed_panels
 from sogjax.view.page.document import (
     Section,
     bullets,
@@ -30,7 +29,7 @@ from sogjax.view.page.document import (
     text,
 )
 from sogjax.view.page.pictures import FramePictures, Picture, SkeletonPictures, cuts, silhouette_pictures
-from sogjax.view.page.plots import curve_plots
+from sogjax.view.page.plots import SIDES, angle_panels, curve_plots, speed_panels
 from sogjax.view.page.sight import hidden_limbs
 from sogjax.view.page.timeline import Marks, timeline
 from sogjax.view.sheets import body_picture

@@ -1,47 +1,16 @@
 """The page of a check: what was found of a recording, worst first, and the calibration drawn into its pictures."""
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol, runtime_checkable
 
+from sogjax.check.findings import Finding
 from sogjax.errors import counted
 from sogjax.view.page.document import Picture, Section, document, figure, paragraph, table, text
-
-
-@runtime_checkable
-class Found(Protocol):
-    """What the page needs of a finding (`sogjax.check.findings.Finding`)."""
-
-    @property
-    def severity(self) -> str:
-        """`ok`, `note`, `warning` or `error`."""
-        ...
-
-    @property
-    def topic(self) -> str:
-        """What was checked."""
-        ...
-
-    @property
-    def what(self) -> str:
-        """What was noticed."""
-        ...
-
-    @property
-    def cause(self) -> str:
-        """The likely one, or nothing."""
-        ...
-
-    @property
-    def remedy(self) -> str:
-        """What to do, or nothing."""
-        ...
-
 
 _KINDS = {"error": ("wrong", "✕"), "warning": ("look", "!"), "note": ("note-card", "i"), "ok": ("right", "✓")}
 
 
 def check_page(
-    name: str, subtitle: str, findings: Sequence[Found], room: Picture, offsets: Mapping[str, float], line: str
+    name: str, subtitle: str, findings: Sequence[Finding], room: Picture, offsets: Mapping[str, float], line: str
 ) -> str:
     """The page as HTML.
 
@@ -66,7 +35,7 @@ def check_page(
     return document(name, subtitle, [each for each in sections if each.content])
 
 
-def _summary(findings: Sequence[Found]) -> str:
+def _summary(findings: Sequence[Finding]) -> str:
     counts = {kind: sum(each.severity == kind for each in findings) for kind in _KINDS}
     parts = [counted(count, kind) for kind, count in counts.items() if count and kind != "ok"]
     parts += [f"{counts['ok']} checked and right"] if counts["ok"] else []
@@ -74,7 +43,7 @@ def _summary(findings: Sequence[Found]) -> str:
     return paragraph(f"{', '.join(parts)}.{wrong}")
 
 
-def _card(finding: Found) -> str:
+def _card(finding: Finding) -> str:
     kind, mark = _KINDS[finding.severity]
     lines = [f"<p>{text(finding.what)}</p>"]
     lines += [f"<p><b>Likely cause:</b> {text(finding.cause)}</p>"] if finding.cause else []

@@ -28,7 +28,7 @@ from sogjax.run.track import track_recording
 from sogjax.settings.compose import track_config
 from sogjax.study.few_cameras import evenly
 from sogjax.study.tracked import kept_actors
-from sogjax.study.verdicts import limb_of
+from sogjax.study.true_poses import limb_of
 from sogjax.synth.cache import cached_recording
 from sogjax.synth.settings import SynthSettings
 

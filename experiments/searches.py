@@ -26,7 +26,7 @@ from sogjax.settings.compose import track_config
 from sogjax.study.record import key_of, program_digest
 from sogjax.study.source import Source
 from sogjax.study.study import Study
-from sogjax.study.verdicts import LimbErrors, limb_errors
+from sogjax.study.true_poses import LimbErrors, limb_errors
 
 RIGHT = 0.10
 """Metres, mean over the joints: a pose farther off is wrong."""
