@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from end_to_end import decoding_rate
@@ -14,6 +15,7 @@ from quantities import Quantity, milliseconds
 from track_speed import demo_recording
 
 from sogjax.energy.frame_energy import FrameEnergy
+from sogjax.energy.pairs import MEMBERS, TILE
 from sogjax.energy.posed import History
 from sogjax.energy.similarity import similarity_among
 from sogjax.io.ground_truth import load_ground_truth
@@ -102,9 +104,10 @@ class FirstStep(NamedTuple):
     capacities: Capacities
 
 
-def first_step(scene: Scene) -> FirstStep:
+def first_step(scene: Scene, *overrides: str) -> FirstStep:
     """The tracker of a scene at its first frame, from the pose that is given."""
-    clip, config = opened_clip(scene.recording, scene.config()), scene.config()
+    config = scene.config(*overrides)
+    clip = opened_clip(scene.recording, config)
     background, actors = learn_background(clip, config.images.background), Actors(tuple(scene.bodies))
     tracker = tracking_setup(clip, background, actors.bodies, config).tracker
     start = find_initial_pose(PoseRequest(clip, background, actors, config), SOURCES).pose
@@ -134,6 +137,8 @@ def stage_quantities(scene: Scene) -> Iterator[Quantity]:
     yield Quantity("stage", "with choice of blobs and colours", milliseconds(views, tracker, state, cells), "ms")
     yield Quantity("stage", "lists of near pairs", milliseconds(near, tracker, state, seen), "ms")
     yield Quantity("stage", "value, gradient and curvature", milliseconds(quadratic, objective, start), "ms")
+    pairs = jnp.linspace(-10.0, 0.0, TILE * MEMBERS * int(near(tracker, state, seen)[1]), dtype=jnp.float32)
+    yield Quantity("stage", "its exponentials alone", milliseconds(jax.jit(jnp.exp), pairs), "ms")
     if tracker.limbs is not None and tracker.reader.subject is not None:
         known = tracker.with_memory(state)
         yield Quantity("stage", "evidence for the limbs", milliseconds(judged, tracker, known, seen), "ms")
