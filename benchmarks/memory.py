@@ -8,6 +8,7 @@ Tracks videos (mp4v) that show the first frames of a recording forwards and back
 
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,6 +20,7 @@ from sogjax.io.recording import Recording
 from sogjax.io.source import open_source
 from sogjax.io.video import VideoWriter
 from sogjax.run.actors import ActorRequest, make_actors
+from sogjax.run.page import FRAMES_ON_PAGE
 from sogjax.run.recordings import opened
 from sogjax.run.run import Run
 from sogjax.run.runner import run_passes
@@ -44,11 +46,10 @@ class Settings:
 
 
 def main() -> None:
-    """Print the table; with one number in `repeats`, only the memory of this process."""
+    """Print the table; with one number in `repeats`, only the seconds and the memory of this process."""
     settings = settings_from(Settings)
     if len(settings.repeats) == 1:
-        track_repeatedly(settings, settings.repeats[0])
-        print(most_resident_mib())
+        print(track_repeatedly(settings, settings.repeats[0]), most_resident_mib())
         return
     print(machine_line())
     for repeats in settings.repeats:
@@ -62,32 +63,39 @@ def main() -> None:
 def long_quantities(recording: Path, actor: Path, repeats: tuple[int, int] = (64, 192)) -> Iterator[Quantity]:
     """What a thousand more frames of four cameras take; nothing, if memory is flat."""
     settings = Settings(str(recording), str(actor))
-    few, many = (largest(settings, each) for each in repeats)
+    few, many = (taken(settings, each)[1] for each in repeats)
     thousands = settings.frames * (repeats[1] - repeats[0]) / 1000.0
     yield Quantity("memory", f"most resident, {settings.frames * repeats[1]} frames, four cameras", many, "MiB")
     yield Quantity("memory", "growth in 1000 frames", (many - few) / thousands, "MiB", target=FLAT)
 
 
-def largest(settings: Settings, repeats: int) -> float:
-    """Mebibytes that a process of its own has resident at most, when it tracks the frames so many times."""
+def taken(settings: Settings, repeats: int) -> tuple[float, float]:
+    """Seconds of a process of its own that tracks the frames so many times, and mebibytes it has resident at most."""
     cameras = ",".join(opened(settings.recording).rig.names[:4])
     words = [f"recording={settings.recording}", f"actor={settings.actor}", f"frames={settings.frames}"]
     words += [f"repeats=[{repeats}]", f"overrides=[solver.max_iterations=20,'cameras=[{cameras}]']"]
     done = subprocess.run([sys.executable, __file__, *words], check=True, stdout=subprocess.PIPE, text=True)
-    return float(done.stdout.split()[-1])
+    seconds, most = done.stdout.split()[-2:]
+    return float(seconds), float(most)
 
 
-def track_repeatedly(settings: Settings, repeats: int) -> None:
-    """The first frames of the recording forwards and backwards, so many times, into a folder that is removed."""
+def track_repeatedly(settings: Settings, repeats: int) -> float:
+    """The first frames of the recording forwards and backwards, so many times, into a folder that is removed; seconds.
+
+    Making the videos is not counted.
+    """
     config = track_config(settings.overrides, recording=settings.recording, actor=settings.actor)
     recording = opened(config.recording, config.cameras)
     config.outputs = config.outputs.asked()
     actors = make_actors(ActorRequest.of_track(opened_clip(recording, config), config))
     with TemporaryDirectory() as folder:
         longer = longer_recording(recording, settings.frames, repeats, Path(folder))
-        clip = opened_clip(longer, config).kept_in(Path(folder) / "kept", None)
-        run = run_passes(Run(clip, config, Path(folder) / "out", Path(folder) / "kept", records={"actors": actors}))
+        begin = time.perf_counter()
+        kept = Path(folder) / "kept"
+        clip = opened_clip(longer, config).kept_in(kept, None).shown_small(kept, FRAMES_ON_PAGE)
+        run = run_passes(Run(clip, config, Path(folder) / "out", kept, records={"actors": actors}))
         assert len(run.result.converged) == longer.num_frames
+        return time.perf_counter() - begin
 
 
 def most_resident_mib() -> float:

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
 
 import jax
@@ -71,11 +72,16 @@ def milliseconds(function: Callable[..., Any], *arguments: Any, repeats: int = 1
 
 
 def reference_milliseconds() -> float:
-    """Of a workload that has nothing of this project in it: exponentials and a matrix product, about equal parts."""
+    """Of the reference workload."""
+    return milliseconds(reference_workload(), repeats=40)
+
+
+def reference_workload() -> Callable[[], Any]:
+    """Work that has nothing of this project in it: exponentials and a matrix product, about equal parts."""
     rng = np.random.default_rng(0)
     values, matrix = (jnp.asarray(rng.random(shape), jnp.float32) for shape in ((1_000_000,), (400, 400)))
     work = jax.jit(lambda values, matrix: (jnp.exp(-values), jnp.matmul(matrix, matrix, precision="highest")))
-    return milliseconds(work, values, matrix, repeats=40)
+    return partial(work, values, matrix)
 
 
 def exponent(sizes: Sequence[float], costs: Sequence[float]) -> float:

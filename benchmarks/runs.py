@@ -3,15 +3,19 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from end_to_end import decoding_rate
+from jaxtyping import Array, UInt8
 from quantities import Quantity, milliseconds
 from track_speed import demo_recording
 
 from sogjax.energy.frame_energy import FrameEnergy
+from sogjax.energy.pairs import MEMBERS, TILE
 from sogjax.energy.posed import History
 from sogjax.energy.similarity import similarity_among
 from sogjax.io.ground_truth import load_ground_truth
@@ -28,14 +32,16 @@ from sogjax.run.track import opened_clip, track_recording
 from sogjax.settings.compose import track_config
 from sogjax.settings.run import TrackConfig
 from sogjax.tracking.capacity import first_capacities
+from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import FrameInput, TrackState
+from sogjax.tracking.tracker import Tracker
 
 SOLVERS = ("gauss_newton", "lbfgs", "conditioned_ascent")
 
 
 @dataclass
 class Scene:
-    """The demo's recording, and an actor that was made of it."""
+    """A recording, and an actor that was made of it."""
 
     folder: Path
     recording: Recording
@@ -44,8 +50,12 @@ class Scene:
 
     @classmethod
     def demo(cls, frames: int) -> "Scene":
-        """Render and estimate what is not there yet."""
-        folder = demo_recording()
+        """The demo's, rendered now if it is not there yet."""
+        return cls.of(demo_recording(), frames)
+
+    @classmethod
+    def of(cls, folder: Path, frames: int) -> "Scene":
+        """Some frames of a recording; the actor is made now if it is not kept."""
         recording = opened(str(folder))
         config: TrackConfig = track_config(recording=folder)
         actors = make_actors(ActorRequest.of_track(opened_clip(recording, config), config))
@@ -85,15 +95,30 @@ def solver_quantities(scene: Scene) -> Iterator[Quantity]:
     yield Quantity("solver", "default's error over the paper's method's", worse, "mm", target=1.0)
 
 
+class FirstStep(NamedTuple):
+    """What the first frame of a scene is tracked with."""
+
+    tracker: Tracker
+    state: TrackState
+    cells: UInt8[Array, "camera rows columns 3"]
+    capacities: Capacities
+
+
+def first_step(scene: Scene, *overrides: str) -> FirstStep:
+    """The tracker of a scene at its first frame, from the pose that is given."""
+    config = scene.config(*overrides)
+    clip = opened_clip(scene.recording, config)
+    background, actors = learn_background(clip, config.images.background), Actors(tuple(scene.bodies))
+    tracker = tracking_setup(clip, background, actors.bodies, config).tracker
+    start = find_initial_pose(PoseRequest(clip, background, actors, config), SOURCES).pose
+    cells, state = jnp.asarray(next(clip.frames()).cells), TrackState.from_pose(jnp.asarray(start))
+    return FirstStep(tracker, state, cells, first_capacities(tracker, state, FrameInput(cells)))
+
+
 def stage_quantities(scene: Scene) -> Iterator[Quantity]:
     """The stages of one step before the solver."""
-    clip = opened_clip(scene.recording, scene.config())
-    background, actors = learn_background(clip, scene.config().images.background), Actors(tuple(scene.bodies))
-    tracker = tracking_setup(clip, background, actors.bodies, scene.config()).tracker
-    start = jnp.asarray(find_initial_pose(PoseRequest(clip, background, actors, scene.config()), SOURCES).pose)
-    cells = jnp.asarray(next(clip.frames()).cells)
-    state = TrackState.from_pose(start)
-    capacities = first_capacities(tracker, state, FrameInput(cells))
+    tracker, state, cells, capacities = first_step(scene)
+    start = state.previous
     leaves = eqx.filter_jit(lambda reader, cells: reader.leaves(cells.astype(jnp.float32) / 255.0))
     views = eqx.filter_jit(lambda tracker, state, cells: tracker.views(FrameInput(cells), state, capacities)[0])
     near = eqx.filter_jit(
@@ -112,6 +137,8 @@ def stage_quantities(scene: Scene) -> Iterator[Quantity]:
     yield Quantity("stage", "with choice of blobs and colours", milliseconds(views, tracker, state, cells), "ms")
     yield Quantity("stage", "lists of near pairs", milliseconds(near, tracker, state, seen), "ms")
     yield Quantity("stage", "value, gradient and curvature", milliseconds(quadratic, objective, start), "ms")
+    pairs = jnp.linspace(-10.0, 0.0, TILE * MEMBERS * int(near(tracker, state, seen)[1]), dtype=jnp.float32)
+    yield Quantity("stage", "its exponentials alone", milliseconds(jax.jit(jnp.exp), pairs), "ms")
     if tracker.limbs is not None and tracker.reader.subject is not None:
         known = tracker.with_memory(state)
         yield Quantity("stage", "evidence for the limbs", milliseconds(judged, tracker, known, seen), "ms")

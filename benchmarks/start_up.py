@@ -89,14 +89,14 @@ def seconds(name: str, checkout: Path, recording: Path, actor: Path) -> tuple[li
         for turn in ("cold", "kept"):
             out = Path(folder) / turn
             out.mkdir()
-            begin, cpus = time.perf_counter(), _cpu_seconds()
+            begin, cpus = time.perf_counter(), cpu_seconds()
             _run(words_of(name, recording, actor, out), checkout, programs, out)
             by_clock.append(time.perf_counter() - begin)
-            of_cpus.append(_cpu_seconds() - cpus)
+            of_cpus.append(cpu_seconds() - cpus)
     return by_clock, of_cpus
 
 
-def _cpu_seconds() -> float:
+def cpu_seconds() -> float:
     """Those of all processes that were started and have ended."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime

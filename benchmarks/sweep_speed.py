@@ -1,9 +1,10 @@
 """How many single runs does a sweep of settings take by the clock, and what does a later member cost beyond tracking?
 
-    python benchmarks/sweep_speed.py [settings=15] [frames=40] [overrides=[...]]
+    python benchmarks/sweep_speed.py [settings=15] [frames=40] [workers=2] [overrides=[...]]
 
 Both are processes of their own on the demo's recording with its actor: `sogjax track`, and `sogjax track -m` over as
 many values of `energy.limit_weight`; each with an empty folder for compiled programs, and with what the first run kept.
+With `workers`, the sweep is run by so many processes as well (joblib), with a folder of its own.
 """
 
 import json
@@ -12,16 +13,17 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
 from quantities import Quantity
-from start_up import OURS, made_actor
+from start_up import OURS, cpu_seconds, made_actor
 from track_speed import demo_recording
 
+from sogjax.errors import counted
 from sogjax.run.clock import TOTAL, TRACKING
 from sogjax.study.script import machine_line, run_script, settings_from
 
@@ -35,6 +37,7 @@ class Settings:
 
     settings: int = 15
     frames: int = 40
+    workers: int = 1
     overrides: list[str] = field(default_factory=list)
 
 
@@ -47,6 +50,10 @@ class Taken(NamedTuple):
     """A later member, the median."""
     tracking: float
     """Of which its frames after the first one."""
+    cpus: float
+    """CPU seconds of the sweep."""
+    programs: int
+    """Kept after it."""
 
 
 def main() -> None:
@@ -55,13 +62,15 @@ def main() -> None:
     print(machine_line())
     with TemporaryDirectory() as folder:
         actor = made_actor(recording, Path(folder), OURS)
-        for name, taken in measured(recording, actor, settings):
-            print(
-                f"programs {name}: run {taken.run:.1f} s, sweep of {settings.settings} {taken.sweep:.1f} s, "
-                f"{taken.sweep / taken.run:.1f} runs; a later member {taken.member:.2f} s, "
-                f"of which tracking {taken.tracking:.2f} s",
-                flush=True,
-            )
+        for workers in sorted({1, settings.workers}):
+            print(f"{counted(workers, 'process', 'processes')}:")
+            for name, taken in measured(recording, actor, replace(settings, workers=workers)):
+                print(
+                    f"programs {name}: run {taken.run:.1f} s, sweep of {settings.settings} {taken.sweep:.1f} s "
+                    f"(CPU {taken.cpus:.1f}), {taken.sweep / taken.run:.1f} runs; a later member {taken.member:.2f} s, "
+                    f"of which tracking {taken.tracking:.2f} s; {taken.programs} programs kept",
+                    flush=True,
+                )
 
 
 def sweep_quantities(actor: Path, frames: int) -> Iterator[Quantity]:
@@ -76,15 +85,19 @@ def measured(recording: Path, actor: Path, settings: Settings) -> Iterator[tuple
     """With programs compiled anew, and kept."""
     words = [f"recording={recording}", f"actor={actor}", f"stop={settings.frames}", *settings.overrides]
     values = ",".join(f"{weight:.3f}" for weight in np.linspace(0.5, 2.0, settings.settings))
-    swept = [*words, "-m", f"energy.limit_weight={values}"]
+    shared_out = [] if settings.workers == 1 else ["hydra/launcher=joblib", f"hydra.launcher.n_jobs={settings.workers}"]
+    swept = [*words, "-m", f"energy.limit_weight={values}", *shared_out]
     with TemporaryDirectory() as folder:
         for name in ("cold", "kept"):
             out = Path(folder) / name
+            programs = Path(folder) / "programs_of_sweeps"
             run = _seconds([*words, f"out={out / 'run'}"], Path(folder) / "programs_of_runs", out)
-            sweep = _seconds([*swept, f"hydra.sweep.dir={out / 'sweep'}"], Path(folder) / "programs_of_sweeps", out)
+            before = cpu_seconds()
+            sweep = _seconds([*swept, f"hydra.sweep.dir={out / 'sweep'}"], programs, out)
+            cpus, kept = cpu_seconds() - before, sum(1 for _ in programs.rglob("*-cache"))
             notes = [json.loads(path.read_text())["seconds"] for path in (out / "sweep").glob("*/run.json")]
             later = sorted(notes, key=lambda note: note[TOTAL])[:-1]
-            yield name, Taken(run, sweep, _median(later, TOTAL), _median(later, TRACKING))
+            yield name, Taken(run, sweep, _median(later, TOTAL), _median(later, TRACKING), cpus, kept)
 
 
 def _median(notes: Sequence[dict[str, float]], stage: str) -> float:

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -59,6 +60,23 @@ def test_the_motion_of_a_dog_is_found(dog):
     assert landmark_error(tracker.body, poses[-1], poses[0]) > 0.04
     assert all(r.result.converged for r in results)
     assert all((r.result.num_near <= r.capacities.near).all() for r in results)
+
+
+def test_a_step_is_lowered_for_a_gpu_with_the_shapes_that_it_has_here(dog):
+    tracker, poses, frames = dog
+    capacities = Capacities(1024, 1024, 1024)
+    given = (tracker, TrackState.from_pose(jnp.asarray(poses[0])), jnp.asarray(frames[0]))
+    arrays, others = eqx.partition(given, eqx.is_array)
+
+    def step(arrays):
+        tracker, state, cells = eqx.combine(arrays, others)
+        return tracker.step(state, cells, capacities)
+
+    lowered = jax.jit(step).trace(arrays).lower(lowering_platforms=("cuda",))
+    state, result = lowered.out_info
+    assert state.previous.shape == result.pose.shape == poses[0].shape
+    assert result.num_near.shape == (len(frames[0]),)
+    assert result.images.means.shape == (len(frames[0]), capacities.near, 2)
 
 
 @pytest.mark.slow

@@ -26,7 +26,8 @@ def ambient(normals: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
     """Light from all around, more of it from above, and the faint second lamp."""
     share = (0.5 + 0.5 * normals[:, 2:]).astype(np.float32)
     fill = np.maximum(normals @ _FILL, 0.0).astype(np.float32)
-    return _GROUND + share * (_SKY - _GROUND) + fill[:, None] * _FILL_COLOR
+    share, colors = share[:, 0], zip(_GROUND, _SKY - _GROUND, _FILL_COLOR, strict=True)
+    return np.stack([ground + share * more + fill * filled for ground, more, filled in colors], -1)
 
 
 def direct(normals: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:

@@ -44,9 +44,12 @@ def value_noise(uv: Coordinates, seed: int) -> Float[np.ndarray, "n"]:
     share = share * share * (3.0 - 2.0 * share)
     x0, y0 = cell[:, 0] & 255, cell[:, 1] & 255
     x1, y1 = (x0 + 1) & 255, (y0 + 1) & 255
-    top = lattice[x0, y0] + share[:, 0] * (lattice[x1, y0] - lattice[x0, y0])
-    bottom = lattice[x0, y1] + share[:, 0] * (lattice[x1, y1] - lattice[x0, y1])
-    return top + share[:, 1] * (bottom - top)
+    along, across = np.ascontiguousarray(share.T)
+    at = lambda x, y: np.take(lattice, 256 * x + y, mode="clip")
+    first, second = at(x0, y0), at(x0, y1)
+    top = first + along * (at(x1, y0) - first)
+    bottom = second + along * (at(x1, y1) - second)
+    return top + across * (bottom - top)
 
 
 def _plain(uv: Coordinates, palette: Palette, period: float, seed: int) -> Colors:

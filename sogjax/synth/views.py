@@ -101,13 +101,18 @@ class Sensor:
         self, picture: Float[np.ndarray, "row column 3"], rng: np.random.Generator
     ) -> UInt8[np.ndarray, "row column 3"]:
         """The picture as recorded, BGR."""
-        values = srgb_from_linear(picture[..., ::-1] * self.gain[::-1].astype(np.float32)) * np.float32(255.0)
+        rows = picture.reshape(len(picture), -1) * np.tile(self.gain.astype(np.float32), picture.shape[1])
+        values = np.ascontiguousarray(srgb_from_linear(rows.reshape(picture.shape))[..., ::-1])
+        values *= np.float32(255.0)
         if self.noise > 0.0:
             bank = _noise_bank(self.seed)
             first = int(rng.integers(len(bank)))
-            noise = np.take(bank, np.arange(first, first + values.size), mode="wrap")
+            noise = bank[first : first + values.size]
+            if len(noise) < values.size:
+                noise = np.resize(np.roll(bank, -first), values.size)
             values += np.float32(255.0 * self.noise) * noise.reshape(values.shape)
-        return np.clip(values + 0.5, 0.0, 255.0).astype(np.uint8)
+        values += np.float32(0.5)
+        return np.clip(values, 0.0, 255.0, out=values).astype(np.uint8)
 
 
 @cache
