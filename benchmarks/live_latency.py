@@ -104,8 +104,9 @@ def beside(states: Sequence[LiveState], offline: Motion, num_frames: int) -> str
     names = offline.joint_names.tolist()
     exchanged = np.zeros(len(found), bool)
     for end in ("wrist", "ankle"):
-        if {f"left_{end}", f"right_{end}"} <= set(names):
-            left, right = names.index(f"left_{end}"), names.index(f"right_{end}")
+        sides = [[k for k, name in enumerate(names) if name.startswith(f"{side}_{end}")] for side in ("left", "right")]
+        if all(sides):
+            left, right = (found_joints[-1] for found_joints in sides)
             apart = np.linalg.norm(known[:, left] - known[:, right], axis=-1)
             as_is = np.linalg.norm(live[:, [left, right]] - known[:, [left, right]], axis=-1).sum(axis=1)
             otherwise = np.linalg.norm(live[:, [right, left]] - known[:, [left, right]], axis=-1).sum(axis=1)

@@ -5,7 +5,8 @@
 Each calculation takes turns with the reference workload, in one thread, and the least CPU time of each counts: what
 else the machine does changes both alike, if at all. Where a ratio of the two is more than 20 % above that in
 `small.json`, it is measured again; where it stays, that is said, and the exit status is 1. `renew` writes the file
-anew, as is due after a change that is meant, or on another kind of processor.
+anew, as is due after a change that is meant. On another kind of processor than the file's the ratios are printed, and
+nothing fails.
 """
 
 import json
@@ -57,9 +58,26 @@ def main() -> None:
     works, reference = calculations(), reference_workload()
     if settings.renew:
         ratios = {name: ratio(work, reference) for name, work in works.items()}
-        write_file(BASELINE, json.dumps({"machine": machine_line(), "ratios": ratios}, indent=1) + "\n")
+        known = {"machine": machine_line(), "processor": processor(), "ratios": ratios}
+        write_file(BASELINE, json.dumps(known, indent=1) + "\n")
         return
-    sys.exit(compare(works, reference, json.loads(BASELINE.read_text(encoding="utf-8"))["ratios"]))
+    before = json.loads(BASELINE.read_text(encoding="utf-8"))
+    slower = compare(works, reference, before["ratios"])
+    if slower and processor() != before["processor"]:
+        print(
+            f"the baseline is of another processor ({before['processor']}, this is {processor()}): nothing is concluded"
+        )
+        return
+    sys.exit(slower)
+
+
+def processor() -> str:
+    """Maker, family and model of the processor: ratios of others differ."""
+    path = Path("/proc/cpuinfo")
+    text = path.read_text(encoding="utf-8") if path.is_file() else ""
+    found = dict(line.split(":", 1) for line in text.splitlines() if ":" in line)
+    named = {key.strip(): value.strip() for key, value in found.items()}
+    return " ".join(named.get(key, "unknown") for key in ("vendor_id", "cpu family", "model"))
 
 
 def calculations() -> dict[str, Work]:
