@@ -181,13 +181,3 @@ def test_pictures_of_example_poses_show_the_empty_scene_outside_of_their_masks(w
         assert not camera.known[: len(camera.known) // 2].any()
         shown = cv2.resize(plates[name], camera.known.shape[::-1], interpolation=cv2.INTER_AREA)
         assert np.abs(camera.picture.astype(int) - shown)[camera.known].mean() < 3.0
-
-
-def test_cameras_without_a_plate_are_said_and_the_others_keep_theirs(walk, tmp_path, capsys):
-    folder = tmp_path / "some"
-    shutil.copytree(walk, folder)
-    first = sorted((folder / "background").iterdir())[0]
-    first.unlink()
-    found = background_of(open_recording(folder))
-    assert f"the background of {first.stem}" in capsys.readouterr().err
-    assert all(camera.known.all() for camera in found.cameras[1:])

@@ -85,7 +85,7 @@ class Background:
 def learn_background(clip: Clip, choice: str, cache: str | None = None, more: Sequence[SampleKind] = ()) -> Background:
     """The background of every camera, as `images.background` asks for.
 
-    With `auto`, photographs count, and the clip for cameras without one, if it is suitable; where it leaves much open,
+    With `auto`, photographs count if every camera has one, else the clip, if it is suitable; where it leaves much open,
     photographs of example poses fill it outside of their masks.
 
     Args:
@@ -109,7 +109,7 @@ def learn_background(clip: Clip, choice: str, cache: str | None = None, more: Se
         )
     if choice == "none":
         return Background(None, "images.background=none")
-    if choice == "pictures" or (choice == "auto" and recording.background):
+    if choice == "pictures" or (choice == "auto" and not missing):
         return _of_plates(clip, choice, cache, more)
     learnt = _of_clip(clip, cache, more)
     if choice == "auto":
@@ -135,8 +135,7 @@ def _of_plates(clip: Clip, choice: str, cache: str | None, more: Sequence[Sample
 
     def of_plates() -> Background:
         plates = fitted_plates(clip, more)
-        without = [name for name in recording.rig.names if name not in plates]
-        unfit = [*say_plates(clip, plates, choice), *without]
+        unfit = say_plates(clip, plates, choice)
         known = {name: BackgroundImage.from_plate(plate) for name, plate in plates.items() if name not in unfit}
         learnt = _of_clip(clip, cache, ()).cameras if unfit else None
         for k, name in enumerate(recording.rig.names):

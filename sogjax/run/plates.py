@@ -91,7 +91,8 @@ def with_example_plates(
 ) -> tuple[tuple[BackgroundImage, ...] | None, float]:
     """The background with what photographs of example poses show of the empty scene, where it is not known else.
 
-    Only pictures with masks count, as far as they agree with the clip. Also returns what part of the pictures they
+    Only pictures with masks count, as far as they agree with the clip; where no background is given, every camera must
+    have one. Also returns what part of the pictures they
     add; with nothing to add, what was given comes back.
 
     Raises:
@@ -113,7 +114,8 @@ def with_example_plates(
         found = tuple(pool.map(filled, range(len(shown))))
     known = lambda cameras: float(np.mean([camera.known.mean() for camera in cameras]))
     added = known(found) - (known(given) if given else 0.0)
-    return (found, added) if added else (given, 0.0)
+    enough = given is not None or all(camera.known.any() for camera in found)
+    return (found, added) if added and enough else (given, 0.0)
 
 
 def _nothing(recording: Recording, camera: str) -> BackgroundImage:
