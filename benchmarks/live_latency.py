@@ -5,7 +5,7 @@ python benchmarks/live_latency.py recording=FOLDER actor=FILE [cameras=[2,4]] [s
 
 The recording is replayed at its own rate, with the first cameras of it and with pictures made smaller. It prints the
 table of docs/performance.md. Two cores of a larger machine: taskset -c 0,1 python ... With `offline`, a motion of the
-same recording and actor from `sogjax track both_ways=false`, each row says how far the joints are from it, and in how
+same recording and actor from `sogjax track tracking.both_ways=false`, each row says how far the joints are from it, and in how
 many frames an arm or leg is where the other one is there.
 """
 
@@ -106,7 +106,7 @@ def beside(states: Sequence[LiveState], offline: Motion, num_frames: int) -> str
     for end in ("wrist", "ankle"):
         sides = [[k for k, name in enumerate(names) if name.startswith(f"{side}_{end}")] for side in ("left", "right")]
         if all(sides):
-            left, right = (found_joints[-1] for found_joints in sides)
+            left, right = (of_side[-1] for of_side in sides)
             apart = np.linalg.norm(known[:, left] - known[:, right], axis=-1)
             as_is = np.linalg.norm(live[:, [left, right]] - known[:, [left, right]], axis=-1).sum(axis=1)
             otherwise = np.linalg.norm(live[:, [right, left]] - known[:, [left, right]], axis=-1).sum(axis=1)

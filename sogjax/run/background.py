@@ -156,7 +156,7 @@ def _with_examples(clip: Clip, learnt: Background) -> Background:
     if not added:
         return learnt
     say(f"pictures of example poses, outside of their masks, show {added:.0%} more of the empty scene")
-    return Background(cameras, learnt.reason)
+    return Background(cameras)
 
 
 def said_if_none(clip: Clip, choice: str, background: Background) -> Background:

@@ -92,8 +92,7 @@ def with_example_plates(
     """The background with what photographs of example poses show of the empty scene, where it is not known else.
 
     Only pictures with masks count, as far as they agree with the clip; where no background is given, every camera must
-    have one. Also returns what part of the pictures they
-    add; with nothing to add, what was given comes back.
+    have one. Also returns what part of the pictures they add; with nothing to add, what was given comes back.
 
     Raises:
         InputError: a picture, mask or video cannot be read.
@@ -119,6 +118,7 @@ def with_example_plates(
 
 
 def _nothing(recording: Recording, camera: str) -> BackgroundImage:
+    """A background that photographs will fill: not one to learn again from a clip that is unsuitable."""
     return replace(BackgroundImage.nothing(*working_size(*recording.rig.image_size(camera))), origin="picture")
 
 
