@@ -5,8 +5,8 @@ python benchmarks/live_latency.py recording=FOLDER actor=FILE [cameras=[2,4]] [s
 
 The recording is replayed at its own rate, with the first cameras of it and with pictures made smaller. It prints the
 table of docs/performance.md. Two cores of a larger machine: taskset -c 0,1 python ... With `offline`, a motion of the
-same recording and actor from `sogjax track tracking.both_ways=false`, each row says how far the joints are from it, and in how
-many frames an arm or leg is where the other one is there.
+same recording and actor (`sogjax track tracking.both_ways=false outputs.filter=null`), each row says how far the joints
+are from it, and in how many frames an arm or leg is where the other one is there.
 """
 
 import os
