@@ -1,7 +1,7 @@
 """How late does a pose come after its pictures, by number of cameras and their size?
 
 python benchmarks/live_latency.py recording=FOLDER actor=FILE [cameras=[2,4]] [scales=[1.0,0.5]] [seconds=30]
-    [offline=motion.npz] [faults={drop:0.05,delay:{1:0.08},gone:{13:[10,12]},seed:1}]
+    [offline=motion.npz] ["faults={drop: 0.05, delay: {1: 0.08}, gone: {13: [10, 12]}, seed: 1}"]
 
 The recording is replayed at its own rate, with the first cameras of it and with pictures made smaller. It prints the
 table of docs/performance.md. Two cores of a larger machine: taskset -c 0,1 python ... With `offline`, a motion of the
