@@ -15,6 +15,7 @@ from sogjax.scene.background import BackgroundImage
 from sogjax.scene.background_difference import working_size
 from sogjax.scene.clip_background import FEWEST_SAMPLES, MOST_SAMPLES, SampledCamera, learnt_background, moves, shaking
 from sogjax.scene.moving_zone import moving_zones
+from sogjax.scene.still_zone import still_zones
 
 MOST_BYTES = 2**30
 """Bytes of samples in memory; beyond, fewer frames are looked at."""
@@ -71,7 +72,11 @@ def learnt_from(
         spans = range(min(len(one.movements) for one in sampled.values()))
         movements = [{k: one.movements[span] for k, one in sampled.items()} for span in spans]
         zones = moving_zones(movements, cameras, axis_vector(recording.up))
-        of_one = lambda k: learnt_background(sampled[k], zones[k], (left_out or {}).get(names[k]))
+        still: dict[int, Bool[np.ndarray, "rows columns"]] = {}
+        if left_out is None and np.mean([zone.mean() for zone in zones.values()]) > MUCH_UNKNOWN:
+            moving = {k: np.any(one.movements, axis=0) for k, one in sampled.items()}
+            still = still_zones(zones, moving, {k: one.even.reference for k, one in sampled.items()}, cameras)
+        of_one = lambda k: learnt_background(sampled[k], zones[k], still.get(k), (left_out or {}).get(names[k]))
         learnt = dict(zip(sampled, pool.map(of_one, sampled), strict=True))
     _say_unknown(recording, 1.0 - float(np.mean([background.known.mean() for background in learnt.values()])))
     nothing = lambda name: BackgroundImage.nothing(*working_size(*recording.rig.image_size(name)))

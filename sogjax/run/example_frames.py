@@ -19,11 +19,12 @@ from sogjax.run.example_people import (
     LIGHT,
     OTHERWISE,
     has_plates,
+    most_seen,
     num_people_seen,
     people_examples,
     told_by_name,
 )
-from sogjax.run.sampled_masks import masks_of_samples
+from sogjax.run.sampled_masks import SampledMasks, masks_of_samples
 from sogjax.run.terminal import say
 from sogjax.scene.background import BackgroundImage
 
@@ -132,8 +133,14 @@ def _need_background(recording: Recording) -> bool:
 
 
 def _person_examples(clip: Clip, learnt: Sequence[BackgroundImage]) -> tuple[ExamplePose, ...]:
-    recording, shapes = clip.recording, seen_shapes(clip, learnt)
-    if (problem := unsuitable(shapes, lambda: num_people_seen(clip, learnt), has_plates(recording))) is not None:
+    recording, seen = clip.recording, masks_of_samples(clip, learnt)
+    shapes = seen_shapes(seen, recording.up)
+    problem = unsuitable(shapes, lambda: num_people_seen(clip, learnt), has_plates(recording))
+    if problem is not None and any(unknown.any() for unknown in seen.unknown.values()):
+        decided = seen_shapes(seen.decided(), recording.up)
+        if unsuitable(decided, lambda: most_seen([shape.num_bodies for shape in decided])) is None:
+            shapes, problem = decided, None
+    if problem is not None:
         raise _no_examples(recording, problem)
     chosen = spread_choice([shape for shape in shapes if shape.agreement > AGREEING], NUM_TRIED)
     _say_chosen([shape.frame for shape in chosen], len(shapes))
@@ -214,12 +221,11 @@ def most_helpful(chosen: Sequence[SeenShape], num_cameras: int, plates: bool = F
     return "pictures of a T-pose, of bent elbows and of a squat (example_poses/POSE/CAMERA.jpg)"
 
 
-def seen_shapes(clip: Clip, learnt: Sequence[BackgroundImage]) -> list[SeenShape]:
+def seen_shapes(seen: SampledMasks, up: str) -> list[SeenShape]:
     """What frames spread over the videos show, where somebody is seen."""
-    seen, up = masks_of_samples(clip, learnt), axis_vector(clip.recording.up)
     cubes = subject_cubes(seen.masks, seen.cameras)
     shapes = [
-        seen_shape(frame, masks, seen.unknown, seen.cameras, cube, up)
+        seen_shape(frame, masks, seen.unknown, seen.cameras, cube, axis_vector(up))
         for frame, masks, cube in zip(seen.frames, seen.masks, cubes, strict=True)
         if cube is not None
     ]

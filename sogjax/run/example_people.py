@@ -63,7 +63,12 @@ def people_examples(
     clip: Clip, learnt: Sequence[BackgroundImage], actors: int, count: int
 ) -> tuple[ExamplePose, ...] | str:
     """At most `count` frames as example poses of each of several people, or why there are none, with the remedy."""
-    return examples_of_masks(clip.recording, masks_of_samples(clip, learnt, LIGHT), actors, count)
+    seen = masks_of_samples(clip, learnt, LIGHT)
+    examples = examples_of_masks(clip.recording, seen, actors, count)
+    if not isinstance(examples, str) or not any(unknown.any() for unknown in seen.unknown.values()):
+        return examples
+    second = examples_of_masks(clip.recording, seen.decided(), actors, count)
+    return examples if isinstance(second, str) else second
 
 
 def examples_of_masks(

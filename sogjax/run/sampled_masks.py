@@ -2,7 +2,8 @@
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 
 import cv2
 import equinox as eqx
@@ -13,13 +14,14 @@ from jaxtyping import Float, UInt8
 from sogjax.actor.frame_choice import Mask
 from sogjax.io.painted import painted_masks
 from sogjax.io.recording import Recording
+from sogjax.io.threads import usable_cores
 from sogjax.model.camera import Camera
 from sogjax.run.clip import Clip, SampleKind, cell_grids, spread_frames
 from sogjax.scene.background import BackgroundImage, stack_background
 from sogjax.scene.cells import CellGrid
 from sogjax.scene.foreground import SHADOW, BackgroundModel, log_odds
 from sogjax.scene.occluders import painted
-from sogjax.scene.segmentation import largest_parts
+from sogjax.scene.segmentation import largest_parts, unlike_the_room
 from sogjax.scene.visual_hull import resized
 
 MOST_LOOKED_AT = 40
@@ -46,6 +48,16 @@ class SampledMasks:
     cameras: dict[int, Camera]
     """The cameras, for pictures of the masks' size."""
     grids: tuple[CellGrid, ...]
+
+    def decided(self) -> "SampledMasks":
+        """The same without anything unknown: there, what looks unlike the room around it is not the background."""
+        frames = [(frame, camera) for frame in range(len(self.frames)) for camera in self.masks[frame]]
+        cut = lambda at: unlike_the_room(self.pictures[at[0]][at[1]], self.unknown[at[1]], self.masks[at[0]][at[1]])
+        with ThreadPoolExecutor(usable_cores()) as pool:
+            masks: list[dict[int, Mask]] = [{} for _ in self.frames]
+            for (frame, camera), mask in zip(frames, pool.map(cut, frames), strict=True):
+                masks[frame][camera] = largest_parts(mask)
+        return replace(self, masks=masks, unknown={k: np.zeros_like(mask) for k, mask in self.unknown.items()})
 
 
 def mask_samples(recording: Recording, frames: Sequence[int] | None = None) -> SampleKind:

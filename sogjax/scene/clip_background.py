@@ -115,7 +115,9 @@ class SampledCamera:
         return cls(tuple(images), even, noise, tolerance, moving)
 
 
-def learnt_background(camera: SampledCamera, zone: Mask, left_out: Mapping[int, Mask] | None = None) -> BackgroundImage:
+def learnt_background(
+    camera: SampledCamera, zone: Mask, still: Mask | None = None, left_out: Mapping[int, Mask] | None = None
+) -> BackgroundImage:
     """The background of one camera.
 
     Outside of the zone it is the mean of all samples. Inside it is what was uncovered: a colour that at least
@@ -124,6 +126,7 @@ def learnt_background(camera: SampledCamera, zone: Mask, left_out: Mapping[int, 
     Args:
         camera: its samples.
         zone: where the subject may stand (`moving_zones`).
+        still: where in it what never changes may be the subject (`still_zones`); None: everywhere.
         left_out: by frame where the tracked body is, widened; these pixels are not looked at. Everything else then
             is background, wherever enough samples agree.
     """
@@ -140,7 +143,8 @@ def learnt_background(camera: SampledCamera, zone: Mask, left_out: Mapping[int, 
                 usable[k] = ~left_out[frame][zone]
         modes = modes_of(samples, usable, camera.tolerance[zone])
         if left_out is None:
-            chosen = grown(modes, zone, picture, camera.tolerance, FEWEST_AGREEING)
+            hidden = np.ones_like(zone) if still is None else still
+            chosen = grown(modes, zone, hidden, picture, camera.tolerance, FEWEST_AGREEING)
         else:
             chosen = np.where(modes.counts[0] >= FEWEST_AGREEING, 0, -1)
         pick = np.maximum(chosen, 0)

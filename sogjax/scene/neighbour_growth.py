@@ -100,6 +100,7 @@ _STEPS = [(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)]
 def grown(
     modes: Modes,
     zone: Bool[np.ndarray, "rows columns"],
+    still: Bool[np.ndarray, "rows columns"],
     picture: Float[np.ndarray, "rows columns 3"],
     tolerance: UInt8[np.ndarray, "rows columns"],
     fewest: int,
@@ -111,11 +112,14 @@ def grown(
     Args:
         modes: of the pixels of the zone.
         zone: the background is known around it.
+        still: where in it a colour that is always there may be the subject's; elsewhere it is the background.
         picture: the background there.
         tolerance: for each pixel, the step of colour up to which it may show the same thing as its neighbour.
         fewest: samples that must show a colour.
     """
     field = _Field(modes, zone, picture, fewest)
+    always = np.flatnonzero((modes.counts[0] == modes.members.shape[1]) & ~still[field.rows, field.columns])
+    field.take(always, np.zeros(len(always), int))
     front = field.beside_known()
     while len(front):
         cost = field.costs(front)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -9,6 +10,7 @@ from jaxtyping import Bool, Float, UInt8
 
 from sogjax.model.camera import Camera
 from sogjax.scene.background_difference import (
+    CHANGED,
     Difference,
     background_difference,
     closed,
@@ -26,6 +28,8 @@ SMALLEST_SHARE = 1e-3
 SMALLEST_PART = 0.1
 """Parts of a mask smaller than this share of the largest one are dropped."""
 GRAB_CUT_ITERATIONS = 2
+COARSE_SIDE = 324
+"""Longer side, in pixels, of pictures of which only a rough outline is wanted."""
 UNCHANGED = 3.0
 """Squared differences, in units of the noise, below which a pixel is certainly background."""
 
@@ -58,7 +62,7 @@ def masks_from_backgrounds(
         Masks by camera; a camera is absent if no subject could be told apart from its background.
     """
     with ThreadPoolExecutor() as pool:
-        compare = lambda k: background_difference(images[k], backgrounds[k], (unknown or {}).get(k))
+        compare = lambda k: _decided(background_difference(images[k], backgrounds[k], (unknown or {}).get(k)))
         found = pool.map(compare, backgrounds)
         differences = dict(zip(backgrounds, found, strict=True))
         guesses = {camera: first_guess(difference) for camera, difference in differences.items()}
@@ -76,6 +80,21 @@ def first_guess(difference: Difference) -> Bool[np.ndarray, "rows columns"]:
     return largest_parts(different | (without_holes(different) & difference.changed))
 
 
+def _decided(difference: Difference) -> Difference:
+    """The difference, in which what is unlike the room is different, where more is unknown than seems the subject."""
+    guess = first_guess(difference)
+    if difference.unknown.sum() <= guess.sum():
+        return difference
+    subject = largest_parts(unlike_the_room(difference.image, difference.unknown, guess))
+    return replace(
+        difference,
+        change=np.where(difference.unknown, np.where(subject, CHANGED, 0.0), difference.change),
+        changed=difference.changed | subject,
+        different=difference.different | subject,
+        unknown=np.zeros_like(subject),
+    )
+
+
 def cut_out(difference: Difference, guess: Mask, hull: Mask | None = None) -> Mask:
     """A guess with its outline corrected by OpenCV's grabCut, in the box around it.
 
@@ -83,22 +102,45 @@ def cut_out(difference: Difference, guess: Mask, hull: Mask | None = None) -> Ma
     floor are as unknown as it, and only their colours tell them from it.
     """
     unknown = np.zeros_like(guess) if hull is None else difference.unknown & hull
-    rows, columns = np.nonzero(guess | unknown)
+    box = _box_around(guess | unknown)
+    labels = _labels(guess[box], difference.change[box], difference.unexplained[box], unknown[box])
+    cut = np.zeros_like(guess)
+    cut[box] = largest_parts(_grab_cut(difference.image[box], labels))
+    return cut
+
+
+def _box_around(mask: Mask) -> tuple[slice, slice]:
+    """The part of a picture that holds a mask, with some of what is around it."""
+    rows, columns = np.nonzero(mask)
     border = 12 + int(0.08 * max(np.ptp(rows), np.ptp(columns)))
-    box = (
+    return (
         slice(max(rows.min() - border, 0), rows.max() + border),
         slice(max(columns.min() - border, 0), columns.max() + border),
     )
-    labels = _labels(guess[box], difference.change[box], difference.unexplained[box], unknown[box])
+
+
+def _grab_cut(picture: UInt8[np.ndarray, "_h _w 3"], labels: UInt8[np.ndarray, "_h _w"]) -> Mask:
+    """The subject by OpenCV's grabCut, which needs both: a box without background is one that the subject fills."""
     subject = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
-    if subject.all():  # grabCut needs both; a box without background is one that the subject fills
-        return guess
+    if subject.all() or not subject.any():
+        return subject
     cv2.setRNGSeed(0)  # its clusters start at random; a mask must not change from run to run
-    crop, model = np.ascontiguousarray(difference.image[box]), lambda: np.zeros((1, 65))
+    crop, labels, model = np.ascontiguousarray(picture), labels.copy(), lambda: np.zeros((1, 65))
     cv2.grabCut(crop, labels, (0, 0, 1, 1), model(), model(), GRAB_CUT_ITERATIONS, cv2.GC_INIT_WITH_MASK)
-    cut = np.zeros_like(guess)
-    cut[box] = largest_parts(np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD)))
-    return cut
+    return np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
+
+
+def unlike_the_room(picture: UInt8[np.ndarray, "_h _w 3"], unknown: Mask, subject: Mask | None = None) -> Mask:
+    """The subject and what is unlike the room around it where the background is unknown, by OpenCV's grabCut."""
+    subject = np.zeros_like(unknown) if subject is None else subject
+    scale = min(COARSE_SIDE / max(unknown.shape), 1.0)
+    size = (round(scale * unknown.shape[1]), round(scale * unknown.shape[0]))
+    small = lambda mask: cv2.resize(mask.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
+    labels = np.where(small(unknown), cv2.GC_PR_FGD, cv2.GC_BGD).astype(np.uint8)
+    labels[small(subject)] = cv2.GC_FGD
+    cut = _grab_cut(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), labels)
+    cut = cv2.resize(cut.astype(np.uint8), unknown.shape[::-1], interpolation=cv2.INTER_NEAREST) > 0
+    return subject | (cut & unknown)
 
 
 def largest_parts(mask: Bool[np.ndarray, "rows columns"]) -> Bool[np.ndarray, "rows columns"]:
