@@ -39,6 +39,15 @@ def color_distance(a: BroadcastColors, b: BroadcastColors, space: str) -> Float[
     return jnp.where(positive, jnp.sqrt(jnp.where(positive, squared, 1.0)), 0.0)
 
 
+def distance_from_box(
+    color: BroadcastColors, low: BroadcastColors, high: BroadcastColors, space: str
+) -> Float[Array, "*#batch"]:
+    """The least that `color_distance` can be between a colour and any within a box; in `hsv` of any hue."""
+    outside = jnp.maximum(jnp.maximum(low - color, color - high), 0.0)
+    channels = range(1 if space == "hsv" else 0, 3)
+    return jnp.sqrt(sum((outside[..., k] ** 2 for k in channels[1:]), outside[..., channels[0]] ** 2))
+
+
 def color_similarity(
     a: BroadcastColors, b: BroadcastColors, space: str, color_radius: Float[Array, ""]
 ) -> Float[Array, "*#batch"]:

@@ -15,7 +15,7 @@ from sogjax.energy.overlap import pair_color_similarities
 from sogjax.energy.views import Windows, windows_around
 from sogjax.errors import InputError
 from sogjax.model.camera import Camera, project
-from sogjax.model.color import averaging_space, convert, from_rgb
+from sogjax.model.color import averaging_space, color_distance, convert, from_rgb
 from sogjax.model.compiled import stage_barrier
 from sogjax.model.sog import Sog
 from sogjax.scene.foreground import BackgroundModel, SubjectColors, foreground_weights, log_odds
@@ -227,8 +227,25 @@ class ImageReader(eqx.Module):
             return similarities if weights.foreground is None else similarities * weights.foreground[None, :]
 
         similarities = stage_barrier(self.true_at_run_time, jax.vmap(compare), near, weights, depths)
-        mask = near.mask & jnp.any(similarities > 0.0, axis=1)
+        alike = jax.vmap(self._alike, in_axes=(0, None, 0, 0))
+        mask = near.mask & stage_barrier(self.true_at_run_time, alike, near, body, weights, depths)
         return eqx.tree_at(lambda sog: sog.mask, near, mask), similarities, jnp.sum(mask, axis=1)
+
+    def _alike(
+        self, image: Sog, body: Sog, weights: BlobWeights, depths: Float[Array, "body"] | None
+    ) -> Bool[Array, "image"]:
+        """Which image blobs resemble a blob of the body that is not hidden there; without the similarities of all."""
+        channels = [image.colors[:, k] for k in range(3)]
+
+        def or_alike(blob: Int[Array, ""], found: Bool[Array, "image"]) -> Bool[Array, "image"]:
+            distance = color_distance(jnp.stack(channels, axis=-1), body.colors[blob][None], self.color_space)
+            alike = distance < self.color_radius
+            if weights.hidden_from is not None and depths is not None:
+                alike &= depths[blob] < weights.hidden_from
+            return found | alike
+
+        found = jax.lax.fori_loop(0, body.capacity, or_alike, jnp.zeros_like(image.mask))
+        return found if weights.foreground is None else found & (weights.foreground > 0.0)
 
 
 def _color_planes(
