@@ -15,7 +15,7 @@ from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, Float, Int
 
 from sogjax.energy.pairs import TILE, SparsePairs
-from sogjax.model.color import color_similarity, from_rgb
+from sogjax.model.color import color_similarity, distance_of_planes, from_rgb, wendland
 from sogjax.model.sog import Sog
 
 
@@ -45,12 +45,11 @@ class Coloring(eqx.Module):
         slots = jnp.arange(TILE, dtype=tile_index.dtype)[:, None]
         places = tile_index[None, :] * TILE + slots
         of_image = lambda values: jnp.pad(values, ((0, 0), (0, extra))).reshape(-1)[places][None]
-        similarities = color_similarity(
-            images.colors.reshape(-1, 3)[places][None],
-            self.body_colors[body_index % count][:, None],
-            self.space,
-            self.radius,
-        )
+        of_body = body_index % count
+        apart = [
+            images.colors[..., k].reshape(-1)[places][None] - self.body_colors[:, k][of_body][:, None] for k in range(3)
+        ]
+        similarities = wendland(distance_of_planes(apart, self.space) / self.radius)
         if self.depths is not None and self.hidden_from is not None:
             shown = self.depths.reshape(-1)[body_index][:, None] < of_image(self.hidden_from)
             similarities = jnp.where(shown, similarities, 0.0)

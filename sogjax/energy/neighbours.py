@@ -120,9 +120,10 @@ def _near(
     sigmas = extreme(image.sigmas, jnp.maximum, 0.0)
     reach = jnp.sqrt((sigmas**2 + (seen.sigmas**2)[None, :]) * (-jnp.log(NEGLIGIBLE) / exponent))
     channels = [image.colors[:, k] for k in range(3)]
-    low = jnp.stack([extreme(channel, jnp.minimum, jnp.inf) for channel in channels], axis=-1)
-    high = jnp.stack([extreme(channel, jnp.maximum, -jnp.inf) for channel in channels], axis=-1)
-    alike = distance_from_box(coloring.body_colors[None], low, high, coloring.space) < coloring.radius
+    low = [extreme(channel, jnp.minimum, jnp.inf) for channel in channels]
+    high = [extreme(channel, jnp.maximum, -jnp.inf) for channel in channels]
+    of_body = [coloring.body_colors[None, :, k] for k in range(3)]
+    alike = distance_from_box(of_body, low, high, coloring.space) < coloring.radius
     return alike & seen.mask[None, :] & (dx * dx + dy * dy < (reach + margin) ** 2)
 
 

@@ -15,7 +15,7 @@ from sogjax.energy.overlap import pair_color_similarities
 from sogjax.energy.views import Windows, windows_around
 from sogjax.errors import InputError
 from sogjax.model.camera import Camera, project
-from sogjax.model.color import averaging_space, color_distance, convert, from_rgb
+from sogjax.model.color import averaging_space, convert, distance_of_planes, from_rgb
 from sogjax.model.compiled import stage_barrier
 from sogjax.model.sog import Sog
 from sogjax.scene.foreground import BackgroundModel, SubjectColors, foreground_weights, log_odds
@@ -235,16 +235,18 @@ class ImageReader(eqx.Module):
         self, image: Sog, body: Sog, weights: BlobWeights, depths: Float[Array, "body"] | None
     ) -> Bool[Array, "image"]:
         """Which image blobs resemble a blob of the body that is not hidden there; without the similarities of all."""
-        channels = [image.colors[:, k] for k in range(3)]
 
-        def or_alike(blob: Int[Array, ""], found: Bool[Array, "image"]) -> Bool[Array, "image"]:
-            distance = color_distance(jnp.stack(channels, axis=-1), body.colors[blob][None], self.color_space)
-            alike = distance < self.color_radius
+        def or_alike(blob: Int[Array, ""], state: tuple[Array, ...]) -> tuple[Array, ...]:
+            found, *planes = state
+            apart = [plane - body.colors[blob, k] for k, plane in enumerate(planes)]
+            alike = distance_of_planes(apart, self.color_space) < self.color_radius
             if weights.hidden_from is not None and depths is not None:
                 alike &= depths[blob] < weights.hidden_from
-            return found | alike
+            return found | alike, *planes
 
-        found = jax.lax.fori_loop(0, body.capacity, or_alike, jnp.zeros_like(image.mask))
+        # In the state, planes lie apart; a loop reads what it closes over as it is, colour by colour.
+        planes = [image.colors[:, k] for k in range(3)]
+        found, *_ = jax.lax.fori_loop(0, body.capacity, or_alike, (jnp.zeros_like(image.mask), *planes))
         return found if weights.foreground is None else found & (weights.foreground > 0.0)
 
 
