@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.energy.coloring import Coloring
-from sogjax.energy.pairs import MEMBERS, TILE, SparsePairs, image_quantities
+from sogjax.energy.pairs import CHUNK, MEMBERS, TILE, SparsePairs, image_quantities
 from sogjax.model.camera import Camera, project
 from sogjax.model.color import distance_from_box
 from sogjax.model.compiled import chosen_indices, stage_barrier
@@ -56,7 +56,7 @@ def near_pairs(
 
     A count above `capacity` means that blocks were cut off: the caller must look at it and try a larger capacity.
     """
-    images = _whole_tiles(images)
+    images, capacity = _whole_tiles(images), -(-capacity // CHUNK) * CHUNK
     (num_cameras, num_bodies), num_images = seen.sigmas.shape, images.capacity
     running = margin[0] > 0.0
     flags = stage_barrier(running, _flags, images, coloring, seen, margin, exponent)
@@ -71,8 +71,9 @@ def near_pairs(
     similarities = jax.lax.stop_gradient(stage_barrier(running, coloring.of_listed, images, tile, body_index))
     amplitudes = jnp.where(real[:, None, :], similarities * scale[None], 0.0)
     image_shape, body_shape = (num_cameras, num_images), (num_cameras, num_bodies)
-    pairs = SparsePairs(x[None], y[None], variances[None], amplitudes, tile, body_index, image_shape, body_shape)
-    return pairs, count // MEMBERS
+    count = count // MEMBERS
+    pairs = SparsePairs(x[None], y[None], variances[None], amplitudes, tile, body_index, count, image_shape, body_shape)
+    return pairs, count
 
 
 def _blocks_of(
