@@ -36,12 +36,17 @@ def color_distance(a: BroadcastColors, b: BroadcastColors, space: str) -> Float[
     return distance_of_planes([difference[..., k] for k in range(3)], space)
 
 
-def distance_of_planes(differences: Planes, space: str) -> Float[Array, "*batch"]:
-    """`color_distance` from the differences of the channels, each an array."""
+def squared_distance(differences: Planes, space: str) -> Float[Array, "*batch"]:
+    """The square of `color_distance` from the differences of the channels, each an array."""
     first, *others = differences
     if space == "hsv":
         first = first - jnp.round(first)
-    squared = sum((other**2 for other in others), first**2)
+    return sum((other**2 for other in others), first**2)
+
+
+def distance_of_planes(differences: Planes, space: str) -> Float[Array, "*batch"]:
+    """`color_distance` from the differences of the channels, each an array."""
+    squared = squared_distance(differences, space)
     positive = squared > 0.0
     return jnp.where(positive, jnp.sqrt(jnp.where(positive, squared, 1.0)), 0.0)
 

@@ -15,7 +15,7 @@ from sogjax.energy.overlap import pair_color_similarities
 from sogjax.energy.views import Windows, windows_around
 from sogjax.errors import InputError
 from sogjax.model.camera import Camera, project
-from sogjax.model.color import averaging_space, convert, distance_of_planes, from_rgb
+from sogjax.model.color import averaging_space, convert, from_rgb, squared_distance
 from sogjax.model.compiled import stage_barrier
 from sogjax.model.sog import Sog
 from sogjax.scene.foreground import BackgroundModel, SubjectColors, foreground_weights, log_odds
@@ -236,18 +236,20 @@ class ImageReader(eqx.Module):
     ) -> Bool[Array, "image"]:
         """Which image blobs resemble a blob of the body that is not hidden there; without the similarities of all."""
 
-        def or_alike(blob: Int[Array, ""], state: tuple[Array, ...]) -> tuple[Array, ...]:
-            found, *planes = state
+        def nearer(blob: Int[Array, ""], state: tuple[Array, ...]) -> tuple[Array, ...]:
+            least, *planes = state
             apart = [plane - body.colors[blob, k] for k, plane in enumerate(planes)]
-            alike = distance_of_planes(apart, self.color_space) < self.color_radius
+            squared = squared_distance(apart, self.color_space)
             if weights.hidden_from is not None and depths is not None:
-                alike &= depths[blob] < weights.hidden_from
-            return found | alike, *planes
+                squared = jnp.where(depths[blob] < weights.hidden_from, squared, jnp.inf)
+            return jnp.minimum(least, squared), *planes
 
         # In the state, planes lie apart; a loop reads what it closes over as it is, colour by colour.
         planes = [image.colors[:, k] for k in range(3)]
-        found, *_ = jax.lax.fori_loop(0, body.capacity, or_alike, (jnp.zeros_like(image.mask), *planes))
-        return found if weights.foreground is None else found & (weights.foreground > 0.0)
+        nowhere = jnp.full_like(image.sigmas, jnp.inf)
+        squared = jax.lax.fori_loop(0, body.capacity, nearer, (nowhere, *planes))[0]
+        alike = jnp.sqrt(squared) < self.color_radius
+        return alike if weights.foreground is None else alike & (weights.foreground > 0.0)
 
 
 def _color_planes(
