@@ -29,26 +29,33 @@ class Coloring(eqx.Module):
     weights: Float[Array, "camera image"] | None = None
     """What similarities are multiplied by, the same for all body blobs; None: 1."""
     body_colors: Float[Array, "body 3"] | None = None
-    """The colours of the body's blobs in `space`; None: unknown, and no pairs can be listed."""
+    """The colours of the body's blobs in `space`; None: unknown, so that no pairs can be listed."""
     depths: Float[Array, "camera body"] | None = None
     """Of the body's blobs (metres), where something may hide them; None: nothing does."""
     hidden_from: Float[Array, "camera image"] | None = None
     """Depth from which on a body's blobs are hidden where an image blob is; None: nothing is hidden."""
 
+    @property
+    def known_body_colors(self) -> Float[Array, "body 3"]:
+        """The colours of the body's blobs.
+
+        Raises:
+            ValueError: they are not known.
+        """
+        if self.body_colors is None:
+            raise ValueError("near pairs are listed by the colours of the body's blobs, which Coloring does not have")
+        return self.body_colors
+
     def of_listed(
         self, images: Sog, tile_index: Int[Array, "block"], body_index: Int[Array, "member block"]
     ) -> Float[Array, "member slot block"]:
         """The similarities of listed pairs (see `SparsePairs`), with their weights; image blobs fill whole tiles."""
-        if self.body_colors is None:
-            raise ValueError("the colours of the body's blobs are not known (Coloring.body_colors)")
-        count, extra = self.body_colors.shape[0], images.capacity - _num_images(self, images)
+        of_body, extra = self.known_body_colors, images.capacity - _num_images(self, images)
         slots = jnp.arange(TILE, dtype=tile_index.dtype)[:, None]
         places = tile_index[None, :] * TILE + slots
         of_image = lambda values: jnp.pad(values, ((0, 0), (0, extra))).reshape(-1)[places][None]
-        of_body = body_index % count
-        apart = [
-            images.colors[..., k].reshape(-1)[places][None] - self.body_colors[:, k][of_body][:, None] for k in range(3)
-        ]
+        body = body_index % of_body.shape[0]
+        apart = [images.colors[..., k].reshape(-1)[places][None] - of_body[:, k][body][:, None] for k in range(3)]
         similarities = wendland(distance_of_planes(apart, self.space) / self.radius)
         if self.depths is not None and self.hidden_from is not None:
             shown = self.depths.reshape(-1)[body_index][:, None] < of_image(self.hidden_from)

@@ -16,8 +16,8 @@ from sogjax.model.camera import project
 from sogjax.model.sog import Sog
 
 LANES = 64
-"""Entries along the last axis of an array that XLA on a CPU computes at once; an exponential of those that are left over
-takes six times as long."""
+"""Entries along the last axis that XLA on a CPU computes at once; an exponential of those left over takes six times as
+long."""
 
 
 class Foreground(ImageTerm):
@@ -91,7 +91,7 @@ def _whole_lanes(seen: Sog) -> Sog:
 
 
 def _exponentials(values: Float[Array, "window column row"]) -> Float[Array, "window column row"]:
-    """Exponentials along one long axis (see `LANES`); without the barrier XLA would turn it back into two short ones."""
+    """Exponentials along one long axis (see `LANES`); without the barrier XLA would make it two short ones again."""
     return jnp.exp(jax.lax.optimization_barrier(values.reshape(values.shape[0], -1))).reshape(values.shape)
 
 

@@ -123,7 +123,7 @@ def _near(
     channels = [image.colors[:, k] for k in range(3)]
     low = [extreme(channel, jnp.minimum, jnp.inf) for channel in channels]
     high = [extreme(channel, jnp.maximum, -jnp.inf) for channel in channels]
-    of_body = [coloring.body_colors[None, :, k] for k in range(3)]
+    of_body = [coloring.known_body_colors[None, :, k] for k in range(3)]
     alike = distance_from_box(of_body, low, high, coloring.space) < coloring.radius
     return alike & seen.mask[None, :] & (dx * dx + dy * dy < (reach + margin) ** 2)
 

@@ -5,6 +5,7 @@ once; what differs is how a quantity of body blobs is spread over the pairs, and
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
 import equinox as eqx
@@ -155,8 +156,8 @@ class SparsePairs(eqx.Module):
         chunks = jnp.arange(self.tile_index.shape[0] // CHUNK, dtype=self.num_blocks.dtype)
 
         def of_chunk(chunk: Int[Array, ""], pairs: SparsePairs, *values: ChunkedSlots) -> Results:
-            of_values = [jax.lax.dynamic_index_in_dim(each, chunk, keepdims=False, allow_negative_indices=False) for each in values]
-            return function(pairs._chunk(chunk), *of_values)
+            taken = partial(jax.lax.dynamic_index_in_dim, index=chunk, keepdims=False, allow_negative_indices=False)
+            return function(pairs._chunk(chunk), *map(taken, values))
 
         def one(_: None, chunk: Int[Array, ""]) -> tuple[None, Results]:
             return None, stage_barrier(chunk * CHUNK < self.num_blocks, of_chunk, chunk, self, *values)

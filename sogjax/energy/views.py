@@ -113,7 +113,8 @@ class Views(eqx.Module):
     ) -> "Views":
         """Compare the colours of a body's blobs with every image; all colours are in `space`."""
         compare = lambda image: pair_color_similarities(image, body, space, color_radius)
-        return cls(cameras, images, jax.vmap(compare)(images), normalizers, coloring=Coloring(color_radius, space, None, body.colors))
+        coloring = Coloring(color_radius, space, body_colors=body.colors)
+        return cls(cameras, images, jax.vmap(compare)(images), normalizers, coloring=coloring)
 
     def near(self, blobs: Sog, exponent: Float[Array, ""], capacity: int) -> tuple["Views", Int[Array, ""]]:
         """These views with only the pairs that matter near `blobs` (world), and how many blocks those are.

@@ -53,7 +53,8 @@ def distance_of_planes(differences: Planes, space: str) -> Float[Array, "*batch"
 
 def distance_from_box(color: Planes, low: Planes, high: Planes, space: str) -> Float[Array, "*batch"]:
     """The least that `color_distance` can be between a colour and any within a box, channel by channel."""
-    outside = [jnp.maximum(jnp.maximum(l - c, c - h), 0.0) for l, c, h in zip(low, color, high, strict=True)]
+    beyond = lambda value, low, high: jnp.maximum(jnp.maximum(low - value, value - high), 0.0)
+    outside = list(map(beyond, color, low, high))
     if space == "hsv":  # hues are on a circle
         outside[0] = jnp.zeros_like(outside[0])
     return distance_of_planes(outside, space)

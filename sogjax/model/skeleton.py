@@ -172,8 +172,8 @@ def point_jacobian(
     turning, sliding = _screws(revolute, axes, world_from_joint)
     moved = jnp.asarray(ancestor_table(parents)[np.array(joints, int)], axes.dtype)
     arms = points_world - world_from_joint[:1, :3, 3]
-    velocities = jnp.cross(turning.T[None, :, :], arms[:, :, None], axis=1) + sliding.T[None, :, :]
-    return velocities * moved[:, None, :]
+    velocities = jnp.cross(turning[None, :, :], arms[:, None, :]) + sliding[None, :, :]
+    return jnp.swapaxes(velocities * moved[:, :, None], 1, 2)
 
 
 def ancestor_table(parents: Parents) -> Bool[np.ndarray, "joint joint"]:

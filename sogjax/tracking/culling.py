@@ -217,7 +217,10 @@ class ImageReader(eqx.Module):
     def compared_blobs(
         self, near: Sog, weights: BlobWeights, body: Sog, depths: Float[Array, "camera body"] | None
     ) -> tuple[Sog, Float[Array, "camera body image"], Int[Array, "camera"]]:
-        """The near blobs in their places, those masked out that resemble no blob of the body; the same otherwise."""
+        """The near blobs in their places, those masked out that resemble no blob of the body; the same otherwise.
+
+        A program that only lists near pairs never computes the similarities: nothing else here needs them.
+        """
 
         def compare(
             image: Sog, weights: BlobWeights, depths: Float[Array, "body"] | None
@@ -234,7 +237,7 @@ class ImageReader(eqx.Module):
     def _alike(
         self, image: Sog, body: Sog, weights: BlobWeights, depths: Float[Array, "body"] | None
     ) -> Bool[Array, "image"]:
-        """Which image blobs resemble a blob of the body that is not hidden there; without the similarities of all."""
+        """Which image blobs resemble a blob of the body that is not hidden there, blob by blob of the body."""
 
         def nearer(blob: Int[Array, ""], state: tuple[Array, ...]) -> tuple[Array, ...]:
             least, *planes = state
