@@ -14,6 +14,7 @@ from sogjax.model.color import (
     color_distance,
     color_similarity,
     convert,
+    distance_from_box,
     from_rgb,
     to_rgb,
     wendland,
@@ -68,6 +69,21 @@ def test_cylinder_and_cone_are_hsv_in_other_coordinates():
     cone = np.column_stack([(saturation * value)[:, None] * direction, value])
     np.testing.assert_allclose(forward(rgb, "hsv_cylinder"), cylinder, atol=FLOAT32)
     np.testing.assert_allclose(forward(rgb, "hsv_cone"), cone, atol=FLOAT32)
+
+
+@pytest.mark.parametrize("space", ["rgb", "hsv", "hsv_cylinder"])
+def test_no_colour_in_a_box_is_nearer_than_the_box(space):
+    """And where a box holds one colour only, it is as near as that, but for hues, which are on a circle."""
+    rng = np.random.default_rng(0)
+    color, *corners = rng.random((3, 500, 3)).astype(np.float32)
+    low, high = np.minimum(*corners), np.maximum(*corners)
+    inside = low + rng.random((500, 3)).astype(np.float32) * (high - low)
+    planes = lambda colors: [jnp.asarray(colors[:, k]) for k in range(3)]
+    least = distance_from_box(planes(color), planes(low), planes(high), space)
+    assert np.all(least <= color_distance(jnp.asarray(color), jnp.asarray(inside), space) + 1e-6)
+    if space != "hsv":
+        single = distance_from_box(planes(color), planes(inside), planes(inside), space)
+        np.testing.assert_allclose(single, np.linalg.norm(color - inside, axis=1), rtol=1e-5)
 
 
 @pytest.mark.parametrize("space", SPACES)

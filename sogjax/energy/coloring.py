@@ -1,4 +1,4 @@
-"""Derivatives of the similarities by colours, which are computed beforehand.
+"""The colours that similarities follow from: those of listed pairs, and derivatives by colours.
 
 Eq. 7 does not depend on the pose, so its values are computed once per frame and only looked up while a pose is found.
 They still are functions of the colours: differentiating by the colours of blobs, or by eps_sim, gives the derivatives
@@ -12,10 +12,10 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from sogjax.energy.pairs import TILE, SparsePairs
-from sogjax.model.color import color_similarity, from_rgb
+from sogjax.model.color import color_similarity, distance_of_planes, from_rgb, wendland
 from sogjax.model.sog import Sog
 
 
@@ -28,6 +28,45 @@ class Coloring(eqx.Module):
     """The colour space of the images; a body's colours are sRGB."""
     weights: Float[Array, "camera image"] | None = None
     """What similarities are multiplied by, the same for all body blobs; None: 1."""
+    body_colors: Float[Array, "body 3"] | None = None
+    """The colours of the body's blobs in `space`; None: unknown, so that no pairs can be listed."""
+    depths: Float[Array, "camera body"] | None = None
+    """Of the body's blobs (metres), where something may hide them; None: nothing does."""
+    hidden_from: Float[Array, "camera image"] | None = None
+    """Depth from which on a body's blobs are hidden where an image blob is; None: nothing is hidden."""
+
+    @property
+    def known_body_colors(self) -> Float[Array, "body 3"]:
+        """The colours of the body's blobs.
+
+        Raises:
+            ValueError: they are not known.
+        """
+        if self.body_colors is None:
+            raise ValueError("near pairs are listed by the colours of the body's blobs, which Coloring does not have")
+        return self.body_colors
+
+    def of_listed(
+        self, images: Sog, tile_index: Int[Array, "block"], body_index: Int[Array, "member block"]
+    ) -> Float[Array, "member slot block"]:
+        """The similarities of listed pairs (see `SparsePairs`), with their weights; image blobs fill whole tiles."""
+        of_body, extra = self.known_body_colors, images.capacity - _num_images(self, images)
+        slots = jnp.arange(TILE, dtype=tile_index.dtype)[:, None]
+        places = tile_index[None, :] * TILE + slots
+        of_image = lambda values: jnp.pad(values, ((0, 0), (0, extra))).reshape(-1)[places][None]
+        body = body_index % of_body.shape[0]
+        apart = [images.colors[..., k].reshape(-1)[places][None] - of_body[:, k][body][:, None] for k in range(3)]
+        similarities = wendland(distance_of_planes(apart, self.space) / self.radius)
+        if self.depths is not None and self.hidden_from is not None:
+            shown = self.depths.reshape(-1)[body_index][:, None] < of_image(self.hidden_from)
+            similarities = jnp.where(shown, similarities, 0.0)
+        return similarities if self.weights is None else similarities * of_image(self.weights)
+
+
+def _num_images(coloring: Coloring, images: Sog) -> int:
+    """How many image blobs the weights are of, which do not fill whole tiles."""
+    known = [table for table in (coloring.weights, coloring.hidden_from) if table is not None]
+    return known[0].shape[1] if known else images.capacity
 
 
 def colored_similarities(

@@ -1,5 +1,6 @@
 """The foreground term: a body is to cover what is not background, and nothing that is."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import equinox as eqx
@@ -13,6 +14,10 @@ from sogjax.energy.posed import Frame, Posed
 from sogjax.energy.views import Windows
 from sogjax.model.camera import project
 from sogjax.model.sog import Sog
+
+LANES = 64
+"""Entries along the last axis that XLA on a CPU computes at once; an exponential of those left over takes six times as
+long."""
 
 
 class Foreground(ImageTerm):
@@ -46,9 +51,10 @@ class Foreground(ImageTerm):
 
     def _pulls(self, windows: Windows, seen: Sog) -> ImagePulls:
         """Value and derivatives of one camera: every sum over cells is a product of small matrices."""
+        num_blobs, seen = seen.capacity, _whole_lanes(seen)
         rows = _rows(windows, seen, self.density)
         total = jnp.einsum("wxb,wyb->wxy", rows.of_x, rows.of_y)
-        left = jnp.exp(-total)
+        left = _exponentials(-total)
         gain = windows.areas[:, None, None] * windows.odds
         slope = gain * left
         weights_x = rows.of_x * jnp.einsum("wxy,wyb->wxb", slope, rows.of_y)
@@ -56,17 +62,18 @@ class Foreground(ImageTerm):
         wanted = rows.of_x * jnp.einsum("wxy,wyb->wxb", jnp.maximum(slope, 0.0), rows.of_y)
         mass, away_x, spread_x = _moments(weights_x, windows.x, seen.means[:, 0])
         _, away_y, spread_y = _moments(weights_y, windows.y, seen.means[:, 1])
+        mass_wanted, _, _ = _moments(wanted, windows.x, seen.means[:, 0])
         inverse_x, inverse_y = 1.0 / rows.variance_x[:, 0], 1.0 / rows.variance_y[:, 0]
         sigma = seen.sigmas[None, :]
         # A_q is density sigma^2 / sqrt(vx vy) exp(...), and both variances grow with sigma^2.
         by_sigma = mass * (2.0 / sigma - sigma * (inverse_x + inverse_y))
         by_sigma = by_sigma + sigma * (spread_x * inverse_x**2 + spread_y * inverse_y**2)
-        stiffness = jnp.einsum("wxb->wb", wanted) * 0.5 * (inverse_x + inverse_y)
+        stiffness = mass_wanted * 0.5 * (inverse_x + inverse_y)
         return ImagePulls(
             value=jnp.sum(gain * (1.0 - left)),
-            by_mean=jnp.sum(jnp.stack([away_x * inverse_x, away_y * inverse_y], axis=-1), axis=0),
-            by_sigma=jnp.sum(by_sigma, axis=0),
-            stiffness=jnp.sum(stiffness, axis=0),
+            by_mean=jnp.sum(jnp.stack([away_x * inverse_x, away_y * inverse_y], axis=-1), axis=0)[:num_blobs],
+            by_sigma=jnp.sum(by_sigma, axis=0)[:num_blobs],
+            stiffness=jnp.sum(stiffness, axis=0)[:num_blobs],
         )
 
 
@@ -74,6 +81,18 @@ def cover(windows: Windows, seen: Sog, density: Float[Array, ""]) -> Float[Array
     """How far blobs cover the cells of one camera's windows: C_i of the foreground term."""
     rows = _rows(windows, seen, density)
     return -jnp.expm1(-jnp.einsum("wxb,wyb->wxy", rows.of_x, rows.of_y))
+
+
+def _whole_lanes(seen: Sog) -> Sog:
+    """The blobs with so much padding that they are a multiple of `LANES`."""
+    extra = -seen.capacity % LANES
+    at_end = lambda leaf: jnp.pad(leaf, [(0, extra), *[(0, 0)] * (leaf.ndim - 1)])
+    return replace(jax.tree.map(at_end, seen), sigmas=jnp.pad(seen.sigmas, (0, extra), constant_values=1.0))
+
+
+def _exponentials(values: Float[Array, "window column row"]) -> Float[Array, "window column row"]:
+    """Exponentials along one long axis (see `LANES`); without the barrier XLA would make it two short ones again."""
+    return jnp.exp(jax.lax.optimization_barrier(values.reshape(values.shape[0], -1))).reshape(values.shape)
 
 
 def _moments(

@@ -10,8 +10,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from sogjax.energy.pairs import MEMBERS, TILE, SparsePairs, image_quantities
+from sogjax.energy.coloring import Coloring
+from sogjax.energy.pairs import CHUNK, MEMBERS, TILE, SparsePairs, image_quantities
 from sogjax.model.camera import Camera, project
+from sogjax.model.color import distance_from_box
 from sogjax.model.compiled import chosen_indices, stage_barrier
 from sogjax.model.sog import Sog
 
@@ -44,7 +46,7 @@ def displaced(before: Sog, after: Sog, margin: Float[Array, "camera"]) -> Float[
 
 def near_pairs(
     images: Sog,
-    color_similarities: Float[Array, "camera body image"],
+    coloring: Coloring,
     seen: Sog,
     margin: Float[Array, "camera"],
     exponent: Float[Array, ""],
@@ -54,31 +56,30 @@ def near_pairs(
 
     A count above `capacity` means that blocks were cut off: the caller must look at it and try a larger capacity.
     """
-    images, color_similarities = _whole_tiles(images, color_similarities)
-    num_cameras, num_bodies, num_images = color_similarities.shape
+    images, capacity = _whole_tiles(images), -(-capacity // CHUNK) * CHUNK
+    (num_cameras, num_bodies), num_images = seen.sigmas.shape, images.capacity
     running = margin[0] > 0.0
-    flags = stage_barrier(running, _flags, images, color_similarities, seen, margin, exponent)
+    flags = stage_barrier(running, _flags, images, coloring, seen, margin, exponent)
     chosen, count = stage_barrier(running, partial(chosen_indices, capacity=capacity * MEMBERS), flags.reshape(-1))
-    tile, body_index, first, real = stage_barrier(
+    tile, body_index, real = stage_barrier(
         running, partial(_blocks_of, tiles=flags.shape[1], members=flags.shape[2], num_bodies=num_bodies), chosen, count
     )
     slots = jnp.arange(TILE, dtype=chosen.dtype)[:, None]
     of_image = lambda values: _taken(values, tile[None, :] * TILE + slots)
     x, y, variances, scale = map(of_image, image_quantities(images))
-    similarities = _taken(color_similarities, first[:, None, :] + slots[None, :, :])
+    # Their derivatives by colours come from `colored_pairs`.
+    similarities = jax.lax.stop_gradient(stage_barrier(running, coloring.of_listed, images, tile, body_index))
     amplitudes = jnp.where(real[:, None, :], similarities * scale[None], 0.0)
     image_shape, body_shape = (num_cameras, num_images), (num_cameras, num_bodies)
-    pairs = SparsePairs(x[None], y[None], variances[None], amplitudes, tile, body_index, image_shape, body_shape)
-    return pairs, count // MEMBERS
+    count = count // MEMBERS
+    pairs = SparsePairs(x[None], y[None], variances[None], amplitudes, tile, body_index, count, image_shape, body_shape)
+    return pairs, count
 
 
 def _blocks_of(
     chosen: Int[Array, "n"], count: Int[Array, ""], tiles: int, members: int, num_bodies: int
-) -> tuple[Int[Array, "block"], Int[Array, "member block"], Int[Array, "member block"], Bool[Array, "member block"]]:
-    """The tile of every block and its body blobs, both counted over all cameras, and where each pair's colours begin.
-
-    Last, which members are no padding.
-    """
+) -> tuple[Int[Array, "block"], Int[Array, "member block"], Bool[Array, "member block"]]:
+    """The tile of every block and its body blobs, both counted over all cameras, and which members are no padding."""
     real = jnp.arange(chosen.shape[0], dtype=chosen.dtype) < count
     # Padding is spread over all places: sums into one and the same place would wait for each other.
     chosen = jnp.where(real, chosen, jnp.arange(chosen.shape[0], dtype=chosen.dtype) % (tiles * members))
@@ -86,27 +87,26 @@ def _blocks_of(
     tile = chosen[0] // members
     body = chosen - tile[None, :] * members
     real, body = real & (body < num_bodies), jnp.where(body < num_bodies, body, (tile[None, :] + body) % num_bodies)
-    camera = tile // tiles
-    body_index = camera[None, :] * num_bodies + body
-    return tile, body_index, (body_index * tiles + (tile - camera * tiles)[None, :]) * TILE, real
+    return tile, (tile // tiles)[None, :] * num_bodies + body, real
 
 
-def _flags(images: Sog, color_similarities: Array, seen: Sog, margin: Array, exponent: Array) -> Array:
+def _flags(images: Sog, coloring: Coloring, seen: Sog, margin: Array, exponent: Array) -> Array:
     """What `_near` and `_whole_blocks` say for all cameras."""
-    near = jax.vmap(_near, in_axes=(0, 0, 0, 0, None))(images, color_similarities, seen, margin, exponent)
+    near = jax.vmap(_near, in_axes=(0, None, 0, 0, None))(images, coloring, seen, margin, exponent)
     return _whole_blocks(near)
 
 
 def _near(
     image: Sog,
-    color_similarities: Float[Array, "body image"],
+    coloring: Coloring,
     seen: Sog,
     margin: Float[Array, ""],
     exponent: Float[Array, ""],
 ) -> Bool[Array, "tile body"]:
     """Tiles and body blobs of alike colours, of which a pair's exponential may exceed `NEGLIGIBLE` within the margin.
 
-    A tile is taken for the box around its blobs with the size of its largest, so it counts too often, never too rarely.
+    A tile is taken for the box around its blobs, of pixels and of colours, with the size of its largest: so it counts
+    too often, never too rarely, and no pair of single blobs is looked at.
     """
     by_slot = lambda values: [values[slot::TILE, None] for slot in range(TILE)]
     real = by_slot(image.mask)
@@ -120,7 +120,11 @@ def _near(
     dx, dy = beyond(x, seen.means[None, :, 0]), beyond(y, seen.means[None, :, 1])
     sigmas = extreme(image.sigmas, jnp.maximum, 0.0)
     reach = jnp.sqrt((sigmas**2 + (seen.sigmas**2)[None, :]) * (-jnp.log(NEGLIGIBLE) / exponent))
-    alike = reduce(jnp.logical_or, [color_similarities[:, slot::TILE] != 0.0 for slot in range(TILE)]).T
+    channels = [image.colors[:, k] for k in range(3)]
+    low = [extreme(channel, jnp.minimum, jnp.inf) for channel in channels]
+    high = [extreme(channel, jnp.maximum, -jnp.inf) for channel in channels]
+    of_body = [coloring.known_body_colors[None, :, k] for k in range(3)]
+    alike = distance_from_box(of_body, low, high, coloring.space) < coloring.radius
     return alike & seen.mask[None, :] & (dx * dx + dy * dy < (reach + margin) ** 2)
 
 
@@ -135,12 +139,8 @@ def _taken(values: Array, index: Int[Array, "*slots block"]) -> Float[Array, "*s
     return values.reshape(-1).at[index].get(mode="promise_in_bounds")
 
 
-def _whole_tiles(
-    images: Sog, color_similarities: Float[Array, "camera body image"]
-) -> tuple[Sog, Float[Array, "camera body image2"]]:
-    """Images and similarities padded so that the image blobs fill whole tiles."""
+def _whole_tiles(images: Sog) -> Sog:
+    """Images padded so that their blobs fill whole tiles."""
     extra = -images.capacity % TILE
-    if extra == 0:
-        return images, color_similarities
-    at_end = lambda leaf, axis: jnp.pad(leaf, [(0, extra if k == axis else 0) for k in range(leaf.ndim)])
-    return jax.tree.map(lambda leaf: at_end(leaf, 1), images), at_end(color_similarities, 2)
+    at_end = lambda leaf: jnp.pad(leaf, [(0, extra if k == 1 else 0) for k in range(leaf.ndim)])
+    return images if extra == 0 else jax.tree.map(at_end, images)

@@ -97,8 +97,7 @@ def overlap_pulls(
     The stiffness is 2 k sum_i E_ij / (si^2 + sj^2): the weights E_ij are held fixed.
     """
     disks = _disks(body)
-    overlaps, weights = pairs.staged(_overlaps_and_weights, pairs, body, exponent)
-    total = pairs.sum_over_body(overlaps)
+    total, weights = pairs.totals(_overlaps_and_weights, body, exponent)
     live = (total < caps) if capped else jnp.ones_like(total, dtype=bool)
     moments = pairs.moments(live, weights, disks)
     return ImagePulls(
@@ -114,19 +113,19 @@ def _overlaps_and_weights(pairs: Pairs, body: Sog, exponent: Float[Array, ""]) -
     disks = _disks(body)
     gaps = separations(pairs, disks)
     inverse = 1.0 / gaps.variance_sum
-    amplitudes = pairs.amplitudes * pairs.of_body(jnp.where(body.mask, disks.variances, 0.0)) * inverse
+    amplitudes = pairs.amplitudes * pairs.of_body(disks.variances) * inverse
     overlaps = amplitudes * jnp.exp(-exponent * gaps.squared_distance * inverse)
     return overlaps, overlaps * inverse
 
 
 def _disks(body: Sog) -> Disks:
-    return Disks(body.means, _safe_sigmas(body) ** 2)
+    return Disks(body.means, jnp.where(body.mask, body.sigmas, 0.0) ** 2)
 
 
 def _plain_overlap(
     capped: bool, pairs: Pairs, caps: Float[Array, "*camera image"], body: Sog, exponent: Float[Array, ""]
 ) -> Float[Array, "*camera"]:
-    total = pairs.sum_over_body(pairs.staged(_overlaps_and_weights, pairs, body, exponent)[0])
+    total, _ = pairs.totals(_overlaps_and_weights, body, exponent)
     return jnp.sum(_apply_cap(total, caps, capped), axis=-1)
 
 

@@ -5,9 +5,11 @@ once; what differs is how a quantity of body blobs is spread over the pairs, and
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
@@ -19,12 +21,16 @@ TILE = 8
 MEMBERS = 8
 """Body blobs that are compared with a tile together."""
 
+CHUNK = 512
+"""Blocks whose pairs are looked at together: 128 KiB for each number of them."""
+
 Results = TypeVar("Results")
 Slots = Float[Array, "member slot block"]
+ChunkedSlots = Float[Array, "chunk member slot block"]
 
 
 class Disks(NamedTuple):
-    """Where projected body blobs lie and how wide they are: pixels, pixels^2."""
+    """Where projected body blobs lie and how wide they are: pixels, pixels^2; 0 wide in the padding."""
 
     means: Float[Array, "*camera body 2"]
     variances: Float[Array, "*camera body"]
@@ -72,13 +78,15 @@ class DensePairs(eqx.Module):
         """A quantity of the body blobs, spread over the pairs."""
         return values[:, None]
 
-    def sum_over_body(self, values: Float[Array, "body image"]) -> Float[Array, "image"]:
-        """The sum for each image blob over its pairs."""
-        return jnp.sum(values, axis=0)
+    def totals(
+        self, function: Callable[..., tuple[Array, Array]], *arguments: Any
+    ) -> tuple[Float[Array, "image"], Float[Array, "body image"]]:
+        """The first result of `function(pairs, *arguments)` summed for each image blob over its pairs, and the second.
 
-    def staged(self, function: Callable[..., Results], *arguments: Any) -> Results:
-        """The results of a function over pairs, as the compiler likes it best."""
-        return function(*arguments)
+        Each is a number for every pair.
+        """
+        values, others = function(self, *arguments)
+        return jnp.sum(values, axis=0), others
 
     def moments(self, live: Bool[Array, "image"], weights: Float[Array, "body image"], body: Disks) -> Moments:
         """Sums over the live pairs of each body blob: one matrix product where it can be, quicker than along rows."""
@@ -96,7 +104,9 @@ class SparsePairs(eqx.Module):
     """Blocks of pairs near each other, of all cameras: each is `MEMBERS` body blobs with one tile of image blobs.
 
     Blocks are the last axis, so that every operation runs along them; sums over members and slots are written out,
-    since XLA does not vectorise what it sums over an axis. Members of padding have amplitude 0.
+    since XLA does not vectorise what it sums over an axis. Members of padding have amplitude 0. Blocks fill whole
+    chunks, which are looked at one after the other, but for those without a block: what is computed of a chunk stays
+    in the processor's cache until it is summed.
     """
 
     x: Float[Array, "1 slot block"]
@@ -107,6 +117,8 @@ class SparsePairs(eqx.Module):
     """The number of each block's tile among those of all cameras."""
     body_index: Int[Array, "member block"]
     """The numbers of each block's body blobs among those of all cameras."""
+    num_blocks: Int[Array, ""]
+    """How many blocks are no padding; they come first."""
     image_shape: tuple[int, int] = eqx.field(static=True)
     body_shape: tuple[int, int] = eqx.field(static=True)
 
@@ -114,28 +126,56 @@ class SparsePairs(eqx.Module):
         """A quantity of the projected body blobs, spread over the pairs."""
         return values.reshape(-1).at[self.body_index].get(mode="promise_in_bounds")[:, None, :]
 
-    def staged(self, function: Callable[..., Results], *arguments: Any) -> Results:
-        """The results of a function over pairs, finished before they are used."""
-        return stage_barrier(self.variances[0, 0, 0] > 0.0, function, *arguments)
+    def totals(
+        self, function: Callable[..., tuple[Slots, Slots]], *arguments: Any
+    ) -> tuple[Float[Array, "camera image"], ChunkedSlots]:
+        """As of `DensePairs`; the second result chunk by chunk."""
 
-    def sum_over_body(self, values: Slots) -> Float[Array, "camera image"]:
-        """The sum for each image blob over its pairs."""
-        zeros = jnp.zeros((TILE, self.image_shape[0] * self.image_shape[1] // TILE), values.dtype)
-        added = self.staged(lambda values: _added(list(values)), values)
-        sums = zeros.at[:, self.tile_index].add(added, mode="promise_in_bounds")
-        return sums.T.reshape(self.image_shape)
+        def of_chunk(chunk: SparsePairs) -> tuple[Float[Array, "block slot"], Slots]:
+            values, others = function(chunk, *arguments)
+            return _added(list(values)).T, others
 
-    def moments(self, live: Bool[Array, "camera image"], weights: Slots, body: Disks) -> Moments:
-        """Sums over the live pairs of each body blob."""
-        counted = live.astype(weights.dtype).reshape(-1, TILE).T.at[:, self.tile_index].get(mode="promise_in_bounds")
-        sums = self.staged(_block_moments, self, counted, weights, body)
-        away_x, away_y, weight, variance, spread = map(self._sum_over_blocks, sums)
+        added, others = self._in_chunks(of_chunk)
+        zeros = jnp.zeros((self.image_shape[0] * self.image_shape[1] // TILE, TILE), added.dtype)
+        sums = zeros.at[self.tile_index].add(added.reshape(-1, TILE), mode="promise_in_bounds")
+        return sums.reshape(self.image_shape), others
+
+    def moments(self, live: Bool[Array, "camera image"], weights: ChunkedSlots, body: Disks) -> Moments:
+        """Sums over the live pairs of each body blob; the weights are those of `totals`."""
+        counted = live.astype(weights.dtype).reshape(-1, TILE).T
+
+        def of_chunk(chunk: SparsePairs, weights: Slots) -> list[Float[Array, "member block"]]:
+            counts = counted.at[:, chunk.tile_index].get(mode="promise_in_bounds")
+            return _block_moments(chunk, weights * counts[None, :, :], body)
+
+        away_x, away_y, weight, variance, spread = map(self._sum_over_blocks, self._in_chunks(of_chunk, weights))
         return Moments(jnp.stack([away_x, away_y], axis=-1), weight, variance, spread)
 
-    def _sum_over_blocks(self, values: Float[Array, "member block"]) -> Float[Array, "camera body"]:
+    def _in_chunks(self, function: Callable[..., Results], *values: ChunkedSlots) -> Results:
+        """What a function gives of every chunk and its values, along a first axis; zeros where there is no block."""
+        chunks = jnp.arange(self.tile_index.shape[0] // CHUNK, dtype=self.num_blocks.dtype)
+
+        def of_chunk(chunk: Int[Array, ""], pairs: SparsePairs, *values: ChunkedSlots) -> Results:
+            taken = partial(jax.lax.dynamic_index_in_dim, index=chunk, keepdims=False, allow_negative_indices=False)
+            return function(pairs._chunk(chunk), *map(taken, values))
+
+        def one(_: None, chunk: Int[Array, ""]) -> tuple[None, Results]:
+            return None, stage_barrier(chunk * CHUNK < self.num_blocks, of_chunk, chunk, self, *values)
+
+        return jax.lax.scan(one, None, chunks)[1]
+
+    def _chunk(self, chunk: Int[Array, ""]) -> "SparsePairs":
+        """The blocks of a chunk."""
+        part = lambda leaf: jax.lax.dynamic_slice_in_dim(
+            leaf, chunk * CHUNK, CHUNK, axis=-1, allow_negative_indices=False
+        )
+        return jax.tree.map(lambda leaf: part(leaf) if leaf.ndim else leaf, self)
+
+    def _sum_over_blocks(self, values: Float[Array, "chunk member block"]) -> Float[Array, "camera body"]:
         """Sums for each projected body blob over its members of blocks."""
         zeros = jnp.zeros(self.body_shape[0] * self.body_shape[1], values.dtype)
-        return zeros.at[self.body_index].add(values, mode="promise_in_bounds").reshape(self.body_shape)
+        index = jnp.moveaxis(self.body_index.reshape(MEMBERS, -1, CHUNK), 1, 0)
+        return zeros.at[index].add(values, mode="promise_in_bounds").reshape(self.body_shape)
 
 
 Pairs = DensePairs | SparsePairs
@@ -148,12 +188,9 @@ def separations(pairs: Pairs, body: Disks) -> Separations:
     return Separations(dx, dy, dx * dx + dy * dy, pairs.variances + pairs.of_body(body.variances))
 
 
-def _block_moments(
-    pairs: SparsePairs, counted: Float[Array, "slot block"], weights: Slots, body: Disks
-) -> list[Float[Array, "member block"]]:
+def _block_moments(pairs: SparsePairs, weights: Slots, body: Disks) -> list[Float[Array, "member block"]]:
     """The summands of `Moments` in each block, summed over its tile."""
     gaps = separations(pairs, body)
-    weights = weights * counted[None, :, :]
     relative = gaps.squared_distance / gaps.variance_sum
     parts = (weights * gaps.dx, weights * gaps.dy, weights, weights * pairs.variances, weights * relative)
     return [_added([part[:, slot] for slot in range(TILE)]) for part in parts]

@@ -113,13 +113,28 @@ class Views(eqx.Module):
     ) -> "Views":
         """Compare the colours of a body's blobs with every image; all colours are in `space`."""
         compare = lambda image: pair_color_similarities(image, body, space, color_radius)
-        return cls(cameras, images, jax.vmap(compare)(images), normalizers, coloring=Coloring(color_radius, space))
+        coloring = Coloring(color_radius, space, body_colors=body.colors)
+        return cls(cameras, images, jax.vmap(compare)(images), normalizers, coloring=coloring)
 
     def near(self, blobs: Sog, exponent: Float[Array, ""], capacity: int) -> tuple["Views", Int[Array, ""]]:
-        """These views with only the pairs that matter near `blobs` (world), and how many blocks those are."""
+        """These views with only the pairs that matter near `blobs` (world), and how many blocks those are.
+
+        Raises:
+            ValueError: the similarities do not follow from colours.
+        """
         seen = jax.vmap(project, in_axes=(0, None))(self.cameras, blobs)
-        pairs, count = near_pairs(self.images, self.color_similarities, seen, margins(self.cameras), exponent, capacity)
+        pairs, count = self.near_seen(seen, exponent, capacity)
         return replace(self, pairs=pairs), count
+
+    def near_seen(self, seen: Sog, exponent: Float[Array, ""], capacity: int) -> tuple[SparsePairs, Int[Array, ""]]:
+        """The pairs that matter near projected blobs, and how many blocks those are.
+
+        Raises:
+            ValueError: the similarities do not follow from colours.
+        """
+        if self.coloring is None:
+            raise ValueError("near pairs are listed by their colours, which these views do not have (Views.coloring)")
+        return near_pairs(self.images, self.coloring, seen, margins(self.cameras), exponent, capacity)
 
     @property
     def unexplained(self) -> Float[Array, "camera image"]:

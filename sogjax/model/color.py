@@ -1,13 +1,15 @@
 """Colour spaces and the colour similarity of two blobs (Eq. 7)."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 Colors = Float[Array, "*batch 3"]
 BroadcastColors = Float[Array, "*#batch 3"]
+Planes = Sequence[Float[Array, "..."]]
+"""The channels of colours, an array each."""
 
 COLOR_RADIUS = {"hsv_cylinder": 0.4, "hsv_cone": 0.15, "hsv": 0.15, "rgb": 0.1, "lab": 0.2}
 """The colour spaces, each with the eps_sim of Eq. 7 that suits its scale."""
@@ -29,14 +31,33 @@ def wendland(distance: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
 
 def color_distance(a: BroadcastColors, b: BroadcastColors, space: str) -> Float[Array, "*#batch"]:
     """Euclidean distance of colours of one space; in `hsv` the hue, in turns, wraps around."""
-    difference = a - b
-    if space == "hsv":
-        hue = difference[..., :1]
-        difference = jnp.concatenate([hue - jnp.round(hue), difference[..., 1:]], -1)
     # Channel by channel: a sum over a last axis of three takes seven times as long on a CPU.
-    squared = sum((difference[..., k] ** 2 for k in range(1, 3)), difference[..., 0] ** 2)
+    difference = a - b
+    return distance_of_planes([difference[..., k] for k in range(3)], space)
+
+
+def squared_distance(differences: Planes, space: str) -> Float[Array, "*batch"]:
+    """The square of `color_distance` from the differences of the channels, each an array."""
+    first, *others = differences
+    if space == "hsv":
+        first = first - jnp.round(first)
+    return sum((other**2 for other in others), first**2)
+
+
+def distance_of_planes(differences: Planes, space: str) -> Float[Array, "*batch"]:
+    """`color_distance` from the differences of the channels, each an array."""
+    squared = squared_distance(differences, space)
     positive = squared > 0.0
     return jnp.where(positive, jnp.sqrt(jnp.where(positive, squared, 1.0)), 0.0)
+
+
+def distance_from_box(color: Planes, low: Planes, high: Planes, space: str) -> Float[Array, "*batch"]:
+    """The least that `color_distance` can be between a colour and any within a box, channel by channel."""
+    beyond = lambda value, low, high: jnp.maximum(jnp.maximum(low - value, value - high), 0.0)
+    outside = list(map(beyond, color, low, high))
+    if space == "hsv":  # hues are on a circle
+        outside[0] = jnp.zeros_like(outside[0])
+    return distance_of_planes(outside, space)
 
 
 def color_similarity(

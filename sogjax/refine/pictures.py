@@ -10,7 +10,6 @@ import numpy as np
 from jaxtyping import Array, Float, Int, UInt8
 
 from sogjax.energy.appearance import BlobClusters, ColorWindows
-from sogjax.energy.neighbours import margins, near_pairs
 from sogjax.energy.pairs import SparsePairs
 from sogjax.energy.similarity import similarity_among
 from sogjax.energy.views import Views
@@ -148,8 +147,7 @@ def _pairs(
             seen = jax.vmap(project, in_axes=(0, None))(cameras, blobs)
         else:
             seen = Sights(sights.moves, velocities).seen(cameras, blobs)
-        similarities = seen_by.color_similarities
-        return near_pairs(seen_by.images, similarities, seen, margins(cameras), exponent, capacity)
+        return seen_by.near_seen(seen, exponent, capacity)
 
     return jax.lax.map(one, (views, poses, None if sights is None else sights.velocities))
 

@@ -15,7 +15,7 @@ from sogjax.energy.overlap import pair_color_similarities
 from sogjax.energy.views import Windows, windows_around
 from sogjax.errors import InputError
 from sogjax.model.camera import Camera, project
-from sogjax.model.color import averaging_space, convert, from_rgb
+from sogjax.model.color import averaging_space, convert, from_rgb, squared_distance
 from sogjax.model.compiled import stage_barrier
 from sogjax.model.sog import Sog
 from sogjax.scene.foreground import BackgroundModel, SubjectColors, foreground_weights, log_odds
@@ -217,7 +217,10 @@ class ImageReader(eqx.Module):
     def compared_blobs(
         self, near: Sog, weights: BlobWeights, body: Sog, depths: Float[Array, "camera body"] | None
     ) -> tuple[Sog, Float[Array, "camera body image"], Int[Array, "camera"]]:
-        """The near blobs in their places, those masked out that resemble no blob of the body; the same otherwise."""
+        """The near blobs in their places, those masked out that resemble no blob of the body; the same otherwise.
+
+        A program that only lists near pairs never computes the similarities: nothing else here needs them.
+        """
 
         def compare(
             image: Sog, weights: BlobWeights, depths: Float[Array, "body"] | None
@@ -227,8 +230,29 @@ class ImageReader(eqx.Module):
             return similarities if weights.foreground is None else similarities * weights.foreground[None, :]
 
         similarities = stage_barrier(self.true_at_run_time, jax.vmap(compare), near, weights, depths)
-        mask = near.mask & jnp.any(similarities > 0.0, axis=1)
+        alike = jax.vmap(self._alike, in_axes=(0, None, 0, 0))
+        mask = near.mask & stage_barrier(self.true_at_run_time, alike, near, body, weights, depths)
         return eqx.tree_at(lambda sog: sog.mask, near, mask), similarities, jnp.sum(mask, axis=1)
+
+    def _alike(
+        self, image: Sog, body: Sog, weights: BlobWeights, depths: Float[Array, "body"] | None
+    ) -> Bool[Array, "image"]:
+        """Which image blobs resemble a blob of the body that is not hidden there, blob by blob of the body."""
+
+        def nearer(blob: Int[Array, ""], state: tuple[Array, ...]) -> tuple[Array, ...]:
+            least, *planes = state
+            apart = [plane - body.colors[blob, k] for k, plane in enumerate(planes)]
+            squared = squared_distance(apart, self.color_space)
+            if weights.hidden_from is not None and depths is not None:
+                squared = jnp.where(depths[blob] < weights.hidden_from, squared, jnp.inf)
+            return jnp.minimum(least, squared), *planes
+
+        # In the state, planes lie apart; a loop reads what it closes over as it is, colour by colour.
+        planes = [image.colors[:, k] for k in range(3)]
+        nowhere = jnp.full_like(image.sigmas, jnp.inf)
+        squared = jax.lax.fori_loop(0, body.capacity, nearer, (nowhere, *planes))[0]
+        alike = jnp.sqrt(squared) < self.color_radius
+        return alike if weights.foreground is None else alike & (weights.foreground > 0.0)
 
 
 def _color_planes(

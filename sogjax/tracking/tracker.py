@@ -149,7 +149,10 @@ class Tracker(eqx.Module):
             images, similarities, counting, num_matching = self.reader.matching_blobs(
                 near, weights, body, depths, capacities.matching
             )
-        coloring = Coloring(self.reader.color_radius, self.reader.color_space, counting)
+        hidden_from = weights.hidden_from if self.pairs == "sparse" else None
+        coloring = Coloring(
+            self.reader.color_radius, self.reader.color_space, counting, body_colors, depths, hidden_from
+        )
         keypoints = self.keypoint_views(frame, state.previous, normalizers)
         views = Views(
             self.cameras, images, similarities, normalizers, coloring=coloring, windows=windows, keypoints=keypoints
