@@ -57,9 +57,9 @@ def film(num_frames=40, light=lambda k: 1.0, shown=covered, shift=lambda k: 0, e
     return images
 
 
-def learnt(images, left_out=None):
+def learnt(images, left_out=None, still=None):
     camera = SampledCamera.from_images(images)
-    return learnt_background(camera, filled(np.any(camera.movements, axis=0)), left_out)
+    return learnt_background(camera, filled(np.any(camera.movements, axis=0)), still, left_out)
 
 
 def apart(background, light=1.0):
@@ -85,6 +85,9 @@ def test_what_never_changes_amid_movement_is_unknown():
     inside = (slice(44, 56), slice(58, 62))
     assert not found.known[inside].any()
     assert (apart(found)[found.known] > 12).mean() < 0.01
+    nobody = np.zeros(SIZE[::-1], bool)
+    told_apart = learnt(film(shown=with_still_part), still=nobody)
+    assert told_apart.known[inside].all()  # where nobody can stand, it is the room
 
 
 def test_without_the_tracked_body_even_rare_background_is_learnt():

@@ -199,6 +199,23 @@ def test_each_person_has_example_poses_in_the_same_frames():
             assert not (one.within[camera] & other.within[camera]).any()
 
 
+def test_who_stands_where_nothing_is_known_is_found_by_colour():
+    seen = sampled(passing(2))
+    noise = np.random.default_rng(0).integers(-9, 10, (*SIZE[::-1], 3))
+    pictures = [
+        {k: (noise + np.where(of_frame[k].any(-1, keepdims=True), of_frame[k], 110)).clip(0, 255).astype(np.uint8)
+         for k in of_frame}
+        for of_frame in seen.pictures
+    ]  # fmt: skip
+    around = {k: cv2.dilate(mask.astype(np.uint8), np.ones((41, 41))) > 0 for k, mask in seen.masks[0].items()}
+    hidden = replace(seen, pictures=pictures, unknown=around, masks=[NOTHING, NOTHING])
+    assert isinstance(examples_of_masks(recording_of(RIG, 2), hidden, 2, 2), str)
+    decided = hidden.decided()
+    for found, truth in zip(decided.masks, seen.masks, strict=True):
+        assert min((found[k] & truth[k]).sum() / (found[k] | truth[k]).sum() for k in truth) > 0.95
+    assert not isinstance(examples_of_masks(recording_of(RIG, 2), decided, 2, 2), str)
+
+
 @pytest.mark.parametrize(
     ("clip", "actors", "words"),
     [

@@ -11,6 +11,7 @@ from rig_cases import opencv_pixels, ring_rig
 from sogjax.model.camera import distort, project_points
 from sogjax.scene.background_difference import background_difference
 from sogjax.scene.segmentation import masks_from_backgrounds
+from sogjax.scene.still_zone import still_zones
 from sogjax.scene.visual_hull import (
     VOXELS,
     Cube,
@@ -130,6 +131,44 @@ def test_legs_that_never_moved_are_told_from_an_unknown_floor_by_their_colours()
     cameras = {k: rig.camera(name) for k, name in enumerate(rig.names)}
     masks = masks_from_backgrounds(images, plates, {}, cameras, UP, unknown)
     assert min(iou(masks[k], truth[k]) for k in images) > 0.8
+
+
+def who_hardly_moves(num_cameras):
+    """Somebody of whom only the arms move, before walls with patterns: pictures, silhouettes, arms, pillars around."""
+    rig = ring_rig(num_cameras, distance=3.0)
+    body = in_colors(shipped("human"))
+    pose = standing(body, 0.9)
+    truth, drawn = draw(body, pose, rig, masks=True, disc=FLESH), draw(body, pose, rig, disc=FLESH)
+    truth = dict(enumerate(truth))
+    pictures, arms, pillars = {}, {}, {}
+    for k in range(num_cameras):
+        mask = truth[k]
+        pictures[k] = photo(np.where(mask[..., None], drawn[k], scene(seed=k, contrast=10.0)), k)
+        rows, columns = np.nonzero(mask)
+        upper = np.zeros_like(mask)
+        upper[rows.min() + len(mask) // 12 : (rows.min() + rows.max()) // 2] = True
+        arms[k] = mask & upper
+        pillars[k] = np.zeros_like(mask)
+        pillars[k][:, max(columns.min() - 40, 0) : columns.max() + 40] = True
+    return rig, pictures, truth, arms, pillars
+
+
+@pytest.mark.parametrize("num_cameras", [4, 8])
+def test_who_stands_still_in_a_pillar_of_the_room_is_told_by_colour(num_cameras):
+    rig, pictures, truth, arms, pillars = who_hardly_moves(num_cameras)
+    cameras = {k: rig.camera(name) for k, name in enumerate(rig.names)}
+    still = still_zones(pillars, arms, pictures, cameras)
+    for k, mask in truth.items():
+        assert (still[k] & mask).sum() > 0.95 * mask.sum(), k
+        assert still[k].sum() < 0.6 * pillars[k].sum(), k
+
+
+def test_who_stands_where_nothing_is_known_gets_masks_by_colour():
+    rig, pictures, truth, _, pillars = who_hardly_moves(6)
+    cameras = {k: rig.camera(name) for k, name in enumerate(rig.names)}
+    masks = masks_from_backgrounds(pictures, pictures, {}, cameras, UP, pillars)
+    assert set(masks) == set(truth)
+    assert min(iou(masks[k], truth[k]) for k in masks) > 0.8
 
 
 def test_a_plate_of_another_place_gives_no_mask():
