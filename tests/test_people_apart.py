@@ -212,7 +212,7 @@ def test_who_stands_where_nothing_is_known_is_found_by_colour():
     assert isinstance(examples_of_masks(recording_of(RIG, 2), hidden, 2, 2), str)
     decided = hidden.decided()
     for found, truth in zip(decided.masks, seen.masks, strict=True):
-        assert min((found[k] & truth[k]).sum() / (found[k] | truth[k]).sum() for k in truth) > 0.95
+        assert min((found[k] & truth[k]).sum() / (found[k] | truth[k]).sum() for k in truth) > 0.9
     assert not isinstance(examples_of_masks(recording_of(RIG, 2), decided, 2, 2), str)
 
 
