@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 
 from sogjax.model.color import (
     COLOR_RADIUS,
+    SHADING,
+    SPREAD,
     averaging_space,
     color_distance,
     color_similarity,
@@ -68,6 +70,18 @@ def test_cylinder_and_cone_are_hsv_in_other_coordinates():
     cone = np.column_stack([(saturation * value)[:, None] * direction, value])
     np.testing.assert_allclose(forward(rgb, "hsv_cylinder"), cylinder, atol=FLOAT32)
     np.testing.assert_allclose(forward(rgb, "hsv_cone"), cone, atol=FLOAT32)
+
+
+def test_shading_moves_a_colour_by_what_is_usual_for_its_brightness():
+    """A part of the brightness more or less: a distance of `SPREAD / SHADING` times that part, at most; hue stays."""
+    rgb, part = random_rgb(), 0.02
+    shaded = np.asarray(forward(rgb * (1.0 - part), "hsv_shaded"), np.float64)
+    lit = np.asarray(forward(rgb, "hsv_shaded"), np.float64)
+    value = rgb.max(axis=1).astype(np.float64)
+    expected = part * value * SPREAD / np.sqrt(SPREAD**2 + (SHADING * value) ** 2)
+    np.testing.assert_allclose(lit[:, 2] - shaded[:, 2], expected, rtol=0.02, atol=FLOAT32)
+    np.testing.assert_allclose(lit[:, :2], forward(rgb, "hsv_cylinder")[:, :2], atol=FLOAT32)
+    np.testing.assert_allclose(lit[:, :2], shaded[:, :2], atol=1e-4)
 
 
 @pytest.mark.parametrize("space", SPACES)
