@@ -69,8 +69,11 @@ def to_rgb(colors: Colors, space: str) -> Colors:
 
 
 def averaging_space(space: str) -> str:
-    """The space without wrap-around in which colours that end up in `space` are averaged."""
-    return "hsv_cylinder" if space == "hsv" else space
+    """The space in which colours that end up in `space` are averaged: without wrap-around, and with v as it is.
+
+    What shading hides from comparisons still splits a picture into blobs: edges stay where they were.
+    """
+    return "hsv_cylinder" if space in ("hsv", "hsv_shaded") else space
 
 
 def convert(colors: Colors, source: str, target: str) -> Colors:
