@@ -104,6 +104,10 @@ def test_conversion_goes_by_way_of_rgb_and_leaves_its_own_space_alone():
     lab = forward(random_rgb(), "lab")
     np.testing.assert_allclose(convert(lab, "lab", "rgb"), random_rgb(), atol=2e-4)
     assert convert(lab, "lab", "lab") is lab
+    cylinder = forward(random_rgb(), "hsv_cylinder")
+    np.testing.assert_allclose(
+        convert(cylinder, "hsv_cylinder", "hsv_shaded"), forward(random_rgb(), "hsv_shaded"), atol=FLOAT32
+    )
 
 
 def test_an_unknown_space_is_refused():

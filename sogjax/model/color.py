@@ -78,6 +78,8 @@ def averaging_space(space: str) -> str:
 
 def convert(colors: Colors, source: str, target: str) -> Colors:
     """Colours of the space `source`, in the space `target`."""
+    if (source, target) == ("hsv_cylinder", "hsv_shaded"):  # in every frame, so without the angle of the hue
+        return _with_value(colors, _shade)
     return colors if source == target else from_rgb(to_rgb(colors, source), target)
 
 
