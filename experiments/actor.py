@@ -54,7 +54,7 @@ def main() -> None:
             ("estimated", body_named("human")),
         ):
             made = make_actor(
-                recording, body, subjects_of(recording)[0], "hsv_cylinder", energy_terms(EnergyConfig()), say
+                recording, body, subjects_of(recording)[0], "hsv_shaded", energy_terms(EnergyConfig()), say
             )
             print(f"{recording.name:<16}{kind:<10}", *report(recording, made, settings.solver), sep="  ", flush=True)
     print(machine_line())

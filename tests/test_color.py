@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 
 from sogjax.model.color import (
     COLOR_RADIUS,
+    SHADING,
+    SPREAD,
     averaging_space,
     color_distance,
     color_similarity,
@@ -71,7 +73,7 @@ def test_cylinder_and_cone_are_hsv_in_other_coordinates():
     np.testing.assert_allclose(forward(rgb, "hsv_cone"), cone, atol=FLOAT32)
 
 
-@pytest.mark.parametrize("space", ["rgb", "hsv", "hsv_cylinder"])
+@pytest.mark.parametrize("space", ["rgb", "hsv", "hsv_cylinder", "hsv_shaded"])
 def test_no_colour_in_a_box_is_nearer_than_the_box(space):
     """And where a box holds one colour only, it is as near as that, but for hues, which are on a circle."""
     rng = np.random.default_rng(0)
@@ -84,6 +86,18 @@ def test_no_colour_in_a_box_is_nearer_than_the_box(space):
     if space != "hsv":
         single = distance_from_box(planes(color), planes(inside), planes(inside), space)
         np.testing.assert_allclose(single, np.linalg.norm(color - inside, axis=1), rtol=1e-5)
+
+
+def test_shading_moves_a_colour_by_what_is_usual_for_its_brightness():
+    """A part of the brightness more or less: a distance of `SPREAD / SHADING` times that part, at most; hue stays."""
+    rgb, part = random_rgb(), 0.02
+    shaded = np.asarray(forward(rgb * (1.0 - part), "hsv_shaded"), np.float64)
+    lit = np.asarray(forward(rgb, "hsv_shaded"), np.float64)
+    value = rgb.max(axis=1).astype(np.float64)
+    expected = part * value * SPREAD / np.sqrt(SPREAD**2 + (SHADING * value) ** 2)
+    np.testing.assert_allclose(lit[:, 2] - shaded[:, 2], expected, rtol=0.02, atol=FLOAT32)
+    np.testing.assert_allclose(lit[:, :2], forward(rgb, "hsv_cylinder")[:, :2], atol=FLOAT32)
+    np.testing.assert_allclose(lit[:, :2], shaded[:, :2], atol=1e-4)
 
 
 @pytest.mark.parametrize("space", SPACES)
@@ -106,6 +120,10 @@ def test_conversion_goes_by_way_of_rgb_and_leaves_its_own_space_alone():
     lab = forward(random_rgb(), "lab")
     np.testing.assert_allclose(convert(lab, "lab", "rgb"), random_rgb(), atol=2e-4)
     assert convert(lab, "lab", "lab") is lab
+    cylinder = forward(random_rgb(), "hsv_cylinder")
+    np.testing.assert_allclose(
+        convert(cylinder, "hsv_cylinder", "hsv_shaded"), forward(random_rgb(), "hsv_shaded"), atol=FLOAT32
+    )
 
 
 def test_an_unknown_space_is_refused():
@@ -130,7 +148,7 @@ def test_averaging_across_the_wrap_of_hue_gives_red():
     mean = backward(jnp.mean(forward(reds, space), axis=0), space)
     less_saturated = 1.0 - np.cos(np.radians(6.0))
     np.testing.assert_allclose(mean, [1.0, less_saturated, less_saturated], atol=1e-5)
-    assert all(averaging_space(name) == name for name in SPACES if name != "hsv")
+    assert all(averaging_space(name) == name for name in SPACES if name not in ("hsv", "hsv_shaded"))
 
 
 def test_wendland_is_the_c2_function_with_its_values_and_derivatives():

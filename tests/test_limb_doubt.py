@@ -13,7 +13,7 @@ from rig_cases import ring_rig
 
 from sogjax.energy.posed import Posed
 from sogjax.model.body import concatenate
-from sogjax.model.limbs import joint_limbs, limb_names, limb_slices
+from sogjax.model.limbs import joint_limbs, limb_blobs, limb_names, limb_slices
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.limb_confidence import LimbMeasures, error_probability, limb_confidence
 from sogjax.quality.limb_evidence import BlobEvidence, LimbBlobs, blob_evidence
@@ -78,6 +78,22 @@ def test_only_a_limb_that_is_elsewhere_is_in_doubt(dog):
     assert float(after.error_probability[names.index(LIMB)]) > 0.5
     others = np.delete(np.asarray(after.error_probability), names.index(LIMB))
     assert others.max() < 0.3
+
+
+@pytest.mark.parametrize("light", [0.55, 1.15])
+def test_a_limb_in_another_light_is_in_doubt_only_elsewhere(dog, light):
+    """As a lamp or the shade beside it makes a limb brighter or darker as a whole, the rest as it was."""
+    tracker, pose, cells = dog
+    body, k = tracker.body, limb_names(tracker.body).index(LIMB)
+    colors = np.array(body.blob_colors)
+    colors[limb_blobs(body)[k]] *= light
+    lit = eqx.tree_at(lambda b: b.blob_colors, body, jnp.asarray(colors, jnp.float32))
+    rig = ring_rig(5, (160, 120), distance=1.6)
+    shown = cells_of(rig, draw(lit, pose, rig), DEPTH)
+    baseline = judged(tracker, pose, cells, jnp.full((2, body.num_blobs), jnp.nan)).baseline
+    assert float(judged(tracker, pose, shown, baseline).error_probability[k]) < 0.5
+    elsewhere = moved(body, pose, ELSEWHERE)
+    assert float(judged(tracker, elsewhere, shown, baseline).error_probability[k]) > 0.5
 
 
 def test_a_limb_in_doubt_does_not_become_usual(dog):

@@ -11,8 +11,13 @@ BroadcastColors = Float[Array, "*#batch 3"]
 Planes = Sequence[Float[Array, "..."]]
 """The channels of colours, an array each."""
 
-COLOR_RADIUS = {"hsv_cylinder": 0.4, "hsv_cone": 0.15, "hsv": 0.15, "rgb": 0.1, "lab": 0.2}
+COLOR_RADIUS = {"hsv_shaded": 0.4, "hsv_cylinder": 0.4, "hsv_cone": 0.15, "hsv": 0.15, "rgb": 0.1, "lab": 0.2}
 """The colour spaces, each with the eps_sim of Eq. 7 that suits its scale."""
+
+SPREAD = 0.07
+"""Standard deviation of a channel (sRGB, 0 to 1) of what is seen of a subject, about the colours of its blobs."""
+SHADING = 0.25
+"""Standard deviation of its brightness, as a part of it: folds, and limbs that turn away from the light."""
 
 _WHITE_D65 = (0.95047, 1.0, 1.08883)
 _XYZ_FROM_RGB = (
@@ -70,7 +75,8 @@ def color_similarity(
 def from_rgb(rgb: Colors, space: str) -> Colors:
     """Colours in `space` from sRGB in 0..1.
 
-    hsv_cylinder: (s cos h, s sin h, v); hsv_cone: (s v cos h, s v sin h, v); hsv: hue in turns; lab: Lab / 100.
+    hsv_cylinder: (s cos h, s sin h, v); hsv_shaded: the same with `_shade` of v; hsv_cone: (s v cos h, s v sin h, v);
+    hsv: hue in turns; lab: Lab / 100.
 
     Raises:
         ValueError: no such space.
@@ -84,12 +90,17 @@ def to_rgb(colors: Colors, space: str) -> Colors:
 
 
 def averaging_space(space: str) -> str:
-    """The space without wrap-around in which colours that end up in `space` are averaged."""
-    return "hsv_cylinder" if space == "hsv" else space
+    """The space in which colours that end up in `space` are averaged: without wrap-around, and with v as it is.
+
+    What shading hides from comparisons still splits a picture into blobs: edges stay where they were.
+    """
+    return "hsv_cylinder" if space in ("hsv", "hsv_shaded") else space
 
 
 def convert(colors: Colors, source: str, target: str) -> Colors:
     """Colours of the space `source`, in the space `target`."""
+    if (source, target) == ("hsv_cylinder", "hsv_shaded"):  # in every frame, so without the angle of the hue
+        return _with_value(colors, _shade)
     return colors if source == target else from_rgb(to_rgb(colors, source), target)
 
 
@@ -100,6 +111,10 @@ def _conversions(space: str) -> tuple[Callable[[Colors], Colors], Callable[[Colo
         "hsv_cylinder": (
             _cylinder_from_rgb,
             lambda c: _rgb_from_hsv(_hsv_from_cylinder(c)),
+        ),
+        "hsv_shaded": (
+            lambda rgb: _with_value(_cylinder_from_rgb(rgb), _shade),
+            lambda c: _rgb_from_hsv(_hsv_from_cylinder(_with_value(c, _unshade))),
         ),
         "hsv_cone": (_cone_from_rgb, _rgb_from_cone),
         "lab": (_lab_from_rgb, _rgb_from_lab),
@@ -170,6 +185,25 @@ def _hsv_from_cylinder(cylinder: Colors) -> Colors:
     hue = jnp.mod(jnp.arctan2(cylinder[..., 1], cylinder[..., 0]) / (2.0 * jnp.pi), 1.0)
     saturation = jnp.hypot(cylinder[..., 0], cylinder[..., 1])
     return jnp.stack([hue, jnp.minimum(saturation, 1.0), cylinder[..., 2]], -1)
+
+
+_SHADES = SHADING / SPREAD
+
+
+def _shade(value: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
+    """Brightness in whose steps shading counts no more than other changes of a colour.
+
+    The integral of `SPREAD / sqrt(SPREAD^2 + (SHADING v)^2)`: v where it is dark, as its logarithm where it is bright.
+    """
+    return jnp.arcsinh(_SHADES * value) / _SHADES
+
+
+def _unshade(shade: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
+    return jnp.sinh(_SHADES * shade) / _SHADES
+
+
+def _with_value(cylinder: Colors, change: Callable[[Float[Array, "*batch"]], Float[Array, "*batch"]]) -> Colors:
+    return jnp.concatenate([cylinder[..., :2], change(cylinder[..., 2:])], -1)
 
 
 def _cone_from_rgb(rgb: Colors) -> Colors:

@@ -15,6 +15,7 @@ from sogjax.energy.posed import Posed
 from sogjax.energy.views import Windows
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, cells_at, point_depths, project
+from sogjax.model.color import SHADING, SPREAD
 from sogjax.model.limbs import limb_blobs
 from sogjax.model.sog import Sog
 from sogjax.scene.foreground import SubjectColors, own_color, own_density, subject_density
@@ -61,13 +62,16 @@ DENSITY = 2.0
 """Density of a blob's middle along a ray, as in the foreground term."""
 BACKGROUND = -0.3
 """Log odds below which a sample speaks for the background."""
+DARKEST = 0.05
+"""A limb's light, at least: nothing is told of colours that are nearly black."""
 
 
 class BlobEvidence(NamedTuple):
     """The evidence for each blob, over all cameras, where other limbs and the trunk do not hide it."""
 
     own: Float[Array, "blob"]
-    """Log likelihood of the colours seen, as the blob's own against any of the subject's; mean of the samples."""
+    """Log likelihood of the colours seen, in the limb's light, as the blob's own against any of the subject's; mean of
+    the samples."""
     contradicted: Float[Array, "blob"]
     """Part of the samples that are background; 0 where none is known."""
     seen: Float[Array, "blob"]
@@ -104,7 +108,7 @@ def blob_evidence(
     if present is not None:
         inside &= present[:, None, None]
     own_colors = posed.body.blob_colors[None, :, None]
-    own, alike = own_density(colors, own_colors), own_color(colors, own_colors)
+    alike = own_color(colors, own_colors)
     against = jnp.zeros(inside.shape, bool) if windows is None else _odds_at(limbs, windows, places) < BACKGROUND
     areas = jnp.where(seen.mask, seen.sigmas, 0.0) ** 2
     weights = jnp.where(inside, (areas * _visible(limbs, posed.blobs, seen, cameras))[:, :, None], 0.0)
@@ -116,13 +120,35 @@ def blob_evidence(
         weights = shown
     whole = jnp.sum(weights, axis=(0, 2)) + 1e-6
     mean = lambda values: jnp.sum(weights * values, axis=(0, 2)) / whole
+    shares = jnp.where(against, 0.0, weights) / jnp.maximum(len(SAMPLES) * areas, 1e-6)[:, :, None]
+    light = _light(limbs, colors, own_colors, shares)[:, :, None, None]
+    lit = jnp.clip(colors / light, 0.0, 1.0)
     return BlobEvidence(
-        own=mean(own - subject_density(colors, subject)),
-        contradicted=mean(against.astype(own.dtype)),
+        own=mean(own_density(lit, own_colors) - subject_density(lit, subject)),
+        contradicted=mean(against.astype(alike.dtype)),
         seen=whole / (len(SAMPLES) * jnp.sum(areas, axis=0) + 1e-6),
         explained=mean(jnp.where(against, 0.0, alike)),
         hidden=hidden,
     )
+
+
+def _light(
+    limbs: LimbBlobs,
+    colors: Float[Array, "camera blob sample 3"],
+    own_colors: Float[Array, "1 blob 1 3"],
+    shares: Float[Array, "camera blob sample"],
+) -> Float[Array, "camera blob"]:
+    """How bright each blob's limb is seen in each camera, as a multiple of its own colours; 1 for the trunk's.
+
+    A limb that turns towards a lamp is brighter as a whole: that is one fact, not one for each of its blobs. The
+    multiple that fits best by least squares, which is expected to be within `SHADING` of 1.
+    """
+    of_limbs = lambda values: jnp.matmul(jnp.sum(shares * values, axis=2), limbs.members.T.astype(shares.dtype))
+    both, own = (jnp.sum(seen * own_colors, axis=-1) for seen in (colors, jnp.broadcast_to(own_colors, colors.shape)))
+    expected = (SPREAD / SHADING) ** 2
+    light = (of_limbs(both) + expected) / (of_limbs(own) + expected)
+    of_blobs = jnp.matmul(light, limbs.members.astype(light.dtype))
+    return jnp.where(jnp.any(limbs.members, axis=0)[None], jnp.maximum(of_blobs, DARKEST), 1.0)
 
 
 def _cells_of(

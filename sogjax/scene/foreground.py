@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, UInt8
 
+from sogjax.model.color import SHADING, SPREAD
 from sogjax.scene.background import BackgroundCells, BackgroundImage
 from sogjax.scene.background_difference import working_size
 
@@ -19,10 +20,6 @@ SMALLEST_SPREAD = 0.015
 """Standard deviation of a channel at one place in one light, at least (compression, a lens that breathes)."""
 SHADOW = 0.25
 """Standard deviation of the light that a shadow or a reflection takes or adds, as a part of the background's."""
-SUBJECT_SPREAD = 0.07
-"""Standard deviation of a channel of what is seen of a subject, about the colours of its blobs."""
-SUBJECT_SHADING = 0.25
-"""Standard deviation of a subject's brightness, as a part of it: folds, and limbs that turn away from the light."""
 SUBJECT_UNKNOWN = 0.3
 """Share of a subject whose colours are none of its blobs': any colour."""
 COLOR_BINS = 32
@@ -69,9 +66,9 @@ def _color_gaussian(colors: Any, color: Any) -> tuple[Any, Any]:
     """
     off, length = colors - color, (color * color).sum(axis=-1)
     along, squared = (off * color).sum(axis=-1), (off * off).sum(axis=-1)
-    variance = SUBJECT_SPREAD**2
-    distance = (squared - along**2 / (variance / SUBJECT_SHADING**2 + length)) / variance
-    return distance, 1.0 / (_NORMAL * variance * (variance + SUBJECT_SHADING**2 * length) ** 0.5)
+    variance = SPREAD**2
+    distance = (squared - along**2 / (variance / SHADING**2 + length)) / variance
+    return distance, 1.0 / (_NORMAL * variance * (variance + SHADING**2 * length) ** 0.5)
 
 
 def own_density(colors: Float[Array, "*#place 3"], color: Float[Array, "*#place 3"]) -> Float[Array, "*place"]:

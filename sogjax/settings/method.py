@@ -10,7 +10,7 @@ from sogjax.settings.option import expert, option
 class ColorConfig:
     """Colour space and similarity (Eq. 7)."""
 
-    space: str = expert("hsv_cylinder", "hsv_cylinder | hsv_cone | hsv (the paper's) | rgb | lab")
+    space: str = expert("hsv_shaded", "hsv_shaded | hsv_cylinder | hsv_cone | hsv (the paper's) | rgb | lab")
     radius: float | None = expert(None, "[eps_sim] colours farther apart do not match; null: the space's own")
 
 
