@@ -136,7 +136,7 @@ def _person_examples(clip: Clip, learnt: Sequence[BackgroundImage]) -> tuple[Exa
     recording, seen = clip.recording, masks_of_samples(clip, learnt)
     shapes = seen_shapes(seen, recording.up)
     problem = unsuitable(shapes, lambda: num_people_seen(clip, learnt), has_plates(recording))
-    if problem is not None and any(unknown.any() for unknown in seen.unknown.values()):
+    if problem is not None and seen.undecided:
         decided = seen_shapes(seen.decided(), recording.up)
         if unsuitable(decided, lambda: most_seen([shape.num_bodies for shape in decided])) is None:
             shapes, problem = decided, None

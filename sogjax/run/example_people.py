@@ -65,7 +65,7 @@ def people_examples(
     """At most `count` frames as example poses of each of several people, or why there are none, with the remedy."""
     seen = masks_of_samples(clip, learnt, LIGHT)
     examples = examples_of_masks(clip.recording, seen, actors, count)
-    if not isinstance(examples, str) or not any(unknown.any() for unknown in seen.unknown.values()):
+    if not isinstance(examples, str) or not seen.undecided:
         return examples
     second = examples_of_masks(clip.recording, seen.decided(), actors, count)
     return examples if isinstance(second, str) else second

@@ -49,6 +49,11 @@ class SampledMasks:
     """The cameras, for pictures of the masks' size."""
     grids: tuple[CellGrid, ...]
 
+    @property
+    def undecided(self) -> bool:
+        """Whether anything is unknown."""
+        return any(mask.any() for mask in self.unknown.values())
+
     def decided(self) -> "SampledMasks":
         """The same without anything unknown: there, what looks unlike the room around it is not the background."""
         frames = [(frame, camera) for frame in range(len(self.frames)) for camera in self.masks[frame]]

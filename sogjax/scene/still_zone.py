@@ -15,15 +15,13 @@ from jaxtyping import Bool, UInt8
 from sogjax.model.camera import Camera
 from sogjax.scene.background_difference import widened
 from sogjax.scene.moving_zone import SEEING, SMALLEST_ROOM
-from sogjax.scene.segmentation import unlike_the_room
+from sogjax.scene.segmentation import COARSE_SIDE, unlike_the_room
 from sogjax.scene.visual_hull import MANY, Cube, cube_around, resized, voxel_pixels
 
-LONGER_SIDE = 324
-"""Pixels of the pictures that are cut."""
 MISTAKEN = 0.25
 """Share of the other cameras that may take somebody for the room where a camera tells him from it."""
-SURELY = 0.25
-"""Part of a pixel that moves, at least."""
+MOVING = 0.25
+"""Part of a pixel of the smaller pictures that moves, at least."""
 
 Mask = Bool[np.ndarray, "_h _w"]
 
@@ -40,7 +38,7 @@ def still_zones(
     By camera, `movements` are where anything moves in the clip, and `pictures` (BGR) are typical ones of it.
     """
     small_zones = {k: _small(zone.astype(np.uint8), cv2.INTER_NEAREST) > 0 for k, zone in zones.items()}
-    moving = {k: _small(movements[k].astype(np.float32), cv2.INTER_AREA) > SURELY for k in zones}
+    moving = {k: _small(movements[k].astype(np.float32), cv2.INTER_AREA) > MOVING for k in zones}
     seeing = [k for k in zones if moving[k].any()]
     if len(seeing) < 2:
         return dict(zones)
@@ -64,6 +62,6 @@ def still_zones(
 
 
 def _small(picture: np.ndarray, interpolation: int) -> np.ndarray:
-    scale = min(LONGER_SIDE / max(picture.shape[:2]), 1.0)
+    scale = min(COARSE_SIDE / max(picture.shape[:2]), 1.0)
     size = (round(scale * picture.shape[1]), round(scale * picture.shape[0]))
     return cv2.resize(picture, size, interpolation=interpolation)
