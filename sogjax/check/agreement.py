@@ -6,12 +6,10 @@ from functools import cached_property
 
 import cv2
 import numpy as np
-from jaxtyping import Bool
 
 from sogjax.check.pictures import Mask, Moment
 from sogjax.io.calibration.rig import CameraRig
-from sogjax.scene.background_difference import widened
-from sogjax.scene.visual_hull import AGREEING, OWN_COVERAGE, Cube, cube_around, resized, voxel_pixels
+from sogjax.scene.visual_hull import AGREEING, OWN_COVERAGE, MaskHull, resized
 
 FEWEST_VIEWS = 3
 """With two silhouettes that disagree, nothing tells which is wrong."""
@@ -40,19 +38,8 @@ class MomentHull:
     def __init__(self, rig: CameraRig, masks: Mapping[int, Mask]):
         self.masks = dict(masks)
         self.cameras = {k: resized(rig.camera(rig.names[k]), mask.shape[1::-1]) for k, mask in masks.items()}
-        self.cube: Cube = cube_around([*masks.values()], [*self.cameras.values()])
-        self._pixels = {k: voxel_pixels(self.cube, self.cameras[k], mask.shape) for k, mask in masks.items()}
-        self._outside = {k: ~p.hits(widened(masks[k], p.footprint // 2)) for k, p in self._pixels.items()}
-
-    def _hull(self, cameras: Sequence[int]) -> Bool[np.ndarray, "voxel"]:
-        """The voxels that the silhouettes of some of the cameras hold."""
-        return ~np.any([self._outside[k] for k in cameras], axis=0)
-
-    def coverages(self, cameras: Sequence[int]) -> dict[int, float]:
-        """The share of each camera's silhouette that the hull of all of these cameras covers."""
-        hull = self._hull(cameras)
-        shown = {k: (self._pixels[k].silhouette_of(hull) & self.masks[k]).sum() for k in cameras}
-        return {k: float(pixels / max(self.masks[k].sum(), 1)) for k, pixels in shown.items()}
+        self._hulls = MaskHull.of_masks(masks, self.cameras)
+        self.cube, self.coverages = self._hulls.cube, self._hulls.coverages
 
     @cached_property
     def misfits(self) -> dict[int, Misfit]:
@@ -76,7 +63,7 @@ class MomentHull:
         found = {}
         for camera, coverage in self.coverages(cameras).items():
             mask = self.masks[camera]
-            expected = self._pixels[camera].silhouette_of(self._hull([k for k in cameras if k != camera]))
+            expected = self._hulls.pixels[camera].silhouette_of(self._hulls.hull([k for k in cameras if k != camera]))
             if not expected.any() or len(cameras) < FEWEST_VIEWS:
                 found[camera] = Misfit(coverage, 0.0 if expected.any() else float("nan"), 0.0)
                 continue

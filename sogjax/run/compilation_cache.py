@@ -37,6 +37,9 @@ COMPILER_OPTIONS = {
 }
 """How XLA compiles for the CPU: with the default (level 3 of LLVM and both others true) a step takes half as long again
 to compile, and runs no faster."""
+LAPACK_VARIABLE = "OPENBLAS_NUM_THREADS"
+"""Threads of LAPACK, which factorises what is too small for several: those that wait for work took more time of the
+processors than all else that the shape of an actor is fitted with."""
 TRIED_JAXLIB = "0.10."
 """How versions of jaxlib begin that know all of these options: XLA ends the process at one that it does not know."""
 _NOT_OF_THIS_MACHINE = "AOT result"
@@ -48,8 +51,9 @@ _DAMAGED = re.compile(r"Error (reading|writing) persistent compilation cache ent
 def use_compiler_options() -> None:
     """Let XLA compile quickly for the CPU, but for what the environment says; to be called before jax compiles.
 
-    With a plugin for another device, nothing is changed.
+    With a plugin for another device, only LAPACK's threads are limited.
     """
+    os.environ.setdefault(LAPACK_VARIABLE, "1")
     if entry_points(group="jax_plugins"):
         return
     flags = os.environ.get(COMPILER_VARIABLE, "")

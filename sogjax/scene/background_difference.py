@@ -155,7 +155,7 @@ def _same_exposure(
 
 
 def _averaged(squares: Float[np.ndarray, "rows columns 3"]) -> Float[np.ndarray, "rows columns"]:
-    return cv2.blur(squares.mean(axis=-1), (3, 3))
+    return cv2.blur(_summed(squares) / 3.0, (3, 3))
 
 
 def _brightness(
@@ -164,9 +164,14 @@ def _brightness(
     weights: Float[np.ndarray, "rows columns 3"],
 ) -> Float[np.ndarray, "rows columns"]:
     """Brightness of each pixel and its neighbours together, in units of the background's."""
-    above = cv2.blur((light * expected * weights).sum(axis=-1), (3, 3))
-    below = cv2.blur((expected * expected * weights).sum(axis=-1), (3, 3))
+    weighted = expected * weights
+    above, below = (cv2.blur(_summed(part * weighted), (3, 3)) for part in (light, expected))
     return above / (below + 1e-6)
+
+
+def _summed(channels: Float[np.ndarray, "rows columns 3"]) -> Float[np.ndarray, "rows columns"]:
+    """The sum of the channels, several times faster than numpy's along an axis that short."""
+    return cv2.transform(channels, np.ones((1, 3), np.float32))  # pyright: ignore[reportReturnType]
 
 
 def _unexplained(

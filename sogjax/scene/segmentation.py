@@ -189,7 +189,8 @@ def _confirmed(difference: Difference, pixels: VoxelPixels, hull: np.ndarray, ab
     """Different colours near the hull, and all changes where it stands above the floor."""
     stands = pixels.silhouette_of(above_floor)
     low = pixels.footprint * LOW_VOXELS  # feet are as near as this to what stands, the rim of a shadow seldom is
-    near = widened(pixels.silhouette_of(hull), pixels.footprint) & widened(stands, low)
+    away = cv2.distanceTransform((~stands).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    near = widened(pixels.silhouette_of(hull), pixels.footprint) & (away <= low)
     different = closed(difference.different & near, 5) & difference.changed
     return largest_parts(different | (difference.open & stands))
 

@@ -7,7 +7,7 @@ import cv2
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 from scipy.ndimage import binary_opening
 
 from sogjax.model.camera import NEAR, Camera, distort, near_picture, project_points
@@ -21,6 +21,8 @@ LOW = 0.2
 """Height above the floor, in units of the subject's size, below which something may be a shadow."""
 LOW_VOXELS = round(LOW / SIDE * VOXELS)
 """`LOW` in voxels."""
+DEPTHS_EVERY = 61
+"""One voxel in so many tells how far away a cube is; no divisor of their number along a side."""
 MANY = 5
 """From so many cameras on, one of them may miss a part of the subject, or a movement."""
 
@@ -120,21 +122,31 @@ def central_ray(mask: Bool[np.ndarray, "_h _w"], camera: Camera) -> tuple[np.nda
 
 def voxel_pixels(cube: Cube, camera: Camera, shape: tuple[int, int]) -> VoxelPixels:
     """Project the voxels into a picture of `shape` (rows, columns)."""
-    points = jnp.asarray(cube.points, camera.intrinsics.dtype)
-    pixels, depths = (np.asarray(part) for part in _picture_pixels(camera, points))
-    columns, rows = np.rint(np.where(depths[:, None] > NEAR, pixels, -1.0)).astype(int).T
-    inside = (depths > NEAR) & (rows >= 0) & (rows < shape[0]) & (columns >= 0) & (columns < shape[1])
+    dtype = camera.intrinsics.dtype
+    placed = (jnp.asarray(cube.centre, dtype), jnp.asarray(cube.spacing, dtype))
+    found = _picture_places(camera, *placed, jnp.asarray(np.array(shape, np.int32)))
+    rows, columns, inside, depths = (np.asarray(part) for part in found)
     nearest = max(float(np.median(depths)), NEAR)
     footprint = int(np.ceil(cube.spacing * float(camera.focal_length) / nearest))
-    return VoxelPixels(np.where(inside, rows, 0), np.where(inside, columns, 0), inside, shape, min(footprint, 64))
+    return VoxelPixels(rows.astype(np.intp), columns.astype(np.intp), inside, shape, min(footprint, 64))
 
 
 @eqx.filter_jit
-def _picture_pixels(camera: Camera, points: Float[Array, "n 3"]) -> tuple[Float[Array, "n 2"], Float[Array, "n"]]:
-    """Pixels as recorded, and depths; far outside the picture, where a lens model folds back, the depth is 0."""
-    pixels, depths = project_points(camera, points)
-    near = near_picture(camera, pixels, 0.5)
-    return jnp.where(near[:, None], distort(camera, pixels), -1.0), jnp.where(near, depths, 0.0)
+def _picture_places(
+    camera: Camera, centre: Float[Array, "3"], spacing: Float[Array, ""], shape: Int[Array, "2"]
+) -> tuple[Int[Array, "voxel"], Int[Array, "voxel"], Bool[Array, "voxel"], Float[Array, "some"]]:
+    """Rows and columns of the pictures as recorded, 0 outside of them; what is inside; depths of some of the voxels.
+
+    Far outside the picture, where a lens model folds back, the depth is 0.
+    """
+    steps = (jnp.arange(VOXELS, dtype=spacing.dtype) - (VOXELS - 1) / 2) * spacing
+    offsets = jnp.stack(jnp.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
+    pixels, depths = project_points(camera, offsets + centre[None])
+    depths = jnp.where(near_picture(camera, pixels, 0.5), depths, 0.0)
+    seen = depths > NEAR
+    columns, rows = jnp.rint(jnp.where(seen[:, None], distort(camera, pixels), -1.0)).astype(jnp.int32).T
+    inside = seen & (rows >= 0) & (rows < shape[0]) & (columns >= 0) & (columns < shape[1])
+    return jnp.where(inside, rows, 0), jnp.where(inside, columns, 0), inside, depths[::DEPTHS_EVERY]
 
 
 def upright(voxels: Bool[np.ndarray, "voxel"], up: Float[np.ndarray, "3"]) -> Bool[np.ndarray, "x y z"]:
@@ -169,6 +181,51 @@ OWN_COVERAGE = 0.2
 Mask = Bool[np.ndarray, "_h _w"]
 
 
+@dataclass(frozen=True)
+class MaskHull:
+    """The visual hulls of masks of one subject: of all of them, or of some.
+
+    All lie in one cube, into whose pictures its voxels are projected once.
+    """
+
+    masks: dict[int, Mask]
+    cube: Cube
+    pixels: dict[int, VoxelPixels]
+    outside: dict[int, Bool[np.ndarray, "voxel"]]
+    """The voxels that each camera rules out."""
+
+    @classmethod
+    def of_masks(
+        cls, masks: Mapping[int, Mask], cameras: Mapping[int, Camera], hidden: Mapping[int, Mask] | None = None
+    ) -> "MaskHull":
+        """The hulls of masks by cameras of pictures of their size; where a camera's view is hidden, all is allowed."""
+        cube = cube_around([*masks.values()], [cameras[k] for k in masks])
+        pixels = {k: voxel_pixels(cube, cameras[k], mask.shape) for k, mask in masks.items()}
+        # A thin limb may lie between the centres of voxels, so masks are widened by half of one.
+        near = {k: widened(mask, pixels[k].footprint // 2) for k, mask in masks.items()}
+        near |= {k: near[k] | mask for k, mask in (hidden or {}).items() if k in near}
+        return cls(dict(masks), cube, pixels, {k: ~pixels[k].hits(mask) for k, mask in near.items()})
+
+    @classmethod
+    def of_subject(
+        cls, masks: Mapping[int, Mask], cameras: Mapping[int, Camera], hidden: Mapping[int, Mask] | None = None
+    ) -> "MaskHull":
+        """The hulls of masks of whole pictures, at the working size."""
+        small = {k: reduced_mask(mask) for k, mask in masks.items()}
+        shrunk = {k: resized(cameras[k], (mask.shape[1], mask.shape[0])) for k, mask in small.items()}
+        return cls.of_masks(small, shrunk, {k: reduced_mask(mask) for k, mask in (hidden or {}).items() if k in small})
+
+    def hull(self, cameras: Sequence[int]) -> Bool[np.ndarray, "voxel"]:
+        """The voxels that the masks of some of the cameras hold."""
+        return ~np.any([self.outside[k] for k in cameras], axis=0)
+
+    def coverages(self, cameras: Sequence[int]) -> dict[int, float]:
+        """The share of each of these masks that the hull of them covers."""
+        hull = self.hull(cameras)
+        shown = {k: (self.pixels[k].silhouette_of(hull) & self.masks[k]).sum() for k in cameras}
+        return {k: float(pixels / max(self.masks[k].sum(), 1)) for k, pixels in shown.items()}
+
+
 def disagreeing_cameras(
     masks: Mapping[int, Mask], cameras: Mapping[int, Camera], hidden: Mapping[int, Mask] | None = None
 ) -> dict[int, float]:
@@ -179,12 +236,11 @@ def disagreeing_cameras(
     the camera is taken out without which the rest agree best, until two are left, of which either may be wrong.
     `hidden` is where something stands in front, by camera: there a mask says nothing.
     """
-    left = list(masks)
+    left, hull = list(masks), MaskHull.of_subject(masks, cameras, hidden)
     out: dict[int, float] = {}
-    covered = hull_coverage(masks, cameras, hidden)
+    covered = hull.coverages(left)
     while len(left) > 2 and min(covered.values()) < AGREEING:
-        rest = lambda camera: {other: masks[other] for other in left if other != camera}
-        without = {camera: hull_coverage(rest(camera), cameras, hidden) for camera in left}
+        without = {camera: hull.coverages([other for other in left if other != camera]) for camera in left}
         worst = max(left, key=lambda camera: sum(without[camera].values()) - OWN_COVERAGE * covered[camera])
         out[worst] = covered[worst]
         left.remove(worst)
@@ -199,17 +255,4 @@ def hull_coverage(
 
     What lies where a camera's view is `hidden` may be in the hull, whatever its mask says.
     """
-    small = {camera: reduced_mask(mask) for camera, mask in masks.items()}
-    shrunk = {camera: resized(cameras[camera], (mask.shape[1], mask.shape[0])) for camera, mask in small.items()}
-    cube = cube_around([*small.values()], [shrunk[camera] for camera in small])
-    pixels = {camera: voxel_pixels(cube, shrunk[camera], mask.shape) for camera, mask in small.items()}
-    # A thin limb may lie between the centres of voxels, so masks are widened by half of one.
-    near = {camera: widened(mask, pixels[camera].footprint // 2) for camera, mask in small.items()}
-    for camera in small:
-        if hidden is not None and camera in hidden:
-            near[camera] |= reduced_mask(hidden[camera])
-    hull = np.all([pixels[camera].hits(mask) for camera, mask in near.items()], axis=0)
-    return {
-        camera: float((pixels[camera].silhouette_of(hull) & mask).sum() / max(mask.sum(), 1))
-        for camera, mask in small.items()
-    }
+    return MaskHull.of_subject(masks, cameras, hidden).coverages(list(masks))
