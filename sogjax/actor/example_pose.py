@@ -3,7 +3,8 @@
 Front or back: what the silhouettes of one picture set hardly tell, several of them and their colours together do.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from itertools import product
 from typing import NamedTuple
 
@@ -25,7 +26,7 @@ from sogjax.solve.solution import Scales
 from sogjax.tracking.solving import pose_scales
 
 NUM_HEADINGS = 16
-COARSE_ITERATIONS = 40
+COARSE_ITERATIONS = 20
 FINE_ITERATIONS = 80
 NUM_FINE = 3
 """Candidates that are climbed to the end."""
@@ -47,29 +48,40 @@ class Candidate(NamedTuple):
 
 
 def poses_from_silhouettes(
-    body: Body, views: Views, starts: Float[Array, "heading named dof"], terms: Terms, up: str
+    body: Body, coarse: Views, fine: Views, starts: Float[Array, "heading named dof"], terms: Terms, up: str
 ) -> list[Candidate]:
     """The best pose by Eq. 9, and after it the best of those that face the other way, if any was tried.
 
     Every named pose is climbed from the heading that suits it best and from the opposite one, since silhouettes hardly
     tell front from back; the best few of each way are climbed to the end. A single start is climbed to the end at once.
+    The silhouettes are `coarse` ones until then, of half as many blobs.
     """
     scales = pose_scales(body.skeleton)
-    refined = lambda pose, iterations: _refined(body, pose, views, terms, scales, jnp.asarray(iterations))
-    candidate = lambda pose, iterations: Candidate((found := refined(pose, iterations))[0], float(found[1]))
+
+    def climbed(poses: Iterable[Float[Array, "dof"]], views: Views, iterations: int) -> list[Candidate]:
+        """Each by a thread of its own, but the first one, which compiles."""
+
+        def candidate(pose: Float[Array, "dof"]) -> Candidate:
+            found, energy = _refined(body, pose, views, terms, scales, jnp.asarray(iterations))
+            return Candidate(found, float(energy))
+
+        first, *others = poses
+        with ThreadPoolExecutor() as pool:
+            return [candidate(first), *pool.map(candidate, others)]
+
     num_headings, num_named, num_dofs = starts.shape
     if num_headings * num_named == 1:
-        return [candidate(starts.reshape(num_dofs), FINE_ITERATIONS)]
-    promise = _energies(body, starts.reshape(-1, num_dofs), views, terms).reshape(num_headings, num_named)
+        return climbed(starts.reshape(1, num_dofs), fine, FINE_ITERATIONS)
+    promise = _energies(body, starts.reshape(-1, num_dofs), coarse, terms).reshape(num_headings, num_named)
     heading = jnp.argmax(promise, axis=0)
     opposite = (heading + num_headings // 2) % num_headings
     named = jnp.arange(num_named)
     tried = jnp.concatenate([starts[heading, named], starts[opposite, named]])
-    coarse = sorted((candidate(pose, COARSE_ITERATIONS) for pose in tried), key=lambda found: -found.energy)
-    like = [np.dot(forward(body, found.pose, up), forward(body, coarse[0].pose, up)) > 0.0 for found in coarse]
-    ways = [[found for found, same in zip(coarse, like, strict=True) if same == way] for way in (True, False)]
+    likely = sorted(climbed(tried, coarse, COARSE_ITERATIONS), key=lambda found: -found.energy)
+    like = [np.dot(forward(body, found.pose, up), forward(body, likely[0].pose, up)) > 0.0 for found in likely]
+    ways = [[found for found, same in zip(likely, like, strict=True) if same == way] for way in (True, False)]
     best = [
-        max((candidate(found.pose, FINE_ITERATIONS) for found in way[:NUM_FINE]), key=lambda c: c.energy)
+        max(climbed((found.pose for found in way[:NUM_FINE]), fine, FINE_ITERATIONS), key=lambda found: found.energy)
         for way in ways
         if way
     ]

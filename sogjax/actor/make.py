@@ -20,7 +20,7 @@ from sogjax.actor.posed_examples import (
     rough_poses,
 )
 from sogjax.actor.silhouette_fit import Estimate, compile_estimate, estimate_shape, silhouettes_of
-from sogjax.actor.silhouettes import PosedPictures, load_pictures, silhouette_views, stack_views
+from sogjax.actor.silhouettes import COARSE_DEPTH, PosedPictures, load_pictures, silhouette_views, stack_views
 from sogjax.energy.term import Terms
 from sogjax.errors import InputError
 from sogjax.io.example_poses import ExamplePose
@@ -116,7 +116,9 @@ def make_actor(
     model = ShapeModel.from_body(upright, symmetric)
     pictures = [load_pictures(recording, e, report, learnt) for e in progress(examples, len(examples), "masks")]
     views, silhouettes = silhouette_views(pictures, rig, body.num_blobs), silhouettes_of(pictures, rig)
-    shown, chooses = list(zip(examples, pictures, views, strict=True)), best is not None and len(examples) > best
+    coarse = silhouette_views(pictures, rig, body.num_blobs, COARSE_DEPTH)
+    shown = list(zip(examples, pictures, coarse, views, strict=True))
+    chooses = best is not None and len(examples) > best
     with ThreadPoolExecutor(1) as beside:
         if not chooses:
             beside.submit(compile_estimate, model, stack_views(views), silhouettes, terms)

@@ -35,19 +35,22 @@ spoils the shape for all: a cartwheel's frames were at 0.65 to 0.71 where those 
 
 def rough_poses(
     body: Body,
-    shown: Sequence[tuple[ExamplePose, PosedPictures, Views]],
+    shown: Sequence[tuple[ExamplePose, PosedPictures, Views, Views]],
     rig: Camera,
     up: str,
     terms: Terms,
     report: Report,
     progress: Progress,
 ) -> list[Float[Array, "dof"]]:
-    """The rough poses of an upright body in the example pictures; front and back are told apart by all together."""
+    """The rough poses of an upright body in the example pictures; front and back are told apart by all together.
+
+    Of each example are `shown` its pictures and its silhouettes, coarse and fine.
+    """
     ways, colors = [], []
-    for example, posed, views in progress(shown, len(shown), "example poses"):
+    for example, posed, coarse, fine in progress(shown, len(shown), "example poses"):
         report(f"pose of {example.name}")
         starts = _starts(body, example, posed, rig, up)
-        ways.append(poses_from_silhouettes(body, views, starts, terms, up))
+        ways.append(poses_from_silhouettes(body, coarse, fine, starts, terms, up))
         colors.append([side_colors(body, colored_views(posed, rig, way.pose), up) for way in ways[-1]])
     chosen = consistent_ways([[way.energy for way in of_example] for of_example in ways], colors)
     return [of_example[k].pose for of_example, k in zip(ways, chosen, strict=True)]

@@ -28,8 +28,9 @@ from sogjax.tracking.culling import capacity_for
 BACKGROUND_SIMILARITY = -0.15
 """d(c_i, c_j) of the body's colour with the background's. Eq. 7 has 0 there; then a blob could grow without end.
 At -0.15 a blob of sigma r / 1.35 fits a disc of radius r best."""
-DEPTH = 7
-"""Depth of the quad-tree of a silhouette; the edges are fitted to cells of their own."""
+DEPTH, COARSE_DEPTH = 7, 6
+"""Depth of the quad-tree of a silhouette, and where poses are only told apart; the edges are fitted to cells of their
+own."""
 SILHOUETTE_TOLERANCE = 0.15
 
 
@@ -90,13 +91,13 @@ def _check_picture(path: Path, image: UInt8[np.ndarray, "_h _w 3"], size: tuple[
         )
 
 
-def silhouette_views(pictures: Sequence[PosedPictures], rig: Camera, num_blobs: int) -> list[Views]:
+def silhouette_views(pictures: Sequence[PosedPictures], rig: Camera, num_blobs: int, depth: int = DEPTH) -> list[Views]:
     """The masks of each example pose as Sogs: blobs of the subject match the body, others repel it a little.
 
     A camera without a picture shows nothing. All have one shape, so that one program serves them.
     """
     sizes = np.asarray(rig.image_size).astype(int)
-    grids = tuple(CellGrid.from_depth(int(width), int(height), DEPTH) for width, height in sizes)
+    grids = tuple(CellGrid.from_depth(int(width), int(height), depth) for width, height in sizes)
     candidates, normalizers = Candidates.from_grids(grids, rig), whole_image_overlap(rig.image_size)
     cells = [jnp.asarray(_white_cells(posed, sizes, grids)) for posed in pictures]
     leaves = [_leaves(of_pose, candidates) for of_pose in cells]
