@@ -9,7 +9,7 @@ import pytest
 from body_cases import shipped
 from drawn_scene import cells_of, draw, standing
 from rig_cases import ring_rig
-from walking_dog import DEPTH, FRAMES, HEIGHT, judging_tracker
+from walking_dog import DEPTH, FRAMES, HEIGHT, judging_tracker, pass_of
 
 from sogjax.model.body import concatenate
 from sogjax.model.limbs import limb_names, limbs
@@ -18,7 +18,7 @@ from sogjax.quality.metrics import stretches
 from sogjax.search import merge_passes as both_ways
 from sogjax.search.body_parts import PartArrays, best_choice, body_parts, merged_pose, select_parts
 from sogjax.search.merge_passes import merge_passes
-from sogjax.search.other_pass import Compared, Pass, part_gains
+from sogjax.search.other_pass import Compared, part_gains
 from sogjax.search.placed_body import means_of
 from sogjax.tracking.capacity import with_room
 from sogjax.tracking.culling import Capacities
@@ -180,7 +180,7 @@ def test_a_limb_of_one_of_two_actors_comes_back(walking_dog):
     half = dog.skeleton.num_dofs
     pose = np.concatenate([np.asarray(standing(dog, HEIGHT, (0.0, y))) for y in (-0.5, 0.5)])
     cells = [cells_of(rig, draw(body, jnp.asarray(pose), rig), DEPTH)] * 8
-    right = Pass.from_frames([*track(tracker, jnp.asarray(pose), cells)])
+    right = pass_of([*track(tracker, jnp.asarray(pose), cells)])
     limb = next(k for k, name in enumerate(limb_names(body)) if "bello" in name and "leg" in name)
     poses, doubts = right.poses.copy(), np.zeros_like(right.doubts)
     poses[LOST, limbs(body.skeleton)[limb][0]] += 0.8

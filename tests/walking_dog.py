@@ -28,6 +28,18 @@ def judging_tracker(body, rig):
     return replace(tracker, reader=reader, limbs=LimbBlobs.from_body(body), pairs="sparse")
 
 
+def pass_of(frames):
+    """The pass of some frames, whose limbs were judged."""
+    column = lambda values: np.stack([np.asarray(value) for value in values])
+    return Pass(
+        column(frame.result.pose for frame in frames),
+        column(frame.result.limbs.error_probability for frame in frames),
+        column(frame.result.limbs.baseline for frame in frames),
+        np.array([float(frame.result.energy) for frame in frames]),
+        frames[-1].capacities,
+    )
+
+
 def walking():
     """The tracker, the cells of all frames, and what it found in them."""
     body, rig = in_colors(shipped("dog")), ring_rig(5, (160, 120), distance=1.6)
@@ -35,4 +47,4 @@ def walking():
     poses = np.stack([np.asarray(standing(body, HEIGHT))] * FRAMES)
     poses[:, 0] += STEP * np.arange(FRAMES)
     cells = [cells_of(rig, draw(body, jnp.asarray(pose), rig), DEPTH) for pose in poses]
-    return tracker, cells, Pass.from_frames([*track(tracker, jnp.asarray(poses[0]), cells)])
+    return tracker, cells, pass_of([*track(tracker, jnp.asarray(poses[0]), cells)])

@@ -5,11 +5,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool
 
 from sogjax.actor.frame_choice import (
     LEAST_BESIDE,
-    Mask,
     SeenShape,
     seen_shape,
     spread_choice,
@@ -227,10 +225,5 @@ def _shapes(person: Sequence[PersonSeen], seen: SampledMasks, up: str) -> dict[i
 
 def _example(recording: Recording, actor: str, person: PersonSeen, grids: Sequence[CellGrid]) -> ExamplePose:
     name = frame_name(person.frame)
-    within = {recording.rig.names[k]: reduced_mask(in_pixels(mask, grids[k])) for k, mask in person.regions.items()}
+    within = {recording.rig.names[k]: reduced_mask(grids[k].enlarged(mask)) for k, mask in person.regions.items()}
     return ExamplePose(name, actor, {}, {}, None, person.frame, within)
-
-
-def in_pixels(cells: Mask, grid: CellGrid) -> Bool[np.ndarray, "height width"]:
-    """A mask of cells as one of the pictures' size."""
-    return np.kron(cells, np.ones((grid.cell_size, grid.cell_size), bool))[: grid.height, : grid.width]

@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Bool, Float, UInt8
 
 from sogjax.model.yuv_picture import ColorStandard, YuvPicture
 
@@ -90,6 +90,10 @@ class CellGrid:
     def rows(self) -> int:
         """Number of cells down."""
         return -(-self.height // self.cell_size)
+
+    def enlarged(self, cells: Bool[np.ndarray, "rows columns"]) -> Bool[np.ndarray, "height width"]:
+        """A mask of cells as one of the image."""
+        return np.kron(cells, np.ones((self.cell_size, self.cell_size), bool))[: self.height, : self.width]
 
     def averages(self, image: UInt8[np.ndarray, "height width 3"]) -> UInt8[np.ndarray, "rows columns 3"]:
         """Mean colour of every cell, over the part of it that the image covers; channels stay as they are.

@@ -20,7 +20,7 @@ from sogjax.quality.fitted import fitted_numbers
 from sogjax.search.body_parts import Part, PartArrays
 from sogjax.tracking.capacity import views_near
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import AnyFrame, TrackedFrame, TrackState, on_device
+from sogjax.tracking.frame import AnyFrame, TrackState, on_device
 from sogjax.tracking.frame_by_frame import track
 from sogjax.tracking.tracker import Tracker
 
@@ -56,19 +56,6 @@ class Pass:
     def energy(self) -> float:
         """The magnitude of a frame's energy, the mean over the frames."""
         return float(np.abs(self.energies).mean())
-
-    @classmethod
-    def from_frames(cls, frames: Sequence[TrackedFrame]) -> "Pass":
-        """The pass of some frames, whose limbs were judged."""
-        judged = [frame.result.limbs for frame in frames]
-        column = lambda values: np.stack([np.asarray(value) for value in values])
-        return cls(
-            column(frame.result.pose for frame in frames),
-            column(limbs.error_probability for limbs in judged if limbs is not None),
-            column(limbs.baseline for limbs in judged if limbs is not None),
-            np.array([float(frame.result.energy) for frame in frames]),
-            frames[-1].capacities,
-        )
 
 
 @dataclass

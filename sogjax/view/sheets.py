@@ -144,14 +144,9 @@ def write_occluders(
     for name, image, grid, of_camera in zip(recording.rig.names, images, grids, hidden, strict=True):
         inside = of_camera[: grid.rows, : grid.columns]
         shown = np.zeros((grid.height, grid.width, 3), np.uint8) if image is None else np.asarray(image)
-        tiles.append(Tile(shown, [(_pixels(np.isfinite(inside), grid), BLUE)], f"{name}: {_told(inside)}"))
+        tiles.append(Tile(shown, [(grid.enlarged(np.isfinite(inside)), BLUE)], f"{name}: {_told(inside)}"))
     write_image(path, contact_sheet(tiles, f"{recording.name}, frame {frame}: {title}"))
     return path
-
-
-def _pixels(cells: Bool[np.ndarray, "rows columns"], grid: CellGrid) -> Bool[np.ndarray, "height width"]:
-    side = grid.cell_size
-    return np.repeat(np.repeat(cells, side, axis=0), side, axis=1)[: grid.height, : grid.width]
 
 
 def _told(hidden: Float[np.ndarray, "rows columns"]) -> str:
