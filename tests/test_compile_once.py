@@ -4,11 +4,12 @@ import os
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import pytest
 
 from sogjax.run import compile_once
-from sogjax.run.compile_once import lock, unlock
+from sogjax.run.compile_once import LOCKS, _with_locks, lock, unlock
 
 fcntl = pytest.importorskip("fcntl", reason="no locks of bytes here")
 
@@ -87,3 +88,10 @@ def test_without_locks_work_goes_on(locked, monkeypatch):
 
     monkeypatch.setattr(fcntl, "lockf", refused)
     lock(locked[0], 7)
+
+
+def test_a_folder_without_a_file_of_locks_is_read_as_before(tmp_path):
+    (tmp_path / LOCKS).mkdir()  # in the way
+    programs = SimpleNamespace(get=str.encode)
+    assert _with_locks(lambda path: (programs, path), str(tmp_path)) == (programs, str(tmp_path))
+    assert programs.get is str.encode
