@@ -1,10 +1,11 @@
 """How many single runs does a sweep of settings take by the clock, and what does a later member cost beyond tracking?
 
-    python benchmarks/sweep_speed.py [settings=15] [frames=40] [workers=2] [overrides=[...]]
+    python benchmarks/sweep_speed.py [settings=15] [frames=40] [workers=2] [launcher=joblib] [overrides=[...]]
 
 Both are processes of their own on the demo's recording with its actor: `sogjax track`, and `sogjax track -m` over as
 many values of `energy.limit_weight`; each with an empty folder for compiled programs, and with what the first run kept.
-With `workers`, the sweep is run by so many processes as well (joblib), with a folder of its own.
+With `workers`, the sweep is run by so many processes as well, with a folder of its own; `submitit_local` takes as many
+as there are settings, and `ray` needs them as cores.
 """
 
 import json
@@ -27,6 +28,12 @@ from sogjax.errors import counted
 from sogjax.run.clock import TOTAL, TRACKING
 from sogjax.study.script import machine_line, run_script, settings_from
 
+LAUNCHERS = {
+    "joblib": ["hydra/launcher=joblib", "hydra.launcher.n_jobs={workers}"],
+    "submitit_local": ["hydra/launcher=submitit_local", "hydra.launcher.timeout_min=20"],
+    "ray": ["hydra/launcher=ray", "+hydra.launcher.ray.init.num_cpus={workers}"],
+}
+"""Words that share a sweep out."""
 AIM = 4.0
 """Single runs that a sweep of 15 settings may take."""
 
@@ -38,6 +45,7 @@ class Settings:
     settings: int = 15
     frames: int = 40
     workers: int = 1
+    launcher: str = "joblib"
     overrides: list[str] = field(default_factory=list)
 
 
@@ -85,7 +93,8 @@ def measured(recording: Path, actor: Path, settings: Settings) -> Iterator[tuple
     """With programs compiled anew, and kept."""
     words = [f"recording={recording}", f"actor={actor}", f"stop={settings.frames}", *settings.overrides]
     values = ",".join(f"{weight:.3f}" for weight in np.linspace(0.5, 2.0, settings.settings))
-    shared_out = [] if settings.workers == 1 else ["hydra/launcher=joblib", f"hydra.launcher.n_jobs={settings.workers}"]
+    launcher = [] if settings.workers == 1 else LAUNCHERS[settings.launcher]
+    shared_out = [word.format(workers=settings.workers) for word in launcher]
     swept = [*words, "-m", f"energy.limit_weight={values}", *shared_out]
     with TemporaryDirectory() as folder:
         for name in ("cold", "kept"):

@@ -11,6 +11,7 @@ from full_disk import files_of_at_most
 
 from sogjax.errors import InputError
 from sogjax.run.compilation_cache import REFUSED, TRIED, VARIABLE, complaints, forget_unread, use_compilation_cache
+from sogjax.run.compile_once import LOCKS
 
 NOT_OF_THIS_MACHINE = (
     "Loading XLA:CPU AOT result. Target machine feature +prefer-no-scatter is not supported on the host machine."
@@ -69,7 +70,7 @@ def test_one_start_on_a_full_disk_does_not_switch_it_off_for_good(tmp_path, room
     kept = tmp_path / "kept"
     with files_of_at_most(room):
         assert hits({VARIABLE: str(kept)}) == 0
-    assert list(kept.glob("*/*")) == []
+    assert {path.name for path in kept.glob("*/*")} <= {LOCKS}
     hits({VARIABLE: str(kept)})
     assert hits({VARIABLE: str(kept)}) >= 1
 

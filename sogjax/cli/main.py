@@ -32,6 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from sogjax.errors import InputError
     from sogjax.run.clock import STARTING, age_of_process, clocked, stage
     from sogjax.run.compilation_cache import use_compilation_cache, use_compiler_options
+    from sogjax.run.compile_once import compile_once
 
     if not arguments or arguments[0] in (*HELP, "help"):
         print(_overview())
@@ -57,6 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with terminated_as_interrupted(), clocked(begun):
             with stage(STARTING):
                 run = pkgutil.resolve_name(f"sogjax.cli.{FUNCTIONS.get(command, f'{command}:run')}")
+                compile_once()
             run(config)
     except InputError as error:
         return _wrong_input(str(error))

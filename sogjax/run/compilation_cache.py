@@ -22,6 +22,7 @@ from typing import Any
 from sogjax.errors import InputError
 from sogjax.io.cache_folder import OFF, default_cache_dir, named_folder, sweep
 from sogjax.io.files import atomic_path
+from sogjax.run.compile_once import compile_once
 
 VARIABLE = "SOGJAX_COMPILATION_CACHE"
 """The environment variable with the folder, or `off`; without it programs lie beside other things that are kept."""
@@ -157,6 +158,7 @@ def _use(folder: str | None) -> None:
         from jax.experimental.compilation_cache.compilation_cache import reset_cache
 
         reset_cache()  # jax looks up the folder once only
+        compile_once()
 
 
 def forget_unread(folder: Path) -> None:
