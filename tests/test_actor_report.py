@@ -14,7 +14,7 @@ from rig_cases import opencv_pixels, ring_rig
 from tiny_body import make_body
 
 from sogjax.actor.coverage import body_silhouette, overlap_ratio, silhouette_iou
-from sogjax.actor.make import MadeActor
+from sogjax.actor.make import MadeActor, doubt_of
 from sogjax.actor.report import actor_report
 from sogjax.actor.silhouette_fit import Estimate
 from sogjax.actor.silhouettes import PosedPictures
@@ -140,6 +140,14 @@ def test_a_good_actor_has_nothing_to_warn_of():
         assert bone.after == pytest.approx(1.1 * bone.before, rel=1e-4)
     assert report.warnings == report.notes == ()
     assert "Notes" not in report_page(report, made, RIG)
+
+
+def test_an_actor_of_another_size_than_its_masks_is_doubtful():
+    made = made_dog()
+    assert doubt_of(made.body, made.estimate.poses, made.pictures, made.rig) is None
+    smaller = doubt_of(made.start, made.estimate.poses, made.pictures, made.rig)
+    assert smaller is not None
+    assert "(stand, turned)" in smaller
 
 
 def test_what_the_pictures_did_not_tell_is_said():

@@ -55,6 +55,6 @@ def test_a_motion_that_fits_well_does_not_look_right_with_odd_bones():
     said = odd_sentence(scaled(shipped("human"), thigh=4 / 3, shank=4 / 3))
     assert said is not None
     assert verdicts({"anna": motion}, {"anna": 0.7})["anna"].looks_right
-    found = verdicts({"anna": motion}, {"anna": 0.7}, odd={"anna": said})["anna"]
+    found = verdicts({"anna": motion}, {"anna": 0.7}, odd={"anna": [said]})["anna"]
     assert not found.looks_right
     assert "thigh 33% too long" in found.sentence

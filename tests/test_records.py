@@ -20,7 +20,7 @@ from sogjax.scene.background import BackgroundImage
 def actors(tmp_path):
     body = load_body(actor_file(tmp_path / "a.yaml"))
     turned = body.rotated(jnp.asarray([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]]))
-    kept = Actors((turned,), (KnownFrame(7, np.linspace(-1.0, 1.0, 5), 0.9),))
+    kept = Actors((turned,), (KnownFrame(7, np.linspace(-1.0, 1.0, 5), 0.9),), ("the actor is doubtful",))
     kept.save(tmp_path)
     return kept
 
@@ -31,6 +31,7 @@ def test_actors_are_kept_to_the_bit(tmp_path, actors):
     (known,) = found.known_frames
     np.testing.assert_array_equal(known.pose, actors.known_frames[0].pose)
     assert (known.frame, known.agreement) == (7, 0.9)
+    assert found.doubts == actors.doubts == ("the actor is doubtful",)
     assert Actors.load(tmp_path / "elsewhere") is None
 
 

@@ -69,9 +69,7 @@ def fit_actor(recording: Recording, subject: str | None = None, **settings: Any)
     Raises:
         InputError: as there.
     """
-    made: list[MadeActor] = []
-    actors_of_pictures(_request(recording, subject, settings), made.extend)
-    return made[0]
+    return actors_of_pictures(_request(recording, subject, settings))[0]
 
 
 def _request(recording: Recording, subject: str | None, settings: dict[str, Any]) -> ActorRequest:

@@ -81,14 +81,14 @@ def verdicts(
     expected: Mapping[str, float],
     limits: Mapping[str, Mapping[str, Limits]] | None = None,
     begun: Mapping[str, str] | None = None,
-    odd: Mapping[str, str] | None = None,
+    odd: Mapping[str, Sequence[str]] | None = None,
     inside: Mapping[str, Sequence[str]] | None = None,
 ) -> dict[str, Verdict]:
     """Of the actors of a run.
 
     `expected` is what actors explain in their example poses, where that is known; `limits` are those of their bodies
     (`limits_of`); `begun` says of actors that their initial pose was not sure, which counts where there is more; `odd`
-    says what is odd about bodies, `inside` where limbs are in each other (`passages`).
+    says what is odd or doubtful about bodies, `inside` where limbs are in each other (`passages`).
     """
     limits, begun, odd, inside = limits or {}, begun or {}, odd or {}, inside or {}
     return {
@@ -100,7 +100,7 @@ def verdicts(
             inside=inside.get(name, ()),
             limits=limits.get(name, {}),
             begun=begun.get(name),
-            odd=odd.get(name),
+            odd=odd.get(name, ()),
         )
         for name, motion in motions.items()
     }
@@ -114,7 +114,7 @@ def _verdict(
     inside: Sequence[str],
     limits: Mapping[str, Limits],
     begun: str | None,
-    odd: str | None,
+    odd: Sequence[str],
 ) -> Verdict:
     told = _told(motion)
     explained = None if motion.explained is None or not told.any() else float(np.median(motion.explained[told]))
@@ -123,8 +123,7 @@ def _verdict(
     doubtful = doubtful_limbs(motion)
     parts = [*_limbs(doubtful), *_shortened([*inside]), *_bent(motion, limits)]
     look = [] if wrong else [*_bad_overlaps(overlap), *_bad_stretches(motion), *parts]
-    if odd is not None:
-        look.append(odd)
+    look += odd
     if begun is not None and (wrong or look):
         look.append(begun)
     return Verdict(

@@ -16,7 +16,7 @@ from sogjax.energy.term import Terms
 from sogjax.errors import InputError
 from sogjax.io.actor_file import load_body, save_body
 from sogjax.io.background_cache import background_origin
-from sogjax.io.npz_file import read_npz, save_npz
+from sogjax.io.npz_file import read_npz, save_npz, text_array
 from sogjax.io.recording import Recording
 from sogjax.io.source import fingerprint
 from sogjax.model.body import Body
@@ -55,6 +55,8 @@ class Actors:
 
     bodies: tuple[Body, ...]
     known_frames: tuple[KnownFrame, ...] = ()
+    doubts: tuple[str, ...] = ()
+    """Why each may be of the wrong sizes; "" where nothing says so. None at all: nothing does."""
 
     def save(self, folder: Path) -> None:
         """Keep them exactly in a run's folder; actor files hold rounded colours."""
@@ -64,6 +66,7 @@ class Actors:
             arrays |= {f"{k}_{n}": np.asarray(leaf) for n, leaf in enumerate(jax.tree.leaves(body))}
         for k, known in enumerate(self.known_frames):
             arrays |= {f"known_{k}": known.pose, f"where_{k}": np.array([known.frame, known.agreement])}
+        arrays |= {f"doubt_{k}": np.array(doubt) for k, doubt in enumerate(self.doubts)}
         save_npz(folder / FILE, arrays)
 
     @classmethod
@@ -81,10 +84,11 @@ class Actors:
             leaves, structure = jax.tree.flatten(load_body(path))
             kept = [_leaf(file, exact.get(f"{len(bodies)}_{n}"), leaf) for n, leaf in enumerate(leaves)]
             bodies.append(jax.tree.unflatten(structure, kept))
+        doubts = [str(text_array(file, exact, name, ())) for k in range(len(bodies)) if (name := f"doubt_{k}") in exact]
         known = []
         for k in count():
             if f"known_{k}" not in exact:
-                return cls(tuple(bodies), tuple(known))
+                return cls(tuple(bodies), tuple(known), tuple(doubts))
             frame, agreement = exact[f"where_{k}"].tolist()
             known.append(KnownFrame(int(frame), exact[f"known_{k}"], agreement))
         raise AssertionError
@@ -170,9 +174,16 @@ def new_actors(request: ActorRequest, report: Report = lambda _: None) -> Actors
     """
     check_scale(request.recording, [body_named(request.body)])
     try:
-        return actors_of_pictures(request, report)
+        made = actors_of_pictures(request)
     except InputError as error:
-        return Actors((_of_keypoints(request, error),))
+        if (actor := _of_keypoints(request, str(error))) is None:
+            raise
+        return Actors((actor,))
+    doubts = tuple(actor.doubt or "" for actor in made)
+    if any(doubts) and (actor := _of_keypoints(request, "; ".join(doubts))) is not None:
+        return Actors((actor,))
+    report(made)
+    return Actors(tuple(actor.body for actor in made), known_frames(made), doubts)
 
 
 def _of_files(request: ActorRequest, files: Sequence[Path]) -> Actors:
@@ -196,7 +207,7 @@ def _alike(one: Body, other: Body) -> bool:
     return one.blob_colors.shape == other.blob_colors.shape and all(map(np.array_equal, parts(one), parts(other)))
 
 
-def actors_of_pictures(request: ActorRequest, report: Report) -> Actors:
+def actors_of_pictures(request: ActorRequest) -> list[MadeActor]:
     """The actors of the recording's example poses, or of frames of its videos where it has none.
 
     Raises:
@@ -223,8 +234,7 @@ def actors_of_pictures(request: ActorRequest, report: Report) -> Actors:
                 best,
             )
         )
-    report(made)
-    return Actors(tuple(actor.body for actor in made), known_frames(made))
+    return made
 
 
 def known_frames(made: Sequence[MadeActor]) -> tuple[KnownFrame, ...]:
@@ -240,19 +250,17 @@ def known_frames(made: Sequence[MadeActor]) -> tuple[KnownFrame, ...]:
     )
 
 
-def _of_keypoints(request: ActorRequest, error: InputError) -> Body:
-    """The actor of keypoints beside the videos, where none can be made of pictures for a reason.
+def _of_keypoints(request: ActorRequest, reason: str) -> Body | None:
+    """The actor of keypoints beside the videos, where pictures do not make a good one for a reason.
 
-    Raises:
-        InputError: the reason, where there are example poses, several actors, or no keypoints that tell.
+    None: there are example poses, several actors, or no keypoints that tell.
     """
     if request.recording.example_poses or request.number not in (None, 1):
-        raise error
+        return None
     start = body_named(request.body)
     actor = keypoint_actor(request.recording, start, request.color_space, request.symmetric)
-    if actor is None:
-        raise error
-    say(f"the actor is made of the keypoints and of colours at the posed body, as its outlines cannot be had ({error})")
+    if actor is not None:
+        say(f"the actor is made of keypoints and of colours at the posed body, as outlines do not serve ({reason})")
     return actor
 
 

@@ -28,7 +28,8 @@ def judged_result(run: Run) -> RunResult:
     """The result of a run, with the comparison with a truth, if there is one, and with what the run thinks of it."""
     result = run.result_so_far
     limits = {body.name: limits_of(body) for body in result.bodies}
-    odd = {body.name: said for body in result.bodies if (said := odd_sentence(body)) is not None}
+    doubts = dict(zip((body.name for body in run.actors.bodies), run.actors.doubts, strict=False))
+    odd = {body.name: [said for said in (doubts.get(body.name), odd_sentence(body)) if said] for body in result.bodies}
     inside = {body.name: passages(body, result.motions[body.name]) for body in result.bodies}
     return replace(
         result,
