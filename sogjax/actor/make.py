@@ -124,14 +124,19 @@ def make_actor(
     with ThreadPoolExecutor(1) as beside:
         if not chooses:
             beside.submit(compile_estimate, model, stack_views(views), silhouettes, terms)
-        poses = rough_poses(upright, shown, rig, recording.up, terms, report, progress)
+        ways = rough_poses(upright, shown, rig, recording.up, terms, report, progress)
     if best is not None and chooses:
-        kept = found_best(upright, poses, pictures, rig, best)
-        examples, pictures, poses = [examples[k] for k in kept], [pictures[k] for k in kept], [poses[k] for k in kept]
+        kept = found_best(upright, [poses[0] for poses in ways], pictures, rig, best)
+        examples, pictures, ways = [examples[k] for k in kept], [pictures[k] for k in kept], [ways[k] for k in kept]
         views, silhouettes = [views[k] for k in kept], silhouettes_of(pictures, rig)
         report(f"uses {', '.join(example.name for example in examples)}")
     report("shape")
-    estimate = estimate_shape(model, jnp.stack(poses), stack_views(views), silhouettes, terms)
+    fitted = lambda way: estimate_shape(
+        model, jnp.stack([poses[way] for poses in ways]), stack_views(views), silhouettes, terms
+    )
+    estimates = [fitted(way) for way in range(1 if best is None else min(map(len, ways)))]
+    agrees = lambda estimate: _overlap(_shaped(model, estimate.shape_params), estimate.poses, pictures, rig)
+    estimate = max(estimates, key=agrees)
     shaped = _shaped(model, estimate.shape_params)
     _check_fit(recording, shaped, estimate, pictures, rig)
     doubt = None if best is None else doubt_of(shaped, estimate.poses, pictures, rig)
@@ -179,8 +184,7 @@ def _check_fit(
 
 def doubt_of(body: Body, poses: Float[Array, "pose dof"], pictures: Sequence[PosedPictures], rig: Camera) -> str | None:
     """Why an actor of frames that nobody chose may be of the wrong sizes, with the remedy; None: they suited."""
-    pairs = zip(poses, pictures, strict=True)
-    overlap = float(np.mean([agreement(body, pose, posed, rig) for pose, posed in pairs]))
+    overlap = _overlap(body, poses, pictures, rig)
     if overlap >= FRAMES_SUIT:
         return None
     shown = ", ".join(posed.name for posed in pictures)
@@ -189,6 +193,11 @@ def doubt_of(body: Body, poses: Float[Array, "pose dof"], pictures: Sequence[Pos
         "(IoU; 0.8 and more is usual); name frames with an upright body and clear limbs in recording.yaml, such as "
         "`example_poses: [0, 150]`, or add example_poses/POSE/CAMERA.jpg with CAMERA.mask.png"
     )
+
+
+def _overlap(body: Body, poses: Float[Array, "pose dof"], pictures: Sequence[PosedPictures], rig: Camera) -> float:
+    """How well the body's silhouettes and all masks agree (mean IoU)."""
+    return float(np.mean([agreement(body, pose, posed, rig) for pose, posed in zip(poses, pictures, strict=True)]))
 
 
 def subjects_of(recording: Recording) -> tuple[str | None, ...]:

@@ -41,10 +41,11 @@ def rough_poses(
     terms: Terms,
     report: Report,
     progress: Progress,
-) -> list[Float[Array, "dof"]]:
+) -> list[list[Float[Array, "dof"]]]:
     """The rough poses of an upright body in the example pictures; front and back are told apart by all together.
 
-    Of each example are `shown` its pictures and its silhouettes, coarse and fine.
+    Of each example are `shown` its pictures and its silhouettes, coarse and fine. Of each, the pose that is believed,
+    and after it that of the body turned round, if it was looked for.
     """
     ways, colors = [], []
     for example, posed, coarse, fine in progress(shown, len(shown), "example poses"):
@@ -53,7 +54,10 @@ def rough_poses(
         ways.append(poses_from_silhouettes(body, coarse, fine, starts, terms, up))
         colors.append([side_colors(body, colored_views(posed, rig, way.pose), up) for way in ways[-1]])
     chosen = consistent_ways([[way.energy for way in of_example] for of_example in ways], colors)
-    return [of_example[k].pose for of_example, k in zip(ways, chosen, strict=True)]
+    return [
+        [of_example[k].pose, *(way.pose for way in of_example if way is not of_example[k])]
+        for of_example, k in zip(ways, chosen, strict=True)
+    ]
 
 
 def found_best(
