@@ -13,8 +13,9 @@ from drawn_scene import draw, in_colors, moved, standing
 from rig_cases import opencv_pixels, recording_of, ring_rig
 from tiny_body import make_body
 
-from sogjax.actor import silhouette_fit
+from sogjax.actor import posed_examples, silhouette_fit
 from sogjax.actor.colors import ColoredView, back_projected_colors, colored
+from sogjax.actor.example_pose import forward
 from sogjax.actor.make import make_actor, subjects_of
 from sogjax.energy.frame_energy import standard_terms
 from sogjax.errors import InputError
@@ -183,6 +184,22 @@ def test_the_poses_of_the_examples_are_found(made):
         found = np.asarray(posed(actor.body, actor.example_poses[name])[1], float)
         expected = np.asarray(posed(truth, jnp.asarray(pose))[1], float)
         assert np.linalg.norm(found - expected, axis=1).mean() < 0.05
+
+
+@pytest.mark.slow
+def test_frames_that_nobody_chose_are_fitted_both_ways_round(made, tmp_path, monkeypatch):
+    """Whichever way colours seem to show it: the fitted body agrees better with the masks the right way round."""
+    _, truth, poses = made
+    rig = ring_rig(4, (160, 120), distance=1.5)
+    examples = tuple(write_example(tmp_path, name, truth, pose, rig) for name, pose in poses.items())
+    recording = replace(recording_of(rig, 1), example_poses=examples)
+    for turned in (False, True):
+        way = lambda fits, _, turned=turned: tuple(len(of_one) - 1 if turned else 0 for of_one in fits)
+        monkeypatch.setattr(posed_examples, "consistent_ways", way)
+        actor = make_actor(recording, shipped("dog"), None, "hsv_cylinder", standard_terms(), best=2)
+        for name, pose in poses.items():
+            ways = [forward(actor.upright_body, jnp.asarray(found), "z") for found in (actor.example_poses[name], pose)]
+            assert np.dot(*ways) > 0.8, (name, turned)
 
 
 @pytest.mark.slow
