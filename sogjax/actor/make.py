@@ -40,7 +40,8 @@ POSE_FOUND = 0.5
 
 FRAMES_SUIT = 0.75
 """Mean IoU of frames that nobody chose below which the actor is doubtful: its limbs may be of the wrong sizes. Good
-frames have 0.86 to 0.89; who sits at a table, whose edges count among the masks, had 0.74, and was followed well."""
+frames have 0.86 to 0.89; who sits at a table, whose edges count among the masks, had 0.74, and was followed well, but
+also 0.68, and all was wrong."""
 
 
 @dataclass(frozen=True)
@@ -189,8 +190,8 @@ def doubt_of(body: Body, poses: Float[Array, "pose dof"], pictures: Sequence[Pos
         return None
     shown = ", ".join(posed.name for posed in pictures)
     return (
-        f"the actor is doubtful: in the frames that suit best ({shown}) masks and body overlap by only {overlap:.2f} "
-        "(IoU; 0.8 and more is usual); name frames with an upright body and clear limbs in recording.yaml, such as "
+        f"the actor is doubtful, and with it the motion: in the frames that suit best ({shown}) masks and body overlap "
+        f"by only {overlap:.2f} (IoU; 0.8 and more is usual); name frames with an upright body and clear limbs in recording.yaml, such as "
         "`example_poses: [0, 150]`, or add example_poses/POSE/CAMERA.jpg with CAMERA.mask.png"
     )
 

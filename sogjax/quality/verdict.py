@@ -123,7 +123,7 @@ def _verdict(
     doubtful = doubtful_limbs(motion)
     parts = [*_limbs(doubtful), *_shortened([*inside]), *_bent(motion, limits)]
     look = [] if wrong else [*_bad_overlaps(overlap), *_bad_stretches(motion), *parts]
-    look += odd
+    look = [*odd, *look]
     if begun is not None and (wrong or look):
         look.append(begun)
     return Verdict(
