@@ -191,8 +191,8 @@ def doubt_of(body: Body, poses: Float[Array, "pose dof"], pictures: Sequence[Pos
     shown = ", ".join(posed.name for posed in pictures)
     return (
         f"the actor is doubtful, and with it the motion: in the frames that suit best ({shown}) masks and body overlap "
-        f"by only {overlap:.2f} (IoU; 0.8 and more is usual); name frames with an upright body and clear limbs in recording.yaml, such as "
-        "`example_poses: [0, 150]`, or add example_poses/POSE/CAMERA.jpg with CAMERA.mask.png"
+        f"by only {overlap:.2f} (IoU; 0.8 and more is usual); name frames with an upright body and clear limbs in "
+        "recording.yaml, such as `example_poses: [0, 150]`, or add example_poses/POSE/CAMERA.jpg with CAMERA.mask.png"
     )
 
 
