@@ -8,7 +8,7 @@ The body is the default one (63 blobs); the image blobs are cells about it. All 
 import statistics
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import jax
@@ -113,7 +113,8 @@ def scattered_views(body: Body, settings: Settings) -> Views:
     """
     rng = np.random.default_rng(0)
     cameras = ring(settings.cameras)
-    seen = jax.vmap(project, in_axes=(0, None))(cameras, body.posed_blobs(body.poses["rest"]))
+    rest = body.poses["rest"]
+    seen = jax.vmap(project, in_axes=(0, None))(cameras, body.posed_blobs(rest))
     side = 8.0 * np.sqrt(1024.0 / settings.image_blobs)
     x, y = np.meshgrid(np.arange(side / 2, 1296.0, side), np.arange(side / 2, 972.0, side))
     cells = np.stack([x.ravel(), y.ravel()], axis=-1)
@@ -124,17 +125,22 @@ def scattered_views(body: Body, settings: Settings) -> Views:
         means.append(cells[nearest])
         worn.append(far[nearest].argmin(axis=1))
     shape = (settings.cameras, settings.image_blobs)
+    clothes = lambda blobs: 0.5 * (3 * blobs // body.num_blobs)
+    lightness = clothes(np.stack(worn)) + rng.uniform(0.0, 0.25, shape)
     images = Sog(
         means=jnp.asarray(np.stack(means), jnp.float32),
         sigmas=jnp.full(shape, side / 2, jnp.float32),
-        colors=jnp.zeros((*shape, 3), jnp.float32),
+        colors=along_lightness(lightness),
         mask=jnp.ones(shape, bool),
     )
-    clothes = lambda blobs: 3 * blobs // body.num_blobs
-    alike = clothes(np.stack(worn))[:, None, :] == clothes(np.arange(body.num_blobs))[None, :, None]
-    similarities = np.where(alike, rng.random(alike.shape), 0.0)
+    wearing = replace(body.posed_blobs(rest), colors=along_lightness(clothes(np.arange(body.num_blobs))))
     normalizers = whole_image_overlap(cameras.image_size)
-    return Views(cameras, images, jnp.asarray(similarities, jnp.float32), normalizers)
+    return Views.from_images(cameras, images, wearing, normalizers, "lab", jnp.asarray(0.25))
+
+
+def along_lightness(lightness: np.ndarray) -> jax.Array:
+    """Greys, in Lab / 100."""
+    return jnp.asarray(np.stack([lightness, 0.0 * lightness, 0.0 * lightness], axis=-1), jnp.float32)
 
 
 def ring(count: int) -> Camera:

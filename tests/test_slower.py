@@ -6,7 +6,10 @@ from pathlib import Path
 import pytest
 
 sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
+import energies
 import small
+from gradient import Settings as Sizes
+from gradient import scattered_views
 
 
 @pytest.fixture
@@ -37,3 +40,9 @@ def test_what_seems_slower_once_is_measured_again(clock):
     whole_measurement = [0.02] * 26
     assert small.ratio(clock(0.02, *whole_measurement), clock(0.001)) == pytest.approx(40.0)
     assert small.compare({"step": clock(0.02, *whole_measurement)}, clock(0.001), {"step": 20.0}) == 0
+
+
+def test_what_is_measured_of_near_pairs_is_the_energy_of_all():
+    body = energies.human()
+    dense = energies.frame_energy(body, scattered_views(body, Sizes(cameras=2, image_blobs=128)))
+    assert energies.difference(dense, energies.with_near_pairs(dense)) < 1e-4
