@@ -10,6 +10,7 @@ from jaxtyping import Array, Float, Int
 
 from sogjax.model.body import Attachments, Body
 from sogjax.model.bones import turning_places
+from sogjax.model.farthest import farthest
 from sogjax.model.rotation import world_from_upright
 from sogjax.model.shape import ShapeModel
 from sogjax.model.skeleton import Skeleton
@@ -152,11 +153,7 @@ def frames_by_spread(
         return rows
     bent = _bent(skeleton, poses[rows])
     first = int(np.argmin(np.linalg.norm(bent - np.median(bent, axis=0), axis=1)))
-    chosen, distance = [first], np.linalg.norm(bent - bent[first], axis=1)
-    while len(chosen) < count:
-        chosen.append(int(np.argmax(distance)))
-        distance = np.minimum(distance, np.linalg.norm(bent - bent[chosen[-1]], axis=1))
-    return rows[np.sort(chosen)]
+    return rows[farthest(bent, count, first)]
 
 
 def _bent(skeleton: Skeleton, poses: Float[np.ndarray, "frame dof"]) -> Float[np.ndarray, "frame limited"]:

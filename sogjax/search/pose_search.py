@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import equinox as eqx
 import jax
@@ -13,6 +14,8 @@ from jaxtyping import Array, Float, Int
 from sogjax.energy.appearance import ColorWindows
 from sogjax.energy.term import Term
 from sogjax.model.body import Body
+from sogjax.model.camera import Camera
+from sogjax.model.farthest import farthest
 from sogjax.model.limbs import limbs, with_other_limb
 from sogjax.model.rotation import axis_vector
 from sogjax.scene.color_clusters import ColorClusters
@@ -37,6 +40,8 @@ NUM_AT_PLACE, FIRST_ITERATIONS = (16, 8, 4, 4), 8
 NUM_SECOND, SECOND_ITERATIONS = 6, 10
 """Those of them whose limbs are tried another way, and how far these are climbed."""
 NUM_LAST, LAST_ITERATIONS = 4, 25
+FEW_CAMERAS = 6
+"""Cameras that many poses are compared in, before the best are in all."""
 LIMBS_TRIED = (3, 1)
 """Ways to hold a limb that are climbed, of all that are scored: of the best pose, of each other."""
 NUM_DRAWN = 16
@@ -102,14 +107,15 @@ def search(searcher: PoseSearch, frame: SeenFrame, count: int = NUM_LAST, report
     found = [place for place in found if place.score >= POOR * found[0].score] or found[:1]
     placed = PlacedSearch.of_places(searcher, frame, np.stack([place.centre for place in found]))
     tried = _starts(searcher, found)
-    with ThreadPoolExecutor(1) as beside:
-        beside.submit(placed.climbed, tried[np.arange(1)], 0)  # what climbs is compiled meanwhile
-        scored = placed.scored(tried)
-    tried = placed.climbed(_spread_best(searcher, scored), FIRST_ITERATIONS)
+    with ThreadPoolExecutor(2) as beside:
+        for level in (placed.glance, placed):
+            beside.submit(level.climbed, tried[np.arange(1)], 0)  # what climbs is compiled meanwhile
+        scored = placed.glance.scored(tried)
+        tried = placed.glance.climbed(_spread_best(searcher, scored), FIRST_ITERATIONS)
     tried = _best(searcher, tried, NUM_SECOND)
     report(0.3)
-    for share in (0.6, 0.85):
-        tried = _best(searcher, with_better_limbs(placed, tried), NUM_LAST)
+    for level, share in ((placed.glance, 0.5), (placed, 0.85)):
+        tried = _best(searcher, with_better_limbs(level, tried), NUM_LAST)
         report(share)
     tried = placed.climbed(tried, LAST_ITERATIONS) if searcher.among > 1 else with_look_alikes(placed, tried)
     report(1.0)
@@ -150,6 +156,17 @@ class PlacedSearch:
         padded = np.pad(centres, ((0, NUM_PLACES - len(centres)), (0, 0)), mode="edge")
         return cls(searcher, searcher.energy(frame), _windows(frame, jnp.asarray(padded, frame.odds.dtype)))
 
+    @cached_property
+    def glance(self) -> "PlacedSearch":
+        """The same as some of the cameras see it, those farthest apart; its energies are compared with each other only.
+
+        Larger cells instead would lose arms, which are as thin as a cell.
+        """
+        cameras = np.asarray(self.energy.cameras.camera_from_world)
+        chosen = farthest(-np.einsum("cji,cj->ci", cameras[:, :3, :3], cameras[:, :3, 3]), FEW_CAMERAS)
+        seen, windows = _of_cameras(self.energy.cameras, self.windows, jnp.asarray(chosen))
+        return replace(self, energy=eqx.tree_at(lambda energy: energy.cameras, self.energy, seen), windows=windows)
+
     def scored(self, tried: Hypotheses) -> Hypotheses:
         """The hypotheses with their energies."""
         return Hypotheses(tried.poses, tried.where, scores(self.energy, self.windows, tried.where, tried.poses))
@@ -159,6 +176,12 @@ class PlacedSearch:
         scales = self.searcher.scales
         poses, values = climbed(self.energy, self.windows, tried.where, tried.poses, scales, iterations)
         return Hypotheses(poses, tried.where, values)
+
+
+@eqx.filter_jit
+def _of_cameras(cameras: Camera, windows: ColorWindows, chosen: Int[Array, "camera"]) -> tuple[Camera, ColorWindows]:
+    some = lambda tree, axis: jax.tree.map(lambda leaf: jnp.take(leaf, chosen, axis), tree)
+    return some(cameras, 0), some(windows, 1)
 
 
 def _starts(searcher: PoseSearch, found: Sequence[Place]) -> Hypotheses:
@@ -200,7 +223,7 @@ def with_better_limbs(placed: PlacedSearch, tried: Hypotheses) -> Hypotheses:
             variants.append(with_other_limb(body, pose, limb, others)[1:])
             source += [(k, j)] * len(variants[-1])
     of_pose, of_limb = np.array(source).T
-    scored = placed.scored(Hypotheses(np.concatenate(variants), tried.where[of_pose], np.zeros(len(of_pose))))
+    scored = placed.glance.scored(Hypotheses(np.concatenate(variants), tried.where[of_pose], np.zeros(len(of_pose))))
     chosen = []
     for k, j in sorted(set(source)):
         here = np.flatnonzero((of_pose == k) & (of_limb == j))
