@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -22,6 +23,7 @@ from sogjax.actor.posed_examples import (
 from sogjax.actor.silhouette_fit import Estimate, compile_estimate, estimate_shape, silhouettes_of
 from sogjax.actor.silhouettes import COARSE_DEPTH, PosedPictures, load_pictures, silhouette_views, stack_views
 from sogjax.energy.term import Terms
+from sogjax.energy.views import Views
 from sogjax.errors import InputError
 from sogjax.io.example_poses import ExamplePose
 from sogjax.io.recording import Recording
@@ -118,26 +120,10 @@ def make_actor(
     upright = body.rotated(jnp.asarray(turn, body.blob_sigmas.dtype))
     model = ShapeModel.from_body(upright, symmetric)
     pictures = [load_pictures(recording, e, report, learnt) for e in progress(examples, len(examples), "masks")]
-    views, silhouettes = silhouette_views(pictures, rig, body.num_blobs), silhouettes_of(pictures, rig)
-    coarse = silhouette_views(pictures, rig, body.num_blobs, COARSE_DEPTH)
-    shown = list(zip(examples, pictures, coarse, views, strict=True))
-    chooses = best is not None and len(examples) > best
-    with ThreadPoolExecutor(1) as beside:
-        if not chooses:
-            beside.submit(compile_estimate, model, stack_views(views), silhouettes, terms)
-        ways = rough_poses(upright, shown, rig, recording.up, terms, report, progress)
-    if best is not None and chooses:
-        kept = found_best(upright, [poses[0] for poses in ways], pictures, rig, best)
-        examples, pictures, ways = [examples[k] for k in kept], [pictures[k] for k in kept], [ways[k] for k in kept]
-        views, silhouettes = [views[k] for k in kept], silhouettes_of(pictures, rig)
-        report(f"uses {', '.join(example.name for example in examples)}")
+    found = _found_poses(upright, model, examples, pictures, rig, recording.up, terms, best, report, progress)
+    examples, pictures = found.examples, found.pictures
     report("shape")
-    fitted = lambda way: estimate_shape(
-        model, jnp.stack([poses[way] for poses in ways]), stack_views(views), silhouettes, terms
-    )
-    estimates = [fitted(way) for way in range(1 if best is None else min(map(len, ways)))]
-    agrees = lambda estimate: _overlap(_shaped(model, estimate.shape_params), estimate.poses, pictures, rig)
-    estimate = max(estimates, key=agrees)
+    estimate = _best_estimate(model, found, rig, terms, ways=1 if best is None else 2)
     shaped = _shaped(model, estimate.shape_params)
     _check_fit(recording, shaped, estimate, pictures, rig)
     doubt = None if best is None else doubt_of(shaped, estimate.poses, pictures, rig)
@@ -162,6 +148,61 @@ def make_actor(
         estimate=estimate,
         doubt=doubt,
     )
+
+
+class _FoundPoses(NamedTuple):
+    """The example poses that an actor is made of, and the rough poses in them."""
+
+    examples: list[ExamplePose]
+    pictures: list[PosedPictures]
+    views: list[Views]
+    """The silhouettes."""
+    ways: list[list[Float[Array, "dof"]]]
+    """The pose of each that is believed, and after it that of the body turned round, if it was looked for."""
+
+
+def _found_poses(
+    upright: Body,
+    model: ShapeModel,
+    examples: list[ExamplePose],
+    pictures: list[PosedPictures],
+    rig: Camera,
+    up: str,
+    terms: Terms,
+    best: int | None,
+    report: Report,
+    progress: Progress,
+) -> _FoundPoses:
+    """Rough poses of all examples, or of the `best` that are found best, if these are fewer."""
+    views = silhouette_views(pictures, rig, upright.num_blobs)
+    coarse = silhouette_views(pictures, rig, upright.num_blobs, COARSE_DEPTH)
+    shown = list(zip(examples, pictures, coarse, views, strict=True))
+    chooses = best is not None and len(examples) > best
+    with ThreadPoolExecutor(1) as beside:
+        if not chooses:
+            beside.submit(compile_estimate, model, stack_views(views), silhouettes_of(pictures, rig), terms)
+        ways = rough_poses(upright, shown, rig, up, terms, report, progress)
+    found = _FoundPoses(examples, pictures, views, ways)
+    if best is None or not chooses:
+        return found
+    kept = found_best(upright, [poses[0] for poses in ways], pictures, rig, best)
+    report(f"uses {', '.join(examples[k].name for k in kept)}")
+    some = lambda values: [values[k] for k in kept]
+    return _FoundPoses(some(examples), some(pictures), some(views), some(ways))
+
+
+def _best_estimate(model: ShapeModel, found: _FoundPoses, rig: Camera, terms: Terms, ways: int) -> Estimate:
+    """Poses and shape fitted to the silhouettes, in as many ways as were found: that which agrees best with the masks.
+
+    Rough silhouettes hardly tell front from back; the fitted body does.
+    """
+    silhouettes, views = silhouettes_of(found.pictures, rig), stack_views(found.views)
+    estimates = [
+        estimate_shape(model, jnp.stack([poses[way] for poses in found.ways]), views, silhouettes, terms)
+        for way in range(min(ways, *map(len, found.ways)))
+    ]
+    agrees = lambda estimate: _overlap(_shaped(model, estimate.shape_params), estimate.poses, found.pictures, rig)
+    return max(estimates, key=agrees) if len(estimates) > 1 else estimates[0]
 
 
 def _check_fit(
