@@ -13,7 +13,7 @@ folder, rows of the experiments `sequences` and `together`, or what `sogjax synt
 
 import json
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -125,14 +125,25 @@ def outcomes_of(
     Raises:
         InputError: no initial pose is found, or nothing can be compared.
     """
+    for start in moved_starts(recording, actors, config, range(count), seed):
+        yield outcome_of(compared(recording, _tracked_from(start, recording, actors, config)), distance)
+
+
+def moved_starts(
+    recording: Recording, actors: Sequence[Body], config: TrackConfig, numbers: Iterable[int], seed: int = 0
+) -> Iterator[InitialPose]:
+    """The initial pose that is found for a clip, moved anew for each number.
+
+    Raises:
+        InputError: none is found.
+    """
     clip = opened_clip(recording, config)
     background = learn_background(clip, config.images.background, config.images.cache)
     found = find_initial_pose(PoseRequest(clip, background, Actors(tuple(actors)), config), SOURCES)
     bodies = [upright(actor, recording) for actor in actors]
-    for number in range(count):
+    for number in numbers:
         pose = moved_pose(bodies, np.asarray(found.pose), np.random.default_rng([seed, number]))
-        start = replace(found, pose=pose, source=f"{found.source}, moved")
-        yield outcome_of(compared(recording, _tracked_from(start, recording, actors, config)), distance)
+        yield replace(found, pose=pose, source=f"{found.source}, moved")
 
 
 def _tracked_from(start: InitialPose, recording: Recording, actors: Sequence[Body], config: TrackConfig) -> Mapping:

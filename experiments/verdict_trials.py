@@ -10,6 +10,7 @@ from typing import Any
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from repeatability import moved_starts
 
 from sogjax.errors import InputError
 from sogjax.io.files import write_file
@@ -23,6 +24,7 @@ from sogjax.quality.markers import joint_errors
 from sogjax.quality.metrics import mean_per_frame, stretches
 from sogjax.quality.passages import passages
 from sogjax.quality.verdict import Verdict, expected_of, verdicts
+from sogjax.run.initial_pose import SOURCES, PoseSource
 from sogjax.run.recordings import opened, with_cameras
 from sogjax.run.track import track_recording
 from sogjax.settings.compose import track_config
@@ -36,6 +38,8 @@ FAR = 0.1
 """Metres from the truth, beyond which a limb is lost."""
 FOR = 3
 """Frames: a limb that is far off for fewer is not lost."""
+ASTRAY, OFTEN = 0.15, 0.01
+"""Metres from the truth, beyond which a single joint is astray, and the part of the frames in which one may be."""
 TRIAL = "trial.json"
 """Name of the file that says what came of a trial, beside its motions."""
 
@@ -50,6 +54,8 @@ class VerdictTrial:
     """The background, as `images.background`."""
     case: str
     """One of `CASES`."""
+    moved: int = 0
+    """Which draw of a moved initial pose (see `repeatability.py`) tracking begins with; 0: it is as found."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +70,8 @@ class JudgedRun:
     """Mean error of all joints (metres)."""
     lost: dict[str, int] | None = None
     """Frames in which a limb is far off, by limb, of the stretches that last."""
+    astray: float = float("nan")
+    """Part of the frames in which some joint is astray."""
 
     @property
     def right(self) -> bool:
@@ -134,7 +142,8 @@ class VerdictTrials:
 
         What was refused is tried again, if `do`.
         """
-        content = json.dumps([asdict(trial), asdict(self.synth[trial.sequence]), self.frames, self.words])
+        said = {name: value for name, value in asdict(trial).items() if name != "moved" or value}
+        content = json.dumps([said, asdict(self.synth[trial.sequence]), self.frames, self.words])
         place = self.folder / "motions" / hashlib.sha256(content.encode()).hexdigest()[:16]
         kept = _read(place)
         if do and (kept is None or kept["refused"]):
@@ -165,7 +174,12 @@ class VerdictTrials:
         words = [f"images.cache={self.folder / 'cells'}", f"images.background={trial.background}", *self.words]
         kept: dict[str, Any] = {"trial": asdict(trial), "refused": "", "expected": {}}
         try:
-            run = track_recording(recording, bodies, track_config(words, recording=recording.path)).result_so_far
+            config = track_config(words, recording=recording.path)
+            sources: Sequence[PoseSource] = SOURCES
+            if trial.moved:
+                start = next(moved_starts(recording, bodies, config, [trial.moved]))
+                sources = (lambda _: start,)
+            run = track_recording(recording, bodies, config, pose_sources=sources).result_so_far
         except InputError as error:
             if isinstance(error.__cause__, OSError):  # a full disk says nothing of the subject
                 raise
@@ -214,7 +228,8 @@ def judged_run(trial: VerdictTrial, name: str, motion: Motion, truth: GroundTrut
     if found is None:
         raise InputError(f"{trial.sequence}: its truth has no joints of the actor")
     lost = {limb: count for limb in dict.fromkeys(map(limb_of, found.names)) if (count := _lost(found, limb))}
-    return JudgedRun(trial, name, "", verdict, float(np.nanmean(found.errors)), lost)
+    astray = float(np.mean(np.nan_to_num(found.errors).max(axis=1) > ASTRAY))
+    return JudgedRun(trial, name, "", verdict, float(np.nanmean(found.errors)), lost, astray)
 
 
 def _lost(found: Any, limb: str) -> int:

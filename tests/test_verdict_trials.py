@@ -12,12 +12,13 @@ import verdict_trials
 from motion_cases import walking_motion
 from small_recording import make_recording
 from tiny_body import make_body
-from verdict_trials import CASES, VerdictTrial, VerdictTrials, judged_run, scaled
+from verdict_trials import CASES, OFTEN, VerdictTrial, VerdictTrials, judged_run, scaled
 
 from sogjax.errors import InputError
 from sogjax.io.ground_truth import GroundTruth
 from sogjax.io.motion import motion_from_poses
 from sogjax.quality.verdict import verdicts
+from sogjax.run.initial_pose import SOURCES
 from sogjax.study.true_poses import limb_errors
 from sogjax.synth.settings import SynthSettings
 
@@ -83,8 +84,9 @@ class Tracking:
     def __init__(self, motion):
         self.motion, self.error, self.count = motion, None, 0
 
-    def __call__(self, *_):
+    def __call__(self, *_, pose_sources):
         self.count += 1
+        self.sources = pose_sources
         if self.error is not None:
             raise self.error
         return SimpleNamespace(result_so_far=SimpleNamespace(motions={"tiny": self.motion}))
@@ -125,6 +127,20 @@ def test_joints_at_their_limits_are_named_of_kept_trials_as_well(tracking, trial
         (again,) = trials.judged(trial, do=False)
         assert again.verdict.findings == at_limit
     assert tracking.count == 1
+
+
+def test_a_moved_initial_pose_is_a_trial_of_its_own(tracking, trials, monkeypatch):
+    monkeypatch.setattr(verdict_trials, "moved_starts", lambda *words: iter([words[-1]]))
+    trials.judged(replace(TRIAL, cameras=2))
+    assert tracking.sources == SOURCES
+    trials.judged(replace(TRIAL, cameras=2, moved=3))
+    assert tracking.sources[0](None) == [3]
+    assert tracking.count == 2
+
+
+def test_a_joint_far_off_in_a_frame_of_a_hundred_is_not_astray():
+    assert judged(0.2, slice(3, 8)).astray > OFTEN
+    assert judged(0.14, slice(3, 8)).astray == 0.0
 
 
 def test_what_was_refused_is_tried_again(tracking, trials):
