@@ -93,6 +93,7 @@ def test_the_lines_add_up_to_the_total_as_they_are_printed(at):
     assert sum(lines.values()) == pytest.approx(total, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_track_ends_with_its_times_which_are_those_of_the_clock(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     recording = trackable(tmp_path / "walk", frames=4)

@@ -76,14 +76,14 @@ def test_units_are_pairs_of_limbs_of_each_actor():
 
 def alike_of(number, pose):
     units = Units.of(HUMAN, units_of(HUMAN))
-    one = jax.tree.map(lambda leaf: leaf[number], (units.index, units.limbs, units.ends))
+    one = jax.tree.map(lambda leaf: leaf[number], (units.index, units.limbs, units.ends, units.outer))
     found = jax.jit(look_alikes)(HUMAN, jnp.asarray(pose), *one, units.counterparts)
     return np.asarray(found)
 
 
 def test_what_looks_alike_has_its_legs_exchanged_or_its_knees_on_the_other_side():
     pose = np.asarray(HUMAN.poses["walk_left"])
-    exchanged, left, right, both = alike_of(0, pose)
+    exchanged, lower, left, right, both = alike_of(0, pose)
     names = list(HUMAN.blobs.names)
     at = lambda pose, name: means_of(HUMAN, np.asarray(pose)[None])[0, names.index(name)]
     apart = lambda one, two: float(np.linalg.norm(one - two))
@@ -91,8 +91,15 @@ def test_what_looks_alike_has_its_legs_exchanged_or_its_knees_on_the_other_side(
     assert crossed < 0.4 * apart(at(pose, "left_shank4"), at(pose, "right_shank4"))
     legs, arms = (unit.all_dofs for unit in units_of(HUMAN))
     others = np.setdiff1d(np.arange(len(pose)), legs)
-    for found in (exchanged, left, right, both):
+    for found in (exchanged, lower, left, right, both):
         np.testing.assert_array_equal(found[others], pose[others])
+    sides = (("left", "right"), ("right", "left"))
+    before, after = (
+        [apart(at(each, f"{side}_toes"), at(pose, f"{other}_toes")) for side, other in sides] for each in (pose, lower)
+    )
+    assert np.less(after, before).all() and sum(after) < 0.7 * sum(before)
+    for side, _ in sides:
+        assert apart(at(lower, f"{side}_thigh1"), at(pose, f"{side}_thigh1")) < 0.05
     first, second = units_of(HUMAN)[0].dofs
     np.testing.assert_allclose(left[second], pose[second], atol=0.1)
     np.testing.assert_allclose(right[first], pose[first], atol=0.1)

@@ -30,6 +30,7 @@ def rendered(tmp_path_factory):
     return rendered_person(folder, cameras=3, frames=6, width=160, height=120)
 
 
+@pytest.mark.slow
 def test_the_command_leaves_motion_figures_and_a_recording(capsys, tmp_path, monkeypatch, rendered):
     monkeypatch.chdir(tmp_path)
     actor = actor_file(tmp_path / "actor.yaml")

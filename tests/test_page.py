@@ -115,6 +115,7 @@ def test_a_resumed_run_shows_the_frames_before_it_was_stopped(capsys, monkeypatc
     assert [frame for frame, _ in known["pictures"]] == list(range(FRAMES))
 
 
+@pytest.mark.slow
 def test_two_actors_have_a_timeline_each(capsys, tracked, tmp_path):
     place, words = tracked
 

@@ -114,6 +114,7 @@ def test_a_run_stopped_while_it_is_adjusted(capsys, tmp_path, monkeypatch, comma
     assert [motion.pose[0, 2] for motion in told.values()] == [after.pose[0, 2]]
 
 
+@pytest.mark.slow
 def test_a_run_without_a_folder_that_is_stopped_does_not_advise_to_resume(capsys, tmp_path, monkeypatch, command):
     recording, actor = open_recording(tmp_path / "walk"), load_body(tmp_path / "a.yaml")
     config = track_config([*SMALL, *SHOWN], recording=tmp_path / "walk")

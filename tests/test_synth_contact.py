@@ -23,6 +23,8 @@ from sogjax.synth.furniture import (
 from sogjax.synth.motions import furniture_sites, motions_of
 from sogjax.synth.settings import MOTIONS, PAIRED
 
+pytestmark = pytest.mark.slow
+
 SINGLE = ("walk", "arms", "run", "sit", "throw", "dance", "stoop")
 PEOPLE = dict.fromkeys(SINGLE, 1) | dict.fromkeys(("pass", *PAIRED), 2)
 TIMES = {"sit": 6.0, "dance": 6.3, "stoop": 5.5, "hug": 4.4, "fight": 6.2, "embrace": 5.0, "talk": 5.0, "couple": 6.4}

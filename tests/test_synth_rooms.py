@@ -23,6 +23,8 @@ from sogjax.synth.render import ground_truth_of, render_recording
 from sogjax.synth.settings import SynthSettings
 from sogjax.synth.stage import stage_of
 
+pytestmark = pytest.mark.slow
+
 SMALL = SynthSettings(cameras=4, width=120, height=90, frames=3, seed=2, noise=0.0, camera_variation=0.0)
 
 

@@ -37,6 +37,7 @@ def pair(tmp_path, monkeypatch, plain_logging):
     return ("track", "-m", "recording=a,b", f"actor={actor_file(tmp_path / 'actor.yaml')}", *FEWEST)
 
 
+@pytest.mark.slow
 def test_a_refused_command_keeps_the_rows_of_what_has_ended(capsys, tmp_path, pair):
     assert main(pair) == 0
     rows, results = rows_of(tmp_path / "outputs"), tmp_path / "outputs" / "a" / "result.json"

@@ -22,7 +22,7 @@ from sogjax.model.limbs import limb_blobs, limb_names, limbs
 from sogjax.model.solid import Solid
 from sogjax.search.body_parts import limb_groups
 from sogjax.search.mirrored import fitted_to_blobs, other_side
-from sogjax.search.other_pass import Pass
+from sogjax.search.other_pass import REACH, Pass
 from sogjax.search.placed_body import means_of
 from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.tracking.capacity import views_near
@@ -30,7 +30,7 @@ from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import AnyFrame, FrameInput, TrackState, on_device
 from sogjax.tracking.tracker import Tracker
 
-NUM_DRAWN = 24
+NUM_DRAWN = 23
 """Ways to hold a unit that are drawn in a frame; another frame draws others."""
 NUM_CLIMBED = 4
 """Different ways that are climbed, the tracked one among them."""
@@ -42,8 +42,6 @@ SMALL_RANGE = 0.9
 """Radians: a degree of freedom of less range is not drawn."""
 NEARBY = 1.2
 """Radians around the tracked pose, within which every second way is drawn."""
-REACH = 0.3
-"""Part of the longer side of an actor's box by which pictures are looked at beyond it: limbs may be held there."""
 LARGEST_ANGLE = 0.3
 """Radians: bound on a step of a climb."""
 
@@ -94,6 +92,8 @@ class Units(eqx.Module):
     """Which of the unit's blobs are those of each limb; none where there is no second one."""
     ends: Int[Array, "unit limb 2"]
     """The first and the last blob of each limb."""
+    outer: Float[Array, "unit slot"]
+    """How far beyond the middle of its limb a blob is: 0 up to there, 1 at the end."""
     counterparts: Int[Array, "blob"]
     """The blob of the other side, or the same."""
 
@@ -102,13 +102,16 @@ class Units(eqx.Module):
         """Padded to the largest."""
         dofs, blobs = _padded([unit.all_dofs for unit in units]), _padded([unit.all_blobs for unit in units])
         of_limb = np.zeros((len(units), 2, blobs[0].shape[1]), bool)
-        ends = np.zeros((len(units), 2, 2), int)
+        ends, outer = np.zeros((len(units), 2, 2), int), np.zeros(blobs[0].shape)
         for k, unit in enumerate(units):
             for j, each in enumerate(unit.blobs):
                 of_limb[k, j] = np.isin(blobs[0][k], each) & blobs[1][k]
             ends[k] = [[each[0], each[-1]] for each in (unit.blobs[0], unit.blobs[-1])]
+            along = [np.linspace(-1.0, 1.0, len(each)) for each in unit.blobs]
+            outer[k, : len(unit.all_blobs)] = np.maximum(np.concatenate(along), 0.0)
         index = PartIndex(*(jnp.asarray(array) for array in (*dofs, *blobs)))
-        return cls(index, jnp.asarray(of_limb), jnp.asarray(ends), jnp.asarray(other_side(body.blobs.names)))
+        counterparts = jnp.asarray(other_side(body.blobs.names))
+        return cls(index, jnp.asarray(of_limb), jnp.asarray(ends), jnp.asarray(outer), counterparts)
 
 
 def _padded(rows: Sequence[Int[np.ndarray, "_n"]]) -> tuple[Int[np.ndarray, "row n"], Bool[np.ndarray, "row n"]]:
@@ -123,14 +126,12 @@ def _padded(rows: Sequence[Int[np.ndarray, "_n"]]) -> tuple[Int[np.ndarray, "row
 SLACK, WORTH = -0.002, 0.001
 """Parts of a frame's energy: what another way gains, while the rest is held, for the whole body to be climbed from
 there, and what it gains then for a pass to go from there."""
+CROSSED_SLACK = -0.01
+"""The same for hands or feet that are exchanged: with the rest held, elbows are not where they would be."""
 DEEP = 0.04
 """Metres that limbs may be deeper in each other, or in the trunk, than in any named pose."""
-SHORT = 8
-"""Frames of a pass that cost too little to pause for."""
 MOST_ROUNDS = 3
 """Times that limbs are searched in a frame, each from the better pose that was found."""
-PAUSE = 3
-"""Key frames for which no other pass is begun after one of which nothing was taken."""
 
 
 class LimbSearch:
@@ -141,7 +142,7 @@ class LimbSearch:
         self.solid = Solid.of(tracker.body)
         self._turn = 0
         self._carried: HeldOtherwise | None = None
-        self._pause_until = 0
+        self._in_vain: dict[int, list[np.ndarray]] = {}
 
     @classmethod
     def of(cls, tracker: Tracker) -> "LimbSearch | None":
@@ -149,10 +150,10 @@ class LimbSearch:
         units = units_of(tracker.body)
         return cls(tracker, units, Units.of(tracker.body, units)) if units else None
 
-    def note(self, num_rows: int, taken: bool) -> None:
-        """Learn how long the pass from the last pose was, and whether anything was taken of it."""
-        if not taken and num_rows > SHORT:
-            self._pause_until = self._turn + PAUSE
+    def note_in_vain(self, rows: Sequence[int], poses: Sequence[Float[np.ndarray, "dof"]]) -> None:
+        """Learn the poses of a pass of which nothing was taken: none begins there again."""
+        for row, pose in zip(rows, poses, strict=True):
+            self._in_vain.setdefault(row, []).append(pose)
 
     def better_pose(self, frame: AnyFrame, passed: Pass, row: int) -> Float[np.ndarray, "dof"] | None:
         """The pose of a frame with limbs held otherwise, climbed with all degrees of freedom, if that is worth more.
@@ -164,13 +165,19 @@ class LimbSearch:
         views = self.views(on_device(frame), pose, passed.capacities)
         for _ in range(MOST_ROUNDS):
             found = self.held_otherwise(views, pose)
-            if self._turn < self._pause_until:
-                return None
             better = self._climbed(views, first, pose, found, passed.energy)
             if better is None:
                 break
             pose = better
-        return None if pose is first else pose
+        tried = self._in_vain.get(row, [])
+        return None if pose is first or (tried and self._apart(np.stack(tried), pose).min() < APART) else pose
+
+    def _apart(
+        self, poses: Float[np.ndarray, "other dof"], pose: Float[np.ndarray, "dof"]
+    ) -> Float[np.ndarray, "other"]:
+        """Metres between poses and one, mean over the blobs of the limb that differs most."""
+        moved = np.linalg.norm(means_of(self.tracker.body, poses) - means_of(self.tracker.body, pose[None]), axis=-1)
+        return np.max([moved[:, blobs].mean(axis=1) for unit in self.units for blobs in unit.blobs], axis=0)
 
     def views(self, frame: FrameInput, pose: Float[np.ndarray, "dof"], capacities: Capacities) -> Views:
         """What the cameras see where limbs may be held."""
@@ -196,14 +203,13 @@ class LimbSearch:
         `first` is the tracked pose, `energy` that of a frame, for scale.
         """
         starts = self._starts(pose, found, energy)
-        starts = starts[self.possible(first, starts)][:MOST_WHOLE]
+        starts = starts[self.possible(first, starts)]
         if not len(starts):
             return None
-        padded = np.stack([pose, *starts, *[pose] * (MOST_WHOLE - len(starts))])
-        ends, values, before = jax.device_get(climbed_in(self.tracker, views, jnp.asarray(padded)))
-        moved = np.linalg.norm(means_of(self.tracker.body, ends) - means_of(self.tracker.body, pose[None]), axis=-1)
-        apart = np.max([moved[:, blobs].mean(axis=1) for unit in self.units for blobs in unit.blobs], axis=0)
-        good = (values - before > WORTH * energy) & (apart > APART) & self.possible(first, ends)
+        padded = np.stack([*starts, *[pose] * (MOST_WHOLE + 1 - len(starts))])
+        found_there = climbed_in(self.tracker, views, jnp.asarray(pose), jnp.asarray(padded), jnp.asarray(len(starts)))
+        ends, values, before = jax.device_get(found_there)
+        good = (values - before > WORTH * energy) & (self._apart(ends, pose) > APART) & self.possible(first, ends)
         return ends[np.argmax(np.where(good, values, -np.inf))] if good.any() else None
 
     def _starts(
@@ -221,7 +227,11 @@ class LimbSearch:
             starts.append(together)
         order = np.argsort(-gains, axis=None)
         promising = order[gains.reshape(-1)[order] > SLACK * energy]
-        return np.array([*starts, *found.poses.reshape(-1, len(pose))[promising]]).reshape(-1, len(pose))
+        starts = [*starts, *found.poses.reshape(-1, len(pose))[promising]][:MOST_WHOLE]
+        likeliest = int(np.argmax(found.crossed_gains))
+        if found.crossed_gains[likeliest] > CROSSED_SLACK * energy:
+            starts.append(found.crossed[likeliest])
+        return np.array(starts).reshape(-1, len(pose))
 
     def possible(
         self, known: Float[np.ndarray, "dof"], poses: Float[np.ndarray, "start dof"]
@@ -252,22 +262,30 @@ def compile_search(tracker: Tracker, state: TrackState, frame: FrameInput, capac
 
 
 MOST_WHOLE = 3
-"""Poses that are climbed with all degrees of freedom in a frame, beside the tracked one."""
+"""Poses that are climbed with all degrees of freedom in a frame, beside the tracked one and that with crossed ends."""
 
 
 @eqx.filter_jit
 def climbed_in(
-    tracker: Tracker, views: Views, starts: Float[Array, "start dof"]
+    tracker: Tracker,
+    views: Views,
+    known: Float[Array, "dof"],
+    starts: Float[Array, "start dof"],
+    count: Int[Array, ""],
 ) -> tuple[Float[Array, "start dof"], Float[Array, "start"], Float[Array, ""]]:
-    """Poses climbed with the tracker's energy and solver, and what they are worth; last, what the first start is."""
-    energy = FrameEnergy(tracker.body, views, History.unknown(starts[0]), tracker.terms)
+    """The first `count` poses climbed with the tracker's energy and solver, and what they are worth (others: nothing).
 
-    def climb(start: Float[Array, "dof"]) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
-        found = tracker.solver.maximize(energy, start, tracker.scales)
-        return found.params, found.value
+    Last, what the known pose is worth.
+    """
+    energy = FrameEnergy(tracker.body, views, History.unknown(known), tracker.terms)
 
-    ends, values = jax.lax.map(climb, starts)
-    return ends, values, energy(starts[0])
+    def climb(k: Int[Array, ""], found: tuple[Array, Array]) -> tuple[Array, Array]:
+        solution = tracker.solver.maximize(energy, starts[k], tracker.scales)
+        return found[0].at[k].set(solution.params), found[1].at[k].set(solution.value)
+
+    nothing = jnp.full(len(starts), -jnp.inf, starts.dtype)
+    ends, values = jax.lax.fori_loop(0, count, climb, (starts, nothing))
+    return ends, values, energy(known)
 
 
 class HeldOtherwise(eqx.Module):
@@ -278,6 +296,9 @@ class HeldOtherwise(eqx.Module):
     """The energy above that of the tracked pose."""
     apart: Float[Array, "*unit way"]
     """Metres from the tracked pose: mean over the blobs of the limb that differs more."""
+    crossed: Float[Array, "*unit dof"]
+    """With the ends of its limbs exchanged, not climbed."""
+    crossed_gains: Float[Array, "*unit"]
 
 
 @eqx.filter_jit
@@ -291,12 +312,12 @@ def held_otherwise(
     scales = replace(tracker.scales, largest_steps=jnp.maximum(tracker.scales.largest_steps, LARGEST_ANGLE))
     solver = GaussNewton(max_iterations=ITERATIONS)
 
-    def of_unit(each: tuple[PartIndex, Array, Array, Array]) -> HeldOtherwise:
-        index, of_limb, ends, others = each
+    def of_unit(each: tuple[PartIndex, Array, Array, Array, Array]) -> HeldOtherwise:
+        index, of_limb, ends, outer, others = each
         energy = PartEnergy.around(tracker.body, views, tracker.terms, pose, index)
         held = lambda params: index.put(pose, params)
         means = lambda params: tracker.body.posed_blobs(held(params)).means[index.blobs]
-        alike = look_alikes(tracker.body, pose, index, of_limb, ends, units.counterparts)
+        alike = look_alikes(tracker.body, pose, index, of_limb, ends, outer, units.counterparts)
         params = jax.vmap(index.params)(jnp.concatenate([pose[None], alike, others]))
         values = _in_parts(energy, params)
         chosen = _different(jax.vmap(means)(params), values, of_limb)
@@ -304,9 +325,14 @@ def held_otherwise(
         found = jax.vmap(climb)(params[chosen])
         places = jax.vmap(means)(found.params)
         apart = jax.vmap(lambda each: _apart(each, means(params[0]), of_limb))(places)
-        return HeldOtherwise(jax.vmap(held)(found.params), found.value - values[0], apart)
+        ways = jax.vmap(held)(found.params), found.value - values[0], apart
+        return HeldOtherwise(*ways, held(params[CROSSED]), values[CROSSED] - values[0])
 
-    return jax.lax.map(of_unit, (units.index, units.limbs, units.ends, tried))
+    return jax.lax.map(of_unit, (units.index, units.limbs, units.ends, units.outer, tried))
+
+
+CROSSED = 2
+"""Among the ways that are compared, the tracked one and what looks like it: ends exchanged."""
 
 
 def look_alikes(
@@ -315,16 +341,23 @@ def look_alikes(
     index: PartIndex,
     of_limb: Bool[Array, "limb slot"],
     ends: Int[Array, "limb 2"],
+    outer: Float[Array, "slot"],
     counterparts: Int[Array, "blob"],
-) -> Float[Array, "4 dof"]:
-    """A unit exchanged with its counterpart; and each of its limbs, or both, turned by a half from root to end."""
+) -> Float[Array, "5 dof"]:
+    """What looks like a unit as it is held.
+
+    Its limbs exchanged; their ends exchanged, with knees and elbows about where they are; each of them turned by a half
+    from root to end; both turned.
+    """
     means = body.posed_blobs(pose).means
     here = means[index.blobs]
     turned = jax.vmap(lambda two: _half_turned(here, means[two[0]], means[two[1]]))(ends)
     place = lambda moved: means.at[jnp.where(index.blob_mask, index.blobs, len(means))].set(moved, mode="drop")
     first, second = (jnp.where(each[:, None], moved, here) for each, moved in zip(of_limb, turned, strict=True))
     both = jnp.where(of_limb[1][:, None], second, first)
-    targets = jnp.stack([place(each) for each in (means[counterparts[index.blobs]], first, second, both)])
+    exchanged = means[counterparts[index.blobs]]
+    crossed = here + outer[:, None] * (exchanged - here)
+    targets = jnp.stack([place(each) for each in (exchanged, crossed, first, second, both)])
     fitted = fitted_to_blobs(body, jnp.tile(pose, (len(targets), 1)), targets, FIT_ITERATIONS)[0]
     return jax.vmap(lambda each: index.put(pose, index.params(each)))(fitted)
 

@@ -29,6 +29,7 @@ from sogjax.search.other_pass import (
     Pass,
     compared_backwards,
     compared_both_ways,
+    gained_in,
 )
 from sogjax.search.pose_search import Report, unreported
 from sogjax.tracking.capacity import views_near
@@ -51,8 +52,6 @@ class Revised:
     energy: float
     terms: dict[str, float]
     judged: LimbConfidence
-    still: float = 0.0
-    """The energy without history: by which passes are compared, since a change of pass is no smooth motion."""
 
 
 @dataclass
@@ -118,7 +117,8 @@ class _Revising:
             pose = None if self._tired else search.better_pose(frame, self.passed, row)
             if pose is not None:
                 found = compared_both_ways(self.tracker, self.passed, self.frames, self.parts, row, pose)
-                search.note(len(found.rows), self.take(self._without_impossible(search, found)))
+                if not self.take(self._without_impossible(search, found)):
+                    search.note_in_vain(found.rows, found.poses)
 
     def _without_impossible(self, search: LimbSearch, found: Compared) -> Compared:
         """The other pass; nothing is gained by parts that it holds deep in something else."""
@@ -144,19 +144,20 @@ class _Revising:
         ends = (bool(rows[0] in (0, total - 1)), bool(rows[-1] in (0, total - 1)))
         taken = select_parts(self.parts, np.stack(found.apart), np.stack(found.gains), self.passed.energy, ends)
         changed = [(k, int(rows[k])) for k in np.flatnonzero(taken.any(axis=1))]
-        known = {row: self._valued(row, found.cells[k]) for k, row in changed}
-        for k, row in changed:
-            self.passed.poses[row] = self._merged(self.passed.poses[row], found, int(k), taken[k])
-        revised = {row: self._valued(row, found.cells[k]) for k, row in changed}
-        better = sum(revised[row].still - known[row].still for row in revised) > 0.0
-        for row, each in (revised if better else known).items():
-            self.passed.poses[row], self.passed.energies[row] = each.pose, each.energy
-            self.passed.doubts[row] = each.judged.error_probability
+        merged = {row: self._merged(self.passed.poses[row], found, int(k), taken[k]) for k, row in changed}
+        gains = [
+            gained_in(self.tracker, found.cells[k], self.passed.capacities, self.passed.poses[row], merged[row])
+            for k, row in changed
+        ]
+        better = sum(gains) > 0.0
         if not better:
             self._looked_at += len(rows)
         else:
-            self.revision.frames.update(revised)
-            self._changed |= set(revised)
+            for row, pose in merged.items():
+                self.passed.poses[row] = pose
+            for k, row in changed:
+                self._revise(row, found.cells[k])
+            self._changed |= set(merged)
         for part, of_part in zip(self.parts, taken.T, strict=True):
             for name in part.names if better and of_part.any() else ():
                 self.revision.parts.setdefault(name, set()).update(rows[of_part].tolist())
@@ -173,10 +174,10 @@ class _Revising:
             return found.poses[k].copy()
         mixed = jnp.asarray(merged_pose(self.tracker.body, self.parts, pose, found.poses[k], taken))
         views = views_near(self.tracker, on_device(found.cells[k]), mixed, self.passed.capacities)
-        return np.asarray(climbed_in(self.tracker, views, mixed[None])[0][0])
+        return np.asarray(climbed_in(self.tracker, views, mixed, mixed[None], jnp.asarray(1))[0][0])
 
-    def _valued(self, row: int, frame: AnyFrame) -> Revised:
-        """What the pose of a frame is worth."""
+    def _revise(self, row: int, frame: AnyFrame) -> None:
+        """Note what the pose of a frame, which changed, is worth."""
         poses = self.passed.poses
         before, before_that = (jnp.asarray(poses[max(row - j, 0)]) for j in (1, 2))
         history = History(before, before_that, jnp.asarray(row >= 2))
@@ -184,9 +185,10 @@ class _Revising:
         known = on_device(frame)
         views = views_near(self.tracker, known, pose, self.passed.capacities)
         found = _valued(self.tracker, history, known, views, pose, baseline)
-        energy, still, terms, judged = jax.device_get(found)
+        energy, terms, judged = jax.device_get(found)
         values = {name: float(term) for name, term in terms.items()}
-        return Revised(poses[row].copy(), float(energy), values, judged, float(still))
+        self.revision.frames[row] = Revised(poses[row].copy(), float(energy), values, judged)
+        self.passed.energies[row], self.passed.doubts[row] = float(energy), judged.error_probability
 
 
 @eqx.filter_jit
@@ -197,8 +199,8 @@ def _valued(
     views: Views,
     pose: Float[Array, "dof"],
     baseline: Float[Array, "2 blob"],
-) -> tuple[Float[Array, ""], Float[Array, ""], dict[str, Float[Array, ""]], LimbConfidence]:
-    """Energy, that without history, terms and doubts of a pose that is known."""
-    energy, still = (FrameEnergy(tracker.body, views, each, tracker.terms) for each in (history, History.unknown(pose)))
+) -> tuple[Float[Array, ""], dict[str, Float[Array, ""]], LimbConfidence]:
+    """Energy, terms and doubts of a pose that is known."""
+    energy = FrameEnergy(tracker.body, views, history, tracker.terms)
     judged = tracker.judged(pose, baseline, views.windows, frame)
-    return energy(pose), still(pose), energy.values(pose), judged
+    return energy(pose), energy.values(pose), judged

@@ -33,6 +33,8 @@ PATIENCE, LEAST_GAIN = 6, 0.02
 """Frames after which a pass from another pose of a key frame ends that explains less than the known one; and what it
 gains at least, as a part of a frame's energy, for its parts to be looked at."""
 
+REACH = 0.3
+"""Part of the longer side of an actor's box by which pictures are looked at beyond it: limbs may be held there."""
 MOST_FRAMES = 240
 """Frames that are tracked backwards from one, at most: the cells of so many are held in memory."""
 
@@ -137,7 +139,8 @@ def compared(
         found.poses.append(np.asarray(both[1]))
         found.apart.append(apart)
         capacities.append(tracked.capacities)
-        gained.append(float(tracked.result.energy) - passed.energies[row])
+        if patience is not None:
+            gained.append(gained_in(tracker, found.cells[k], passed.capacities, *both))
         agree = agree + 1 if apart.max(initial=0.0) <= numbers.together else 0
         if k + 1 >= at_least and agree >= SURE_FRAMES:
             break
@@ -149,6 +152,20 @@ def compared(
         differ = np.zeros(len(parts), bool) if hopeless else _differ(parts, found.apart[k] > numbers.compared)
         found.gains.append(part_gains(tracker, found.cells[k], capacities[k], choices, *both, differ))
     return found
+
+
+def gained_in(
+    tracker: Tracker,
+    frame: AnyFrame,
+    capacities: Capacities,
+    known: Float[np.ndarray | Array, "dof"],
+    other: Float[np.ndarray | Array, "dof"],
+) -> float:
+    """The rise of the energy with another pose, in the same views: as tracking saw it, each has its own."""
+    both = jnp.stack([jnp.asarray(known), jnp.asarray(other)])
+    views = views_near(tracker, on_device(frame), both[0], capacities, REACH)
+    before, after = np.asarray(values_in(tracker, views, both))
+    return float(after - before)
 
 
 def _differ(parts: Sequence[Part], apart: Bool[np.ndarray, "part"]) -> Bool[np.ndarray, "part"]:
