@@ -97,7 +97,8 @@ def test_what_looks_alike_has_its_legs_exchanged_or_its_knees_on_the_other_side(
     before, after = (
         [apart(at(each, f"{side}_toes"), at(pose, f"{other}_toes")) for side, other in sides] for each in (pose, lower)
     )
-    assert np.less(after, before).all() and sum(after) < 0.7 * sum(before)
+    assert np.less(after, before).all()
+    assert sum(after) < 0.7 * sum(before)
     for side, _ in sides:
         assert apart(at(lower, f"{side}_thigh1"), at(pose, f"{side}_thigh1")) < 0.05
     first, second = units_of(HUMAN)[0].dofs
@@ -154,6 +155,20 @@ def test_what_is_compiled_beforehand_is_what_the_search_for_limbs_takes(walking_
     traces.clear()
     LimbSearch.of(tracker).better_pose(cells[1], replace(right, capacities=capacities[0]), 1)
     assert not traces
+
+
+def test_no_pass_begins_where_one_went_in_vain(walking_dog, monkeypatch):
+    tracker, cells, right = walking_dog
+    search = LimbSearch.of(tracker)
+    other = right.poses[1].copy()
+    other[search.units[0].all_dofs] += 0.5
+    monkeypatch.setattr(LimbSearch, "held_otherwise", lambda *_: None)
+    monkeypatch.setattr(LimbSearch, "_climbed", lambda _, views, first, pose, *__: other if pose is first else None)
+    better = lambda row: search.better_pose(cells[row], right, row)
+    assert better(1) is other
+    search.note_in_vain([1], [other])
+    assert better(1) is None
+    assert better(2) is other
 
 
 @pytest.mark.slow
