@@ -57,17 +57,17 @@ def main() -> None:
     settings = settings_from(Settings)
     print(machine_line(), flush=True)
     works, reference = calculations(), reference_workload()
-    known = json.loads(BASELINE.read_text(encoding="utf-8"))
+    known = json.loads(BASELINE.read_text(encoding="utf-8")) if BASELINE.is_file() else {}
     if settings.renew:
         ratios = {name: median(ratio(work, reference) for _ in range(3)) for name, work in works.items()}
         known[processor()] = {"machine": machine_line(), "ratios": ratios}
         write_file(BASELINE, json.dumps(known, indent=1) + "\n")
         return
-    before = known.get(processor())
-    if before is None:
-        print(f"{BASELINE.name} has {', '.join(known)}, this is {processor()}: nothing is concluded")
-    status = compare(works, reference, (before or next(iter(known.values())))["ratios"])
-    sys.exit(0 if before is None else status)
+    if (before := known.get(processor())) is not None:
+        sys.exit(compare(works, reference, before["ratios"]))
+    for name, work in works.items():
+        print(f"{name:<34}{ratio(work, reference):8.3f} of the reference", flush=True)
+    print(f"{BASELINE.name} has {', '.join(known)}, this is {processor()}: nothing is concluded")
 
 
 def processor() -> str:

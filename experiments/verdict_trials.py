@@ -228,7 +228,8 @@ def judged_run(trial: VerdictTrial, name: str, motion: Motion, truth: GroundTrut
     if found is None:
         raise InputError(f"{trial.sequence}: its truth has no joints of the actor")
     lost = {limb: count for limb in dict.fromkeys(map(limb_of, found.names)) if (count := _lost(found, limb))}
-    astray = float(np.mean(np.nan_to_num(found.errors).max(axis=1) > ASTRAY))
+    known = found.errors[np.isfinite(found.errors).any(axis=1)]
+    astray = float(np.mean(np.nanmax(known, axis=1) > ASTRAY)) if len(known) else 0.0
     return JudgedRun(trial, name, "", verdict, float(np.nanmean(found.errors)), lost, astray)
 
 

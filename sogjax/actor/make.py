@@ -192,7 +192,7 @@ def _found_poses(
 
 
 def _best_estimate(model: ShapeModel, found: _FoundPoses, rig: Camera, terms: Terms, ways: int) -> Estimate:
-    """Poses and shape fitted to the silhouettes, in as many ways as were found: that which agrees best with the masks.
+    """Poses and shape fitted to the silhouettes, in so many ways, if found: that which agrees best with the masks.
 
     Rough silhouettes hardly tell front from back; the fitted body does.
     """

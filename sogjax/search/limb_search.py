@@ -4,7 +4,7 @@ A unit is a pair of limbs that are each other's counterpart, since what one of t
 The rest of the body is held meanwhile (`energy/part_energy.py`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import equinox as eqx
@@ -111,7 +111,9 @@ class Units(eqx.Module):
             outer[k, : len(unit.all_blobs)] = np.maximum(np.concatenate(along), 0.0)
         index = PartIndex(*(jnp.asarray(array) for array in (*dofs, *blobs)))
         counterparts = jnp.asarray(other_side(body.blobs.names))
-        return cls(index, jnp.asarray(of_limb), jnp.asarray(ends), jnp.asarray(outer), counterparts)
+        return cls(
+            index, jnp.asarray(of_limb), jnp.asarray(ends), jnp.asarray(outer, body.blob_sigmas.dtype), counterparts
+        )
 
 
 def _padded(rows: Sequence[Int[np.ndarray, "_n"]]) -> tuple[Int[np.ndarray, "row n"], Bool[np.ndarray, "row n"]]:
@@ -126,8 +128,9 @@ def _padded(rows: Sequence[Int[np.ndarray, "_n"]]) -> tuple[Int[np.ndarray, "row
 SLACK, WORTH = -0.002, 0.001
 """Parts of a frame's energy: what another way gains, while the rest is held, for the whole body to be climbed from
 there, and what it gains then for a pass to go from there."""
-CROSSED_SLACK = -0.01
-"""The same for hands or feet that are exchanged: with the rest held, elbows are not where they would be."""
+CROSSED_SLACK, CROSSED_APART = -0.01, 0.03
+"""What hands or feet that are exchanged gain at least, as a part of a frame's energy, to be climbed with the whole body
+(with the rest held, elbows are not where they would be), and how far they then are, as `APART`."""
 DEEP = 0.04
 """Metres that limbs may be deeper in each other, or in the trunk, than in any named pose."""
 MOST_ROUNDS = 3
@@ -155,6 +158,11 @@ class LimbSearch:
         for row, pose in zip(rows, poses, strict=True):
             self._in_vain.setdefault(row, []).append(pose)
 
+    def forget_in_vain(self, rows: Iterable[int]) -> None:
+        """Rows changed: what led nowhere from there may do now."""
+        for row in rows:
+            self._in_vain.pop(row, None)
+
     def better_pose(self, frame: AnyFrame, passed: Pass, row: int) -> Float[np.ndarray, "dof"] | None:
         """The pose of a frame with limbs held otherwise, climbed with all degrees of freedom, if that is worth more.
 
@@ -165,12 +173,11 @@ class LimbSearch:
         views = self.views(on_device(frame), pose, passed.capacities)
         for _ in range(MOST_ROUNDS):
             found = self.held_otherwise(views, pose)
-            better = self._climbed(views, first, pose, found, passed.energy)
+            better = self._climbed(views, first, pose, found, passed.energy, self._in_vain.get(row, []))
             if better is None:
                 break
             pose = better
-        tried = self._in_vain.get(row, [])
-        return None if pose is first or (tried and self._apart(np.stack(tried), pose).min() < APART) else pose
+        return None if pose is first else pose
 
     def _apart(
         self, poses: Float[np.ndarray, "other dof"], pose: Float[np.ndarray, "dof"]
@@ -197,25 +204,31 @@ class LimbSearch:
         pose: Float[np.ndarray, "dof"],
         found: "HeldOtherwise",
         energy: float,
+        in_vain: Sequence[Float[np.ndarray, "dof"]],
     ) -> Float[np.ndarray, "dof"] | None:
         """The best that is reached from a pose with units held otherwise; None: nothing that is worth more.
 
-        `first` is the tracked pose, `energy` that of a frame, for scale.
+        `first` is the tracked pose, `energy` that of a frame, for scale; near poses `in_vain` nothing counts.
         """
-        starts = self._starts(pose, found, energy)
-        starts = starts[self.possible(first, starts)]
+        starts = self._starts(first, pose, found, energy)
         if not len(starts):
             return None
         padded = np.stack([*starts, *[pose] * (MOST_WHOLE + 1 - len(starts))])
         found_there = climbed_in(self.tracker, views, jnp.asarray(pose), jnp.asarray(padded), jnp.asarray(len(starts)))
         ends, values, before = jax.device_get(found_there)
         good = (values - before > WORTH * energy) & (self._apart(ends, pose) > APART) & self.possible(first, ends)
+        for other in in_vain:
+            good &= self._apart(ends, other) > APART
         return ends[np.argmax(np.where(good, values, -np.inf))] if good.any() else None
 
     def _starts(
-        self, pose: Float[np.ndarray, "dof"], found: "HeldOtherwise", energy: float
+        self,
+        first: Float[np.ndarray, "dof"],
+        pose: Float[np.ndarray, "dof"],
+        found: "HeldOtherwise",
+        energy: float,
     ) -> Float[np.ndarray, "start dof"]:
-        """What is worth climbing: the best way of every unit together, then single ones, the best first."""
+        """What is possible and worth climbing: the best way of every unit together, single ones, crossed ends last."""
         gains = np.where(found.apart > APART, found.gains, -np.inf)
         best, starts = gains.argmax(axis=1), []
         gaining = [k for k, way in enumerate(best) if gains[k, way] > 0.0]
@@ -227,11 +240,11 @@ class LimbSearch:
             starts.append(together)
         order = np.argsort(-gains, axis=None)
         promising = order[gains.reshape(-1)[order] > SLACK * energy]
-        starts = [*starts, *found.poses.reshape(-1, len(pose))[promising]][:MOST_WHOLE]
-        likeliest = int(np.argmax(found.crossed_gains))
-        if found.crossed_gains[likeliest] > CROSSED_SLACK * energy:
-            starts.append(found.crossed[likeliest])
-        return np.array(starts).reshape(-1, len(pose))
+        whole = np.array([*starts, *found.poses.reshape(-1, len(pose))[promising]]).reshape(-1, len(pose))
+        crossed = np.where(found.crossed_apart > CROSSED_APART, found.crossed_gains, -np.inf)
+        likeliest = found.crossed[[int(np.argmax(crossed))]] if crossed.max() > CROSSED_SLACK * energy else whole[:0]
+        possible = lambda poses: poses[self.possible(first, poses)]
+        return np.concatenate([possible(whole)[:MOST_WHOLE], possible(likeliest)])
 
     def possible(
         self, known: Float[np.ndarray, "dof"], poses: Float[np.ndarray, "start dof"]
@@ -299,6 +312,7 @@ class HeldOtherwise(eqx.Module):
     crossed: Float[Array, "*unit dof"]
     """With the ends of its limbs exchanged, not climbed."""
     crossed_gains: Float[Array, "*unit"]
+    crossed_apart: Float[Array, "*unit"]
 
 
 @eqx.filter_jit
@@ -326,7 +340,8 @@ def held_otherwise(
         places = jax.vmap(means)(found.params)
         apart = jax.vmap(lambda each: _apart(each, means(params[0]), of_limb))(places)
         ways = jax.vmap(held)(found.params), found.value - values[0], apart
-        return HeldOtherwise(*ways, held(params[CROSSED]), values[CROSSED] - values[0])
+        crossed = held(params[CROSSED]), values[CROSSED] - values[0]
+        return HeldOtherwise(*ways, *crossed, _apart(means(params[CROSSED]), means(params[0]), of_limb))
 
     return jax.lax.map(of_unit, (units.index, units.limbs, units.ends, units.outer, tried))
 

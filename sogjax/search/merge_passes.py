@@ -40,7 +40,7 @@ IMPOSSIBLE = 0.02
 """Part of a frame's energy that a part costs in a frame in which it is deep in something else."""
 MOST_SWEEPS = 3
 """Times that key frames are searched, where they changed meanwhile."""
-MOST_LOOKS = 2
+MOST_LOOKS = 1
 """Frames of other passes that gain nothing, at most, in lengths of the clip."""
 
 
@@ -117,7 +117,9 @@ class _Revising:
             pose = None if self._tired else search.better_pose(frame, self.passed, row)
             if pose is not None:
                 found = compared_both_ways(self.tracker, self.passed, self.frames, self.parts, row, pose)
-                if not self.take(self._without_impossible(search, found)):
+                if self.take(self._without_impossible(search, found)):
+                    search.forget_in_vain(self._changed)
+                else:
                     search.note_in_vain(found.rows, found.poses)
 
     def _without_impossible(self, search: LimbSearch, found: Compared) -> Compared:

@@ -161,11 +161,14 @@ def gained_in(
     known: Float[np.ndarray | Array, "dof"],
     other: Float[np.ndarray | Array, "dof"],
 ) -> float:
-    """The rise of the energy with another pose, in the same views: as tracking saw it, each has its own."""
-    both = jnp.stack([jnp.asarray(known), jnp.asarray(other)])
-    views = views_near(tracker, on_device(frame), both[0], capacities, REACH)
-    before, after = np.asarray(values_in(tracker, views, both))
-    return float(after - before)
+    """The rise of the energy with another pose, both in the same views: the mean of those around either.
+
+    Tracking valued each in views of its own, in which other image blobs count.
+    """
+    both, seen = jnp.stack([jnp.asarray(known), jnp.asarray(other)]), on_device(frame)
+    views = [views_near(tracker, seen, pose, capacities, REACH) for pose in both]
+    values = np.mean([np.asarray(values_in(tracker, around, both)) for around in views], axis=0)
+    return float(values[1] - values[0])
 
 
 def _differ(parts: Sequence[Part], apart: Bool[np.ndarray, "part"]) -> Bool[np.ndarray, "part"]:

@@ -108,7 +108,7 @@ def search(searcher: PoseSearch, frame: SeenFrame, count: int = NUM_LAST, report
     placed = PlacedSearch.of_places(searcher, frame, np.stack([place.centre for place in found]))
     tried = _starts(searcher, found)
     with ThreadPoolExecutor(2) as beside:
-        for level in (placed.glance, placed):
+        for level in [placed.glance, placed][placed.glance is placed :]:
             beside.submit(level.climbed, tried[np.arange(1)], 0)  # what climbs is compiled meanwhile
         scored = placed.glance.scored(tried)
         tried = placed.glance.climbed(_spread_best(searcher, scored), FIRST_ITERATIONS)
@@ -158,12 +158,18 @@ class PlacedSearch:
 
     @cached_property
     def glance(self) -> "PlacedSearch":
-        """The same as some of the cameras see it, those farthest apart; its energies are compared with each other only.
+        """The same as few of the cameras see it, those farthest apart; its energies are compared with each other only.
 
+        Of the cameras that see anything of the places, if these are enough; itself, if it has no more than those.
         Larger cells instead would lose arms, which are as thin as a cell.
         """
         cameras = np.asarray(self.energy.cameras.camera_from_world)
-        chosen = farthest(-np.einsum("cji,cj->ci", cameras[:, :3, :3], cameras[:, :3, 3]), FEW_CAMERAS)
+        if len(cameras) <= FEW_CAMERAS:
+            return self
+        seeing = np.flatnonzero(np.asarray(jnp.any(self.windows.odds != 0.0, axis=(0, 2, 3, 4))))
+        seeing = seeing if len(seeing) >= FEW_CAMERAS else np.arange(len(cameras))
+        centres = -np.einsum("cji,cj->ci", cameras[:, :3, :3], cameras[:, :3, 3])
+        chosen = seeing[farthest(centres[seeing], FEW_CAMERAS)]
         seen, windows = _of_cameras(self.energy.cameras, self.windows, jnp.asarray(chosen))
         return replace(self, energy=eqx.tree_at(lambda energy: energy.cameras, self.energy, seen), windows=windows)
 
