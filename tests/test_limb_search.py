@@ -20,7 +20,8 @@ from sogjax.energy.views import Windows
 from sogjax.model.body import concatenate
 from sogjax.model.limbs import limb_names
 from sogjax.search import limb_search
-from sogjax.search.limb_search import LimbSearch, Units, compile_search, drawn_ways, look_alikes, units_of
+from sogjax.search.limb_search import LimbSearch, compile_search
+from sogjax.search.limb_ways import Units, drawn_ways, look_alikes, units_of
 from sogjax.search.merge_passes import merge_passes
 from sogjax.search.placed_body import means_of
 from sogjax.tracking.frame_by_frame import track

@@ -1,11 +1,10 @@
 """Other ways to hold the limbs of a body in one frame: many are compared, the best different ones climbed.
 
-A unit is a pair of limbs that are each other's counterpart, since what one of them explains is often the other one's.
 The rest of the body is held meanwhile (`energy/part_energy.py`).
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import equinox as eqx
 import jax
@@ -17,11 +16,8 @@ from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.part_energy import PartEnergy, PartIndex
 from sogjax.energy.posed import History
 from sogjax.energy.views import Views
-from sogjax.model.body import Body
-from sogjax.model.limbs import limb_blobs, limb_names, limbs
 from sogjax.model.solid import Solid
-from sogjax.search.body_parts import limb_groups
-from sogjax.search.mirrored import fitted_to_blobs, other_side
+from sogjax.search.limb_ways import CROSSED, Unit, Units, drawn_ways, look_alikes, units_of
 from sogjax.search.other_pass import REACH, Pass
 from sogjax.search.placed_body import means_of
 from sogjax.solve.gauss_newton import GaussNewton
@@ -30,99 +26,14 @@ from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import AnyFrame, FrameInput, TrackState, on_device
 from sogjax.tracking.tracker import Tracker
 
-NUM_DRAWN = 23
-"""Ways to hold a unit that are drawn in a frame; another frame draws others."""
 NUM_CLIMBED = 4
 """Different ways that are climbed, the tracked one among them."""
 AT_ONCE = 8
-ITERATIONS, FIT_ITERATIONS = 5, 5
+ITERATIONS = 5
 APART = 0.08
 """Metres, mean over the blobs of the limb that differs more: ways to hold a unit that count as different."""
-SMALL_RANGE = 0.9
-"""Radians: a degree of freedom of less range is not drawn."""
-NEARBY = 1.2
-"""Radians around the tracked pose, within which every second way is drawn."""
 LARGEST_ANGLE = 0.3
 """Radians: bound on a step of a climb."""
-
-
-@dataclass(frozen=True)
-class Unit:
-    """Limbs that are searched together."""
-
-    limbs: tuple[int, ...]
-    """One, or two that are each other's counterpart; their numbers among those of the body."""
-    name: str
-    dofs: tuple[Int[np.ndarray, "_dof"], ...]
-    """Of each limb."""
-    blobs: tuple[Int[np.ndarray, "_blob"], ...]
-    """Of each limb, from its root to its end."""
-
-    @property
-    def all_dofs(self) -> Int[np.ndarray, "_dof"]:
-        """Of all its limbs."""
-        return np.concatenate(self.dofs)
-
-    @property
-    def all_blobs(self) -> Int[np.ndarray, "_blob"]:
-        """Of all its limbs."""
-        return np.concatenate(self.blobs)
-
-
-def units_of(body: Body) -> tuple[Unit, ...]:
-    """The pairs of limbs of a body; where it has no sides, its limbs."""
-    names, every_limb, blobs, groups = limb_names(body), limbs(body.skeleton), limb_blobs(body), limb_groups(body)
-    pairs = [members for members in groups if len(members) == 2]
-    return tuple(
-        Unit(
-            members,
-            " and ".join(names[j] for j in members),
-            tuple(every_limb[j] for j in members),
-            tuple(np.flatnonzero(blobs[j]) for j in members),
-        )
-        for members in pairs or groups
-    )
-
-
-class Units(eqx.Module):
-    """Units as arrays of one shape."""
-
-    index: PartIndex
-    limbs: Bool[Array, "unit limb slot"]
-    """Which of the unit's blobs are those of each limb; none where there is no second one."""
-    ends: Int[Array, "unit limb 2"]
-    """The first and the last blob of each limb."""
-    outer: Float[Array, "unit slot"]
-    """How far beyond the middle of its limb a blob is: 0 up to there, 1 at the end."""
-    counterparts: Int[Array, "blob"]
-    """The blob of the other side, or the same."""
-
-    @classmethod
-    def of(cls, body: Body, units: Sequence[Unit]) -> "Units":
-        """Padded to the largest."""
-        dofs, blobs = _padded([unit.all_dofs for unit in units]), _padded([unit.all_blobs for unit in units])
-        of_limb = np.zeros((len(units), 2, blobs[0].shape[1]), bool)
-        ends, outer = np.zeros((len(units), 2, 2), int), np.zeros(blobs[0].shape)
-        for k, unit in enumerate(units):
-            for j, each in enumerate(unit.blobs):
-                of_limb[k, j] = np.isin(blobs[0][k], each) & blobs[1][k]
-            ends[k] = [[each[0], each[-1]] for each in (unit.blobs[0], unit.blobs[-1])]
-            along = [np.linspace(-1.0, 1.0, len(each)) for each in unit.blobs]
-            outer[k, : len(unit.all_blobs)] = np.maximum(np.concatenate(along), 0.0)
-        index = PartIndex(*(jnp.asarray(array) for array in (*dofs, *blobs)))
-        counterparts = jnp.asarray(other_side(body.blobs.names))
-        return cls(
-            index, jnp.asarray(of_limb), jnp.asarray(ends), jnp.asarray(outer, body.blob_sigmas.dtype), counterparts
-        )
-
-
-def _padded(rows: Sequence[Int[np.ndarray, "_n"]]) -> tuple[Int[np.ndarray, "row n"], Bool[np.ndarray, "row n"]]:
-    """Rows of the same length, and what of them is real."""
-    size = max(map(len, rows))
-    return (
-        np.stack([np.pad(row, (0, size - len(row))) for row in rows]),
-        np.stack([np.arange(size) < len(row) for row in rows]),
-    )
 
 
 SLACK, WORTH = -0.002, 0.001
@@ -344,77 +255,6 @@ def held_otherwise(
         return HeldOtherwise(*ways, *crossed, _apart(means(params[CROSSED]), means(params[0]), of_limb))
 
     return jax.lax.map(of_unit, (units.index, units.limbs, units.ends, units.outer, tried))
-
-
-CROSSED = 2
-"""Among the ways that are compared, the tracked one and what looks like it: ends exchanged."""
-
-
-def look_alikes(
-    body: Body,
-    pose: Float[Array, "dof"],
-    index: PartIndex,
-    of_limb: Bool[Array, "limb slot"],
-    ends: Int[Array, "limb 2"],
-    outer: Float[Array, "slot"],
-    counterparts: Int[Array, "blob"],
-) -> Float[Array, "5 dof"]:
-    """What looks like a unit as it is held.
-
-    Its limbs exchanged; their ends exchanged, with knees and elbows about where they are; each of them turned by a half
-    from root to end; both turned.
-    """
-    means = body.posed_blobs(pose).means
-    here = means[index.blobs]
-    turned = jax.vmap(lambda two: _half_turned(here, means[two[0]], means[two[1]]))(ends)
-    place = lambda moved: means.at[jnp.where(index.blob_mask, index.blobs, len(means))].set(moved, mode="drop")
-    first, second = (jnp.where(each[:, None], moved, here) for each, moved in zip(of_limb, turned, strict=True))
-    both = jnp.where(of_limb[1][:, None], second, first)
-    exchanged = means[counterparts[index.blobs]]
-    crossed = here + outer[:, None] * (exchanged - here)
-    targets = jnp.stack([place(each) for each in (exchanged, crossed, first, second, both)])
-    fitted = fitted_to_blobs(body, jnp.tile(pose, (len(targets), 1)), targets, FIT_ITERATIONS)[0]
-    return jax.vmap(lambda each: index.put(pose, index.params(each)))(fitted)
-
-
-def _half_turned(
-    points: Float[Array, "point 3"], root: Float[Array, "3"], end: Float[Array, "3"]
-) -> Float[Array, "point 3"]:
-    """Points turned by a half about the line from a root to an end: a knee or elbow on the other side of it."""
-    along = (end - root) / jnp.maximum(jnp.linalg.norm(end - root), 1e-6)
-    off = points - root[None]
-    return root[None] + 2.0 * jnp.sum(off * along[None], axis=-1, keepdims=True) * along[None] - off
-
-
-def drawn_ways(
-    body: Body, unit: Unit, pose: Float[np.ndarray, "dof"], turn: int, count: int = NUM_DRAWN
-) -> Float[np.ndarray, "drawn dof"]:
-    """Quasi-random ways to hold a unit: its first limb, its second, or both; within their limits, or nearby.
-
-    Each `turn` draws others.
-    """
-    lower, upper = np.asarray(body.skeleton.dof_lower), np.asarray(body.skeleton.dof_upper)
-    free = [dofs[(upper - lower)[dofs] > SMALL_RANGE] for dofs in unit.dofs]
-    dofs = np.concatenate(free)
-    shares = _quasi_random(count, turn, len(dofs))
-    whole = lower[dofs] + shares * (upper - lower)[dofs]
-    low, high = np.maximum(lower[dofs], pose[dofs] - NEARBY), np.minimum(upper[dofs], pose[dofs] + NEARBY)
-    values = np.where(np.arange(count)[:, None] % 2 == 0, whole, low + shares * (high - low))
-    found = np.tile(pose, (count, 1))
-    which = (np.arange(count) // 2) % (2 ** len(unit.limbs) - 1)
-    for k, of_limb in enumerate(free):
-        rows = np.flatnonzero((which == k) | (which == 2))
-        found[np.ix_(rows, of_limb)] = values[rows][:, np.isin(dofs, of_limb)]
-    return found.astype(pose.dtype)
-
-
-def _quasi_random(count: int, turn: int, dims: int) -> Float[np.ndarray, "count dims"]:
-    """Points that fill a cube evenly (Roberts' R sequence); later turns fill its gaps."""
-    root = 2.0
-    for _ in range(30):
-        root = (1.0 + root) ** (1.0 / (dims + 1))
-    steps = (1.0 / root) ** np.arange(1, dims + 1)
-    return np.mod(0.5 + (np.arange(count) + 1 + turn * count)[:, None] * steps[None], 1.0)
 
 
 def _in_parts(energy: PartEnergy, params: Float[Array, "seed param"]) -> Float[Array, "seed"]:
