@@ -151,11 +151,11 @@ class LimbSearch:
             starts.append(together)
         order = np.argsort(-gains, axis=None)
         promising = order[gains.reshape(-1)[order] > SLACK * energy]
-        whole = np.array([*starts, *found.poses.reshape(-1, len(pose))[promising]]).reshape(-1, len(pose))
+        starts = np.array([*starts, *found.poses.reshape(-1, len(pose))[promising]]).reshape(-1, len(pose))
         crossed = np.where(found.crossed_apart > CROSSED_APART, found.crossed_gains, -np.inf)
-        likeliest = found.crossed[[int(np.argmax(crossed))]] if crossed.max() > CROSSED_SLACK * energy else whole[:0]
-        possible = lambda poses: poses[self.possible(first, poses)]
-        return np.concatenate([possible(whole)[:MOST_WHOLE], possible(likeliest)])
+        likeliest = found.crossed[[int(np.argmax(crossed))]] if crossed.max() > CROSSED_SLACK * energy else starts[:0]
+        allowed = lambda poses: poses[self.possible(first, poses)]
+        return np.concatenate([allowed(starts)[:MOST_WHOLE], allowed(likeliest)])
 
     def possible(
         self, known: Float[np.ndarray, "dof"], poses: Float[np.ndarray, "start dof"]
@@ -223,7 +223,9 @@ class HeldOtherwise(eqx.Module):
     crossed: Float[Array, "*unit dof"]
     """With the ends of its limbs exchanged, not climbed."""
     crossed_gains: Float[Array, "*unit"]
+    """As `gains`, of that."""
     crossed_apart: Float[Array, "*unit"]
+    """As `apart`, of that."""
 
 
 @eqx.filter_jit

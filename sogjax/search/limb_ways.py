@@ -107,7 +107,7 @@ def _padded(rows: Sequence[Int[np.ndarray, "_n"]]) -> tuple[Int[np.ndarray, "row
 
 
 CROSSED = 2
-"""Among the ways that are compared, the tracked one and what looks like it: ends exchanged."""
+"""Where the way with exchanged ends is among those compared: the tracked one, then what looks like it."""
 
 
 def look_alikes(
