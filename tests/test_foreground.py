@@ -99,6 +99,17 @@ def test_slow_light_is_no_foreground():
     assert float(odds[0, 5, 5]) == LARGEST
 
 
+def test_a_dark_leg_is_told_from_the_floor_in_any_light():
+    """In a brighter light it was a shadow once, as more than all of the difference was explained by one."""
+    floor, trousers = wall(color=(0.55, 0.42, 0.3)), (0.11, 0.09, 0.09)
+    floor = replace(floor, spread=jnp.full(floor.spread.shape, 0.028))
+    usual, darker, brighter = (
+        float(odds_of(seen(floor, trousers, gain), floor, subject(trousers))[0, 5, 5]) for gain in (1.0, 0.9, 1.1)
+    )
+    assert min(usual, darker, brighter) > 0.5
+    assert max(usual, darker, brighter) - min(usual, darker, brighter) < 0.3
+
+
 def test_windows_look_where_the_lens_put_things():
     """Odds that rise along the recorded picture, looked at from undistorted pixels; nothing outside it."""
     rig = ring_rig(2, distortion=(-0.2, 0.05, 1e-3, -2e-3, 0.01))

@@ -96,8 +96,8 @@ class BackgroundModel(eqx.Module):
     """Red, green and blue of the background, sRGB, 0 to 1."""
     precision: Cells
     """1 / variance of a channel."""
-    shade: Cells
-    """Share of the way along its own colour that a shadow explains, divided by the colour's squared length."""
+    stiffness: Cells
+    """Squared length along the background's own colour up to which a shadow explains little: variance / shadow^2."""
     volume: Cells
     """Logarithm of the Gaussian's volume in colours."""
     known: Bool[Array, "camera rows columns"]
@@ -112,7 +112,7 @@ class BackgroundModel(eqx.Module):
         known, unknown = self.known | other.known, self.unknown & other.unknown
         parts = {
             name: jax.tree.map(filled, getattr(self, name), getattr(other, name))
-            for name in ("planes", "precision", "shade", "volume")
+            for name in ("planes", "precision", "stiffness", "volume")
         }
         return replace(self, **parts, known=known, unknown=unknown)
 
@@ -135,7 +135,7 @@ class BackgroundModel(eqx.Module):
     def _with_variance(self, variance: Cells, shadow: float) -> "BackgroundModel":
         length = sum(plane * plane for plane in self.planes)
         volume = jnp.log(_NORMAL * variance * jnp.sqrt(variance + shadow**2 * length))
-        return replace(self, precision=1.0 / variance, shade=1.0 / (variance / shadow**2 + length), volume=volume)
+        return replace(self, precision=1.0 / variance, stiffness=variance / shadow**2, volume=volume)
 
     def blurred(self, spread: float) -> "BackgroundModel":
         """This background, each channel of which is known no better than to a standard deviation."""
@@ -202,7 +202,9 @@ def _surprise(seen: list[Cells], empty: BackgroundModel) -> Cells:
     off = [s - e for s, e in zip(seen, expected, strict=True)]
     squared = sum(o * o for o in off)
     along = sum(o * e for o, e in zip(off, expected, strict=True))
-    return 0.5 * (squared - along * along * empty.shade) * empty.precision + empty.volume
+    # the length of what is expected, not of the background: in a brighter light more than all of it was explained
+    explained = along * along / (empty.stiffness + sum(e * e for e in expected))
+    return 0.5 * (squared - explained) * empty.precision + empty.volume
 
 
 def color_bins(cells: Float[Array, "*cell 3"]) -> tuple[Array, Array, Array]:
