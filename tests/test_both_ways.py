@@ -18,7 +18,7 @@ from sogjax.quality.metrics import stretches
 from sogjax.search import merge_passes as both_ways
 from sogjax.search.body_parts import PartArrays, best_choice, body_parts, merged_pose, select_parts
 from sogjax.search.merge_passes import merge_passes
-from sogjax.search.other_pass import Compared, part_gains
+from sogjax.search.other_pass import BothSeen, Compared, part_gains
 from sogjax.search.placed_body import means_of
 from sogjax.tracking.capacity import with_room
 from sogjax.tracking.culling import Capacities
@@ -120,7 +120,7 @@ def test_a_frame_that_two_passes_revise_counts_once(walking_dog, monkeypatch):
         column = lambda value: list(np.tile(np.where(np.arange(len(parts)) == 0, value, 0.0), (begin, 1)))
         poses = [right.poses[row] for row in reversed(range(begin))]
         gains, apart = column(10.0 * right.energy), column(2.0 * COSTS.apart)
-        return Compared([*reversed(range(begin))], cells[:begin][::-1], poses, gains, apart)
+        return Compared([*reversed(range(begin))], cells[:begin][::-1], poses, gains, apart, [1.0] * begin)
 
     monkeypatch.setattr(both_ways, "compared_backwards", compared)
     beside = replace(right, doubts=doubts, poses=right.poses + np.float32(0.02))
@@ -149,7 +149,8 @@ def test_what_sees_more_image_blobs_than_there_is_room_for_is_valued_with_more_r
     small, row = Capacities(8, 8, right.capacities.blocks), LOST.start
     choices = PartArrays.of(tracker.body, body_parts(tracker.body))
     poses = [jnp.asarray(each.poses[row]) for each in (passed, right)]
-    gains = [part_gains(tracker, cells[row], room, choices, *poses) for room in (small, right.capacities)]
+    seen = [BothSeen.of(tracker, cells[row], room, *poses) for room in (small, right.capacities)]
+    gains = [part_gains(tracker, each, choices) for each in seen]
     np.testing.assert_allclose(*gains, rtol=1e-3, atol=1e-5 * right.energy)
     compared = both_ways.compared_backwards
     monkeypatch.setattr(

@@ -60,9 +60,9 @@ def test_a_place_whose_background_was_never_seen_says_nothing():
     assert (odds[0, 5, 3:7] > 1.0).all()
 
 
-def test_a_shadow_is_background_unless_it_is_a_subjects_colour():
+def test_a_faint_shadow_is_background_unless_it_is_a_subjects_colour():
     background = wall()
-    dark = tuple(0.75 * c for c in WALL)
+    dark = tuple(0.82 * c for c in WALL)
     in_shade = lambda whose: float(odds_of(seen(background, dark), background, whose)[0, 5, 5])
     assert in_shade(subject(SHIRT)) < -1.0
     assert in_shade(subject(dark)) > in_shade(subject(SHIRT)) + 0.5

@@ -165,7 +165,7 @@ def test_no_pass_begins_where_one_went_in_vain(walking_dog, monkeypatch):
     other[search.units[0].all_dofs] += 0.5
     ends, values = jnp.stack([jnp.asarray(other)] * 4), jnp.array([1.0, -jnp.inf, -jnp.inf, -jnp.inf])
     monkeypatch.setattr(LimbSearch, "held_otherwise", lambda *_: None)
-    monkeypatch.setattr(LimbSearch, "_starts", lambda *_: other[None])
+    monkeypatch.setattr(LimbSearch, "_starts", lambda *_: (other[None], other[:0].reshape(0, len(other))))
     monkeypatch.setattr(LimbSearch, "possible", lambda _, known, poses: np.ones(len(poses), bool))
     monkeypatch.setattr(limb_search, "climbed_in", lambda *_: (ends, values, jnp.asarray(0.0)))
     better = lambda row: search.better_pose(cells[row], right, row)

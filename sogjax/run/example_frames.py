@@ -16,7 +16,6 @@ from sogjax.run.background import Background
 from sogjax.run.clip import Clip
 from sogjax.run.example_people import (
     AGREEING,
-    LIGHT,
     OTHERWISE,
     has_plates,
     most_seen,
@@ -83,7 +82,7 @@ def _told_apart(clip: Clip, learnt: tuple[BackgroundImage, ...] | None) -> Recor
     if not shared or learnt is None:
         return recording
     frames = sorted({example.frame for example in shared if example.frame is not None})
-    told = told_by_name(recording, masks_of_samples(clip, learnt, LIGHT, frames), shared)
+    told = told_by_name(recording, masks_of_samples(clip, learnt, frames), shared)
     if isinstance(told, str):
         raise InputError(f"{recording.path}: example_poses: {told}")
     if all(example.initial_pose is None for example in shared):

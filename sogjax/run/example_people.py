@@ -25,9 +25,6 @@ from sogjax.scene.background import BackgroundImage
 from sogjax.scene.background_difference import reduced_mask
 from sogjax.scene.cells import CellGrid
 
-LIGHT = 0.05
-"""Standard deviation of the background's light, as a part of it: dark trousers must not pass for a shadow. Shadows are
-told by lying on the floor."""
 AGREEING = 0.45
 """Least agreement of everybody's hull and silhouettes in a frame."""
 FEWEST_APART = 2
@@ -47,7 +44,7 @@ def person_name(number: int) -> str:
 
 def num_people_seen(clip: Clip, learnt: Sequence[BackgroundImage]) -> int:
     """How many people most frames show that show any; 0: none does."""
-    seen = masks_of_samples(clip, learnt, LIGHT)
+    seen = masks_of_samples(clip, learnt)
     return most_seen([len(people) for people in everybody(seen, clip.recording.up)])
 
 
@@ -61,7 +58,7 @@ def people_examples(
     clip: Clip, learnt: Sequence[BackgroundImage], actors: int, count: int
 ) -> tuple[ExamplePose, ...] | str:
     """At most `count` frames as example poses of each of several people, or why there are none, with the remedy."""
-    seen = masks_of_samples(clip, learnt, LIGHT)
+    seen = masks_of_samples(clip, learnt)
     examples = examples_of_masks(clip.recording, seen, actors, count)
     if not isinstance(examples, str) or not seen.undecided:
         return examples

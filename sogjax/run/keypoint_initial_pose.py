@@ -16,7 +16,6 @@ from sogjax.model.body import Body, concatenate
 from sogjax.run import build
 from sogjax.run.background import Background
 from sogjax.run.clip import Clip
-from sogjax.run.example_people import LIGHT
 from sogjax.run.sampled_masks import masks_of_samples
 from sogjax.run.terminal import say
 from sogjax.search.described_pose import MIN_LANDMARKS
@@ -85,7 +84,7 @@ def _seen_people(
     people = [person for person in points if np.isfinite(person).all(-1).sum() >= MIN_LANDMARKS]
     if background.cameras is None:
         return people
-    seen = masks_of_samples(clip, background.cameras, LIGHT, (frame,))
+    seen = masks_of_samples(clip, background.cameras, (frame,))
     if not seen.frames:
         return people[:wanted]
     masks = {k: mask | seen.unknown[k] for k, mask in seen.masks[0].items()}

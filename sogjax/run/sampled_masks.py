@@ -19,7 +19,7 @@ from sogjax.model.camera import Camera
 from sogjax.run.clip import Clip, SampleKind, cell_grids, spread_frames
 from sogjax.scene.background import BackgroundImage, stack_background
 from sogjax.scene.cells import CellGrid
-from sogjax.scene.foreground import SHADOW, BackgroundModel, log_odds
+from sogjax.scene.foreground import BackgroundModel, log_odds
 from sogjax.scene.occluders import painted
 from sogjax.scene.segmentation import largest_parts, unlike_the_room
 from sogjax.scene.visual_hull import resized
@@ -74,15 +74,11 @@ def mask_samples(recording: Recording, frames: Sequence[int] | None = None) -> S
 
 
 def masks_of_samples(
-    clip: Clip, learnt: Sequence[BackgroundImage], shadow: float = SHADOW, frames: Sequence[int] | None = None
+    clip: Clip, learnt: Sequence[BackgroundImage], frames: Sequence[int] | None = None
 ) -> SampledMasks:
-    """The masks of the frames, or else of at most `MOST_LOOKED_AT` spread over the clip, that all cameras have.
-
-    `shadow` is the standard deviation of the light that a shadow takes, as a part of the background's: what is darker
-    by more is not the background.
-    """
+    """The masks of the frames, or else of at most `MOST_LOOKED_AT` spread over the clip, that all cameras have."""
     recording, grids = clip.recording, cell_grids(clip.recording, DEPTH)
-    empty = BackgroundModel.from_background(stack_background(learnt, grids), shadow)
+    empty = BackgroundModel.from_background(stack_background(learnt, grids))
     shown = jnp.asarray(painted(painted_masks(recording), grids) > 0.0)
     empty = eqx.tree_at(lambda model: model.known, empty, empty.known & shown)
     sampled = clip.sampled([mask_samples(recording, frames)])[0]

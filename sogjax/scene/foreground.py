@@ -18,8 +18,9 @@ LARGEST = 2.0
 """No cell says more than this: what disturbs one (a reflection, a wrong background) disturbs its neighbours too."""
 SMALLEST_SPREAD = 0.015
 """Standard deviation of a channel at one place in one light, at least (compression, a lens that breathes)."""
-SHADOW = 0.25
-"""Standard deviation of the light that a shadow or a reflection takes or adds, as a part of the background's."""
+SHADOW = 0.06
+"""Standard deviation of the light that a shadow or a reflection takes or adds, as a part of the background's. Deeper
+shadows count as foreground: with room for them dark sleeves and trousers pass for shadows, and limbs are lost."""
 SUBJECT_UNKNOWN = 0.3
 """Share of a subject whose colours are none of its blobs': any colour."""
 COLOR_BINS = 32
@@ -117,11 +118,8 @@ class BackgroundModel(eqx.Module):
         return replace(self, **parts, known=known, unknown=unknown)
 
     @classmethod
-    def from_background(cls, background: BackgroundCells, shadow: float = SHADOW) -> "BackgroundModel":
-        """The background may be darker or brighter by a factor (a shadow), at a cost: a longer Gaussian that way.
-
-        `shadow` is that factor's standard deviation.
-        """
+    def from_background(cls, background: BackgroundCells) -> "BackgroundModel":
+        """The background may be darker or brighter by a factor (a shadow), at a cost: a longer Gaussian that way."""
         dtype = jnp.result_type(float)
         variance = jnp.maximum(jnp.asarray(background.spread, dtype), SMALLEST_SPREAD) ** 2
         colors, known = jnp.asarray(background.colors, dtype) / 255.0, jnp.asarray(background.known)
@@ -130,16 +128,16 @@ class BackgroundModel(eqx.Module):
         elsewhere = color_surprise(colors, known.astype(dtype))
         nothing = jnp.zeros_like(variance)
         empty = cls((red, green, blue), nothing, nothing, nothing, known, unknown, elsewhere)
-        return empty._with_variance(variance, shadow)
+        return empty._with_variance(variance)
 
-    def _with_variance(self, variance: Cells, shadow: float) -> "BackgroundModel":
+    def _with_variance(self, variance: Cells) -> "BackgroundModel":
         length = sum(plane * plane for plane in self.planes)
-        volume = jnp.log(_NORMAL * variance * jnp.sqrt(variance + shadow**2 * length))
-        return replace(self, precision=1.0 / variance, stiffness=variance / shadow**2, volume=volume)
+        volume = jnp.log(_NORMAL * variance * jnp.sqrt(variance + SHADOW**2 * length))
+        return replace(self, precision=1.0 / variance, stiffness=variance / SHADOW**2, volume=volume)
 
     def blurred(self, spread: float) -> "BackgroundModel":
         """This background, each channel of which is known no better than to a standard deviation."""
-        return self._with_variance(jnp.maximum(1.0 / self.precision, spread**2), SHADOW)
+        return self._with_variance(jnp.maximum(1.0 / self.precision, spread**2))
 
 
 def log_odds(

@@ -121,11 +121,15 @@ class LimbSearch:
 
         `first` is the tracked pose, `energy` that of a frame, for scale; near poses `in_vain` nothing counts.
         """
-        starts = self._starts(first, pose, found, energy)
+        held, crossed = self._starts(first, pose, found, energy)
+        starts = np.concatenate([held, crossed])
         if not len(starts):
             return None
         padded = np.stack([*starts, *[pose] * (MOST_WHOLE + 1 - len(starts))])
-        found_there = climbed_in(self.tracker, views, jnp.asarray(pose), jnp.asarray(padded), jnp.asarray(len(starts)))
+        most = self.tracker.solver.max_iterations
+        steps = jnp.where(np.arange(len(padded)) < len(held), jnp.minimum(FEW_STEPS, most), most)
+        arrays = jnp.asarray(pose), jnp.asarray(padded), jnp.asarray(len(starts)), steps
+        found_there = climbed_in(self.tracker, views, *arrays)
         ends, values, before = jax.device_get(found_there)
         good = (values - before > WORTH * energy) & (self._apart(ends, pose) > APART) & self.possible(first, ends)
         for other in in_vain:
@@ -138,8 +142,8 @@ class LimbSearch:
         pose: Float[np.ndarray, "dof"],
         found: "HeldOtherwise",
         energy: float,
-    ) -> Float[np.ndarray, "start dof"]:
-        """What is possible and worth climbing: the best way of every unit together, single ones, crossed ends last."""
+    ) -> tuple[Float[np.ndarray, "start dof"], Float[np.ndarray, "crossed dof"]]:
+        """What is possible and worth climbing: the best ways of all units together, single ones; and crossed ends."""
         gains = np.where(found.apart > APART, found.gains, -np.inf)
         best, starts = gains.argmax(axis=1), []
         gaining = [k for k, way in enumerate(best) if gains[k, way] > 0.0]
@@ -155,7 +159,7 @@ class LimbSearch:
         crossed = np.where(found.crossed_apart > CROSSED_APART, found.crossed_gains, -np.inf)
         likeliest = found.crossed[[int(np.argmax(crossed))]] if crossed.max() > CROSSED_SLACK * energy else starts[:0]
         allowed = lambda poses: poses[self.possible(first, poses)]
-        return np.concatenate([allowed(starts)[:MOST_WHOLE], allowed(likeliest)])
+        return allowed(starts)[:MOST_WHOLE], allowed(likeliest)
 
     def possible(
         self, known: Float[np.ndarray, "dof"], poses: Float[np.ndarray, "start dof"]
@@ -185,6 +189,8 @@ def compile_search(tracker: Tracker, state: TrackState, frame: FrameInput, capac
         search.held_otherwise(search.views(frame, pose, capacities), pose)
 
 
+FEW_STEPS = 8
+"""Steps that the whole body makes from limbs that were climbed already: a pass that goes from there makes more."""
 MOST_WHOLE = 3
 """Poses that are climbed with all degrees of freedom in a frame, beside the tracked one and that with crossed ends."""
 
@@ -196,15 +202,18 @@ def climbed_in(
     known: Float[Array, "dof"],
     starts: Float[Array, "start dof"],
     count: Int[Array, ""],
+    steps: Int[Array, "start"] | None = None,
 ) -> tuple[Float[Array, "start dof"], Float[Array, "start"], Float[Array, ""]]:
     """The first `count` poses climbed with the tracker's energy and solver, and what they are worth (others: nothing).
 
-    Last, what the known pose is worth.
+    At most so many `steps` are made from each; None: as many as in tracking. Last, what the known pose is worth.
     """
     energy = FrameEnergy(tracker.body, views, History.unknown(known), tracker.terms)
 
     def climb(k: Int[Array, ""], found: tuple[Array, Array]) -> tuple[Array, Array]:
-        solution = tracker.solver.maximize(energy, starts[k], tracker.scales)
+        most = tracker.solver.max_iterations if steps is None else steps[k]
+        solver = eqx.tree_at(lambda solver: solver.max_iterations, tracker.solver, most)
+        solution = solver.maximize(energy, starts[k], tracker.scales)
         return found[0].at[k].set(solution.params), found[1].at[k].set(solution.value)
 
     nothing = jnp.full(len(starts), -jnp.inf, starts.dtype)

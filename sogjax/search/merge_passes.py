@@ -24,12 +24,12 @@ from sogjax.search.body_parts import body_parts, merged_pose, select_parts
 from sogjax.search.limb_search import LimbSearch, climbed_in
 from sogjax.search.other_pass import (
     SURE_FRAMES,
+    BothSeen,
     Compared,
     FramesOfRows,
     Pass,
     compared_backwards,
     compared_both_ways,
-    gained_in,
 )
 from sogjax.search.pose_search import Report, unreported
 from sogjax.tracking.capacity import views_near
@@ -147,11 +147,7 @@ class _Revising:
         taken = select_parts(self.parts, np.stack(found.apart), np.stack(found.gains), self.passed.energy, ends)
         changed = [(k, int(rows[k])) for k in np.flatnonzero(taken.any(axis=1))]
         merged = {row: self._merged(self.passed.poses[row], found, int(k), taken[k]) for k, row in changed}
-        gains = [
-            gained_in(self.tracker, found.cells[k], self.passed.capacities, self.passed.poses[row], merged[row])
-            for k, row in changed
-        ]
-        better = sum(gains) > 0.0
+        better = sum(self._gained(found, int(k), self.passed.poses[row], merged[row]) for k, row in changed) > 0.0
         if not better:
             self._looked_at += len(rows)
         else:
@@ -164,6 +160,14 @@ class _Revising:
             for name in part.names if better and of_part.any() else ():
                 self.revision.parts.setdefault(name, set()).update(rows[of_part].tolist())
         return better
+
+    def _gained(
+        self, found: Compared, k: int, pose: Float[np.ndarray, "dof"], merged: Float[np.ndarray, "dof"]
+    ) -> float:
+        """The rise of a frame's energy with a merged pose, which may be that of the other pass."""
+        if np.array_equal(merged, found.poses[k]):
+            return found.gained[k]
+        return BothSeen.of(self.tracker, found.cells[k], self.passed.capacities, pose, merged).gain
 
     def _merged(
         self, pose: Float[np.ndarray, "dof"], found: Compared, k: int, taken: Bool[np.ndarray, "part"]

@@ -3,6 +3,7 @@
 It begins behind frames in doubt and goes backwards, or at another pose of a key frame and goes both ways.
 """
 
+from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 
@@ -10,7 +11,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History
@@ -71,6 +72,8 @@ class Compared:
     """The rise of the energy if a part is taken from the other pass."""
     apart: list[Float[np.ndarray, "part"]] = field(default_factory=list)
     """Metres."""
+    gained: list[float] = field(default_factory=list)
+    """The rise of the energy with the other pass's pose."""
 
     def joined(self, later: "Compared") -> "Compared":
         """These frames turned round, then later ones of which the first is known already."""
@@ -125,50 +128,71 @@ def compared(
     With `patience` the pass ends, too, where it has explained less than the known one for so many frames.
     """
     found, choices, numbers = Compared(), PartArrays.of(tracker.body, parts), fitted_numbers().merge_passes
+    waiting: deque[tuple[int, BothSeen]] = deque()
 
     def coming() -> Iterable[AnyFrame]:
         for frame in frames(rows):
             found.cells.append(frame)
             yield frame
 
-    agree, capacities, gained = 0, [], []
+    def compare(k: int, seen: BothSeen) -> None:
+        found.gains[k] = part_gains(tracker, seen, choices, _differ(parts, found.apart[k] > numbers.compared))
+
+    agree, promising = 0, patience is None
     for k, (row, tracked) in enumerate(zip(rows, track(tracker, start, coming(), passed.capacities), strict=False)):
         both = (jnp.asarray(passed.poses[row]), jnp.asarray(tracked.result.pose))
         apart = np.asarray(_apart(tracker.body, choices.blobs, *both))
+        seen = BothSeen.of(tracker, found.cells[k], tracked.capacities, *both)
         found.rows.append(row)
         found.poses.append(np.asarray(both[1]))
         found.apart.append(apart)
-        capacities.append(tracked.capacities)
-        if patience is not None:
-            gained.append(gained_in(tracker, found.cells[k], passed.capacities, *both))
+        found.gained.append(seen.gain)
+        found.gains.append(np.zeros(len(parts)))
+        waiting.append((k, seen))
+        promising = promising or sum(found.gained) >= LEAST_GAIN * passed.energy
+        while waiting and (promising or len(waiting) > PATIENCE):
+            compare(*waiting.popleft())
         agree = agree + 1 if apart.max(initial=0.0) <= numbers.together else 0
         if k + 1 >= at_least and agree >= SURE_FRAMES:
             break
-        if patience is not None and k + 1 >= patience and sum(gained[-patience:]) < 0.0:
+        if patience is not None and k + 1 >= patience and sum(found.gained[-patience:]) < 0.0:
             break
-    hopeless = patience is not None and max(np.cumsum(gained)) < LEAST_GAIN * passed.energy
-    for k, row in enumerate(found.rows):
-        both = (jnp.asarray(passed.poses[row]), jnp.asarray(found.poses[k]))
-        differ = np.zeros(len(parts), bool) if hopeless else _differ(parts, found.apart[k] > numbers.compared)
-        found.gains.append(part_gains(tracker, found.cells[k], capacities[k], choices, *both, differ))
+    if not promising:
+        found.gains = [np.zeros(len(parts)) for _ in found.gains]
     return found
 
 
-def gained_in(
-    tracker: Tracker,
-    frame: AnyFrame,
-    capacities: Capacities,
-    known: Float[np.ndarray | Array, "dof"],
-    other: Float[np.ndarray | Array, "dof"],
-) -> float:
-    """The rise of the energy with another pose, both in the same views: the mean of those around either.
+@dataclass(frozen=True)
+class BothSeen:
+    """A known pose of a frame and another one, and what is seen around either.
 
     Tracking valued each in views of its own, in which other image blobs count.
     """
-    both, seen = jnp.stack([jnp.asarray(known), jnp.asarray(other)]), on_device(frame)
-    views = [views_near(tracker, seen, pose, capacities, REACH) for pose in both]
-    values = np.mean([np.asarray(values_in(tracker, around, both)) for around in views], axis=0)
-    return float(values[1] - values[0])
+
+    poses: Float[Array, "2 dof"]
+    views: tuple[Views, Views]
+    values: Float[np.ndarray, "2 2"]
+    """The energy of both poses, in the views of the one and of the other."""
+
+    @classmethod
+    def of(
+        cls,
+        tracker: Tracker,
+        frame: AnyFrame,
+        capacities: Capacities,
+        known: Float[np.ndarray | Array, "dof"],
+        other: Float[np.ndarray | Array, "dof"],
+    ) -> "BothSeen":
+        """Of a frame, with that much room for image blobs or more."""
+        poses, seen = jnp.stack([jnp.asarray(known), jnp.asarray(other)]), on_device(frame)
+        near_known, near_other = (views_near(tracker, seen, pose, capacities, REACH) for pose in poses)
+        views = near_known, near_other
+        return cls(poses, views, np.stack([values_in(tracker, around, poses) for around in views]))
+
+    @property
+    def gain(self) -> float:
+        """The rise of the energy with the other pose: the mean over the views."""
+        return float(np.mean(self.values[:, 1] - self.values[:, 0]))
 
 
 def _differ(parts: Sequence[Part], apart: Bool[np.ndarray, "part"]) -> Bool[np.ndarray, "part"]:
@@ -192,60 +216,53 @@ PARTS_AT_ONCE = 4
 
 
 def part_gains(
-    tracker: Tracker,
-    frame: AnyFrame,
-    capacities: Capacities,
-    parts: PartArrays,
-    first: Float[Array, "dof"],
-    second: Float[Array, "dof"],
-    asked: Bool[np.ndarray, "part"] | None = None,
+    tracker: Tracker, seen: BothSeen, parts: PartArrays, asked: Bool[np.ndarray, "part"] | None = None
 ) -> Float[np.ndarray, "part"]:
-    """The rise of the energy with each part of the second pose instead of the first one's.
+    """The rise of the energy with each part of the other pose instead of the known one's.
 
-    What holds around a part is the rest of the first pose, or that of the second; in what is seen near either. Of a
+    What holds around a part is the rest of the known pose, or that of the other; in what is seen near either. Of a
     limb that has a counterpart the lesser rise counts: where two are exchanged, one by itself gains only beside the
     other's new place. Of other parts it is the mean.
 
     Args:
         tracker: whose energy it is.
-        frame: what is seen.
-        capacities: room for image blobs.
+        seen: both poses.
         parts: of the body.
-        first: the pose that is known.
-        second: the other one.
         asked: of which parts the rise is wanted; None: of all. It is 0 for the others.
     """
     found = np.zeros(len(parts.whole))
     rows = np.arange(len(found)) if asked is None else np.flatnonzero(asked)
-    if len(rows):
-        known = on_device(frame)
-        views = [views_near(tracker, known, at, capacities) for at in (first, second)]
-        for some in np.split(rows, range(PARTS_AT_ONCE, len(rows), PARTS_AT_ONCE)):
-            chosen = np.resize(some, PARTS_AT_ONCE)
-            those = jax.tree.map(lambda leaf, chosen=chosen: leaf[chosen], parts)
-            found[some] = np.asarray(_gains(tracker, views, those, first, second))[: len(some)]
+    for some in np.split(rows, range(PARTS_AT_ONCE, len(rows), PARTS_AT_ONCE)) if len(rows) else ():
+        chosen = np.resize(some, PARTS_AT_ONCE)
+        those = jax.tree.map(lambda leaf, chosen=chosen: leaf[chosen], parts)
+        mixed = _mixed(tracker.body, those, *seen.poses)[: 2 * len(some)]
+        values = np.stack([values_in(tracker, near, mixed) for near in seen.views])
+        around = np.stack([values[:, ::2] - seen.values[:, :1], seen.values[:, 1:] - values[:, 1::2]]).mean(axis=1)
+        in_pairs = np.asarray(those.in_pairs)[: len(some)]
+        found[some] = np.where(in_pairs, around.min(axis=0), around.mean(axis=0))
     return found
-
-
-def _gains(
-    tracker: Tracker, views: Sequence[Views], parts: PartArrays, first: Float[Array, "dof"], second: Float[Array, "dof"]
-) -> Float[np.ndarray, "part"]:
-    poses = _mixed(tracker.body, parts, first, second)
-    values = np.stack([np.asarray(values_in(tracker, near, poses)) for near in views])
-    into_first, into_second = np.split(values[:, 2:], 2, axis=1)
-    around = np.stack([into_first - values[:, :1], values[:, 1:2] - into_second]).mean(axis=1)
-    return np.where(np.asarray(parts.in_pairs), around.min(axis=0), around.mean(axis=0))
 
 
 @eqx.filter_jit
 def _mixed(
     body: Body, parts: PartArrays, first: Float[Array, "dof"], second: Float[Array, "dof"]
 ) -> Float[Array, "mixed dof"]:
-    mixed = [parts.mixed(body, first, second), parts.mixed(body, second, first)]
-    return jnp.concatenate([first[None], second[None], *mixed])
+    """For each part, the first pose with that of the second, and the second with that of the first."""
+    mixed = jnp.stack([parts.mixed(body, first, second), parts.mixed(body, second, first)], axis=1)
+    return mixed.reshape(-1, len(first))
+
+
+def values_in(tracker: Tracker, views: Views, poses: Float[Array, "pose dof"]) -> Float[np.ndarray, "pose"]:
+    """The energies of poses in the same views, without history."""
+    padded = jnp.concatenate([poses, jnp.repeat(poses[:1], 2 * PARTS_AT_ONCE - len(poses), axis=0)])
+    return np.asarray(_values_in(tracker, views, padded, jnp.asarray(len(poses))))[: len(poses)]
 
 
 @eqx.filter_jit
-def values_in(tracker: Tracker, views: Views, poses: Float[Array, "start dof"]) -> Float[Array, "start"]:
-    """The energies of poses in the same views, without history."""
-    return jax.lax.map(FrameEnergy(tracker.body, views, History.unknown(poses[0]), tracker.terms), poses)
+def _values_in(
+    tracker: Tracker, views: Views, poses: Float[Array, "pose dof"], count: Int[Array, ""]
+) -> Float[Array, "pose"]:
+    """Of the first `count`."""
+    energy = FrameEnergy(tracker.body, views, History.unknown(poses[0]), tracker.terms)
+    values = jnp.zeros(len(poses), poses.dtype)
+    return jax.lax.fori_loop(0, count, lambda k, found: found.at[k].set(energy(poses[k])), values)
