@@ -126,8 +126,7 @@ class LimbSearch:
         if not len(starts):
             return None
         padded = np.stack([*starts, *[pose] * (MOST_WHOLE + 1 - len(starts))])
-        most = self.tracker.solver.max_iterations
-        steps = jnp.where(np.arange(len(padded)) < len(held), jnp.minimum(FEW_STEPS, most), most)
+        steps = jnp.where(np.arange(len(padded)) < len(held), FEW_STEPS, MORE_STEPS)
         arrays = jnp.asarray(pose), jnp.asarray(padded), jnp.asarray(len(starts)), steps
         found_there = climbed_in(self.tracker, views, *arrays)
         ends, values, before = jax.device_get(found_there)
@@ -189,8 +188,9 @@ def compile_search(tracker: Tracker, state: TrackState, frame: FrameInput, capac
         search.held_otherwise(search.views(frame, pose, capacities), pose)
 
 
-FEW_STEPS = 8
-"""Steps that the whole body makes from limbs that were climbed already: a pass that goes from there makes more."""
+FEW_STEPS, MORE_STEPS = 8, 32
+"""Steps that the whole body makes from limbs that were climbed already, and from those that were not: a pass that goes
+from there makes more."""
 MOST_WHOLE = 3
 """Poses that are climbed with all degrees of freedom in a frame, beside the tracked one and that with crossed ends."""
 
@@ -202,16 +202,16 @@ def climbed_in(
     known: Float[Array, "dof"],
     starts: Float[Array, "start dof"],
     count: Int[Array, ""],
-    steps: Int[Array, "start"] | None = None,
+    steps: Int[Array, "start"],
 ) -> tuple[Float[Array, "start dof"], Float[Array, "start"], Float[Array, ""]]:
     """The first `count` poses climbed with the tracker's energy and solver, and what they are worth (others: nothing).
 
-    At most so many `steps` are made from each; None: as many as in tracking. Last, what the known pose is worth.
+    At most so many `steps` are made from each, and no more than in tracking. Last, what the known pose is worth.
     """
     energy = FrameEnergy(tracker.body, views, History.unknown(known), tracker.terms)
 
     def climb(k: Int[Array, ""], found: tuple[Array, Array]) -> tuple[Array, Array]:
-        most = tracker.solver.max_iterations if steps is None else steps[k]
+        most = jnp.minimum(steps[k], tracker.solver.max_iterations)
         solver = eqx.tree_at(lambda solver: solver.max_iterations, tracker.solver, most)
         solution = solver.maximize(energy, starts[k], tracker.scales)
         return found[0].at[k].set(solution.params), found[1].at[k].set(solution.value)
