@@ -11,6 +11,8 @@ from drawn_scene import cells_of, draw, standing
 from rig_cases import ring_rig
 from walking_dog import DEPTH, FRAMES, HEIGHT, judging_tracker, pass_of
 
+from sogjax.energy.frame_energy import FrameEnergy
+from sogjax.energy.posed import History
 from sogjax.model.body import concatenate
 from sogjax.model.limbs import limb_names, limbs
 from sogjax.quality.fitted import fitted_numbers
@@ -18,11 +20,11 @@ from sogjax.quality.metrics import stretches
 from sogjax.search import merge_passes as both_ways
 from sogjax.search.body_parts import PartArrays, best_choice, body_parts, merged_pose, select_parts
 from sogjax.search.merge_passes import merge_passes
-from sogjax.search.other_pass import BothSeen, Compared, part_gains
+from sogjax.search.other_pass import REACH, BothSeen, Compared, part_gains
 from sogjax.search.placed_body import means_of
-from sogjax.tracking.capacity import with_room
+from sogjax.tracking.capacity import views_near, with_room
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import FrameInput
+from sogjax.tracking.frame import FrameInput, on_device
 from sogjax.tracking.frame_by_frame import track
 
 LOST = slice(4, 7)
@@ -151,6 +153,10 @@ def test_what_sees_more_image_blobs_than_there_is_room_for_is_valued_with_more_r
     poses = [jnp.asarray(each.poses[row]) for each in (passed, right)]
     seen = [BothSeen.of(tracker, cells[row], room, *poses) for room in (small, right.capacities)]
     gains = [part_gains(tracker, each, choices) for each in seen]
+    views = [views_near(tracker, on_device(cells[row]), pose, right.capacities, REACH) for pose in poses]
+    alone = lambda around, pose: FrameEnergy(tracker.body, around, History.unknown(pose), tracker.terms)(pose)
+    rises = [float(alone(around, poses[1]) - alone(around, poses[0])) for around in views]
+    assert seen[0].gain == pytest.approx(np.mean(rises), rel=1e-3)
     np.testing.assert_allclose(*gains, rtol=1e-3, atol=1e-5 * right.energy)
     compared = both_ways.compared_backwards
     monkeypatch.setattr(

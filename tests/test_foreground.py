@@ -16,7 +16,15 @@ from sogjax.energy.posed import Frame, History, Posed
 from sogjax.energy.views import COLUMNS, ROWS, Windows, windows_around
 from sogjax.scene.background import BackgroundCells
 from sogjax.scene.color_clusters import cluster_odds, odds_where_told
-from sogjax.scene.foreground import LARGEST, BackgroundModel, foreground_weights, log_odds, subject_colors
+from sogjax.scene.foreground import (
+    LARGEST,
+    SHADOW,
+    BackgroundModel,
+    background_surprise,
+    foreground_weights,
+    log_odds,
+    subject_colors,
+)
 
 WALL, SHIRT, SKIN = (0.5, 0.6, 0.7), (0.1, 0.2, 0.6), (0.6, 0.42, 0.33)
 odds_of = jax.jit(
@@ -99,15 +107,17 @@ def test_slow_light_is_no_foreground():
     assert float(odds[0, 5, 5]) == LARGEST
 
 
-def test_a_dark_leg_is_told_from_the_floor_in_any_light():
-    """In a brighter light it was a shadow once, as more than all of the difference was explained by one."""
-    floor, trousers = wall(color=(0.55, 0.42, 0.3)), (0.11, 0.09, 0.09)
-    floor = replace(floor, spread=jnp.full(floor.spread.shape, 0.028))
-    usual, darker, brighter = (
-        float(odds_of(seen(floor, trousers, gain), floor, subject(trousers))[0, 5, 5]) for gain in (1.0, 0.9, 1.1)
-    )
-    assert min(usual, darker, brighter) > 0.5
-    assert max(usual, darker, brighter) - min(usual, darker, brighter) < 0.3
+@pytest.mark.parametrize("gain", [0.9, 1.0, 1.1])
+def test_surprise_is_that_of_a_gaussian_about_the_background_in_the_frames_light(gain):
+    """In a brighter light dark trousers passed for a shadow once."""
+    color, trousers, spread = np.array([140.0, 107.0, 77.0]) / 255.0, np.array([0.11, 0.09, 0.09]), 0.028
+    floor = replace(wall(color=color), spread=jnp.full((1, 12, 15), spread))
+    found = background_surprise(seen(floor, trousers, gain), BackgroundModel.from_background(floor))[0, 5, 5]
+    expected = gain * color
+    inverse = np.linalg.inv(spread**2 * np.eye(3) + SHADOW**2 * np.outer(expected, expected))
+    off = gain * trousers - expected
+    volume = 1.5 * np.log(2.0 * np.pi) + 0.5 * np.log(spread**4 * (spread**2 + SHADOW**2 * color @ color))
+    assert float(found) == pytest.approx(0.5 * off @ inverse @ off + volume, rel=1e-3)
 
 
 def test_windows_look_where_the_lens_put_things():

@@ -20,10 +20,11 @@ from sogjax.energy.views import Windows
 from sogjax.model.body import concatenate
 from sogjax.model.limbs import limb_names
 from sogjax.search import limb_search
-from sogjax.search.limb_search import LimbSearch, compile_search
+from sogjax.search.limb_search import LimbSearch, climbed_in, compile_search
 from sogjax.search.limb_ways import Units, drawn_ways, look_alikes, units_of
 from sogjax.search.merge_passes import merge_passes
 from sogjax.search.placed_body import means_of
+from sogjax.tracking.frame import on_device
 from sogjax.tracking.frame_by_frame import track
 
 HUMAN = shipped("human")
@@ -175,6 +176,21 @@ def test_no_pass_begins_where_one_went_in_vain(walking_dog, monkeypatch):
     assert np.array_equal(better(2), other)
     search.forget_in_vain([1])
     assert np.array_equal(better(1), other)
+
+
+@pytest.mark.slow
+def test_a_climb_makes_its_share_of_the_solvers_iterations(walking_dog):
+    tracker, cells, right = walking_dog
+    pose = right.poses[1]
+    starts = jnp.asarray(np.stack([pose + np.float32(0.1)] * 4))
+    views = LimbSearch.of(tracker).views(on_device(cells[1]), pose, right.capacities)
+    shares = jnp.array([0.0, 0.04, 1.0, 1.0])
+    ends, values, before = climbed_in(tracker, views, jnp.asarray(pose), starts, jnp.asarray(3), shares)
+    np.testing.assert_array_equal(ends[0], starts[0])
+    np.testing.assert_array_equal(ends[3], starts[3])
+    assert values[0] < values[1] < values[2]
+    assert values[3] == -jnp.inf
+    assert float(values[2]) == pytest.approx(float(before), rel=0.01)
 
 
 @pytest.mark.slow

@@ -20,7 +20,8 @@ SMALLEST_SPREAD = 0.015
 """Standard deviation of a channel at one place in one light, at least (compression, a lens that breathes)."""
 SHADOW = 0.06
 """Standard deviation of the light that a shadow or a reflection takes or adds, as a part of the background's. Deeper
-shadows count as foreground: with room for them dark sleeves and trousers pass for shadows, and limbs are lost."""
+shadows count as foreground: with room for them dark sleeves and trousers pass for shadows, and limbs are lost. Where
+people are looked for, shadows are told by lying on the floor."""
 SUBJECT_UNKNOWN = 0.3
 """Share of a subject whose colours are none of its blobs': any colour."""
 COLOR_BINS = 32
@@ -97,10 +98,8 @@ class BackgroundModel(eqx.Module):
     """Red, green and blue of the background, sRGB, 0 to 1."""
     precision: Cells
     """1 / variance of a channel."""
-    stiffness: Cells
-    """Squared length along the background's own colour up to which a shadow explains little: variance / shadow^2."""
     volume: Cells
-    """Logarithm of the Gaussian's volume in colours."""
+    """Logarithm of the Gaussian's volume in colours, in the background's own light: a frame's changes it little."""
     known: Bool[Array, "camera rows columns"]
     unknown: Bool[Array, "camera rows columns"]
     """The other cells that are in the picture."""
@@ -113,7 +112,7 @@ class BackgroundModel(eqx.Module):
         known, unknown = self.known | other.known, self.unknown & other.unknown
         parts = {
             name: jax.tree.map(filled, getattr(self, name), getattr(other, name))
-            for name in ("planes", "precision", "stiffness", "volume")
+            for name in ("planes", "precision", "volume")
         }
         return replace(self, **parts, known=known, unknown=unknown)
 
@@ -127,13 +126,13 @@ class BackgroundModel(eqx.Module):
         unknown = (jnp.asarray(background.spread) > 0.0) & ~known
         elsewhere = color_surprise(colors, known.astype(dtype))
         nothing = jnp.zeros_like(variance)
-        empty = cls((red, green, blue), nothing, nothing, nothing, known, unknown, elsewhere)
+        empty = cls((red, green, blue), nothing, nothing, known, unknown, elsewhere)
         return empty._with_variance(variance)
 
     def _with_variance(self, variance: Cells) -> "BackgroundModel":
         length = sum(plane * plane for plane in self.planes)
         volume = jnp.log(_NORMAL * variance * jnp.sqrt(variance + SHADOW**2 * length))
-        return replace(self, precision=1.0 / variance, stiffness=variance / SHADOW**2, volume=volume)
+        return replace(self, precision=1.0 / variance, volume=volume)
 
     def blurred(self, spread: float) -> "BackgroundModel":
         """This background, each channel of which is known no better than to a standard deviation."""
@@ -200,8 +199,9 @@ def _surprise(seen: list[Cells], empty: BackgroundModel) -> Cells:
     off = [s - e for s, e in zip(seen, expected, strict=True)]
     squared = sum(o * o for o in off)
     along = sum(o * e for o, e in zip(off, expected, strict=True))
-    # the length of what is expected, not of the background: in a brighter light more than all of it was explained
-    explained = along * along / (empty.stiffness + sum(e * e for e in expected))
+    # Along the expected colour: by the background's length, a brighter light would explain more than all.
+    shadow = SHADOW**2 * empty.precision
+    explained = shadow * along * along / (1.0 + shadow * sum(e * e for e in expected))
     return 0.5 * (squared - explained) * empty.precision + empty.volume
 
 

@@ -126,8 +126,8 @@ class LimbSearch:
         if not len(starts):
             return None
         padded = np.stack([*starts, *[pose] * (MOST_WHOLE + 1 - len(starts))])
-        steps = jnp.where(np.arange(len(padded)) < len(held), FEW_STEPS, MORE_STEPS)
-        arrays = jnp.asarray(pose), jnp.asarray(padded), jnp.asarray(len(starts)), steps
+        shares = jnp.where(np.arange(len(padded)) < len(held), FEW, MORE)
+        arrays = jnp.asarray(pose), jnp.asarray(padded), jnp.asarray(len(starts)), shares
         found_there = climbed_in(self.tracker, views, *arrays)
         ends, values, before = jax.device_get(found_there)
         good = (values - before > WORTH * energy) & (self._apart(ends, pose) > APART) & self.possible(first, ends)
@@ -188,9 +188,9 @@ def compile_search(tracker: Tracker, state: TrackState, frame: FrameInput, capac
         search.held_otherwise(search.views(frame, pose, capacities), pose)
 
 
-FEW_STEPS, MORE_STEPS = 8, 32
-"""Steps that the whole body makes from limbs that were climbed already, and from those that were not: a pass that goes
-from there makes more."""
+FEW, MORE = 0.16, 0.64
+"""Parts of the solver's most iterations that the whole body makes, from limbs that were climbed already, and from those
+that were not."""
 MOST_WHOLE = 3
 """Poses that are climbed with all degrees of freedom in a frame, beside the tracked one and that with crossed ends."""
 
@@ -202,16 +202,16 @@ def climbed_in(
     known: Float[Array, "dof"],
     starts: Float[Array, "start dof"],
     count: Int[Array, ""],
-    steps: Int[Array, "start"],
+    shares: Float[Array, "start"],
 ) -> tuple[Float[Array, "start dof"], Float[Array, "start"], Float[Array, ""]]:
     """The first `count` poses climbed with the tracker's energy and solver, and what they are worth (others: nothing).
 
-    At most so many `steps` are made from each, and no more than in tracking. Last, what the known pose is worth.
+    From each, a share of the solver's most iterations is made. Last, what the known pose is worth.
     """
     energy = FrameEnergy(tracker.body, views, History.unknown(known), tracker.terms)
 
     def climb(k: Int[Array, ""], found: tuple[Array, Array]) -> tuple[Array, Array]:
-        most = jnp.minimum(steps[k], tracker.solver.max_iterations)
+        most = jnp.ceil(shares[k] * tracker.solver.max_iterations).astype(jnp.int32)
         solver = eqx.tree_at(lambda solver: solver.max_iterations, tracker.solver, most)
         solution = solver.maximize(energy, starts[k], tracker.scales)
         return found[0].at[k].set(solution.params), found[1].at[k].set(solution.value)

@@ -21,7 +21,7 @@ from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.quality.metrics import stretches
 from sogjax.search.body_parts import body_parts, merged_pose, select_parts
-from sogjax.search.limb_search import MORE_STEPS, LimbSearch, climbed_in
+from sogjax.search.limb_search import MORE, LimbSearch, climbed_in
 from sogjax.search.other_pass import (
     SURE_FRAMES,
     BothSeen,
@@ -180,8 +180,8 @@ class _Revising:
             return found.poses[k].copy()
         mixed = jnp.asarray(merged_pose(self.tracker.body, self.parts, pose, found.poses[k], taken))
         views = views_near(self.tracker, on_device(found.cells[k]), mixed, self.passed.capacities)
-        steps = jnp.asarray([MORE_STEPS])
-        return np.asarray(climbed_in(self.tracker, views, mixed, mixed[None], jnp.asarray(1), steps)[0][0])
+        arrays = mixed, mixed[None], jnp.asarray(1), jnp.asarray([MORE])
+        return np.asarray(climbed_in(self.tracker, views, *arrays)[0][0])
 
     def _revise(self, row: int, frame: AnyFrame) -> None:
         """Note what the pose of a frame, which changed, is worth."""

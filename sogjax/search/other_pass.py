@@ -34,6 +34,9 @@ PATIENCE, LEAST_GAIN = 6, 0.02
 """Frames after which a pass from another pose of a key frame ends that explains less than the known one; and what it
 gains at least, as a part of a frame's energy, for its parts to be looked at."""
 
+MOST_WAITING = 6
+"""Frames of which views are held until a pass is promising."""
+
 REACH = 0.3
 """Part of the longer side of an actor's box by which pictures are looked at beyond it: limbs may be held there."""
 MOST_FRAMES = 240
@@ -73,7 +76,15 @@ class Compared:
     apart: list[Float[np.ndarray, "part"]] = field(default_factory=list)
     """Metres."""
     gained: list[float] = field(default_factory=list)
-    """The rise of the energy with the other pass's pose."""
+    """The rise of the energy with the other pass's pose; 0 where that was not asked."""
+
+    def add(self, row: int, pose: Float[np.ndarray, "dof"], apart: Float[np.ndarray, "part"]) -> None:
+        """Add a frame, of which no rise is known yet."""
+        self.rows.append(row)
+        self.poses.append(pose)
+        self.apart.append(apart)
+        self.gains.append(np.zeros(len(apart)))
+        self.gained.append(0.0)
 
     def joined(self, later: "Compared") -> "Compared":
         """These frames turned round, then later ones of which the first is known already."""
@@ -128,6 +139,7 @@ def compared(
     With `patience` the pass ends, too, where it has explained less than the known one for so many frames.
     """
     found, choices, numbers = Compared(), PartArrays.of(tracker.body, parts), fitted_numbers().merge_passes
+    # Parts are compared once the pass is promising; views are large, so few frames wait for that.
     waiting: deque[tuple[int, BothSeen]] = deque()
 
     def coming() -> Iterable[AnyFrame]:
@@ -136,21 +148,20 @@ def compared(
             yield frame
 
     def compare(k: int, seen: BothSeen) -> None:
-        found.gains[k] = part_gains(tracker, seen, choices, _differ(parts, found.apart[k] > numbers.compared))
+        found.gains[k] = part_gains(tracker, seen, choices, differ(k))
 
+    differ = lambda k: _differ(parts, found.apart[k] > numbers.compared)
     agree, promising = 0, patience is None
     for k, (row, tracked) in enumerate(zip(rows, track(tracker, start, coming(), passed.capacities), strict=False)):
         both = (jnp.asarray(passed.poses[row]), jnp.asarray(tracked.result.pose))
         apart = np.asarray(_apart(tracker.body, choices.blobs, *both))
-        seen = BothSeen.of(tracker, found.cells[k], tracked.capacities, *both)
-        found.rows.append(row)
-        found.poses.append(np.asarray(both[1]))
-        found.apart.append(apart)
-        found.gained.append(seen.gain)
-        found.gains.append(np.zeros(len(parts)))
-        waiting.append((k, seen))
+        found.add(row, np.asarray(both[1]), apart)
+        if patience is not None or differ(k).any():
+            seen = BothSeen.of(tracker, found.cells[k], tracked.capacities, *both)
+            found.gained[k] = seen.gain
+            waiting.append((k, seen))
         promising = promising or sum(found.gained) >= LEAST_GAIN * passed.energy
-        while waiting and (promising or len(waiting) > PATIENCE):
+        while waiting and (promising or len(waiting) > MOST_WAITING):
             compare(*waiting.popleft())
         agree = agree + 1 if apart.max(initial=0.0) <= numbers.together else 0
         if k + 1 >= at_least and agree >= SURE_FRAMES:
@@ -164,9 +175,9 @@ def compared(
 
 @dataclass(frozen=True)
 class BothSeen:
-    """A known pose of a frame and another one, and what is seen around either.
+    """A known pose of a frame and another one, and what is seen around either, wider by `REACH`.
 
-    Tracking valued each in views of its own, in which other image blobs count.
+    Tracking valued each in views of its own, in which other image blobs count: these energies cannot be compared.
     """
 
     poses: Float[Array, "2 dof"]
@@ -183,11 +194,11 @@ class BothSeen:
         known: Float[np.ndarray | Array, "dof"],
         other: Float[np.ndarray | Array, "dof"],
     ) -> "BothSeen":
-        """Of a frame, with that much room for image blobs or more."""
+        """Look at a frame around both poses, with at least so much room for image blobs."""
         poses, seen = jnp.stack([jnp.asarray(known), jnp.asarray(other)]), on_device(frame)
         near_known, near_other = (views_near(tracker, seen, pose, capacities, REACH) for pose in poses)
         views = near_known, near_other
-        return cls(poses, views, np.stack([values_in(tracker, around, poses) for around in views]))
+        return cls(poses, views, np.stack([_energies(tracker, around, poses) for around in views]))
 
     @property
     def gain(self) -> float:
@@ -232,11 +243,13 @@ def part_gains(
     """
     found = np.zeros(len(parts.whole))
     rows = np.arange(len(found)) if asked is None else np.flatnonzero(asked)
-    for some in np.split(rows, range(PARTS_AT_ONCE, len(rows), PARTS_AT_ONCE)) if len(rows) else ():
+    if not len(rows):
+        return found
+    for some in np.split(rows, range(PARTS_AT_ONCE, len(rows), PARTS_AT_ONCE)):
         chosen = np.resize(some, PARTS_AT_ONCE)
         those = jax.tree.map(lambda leaf, chosen=chosen: leaf[chosen], parts)
         mixed = _mixed(tracker.body, those, *seen.poses)[: 2 * len(some)]
-        values = np.stack([values_in(tracker, near, mixed) for near in seen.views])
+        values = np.stack([_energies(tracker, near, mixed) for near in seen.views])
         around = np.stack([values[:, ::2] - seen.values[:, :1], seen.values[:, 1:] - values[:, 1::2]]).mean(axis=1)
         in_pairs = np.asarray(those.in_pairs)[: len(some)]
         found[some] = np.where(in_pairs, around.min(axis=0), around.mean(axis=0))
@@ -252,17 +265,17 @@ def _mixed(
     return mixed.reshape(-1, len(first))
 
 
-def values_in(tracker: Tracker, views: Views, poses: Float[Array, "pose dof"]) -> Float[np.ndarray, "pose"]:
-    """The energies of poses in the same views, without history."""
+def _energies(tracker: Tracker, views: Views, poses: Float[Array, "pose dof"]) -> Float[np.ndarray, "pose"]:
+    """The energies of at most `2 * PARTS_AT_ONCE` poses in the same views, without history."""
     padded = jnp.concatenate([poses, jnp.repeat(poses[:1], 2 * PARTS_AT_ONCE - len(poses), axis=0)])
-    return np.asarray(_values_in(tracker, views, padded, jnp.asarray(len(poses))))[: len(poses)]
+    return np.asarray(_padded_energies(tracker, views, padded, jnp.asarray(len(poses))))[: len(poses)]
 
 
 @eqx.filter_jit
-def _values_in(
+def _padded_energies(
     tracker: Tracker, views: Views, poses: Float[Array, "pose dof"], count: Int[Array, ""]
 ) -> Float[Array, "pose"]:
-    """Of the first `count`."""
+    """The energies of the first `count` poses, 0 for the others."""
     energy = FrameEnergy(tracker.body, views, History.unknown(poses[0]), tracker.terms)
     values = jnp.zeros(len(poses), poses.dtype)
     return jax.lax.fori_loop(0, count, lambda k, found: found.at[k].set(energy(poses[k])), values)
