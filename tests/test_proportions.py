@@ -30,6 +30,20 @@ def test_legs_a_third_too_long_are_odd_and_a_tall_body_is_not():
     assert odd == {"thigh": pytest.approx(4 / 3, rel=0.01), "shank": pytest.approx(4 / 3, rel=0.01)}
 
 
+@pytest.mark.parametrize(("size", "said"), [(0.57, "only a part of somebody"), (1.4, "more than one person")])
+def test_a_human_of_half_the_size_or_a_giant_is_doubted(size, said):
+    sentence = odd_sentence(scaled(shipped("human"), whole_body=size))
+    assert sentence is not None
+    assert f"{size:.0%} as long as an adult's" in sentence
+    assert said in sentence
+
+
+def test_a_child_of_seven_a_tall_man_and_a_small_dog_are_not():
+    assert odd_sentence(scaled(shipped("human"), whole_body=0.72)) is None
+    assert odd_sentence(scaled(shipped("human"), whole_body=1.15)) is None
+    assert odd_sentence(scaled(shipped("dog"), whole_body=0.5)) is None
+
+
 def test_one_side_is_named():
     body = shipped("human")
     lengths = np.asarray(body.skeleton.offsets).copy()

@@ -137,6 +137,10 @@ class Proportions:
 
     most_odd: float
     """Logarithm of how many times as long as in the starting body a bone may be, for the size of the whole."""
+    least_size: float
+    """How many times as long as those of the adult that comes with the package the bones of a human are, at least."""
+    most_size: float
+    """The same, at most."""
 
 
 @dataclass(frozen=True)

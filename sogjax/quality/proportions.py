@@ -13,6 +13,10 @@ from sogjax.model.body import Body
 from sogjax.model.bones import WIDTHS, bone_lengths
 from sogjax.quality.fitted import fitted_numbers
 
+ADULT = "human"
+"""The body that comes with the package and has an adult's size."""
+FEWEST = 3
+"""Long bones from which the size of a body is told."""
 LONG = 0.5
 """Bones of the starting body that have this part of its longest one's length at least are compared."""
 
@@ -23,19 +27,42 @@ def odd_bones(body: Body, start: Body | None = None) -> dict[str, float]:
     `start` is the body that the actor was made from; None: the one with its joints that comes with the package, or else
     nothing is odd. The size of the whole is the median over the long bones, so a bone that is wrong hardly moves it.
     """
-    before = start or _bundled_like(body)
-    if before is None:
-        return {}
-    ratios = _ratios(bone_lengths(before), bone_lengths(body))
-    if len(ratios) < 3:
+    ratios = _ratios(start or _bundled_like(body), body)
+    if len(ratios) < FEWEST:
         return {}
     whole = float(np.median([*ratios.values()]))
     bound = fitted_numbers().proportions.most_odd
     return _sides_together({name: r / whole for name, r in ratios.items() if abs(np.log(r / whole)) > bound})
 
 
+def odd_size(body: Body) -> float | None:
+    """How many times as long as an adult's the bones of a human are, if they are odd."""
+    like = _bundled_like(body)
+    ratios = _ratios(like, body) if like is not None and like.name == ADULT else {}
+    if len(ratios) < FEWEST:
+        return None
+    size, bounds = float(np.median([*ratios.values()])), fitted_numbers().proportions
+    return None if bounds.least_size <= size <= bounds.most_size else size
+
+
 def odd_sentence(body: Body, start: Body | None = None) -> str | None:
     """What is odd about an actor's bones, with the remedy; None: nothing."""
+    said = [sentence for sentence in (_size_sentence(body), _bones_sentence(body, start)) if sentence is not None]
+    return "; ".join(said) or None
+
+
+def _size_sentence(body: Body) -> str | None:
+    size = odd_size(body)
+    if size is None:
+        return None
+    masks = "its masks show only a part of somebody" if size < 1.0 else "its masks show more than one person"
+    return (
+        f"its bones are {size:.0%} as long as an adult's: if that is not so, {masks}, or the calibration's unit is "
+        "wrong; look at the masks in the actor's report, and correct them or give pictures of the empty scene"
+    )
+
+
+def _bones_sentence(body: Body, start: Body | None) -> str | None:
     odd = odd_bones(body, start)
     if not odd:
         return None
@@ -49,8 +76,11 @@ def odd_sentence(body: Body, start: Body | None = None) -> str | None:
     )
 
 
-def _ratios(before: Mapping[str, float], after: Mapping[str, float]) -> dict[str, float]:
-    """How many times as long as before the long bones are; both by name."""
+def _ratios(like: Body | None, body: Body) -> dict[str, float]:
+    """How many times as long as those of another body the long bones are, by name; none if there is no other one."""
+    if like is None:
+        return {}
+    before, after = bone_lengths(like), bone_lengths(body)
     bones = {name: length for name, length in before.items() if name not in WIDTHS and name in after}
     shortest = LONG * max(bones.values(), default=0.0)
     return {name: max(after[name], 1e-6) / length for name, length in bones.items() if length >= shortest > 0.0}
