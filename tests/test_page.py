@@ -137,6 +137,7 @@ def test_two_actors_have_a_timeline_each(capsys, tracked, tmp_path):
     assert faults_of(tmp_path / "run" / "index.html") == []
 
 
+@pytest.mark.slow
 def test_a_single_frame_of_which_nothing_is_judged(capsys, tracked, tmp_path):
     _, words = tracked
     done(capsys, *words, f"out={tmp_path / 'run'}", "start=3", "stop=4", "outputs.confidence=false")

@@ -42,6 +42,7 @@ def test_what_seems_slower_once_is_measured_again(clock):
     assert small.compare({"step": clock(0.02, *whole_measurement)}, clock(0.001), {"step": 20.0}) == 0
 
 
+@pytest.mark.slow
 def test_what_is_measured_of_near_pairs_is_the_energy_of_all():
     body = energies.human()
     dense = energies.frame_energy(body, scattered_views(body, Sizes(cameras=2, image_blobs=128)))

@@ -6,6 +6,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 from command_line import actor_file, interrupt_at, trackable
+from slow_values import fast_and_slow
 
 from sogjax.cli.main import main
 from sogjax.errors import InputError
@@ -60,7 +61,7 @@ def fill_the_disk(monkeypatch):
     return 2
 
 
-@pytest.mark.parametrize("trouble", [interrupt_the_step, break_a_video, fill_the_disk])
+@pytest.mark.parametrize("trouble", fast_and_slow(break_a_video, interrupt_the_step, fill_the_disk))
 def test_an_early_end_leaves_the_motion_so_far(capsys, tmp_path, monkeypatch, command, trouble):
     assert main([*command, "out=whole", "outputs.overlay=false", "outputs.rerun=false", "outputs.page=false"]) == 0
     capsys.readouterr()

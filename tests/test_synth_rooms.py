@@ -253,6 +253,7 @@ def test_people_who_dress_alike_keep_their_own_skin_and_hair():
     assert [(o.skin, o.hair) for o in alike] == [(o.skin, o.hair) for o in usual]
 
 
+@pytest.mark.slow
 def test_one_of_two_people_does_the_same_alone():
     """What two people cost a tracker is told by the first one alone: the same motion, clothes, cameras and room."""
     both, alone = stage(motion="talk", actors=2), stage(motion="talk", alone=True)
