@@ -1,7 +1,7 @@
 """What every solver takes and returns: objectives, their quadratic models, scales of steps, solutions."""
 
 from collections.abc import Callable
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import equinox as eqx
 import jax
@@ -111,8 +111,8 @@ class Solver(Protocol):
     """Maximises a smooth function from a start; pure, and usable under jit and vmap."""
 
     @property
-    def max_iterations(self) -> Int[Array, ""]:
-        """The most iterations of a climb."""
+    def max_iterations(self) -> Any:
+        """The most iterations of a climb, a scalar; type checkers take a converted field for what converts it."""
         ...
 
     def maximize(self, objective: Objective, start: Params, scales: Scales) -> Solution:
