@@ -15,7 +15,7 @@ from sogjax.io.recording import open_recording
 from sogjax.io.video import read_frames
 from sogjax.synth.cache import cache_name
 from sogjax.synth.clothes import outfits_from_seed
-from sogjax.synth.filming import film
+from sogjax.synth.filming import EmptyView, film
 from sogjax.synth.flesh import PARTS
 from sogjax.synth.landmarks import LANDMARKS, landmark_points
 from sogjax.synth.picture import Shadows, plate_of, shot_of
@@ -44,6 +44,22 @@ def masks(made, empty, frame):
     meshes = [person.posed(pose) for person, pose in zip(made.people, made.poses(frame), strict=True)]
     shadows = Shadows.of(meshes, made.scene.shadow)
     return [shot_of(view, p, made.people, meshes, shadows).mask for view, p in zip(made.views, empty, strict=True)]
+
+
+def test_a_picture_is_that_of_the_empty_scene_but_where_people_and_their_shadows_are():
+    made = stage(motion="arms", noise=0.02, camera_variation=0.1)
+    meshes = [person.posed(pose) for person, pose in zip(made.people, made.poses(1), strict=True)]
+    for view, sensor in zip(made.views, made.sensors, strict=True):
+        plate = plate_of(made.scene, view)
+        shot = shot_of(view, plate, made.people, meshes, Shadows.of(meshes))
+        outside = np.ones(shot.mask.shape, bool)
+        outside[shot.changed.slices] = False
+        assert outside.any()
+        assert not shot.mask[outside].any()
+        assert np.array_equal(shot.light[outside], plate.total[outside])
+        rng = lambda: np.random.default_rng(4)
+        whole = sensor.exposed(shot.light, rng()).astype(int)
+        assert np.abs(EmptyView(sensor, plate).recorded(shot, rng()) - whole).max() <= 1  # by rounding, if at all
 
 
 def test_a_table_hides_legs_from_some_cameras_and_stands_in_the_plates():

@@ -12,11 +12,12 @@ import sys
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, UInt8
 
 from sogjax.errors import InputError
 from sogjax.io import recording_files
@@ -30,6 +31,7 @@ from sogjax.synth.picture import Plate, Shadows, Shot, plate_of, shot_of
 from sogjax.synth.scene import Scene
 from sogjax.synth.settings import SynthSettings
 from sogjax.synth.stage import Stage, stage_of
+from sogjax.synth.views import Sensor
 
 _NOISE, _VIDEO, _STILL, _EMPTY = 7, 0, 1, 2
 """Streams of random numbers: pictures have the same noise whichever process renders them."""
@@ -49,62 +51,94 @@ def example_folder(stage: Stage, actor: int, pose: str) -> str:
     return pose if stage.settings.actors == 1 else f"{stage.settings.actor_names[actor]}_{pose}"
 
 
+@dataclass(frozen=True)
+class EmptyView:
+    """What a camera shows of the empty scene; most of every picture is taken from there."""
+
+    sensor: Sensor
+    plate: Plate
+
+    @cached_property
+    def levels(self) -> Float[np.ndarray, "row column 3"]:
+        """The picture without people and without noise, in grey levels."""
+        return self.sensor.without_noise(self.plate.total)
+
+    def empty(self, rng: np.random.Generator) -> UInt8[np.ndarray, "row column 3"]:
+        """The picture without people."""
+        return self.sensor.recorded(self.levels.copy(), rng)
+
+    def recorded(
+        self, shot: Shot, rng: np.random.Generator, drift: Float[np.ndarray, "3"] | None = None
+    ) -> UInt8[np.ndarray, "row column 3"]:
+        """The picture of a shot; `drift` is what is left of the room's red, green and blue light, if that changes."""
+        if drift is not None:
+            return self.sensor.exposed(shot.light * drift, rng)
+        levels, changed = self.levels.copy(), shot.changed.slices
+        levels[changed] = self.sensor.without_noise(shot.light[changed])
+        return self.sensor.recorded(levels, rng)
+
+
 def film(stage: Stage, cameras: Sequence[int], folder: Path) -> Iterator[None]:
     """Write everything that some cameras see into a recording's folder; yields after each picture."""
-    plates = {}
+    views = {}
     for camera in cameras:
-        plates[camera] = plate_of(stage.scene, stage.views[camera])
+        views[camera] = _empty_view(stage, stage.scene, camera)
         if stage.settings.background:
-            empty = stage.sensors[camera].exposed(plates[camera].total, _rng(stage, camera, _EMPTY, 0))
+            empty = views[camera].empty(_rng(stage, camera, _EMPTY, 0))
             write_image(recording_files.BACKGROUND.of(folder) / f"{stage.views[camera].name}.jpg", empty)
         yield
     if stage.settings.example_poses:
         # before tables and chairs are brought in
         bare = stage.scene is stage.bare
-        yield from _stills(stage, plates if bare else {k: plate_of(stage.bare, stage.views[k]) for k in plates}, folder)
-    yield from _videos(stage, plates, folder)
+        yield from _stills(stage, views if bare else {k: _empty_view(stage, stage.bare, k) for k in views}, folder)
+    yield from _videos(stage, views, folder)
 
 
-def _stills(stage: Stage, plates: dict[int, Plate], folder: Path) -> Iterator[None]:
+def _empty_view(stage: Stage, scene: Scene, camera: int) -> EmptyView:
+    return EmptyView(stage.sensors[camera], plate_of(scene, stage.views[camera]))
+
+
+def _stills(stage: Stage, views: dict[int, EmptyView], folder: Path) -> Iterator[None]:
     for actor, person in enumerate(stage.people):
         for number, pose in enumerate(EXAMPLE_POSES):
             place = recording_files.EXAMPLE_POSES.of(folder) / example_folder(stage, actor, pose)
-            for camera, shot in _shots(stage.bare, stage, plates, [person], [stage.example_pose(actor, pose)]):
+            for camera, shot in _shots(stage.bare, stage, views, [person], [stage.example_pose(actor, pose)]):
                 rng = _rng(stage, camera, _STILL, 10 * actor + number)
                 name = stage.views[camera].name
-                write_image(place / f"{name}.jpg", stage.sensors[camera].exposed(shot.light, rng))
+                write_image(place / f"{name}.jpg", views[camera].recorded(shot, rng))
                 write_mask(place / f"{name}.mask.png", shot.mask)
                 yield
 
 
-def _videos(stage: Stage, plates: dict[int, Plate], folder: Path) -> Iterator[None]:
+def _videos(stage: Stage, views: dict[int, EmptyView], folder: Path) -> Iterator[None]:
     with ExitStack() as stack:
         writers = {}
-        for camera in plates:
+        for camera in views:
             path = recording_files.VIDEOS.of(folder) / f"{stage.views[camera].name}.mp4"
             writers[camera] = stack.enter_context(VideoWriter(path, stage.settings.fps))
         for frame in range(stage.settings.frames):
-            for camera, shot in _shots(stage.scene, stage, plates, stage.people, stage.poses(frame)):
+            drift = _drift(stage, frame)
+            for camera, shot in _shots(stage.scene, stage, views, stage.people, stage.poses(frame)):
                 rng = _rng(stage, camera, _VIDEO, frame)
-                writers[camera].write(stage.sensors[camera].exposed(_drifted(stage, shot, frame), rng))
+                writers[camera].write(views[camera].recorded(shot, rng, drift))
                 yield
 
 
-def _drifted(stage: Stage, shot: Shot, frame: int) -> Float[np.ndarray, "row column 3"]:
-    """The light of a shot under the room's light at a frame."""
+def _drift(stage: Stage, frame: int) -> Float[np.ndarray, "3"] | None:
+    """What is left of the room's light at a frame; None: all."""
     drift = stage.settings.light_drift
-    return shot.light * drifted(drift, frame / max(stage.settings.frames - 1, 1)) if drift else shot.light
+    return drifted(drift, frame / max(stage.settings.frames - 1, 1)) if drift else None
 
 
 def _shots(
-    scene: Scene, stage: Stage, plates: dict[int, Plate], people: Sequence[Figure], poses: Sequence[Pose]
+    scene: Scene, stage: Stage, views: dict[int, EmptyView], people: Sequence[Figure], poses: Sequence[Pose]
 ) -> Iterator[tuple[int, Shot]]:
     """What each camera sees of people in poses; surface and shadows are made once for all cameras."""
     meshes = [person.posed(pose) for person, pose in zip(people, poses, strict=True)]
     furniture = None if scene.props is None else scene.shadow
     shadows = Shadows.of(meshes, furniture) if stage.settings.shadows else None
-    for camera, plate in plates.items():
-        yield camera, shot_of(stage.views[camera], plate, people, meshes, shadows)
+    for camera, empty in views.items():
+        yield camera, shot_of(stage.views[camera], empty.plate, people, meshes, shadows)
 
 
 def _rng(stage: Stage, camera: int, kind: int, number: int) -> np.random.Generator:

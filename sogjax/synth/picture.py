@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -27,7 +28,7 @@ class Plate:
     props: Float[np.ndarray, "y x"] | None = None
     """Depth of the samples that show what stands among the people, infinite elsewhere; None where nothing does."""
 
-    @property
+    @cached_property
     def total(self) -> Float[np.ndarray, "row column 3"]:
         """The picture without people."""
         return self.ambient + self.direct
@@ -115,6 +116,8 @@ class Shot:
     """Linear."""
     coverage: Float[np.ndarray, "row column"]
     """Share of each pixel that shows people."""
+    changed: Window
+    """Outside of it, the picture is the empty scene's."""
 
     @property
     def mask(self) -> Bool[np.ndarray, "row column"]:
@@ -126,17 +129,17 @@ def shot_of(
     view: View, plate: Plate, people: Sequence[Figure], meshes: Sequence[Mesh], shadows: Shadows | None
 ) -> Shot:
     """Draw people into the empty scene, behind what stands in front of them."""
-    picture = plate.total
+    picture = plate.total.copy()
     coverage = np.zeros(picture.shape[:2], np.float32)
-    if shadows is not None:
-        _darken(picture, view, plate, meshes, shadows)
+    changed = Window(0, 0, 0, 0) if shadows is None else _darken(picture, view, plate, meshes, shadows)
     colors, covered, window = _people_samples(view, plate, people, meshes, shadows)
     if window.width and window.height:
         small = Window(*(value // OVERSAMPLING for value in (window.x, window.y, window.width, window.height)))
         share = averaged(covered)[..., 0]
         picture[small.slices] = picture[small.slices] * (1.0 - share)[..., None] + averaged(colors)
         coverage[small.slices] = share
-    return Shot(picture, coverage)
+        changed = changed.joined(small)
+    return Shot(picture, coverage, changed)
 
 
 def _people_samples(
@@ -179,8 +182,8 @@ def _darken(
     plate: Plate,
     meshes: Sequence[Mesh],
     shadows: Shadows,
-) -> None:
-    """Take away from the empty scene the light that the people stop."""
+) -> Window:
+    """Take away from the empty scene the light that the people stop, and say where."""
     bodies = np.concatenate([mesh.vertices for mesh in meshes])
     on_floor = bodies - bodies[:, 2:] / light.LAMP[2] * light.LAMP
     around = _CONTACT * np.array([[1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]])
@@ -200,3 +203,4 @@ def _darken(
     shape = (window.height, window.width, 1)
     left = _LEAST_AMBIENT + (1.0 - _LEAST_AMBIENT) * open_above.reshape(shape)
     picture[rows, columns] = plate.ambient[rows, columns] * left + plate.direct[rows, columns] * lit.reshape(shape)
+    return window

@@ -43,6 +43,16 @@ class Window:
         bottom = min(int(upper[1]), limit.y + limit.height)
         return cls(x, y, max(right - x, 0), max(bottom - y, 0))
 
+    def joined(self, other: "Window") -> "Window":
+        """The smallest window that holds both; one without pixels counts for nothing."""
+        whole = [window for window in (self, other) if window.width and window.height]
+        if len(whole) < 2:
+            return whole[0] if whole else self
+        x, y = min(self.x, other.x), min(self.y, other.y)
+        right = max(self.x + self.width, other.x + other.width)
+        bottom = max(self.y + self.height, other.y + other.height)
+        return Window(x, y, right - x, bottom - y)
+
     @property
     def slices(self) -> tuple[slice, slice]:
         """Rows and columns of an image that starts at pixel (0, 0)."""

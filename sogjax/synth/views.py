@@ -101,18 +101,28 @@ class Sensor:
         self, picture: Float[np.ndarray, "row column 3"], rng: np.random.Generator
     ) -> UInt8[np.ndarray, "row column 3"]:
         """The picture as recorded, BGR."""
+        return self.recorded(self.without_noise(picture), rng)
+
+    def without_noise(self, picture: Float[np.ndarray, "row column 3"]) -> Float[np.ndarray, "row column 3"]:
+        """The picture in grey levels, BGR, as it would be recorded without noise."""
         rows = picture.reshape(len(picture), -1) * np.tile(self.gain.astype(np.float32), picture.shape[1])
         values = np.ascontiguousarray(srgb_from_linear(rows.reshape(picture.shape))[..., ::-1])
         values *= np.float32(255.0)
+        return values
+
+    def recorded(
+        self, levels: Float[np.ndarray, "row column 3"], rng: np.random.Generator
+    ) -> UInt8[np.ndarray, "row column 3"]:
+        """Grey levels, which are used up, with noise."""
         if self.noise > 0.0:
             bank = _noise_bank(self.seed)
             first = int(rng.integers(len(bank)))
-            noise = bank[first : first + values.size]
-            if len(noise) < values.size:
-                noise = np.resize(np.roll(bank, -first), values.size)
-            values += np.float32(255.0 * self.noise) * noise.reshape(values.shape)
-        values += np.float32(0.5)
-        return np.clip(values, 0.0, 255.0, out=values).astype(np.uint8)
+            noise = bank[first : first + levels.size]
+            if len(noise) < levels.size:
+                noise = np.resize(np.roll(bank, -first), levels.size)
+            levels += np.float32(255.0 * self.noise) * noise.reshape(levels.shape)
+        levels += np.float32(0.5)
+        return np.clip(levels, 0.0, 255.0, out=levels).astype(np.uint8)
 
 
 @cache
