@@ -4,7 +4,8 @@
 
 Runs are folders of results, of rendered recordings or others with a truth; those with the same number of cameras make
 one table. Where a truth has no joint angles (rendered by earlier versions, or labelled by hand), the angles between the
-lines that join its joints are compared. `truths` are other files of the runs' truths, one for each.
+lines that join its joints are compared. `truths` are other files of the runs' truths, one for each. How far each angle
+moves the body's blobs follows: a sphere looks the same however it is turned.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,10 +15,12 @@ from pathlib import Path
 import numpy as np
 
 from sogjax.errors import InputError
+from sogjax.io.export.angles import angle_reaches, has_angles
 from sogjax.io.frame_motions import load_motions
 from sogjax.io.ground_truth import load_ground_truth
 from sogjax.io.recording_files import GROUND_TRUTH
-from sogjax.quality.angle_errors import BETWEEN_BONES, AngleError, angle_table
+from sogjax.model.reach import TOLD
+from sogjax.quality.angle_errors import BETWEEN_BONES, AngleError, angle_table, base_name
 from sogjax.quality.evaluation import evaluate_motions
 from sogjax.run.adjust import kept_config
 from sogjax.run.recordings import opened
@@ -34,6 +37,8 @@ class RunAngles:
     errors: tuple[AngleError, ...]
     joints: float
     """Mean distance of the joints from the true ones, millimetres; a run that was lost shows here."""
+    reaches: Mapping[str, float] = field(default_factory=dict)
+    """How far each angle moves the body's blobs (`sogjax.model.reach`), the mean over the actors."""
 
     @property
     def by_lines(self) -> bool:
@@ -54,10 +59,18 @@ def angles_of_run(run: Path, truth: Path | None = None) -> RunAngles:
     path = GROUND_TRUTH.of(recording.path) if truth is None else truth
     if not path.is_file():
         raise InputError(f"{run}: its recording {recording.path} has no truth; give runs of one that has")
-    evaluated = evaluate_motions(load_motions(run), load_ground_truth(path)).evaluations.values()
+    motions = load_motions(run)
+    evaluated = evaluate_motions(motions, load_ground_truth(path)).evaluations.values()
     distances = [1000.0 * each.joints.errors.ravel() for each in evaluated if each.joints is not None]
     joints = float(np.nanmean(np.concatenate(distances))) if distances else float("nan")
-    return RunAngles(run, len(recording.rig), tuple(error for each in evaluated for error in each.angles), joints)
+    reaches = [angle_reaches(motion, motion.up) for motion in motions.values() if has_angles(motion)]
+    return RunAngles(
+        run,
+        len(recording.rig),
+        tuple(error for each in evaluated for error in each.angles),
+        joints,
+        {name: float(np.mean([each[name] for each in reaches])) for name in (reaches[0] if reaches else ())},
+    )
 
 
 def degrees_tables(runs: Sequence[RunAngles]) -> str:
@@ -72,7 +85,17 @@ def _table(cameras: int, runs: Sequence[RunAngles]) -> str:
     names = ", ".join(f"{run.run.name} (joints {run.joints:.0f} mm)" for run in runs)
     by_lines = "; angles between the lines that join the joints, as the truth has no others" if runs[0].by_lines else ""
     errors = [error for run in runs for error in run.errors]
-    return "\n".join([f"{cameras} cameras: {names}{by_lines}", *angle_table(errors, details=False)])
+    return "\n".join([f"{cameras} cameras: {names}{by_lines}", *angle_table(errors, details=False), *_reaches(runs)])
+
+
+def _reaches(runs: Sequence[RunAngles]) -> list[str]:
+    """In a line, how far angles move blobs, both sides together, the least first."""
+    found: dict[str, list[float]] = {}
+    for run in runs:
+        for name, value in run.reaches.items():
+            found.setdefault(base_name(name), []).append(value)
+    parts = [f"{name} {np.mean(values):.1f}" for name, values in sorted(found.items(), key=lambda item: min(item[1]))]
+    return [f"reach, in sizes of blobs (below {TOLD:g} an angle is not told): {', '.join(parts)}"] if parts else []
 
 
 def truths_of(runs: Sequence[str], truths: Sequence[str]) -> Mapping[Path, Path | None]:

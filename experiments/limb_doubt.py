@@ -74,7 +74,8 @@ def write_weights(path: Path, found: Mapping[str, Sequence[JudgedLimb]], trials:
     for name, limbs in found.items():
         part["values"][name] = {key: round(value, 1) + 0.0 for key, value in asdict(fitted_weights(limbs)).items()}
     counts = [f"{name}: {len(lost(limbs))} limbs, {int(lost(limbs).sum())} lost" for name, limbs in found.items()]
-    part["recordings"] = "; ".join([trials, *counts])
+    others = [said for said in part["recordings"].split("; ") if said.split(":")[0] in {*part["values"]} - {*found}]
+    part["recordings"] = "; ".join([trials, *counts, *others])
     header = "".join(line for line in text.splitlines(keepends=True) if line.startswith("#"))
     with atomic_path(path) as temporary:
         written = yaml.safe_dump(content, sort_keys=False, width=120, allow_unicode=True, default_flow_style=None)

@@ -9,11 +9,13 @@ from motion_cases import walking_motion
 from scipy.spatial.transform import Rotation
 
 from sogjax.errors import InputError
-from sogjax.io.export.angles import joint_angles, segment_angles
+from sogjax.io.export.angles import angles_not_told, joint_angles, segment_angles
 from sogjax.io.export.points import marker_points
 from sogjax.io.motion import motion_from_poses
 from sogjax.io.motion_data import save_motion
+from sogjax.model.reach import reach, told_dofs
 from sogjax.model.rotation import world_from_upright
+from sogjax.quality.limb_warnings import limits_of
 
 DEGREES = 0.01
 
@@ -132,10 +134,35 @@ def test_angles_as_csv_and_what_has_none(capsys, tmp_path, body):
     done(capsys, "export", source, f"to={tmp_path / 'a.csv'}", "angles=true")
     head = (tmp_path / "a.csv").read_text().splitlines()
     assert "degrees" in head[0]
+    assert "pro_sup_l" in head[0].partition("not told by the body's spheres: ")[2].split()
     assert "knee_angle_l" in head[1].split(",")
     assert "only .csv and .mot" in refused(capsys, "export", source, f"to={tmp_path / 'a.bvh'}", "angles=true")
     with pytest.raises(InputError, match="default one"):
         joint_angles(walking_motion())
+
+
+@pytest.mark.parametrize("up", ["z", "-y"])
+def test_what_spheres_do_not_tell_is_named(body, up):
+    """The turn of a forearm never, that of an upper arm only where the elbow is stretched."""
+    stretched, bent = (angles_not_told(posed(body, up, **bends), up) for bends in ({}, {"left_elbow": 1.5}))
+    for untold in (stretched, bent):
+        assert {"pro_sup_l", "pro_sup_r", "neck_rotation", "subtalar_angle_l"} <= {*untold}
+        assert not {"knee_angle_l", "elbow_flex_l", "hip_flexion_r", "ankle_angle_r", "lumbar_bending"} & {*untold}
+    assert {"arm_rot_l", "arm_rot_r"} <= {*stretched}
+    assert {*stretched} - {*bent} == {"arm_rot_l"}
+
+
+def test_the_reach_of_a_turn_by_hand():
+    moved = np.array([[[0.3, 0.0, 0.4], [0.0, 0.24, 0.0]]])  # velocities of 0.5 and 0.24 m, blobs of 10 and 2 cm
+    assert reach(moved, np.array([0.1, 0.02])) == pytest.approx([np.hypot(5.0, 12.0)])
+
+
+def test_a_turn_that_is_not_told_is_no_joint_at_its_limit(body):
+    told = dict(zip(body.skeleton.dof_names, told_dofs(body), strict=True))
+    assert not told["left_forearm_roll"]
+    assert not told["right_wrist_bend"]
+    assert all(told[name] for name in ("root_x", "root_yaw", "left_elbow", "left_shoulder_roll", "left_hip_twist"))
+    assert {*limits_of(body)} == {name for name in told if told[name]}
 
 
 def test_the_file_of_a_motion_has_points_by_plain_names(tmp_path, body):

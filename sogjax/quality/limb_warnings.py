@@ -1,6 +1,7 @@
 """Stretches of a motion in which a limb is in doubt.
 
-Joints that are bent as far as they can be: nobody stands so for long, but what is not seen ends up there.
+Joints that are bent as far as they can be: nobody stands so for long, but what is not seen ends up there. Of turns that
+a body's spheres do not tell, that says nothing.
 """
 
 from collections.abc import Mapping
@@ -12,6 +13,7 @@ from jaxtyping import Bool
 
 from sogjax.io.motion import Motion
 from sogjax.model.body import Body
+from sogjax.model.reach import told_dofs
 from sogjax.quality.metrics import stretches
 
 LIKELY_LOST = 0.5
@@ -86,11 +88,12 @@ class Limits(NamedTuple):
 
 
 def limits_of(body: Body) -> dict[str, Limits]:
-    """The limits of a body's degrees of freedom, by name; infinite where there is no limit."""
+    """The limits of the degrees of freedom that a body's blobs tell, by name; infinite where there is no limit."""
     skeleton = body.skeleton
     columns = (skeleton.dof_lower, skeleton.dof_upper, body.poses["rest"])
     rows = zip(*(np.asarray(column, float).tolist() for column in columns), strict=True)
-    return {name: Limits(*row) for name, row in zip(skeleton.dof_names, rows, strict=True)}
+    named = zip(skeleton.dof_names, rows, told_dofs(body).tolist(), strict=True)
+    return {name: Limits(*row) for name, row, told in named if told}
 
 
 def joints_at_limits(motion: Motion, limits: Mapping[str, Limits]) -> dict[str, float]:

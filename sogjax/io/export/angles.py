@@ -16,7 +16,9 @@ from sogjax.io.export.bones import euler_angles, frame_time, world_turn
 from sogjax.io.export.points import write_columns
 from sogjax.io.files import write_file
 from sogjax.io.motion_data import MotionData
+from sogjax.model.reach import TOLD, reach
 from sogjax.model.rotation import world_from_upright
+from sogjax.model.skeleton import ancestor_table
 
 _OPENSIM_FROM_BODY = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """A body's axes are x forward, y to its left, z up."""
@@ -124,6 +126,35 @@ def segment_angles(
     return columns
 
 
+def angle_reaches(motion: MotionData, up: str = "z") -> dict[str, float]:
+    """How far each angle moves the body's blobs (`sogjax.model.reach`), the median over the frames, by OpenSim's names.
+
+    Those of the pelvis, which move everything, are left out.
+    """
+    joints = motion.joint_names.tolist()
+    known = {segment: joints.index(joint) for segment, joint in SEGMENT_JOINTS.items() if joint in joints}
+    below = ancestor_table(tuple(motion.joint_parents.tolist()))
+    bone_axes = (_OPENSIM_FROM_BODY @ world_from_upright(up).T).T
+    frames, found = motion.world_from_joint.astype(float), {}
+    for pair in _PAIRS:
+        if pair.above is None or pair.above not in known or pair.below not in known or not motion.num_frames:
+            continue
+        joint, carried = known[pair.below], below[motion.blob_joint, known[pair.below]]
+        arms = motion.blob_means[:, carried].astype(float) - frames[:, None, joint, :3, 3]
+        sigmas = motion.blob_sigma[carried].astype(float)
+        for name, axis, _ in pair.names:
+            # the first angle turns about an axis of the upper segment, the others about those of the lower one, nearly
+            held_by = known[pair.above] if axis == pair.order[0] else joint
+            direction = frames[:, held_by, :3, :3] @ bone_axes[:, "XYZ".index(axis)]
+            found[name] = float(np.median(reach(np.cross(direction[:, None], arms), sigmas)))
+    return found
+
+
+def angles_not_told(motion: MotionData, up: str = "z") -> tuple[str, ...]:
+    """The angles that the body's blobs do not tell in most frames, by OpenSim's names."""
+    return tuple(name for name, reaches in angle_reaches(motion, up).items() if reaches < TOLD)
+
+
 def unwrapped(degrees: Float[np.ndarray, "frame *angle"]) -> Float[np.ndarray, "frame *angle"]:
     """Angles that go on from frame to frame instead of jumping by a turn; their medians lie within half a turn of 0."""
     if len(degrees) == 0:
@@ -133,12 +164,16 @@ def unwrapped(degrees: Float[np.ndarray, "frame *angle"]) -> Float[np.ndarray, "
 
 
 def write_angles_csv(path: Path, motion: MotionData, up: str = "z") -> None:
-    """Write one row per frame, after a line starting with `#` that gives the units, and the columns' names.
+    """Write one row per frame, after a line starting with `#`, and the columns' names.
+
+    That line gives the units, and names the angles that the body does not tell.
 
     Raises:
         InputError: as `joint_angles`; a path that cannot be written.
     """
     note = "angles: degrees, pelvis_tx pelvis_ty pelvis_tz: m with y up, time: s"
+    untold = angles_not_told(motion, up)
+    note += f", not told by the body's spheres: {' '.join(untold)}" if untold else ""
     write_columns(path, motion, note, joint_angles(motion, up))
 
 
@@ -148,6 +183,8 @@ def write_mot(path: Path, motion: MotionData, up: str = "z") -> None:
     columns = {"time": motion.time, **joint_angles(motion, up)}
     header = [path.stem, "version=1", f"nRows={motion.num_frames}", f"nColumns={len(columns)}", "inDegrees=yes"]
     header += [f"filter={motion.filtered_by}"] if motion.filtered_by else []
+    untold = angles_not_told(motion, up)
+    header += [f"not_told={' '.join(untold)}"] if untold else []
     rows = zip(*columns.values(), strict=True)
     lines = [*header, "endheader", "\t".join(columns), *("\t".join(f"{value:.6f}" for value in row) for row in rows)]
     write_file(path, "\n".join(lines) + "\n")

@@ -7,7 +7,7 @@ matplotlib is imported where a figure is made, since it is slow to import.
 
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -15,9 +15,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from sogjax.errors import InputError
-from sogjax.io.export.angles import joint_angles
+from sogjax.io.export.angles import angles_not_told, joint_angles
 from sogjax.io.motion import Motion
 from sogjax.model.body import Body
+from sogjax.model.reach import told_dofs
 from sogjax.view.bones import LEFT, RIGHT, side_of
 from sogjax.view.page.document import text
 
@@ -142,15 +143,19 @@ _FIRST = ("hip_", "knee_", "ankle_", "subtalar_", "arm_", "elbow_", "pro_", "wri
 
 
 def angle_panels(motion: Motion, body: Body) -> list[Curves]:
-    """Joint angles in degrees, left and right in one panel; of other bodies than people their degrees of freedom."""
+    """Joint angles in degrees, left and right in one panel; of other bodies than people their degrees of freedom.
+
+    What the body's blobs do not tell is marked.
+    """
     try:
         found = {name: angle for name, angle in joint_angles(motion, motion.up).items() if "pelvis_t" not in name[:8]}
         tilt = joint_angles(motion, motion.up).get("pelvis_tilt")
         found |= {} if tilt is None else {"pelvis_tilt": tilt}
     except InputError:
-        return _paired(_turning(motion, body))
+        told = dict(zip(body.skeleton.dof_names, told_dofs(body).tolist(), strict=True))
+        return _paired(_turning(motion, body), [name for name in told if not told[name]])
     place = lambda name: next((k for k, start in enumerate(_FIRST) if name.startswith(start)), len(_FIRST))
-    return _paired({name: found[name] for name in sorted(found, key=place)})
+    return _paired({name: found[name] for name in sorted(found, key=place)}, angles_not_told(motion, motion.up))
 
 
 def _turning(motion: Motion, body: Body) -> dict[str, Float[np.ndarray, "frame"]]:
@@ -159,15 +164,18 @@ def _turning(motion: Motion, body: Body) -> dict[str, Float[np.ndarray, "frame"]
     return {name: np.degrees(np.asarray(values, float)) for name, turns, values in columns if turns}
 
 
-def _paired(angles: dict[str, Float[np.ndarray, "frame"]]) -> list[Curves]:
+def _paired(angles: dict[str, Float[np.ndarray, "frame"]], untold: Collection[str]) -> list[Curves]:
     panels: dict[str, dict[str, np.ndarray]] = {}
+    units: dict[str, str] = {}
     for name, values in angles.items():
         side = side_of(name)
         color = "left" if side == LEFT else "right" if side == RIGHT else "accent"
         title = _without_side(name)
         shown = np.unwrap(np.asarray(values, float), period=360.0)
-        panels.setdefault(_TITLES.get(title, title.replace("_", " ")), {})[color] = shown
-    return [Curves(title[:1].upper() + title[1:], "degrees", curves) for title, curves in panels.items()]
+        title = _TITLES.get(title, title.replace("_", " "))
+        panels.setdefault(title, {})[color] = shown
+        units[title] = "degrees; spheres hardly tell it" if name in untold else "degrees"
+    return [Curves(title[:1].upper() + title[1:], units[title], curves) for title, curves in panels.items()]
 
 
 def _without_side(name: str) -> str:
