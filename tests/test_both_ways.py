@@ -238,6 +238,17 @@ def test_limbs_are_left_where_the_trunk_is_elsewhere_and_slight_gains_are_none()
     assert not select_parts(parts, apart, gains, 1.0).any()
 
 
+def test_a_limb_that_is_likely_lost_is_taken_for_a_slight_gain():
+    parts = body_parts(shipped("dog"))
+    limb = next(k for k, part in enumerate(parts) if part.whole is not None)
+    apart, gains, doubts = np.full((6, len(parts)), 0.01), np.full((6, len(parts)), -0.1), np.zeros((6, len(parts)))
+    apart[:, limb], gains[:, limb] = 2.0 * COSTS.apart, 0.5 * COSTS.bias
+    ends = (True, True)
+    assert not select_parts(parts, apart, gains, 1.0, ends, doubts).any()
+    doubts[:, limb] = 0.9
+    assert select_parts(parts, apart, gains, 1.0, ends, doubts)[:, limb].all()
+
+
 def test_a_limb_is_taken_to_its_place_though_the_trunk_is_turned():
     body = shipped("human")
     parts = body_parts(body)

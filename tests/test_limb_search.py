@@ -172,7 +172,12 @@ def test_no_pass_begins_where_one_went_in_vain(walking_dog, monkeypatch):
     monkeypatch.setattr(limb_search, "climbed_in", lambda *_: (ends, values, jnp.asarray(0.0)))
     better = lambda row: search.better_pose(cells[row], right, row)
     assert np.array_equal(better(1), other)
-    search.note_in_vain([1], [other])
+    search.note_in_vain([1], [other], [0.1])
+    assert np.array_equal(better(1), other)  # it gained there: one more may begin
+    search.note_in_vain([1], [other], [0.1])
+    assert better(1) is None
+    search.forget_in_vain([1])
+    search.note_in_vain([1], [other], [-0.1])
     assert better(1) is None
     assert np.array_equal(better(2), other)
     search.forget_in_vain([1])

@@ -129,6 +129,7 @@ def select_parts(
     gains: Float[np.ndarray, "frame part"],
     energy: float,
     open_ends: tuple[bool, bool] = (False, False),
+    doubts: Float[np.ndarray, "frame part"] | float = 0.0,
 ) -> Bool[np.ndarray, "frame part"]:
     """Which parts are taken from the other pass, in frames that follow each other; the pass itself holds around them.
 
@@ -142,15 +143,17 @@ def select_parts(
         gains: of taking each part.
         energy: of a frame, for scale.
         open_ends: whether the clip ends before the first and behind the last of the frames.
+        doubts: how likely each part is lost in the known pass: the less it need gain to be taken.
     """
     costs, taken = fitted_numbers().merge_passes, np.zeros(apart.shape, bool)
+    bias = costs.bias * (1.0 - np.broadcast_to(doubts, apart.shape))
     for k, part in enumerate(parts):
         whole = 0.0 if part.whole is None else apart[:, part.whole]
         alone = [
             j for j, other in enumerate(parts) if len(part.names) > 1 and other.names in [(n,) for n in part.names]
         ]
         more = gains[:, k] - np.maximum(gains[:, alone], 0.0).sum(axis=1)  # of a pair, than of its limbs by themselves
-        worth = np.where(whole > costs.apart, 0.0, more / energy) - costs.bias
+        worth = np.where(whole > costs.apart, 0.0, more / energy) - bias[:, k]
         found = best_choice(worth, costs.change * apart[:, k], open_ends)
         for stretch in (slice(*ends) for ends in stretches(found)):
             taken[stretch, k] = apart[stretch, k].max() > costs.apart

@@ -44,6 +44,8 @@ CROSSED_SLACK, CROSSED_APART = -0.01, 0.03
 (with the rest held, elbows are not where they would be), and how far they then are, as `APART`."""
 DEEP = 0.04
 """Metres that limbs may be deeper in each other, or in the trunk, than in any named pose."""
+IN_VAIN = 2
+"""Passes in vain that hold a pose in a frame, from which on none begins there."""
 MOST_ROUNDS = 3
 """Times that limbs are searched in a frame, each from the better pose that was found."""
 
@@ -64,10 +66,15 @@ class LimbSearch:
         units = units_of(tracker.body)
         return cls(tracker, units, Units.of(tracker.body, units)) if units else None
 
-    def note_in_vain(self, rows: Sequence[int], poses: Sequence[Float[np.ndarray, "dof"]]) -> None:
-        """Learn the poses of a pass of which nothing was taken: none begins there again."""
-        for row, pose in zip(rows, poses, strict=True):
-            self._in_vain.setdefault(row, []).append(pose)
+    def note_in_vain(
+        self, rows: Sequence[int], poses: Sequence[Float[np.ndarray, "dof"]], gained: Sequence[float]
+    ) -> None:
+        """Learn the poses of a pass of which nothing was taken, and what they gained.
+
+        None begins there again; where it gained, one more may: it went wrong elsewhere, and may not from there.
+        """
+        for row, pose, gain in zip(rows, poses, gained, strict=True):
+            self._in_vain.setdefault(row, []).extend([pose] * (1 if gain > 0.0 else IN_VAIN))
 
     def forget_in_vain(self, rows: Iterable[int]) -> None:
         """Rows changed: what led nowhere from there may do now."""
@@ -119,7 +126,7 @@ class LimbSearch:
     ) -> Float[np.ndarray, "dof"] | None:
         """The best that is reached from a pose with units held otherwise; None: nothing that is worth more.
 
-        `first` is the tracked pose, `energy` that of a frame, for scale; near poses `in_vain` nothing counts.
+        `first` is the tracked pose, `energy` that of a frame, for scale; near several poses `in_vain` nothing counts.
         """
         held, crossed = self._starts(first, pose, found, energy)
         starts = np.concatenate([held, crossed])
@@ -131,8 +138,7 @@ class LimbSearch:
         found_there = climbed_in(self.tracker, views, *arrays)
         ends, values, before = jax.device_get(found_there)
         good = (values - before > WORTH * energy) & (self._apart(ends, pose) > APART) & self.possible(first, ends)
-        for other in in_vain:
-            good &= self._apart(ends, other) > APART
+        good &= np.sum([self._apart(ends, other) <= APART for other in in_vain], axis=0) < IN_VAIN
         return ends[np.argmax(np.where(good, values, -np.inf))] if good.any() else None
 
     def _starts(
@@ -166,11 +172,16 @@ class LimbSearch:
         """Which poses hold nothing deep in something else, but for what is as deep in the known one."""
         return self.solid.deeper(self.tracker.body, known, poses).max(axis=1, initial=0.0) <= DEEP
 
-    def impossible_blobs(
+    def impossible_depths(
         self, known: Float[np.ndarray, "dof"], pose: Float[np.ndarray, "dof"]
-    ) -> Int[np.ndarray, "_blob"]:
-        """Blobs of what a pose holds deep in something else, and a known one does not."""
-        return self.solid.blobs_of(self.solid.deeper(self.tracker.body, known, pose[None])[0] > DEEP)
+    ) -> Float[np.ndarray, "blob"]:
+        """Metres by which a pose holds each blob deeper than may be, in something else, and a known one does not."""
+        beyond = self.solid.deeper(self.tracker.body, known, pose[None])[0] - DEEP
+        depths = np.zeros(self.tracker.body.num_blobs)
+        for pair in np.flatnonzero(beyond > 0.0):
+            blobs = self.solid.blobs_of(np.arange(len(beyond)) == pair)
+            depths[blobs] = np.maximum(depths[blobs], beyond[pair])
+        return depths
 
     def _tried(self, number: int, unit: Unit, pose: Float[np.ndarray, "dof"]) -> Float[np.ndarray, "seed dof"]:
         """Ways that are drawn, and those of the last key frame."""

@@ -12,16 +12,18 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History
 from sogjax.energy.views import Views
+from sogjax.model.limbs import limb_names
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.limb_confidence import LimbConfidence
+from sogjax.quality.limb_warnings import LIKELY_LOST
 from sogjax.quality.metrics import stretches
 from sogjax.search.body_parts import body_parts, merged_pose, select_parts
-from sogjax.search.limb_search import MORE, LimbSearch, climbed_in
+from sogjax.search.limb_search import DEEP, MORE, LimbSearch, climbed_in
 from sogjax.search.other_pass import (
     SURE_FRAMES,
     BothSeen,
@@ -37,11 +39,16 @@ from sogjax.tracking.frame import AnyFrame, FrameInput, on_device
 from sogjax.tracking.tracker import Tracker
 
 IMPOSSIBLE = 0.02
-"""Part of a frame's energy that a part costs in a frame in which it is deep in something else."""
+"""Part of a frame's energy that a part costs, at most, in a frame in which it is deep in something else: hands that meet
+may be a little too deep in a pass that is right."""
 MOST_SWEEPS = 3
 """Times that key frames are searched, where they changed meanwhile."""
-MOST_LOOKS = 1
-"""Frames of other passes that gain nothing, at most, in lengths of the clip."""
+MORE_SWEEPS = 6
+"""Times that key frames in which a limb is likely lost still are searched, each time with other draws: with few cameras
+only few draws lead to where an arm is."""
+MOST_LOOKS, MOST_LOOKS_IN_DOUBT = 1, 5
+"""Frames of other passes that gain nothing, at most, in lengths of the clip; from frames in which a limb is likely
+lost."""
 
 
 @dataclass(frozen=True)
@@ -92,9 +99,13 @@ class _Revising:
         self._changed: set[int] = set()
         self._looked_at = 0
 
-    @property
-    def _tired(self) -> bool:
-        return self._looked_at > MOST_LOOKS * len(self.passed.poses)
+    def _tired(self, row: int | None = None) -> bool:
+        """Whether too much was looked at in vain for another pass, which begins in a row."""
+        most = MOST_LOOKS if row is None or not self._likely_lost(row) else MOST_LOOKS_IN_DOUBT
+        return self._looked_at > most * len(self.passed.poses)
+
+    def _likely_lost(self, row: int) -> bool:
+        return bool(self.passed.doubts[row].max(initial=0.0) > LIKELY_LOST)
 
     def search_limbs(self, rows: Sequence[int], report: Report) -> None:
         """Hold limbs in other ways in some frames, and see where these lead that are worth more.
@@ -109,30 +120,32 @@ class _Revising:
             changed = [row for row in rows if row in self._changed]
             self._changed.clear()
             self._search_limbs(search, changed, unreported)
+        for _ in range(MORE_SWEEPS):
+            self._search_limbs(search, [row for row in rows if self._likely_lost(row)], unreported)
 
     def _search_limbs(self, search: LimbSearch, rows: Sequence[int], report: Report) -> None:
         for number, row in enumerate(rows):
             frame = next(iter(self.frames(range(row, row + 1))))
             report(number / len(rows))
-            pose = None if self._tired else search.better_pose(frame, self.passed, row)
+            pose = None if self._tired(row) else search.better_pose(frame, self.passed, row)
             if pose is not None:
                 found = compared_both_ways(self.tracker, self.passed, self.frames, self.parts, row, pose)
                 if self.take(self._without_impossible(search, found)):
                     search.forget_in_vain(self._changed)
                 else:
-                    search.note_in_vain(found.rows, found.poses)
+                    search.note_in_vain(found.rows, found.poses, found.gained)
 
     def _without_impossible(self, search: LimbSearch, found: Compared) -> Compared:
-        """The other pass; nothing is gained by parts that it holds deep in something else."""
+        """The other pass; parts cost that it holds deep in something else."""
         for k, (row, pose) in enumerate(zip(found.rows, found.poses, strict=True)):
-            blobs = search.impossible_blobs(self.passed.poses[row], pose)
-            at_fault = np.array([part.blobs[blobs].any() for part in self.parts])
-            found.gains[k] = np.where(at_fault, -IMPOSSIBLE * self.passed.energy, found.gains[k])
+            depths = search.impossible_depths(self.passed.poses[row], pose)
+            deepest = np.array([depths[part.blobs].max(initial=0.0) for part in self.parts])
+            found.gains[k] -= IMPOSSIBLE * self.passed.energy * np.minimum(deepest / DEEP, 1.0)
         return found
 
     def next_stretch(self) -> tuple[int, int] | None:
         """First and last frame of the last stretch in doubt from behind which no pass has begun."""
-        if self._tired:
+        if self._tired():
             return None
         found = [(first, stop - 1) for first, stop in stretches(in_doubt(self.passed), gap=SURE_FRAMES)]
         left = [stretch for stretch in found if stretch[1] not in self._tried]
@@ -144,7 +157,8 @@ class _Revising:
         """Revise what another pass explains better; whether that raises the energy of the stretch, else all stays."""
         rows, total = np.array(found.rows), len(self.passed.poses)
         ends = (bool(rows[0] in (0, total - 1)), bool(rows[-1] in (0, total - 1)))
-        taken = select_parts(self.parts, np.stack(found.apart), np.stack(found.gains), self.passed.energy, ends)
+        apart, gains = np.stack(found.apart), np.stack(found.gains)
+        taken = select_parts(self.parts, apart, gains, self.passed.energy, ends, self._doubts(rows))
         changed = [(k, int(rows[k])) for k in np.flatnonzero(taken.any(axis=1))]
         merged = {row: self._merged(self.passed.poses[row], found, int(k), taken[k]) for k, row in changed}
         better = sum(self._gained(found, int(k), self.passed.poses[row], merged[row]) for k, row in changed) > 0.0
@@ -160,6 +174,12 @@ class _Revising:
             for name in part.names if better and of_part.any() else ():
                 self.revision.parts.setdefault(name, set()).update(rows[of_part].tolist())
         return better
+
+    def _doubts(self, rows: Int[np.ndarray, "frame"]) -> Float[np.ndarray, "frame part"]:
+        """How likely a limb of each part is lost; 0 for whole actors."""
+        names = limb_names(self.tracker.body)
+        limbs = [[k for k, name in enumerate(names) if name in part.names] for part in self.parts]
+        return np.stack([self.passed.doubts[rows][:, of_part].max(axis=1, initial=0.0) for of_part in limbs], axis=1)
 
     def _gained(
         self, found: Compared, k: int, pose: Float[np.ndarray, "dof"], merged: Float[np.ndarray, "dof"]
