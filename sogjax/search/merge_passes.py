@@ -39,8 +39,8 @@ from sogjax.tracking.frame import AnyFrame, FrameInput, on_device
 from sogjax.tracking.tracker import Tracker
 
 IMPOSSIBLE = 0.02
-"""Part of a frame's energy that a part costs, at most, in a frame in which it is deep in something else: hands that meet
-may be a little too deep in a pass that is right."""
+"""Part of a frame's energy that a part costs, at most, in a frame in which it is deep in something else: where hands
+meet, they may be a little too deep in a pass that is right."""
 MOST_SWEEPS = 3
 """Times that key frames are searched, where they changed meanwhile."""
 MORE_SWEEPS = 6
