@@ -69,7 +69,7 @@ def angles_of_run(run: Path, truth: Path | None = None) -> RunAngles:
         len(recording.rig),
         tuple(error for each in evaluated for error in each.angles),
         joints,
-        {name: float(np.mean([each[name] for each in reaches])) for name in (reaches[0] if reaches else ())},
+        {name: float(np.mean([each[name] for each in reaches if name in each])) for each in reaches for name in each},
     )
 
 
@@ -94,7 +94,9 @@ def _reaches(runs: Sequence[RunAngles]) -> list[str]:
     for run in runs:
         for name, value in run.reaches.items():
             found.setdefault(base_name(name), []).append(value)
-    parts = [f"{name} {np.mean(values):.1f}" for name, values in sorted(found.items(), key=lambda item: min(item[1]))]
+    parts = [
+        f"{name} {np.mean(values):.1f}" for name, values in sorted(found.items(), key=lambda item: np.mean(item[1]))
+    ]
     return [f"reach, in sizes of blobs (below {TOLD:g} an angle is not told): {', '.join(parts)}"] if parts else []
 
 

@@ -19,7 +19,7 @@ from sogjax.io.motion import Motion, load_motion
 from sogjax.io.motion_data import save_motion
 from sogjax.io.recording_files import GROUND_TRUTH
 from sogjax.model.body import Body
-from sogjax.quality.limb_warnings import Limits, limits_of
+from sogjax.quality.limb_warnings import limits_of
 from sogjax.quality.markers import joint_errors
 from sogjax.quality.metrics import mean_per_frame, stretches
 from sogjax.quality.passages import passages
@@ -155,16 +155,12 @@ class VerdictTrials:
             return [JudgedRun(trial, "", kept["refused"])]
         motions = {name: load_motion(place / f"{name}.npz") for name in kept["expected"]}
         expected = {name: value for name, value in kept["expected"].items() if value}
-        inside = {body.name: passages(body, motions[body.name]) for body in self._bodies(trial)}
-        found = verdicts(motions, expected, self._limits(trial, kept), inside=inside)
+        bodies = self._bodies(trial)
+        inside = {body.name: passages(body, motions[body.name]) for body in bodies}
+        limits = {body.name: limits_of(body) for body in bodies}
+        found = verdicts(motions, expected, limits, inside=inside)
         truth = self._truth(trial.sequence)
         return [judged_run(trial, name, motion, truth, found[name]) for name, motion in motions.items()]
-
-    def _limits(self, trial: VerdictTrial, kept: dict[str, Any]) -> dict[str, dict[str, Limits]]:
-        """The limits by actor and degree of freedom; earlier versions did not keep them beside the motions."""
-        if "limits" not in kept:
-            return {body.name: limits_of(body) for body in self._bodies(trial)}
-        return {name: {dof: Limits(*row) for dof, row in rows.items()} for name, rows in kept["limits"].items()}
 
     def _run(self, trial: VerdictTrial, place: Path) -> None:
         recording = opened(str(cached_recording(self.synth[trial.sequence])))
@@ -187,7 +183,6 @@ class VerdictTrials:
         else:
             expected = expected_of(bodies)
             kept["expected"] = {name: expected.get(name) for name in run.motions}
-            kept["limits"] = {body.name: limits_of(body) for body in bodies}
             for name, motion in run.motions.items():
                 save_motion(place / f"{name}.npz", motion)
         write_file(place / TRIAL, json.dumps(kept, indent=1))

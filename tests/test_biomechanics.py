@@ -15,7 +15,7 @@ from sogjax.io.motion import motion_from_poses
 from sogjax.io.motion_data import save_motion
 from sogjax.model.reach import reach, told_dofs
 from sogjax.model.rotation import world_from_upright
-from sogjax.quality.limb_warnings import limits_of
+from sogjax.quality.limb_warnings import joints_at_limits, limits_of
 
 DEGREES = 0.01
 
@@ -96,6 +96,7 @@ def test_mot_is_what_opensim_reads(capsys, tmp_path, body):
     names, row = lines[end + 1].split("\t"), np.array(lines[end + 2].split("\t"), float)
     assert (header["nRows"], int(header["nColumns"]), header["inDegrees"]) == ("1", len(names), "yes")
     assert names[0] == "time"
+    assert "pro_sup_l" in header["not_told"].split()
     assert row[names.index("knee_angle_l")] == pytest.approx(np.rad2deg(0.5), abs=DEGREES)
 
 
@@ -162,7 +163,11 @@ def test_a_turn_that_is_not_told_is_no_joint_at_its_limit(body):
     assert not told["left_forearm_roll"]
     assert not told["right_wrist_bend"]
     assert all(told[name] for name in ("root_x", "root_yaw", "left_elbow", "left_shoulder_roll", "left_hip_twist"))
-    assert {*limits_of(body)} == {name for name in told if told[name]}
+    names = [*body.skeleton.dof_names]
+    pose = np.zeros((10, len(names)), np.float32)
+    pose[:, names.index("left_wrist_bend")] = np.asarray(body.skeleton.dof_upper)[names.index("left_wrist_bend")]
+    pose[:, names.index("left_hip_twist")] = np.asarray(body.skeleton.dof_upper)[names.index("left_hip_twist")]
+    assert {*joints_at_limits(motion_from_poses(body, pose, 25.0), limits_of(body))} == {"left_hip_twist"}
 
 
 def test_the_file_of_a_motion_has_points_by_plain_names(tmp_path, body):

@@ -107,6 +107,7 @@ def test_weights_are_written_into_the_file_and_nothing_else_changes(tmp_path):
     found = read_fitted(path.read_text()).limb_weights.with_background
     assert found.worse == round(fitted_weights([drawn(4000)]).worse, 1)
     assert after["limb_weights"]["recordings"].startswith("drawn limbs; with_background: 4000 limbs, ")
+    assert "; without_background: " in after["limb_weights"]["recordings"]  # which was not fitted anew
     assert after["limb_weights"]["values"].pop("with_background") != before["limb_weights"]["values"].pop(
         "with_background"
     )

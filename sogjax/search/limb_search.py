@@ -58,7 +58,7 @@ class LimbSearch:
         self.solid = Solid.of(tracker.body)
         self._turn = 0
         self._carried: HeldOtherwise | None = None
-        self._in_vain: dict[int, list[np.ndarray]] = {}
+        self._in_vain: dict[int, list[tuple[np.ndarray, int]]] = {}
 
     @classmethod
     def of(cls, tracker: Tracker) -> "LimbSearch | None":
@@ -74,7 +74,7 @@ class LimbSearch:
         None begins there again; where it gained, one more may: it went wrong elsewhere, and may not from there.
         """
         for row, pose, gain in zip(rows, poses, gained, strict=True):
-            self._in_vain.setdefault(row, []).extend([pose] * (1 if gain > 0.0 else IN_VAIN))
+            self._in_vain.setdefault(row, []).append((pose, 1 if gain > 0.0 else IN_VAIN))
 
     def forget_in_vain(self, rows: Iterable[int]) -> None:
         """Rows changed: what led nowhere from there may do now."""
@@ -122,11 +122,11 @@ class LimbSearch:
         pose: Float[np.ndarray, "dof"],
         found: "HeldOtherwise",
         energy: float,
-        in_vain: Sequence[Float[np.ndarray, "dof"]],
+        in_vain: Sequence[tuple[Float[np.ndarray, "dof"], int]],
     ) -> Float[np.ndarray, "dof"] | None:
         """The best that is reached from a pose with units held otherwise; None: nothing that is worth more.
 
-        `first` is the tracked pose, `energy` that of a frame, for scale; near several poses `in_vain` nothing counts.
+        `first` is the tracked pose, `energy` that of a frame, for scale. Near poses that were `in_vain` nothing counts.
         """
         held, crossed = self._starts(first, pose, found, energy)
         starts = np.concatenate([held, crossed])
@@ -138,7 +138,10 @@ class LimbSearch:
         found_there = climbed_in(self.tracker, views, *arrays)
         ends, values, before = jax.device_get(found_there)
         good = (values - before > WORTH * energy) & (self._apart(ends, pose) > APART) & self.possible(first, ends)
-        good &= np.sum([self._apart(ends, other) <= APART for other in in_vain], axis=0) < IN_VAIN
+        good &= (
+            sum((count * (self._apart(ends, other) <= APART) for other, count in in_vain), np.zeros(len(ends)))
+            < IN_VAIN
+        )
         return ends[np.argmax(np.where(good, values, -np.inf))] if good.any() else None
 
     def _starts(

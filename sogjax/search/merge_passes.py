@@ -39,8 +39,8 @@ from sogjax.tracking.frame import AnyFrame, FrameInput, on_device
 from sogjax.tracking.tracker import Tracker
 
 IMPOSSIBLE = 0.02
-"""Part of a frame's energy that a part costs, at most, in a frame in which it is deep in something else: where hands
-meet, they may be a little too deep in a pass that is right."""
+"""Part of a frame's energy that a part costs, at most, in a frame in which it is too deep in something else; all of it
+where it is twice as deep as may be. Where hands meet, they may be a little too deep in a pass that is right."""
 MOST_SWEEPS = 3
 """Times that key frames are searched, where they changed meanwhile."""
 MORE_SWEEPS = 6
@@ -121,18 +121,23 @@ class _Revising:
             self._changed.clear()
             self._search_limbs(search, changed, unreported)
         for _ in range(MORE_SWEEPS):
-            self._search_limbs(search, [row for row in rows if self._likely_lost(row)], unreported)
+            lost = [row for row in rows if self._likely_lost(row)]
+            self._looked_at += len(lost)
+            self._search_limbs(search, lost, unreported)
+        self._looked_at = 0  # what comes backwards from behind doubts may look at as much
 
     def _search_limbs(self, search: LimbSearch, rows: Sequence[int], report: Report) -> None:
         for number, row in enumerate(rows):
-            frame = next(iter(self.frames(range(row, row + 1))))
             report(number / len(rows))
-            pose = None if self._tired(row) else search.better_pose(frame, self.passed, row)
+            if self._tired(row):
+                continue
+            frame = next(iter(self.frames(range(row, row + 1))))
+            pose = search.better_pose(frame, self.passed, row)
             if pose is not None:
                 found = compared_both_ways(self.tracker, self.passed, self.frames, self.parts, row, pose)
-                if self.take(self._without_impossible(search, found)):
-                    search.forget_in_vain(self._changed)
-                else:
+                changed = self.take(self._without_impossible(search, found))
+                search.forget_in_vain(changed)
+                if not changed:
                     search.note_in_vain(found.rows, found.poses, found.gained)
 
     def _without_impossible(self, search: LimbSearch, found: Compared) -> Compared:
@@ -153,8 +158,8 @@ class _Revising:
             self._tried.add(left[-1][1])
         return left[-1] if left else None
 
-    def take(self, found: Compared) -> bool:
-        """Revise what another pass explains better; whether that raises the energy of the stretch, else all stays."""
+    def take(self, found: Compared) -> set[int]:
+        """Revise what another pass explains better, if that raises the energy of the stretch; the rows that changed."""
         rows, total = np.array(found.rows), len(self.passed.poses)
         ends = (bool(rows[0] in (0, total - 1)), bool(rows[-1] in (0, total - 1)))
         apart, gains = np.stack(found.apart), np.stack(found.gains)
@@ -173,7 +178,7 @@ class _Revising:
         for part, of_part in zip(self.parts, taken.T, strict=True):
             for name in part.names if better and of_part.any() else ():
                 self.revision.parts.setdefault(name, set()).update(rows[of_part].tolist())
-        return better
+        return set(merged) if better else set()
 
     def _doubts(self, rows: Int[np.ndarray, "frame"]) -> Float[np.ndarray, "frame part"]:
         """How likely a limb of each part is lost; 0 for whole actors."""

@@ -105,7 +105,9 @@ class Sensor:
 
     def without_noise(self, picture: Float[np.ndarray, "row column 3"]) -> Float[np.ndarray, "row column 3"]:
         """The picture in grey levels, BGR, as it would be recorded without noise."""
-        rows = picture.reshape(len(picture), -1) * np.tile(self.gain.astype(np.float32), picture.shape[1])
+        rows = picture.reshape(len(picture), 3 * picture.shape[1]) * np.tile(
+            self.gain.astype(np.float32), picture.shape[1]
+        )
         values = np.ascontiguousarray(srgb_from_linear(rows.reshape(picture.shape))[..., ::-1])
         values *= np.float32(255.0)
         return values

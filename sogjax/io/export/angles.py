@@ -129,7 +129,8 @@ def segment_angles(
 def angle_reaches(motion: MotionData, up: str = "z") -> dict[str, float]:
     """How far each angle moves the body's blobs (`sogjax.model.reach`), the median over the frames, by OpenSim's names.
 
-    Those of the pelvis, which move everything, are left out.
+    It is the turn of the lower segment about its own joint, of a head about the base of its skull. Those of the pelvis,
+    which move everything, are left out.
     """
     joints = motion.joint_names.tolist()
     known = {segment: joints.index(joint) for segment, joint in SEGMENT_JOINTS.items() if joint in joints}

@@ -51,6 +51,8 @@ class Curves:
     unit: str
     curves: Mapping[str, Float[np.ndarray, "frame"]]
     """By colour of the style."""
+    remark: str = ""
+    """What else the title says."""
 
 
 def curve_plots(frames: Int[np.ndarray, "frame"], panels: Sequence[Curves], names: Mapping[str, str]) -> str:
@@ -64,7 +66,7 @@ def _panel(frames: Int[np.ndarray, "frame"], panel: Curves, names: Mapping[str, 
     values = np.concatenate([*panel.curves.values()])
     for color, curve in panel.curves.items():
         axes.plot(frames, curve, color=COLORS[color], linewidth=1.3, solid_joinstyle="round")
-    axes.set_title(f"{panel.title}, {panel.unit}", loc="left", fontsize=FONT, color=COLORS["ink"], pad=5)
+    axes.set_title(f"{panel.title}, {panel.unit}{panel.remark}", loc="left", fontsize=FONT, color=COLORS["ink"], pad=5)
     style(axes, frames)
     axes.locator_params(axis="y", nbins=4)
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
@@ -74,7 +76,7 @@ def _panel(frames: Int[np.ndarray, "frame"], panel: Curves, names: Mapping[str, 
         f"{names.get(color, '') + ' ' if len(panel.curves) > 1 else ''}{np.nanmin(curve):.3g} to {np.nanmax(curve):.3g}"
         for color, curve in panel.curves.items()
     )
-    return plot(drawn, axes, frames, f"{panel.title} over the frames, {panel.unit}: {of_each}")
+    return plot(drawn, axes, frames, f"{panel.title} over the frames, {panel.unit}{panel.remark}: {of_each}")
 
 
 def new_figure(width: float, height: float) -> "Figure":
@@ -166,7 +168,7 @@ def _turning(motion: Motion, body: Body) -> dict[str, Float[np.ndarray, "frame"]
 
 def _paired(angles: dict[str, Float[np.ndarray, "frame"]], untold: Collection[str]) -> list[Curves]:
     panels: dict[str, dict[str, np.ndarray]] = {}
-    units: dict[str, str] = {}
+    not_told: dict[str, list[str]] = {}
     for name, values in angles.items():
         side = side_of(name)
         color = "left" if side == LEFT else "right" if side == RIGHT else "accent"
@@ -174,8 +176,17 @@ def _paired(angles: dict[str, Float[np.ndarray, "frame"]], untold: Collection[st
         shown = np.unwrap(np.asarray(values, float), period=360.0)
         title = _TITLES.get(title, title.replace("_", " "))
         panels.setdefault(title, {})[color] = shown
-        units[title] = "degrees; spheres hardly tell it" if name in untold else "degrees"
-    return [Curves(title[:1].upper() + title[1:], units[title], curves) for title, curves in panels.items()]
+        not_told.setdefault(title, []).extend([color] if name in untold else [])
+    return [
+        Curves(title[:1].upper() + title[1:], "degrees", curves, _remark(not_told[title], curves))
+        for title, curves in panels.items()
+    ]
+
+
+def _remark(untold: Sequence[str], curves: Mapping[str, Float[np.ndarray, "frame"]]) -> str:
+    """Which of the curves, by their colours, the body's blobs do not tell."""
+    whose = "" if len(untold) == len(curves) else f"{' and '.join(untold)}: "
+    return f"; {whose}spheres hardly tell it" if untold else ""
 
 
 def _without_side(name: str) -> str:
