@@ -46,9 +46,9 @@ MOST_SWEEPS = 3
 MORE_SWEEPS = 6
 """Times that key frames in which a limb is likely lost still are searched, each time with other draws: with few cameras
 only few draws lead to where an arm is."""
-MOST_LOOKS, MOST_LOOKS_IN_DOUBT = 1, 5
-"""Frames of other passes that gain nothing, at most, in lengths of the clip; from frames in which a limb is likely
-lost."""
+MOST_LOOKS, MORE_LOOKS = 1, 2
+"""Frames of other passes that gain nothing, at most, in lengths of the clip; and how many more, from where a limb is
+likely lost, in numbers of such frames."""
 
 
 @dataclass(frozen=True)
@@ -101,11 +101,13 @@ class _Revising:
 
     def _tired(self, row: int | None = None) -> bool:
         """Whether too much was looked at in vain for another pass, which begins in a row."""
-        most = MOST_LOOKS if row is None or not self._likely_lost(row) else MOST_LOOKS_IN_DOUBT
-        return self._looked_at > most * len(self.passed.poses)
+        lost = self._likely_lost
+        more = 0 if row is None or not lost[row] else MORE_LOOKS * lost.sum()
+        return self._looked_at > MOST_LOOKS * len(lost) + more
 
-    def _likely_lost(self, row: int) -> bool:
-        return bool(self.passed.doubts[row].max(initial=0.0) > LIKELY_LOST)
+    @property
+    def _likely_lost(self) -> Bool[np.ndarray, "frame"]:
+        return self.passed.doubts.max(axis=1, initial=0.0) > LIKELY_LOST
 
     def search_limbs(self, rows: Sequence[int], report: Report) -> None:
         """Hold limbs in other ways in some frames, and see where these lead that are worth more.
@@ -121,7 +123,7 @@ class _Revising:
             self._changed.clear()
             self._search_limbs(search, changed, unreported)
         for _ in range(MORE_SWEEPS):
-            lost = [row for row in rows if self._likely_lost(row)]
+            lost = [row for row in rows if self._likely_lost[row]]
             self._looked_at += len(lost)
             self._search_limbs(search, lost, unreported)
         self._looked_at = 0  # what comes backwards from behind doubts may look at as much
