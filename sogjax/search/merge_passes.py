@@ -102,7 +102,7 @@ class _Revising:
     def _tired(self, row: int | None = None) -> bool:
         """Whether too much was looked at in vain for another pass, which begins in a row."""
         lost = self._likely_lost
-        more = 0 if row is None or not lost[row] else MORE_LOOKS * lost.sum()
+        more = 0 if row is None or not lost[row] else MORE_LOOKS * int(lost.sum())
         return self._looked_at > MOST_LOOKS * len(lost) + more
 
     @property
