@@ -138,10 +138,10 @@ class LimbSearch:
         found_there = climbed_in(self.tracker, views, *arrays)
         ends, values, before = jax.device_get(found_there)
         good = (values - before > WORTH * energy) & (self._apart(ends, pose) > APART) & self.possible(first, ends)
-        good &= (
-            sum((count * (self._apart(ends, other) <= APART) for other, count in in_vain), np.zeros(len(ends)))
-            < IN_VAIN
-        )
+        times = np.zeros(len(ends), int)
+        for other, count in in_vain:
+            times += count * (self._apart(ends, other) <= APART)
+        good &= times < IN_VAIN
         return ends[np.argmax(np.where(good, values, -np.inf))] if good.any() else None
 
     def _starts(

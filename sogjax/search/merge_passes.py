@@ -123,8 +123,9 @@ class _Revising:
             self._changed.clear()
             self._search_limbs(search, changed, unreported)
         for _ in range(MORE_SWEEPS):
-            lost = [row for row in rows if self._likely_lost[row]]
-            self._looked_at += len(lost)
+            likely = self._likely_lost
+            lost = [row for row in rows if likely[row]]
+            self._looked_at += len(lost)  # a look costs about as much as a frame of a pass
             self._search_limbs(search, lost, unreported)
         self._looked_at = 0  # what comes backwards from behind doubts may look at as much
 
