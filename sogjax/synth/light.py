@@ -104,12 +104,11 @@ class ShadowMap:
         count = np.zeros(len(points), np.float32)
         angles = 2.39996 * np.arange(taps)
         radii = self.spread * np.sqrt((np.arange(taps) + 0.5) / taps)
-        flat = self.depths.ravel()
+        bordered = np.pad(self.depths, 1, constant_values=_FAR).ravel()  # nothing is in the way outside
+        places = local[:, :2].T * np.float32(1.0 / self.spacing)
         for angle, radius in zip(angles, radii, strict=True):
             shift = (radius * np.array([np.cos(angle), np.sin(angle)]) / self.spacing + 0.5).astype(np.float32)
-            x = (local[:, 0] * np.float32(1.0 / self.spacing) + shift[0]).astype(np.int32)
-            y = (local[:, 1] * np.float32(1.0 / self.spacing) + shift[1]).astype(np.int32)
-            outside = (x < 0) | (x >= width) | (y < 0) | (y >= height)
-            x[outside] = y[outside] = 0
-            count += outside | (flat[y * width + x] >= limit)
+            x, y = (places + shift[:, None]).astype(np.int32)
+            at = (np.clip(y, -1, height) + 1) * (width + 2) + np.clip(x, -1, width) + 1
+            count += np.take(bordered, at, mode="clip") >= limit
         return count / np.float32(taps)

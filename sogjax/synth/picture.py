@@ -57,19 +57,22 @@ def plate_of(scene: Scene, view: View) -> Plate:
     hits = rasterize(pixels, depths, scene.mesh.faces, window)
     vertices = np.concatenate([scene.mesh.vertices, scene.uv], 1, dtype=np.float32)
     values = hits.interpolated(vertices, scene.mesh.faces)
-    normals = scene.mesh.normals[scene.mesh.faces[hits.faces, 0]].astype(np.float32)
     albedo = light.linear_from_srgb(scene.colors(hits.faces, values[:, 3:]))
+    normals = scene.mesh.normals[scene.mesh.faces[:, 0]].astype(np.float32)  # of faces, which are flat
+    of_samples = lambda of_faces: np.take(of_faces, hits.faces, axis=0)
 
     def image(samples: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "row column 3"]:
+        if len(samples) == window.height * window.width:
+            return samples.reshape(window.height, window.width, 3)
         filled = np.zeros((window.height, window.width, 3), np.float32)
         filled[hits.rows, hits.columns] = samples
         return filled
 
     # Where the shadows of the furniture fall is looked up once per pixel: they are softer than that anyway.
-    points, upwards = (image(v)[::OVERSAMPLING, ::OVERSAMPLING] for v in (values[:, :3], normals))
+    points, upwards = (image(v)[::OVERSAMPLING, ::OVERSAMPLING] for v in (values[:, :3], of_samples(normals)))
     lit = scene.shadow.lit((points + np.float32(0.02) * upwards).reshape(-1, 3), taps=6)
-    lamp = averaged(image(albedo * light.direct(normals))) * lit.reshape(view.height, view.width, 1)
-    ambient = averaged(image(albedo * light.ambient(normals)))
+    lamp = averaged(image(albedo * of_samples(light.direct(normals)))) * lit.reshape(view.height, view.width, 1)
+    ambient = averaged(image(albedo * of_samples(light.ambient(normals))))
     return Plate(ambient, lamp, np.ascontiguousarray(points), _depths_of_props(scene, hits, window))
 
 

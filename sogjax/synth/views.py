@@ -120,8 +120,8 @@ class Sensor:
             bank = _noise_bank(self.seed)
             first = int(rng.integers(len(bank)))
             noise = bank[first : first + levels.size]
-            if len(noise) < levels.size:
-                noise = np.resize(np.roll(bank, -first), levels.size)
+            if len(noise) < levels.size:  # the bank's beginning follows its end
+                noise = np.concatenate([noise, np.resize(bank, levels.size - len(noise))])
             levels += np.float32(255.0 * self.noise) * noise.reshape(levels.shape)
         levels += np.float32(0.5)
         return np.clip(levels, 0.0, 255.0, out=levels).astype(np.uint8)
