@@ -19,13 +19,14 @@ from sogjax.io.video import read_still
 from sogjax.run.clip import Clip, SampleKind, spread_frames
 from sogjax.run.terminal import say
 from sogjax.scene.background import BackgroundImage
-from sogjax.scene.background_difference import disc, working_size
+from sogjax.scene.background_difference import background_difference, disc, working_size
 from sogjax.scene.plates import FittedPlate, fitted_plate
 
 LOOKED_AT = 9
 """Frames whose median is what a camera shows; somebody who moves is not in it."""
 BORDER = 0.02
-"""Around a mask, what is not used of a picture, as a part of its longer side: masks are rough, shadows begin there."""
+"""Around a mask, and what is not as in the clip, what is not used of a picture, as a part of its longer side: masks are
+rough, shadows begin there."""
 
 
 def scene_samples(clip: Clip) -> SampleKind:
@@ -134,7 +135,10 @@ def _masked_pictures(recording: Recording, camera: str) -> list[tuple[Path, Path
 def _example_plates(
     recording: Recording, camera: str, frames: Sequence[UInt8[np.ndarray, "rows columns 3"]]
 ) -> list[FittedPlate]:
-    """The pictures of example poses that fit, without their subject, at the size of the frames."""
+    """The pictures of example poses that fit, where they show no subject and what the clip shows, at the frames' size.
+
+    Where they differ from the clip, the subject may stand there in all of it, or a table was brought in since.
+    """
     scene, found = median_picture(frames), []
     size = (scene.shape[1], scene.shape[0])
     border = disc(2 * round(BORDER * max(size)) + 1)
@@ -146,7 +150,8 @@ def _example_plates(
         away = tuple(round(part) for part in plate.shift)
         subject = np.roll(cv2.dilate(subject, border), away[::-1], (0, 1)) > 0
         if plate.fits:
-            found.append(replace(plate, known=plate.known & ~subject))
+            changed = cv2.dilate(background_difference(scene, plate.picture).changed.astype(np.uint8), border) > 0
+            found.append(replace(plate, known=plate.known & ~subject & ~changed))
     return found
 
 

@@ -87,17 +87,31 @@ class LimbSearch:
         From a better pose the limbs are searched again: one may have been in the place of another.
         """
         self._turn += 1
-        first = pose = passed.poses[row]
-        views = self.views(on_device(frame), pose, passed.capacities)
+        first = passed.poses[row]
+        views = self.views(on_device(frame), first, passed.capacities)
+        pose = self.with_better_limbs(views, first, first, passed.energy, self._in_vain.get(row, []))
+        return None if pose is first else pose
+
+    def with_better_limbs(
+        self,
+        views: Views,
+        first: Float[np.ndarray, "dof"],
+        pose: Float[np.ndarray, "dof"],
+        energy: float,
+        in_vain: Sequence[tuple[Float[np.ndarray, "dof"], int]] = (),
+    ) -> Float[np.ndarray, "dof"]:
+        """A pose with limbs held otherwise as long as that is worth more; itself, where nothing is.
+
+        `first` is the tracked pose, `energy` that of a frame, for scale. Poses near those `in_vain` do not count.
+        """
         for _ in range(MOST_ROUNDS):
-            found = self.held_otherwise(views, pose)
-            better = self._climbed(views, first, pose, found, passed.energy, self._in_vain.get(row, []))
+            better = self._better(views, first, pose, self.held_otherwise(views, pose), energy, in_vain)
             if better is None:
                 break
             pose = better
-        return None if pose is first else pose
+        return pose
 
-    def _apart(
+    def apart(
         self, poses: Float[np.ndarray, "other dof"], pose: Float[np.ndarray, "dof"]
     ) -> Float[np.ndarray, "other"]:
         """Metres between poses and one, mean over the blobs of the limb that differs most."""
@@ -115,7 +129,7 @@ class LimbSearch:
         found = self._carried = jax.device_get(found)
         return found
 
-    def _climbed(
+    def _better(
         self,
         views: Views,
         first: Float[np.ndarray, "dof"],
@@ -124,25 +138,33 @@ class LimbSearch:
         energy: float,
         in_vain: Sequence[tuple[Float[np.ndarray, "dof"], int]],
     ) -> Float[np.ndarray, "dof"] | None:
-        """The best that is reached from a pose with units held otherwise; None: nothing that is worth more.
-
-        `first` is the tracked pose, `energy` that of a frame, for scale. Near poses that were `in_vain` nothing counts.
-        """
+        """The best that is reached from a pose with units held otherwise; None: nothing that is worth more."""
         held, crossed = self._starts(first, pose, found, energy)
         starts = np.concatenate([held, crossed])
         if not len(starts):
             return None
-        padded = np.stack([*starts, *[pose] * (MOST_WHOLE + 1 - len(starts))])
-        shares = jnp.where(np.arange(len(padded)) < len(held), FEW, MORE)
-        arrays = jnp.asarray(pose), jnp.asarray(padded), jnp.asarray(len(starts)), shares
-        found_there = climbed_in(self.tracker, views, *arrays)
-        ends, values, before = jax.device_get(found_there)
-        good = (values - before > WORTH * energy) & (self._apart(ends, pose) > APART) & self.possible(first, ends)
+        ends, gains = self.climbed(views, pose, starts, np.where(np.arange(len(starts)) < len(held), FEW, MORE))
+        good = (gains > WORTH * energy) & (self.apart(ends, pose) > APART) & self.possible(first, ends)
         times = np.zeros(len(ends), int)
         for other, count in in_vain:
-            times += count * (self._apart(ends, other) <= APART)
+            times += count * (self.apart(ends, other) <= APART)
         good &= times < IN_VAIN
-        return ends[np.argmax(np.where(good, values, -np.inf))] if good.any() else None
+        return ends[np.argmax(np.where(good, gains, -np.inf))] if good.any() else None
+
+    def climbed(
+        self,
+        views: Views,
+        known: Float[np.ndarray, "dof"],
+        starts: Float[np.ndarray, "start dof"],
+        shares: Float[np.ndarray, "start"],
+    ) -> tuple[Float[np.ndarray, "start dof"], Float[np.ndarray, "start"]]:
+        """At most `MOST_WHOLE + 1` poses climbed, each as far as `climbed_in`, and what they gain over a known pose."""
+        more = MOST_WHOLE + 1 - len(starts)
+        padded = np.stack([*starts, *[known] * more]).astype(known.dtype)
+        arrays = jnp.asarray(known), jnp.asarray(padded), jnp.asarray(len(starts))
+        found = climbed_in(self.tracker, views, *arrays, jnp.asarray(np.pad(shares, (0, more)), known.dtype))
+        ends, values, before = jax.device_get(found)
+        return ends[: len(starts)], values[: len(starts)] - before
 
     def _starts(
         self,

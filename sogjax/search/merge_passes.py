@@ -1,8 +1,9 @@
 """Other passes: each part of the body is taken from the pass that explains it better, over time.
 
-In key frames all over the clip limbs are held in other ways, and where one of these is worth more than the tracked one,
-a pass goes from there both ways. Where limbs are in doubt then, a pass comes backwards from behind: a limb that is lost
-is often found again by itself, and what hid it, or moved too far for one frame, comes from the other side.
+In key frames all over the clip limbs are held in other ways, in a few frames actors are turned round, and where that
+is worth more than what was tracked, a pass goes from there both ways. Where limbs are in doubt then, a pass comes
+backwards from behind: a limb that is lost is often found again by itself, and what hid it, or moved too far for one
+frame, comes from the other side.
 """
 
 from collections.abc import Sequence
@@ -34,6 +35,7 @@ from sogjax.search.other_pass import (
     compared_both_ways,
 )
 from sogjax.search.pose_search import Report, unreported
+from sogjax.search.turned_body import turned_pose, turned_rows
 from sogjax.tracking.capacity import views_near
 from sogjax.tracking.frame import AnyFrame, FrameInput, on_device
 from sogjax.tracking.tracker import Tracker
@@ -115,8 +117,9 @@ class _Revising:
         Frames that changed meanwhile are searched again: a limb may have been in the place of another.
         """
         search = LimbSearch.of(self.tracker)
-        if search is None:
+        if search is None or not rows:
             return
+        self._turn_actors(search)
         self._search_limbs(search, rows, report)
         for _ in range(MOST_SWEEPS - 1):
             changed = [row for row in rows if row in self._changed]
@@ -129,19 +132,33 @@ class _Revising:
             self._search_limbs(search, lost, unreported)
         self._looked_at = 0  # what comes backwards from behind doubts may look at as much
 
+    def _turn_actors(self, search: LimbSearch) -> None:
+        """See where it leads if an actor is the other way round in a few frames all over the clip."""
+        wholes = [part for part in self.parts if part.whole is None]
+        for row in turned_rows(len(self.passed.poses)):
+            pose = turned_pose(search, wholes, self._frame(row), self.passed, row)
+            if pose is not None:
+                self._pass_from(search, row, pose)
+
     def _search_limbs(self, search: LimbSearch, rows: Sequence[int], report: Report) -> None:
         for number, row in enumerate(rows):
             report(number / len(rows))
             if self._tired(row):
                 continue
-            frame = next(iter(self.frames(range(row, row + 1))))
-            pose = search.better_pose(frame, self.passed, row)
+            pose = search.better_pose(self._frame(row), self.passed, row)
             if pose is not None:
-                found = compared_both_ways(self.tracker, self.passed, self.frames, self.parts, row, pose)
-                changed = self.take(self._without_impossible(search, found))
-                search.forget_in_vain(changed)
-                if not changed:
-                    search.note_in_vain(found.rows, found.poses, found.gained)
+                self._pass_from(search, row, pose)
+
+    def _frame(self, row: int) -> AnyFrame:
+        return next(iter(self.frames(range(row, row + 1))))
+
+    def _pass_from(self, search: LimbSearch, row: int, pose: Float[np.ndarray, "dof"]) -> None:
+        """Go both ways from another pose of a frame, and take what that explains better."""
+        found = compared_both_ways(self.tracker, self.passed, self.frames, self.parts, row, pose)
+        changed = self.take(self._without_impossible(search, found))
+        search.forget_in_vain(changed)
+        if not changed:
+            search.note_in_vain(found.rows, found.poses, found.gained)
 
     def _without_impossible(self, search: LimbSearch, found: Compared) -> Compared:
         """The other pass; parts cost that it holds deep in something else."""

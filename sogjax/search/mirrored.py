@@ -37,14 +37,14 @@ def _exchanged(name: str) -> str:
 def look_alikes(body: Body, pose: Float[np.ndarray, "dof"]) -> Float[np.ndarray, "other dof"]:
     """Poses whose silhouettes are nearly that of a pose.
 
-    Half turned with the sides exchanged, with one pair of limbs exchanged, and with all but one pair.
+    Half turned with the sides exchanged; then for each of the `limb_pairs`, with it exchanged, and with all but it.
     """
     blobs = other_side(body.blobs.names)
     means = means_of(body, pose[None])[0]
     if np.all(blobs == np.arange(len(blobs))):
         return pose[None][:0]
     exchanged = [np.arange(len(blobs))]
-    for pair in _limb_pairs(body):
+    for pair in limb_pairs(body):
         exchanged += [pair, np.setdiff1d(np.arange(len(blobs)), pair)]
     targets = np.repeat(means[None], len(exchanged), axis=0)
     for target, which in zip(targets, exchanged, strict=True):
@@ -63,7 +63,7 @@ def sides_apart(body: Body, poses: Float[np.ndarray, "start dof"]) -> Float[np.n
     Mean distance of a limb's blobs from those of its counterpart, of the pair for which that is least; infinite for a
     body without sides.
     """
-    others, pairs = other_side(body.blobs.names), _limb_pairs(body)
+    others, pairs = other_side(body.blobs.names), limb_pairs(body)
     if not pairs:
         return np.full(len(poses), np.inf)
     named = means_of(body, np.stack([np.asarray(pose) for pose in body.poses.values()]))
@@ -73,7 +73,7 @@ def sides_apart(body: Body, poses: Float[np.ndarray, "start dof"]) -> Float[np.n
     return (between(means_of(body, poses)) / between(named).min(axis=0)).min(axis=1)
 
 
-def _limb_pairs(body: Body) -> list[Int[np.ndarray, "blob"]]:
+def limb_pairs(body: Body) -> list[Int[np.ndarray, "blob"]]:
     """The blobs of each pair of limbs that are each other's counterpart."""
     dofs = other_side(body.skeleton.dof_names)
     every_limb, blobs = limbs(body.skeleton), limb_blobs(body)

@@ -1,0 +1,96 @@
+"""Whole actors turned back to front: what is tried, where, and that it is found."""
+
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from body_cases import random_body, shipped
+from drawn_scene import cells_of, colored, draw, in_colors, standing
+from rig_cases import ring_rig
+from test_both_ways import reader
+from walking_dog import DEPTH, judging_tracker, pass_of
+
+from sogjax.model.body import concatenate
+from sogjax.search.body_parts import body_parts
+from sogjax.search.limb_search import LimbSearch
+from sogjax.search.merge_passes import merge_passes
+from sogjax.search.mirrored import look_alikes, other_side
+from sogjax.search.placed_body import means_of
+from sogjax.search.turned_body import turned, turned_pose, turned_rows
+from sogjax.tracking.frame_by_frame import track
+
+HUMAN = shipped("human")
+FRAMES, SPEED = 9, 0.01
+
+
+def test_actors_are_turned_in_the_middle_of_equal_parts_of_a_clip():
+    assert turned_rows(60) == [10, 30, 50]
+    assert turned_rows(1) == [0]
+    long = turned_rows(1000)
+    assert max(np.diff([0, *long, 1000])) <= 60
+    assert len(long) == 17
+
+
+@pytest.mark.parametrize("actor", [0, 1])
+def test_one_of_two_actors_is_turned_in_all_ways_and_the_other_stays(actor):
+    both = concatenate([replace(HUMAN, name="anna"), replace(HUMAN, name="ben")])
+    one = np.asarray(HUMAN.poses["walk_left"], np.float32)
+    pose = np.concatenate([one, one])
+    whole = [part for part in body_parts(both) if part.whole is None][actor]
+    others = turned(both, whole, pose)
+    assert len(others) == 3  # all sides exchanged, all but the arms, all but the legs
+    moves = np.isin(np.arange(len(pose)), whole.dofs)
+    np.testing.assert_array_equal(others[:, ~moves], np.tile(pose[~moves], (3, 1)))
+    means, before = means_of(both, others), means_of(both, pose[None])[0]
+    moved = np.linalg.norm(means - before, axis=-1)
+    own = both.blob_actors == actor
+    assert moved[:, ~own].max() < 1e-5
+    assert moved[:, own].mean(axis=1).min() > 0.05
+
+
+def test_a_body_without_sides_is_not_turned():
+    thing = random_body(0)
+    whole = next(part for part in body_parts(thing) if part.whole is None)
+    assert turned(thing, whole, np.zeros(thing.skeleton.num_dofs, np.float32)).shape == (0, thing.skeleton.num_dofs)
+
+
+def alike_on_both_sides(body):
+    """A body whose left is coloured as its right, as most people are."""
+    sides = other_side(body.blobs.names)
+    return colored(body, np.asarray(body.blob_colors)[np.minimum(sides, np.arange(len(sides)))])
+
+
+@pytest.fixture(scope="module")
+def back_to_front():
+    """A tracker, the cells of somebody who goes sideways, and what is found from a pose back to front."""
+    body, rig = alike_on_both_sides(in_colors(HUMAN)), ring_rig(5, (160, 120), distance=3.0)
+    tracker = judging_tracker(body, rig)
+    root = [name.startswith("root") for name in body.skeleton.dof_names]
+    pose = np.where(root, standing(body, 1.0), np.asarray(body.poses["walk_left"])).astype(np.float32)
+    poses = np.stack([pose] * FRAMES)
+    poses[:, 0] += SPEED * np.arange(FRAMES)
+    cells = [cells_of(rig, draw(body, jnp.asarray(pose), rig), DEPTH) for pose in poses]
+    wrong = look_alikes(body, poses[0].astype(np.float32))[0]
+    return tracker, cells, poses, pass_of([*track(tracker, jnp.asarray(wrong), cells)])
+
+
+@pytest.mark.slow
+def test_an_actor_that_is_followed_back_to_front_is_turned(back_to_front):
+    tracker, cells, poses, passed = back_to_front
+    off = lambda found: np.linalg.norm(
+        means_of(tracker.body, np.stack(found)) - means_of(tracker.body, poses), axis=-1
+    ).mean()
+    assert off(passed.poses) > 0.1
+    found = merge_passes(tracker, passed, reader(cells), range(0, FRAMES, 4))
+    assert found.parts["whole body"] == {*range(FRAMES)}
+    assert off([found.frames[row].pose for row in range(FRAMES)]) < 0.03
+
+
+@pytest.mark.slow
+def test_an_actor_that_is_followed_rightly_is_not_turned(back_to_front):
+    tracker, cells, poses, _ = back_to_front
+    right = pass_of([*track(tracker, jnp.asarray(poses[0], jnp.float32), cells)])
+    search = LimbSearch.of(tracker)
+    wholes = [part for part in body_parts(tracker.body) if part.whole is None]
+    assert all(turned_pose(search, wholes, cells[row], right, row) is None for row in turned_rows(FRAMES))
