@@ -181,3 +181,25 @@ def test_pictures_of_example_poses_show_the_empty_scene_outside_of_their_masks(w
         assert not camera.known[: len(camera.known) // 2].any()
         shown = cv2.resize(plates[name], camera.known.shape[::-1], interpolation=cv2.INTER_AREA)
         assert np.abs(camera.picture.astype(int) - shown)[camera.known].mean() < 3.0
+
+
+def test_what_stands_only_in_the_clip_is_not_taken_from_pictures_of_example_poses(walk, tmp_path):
+    """A table that was brought in after the example poses is not somebody."""
+    folder = tmp_path / "posed"
+    shutil.copytree(walk, folder)
+    plates = {path.stem: cv2.imread(str(path)) for path in sorted((folder / "background").iterdir())}
+    shutil.rmtree(folder / "background")
+    posed = folder / "example_poses" / "stand"
+    posed.mkdir(parents=True)
+    for name, plate in plates.items():
+        rows, columns = (slice(size // 2, 3 * size // 4) for size in plate.shape[:2])
+        plate[rows, columns] = 255 - plate[rows, columns]
+        mask = np.zeros(plate.shape[:2], np.uint8)
+        mask[:10, :10] = 255
+        cv2.imwrite(str(posed / f"{name}.jpg"), plate)
+        cv2.imwrite(str(posed / f"{name}.mask.png"), mask)
+    found, added = with_example_plates(clip_of(open_recording(folder)), None)
+    assert 0.6 < added < 0.95
+    for camera in found:
+        rows, columns = (slice(size // 2 + 2, 3 * size // 4 - 2) for size in camera.known.shape)
+        assert camera.known[rows, columns].mean() < 0.1

@@ -15,6 +15,7 @@ from sogjax.scene.background import BackgroundImage
 from sogjax.scene.background_difference import working_size
 from sogjax.scene.clip_background import FEWEST_SAMPLES, MOST_SAMPLES, SampledCamera, learnt_background, moves, shaking
 from sogjax.scene.moving_zone import moving_zones
+from sogjax.scene.still_body import still_bodies, with_room_behind
 from sogjax.scene.still_zone import still_zones
 
 MOST_BYTES = 2**30
@@ -78,6 +79,12 @@ def learnt_from(
             still = still_zones(zones, moving, {k: one.even.reference for k, one in sampled.items()}, cameras)
         of_one = lambda k: learnt_background(sampled[k], zones[k], still.get(k), (left_out or {}).get(names[k]))
         learnt = dict(zip(sampled, pool.map(of_one, sampled), strict=True))
+        if left_out is None and not recording.example_poses:
+            anywhere = {k: np.any(one.movements, axis=0) for k, one in sampled.items()}
+            typical = {k: one.even.reference for k, one in sampled.items()}
+            bodies = still_bodies(anywhere, typical, cameras, axis_vector(recording.up))
+            behind = lambda k: with_room_behind(learnt[k], bodies[k], anywhere[k], typical[k])
+            learnt = dict(zip(sampled, pool.map(behind, sampled), strict=True))
     _say_unknown(recording, 1.0 - float(np.mean([background.known.mean() for background in learnt.values()])))
     nothing = lambda name: BackgroundImage.nothing(*working_size(*recording.rig.image_size(name)))
     return tuple(learnt.get(k) or nothing(name) for k, name in enumerate(names))

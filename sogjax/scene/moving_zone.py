@@ -118,7 +118,7 @@ def _standing(
     for block in spans:
         room = np.zeros_like(block)
         heights = block.sum(axis=2)
-        room[_convex((heights > 0) & (heights >= core * heights.max()), reach / spacing), height] = True
+        room[convex((heights > 0) & (heights >= core * heights.max()), reach / spacing), height] = True
         rooms.append(room)
     return rooms
 
@@ -129,7 +129,7 @@ def _early_and_late(rooms: Bool[np.ndarray, "span x y z"]) -> Bool[np.ndarray, "
     return rooms.any(axis=0) & (last - first >= len(rooms) // 2)
 
 
-def _convex(plan: Bool[np.ndarray, "x y"], border: float) -> Bool[np.ndarray, "x y"]:
+def convex(plan: Bool[np.ndarray, "x y"], border: float) -> Bool[np.ndarray, "x y"]:
     """Every part of a plan made convex, with a border."""
     outlines, _ = cv2.findContours(plan.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     canvas = np.zeros(plan.shape, np.uint8)

@@ -13,16 +13,12 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 
 from sogjax.model.camera import Camera
-from sogjax.scene.background_difference import widened
-from sogjax.scene.moving_zone import SEEING, SMALLEST_ROOM
-from sogjax.scene.segmentation import COARSE_SIDE, unlike_the_room
-from sogjax.scene.visual_hull import MANY, Cube, cube_around, resized, voxel_pixels
+from sogjax.scene.coarse_views import CoarseViews, enlarged, small
+from sogjax.scene.segmentation import unlike_the_room
+from sogjax.scene.visual_hull import MANY
 
 MISTAKEN = 0.25
 """Share of the other cameras that may take somebody for the room where a camera tells him from it."""
-MOVING = 0.25
-"""Part of a pixel of the smaller pictures that moves, at least."""
-
 Mask = Bool[np.ndarray, "_h _w"]
 
 
@@ -37,31 +33,20 @@ def still_zones(
     That is what a camera tells from the room and most others do not take for it; and what all the others tell from it.
     By camera, `movements` are where anything moves in the clip, and `pictures` (BGR) are typical ones of it.
     """
-    small_zones = {k: _small(zone.astype(np.uint8), cv2.INTER_NEAREST) > 0 for k, zone in zones.items()}
-    moving = {k: _small(movements[k].astype(np.float32), cv2.INTER_AREA) > MOVING for k in zones}
-    seeing = [k for k in zones if moving[k].any()]
-    if len(seeing) < 2:
+    views = CoarseViews.of({k: movements[k] for k in zones}, cameras)
+    if views is None:
         return dict(zones)
-    cut = lambda k: unlike_the_room(_small(pictures[k], cv2.INTER_AREA), small_zones[k]) | moving[k]
+    seeing, pixels = [*views.moving], views.pixels
+    small_zone = lambda k: small(zones[k].astype(np.uint8), cv2.INTER_NEAREST) > 0
+    cut = lambda k: unlike_the_room(small(pictures[k], cv2.INTER_AREA), small_zone(k)) | views.moving[k]
     with ThreadPoolExecutor() as pool:
         unlike = dict(zip(seeing, pool.map(cut, seeing), strict=True))
-    small = {k: resized(cameras[k], unlike[k].shape[::-1]) for k in seeing}
-    found = cube_around([moving[k] for k in seeing], [small[k] for k in seeing])
-    cube = Cube(found.centre, max(found.size, SMALLEST_ROOM))
-    pixels = {k: voxel_pixels(cube, small[k], unlike[k].shape) for k in seeing}
-    missed = {k: ~pixels[k].hits(widened(unlike[k], pixels[k].footprint)) for k in seeing}
+    missed = views.missed(unlike)
     misses = np.sum([*missed.values()], axis=0)
-    inside = np.sum([pixels[k].inside for k in seeing], axis=0) >= SEEING * len(seeing)
-    surely = inside & (misses <= (1 if len(seeing) >= MANY else 0))
+    surely = views.inside & (misses <= (1 if len(seeing) >= MANY else 0))
     still = dict(zones)
     for k in seeing:
-        perhaps = inside & (misses - missed[k] <= int(MISTAKEN * len(seeing)))
+        perhaps = views.inside & (misses - missed[k] <= int(MISTAKEN * len(seeing)))
         told = (pixels[k].silhouette_of(perhaps) & unlike[k]) | pixels[k].silhouette_of(surely)
-        still[k] = cv2.resize(told.astype(np.uint8), zones[k].shape[::-1], interpolation=cv2.INTER_NEAREST) > 0
+        still[k] = enlarged(told, zones[k].shape)
     return still
-
-
-def _small(picture: np.ndarray, interpolation: int) -> np.ndarray:
-    scale = min(COARSE_SIDE / max(picture.shape[:2]), 1.0)
-    size = (round(scale * picture.shape[1]), round(scale * picture.shape[0]))
-    return cv2.resize(picture, size, interpolation=interpolation)

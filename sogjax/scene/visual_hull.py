@@ -7,7 +7,7 @@ import cv2
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Bool, Float, Int, Shaped
 from scipy.ndimage import binary_opening
 
 from sogjax.model.camera import NEAR, Camera, distort, near_picture, project_points
@@ -149,8 +149,8 @@ def _picture_places(
     return jnp.where(inside, rows, 0), jnp.where(inside, columns, 0), inside, depths[::DEPTHS_EVERY]
 
 
-def upright(voxels: Bool[np.ndarray, "voxel"], up: Float[np.ndarray, "3"]) -> Bool[np.ndarray, "x y z"]:
-    """Voxels as a block whose last axis points up."""
+def upright(voxels: Shaped[np.ndarray, "voxel"], up: Float[np.ndarray, "3"]) -> Shaped[np.ndarray, "x y z"]:
+    """What is known of voxels as a block whose last axis points up."""
     axis = int(np.argmax(np.abs(up)))
     block = np.moveaxis(voxels.reshape(3 * (VOXELS,)), axis, 2)
     return block if up[axis] > 0 else np.flip(block, 2)
