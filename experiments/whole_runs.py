@@ -9,6 +9,7 @@ are kept in `out` and not made again. The table is printed, and written as table
 """
 
 import json
+import os
 import subprocess
 import sys
 from dataclasses import dataclass, field
@@ -18,9 +19,11 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from sogjax.errors import InputError
+from sogjax.io.background_cache import VARIABLE
+from sogjax.io.cache_folder import OFF
 from sogjax.io.files import write_file, write_json
-from sogjax.io.ground_truth import load_ground_truth
-from sogjax.io.motion import load_motion
+from sogjax.io.ground_truth import GroundTruth, load_ground_truth
+from sogjax.io.motion import Motion, load_motion
 from sogjax.io.recording_files import BACKGROUND, CALIBRATION, EXAMPLE_POSES, GROUND_TRUTH, SETTINGS, VIDEOS
 from sogjax.quality.markers import joint_errors
 from sogjax.run.run_files import METRICS
@@ -75,9 +78,10 @@ class Settings:
 def main() -> None:
     """Run what is not there yet, and write the table."""
     settings = settings_from(Settings)
-    lines = [f"{machine_line()}", "", "| recording | joints, mm | verdict |", "|---|---|---|"]
+    lines = [machine_line(), "", "| recording | joints, mm | verdict |", "|---|---|---|"]
     for row in settings.rows:
-        folder = Path(settings.out) / row.replace(" ", "_").replace("=", "-")
+        name = f"{row} {settings.frames}".replace(" ", "_").replace("=", "-")
+        folder = Path(settings.out) / name
         found = _kept(folder) or _run(row, settings.frames, folder)
         lines.append(f"| {row} | {', '.join(f'{1e3 * mean:.0f}' for mean in found['joints'])} | {found['said']} |")
         print(lines[-1], flush=True)
@@ -109,7 +113,8 @@ def _run(row: str, frames: int, folder: Path) -> dict:
             path.symlink_to(file.of(rendered), file.is_folder)
     people = (f"actors={actors}",) if given == "videos" and numbers["actors"] > 1 else ()
     command = [sys.executable, "-m", "sogjax", "track", f"recording={recording}", f"out={results}", *LEAN, *people]
-    ran = subprocess.run(command, capture_output=True, text=True, check=False)
+    unkept = os.environ | {VARIABLE: OFF}  # a background of an earlier program is none of this one's
+    ran = subprocess.run(command, capture_output=True, text=True, check=False, env=unkept)
     write_file(folder / "log.txt", ran.stdout + ran.stderr)
     if ran.returncode:
         said = next((line for line in ran.stderr.splitlines() if line.startswith("sogjax:")), "failed; see log.txt")
@@ -130,7 +135,7 @@ def _errors(results: Path, truth: Path) -> list[float]:
     return errors[rows, columns].tolist()
 
 
-def _mean(motion, person) -> float:
+def _mean(motion: Motion, person: GroundTruth) -> float:
     errors = joint_errors(motion, person)
     return float("inf") if errors is None else float(errors.errors.mean())
 

@@ -16,7 +16,7 @@ from sogjax.io.npz_file import read_npz, save_npz
 from sogjax.io.recording import Recording
 from sogjax.io.source import fingerprint
 
-BACKGROUND_VERSION = 4
+BACKGROUND_VERSION = 5
 """Raise it with every change that alters what is learnt."""
 NOTE = "made_from"
 VARIABLE = "SOGJAX_BACKGROUND_CACHE"
@@ -33,6 +33,7 @@ def background_origin(recording: Recording) -> dict[str, Any]:
     return {
         "version": BACKGROUND_VERSION,
         "up": recording.up,
+        "masked": recording.masked,
         "frames": [recording.first_frame, recording.num_frames],
         "frame_offset": {name: recording.frame_offset[name] for name in names},
         "files": {name: fingerprint(recording.sources[name]) for name in names},

@@ -83,6 +83,11 @@ class Recording:
         return range(self.first_frame, self.first_frame + self.num_frames)
 
     @property
+    def masked(self) -> bool:
+        """Whether masks of example poses tell what its people look like."""
+        return any(example.masks for example in self.example_poses)
+
+    @property
     def complete(self) -> bool:
         """Whether every camera has a picture of every frame."""
         return self.fewest_cameras is None and not any(self.missing.get(name) for name in self.rig.names)

@@ -72,20 +72,19 @@ def learnt_from(
         cameras = {k: recording.rig.camera(name) for k, name in enumerate(names)}
         spans = range(min(len(one.movements) for one in sampled.values()))
         movements = [{k: one.movements[span] for k, one in sampled.items()} for span in spans]
-        zones = moving_zones(movements, cameras, axis_vector(recording.up))
-        still: dict[int, Bool[np.ndarray, "rows columns"]] = {}
+        up = axis_vector(recording.up)
+        zones, still = moving_zones(movements, cameras, up), dict[int, Bool[np.ndarray, "rows columns"]]()
+        moving = {k: np.any(one.movements, axis=0) for k, one in sampled.items()}
+        shown = {k: one.even.reference for k, one in sampled.items()}
         if left_out is None and np.mean([zone.mean() for zone in zones.values()]) > MUCH_UNKNOWN:
-            moving = {k: np.any(one.movements, axis=0) for k, one in sampled.items()}
-            still = still_zones(zones, moving, {k: one.even.reference for k, one in sampled.items()}, cameras)
+            still = still_zones(zones, moving, shown, cameras)
         of_one = lambda k: learnt_background(sampled[k], zones[k], still.get(k), (left_out or {}).get(names[k]))
         learnt = dict(zip(sampled, pool.map(of_one, sampled), strict=True))
-        if left_out is None and not recording.example_poses:
-            anywhere = {k: np.any(one.movements, axis=0) for k, one in sampled.items()}
-            typical = {k: one.even.reference for k, one in sampled.items()}
-            bodies = still_bodies(anywhere, typical, cameras, axis_vector(recording.up))
-            behind = lambda k: with_room_behind(learnt[k], bodies[k], anywhere[k], typical[k])
+        _say_unknown(recording, 1.0 - float(np.mean([background.known.mean() for background in learnt.values()])))
+        if left_out is None and not recording.masked:
+            bodies = still_bodies(moving, shown, cameras, up)
+            behind = lambda k: with_room_behind(learnt[k], bodies[k], moving[k], shown[k])
             learnt = dict(zip(sampled, pool.map(behind, sampled), strict=True))
-    _say_unknown(recording, 1.0 - float(np.mean([background.known.mean() for background in learnt.values()])))
     nothing = lambda name: BackgroundImage.nothing(*working_size(*recording.rig.image_size(name)))
     return tuple(learnt.get(k) or nothing(name) for k, name in enumerate(names))
 

@@ -40,7 +40,8 @@ def merge_backward(setup: Setup, tracked: FrameTable) -> Merged:
     try:
         with alive("searching limbs over the clip") as work:
             keys = key_rows(len(numbers), setup.clip.fps)
-            found = merge_passes(setup.tracker, passed, of_rows, keys, partial(setattr, work, "share"))
+            turning = turning_rows(len(numbers), setup.clip.fps)
+            found = merge_passes(setup.tracker, passed, of_rows, keys, turning, partial(setattr, work, "share"))
     except InputError as error:
         say(f"warning: limbs were not searched over the clip, which stays as it was tracked: {error}")
         return Merged(tracked)
@@ -58,6 +59,17 @@ KEY_SECONDS = 0.15
 def key_rows(num_rows: int, fps: float) -> range:
     """The frames of a clip in which limbs are searched."""
     return range(0, num_rows, max(round(KEY_SECONDS * fps), 1))
+
+
+FEWEST_TURNED, TURNED_SECONDS = 3, 2.0
+"""Frames of a clip in which actors are turned back to front, at least, and the time between them, at most: in one frame
+an actor may not move, and then little tells; each costs about half a second."""
+
+
+def turning_rows(num_rows: int, fps: float) -> list[int]:
+    """The frames in which actors are turned: the middles of equal parts of the clip."""
+    count = max(FEWEST_TURNED, int(np.ceil(num_rows / (TURNED_SECONDS * fps))))
+    return sorted({int((k + 0.5) * num_rows / count) for k in range(count)})
 
 
 def _columns(revised: Revised) -> dict[str, object]:

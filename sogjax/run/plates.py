@@ -25,7 +25,7 @@ from sogjax.scene.plates import FittedPlate, fitted_plate
 LOOKED_AT = 9
 """Frames whose median is what a camera shows; somebody who moves is not in it."""
 BORDER = 0.02
-"""Around a mask, and what is not as in the clip, what is not used of a picture, as a part of its longer side: masks are
+"""Width left out around masks, and around what differs from the clip, as a part of a picture's longer side: masks are
 rough, shadows begin there."""
 
 

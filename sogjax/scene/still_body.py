@@ -26,8 +26,8 @@ from sogjax.scene.visual_hull import MANY, VoxelPixels, from_upright, upright
 ALIKE, AGREEING = 0.5, 0.7
 """How like the median colour a camera must see a place, 0 to 1; and the share of the cameras that must, as somebody
 else may be before some."""
-LEAST_HEIGHT = 0.35
-"""Metres: what is lower is no leg."""
+LEAST_HEIGHT, SHOES = 0.35, 0.35
+"""Metres: what is less high is no leg; and a leg begins so far above the floor, whose colour shoes may have."""
 RIM = 0.08
 """Metres around what is seen in one colour that may be somebody, too: at its edge, some cameras look past it."""
 INPAINTED = 5
@@ -85,9 +85,10 @@ def _one_color(
 ) -> tuple[Float[np.ndarray, "voxel 3"], Float[np.ndarray, "voxel"]]:
     """The median colour (0 to 1) in which voxels are seen, and the share of the cameras that see them so."""
     seen = np.stack([picture[at.rows, at.columns] for picture, at in views]) / np.float32(255.0)
-    colors = np.median(seen, axis=0)
-    weights = np.stack([at.inside for _, at in views]) + np.float32(1e-6)
-    return colors, np.average(_alike(seen, colors), axis=0, weights=weights)
+    inside = np.stack([at.inside for _, at in views])
+    colors, partly = np.median(seen, axis=0), inside.any(axis=0) & ~inside.all(axis=0)
+    colors[partly] = np.nanmedian(np.where(inside[:, partly, None], seen[:, partly], np.nan), axis=0)
+    return colors, np.average(_alike(seen, colors), axis=0, weights=inside + np.float32(1e-6))
 
 
 def _alike(seen: Float[np.ndarray, "*n 3"], color: Float[np.ndarray, "*m 3"]) -> Bool[np.ndarray, "*n"]:
@@ -115,20 +116,21 @@ def _still(
     body[:, :, top + 1 :] = False
     body[:, :, : max(round(top - TALLEST / spacing), 0)] = False
     shares = (alike & ring[:, :, None]).sum(axis=(0, 1)) / max(ring.sum(), 1)
-    floor = int(np.argmax(shares))
-    number = upright(np.arange(len(colors)), up)
-    if shares[floor] >= FLOOR:
+    floor, number = int(np.argmax(shares)), upright(np.arange(len(colors)), up)
+    seen_floor = shares[floor] >= FLOOR
+    if seen_floor:
         its_color = np.median(colors[number[:, :, floor][ring & alike[:, :, floor]]], axis=0)
         body &= ~_alike(colors, its_color)[number]
     connected: Any = label(body)
     labels: Int[np.ndarray, "x y z"] = connected[0]
-    kept = [_stands(np.nonzero(labels == k)[2] * spacing, floor * spacing) for k in range(1, connected[1] + 1)]
+    ground = floor * spacing if seen_floor else np.inf
+    kept = [_stands(np.nonzero(labels == k)[2] * spacing, ground) for k in range(1, connected[1] + 1)]
     return body & np.isin(labels, np.flatnonzero(kept) + 1)
 
 
 def _stands(heights: Float[np.ndarray, "place"], floor: float) -> bool:
-    """Whether a part is as high as a leg and reaches down to the floor; metres."""
-    return bool(np.ptp(heights) >= LEAST_HEIGHT and heights.min() <= floor + LEAST_HEIGHT)
+    """Whether a part is as high as a leg and reaches down to the floor, at most to its shoes; metres."""
+    return bool(np.ptp(heights) >= LEAST_HEIGHT and heights.min() <= floor + SHOES)
 
 
 def with_room_behind(

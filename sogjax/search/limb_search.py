@@ -86,7 +86,6 @@ class LimbSearch:
 
         From a better pose the limbs are searched again: one may have been in the place of another.
         """
-        self._turn += 1
         first = passed.poses[row]
         views = self.views(on_device(frame), first, passed.capacities)
         pose = self.with_better_limbs(views, first, first, passed.energy, self._in_vain.get(row, []))
@@ -104,6 +103,7 @@ class LimbSearch:
 
         `first` is the tracked pose, `energy` that of a frame, for scale. Poses near those `in_vain` do not count.
         """
+        self._turn += 1
         for _ in range(MOST_ROUNDS):
             better = self._better(views, first, pose, self.held_otherwise(views, pose), energy, in_vain)
             if better is None:
@@ -111,7 +111,7 @@ class LimbSearch:
             pose = better
         return pose
 
-    def apart(
+    def _apart(
         self, poses: Float[np.ndarray, "other dof"], pose: Float[np.ndarray, "dof"]
     ) -> Float[np.ndarray, "other"]:
         """Metres between poses and one, mean over the blobs of the limb that differs most."""
@@ -144,10 +144,10 @@ class LimbSearch:
         if not len(starts):
             return None
         ends, gains = self.climbed(views, pose, starts, np.where(np.arange(len(starts)) < len(held), FEW, MORE))
-        good = (gains > WORTH * energy) & (self.apart(ends, pose) > APART) & self.possible(first, ends)
+        good = (gains > WORTH * energy) & (self._apart(ends, pose) > APART) & self.possible(first, ends)
         times = np.zeros(len(ends), int)
         for other, count in in_vain:
-            times += count * (self.apart(ends, other) <= APART)
+            times += count * (self._apart(ends, other) <= APART)
         good &= times < IN_VAIN
         return ends[np.argmax(np.where(good, gains, -np.inf))] if good.any() else None
 
@@ -158,8 +158,15 @@ class LimbSearch:
         starts: Float[np.ndarray, "start dof"],
         shares: Float[np.ndarray, "start"],
     ) -> tuple[Float[np.ndarray, "start dof"], Float[np.ndarray, "start"]]:
-        """At most `MOST_WHOLE + 1` poses climbed, each as far as `climbed_in`, and what they gain over a known pose."""
-        more = MOST_WHOLE + 1 - len(starts)
+        """Poses climbed, each by a share of the solver's most iterations, and what they gain over a known pose."""
+        most = MOST_WHOLE + 1
+        if len(starts) > most:
+            parts = [slice(k, k + most) for k in range(0, len(starts), most)]
+            found_there = [self.climbed(views, known, starts[part], shares[part]) for part in parts]
+            return np.concatenate([ends for ends, _ in found_there]), np.concatenate(
+                [gains for _, gains in found_there]
+            )
+        more = most - len(starts)
         padded = np.stack([*starts, *[known] * more]).astype(known.dtype)
         arrays = jnp.asarray(known), jnp.asarray(padded), jnp.asarray(len(starts))
         found = climbed_in(self.tracker, views, *arrays, jnp.asarray(np.pad(shares, (0, more)), known.dtype))

@@ -1,7 +1,7 @@
 """Other passes: each part of the body is taken from the pass that explains it better, over time.
 
-In key frames all over the clip limbs are held in other ways, in a few frames actors are turned round, and where that
-is worth more than what was tracked, a pass goes from there both ways. Where limbs are in doubt then, a pass comes
+In key frames all over the clip limbs are held in other ways, and in a few frames actors are turned back to front. Where
+that is worth more than what was tracked, a pass goes from there both ways. Where limbs are in doubt then, a pass comes
 backwards from behind: a limb that is lost is often found again by itself, and what hid it, or moved too far for one
 frame, comes from the other side.
 """
@@ -35,7 +35,7 @@ from sogjax.search.other_pass import (
     compared_both_ways,
 )
 from sogjax.search.pose_search import Report, unreported
-from sogjax.search.turned_body import turned_pose, turned_rows
+from sogjax.search.turned_body import turned_pose
 from sogjax.tracking.capacity import views_near
 from sogjax.tracking.frame import AnyFrame, FrameInput, on_device
 from sogjax.tracking.tracker import Tracker
@@ -77,14 +77,21 @@ def in_doubt(passed: Pass) -> Bool[np.ndarray, "frame"]:
 
 
 def merge_passes(
-    tracker: Tracker, passed: Pass, frames: FramesOfRows, key_rows: Sequence[int] = (), report: Report = unreported
+    tracker: Tracker,
+    passed: Pass,
+    frames: FramesOfRows,
+    key_rows: Sequence[int] = (),
+    turning_rows: Sequence[int] = (),
+    report: Report = unreported,
 ) -> Revision:
-    """Where another pass explains parts of the body better; `key_rows` are the frames in which limbs are searched.
+    """Where another pass explains parts of the body better.
 
-    `frames` reads what is seen in rows of `passed`; the tracker must judge limbs.
+    Limbs are searched in `key_rows`, actors turned back to front in `turning_rows`. `frames` reads what is seen in rows
+    of `passed`; the tracker must judge limbs.
     """
     own = {name: getattr(passed, name).copy() for name in ("poses", "doubts", "energies")}
     revising = _Revising(tracker, replace(passed, **own), frames)
+    revising.turn_actors(turning_rows)
     revising.search_limbs(key_rows, report)
     while (stretch := revising.next_stretch()) is not None:
         revising.take(compared_backwards(tracker, revising.passed, frames, revising.parts, *stretch))
@@ -117,9 +124,8 @@ class _Revising:
         Frames that changed meanwhile are searched again: a limb may have been in the place of another.
         """
         search = LimbSearch.of(self.tracker)
-        if search is None or not rows:
+        if search is None:
             return
-        self._turn_actors(search)
         self._search_limbs(search, rows, report)
         for _ in range(MOST_SWEEPS - 1):
             changed = [row for row in rows if row in self._changed]
@@ -132,13 +138,17 @@ class _Revising:
             self._search_limbs(search, lost, unreported)
         self._looked_at = 0  # what comes backwards from behind doubts may look at as much
 
-    def _turn_actors(self, search: LimbSearch) -> None:
-        """See where it leads if an actor is the other way round in a few frames all over the clip."""
-        wholes = [part for part in self.parts if part.whole is None]
-        for row in turned_rows(len(self.passed.poses)):
+    def turn_actors(self, rows: Sequence[int]) -> None:
+        """See where it leads if an actor is back to front in some frames."""
+        search, wholes = LimbSearch.of(self.tracker), [part for part in self.parts if part.whole is None]
+        for row in rows:
+            if search is None or self._tired():
+                break
             pose = turned_pose(search, wholes, self._frame(row), self.passed, row)
             if pose is not None:
                 self._pass_from(search, row, pose)
+        self._changed.clear()  # limbs are searched all over the clip next
+        self._looked_at = 0
 
     def _search_limbs(self, search: LimbSearch, rows: Sequence[int], report: Report) -> None:
         for number, row in enumerate(rows):

@@ -83,7 +83,7 @@ def limb_pairs(body: Body) -> list[Int[np.ndarray, "blob"]]:
             continue
         others = [k for k, other in enumerate(every_limb) if np.isin(other, dofs[limb]).any()]
         found.append(np.flatnonzero(of_limb | blobs[others].any(axis=0)))
-    return found
+    return [pair for pair in found if len(pair)]
 
 
 @eqx.filter_jit

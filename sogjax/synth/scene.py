@@ -40,7 +40,7 @@ def value_noise(uv: Coordinates, seed: int) -> Float[np.ndarray, "n"]:
     """Smooth random values in 0..1 on a lattice of unit spacing."""
     lattice = np.random.default_rng([seed, 977]).random((256, 256), np.float32)
     whole = np.floor(uv)
-    share, cell = (uv - whole).astype(float), whole.astype(np.int32)
+    share, cell = uv.astype(float) - whole, whole.astype(np.int32)
     share = share * share * (3.0 - 2.0 * share)
     x0, y0 = cell[:, 0] & 255, cell[:, 1] & 255
     x1, y1 = (x0 + 1) & 255, (y0 + 1) & 255
