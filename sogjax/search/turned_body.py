@@ -17,8 +17,8 @@ from sogjax.search.other_pass import Pass
 from sogjax.tracking.frame import AnyFrame, on_device
 
 PROMISING = -0.01
-"""Part of a frame's energy that a turned actor, climbed, may be worth less for its limbs to be searched, too: limbs that
-are still those of the other side cost about as much."""
+"""Part of a frame's energy that a turned actor may be worth less, climbed, for its limbs to be searched, too: those of
+the other side cost about as much."""
 WHOLE = 1.0
 """Part of the solver's most iterations that a turned actor is climbed by."""
 
