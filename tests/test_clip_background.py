@@ -9,6 +9,8 @@ import pytest
 from rig_cases import recording_of, ring_rig
 
 from sogjax.errors import InputError
+from sogjax.io.example_poses import ExamplePose
+from sogjax.run import background, clip_learning
 from sogjax.run.background import learn_background, said_if_none
 from sogjax.run.clip import Clip
 from sogjax.run.shared import SHARED
@@ -17,6 +19,7 @@ from sogjax.scene.cells import CellGrid
 from sogjax.scene.clip_background import SampledCamera, even_samples, learnt_background
 from sogjax.scene.foreground import foreground_probability
 from sogjax.scene.moving_zone import filled
+from sogjax.scene.still_body import still_bodies
 
 SIZE = (128, 96)
 RNG = np.random.default_rng(0)
@@ -205,3 +208,19 @@ def test_a_background_is_kept_in_the_cache_and_made_anew_for_other_frames(tmp_pa
         np.testing.assert_array_equal(one.known, other.known)
     of(replace(recording, num_frames=29), "clip", cache)
     assert "made again" in capsys.readouterr().err
+
+
+def test_who_stands_still_is_looked_for_only_where_no_masks_tell_who_it_is(tmp_path, monkeypatch):
+    """Kept backgrounds of both kinds are told apart."""
+    asked = []
+    monkeypatch.setattr(clip_learning, "still_bodies", lambda *given: asked.append(1) or still_bodies(*given))
+    recording, cache = filmed(tmp_path / "clip", num_frames=30), str(tmp_path / "cache")
+    of(recording, "clip", cache)
+    assert asked == [1]
+    name = recording.rig.names[0]
+    for masks in ({}, {name: tmp_path / "mask.png"}):
+        example = ExamplePose("stand", None, {name: tmp_path / "stand.jpg"}, masks, None)
+        with monkeypatch.context() as patch:
+            patch.setattr(background, "with_example_plates", lambda _, learnt: (learnt, 0.0))
+            of(replace(recording, example_poses=(example,)), "clip", cache)
+    assert asked == [1]  # without masks it is the kept one, with masks one without the search
