@@ -264,6 +264,18 @@ def test_a_limb_is_taken_to_its_place_though_the_trunk_is_turned():
     assert off(means)[~parts[limb].blobs].mean() < 0.01
 
 
+def test_an_actor_is_not_turned_back_within_a_frame_where_its_limbs_would_fly():
+    body = shipped("human")
+    parts = body_parts(body)
+    whole = next(k for k, part in enumerate(parts) if part.whole is None)
+    apart, gains = np.zeros((8, len(parts))), np.zeros((8, len(parts)))
+    apart[:, whole], gains[:, whole] = 0.13, [-0.01, -0.01, -0.01, 0.03, 0.03, 0.03, 0.03, 0.03]
+    held = select_parts(parts, apart, gains, 1.0, (True, True))[:, whole]
+    assert held.tolist() == [False] * 3 + [True] * 5
+    apart[:, [k for k, part in enumerate(parts) if part.whole == whole]] = 1.0
+    assert select_parts(parts, apart, gains, 1.0, (True, True))[:, whole].all()
+
+
 def test_actors_are_parts_of_their_own():
     body = concatenate([replace(shipped("dog"), name="rex"), replace(shipped("dog"), name="bello")])
     parts = body_parts(body)

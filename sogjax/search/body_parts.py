@@ -154,7 +154,8 @@ def select_parts(
         ]
         more = gains[:, k] - np.maximum(gains[:, alone], 0.0).sum(axis=1)  # of a pair, than of its limbs by themselves
         worth = np.where(whole > costs.apart, 0.0, more / energy) - bias[:, k]
-        found = best_choice(worth, costs.change * apart[:, k], open_ends)
+        own = [j for j, other in enumerate(parts) if other.whole == k]  # an actor moves as far as its limbs do
+        found = best_choice(worth, costs.change * apart[:, [k, *own]].max(axis=1), open_ends)
         for stretch in (slice(*ends) for ends in stretches(found)):
             taken[stretch, k] = apart[stretch, k].max() > costs.apart
     return taken
