@@ -26,6 +26,7 @@ from sogjax.quality.metrics import stretches
 from sogjax.search.body_parts import body_parts, merged_pose, select_parts
 from sogjax.search.limb_search import DEEP, MORE, LimbSearch, climbed_in
 from sogjax.search.other_pass import (
+    PATIENCE,
     SURE_FRAMES,
     BothSeen,
     Compared,
@@ -51,6 +52,9 @@ only few draws lead to where an arm is."""
 MOST_LOOKS, MORE_LOOKS = 1, 2
 """Frames of other passes that gain nothing, at most, in lengths of the clip; and how many more, from where a limb is
 likely lost, in numbers of such frames."""
+
+TURNED_PATIENCE = 20
+"""`PATIENCE` of a pass with an actor turned: while he stands still, front and back are worth the same."""
 
 
 @dataclass(frozen=True)
@@ -146,7 +150,7 @@ class _Revising:
                 break
             pose = turned_pose(search, wholes, self._frame(row), self.passed, row)
             if pose is not None:
-                self._pass_from(search, row, pose)
+                self._pass_from(search, row, pose, TURNED_PATIENCE)
         self._changed.clear()  # limbs are searched all over the clip next
         self._looked_at = 0
 
@@ -162,9 +166,11 @@ class _Revising:
     def _frame(self, row: int) -> AnyFrame:
         return next(iter(self.frames(range(row, row + 1))))
 
-    def _pass_from(self, search: LimbSearch, row: int, pose: Float[np.ndarray, "dof"]) -> None:
+    def _pass_from(
+        self, search: LimbSearch, row: int, pose: Float[np.ndarray, "dof"], patience: int = PATIENCE
+    ) -> None:
         """Go both ways from another pose of a frame, and take what that explains better."""
-        found = compared_both_ways(self.tracker, self.passed, self.frames, self.parts, row, pose)
+        found = compared_both_ways(self.tracker, self.passed, self.frames, self.parts, row, pose, patience)
         changed = self.take(self._without_impossible(search, found))
         search.forget_in_vain(changed)
         if not changed:

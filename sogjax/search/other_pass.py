@@ -113,14 +113,15 @@ def compared_both_ways(
     parts: Sequence[Part],
     row: int,
     pose: Float[np.ndarray, "dof"],
+    patience: int = PATIENCE,
 ) -> Compared:
-    """Track from another pose of a frame, backwards and forwards, until the passes agree."""
+    """Track from another pose of a frame, backwards and forwards, until the passes agree, or `patience` ends."""
     start = replace(TrackState.from_pose(jnp.asarray(pose)), baseline=jnp.asarray(passed.baseline[row]))
     ways = (
         range(row, max(row - MOST_FRAMES, -1), -1),
         range(row, min(row + MOST_FRAMES, len(passed.poses))),
     )
-    back, forth = (compared(tracker, passed, frames, parts, start, way, 1, PATIENCE) for way in ways)
+    back, forth = (compared(tracker, passed, frames, parts, start, way, 1, patience) for way in ways)
     return back.joined(forth)
 
 
