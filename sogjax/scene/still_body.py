@@ -61,8 +61,8 @@ def still_bodies(
 
     By camera, `movements` are where anything moves in the clip, and `pictures` (BGR) are typical ones of it.
     """
-    nothing, views = {k: np.zeros_like(mask) for k, mask in movements.items()}, CoarseViews.of(movements, cameras)
-    nowhere = {k: Standing(none, none) for k, none in nothing.items()}
+    nowhere = {k: Standing(np.zeros_like(mask), np.zeros_like(mask)) for k, mask in movements.items()}
+    views = CoarseViews.of(movements, cameras)
     if views is None or len(views.moving) < MANY:
         return nowhere
     misses = np.sum([*views.missed(views.moving).values()], axis=0)
@@ -75,9 +75,7 @@ def still_bodies(
     shown = {k: at.silhouette_of(still) for k, at in views.pixels.items()}
     rim = {k: round(RIM / views.cube.spacing * at.footprint) for k, at in views.pixels.items()}
     large = lambda k, mask: enlarged(mask, movements[k].shape) & ~movements[k]
-    surely = {k: large(k, mask) for k, mask in shown.items()}
-    perhaps = {k: large(k, widened(mask, rim[k])) for k, mask in shown.items()}
-    return nowhere | {k: Standing(surely[k], perhaps[k]) for k in shown}
+    return nowhere | {k: Standing(large(k, mask), large(k, widened(mask, rim[k]))) for k, mask in shown.items()}
 
 
 def _one_color(
