@@ -1,5 +1,9 @@
 """How XLA compiles is ours, unless somebody names one or another device may be used."""
 
+import os
+import subprocess
+import sys
+
 import pytest
 
 from sogjax.run import compilation_cache as compiler_options
@@ -12,14 +16,24 @@ def flags_as_before(monkeypatch):
     monkeypatch.setattr(compiler_options, "entry_points", lambda group: ())
 
 
-OURS = " ".join(f"{option}={value}" for option, value in compiler_options.COMPILER_OPTIONS.items())
+OPTIONS = compiler_options.COMPILER_OPTIONS
 
 
 def test_the_options_are_set_once_beside_others(monkeypatch):
+    monkeypatch.setattr(compiler_options, "version", lambda package: "0.10.2")
     monkeypatch.setenv(COMPILER_VARIABLE, "--xla_dump_to=there")
+    ours = " ".join(f"{option}={value}" for option, value in OPTIONS.items())
     for _ in range(2):
         use_compiler_options()
-        assert compiler_options.os.environ[COMPILER_VARIABLE] == f"--xla_dump_to=there {OURS}"
+        assert compiler_options.os.environ[COMPILER_VARIABLE] == f"--xla_dump_to=there {ours}"
+
+
+def test_the_jaxlib_that_is_installed_knows_the_options_that_it_is_given(tmp_path):
+    use_compiler_options()
+    given = {**os.environ, "JAX_PLATFORMS": "cpu"}
+    assert given[COMPILER_VARIABLE]
+    ran = subprocess.run([sys.executable, "-c", "import jax; jax.devices()"], env=given, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr
 
 
 def test_a_level_that_somebody_names_stays(monkeypatch):

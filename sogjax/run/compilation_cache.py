@@ -41,8 +41,8 @@ to compile, and runs no faster."""
 LAPACK_VARIABLE = "OPENBLAS_NUM_THREADS"
 """Threads of LAPACK, which factorises what is too small for several: those that wait for work took more time of the
 processors than all else that the shape of an actor is fitted with."""
-TRIED_JAXLIB = "0.10."
-"""How versions of jaxlib begin that know all of these options: XLA ends the process at one that it does not know."""
+KNOWN = {"0.10.": tuple(COMPILER_OPTIONS), "0.11.": (LEVEL, "--xla_cpu_enable_concurrency_optimized_scheduler")}
+"""The options that a jaxlib knows whose version begins so; XLA ends the process at one that it does not know."""
 _NOT_OF_THIS_MACHINE = "AOT result"
 """Part of what is written to standard error about a program that may not run on this processor."""
 _DAMAGED = re.compile(r"Error (reading|writing) persistent compilation cache entry for '([^']+)'")
@@ -58,7 +58,7 @@ def use_compiler_options() -> None:
     if entry_points(group="jax_plugins"):
         return
     flags = os.environ.get(COMPILER_VARIABLE, "")
-    known = list(COMPILER_OPTIONS) if version("jaxlib").startswith(TRIED_JAXLIB) else [LEVEL]
+    known = next((options for start, options in KNOWN.items() if version("jaxlib").startswith(start)), (LEVEL,))
     chosen = [f"{option}={COMPILER_OPTIONS[option]}" for option in known if option not in flags]
     os.environ[COMPILER_VARIABLE] = " ".join([flags, *chosen]).strip()
 
