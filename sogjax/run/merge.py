@@ -7,10 +7,13 @@ import numpy as np
 
 from sogjax.errors import InputError, counted
 from sogjax.io.frame_table import TERM, FramesRecord, FrameTable
+from sogjax.quality.fitted import fitted_numbers
+from sogjax.quality.verdict import expected_of
 from sogjax.run.frames import capacities_of
 from sogjax.run.setup import Setup
 from sogjax.run.terminal import alive, say
 from sogjax.search.merge_passes import Revised, merge_passes
+from sogjax.search.misplaced import Misplaced
 from sogjax.search.other_pass import Pass
 from sogjax.tracking.frame import FrameInput
 
@@ -41,7 +44,8 @@ def merge_backward(setup: Setup, tracked: FrameTable) -> Merged:
         with alive("searching limbs over the clip") as work:
             keys = key_rows(len(numbers), setup.clip.fps)
             turning = turning_rows(len(numbers), setup.clip.fps)
-            found = merge_passes(setup.tracker, passed, of_rows, keys, turning, partial(setattr, work, "share"))
+            report = partial(setattr, work, "share")
+            found = merge_passes(setup.tracker, passed, of_rows, keys, turning, misplaced(setup, tracked), report)
     except InputError as error:
         say(f"warning: limbs were not searched over the clip, which stays as it was tracked: {error}")
         return Merged(tracked)
@@ -70,6 +74,19 @@ def turning_rows(num_rows: int, fps: float) -> list[int]:
     """The frames in which actors are turned: the middles of equal parts of the clip."""
     count = max(FEWEST_TURNED, int(np.ceil(num_rows / (TURNED_SECONDS * fps))))
     return sorted({int((k + 0.5) * num_rows / count) for k in range(count)})
+
+
+def misplaced(setup: Setup, tracked: FrameTable) -> Misplaced | None:
+    """The search for actors who seem to be somebody else where they are tracked; None: nothing tells."""
+    if tracked.explained is None:
+        return None
+    bounds, expected = fitted_numbers().verdict, expected_of(setup.bodies)
+    least = [
+        bounds.other_subject * expected[body.name] if body.name in expected else bounds.least_explained
+        for body in setup.bodies
+    ]
+    up = setup.clip.recording.up
+    return Misplaced(setup.tracker, setup.bodies, up, np.asarray(tracked.explained, float), np.array(least))
 
 
 def _columns(revised: Revised) -> dict[str, object]:

@@ -25,6 +25,7 @@ from sogjax.quality.limb_warnings import LIKELY_LOST
 from sogjax.quality.metrics import stretches
 from sogjax.search.body_parts import body_parts, merged_pose, select_parts
 from sogjax.search.limb_search import DEEP, MORE, LimbSearch, climbed_in
+from sogjax.search.misplaced import Misplaced
 from sogjax.search.other_pass import (
     PATIENCE,
     SURE_FRAMES,
@@ -86,15 +87,18 @@ def merge_passes(
     frames: FramesOfRows,
     key_rows: Sequence[int] = (),
     turning_rows: Sequence[int] = (),
+    misplaced: Misplaced | None = None,
     report: Report = unreported,
 ) -> Revision:
     """Where another pass explains parts of the body better.
 
-    Limbs are searched in `key_rows`, actors turned back to front in `turning_rows`. `frames` reads what is seen in rows
-    of `passed`; the tracker must judge limbs.
+    Limbs are searched in `key_rows`, actors turned back to front in `turning_rows`, and those `misplaced` looked for.
+    `frames` reads what is seen in rows of `passed`; the tracker must judge limbs.
     """
     own = {name: getattr(passed, name).copy() for name in ("poses", "doubts", "energies")}
     revising = _Revising(tracker, replace(passed, **own), frames)
+    if misplaced is not None:
+        revising.place_actors(misplaced)
     revising.turn_actors(turning_rows)
     revising.search_limbs(key_rows, report)
     while (stretch := revising.next_stretch()) is not None:
@@ -141,6 +145,20 @@ class _Revising:
             self._looked_at += len(lost)  # a look costs about as much as a frame of a pass
             self._search_limbs(search, lost, unreported)
         self._looked_at = 0  # what comes backwards from behind doubts may look at as much
+
+    def place_actors(self, misplaced: Misplaced) -> None:
+        """See where it leads if an actor of whom little is explained is where he is found again."""
+        search = LimbSearch.of(self.tracker)
+        for row, actor in misplaced.places():
+            if search is None or self._tired():
+                break
+            pose = misplaced.pose(search, self._frame(row), self.passed, row, actor)
+            if pose is not None:
+                self._pass_from(search, row, pose, TURNED_PATIENCE)
+                for changed in self._changed:
+                    misplaced.explained[changed] = self.revision.frames[changed].judged.explained
+        self._changed.clear()
+        self._looked_at = 0
 
     def turn_actors(self, rows: Sequence[int]) -> None:
         """See where it leads if an actor is back to front in some frames."""
