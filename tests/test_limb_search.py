@@ -1,7 +1,6 @@
 """Limbs held in other ways: what a part adds to the energy, which ways are tried, what is found undoubted."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import equinox as eqx
 import jax
@@ -21,7 +20,7 @@ from sogjax.energy.posed import History
 from sogjax.energy.views import Windows
 from sogjax.model.body import concatenate
 from sogjax.model.limbs import limb_names
-from sogjax.model.solid import Solid
+from sogjax.model.solid import Solid, impossible
 from sogjax.search import limb_search
 from sogjax.search.limb_search import LimbSearch, climbed_in, compile_search
 from sogjax.search.limb_ways import Units, drawn_ways, look_alikes, units_of
@@ -162,24 +161,14 @@ def test_what_is_compiled_beforehand_is_what_the_search_for_limbs_takes(walking_
     assert not traces
 
 
-def test_legs_are_the_deeper_in_each_other_the_more_one_is_turned_in():
+def test_a_pose_is_the_less_likely_the_deeper_a_leg_is_in_the_other():
     body = shipped("human")
-    rest, side = np.asarray(body.poses["rest"]), body.skeleton.dof_names.index("left_hip_side")
-    search = SimpleNamespace(solid=Solid.of(body), tracker=SimpleNamespace(body=body))
-
-    def depths(turned):
-        pose = rest.copy()
-        pose[side] = turned
-        return LimbSearch.impossible_depths(search, rest, pose)
-
-    assert not depths(-0.1).any()
-    slight, deep = depths(-0.2), depths(-0.4)
-    shank = body.blobs.names.index("left_shank1")
-    assert 0.0 < slight[shank] < deep[shank]
-    assert not deep[[k for k, name in enumerate(body.blobs.names) if "arm" in name or "chest" in name]].any()
-    known = rest.copy()
-    known[side] = -0.4
-    assert not LimbSearch.impossible_depths(search, known, known).any()  # it was as deep before
+    solid, side = Solid.of(body), body.skeleton.dof_names.index("left_hip_side")
+    poses = np.tile(np.asarray(body.poses["rest"]), (5, 1))
+    poses[:, side] = (0.0, -0.1, -0.3, -0.4, -0.8)
+    none, apart, slight, deep, deepest = np.asarray(impossible(solid, body, jnp.asarray(poses)))
+    assert none == apart == 0.0
+    assert 0.0 < slight < deep <= deepest == 1.0
 
 
 def test_no_pass_begins_where_one_went_in_vain(walking_dog, monkeypatch):

@@ -8,6 +8,7 @@ from body_cases import shipped
 from drawn_scene import cells_of, draw, in_colors, make_tracker, standing
 from rig_cases import ring_rig
 
+from sogjax.model.solid import Solid
 from sogjax.quality.limb_evidence import LimbBlobs
 from sogjax.scene.foreground import subject_colors
 from sogjax.search.other_pass import Pass
@@ -25,7 +26,7 @@ def judging_tracker(body, rig):
     table = subject_colors(np.asarray(body.blob_colors), np.asarray(body.blob_sigmas) ** 2)
     tracker = make_tracker(body, rig, DEPTH, solver=GaussNewton())
     reader = replace(tracker.reader, subject=jnp.asarray(table, jnp.float32))
-    return replace(tracker, reader=reader, limbs=LimbBlobs.from_body(body), pairs="sparse")
+    return replace(tracker, reader=reader, limbs=LimbBlobs.from_body(body), solid=Solid.of(body), pairs="sparse")
 
 
 def pass_of(frames):

@@ -19,6 +19,11 @@ RADIUS = 1.35
 """Of the disc that a blob of sigma 1 stands for."""
 SOFT = 0.02
 """Metres by which two parts may always be in each other: clothes and flesh give way."""
+DEEP = 0.04
+"""Metres beyond that, and beyond all named poses, that a pose may not be deeper than one that is known."""
+UNLIKELY, IMPOSSIBLE = 0.07, 0.11
+"""Metres from which on a pose is the less likely the deeper it is, and from which on it is impossible: two who dance or
+talk are up to 0.07 in each other, and legs of who runs for an instant; legs that were exchanged are 0.1."""
 
 
 class Solid(eqx.Module):
@@ -87,6 +92,11 @@ class Solid(eqx.Module):
         """By how much each pair is deeper than is allowed (metres); 0 where it is not."""
         return jnp.maximum(self.depths(means) - self.allowed, 0.0)
 
+    def impossible(self, means: Float[Array, "blob 3"]) -> Float[Array, ""]:
+        """How impossible it is that the blobs are there, 0 to 1, as the pair says that is deepest."""
+        deepest = jnp.max(self.excess(means), initial=0.0)
+        return jnp.clip((deepest - UNLIKELY) / (IMPOSSIBLE - UNLIKELY), 0.0, 1.0)
+
 
 @eqx.filter_jit
 def _deepest(solid: Solid, body: Body, poses: Float[Array, "start dof"]) -> Float[Array, "pair"]:
@@ -97,6 +107,12 @@ def _deepest(solid: Solid, body: Body, poses: Float[Array, "start dof"]) -> Floa
 @eqx.filter_jit
 def _excess(solid: Solid, body: Body, poses: Float[Array, "start dof"]) -> Float[Array, "start pair"]:
     return jax.vmap(lambda pose: solid.excess(body.posed_blobs(pose).means))(poses)
+
+
+@eqx.filter_jit
+def impossible(solid: Solid, body: Body, poses: Float[Array, "start dof"]) -> Float[Array, "start"]:
+    """How impossible poses are, 0 to 1."""
+    return jax.vmap(lambda pose: solid.impossible(body.posed_blobs(pose).means))(poses)
 
 
 def segment_distance(one: Float[Array, "2 3"], two: Float[Array, "2 3"]) -> Float[Array, ""]:

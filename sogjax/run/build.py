@@ -19,6 +19,7 @@ from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.color import COLOR_RADIUS
+from sogjax.model.solid import Solid
 from sogjax.quality.limb_evidence import LimbBlobs
 from sogjax.quality.markers import MARKER_RULES, MarkerRule
 from sogjax.run.background import CHOICES, Background
@@ -194,6 +195,7 @@ def tracker(clip: Clip, background: Background, body: Body, config: TrackConfig,
         extrapolation=config.tracking.extrapolation,
         pairs=pair_choice(config.energy),
         limbs=LimbBlobs.from_body(body) if config.outputs.confidence else None,
+        solid=Solid.of(body) if config.tracking.both_ways else None,
     )
 
 

@@ -16,10 +16,11 @@ from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.part_energy import PartEnergy, PartIndex
 from sogjax.energy.posed import History
 from sogjax.energy.views import Views
-from sogjax.model.solid import Solid
+from sogjax.model.solid import DEEP, impossible
 from sogjax.search.limb_ways import CROSSED, Unit, Units, drawn_ways, look_alikes, units_of
 from sogjax.search.other_pass import REACH, Pass
 from sogjax.search.placed_body import means_of
+from sogjax.search.worth import IMPOSSIBLE, worth
 from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.tracking.capacity import views_near
 from sogjax.tracking.culling import Capacities
@@ -42,8 +43,6 @@ there, and what it gains then for a pass to go from there."""
 CROSSED_SLACK, CROSSED_APART = -0.01, 0.03
 """What hands or feet that are exchanged gain at least, as a part of a frame's energy, to be climbed with the whole body
 (with the rest held, elbows are not where they would be), and how far they then are, as `APART`."""
-DEEP = 0.04
-"""Metres that limbs may be deeper in each other, or in the trunk, than in any named pose."""
 IN_VAIN = 2
 """Passes in vain that hold a pose in a frame, from which on none begins there."""
 MOST_ROUNDS = 3
@@ -55,7 +54,6 @@ class LimbSearch:
 
     def __init__(self, tracker: Tracker, units: Sequence[Unit], arrays: Units) -> None:
         self.tracker, self.units, self.arrays = tracker, units, arrays
-        self.solid = Solid.of(tracker.body)
         self._turn = 0
         self._carried: HeldOtherwise | None = None
         self._in_vain: dict[int, list[tuple[np.ndarray, int]]] = {}
@@ -181,7 +179,9 @@ class LimbSearch:
         energy: float,
     ) -> tuple[Float[np.ndarray, "start dof"], Float[np.ndarray, "crossed dof"]]:
         """What is possible and worth climbing: the best ways of all units together, single ones; and crossed ends."""
-        gains = np.where(found.apart > APART, found.gains, -np.inf)
+        known = self._impossible(pose[None])[0]
+        cheaper = lambda poses: IMPOSSIBLE * energy * (known - self._impossible(np.asarray(poses)))
+        gains = np.where(found.apart > APART, found.gains + cheaper(found.poses), -np.inf)
         best, starts = gains.argmax(axis=1), []
         gaining = [k for k, way in enumerate(best) if gains[k, way] > 0.0]
         if len(gaining) > 1:
@@ -193,7 +193,7 @@ class LimbSearch:
         order = np.argsort(-gains, axis=None)
         promising = order[gains.reshape(-1)[order] > SLACK * energy]
         starts = np.array([*starts, *found.poses.reshape(-1, len(pose))[promising]]).reshape(-1, len(pose))
-        crossed = np.where(found.crossed_apart > CROSSED_APART, found.crossed_gains, -np.inf)
+        crossed = np.where(found.crossed_apart > CROSSED_APART, found.crossed_gains + cheaper(found.crossed), -np.inf)
         likeliest = found.crossed[[int(np.argmax(crossed))]] if crossed.max() > CROSSED_SLACK * energy else starts[:0]
         allowed = lambda poses: poses[self.possible(first, poses)]
         return allowed(starts)[:MOST_WHOLE], allowed(likeliest)
@@ -202,18 +202,17 @@ class LimbSearch:
         self, known: Float[np.ndarray, "dof"], poses: Float[np.ndarray, "start dof"]
     ) -> Bool[np.ndarray, "start"]:
         """Which poses hold nothing deep in something else, but for what is as deep in the known one."""
-        return self.solid.deeper(self.tracker.body, known, poses).max(axis=1, initial=0.0) <= DEEP
+        solid = self.tracker.solid
+        if solid is None:
+            return np.ones(len(poses), bool)
+        return solid.deeper(self.tracker.body, known, poses).max(axis=1, initial=0.0) <= DEEP
 
-    def impossible_depths(
-        self, known: Float[np.ndarray, "dof"], pose: Float[np.ndarray, "dof"]
-    ) -> Float[np.ndarray, "blob"]:
-        """Metres by which a pose holds each blob deeper than may be, in something else, and a known one does not."""
-        beyond = self.solid.deeper(self.tracker.body, known, pose[None])[0] - DEEP
-        depths = np.zeros(self.tracker.body.num_blobs)
-        for pair in np.flatnonzero(beyond > 0.0):
-            blobs = self.solid.blobs_of(np.arange(len(beyond)) == pair)
-            depths[blobs] = np.maximum(depths[blobs], beyond[pair])
-        return depths
+    def _impossible(self, poses: Float[np.ndarray, "*start dof"]) -> Float[np.ndarray, "*start"]:
+        """How impossible poses are, 0 to 1."""
+        if self.tracker.solid is None:
+            return np.zeros(poses.shape[:-1], poses.dtype)
+        found = impossible(self.tracker.solid, self.tracker.body, jnp.asarray(poses.reshape(-1, poses.shape[-1])))
+        return np.asarray(found).reshape(poses.shape[:-1])
 
     def _tried(self, number: int, unit: Unit, pose: Float[np.ndarray, "dof"]) -> Float[np.ndarray, "seed dof"]:
         """Ways that are drawn, and those of the last key frame."""
@@ -257,11 +256,12 @@ def climbed_in(
         most = jnp.ceil(shares[k] * tracker.solver.max_iterations).astype(jnp.int32)
         solver = eqx.tree_at(lambda solver: solver.max_iterations, tracker.solver, most)
         solution = solver.maximize(energy, starts[k], tracker.scales)
-        return found[0].at[k].set(solution.params), found[1].at[k].set(solution.value)
+        value = worth(energy, tracker.solid, solution.params, solution.value)
+        return found[0].at[k].set(solution.params), found[1].at[k].set(value)
 
     nothing = jnp.full(len(starts), -jnp.inf, starts.dtype)
     ends, values = jax.lax.fori_loop(0, count, climb, (starts, nothing))
-    return ends, values, energy(known)
+    return ends, values, worth(energy, tracker.solid, known)
 
 
 class HeldOtherwise(eqx.Module):

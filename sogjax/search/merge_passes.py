@@ -24,7 +24,7 @@ from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.quality.limb_warnings import LIKELY_LOST
 from sogjax.quality.metrics import stretches
 from sogjax.search.body_parts import body_parts, merged_pose, select_parts
-from sogjax.search.limb_search import DEEP, MORE, LimbSearch, climbed_in
+from sogjax.search.limb_search import MORE, LimbSearch, climbed_in
 from sogjax.search.misplaced import Misplaced
 from sogjax.search.other_pass import (
     PATIENCE,
@@ -42,9 +42,6 @@ from sogjax.tracking.capacity import views_near
 from sogjax.tracking.frame import AnyFrame, FrameInput, on_device
 from sogjax.tracking.tracker import Tracker
 
-IMPOSSIBLE = 0.02
-"""Part of a frame's energy that a part costs, at most, in a frame in which it is too deep in something else; all of it
-where it is twice as deep as may be. Where hands meet, they may be a little too deep in a pass that is right."""
 MOST_SWEEPS = 3
 """Times that key frames are searched, where they changed meanwhile."""
 MORE_SWEEPS = 6
@@ -189,18 +186,10 @@ class _Revising:
     ) -> None:
         """Go both ways from another pose of a frame, and take what that explains better."""
         found = compared_both_ways(self.tracker, self.passed, self.frames, self.parts, row, pose, patience)
-        changed = self.take(self._without_impossible(search, found))
+        changed = self.take(found)
         search.forget_in_vain(changed)
         if not changed:
             search.note_in_vain(found.rows, found.poses, found.gained)
-
-    def _without_impossible(self, search: LimbSearch, found: Compared) -> Compared:
-        """The other pass; parts cost that it holds deep in something else."""
-        for k, (row, pose) in enumerate(zip(found.rows, found.poses, strict=True)):
-            depths = search.impossible_depths(self.passed.poses[row], pose)
-            deepest = np.array([depths[part.blobs].max(initial=0.0) for part in self.parts])
-            found.gains[k] -= IMPOSSIBLE * self.passed.energy * np.minimum(deepest / DEEP, 1.0)
-        return found
 
     def next_stretch(self) -> tuple[int, int] | None:
         """First and last frame of the last stretch in doubt from behind which no pass has begun."""

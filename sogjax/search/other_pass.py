@@ -19,6 +19,7 @@ from sogjax.energy.views import Views
 from sogjax.model.body import Body
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.search.body_parts import Part, PartArrays
+from sogjax.search.worth import worth
 from sogjax.tracking.capacity import views_near
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import AnyFrame, TrackState, on_device
@@ -276,7 +277,8 @@ def _energies(tracker: Tracker, views: Views, poses: Float[Array, "pose dof"]) -
 def _padded_energies(
     tracker: Tracker, views: Views, poses: Float[Array, "pose dof"], count: Int[Array, ""]
 ) -> Float[Array, "pose"]:
-    """The energies of the first `count` poses, 0 for the others."""
+    """What the first `count` poses are worth, 0 for the others."""
     energy = FrameEnergy(tracker.body, views, History.unknown(poses[0]), tracker.terms)
     values = jnp.zeros(len(poses), poses.dtype)
-    return jax.lax.fori_loop(0, count, lambda k, found: found.at[k].set(energy(poses[k])), values)
+    known = lambda k, found: found.at[k].set(worth(energy, tracker.solid, poses[k]))
+    return jax.lax.fori_loop(0, count, known, values)

@@ -23,6 +23,7 @@ from sogjax.model.camera import Camera, point_depths
 from sogjax.model.color import from_rgb
 from sogjax.model.compiled import stage_barrier
 from sogjax.model.sog import Sog
+from sogjax.model.solid import Solid
 from sogjax.quality.limb_confidence import LimbConfidence, frame_fit, limb_confidence
 from sogjax.quality.limb_evidence import LimbBlobs, blob_evidence
 from sogjax.solve.solution import Scales, Solution, Solver
@@ -53,6 +54,8 @@ class Tracker(eqx.Module):
     """Whether all pairs of blobs are compared, or those near each other."""
     limbs: LimbBlobs | None = None
     """Which are judged in every frame; None: none."""
+    solid: Solid | None = None
+    """What cannot be in one place, which searches ask; None: anything may be anywhere."""
     capacities: Capacities | None = None
     """Room for image blobs of a step that is given none."""
     initial_pose: Float[Array, "dof"] | None = None
