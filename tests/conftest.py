@@ -43,9 +43,11 @@ def be_strict():
     jax.config.update("jax_numpy_rank_promotion", "raise")
     jax.config.update("jax_numpy_dtype_promotion", "strict")
 
-    from sogjax.run.compilation_cache import use_compilation_cache  # after the hook
+    from sogjax.run import kept_programs  # after the hook
+    from sogjax.run.compilation_cache import use_compilation_cache
 
     use_compilation_cache()
+    kept_programs.hold_programs = lambda: None  # types are checked while functions are traced
 
 
 @pytest.fixture(scope="session")

@@ -18,6 +18,7 @@ from sogjax.model.body import Body
 from sogjax.model.camera import Camera, camera_of, distort, project, project_points
 from sogjax.model.color import averaging_space, from_rgb, linear_light, to_rgb
 from sogjax.model.compiled import compiled_hastily
+from sogjax.model.program import compiled
 from sogjax.model.sog import Sog
 from sogjax.search.placed_body import means_of
 
@@ -96,14 +97,14 @@ def _sample_pixels(
     return recorded.reshape(pixels.shape), ~hidden & np.asarray(seen.mask)[:, None]
 
 
-@eqx.filter_jit
+@compiled
 def _seen_blobs(body: Body, camera: Camera, pose: Float[Array, "dof"]) -> tuple[Sog, Float[Array, "blob"]]:
     """The projected blobs and their depths (metres)."""
     blobs = body.posed_blobs(pose)
     return project(camera, blobs), project_points(camera, blobs.means)[1]
 
 
-_distorted = eqx.filter_jit(distort)
+_distorted = compiled(distort)
 _from_rgb, _to_rgb = compiled_hastily(from_rgb), compiled_hastily(to_rgb)
 
 

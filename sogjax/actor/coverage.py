@@ -18,6 +18,7 @@ from jaxtyping import Array, Bool, Float
 from sogjax.energy.overlap import EXACT_EXPONENT, overlaps, self_overlaps
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, distort, project, project_points
+from sogjax.model.program import compiled
 from sogjax.model.sog import Sog
 from sogjax.scene.background_difference import reduced_mask
 from sogjax.scene.visual_hull import resized
@@ -161,7 +162,7 @@ def body_silhouette(
     return np.asarray(_coverage(body, pose, resized(camera, (shape[1], shape[0])), shape)) > BODY_LEVEL
 
 
-@eqx.filter_jit
+@compiled
 def _coverage(
     body: Body, pose: Float[Array, "dof"], camera: Camera, shape: tuple[int, int]
 ) -> Float[Array, "rows columns"]:

@@ -8,7 +8,6 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import product
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -19,6 +18,7 @@ from sogjax.energy.frame_energy import still_energy
 from sogjax.energy.term import Terms
 from sogjax.energy.views import Views
 from sogjax.model.body import Body
+from sogjax.model.program import compiled
 from sogjax.model.rotation import world_from_upright
 from sogjax.search.placed_body import centred, headings, root_rotation, turned
 from sogjax.solve.ascent import ConditionedAscent
@@ -94,12 +94,12 @@ def forward(body: Body, pose: Float[Array, "dof"], up: str) -> Float[np.ndarray,
     return turn @ world_from_upright(up)[:, 0]
 
 
-@eqx.filter_jit
+@compiled
 def _energies(body: Body, poses: Array, views: Views, terms: Terms) -> Float[Array, "start"]:
     return jax.lax.map(lambda pose: still_energy(body, pose, views, terms), poses)
 
 
-@eqx.filter_jit
+@compiled
 def _refined(
     body: Body,
     start: Float[Array, "dof"],
@@ -153,7 +153,7 @@ def _sides(body: Body, view: ColoredView, up: str) -> np.ndarray:
     return np.round(azimuth / (2.0 * np.pi / SIDES)).astype(int) % SIDES
 
 
-@eqx.filter_jit
+@compiled
 def _frames_and_means(
     body: Body, pose: Float[Array, "dof"]
 ) -> tuple[Float[Array, "joint 4 4"], Float[Array, "blob 3"]]:

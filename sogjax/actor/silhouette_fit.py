@@ -25,6 +25,7 @@ from sogjax.energy.term import Terms
 from sogjax.energy.views import Views
 from sogjax.model.camera import Camera, undistort, undistorted_sizes
 from sogjax.model.compiled import compiled_hastily
+from sogjax.model.program import compiled
 from sogjax.model.shape import ShapeModel
 from sogjax.solve.ascent import ConditionedAscent
 from sogjax.solve.gauss_newton import GaussNewton
@@ -191,7 +192,7 @@ def fitted(
     return _fitted(fit, start, scales, jnp.asarray(max_iterations))
 
 
-@eqx.filter_jit
+@compiled
 def _fitted(
     fit: SilhouetteFit, start: Float[Array, "param"], scales: Scales, max_iterations: Int[Array, ""]
 ) -> Solution:
@@ -262,10 +263,10 @@ def compile_estimate(model: ShapeModel, views: Views, silhouettes: Silhouettes, 
     estimate_shape(model, jnp.tile(model.body.poses["rest"], (num_poses, 1)), views, silhouettes, terms, (0, 0))
 
 
-_deviations = eqx.filter_jit(SilhouetteFit.deviations)
+_deviations = compiled(SilhouetteFit.deviations)
 
 
-@eqx.filter_jit
+@compiled
 def _climb(
     model: ShapeModel,
     start: Float[Array, "param"],

@@ -59,6 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             with stage(STARTING):
                 run = pkgutil.resolve_name(f"sogjax.cli.{FUNCTIONS.get(command, f'{command}:run')}")
                 compile_once()
+                pkgutil.resolve_name("sogjax.run.kept_programs:hold_programs")()
             run(config)
     except InputError as error:
         return _wrong_input(str(error))

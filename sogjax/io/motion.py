@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -16,6 +15,7 @@ from sogjax.io.export.write import export_motion
 from sogjax.io.motion_data import DEFAULT_UP, FORMAT_VERSION, MotionData, per_frame_fields
 from sogjax.io.npz_file import bool_array, finite_array, float_array, int_array, number, read_npz, text_array
 from sogjax.model.body import Body
+from sogjax.model.program import compiled
 from sogjax.model.rotation import UP_AXES
 
 FRAMES_AT_ONCE = 8
@@ -229,7 +229,7 @@ def _forward_in_blocks(
     return joint_params, world_from_joint, blob_means
 
 
-@eqx.filter_jit
+@compiled
 def _forward(
     body: Body, poses: Float[Array, "frame dof"]
 ) -> tuple[Float[Array, "frame joint"], Float[Array, "frame joint 4 4"], Float[Array, "frame blob 3"]]:

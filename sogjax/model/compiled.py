@@ -8,11 +8,12 @@ from functools import reduce
 from operator import add
 from typing import ParamSpec, TypeVar
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
+
+from sogjax.model.program import compiled
 
 Arguments = ParamSpec("Arguments")
 Results = TypeVar("Results")
@@ -23,7 +24,7 @@ def compiled_hastily(function: Callable[Arguments, Results]) -> Callable[Argumen
 
     It is there in a third of the time, and takes up to five times as long to run.
     """
-    return eqx.filter_jit(function, compiler_options={"xla_backend_optimization_level": 0})  # pyright: ignore[reportCallIssue]
+    return compiled(function, xla_backend_optimization_level=0)
 
 
 def stage_barrier(

@@ -14,6 +14,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.model.body import Body
 from sogjax.model.limbs import limb_blobs
+from sogjax.model.program import compiled
 
 RADIUS = 1.35
 """Of the disc that a blob of sigma 1 stands for."""
@@ -98,18 +99,18 @@ class Solid(eqx.Module):
         return jnp.clip((deepest - UNLIKELY) / (IMPOSSIBLE - UNLIKELY), 0.0, 1.0)
 
 
-@eqx.filter_jit
+@compiled
 def _deepest(solid: Solid, body: Body, poses: Float[Array, "start dof"]) -> Float[Array, "pair"]:
     """How deep each pair is in each other in any of some poses."""
     return jnp.max(jax.vmap(lambda pose: solid.depths(body.posed_blobs(pose).means))(poses), axis=0)
 
 
-@eqx.filter_jit
+@compiled
 def _excess(solid: Solid, body: Body, poses: Float[Array, "start dof"]) -> Float[Array, "start pair"]:
     return jax.vmap(lambda pose: solid.excess(body.posed_blobs(pose).means))(poses)
 
 
-@eqx.filter_jit
+@compiled
 def impossible(solid: Solid, body: Body, poses: Float[Array, "start dof"]) -> Float[Array, "start"]:
     """How impossible poses are, 0 to 1."""
     return jax.vmap(lambda pose: solid.impossible(body.posed_blobs(pose).means))(poses)

@@ -3,11 +3,11 @@
 import time
 from dataclasses import dataclass, replace
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, UInt8
 
+from sogjax.model.program import compiled
 from sogjax.run.terminal import say
 from sogjax.tracking.capacity import first_capacities, larger_capacities
 from sogjax.tracking.culling import Capacities
@@ -84,7 +84,7 @@ class LiveStep:
         self.capacities = larger_capacities(used, near, matching, blocks)
 
 
-@eqx.filter_jit
+@compiled
 def _step(
     tracker: Tracker, state: TrackState, frame: FrameInput, ratio: Float[Array, ""], capacities: Capacities
 ) -> tuple[TrackState, FrameResult, Float[Array, "joint 4 4"]]:

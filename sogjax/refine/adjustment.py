@@ -3,13 +3,13 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from sogjax.model.body import Body
+from sogjax.model.program import compiled
 from sogjax.model.rotation import axis_vector
 from sogjax.refine.camera_moves import MOVE, velocities_of
 from sogjax.refine.camera_search import FoundCameras, Part, found_cameras
@@ -244,4 +244,4 @@ def _floor(body: Body, poses: Float[np.ndarray, "frame dof"], vertical: Float[np
     return floor_height(undersides(means, np.asarray(body.blob_sigmas, float), vertical))
 
 
-_means = eqx.filter_jit(lambda body, poses: jax.lax.map(lambda pose: body.posed_blobs(pose).means, poses))
+_means = compiled(lambda body, poses: jax.lax.map(lambda pose: body.posed_blobs(pose).means, poses))

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import equinox as eqx
 import jax
 from jaxtyping import Array, Float
 
@@ -17,23 +16,24 @@ from sogjax.energy.term import Terms
 from sogjax.energy.views import Views
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, project
+from sogjax.model.program import compiled
 from sogjax.model.sog import Sog
 from sogjax.refine.camera_moves import Sights, moved_cameras
 from sogjax.refine.clip_shape import ClipShape
 from sogjax.refine.frame_models import FrameModels, blobs_by_shape, frame_model, shape_rates
 from sogjax.refine.pictures import ClipPictures
 
-moved_in_frames = eqx.filter_jit(jax.vmap(moved_cameras, in_axes=(0, None)))
+moved_in_frames = compiled(jax.vmap(moved_cameras, in_axes=(0, None)))
 """The cameras of every frame, moved."""
 
 
-@eqx.filter_jit
+@compiled
 def shaped(shape: ClipShape, params: Float[Array, "shape"]) -> Body:
     """The body with some shape parameters."""
     return shape.shaped(params)
 
 
-@eqx.filter_jit
+@compiled
 def moving_blobs(
     shape: ClipShape, params: Float[Array, "shape"], poses: Float[Array, "frame dof"]
 ) -> tuple[Array, ...]:
@@ -49,7 +49,7 @@ def moving_blobs(
     return (*jax.lax.map(one, poses), body.blob_sigmas, rates.blob_sigmas)
 
 
-@eqx.filter_jit
+@compiled
 def frame_models(
     shape: ClipShape,
     params: Float[Array, "shape"],
@@ -76,7 +76,7 @@ def frame_models(
     return jax.lax.map(one, (pictures.views, pictures.windows, pairs, poses, velocities))
 
 
-@eqx.filter_jit
+@compiled
 def term_values(
     body: Body, terms: Terms, views: Views, pairs: SparsePairs, poses: Float[Array, "frame dof"]
 ) -> dict[str, Float[Array, "frame"]]:
@@ -89,7 +89,7 @@ def term_values(
     return jax.lax.map(one, (views, pairs, poses))
 
 
-@eqx.filter_jit
+@compiled
 def moved_in_pictures(
     cameras: Camera, bodies: tuple[Body, Body], sights: tuple[Sights | None, Sights | None], poses: tuple[Array, Array]
 ) -> Float[Array, "frame"]:

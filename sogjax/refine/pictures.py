@@ -15,6 +15,7 @@ from sogjax.energy.similarity import similarity_among
 from sogjax.energy.views import Views
 from sogjax.model.body import Body
 from sogjax.model.camera import project
+from sogjax.model.program import compiled
 from sogjax.refine.camera_moves import Sights
 from sogjax.scene.cells import inside_pictures
 from sogjax.scene.color_clusters import SLOTS, SPARE, ColorClusters, odds_where_told
@@ -121,7 +122,7 @@ class NearPairs(eqx.Module):
             capacity = block_capacity(most, BLOCK_HEADROOM)
 
 
-@eqx.filter_jit
+@compiled
 def _views(
     tracker: Tracker,
     frame: FrameInput,
@@ -131,7 +132,7 @@ def _views(
     return tracker.views(frame, state, capacities)
 
 
-@eqx.filter_jit
+@compiled
 def _pairs(
     body: Body,
     views: Views,
@@ -152,7 +153,7 @@ def _pairs(
     return jax.lax.map(one, (views, poses, None if sights is None else sights.velocities))
 
 
-@eqx.filter_jit
+@compiled
 def _windows(
     tracker: Tracker,
     cells: UInt8[Array, "camera rows columns 3"],

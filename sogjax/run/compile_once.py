@@ -10,7 +10,7 @@ import hashlib
 import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -30,7 +30,8 @@ COMPILED = "/jax/core/compile/backend_compile_duration"
 """What jax calls the end of a compilation, or of reading in its place, failed or not."""
 
 _held = threading.local()
-"""The lock of each thread, as file and byte: a thread compiles one program after the other, so none waits for two."""
+"""The lock of each thread, as file and byte: a thread compiles one program after the other, so none waits for two. And
+what it read last."""
 
 
 def compile_once() -> None:
@@ -63,10 +64,28 @@ def _found_or_locked(file: int, read: Callable[[str], bytes | None], key: str) -
     """A kept program; where there is none, this process is the one that compiles it."""
     unlock()
     lock(file, int.from_bytes(hashlib.sha256(key.encode()).digest()[:7], "big"))
-    program = read(key)
+    program = _held.read = read(key)
     if program is not None:
         unlock()
     return program
+
+
+@contextlib.contextmanager
+def reading() -> Iterator[Callable[[], bytes | None]]:
+    """Within the block, tell what this thread read last as it was kept; None: what it asked for was not there.
+
+    Raises:
+        LookupError: it asked for nothing.
+    """
+    _held.read = LookupError
+
+    def last() -> bytes | None:
+        if _held.read is LookupError:
+            raise LookupError
+        return _held.read
+
+    yield last
+    _held.read = None
 
 
 def lock(file: int, byte: int) -> None:

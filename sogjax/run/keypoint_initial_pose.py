@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import permutations
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -13,6 +12,7 @@ from sogjax.energy.frame_energy import still_energy
 from sogjax.energy.similarity import similarity_among
 from sogjax.io.keypoints.load import Keypoints, load_keypoints
 from sogjax.model.body import Body, concatenate
+from sogjax.model.program import compiled
 from sogjax.run import build
 from sogjax.run.background import Background
 from sogjax.run.clip import Clip
@@ -153,7 +153,7 @@ def _pose(found: KeypointPose | None) -> Float[np.ndarray, "dof"]:
     return found.pose
 
 
-@eqx.filter_jit
+@compiled
 def _similarity(
     tracker: Tracker,
     state: TrackState,

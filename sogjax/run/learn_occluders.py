@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
@@ -16,6 +15,7 @@ from sogjax.errors import counted
 from sogjax.io.frame_table import FramesRecord, FrameTable
 from sogjax.io.npz_file import read_npz, save_npz
 from sogjax.model.limbs import limb_blobs
+from sogjax.model.program import compiled
 from sogjax.run.frames import continued, rows_of
 from sogjax.run.setup import Setup
 from sogjax.run.terminal import progress, say
@@ -208,10 +208,10 @@ def _alike(colors: Float[np.ndarray, "n 3"], own: Float[np.ndarray, "n 3"]) -> F
     return np.asarray(_own_color(*padded))[: len(colors)]
 
 
-_own_color = eqx.filter_jit(own_color)
+_own_color = compiled(own_color)
 
 
-@eqx.filter_jit
+@compiled
 def _odds(tracker: Tracker, cells: Array) -> Array:
     odds = tracker.reader.odds(cells.astype(tracker.cameras.intrinsics.dtype) / 255.0)
     assert odds is not None

@@ -11,7 +11,7 @@ import os
 import sys
 from pathlib import Path
 
-import jax
+from sogjax.model.program import forget_programs
 
 FULL = 0.4
 """Share of the allowed maps above which programs are dropped; one run may need a tenth."""
@@ -39,7 +39,7 @@ def forget_programs_if_many(maps: Path = _MAPS, most: Path = _MOST, memory: floa
     memory = _memory_share() if memory is None else memory
     if used < (MANY if memory > LARGE else FULL) * allowed:
         return False
-    jax.clear_caches()
+    forget_programs()
     gc.collect()
     return True
 

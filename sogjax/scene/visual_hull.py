@@ -11,6 +11,7 @@ from jaxtyping import Array, Bool, Float, Int, Shaped
 from scipy.ndimage import binary_opening
 
 from sogjax.model.camera import NEAR, Camera, distort, near_picture, project_points
+from sogjax.model.program import compiled
 from sogjax.scene.background_difference import reduced_mask, widened
 
 VOXELS = 64
@@ -131,7 +132,7 @@ def voxel_pixels(cube: Cube, camera: Camera, shape: tuple[int, int]) -> VoxelPix
     return VoxelPixels(rows.astype(np.intp), columns.astype(np.intp), inside, shape, min(footprint, 64))
 
 
-@eqx.filter_jit
+@compiled
 def _picture_places(
     camera: Camera, centre: Float[Array, "3"], spacing: Float[Array, ""], shape: Int[Array, "2"]
 ) -> tuple[Int[Array, "voxel"], Int[Array, "voxel"], Bool[Array, "voxel"], Float[Array, "some"]]:

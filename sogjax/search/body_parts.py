@@ -10,6 +10,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.model.body import Body
 from sogjax.model.limbs import limb_blobs, limb_names, limbs
+from sogjax.model.program import compiled
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.metrics import stretches
 from sogjax.search.mirrored import fitted_to_blobs, other_side
@@ -110,7 +111,7 @@ def merged_pose(
     return np.asarray(with_blobs(body, jnp.asarray(base), jnp.asarray(other), jnp.asarray(blobs[None]))[0])
 
 
-@eqx.filter_jit
+@compiled
 def with_blobs(
     body: Body, pose: Float[Array, "dof"], other: Float[Array, "dof"], blobs: Bool[Array, "choice blob"]
 ) -> Float[Array, "choice dof"]:

@@ -10,6 +10,7 @@ from sogjax.energy.appearance import ColorWindows
 from sogjax.energy.posed import Posed
 from sogjax.energy.views import odds_on_grid
 from sogjax.model.limbs import limb_blobs
+from sogjax.model.program import compiled
 from sogjax.search.placed_body import centres_of
 from sogjax.search.pose_search import PlacedSearch, PoseSearch
 from sogjax.search.search_energy import SearchEnergy
@@ -50,13 +51,13 @@ def cell_evidence(searcher: PoseSearch, frame: SeenFrame, pose: Float[np.ndarray
     return _cell_evidence(placed.energy, here, known, jnp.asarray(limb_blobs(searcher.body)), jnp.asarray(pose))
 
 
-@eqx.filter_jit
+@compiled
 def _known(frame: SeenFrame, windows: ColorWindows) -> Float[Array, "camera column row"]:
     """1 where the background is known, -1 where it is not, 0 outside the pictures."""
     return jax.vmap(odds_on_grid)(frame.known, frame.cell_sizes, frame.cameras, windows.x, windows.y)
 
 
-@eqx.filter_jit
+@compiled
 def _cell_evidence(
     energy: SearchEnergy,
     here: ColorWindows,

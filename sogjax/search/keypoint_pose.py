@@ -3,13 +3,13 @@
 from dataclasses import dataclass, replace
 from itertools import combinations
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
 from sogjax.io.keypoints.scheme import KeypointScheme
 from sogjax.model.body import Body
+from sogjax.model.program import compiled
 from sogjax.model.shape import ShapeModel
 from sogjax.search.described_pose import MIN_LANDMARKS, NUM_HEADINGS, dof_spread
 from sogjax.search.placed_body import headings, landmarks_of, placed, root_position, turned
@@ -157,7 +157,7 @@ class _BoneLengths(LeastSquares):
         return jnp.concatenate([jnp.log(own / self.lengths) / LENGTH_NOISE, params / self.model.spread])
 
 
-@eqx.filter_jit
+@compiled
 def _fitted(fit: _BoneLengths) -> Float[Array, "shape"]:
     start = jnp.zeros_like(fit.model.spread)
     solver = GaussNewton(epsilon=EPSILON, first_damping=DAMPING, smallest_damping=DAMPING, common_damping=0.0)

@@ -16,6 +16,7 @@ from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.part_energy import PartEnergy, PartIndex
 from sogjax.energy.posed import History
 from sogjax.energy.views import Views
+from sogjax.model.program import compiled
 from sogjax.model.solid import DEEP, impossible
 from sogjax.search.limb_ways import CROSSED, Unit, Units, drawn_ways, look_alikes, units_of
 from sogjax.search.other_pass import REACH, Pass
@@ -237,7 +238,7 @@ MOST_WHOLE = 3
 """Poses that are climbed with all degrees of freedom in a frame, beside the tracked one and that with crossed ends."""
 
 
-@eqx.filter_jit
+@compiled
 def climbed_in(
     tracker: Tracker,
     views: Views,
@@ -280,7 +281,7 @@ class HeldOtherwise(eqx.Module):
     """As `apart`, of that."""
 
 
-@eqx.filter_jit
+@compiled
 def held_otherwise(
     tracker: Tracker, views: Views, pose: Float[Array, "dof"], units: Units, tried: Float[Array, "unit seed dof"]
 ) -> HeldOtherwise:

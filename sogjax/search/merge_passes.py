@@ -9,7 +9,6 @@ frame, comes from the other side.
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -19,6 +18,7 @@ from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History
 from sogjax.energy.views import Views
 from sogjax.model.limbs import limb_names
+from sogjax.model.program import compiled
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.quality.limb_warnings import LIKELY_LOST
@@ -266,7 +266,7 @@ class _Revising:
         self.passed.energies[row], self.passed.doubts[row] = float(energy), judged.error_probability
 
 
-@eqx.filter_jit
+@compiled
 def _valued(
     tracker: Tracker,
     history: History,

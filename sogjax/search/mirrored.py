@@ -2,7 +2,6 @@
 
 from functools import partial
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -10,6 +9,7 @@ from jaxtyping import Array, Float, Int
 
 from sogjax.model.body import Body
 from sogjax.model.limbs import limb_blobs, limbs
+from sogjax.model.program import compiled
 from sogjax.search.placed_body import means_of
 
 SIDES = (("left", "right"), ("Left", "Right"), ("l_", "r_"), ("L_", "R_"))
@@ -86,7 +86,7 @@ def limb_pairs(body: Body) -> list[Int[np.ndarray, "blob"]]:
     return [pair for pair in found if len(pair)]
 
 
-@eqx.filter_jit
+@compiled
 def fitted_to_blobs(
     body: Body, starts: Float[Array, "start dof"], targets: Float[Array, "start blob 3"], iterations: int = ITERATIONS
 ) -> tuple[Float[Array, "start dof"], Float[Array, "start"]]:

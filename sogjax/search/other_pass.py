@@ -7,7 +7,6 @@ from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -17,6 +16,7 @@ from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History
 from sogjax.energy.views import Views
 from sogjax.model.body import Body
+from sogjax.model.program import compiled
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.search.body_parts import Part, PartArrays
 from sogjax.search.worth import worth
@@ -214,7 +214,7 @@ def _differ(parts: Sequence[Part], apart: Bool[np.ndarray, "part"]) -> Bool[np.n
     return np.array([bool(moved) if part.whole is None else not moved.isdisjoint(part.names) for part in parts])
 
 
-@eqx.filter_jit
+@compiled
 def _apart(
     body: Body, blobs: Bool[Array, "part blob"], pose: Float[Array, "dof"], other: Float[Array, "dof"]
 ) -> Float[Array, "part"]:
@@ -258,7 +258,7 @@ def part_gains(
     return found
 
 
-@eqx.filter_jit
+@compiled
 def _mixed(
     body: Body, parts: PartArrays, first: Float[Array, "dof"], second: Float[Array, "dof"]
 ) -> Float[Array, "mixed dof"]:
@@ -273,7 +273,7 @@ def _energies(tracker: Tracker, views: Views, poses: Float[Array, "pose dof"]) -
     return np.asarray(_padded_energies(tracker, views, padded, jnp.asarray(len(poses))))[: len(poses)]
 
 
-@eqx.filter_jit
+@compiled
 def _padded_energies(
     tracker: Tracker, views: Views, poses: Float[Array, "pose dof"], count: Int[Array, ""]
 ) -> Float[Array, "pose"]:

@@ -3,13 +3,13 @@
 import itertools
 from collections.abc import Sequence
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from sogjax.model.body import Body
+from sogjax.model.program import compiled
 from sogjax.model.rotation import axis_vector
 
 
@@ -21,7 +21,7 @@ def means_of(body: Body, poses: Float[np.ndarray, "start dof"]) -> Float[np.ndar
     return np.concatenate(parts)[: len(poses)]
 
 
-@eqx.filter_jit
+@compiled
 def _means(body: Body, poses: Array) -> Float[Array, "start blob 3"]:
     return jax.vmap(lambda pose: body.posed_blobs(pose).means)(poses)
 
@@ -31,7 +31,7 @@ def landmarks_of(body: Body, poses: Float[Array, "start dof"]) -> Float[np.ndarr
     return np.asarray(_landmarks(body, poses), float)
 
 
-@eqx.filter_jit
+@compiled
 def _landmarks(body: Body, poses: Array) -> Float[Array, "start landmark 3"]:
     return jax.vmap(body.posed_landmarks)(poses)
 

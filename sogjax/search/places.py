@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -10,6 +9,7 @@ from jaxtyping import Array, Float
 from scipy.ndimage import gaussian_filter, maximum_filter
 
 from sogjax.model.camera import NEAR, Camera, cells_at, project_points
+from sogjax.model.program import compiled
 from sogjax.model.rotation import axis_vector
 from sogjax.scene.visual_hull import nearest_point
 from sogjax.search.seen_frame import SeenFrame
@@ -123,7 +123,7 @@ def _voxels(cameras: Camera, up: str) -> tuple[Float[np.ndarray, "a b c 3"], flo
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1) + middle, spacing
 
 
-@eqx.filter_jit
+@compiled
 def _voxel_scores(frame: SeenFrame, points: Float[Array, "voxel 3"]) -> Float[Array, "voxel"]:
     """Mean log odds over the cameras that see a voxel; very low where too few do."""
 

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from sogjax.model.body import Body
+from sogjax.model.program import compiled
 from sogjax.solve.gauss_newton import GaussNewton, LeastSquares
 from sogjax.tracking.solving import pose_scales
 
@@ -67,7 +68,7 @@ def fitted_to_points(
     return _fitted(body, starts, points, far, spread, scales)
 
 
-@eqx.filter_jit
+@compiled
 def _fitted(body, starts, points, far, spread, scales):
     solver = GaussNewton(
         epsilon=EPSILON,

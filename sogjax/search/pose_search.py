@@ -17,6 +17,7 @@ from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.farthest import farthest
 from sogjax.model.limbs import limbs, with_other_limb
+from sogjax.model.program import compiled
 from sogjax.model.rotation import axis_vector
 from sogjax.scene.color_clusters import ColorClusters
 from sogjax.search.mirrored import look_alikes
@@ -184,7 +185,7 @@ class PlacedSearch:
         return Hypotheses(poses, tried.where, values)
 
 
-@eqx.filter_jit
+@compiled
 def _of_cameras(cameras: Camera, windows: ColorWindows, chosen: Int[Array, "camera"]) -> tuple[Camera, ColorWindows]:
     some = lambda tree, axis: jax.tree.map(lambda leaf: jnp.take(leaf, chosen, axis), tree)
     return some(cameras, 0), some(windows, 1)
@@ -211,7 +212,7 @@ def _other_verticals(place: Place, up: Float[np.ndarray, "3"]) -> list[Float[np.
     return [along, -along] if lying else [-up]
 
 
-@eqx.filter_jit
+@compiled
 def _windows(frame: SeenFrame, centres: Float[Array, "place 3"]) -> ColorWindows:
     radius = jnp.asarray(BODY_RADIUS, centres.dtype)
     return jax.lax.map(lambda centre: frame.windows(centre, radius), centres)

@@ -21,6 +21,7 @@ from sogjax.energy.term import Penalty, Term, Terms
 from sogjax.energy.views import Views, whole_image_overlap
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
+from sogjax.model.program import compiled
 from sogjax.model.skeleton import Skeleton
 from sogjax.model.sog import Sog
 from sogjax.scene.color_clusters import SLOTS, ColorClusters
@@ -119,7 +120,7 @@ def scores(
     return _in_parts(partial(_scores, energy, windows), SCORED_AT_ONCE, place, poses)[0]
 
 
-@eqx.filter_jit
+@compiled
 def _scores(energy: SearchEnergy, windows: ColorWindows, place: Array, poses: Array) -> tuple[Float[Array, "start"]]:
     def one(start: tuple[Array, Array]) -> Float[Array, ""]:
         return energy.of_windows(jax.tree.map(lambda leaf: leaf[start[0]], windows))(start[1])
@@ -152,7 +153,7 @@ def _in_parts(function: Callable[..., tuple[Array, ...]], size: int, place: np.n
     return [np.concatenate(part)[:count] for part in zip(*parts, strict=True)]
 
 
-@eqx.filter_jit
+@compiled
 def _climbed(
     energy: SearchEnergy, windows: ColorWindows, scales: Scales, iterations: Array, place: Array, poses: Array
 ) -> tuple[Float[Array, "start dof"], Float[Array, "start"]]:

@@ -13,6 +13,7 @@ from sogjax.energy.appearance import ColorWindows
 from sogjax.energy.views import odds_on_grid
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, point_depths, project, project_points
+from sogjax.model.program import compiled
 from sogjax.model.sog import Sog
 from sogjax.scene.cells import inside_pictures
 from sogjax.scene.color_clusters import ColorClusters, cluster_odds
@@ -118,13 +119,13 @@ class SeenFrame(eqx.Module):
         return self.odds[:, -1]
 
 
-_posed = eqx.filter_jit(Body.posed_blobs)
+_posed = compiled(Body.posed_blobs)
 
 
 def _is_tuple(value: object) -> bool:
     return isinstance(value, tuple)
 
 
-@eqx.filter_jit
+@compiled
 def _odds(cells: Array, inside: Array, background: BackgroundModel | None, tables: Array) -> Array:
     return cluster_odds(cells.astype(tables.dtype) / 255.0, inside.astype(tables.dtype), background, tables, SOMEBODY)

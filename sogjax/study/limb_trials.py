@@ -5,7 +5,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -16,6 +15,7 @@ from sogjax.errors import InputError
 from sogjax.io.files import atomic_path
 from sogjax.model.body import Body
 from sogjax.model.limbs import limb_blobs, limb_names, limbs
+from sogjax.model.program import compiled
 from sogjax.quality.limb_confidence import LimbMeasures, limb_confidence, limb_measures
 from sogjax.quality.limb_evidence import blob_evidence
 from sogjax.run.terminal import say
@@ -218,7 +218,7 @@ def measured(
     return LimbMeasures(*(jnp.stack(part) for part in zip(*found, strict=True))), np.stack(history)
 
 
-@eqx.filter_jit
+@compiled
 def _measured(
     tracker: Tracker, cells: Array, before: Array, pose: Array, baseline: Array
 ) -> tuple[LimbMeasures, Float[Array, "2 blob"]]:

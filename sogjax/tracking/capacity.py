@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from typing import TypeVar
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, UInt8
@@ -11,6 +10,7 @@ from jaxtyping import Array, Float, Int, UInt8
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History
 from sogjax.energy.views import Views
+from sogjax.model.program import compiled
 from sogjax.tracking.culling import CAPACITIES, Capacities, block_capacity, capacity_for
 from sogjax.tracking.frame import FrameInput, TrackState
 from sogjax.tracking.tracker import Tracker
@@ -51,7 +51,7 @@ def views_near(
     return with_room(lambda room: _views_near(tracker, frame, pose, part, room), capacities)
 
 
-@eqx.filter_jit
+@compiled
 def _views_near(
     tracker: Tracker, frame: FrameInput, pose: Float[Array, "dof"], beyond: Float[Array, ""], capacities: Capacities
 ) -> tuple[Views, Needed]:
@@ -90,7 +90,7 @@ def compile_counts(tracker: Tracker, shape: tuple[int, ...]) -> None:
     _counts(tracker, tracker.start(tracker.body.poses["rest"]), jnp.zeros(shape, jnp.uint8))
 
 
-@eqx.filter_jit
+@compiled
 def _counts(
     tracker: Tracker, state: TrackState, cells: UInt8[Array, "camera rows columns 3"]
 ) -> tuple[Int[Array, "camera"], Int[Array, "camera"], Int[Array, ""]]:

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int, UInt8
 
+from sogjax.model.program import compiled
 from sogjax.model.sog import Sog
 from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.tracking.capacity import first_capacities, larger_capacities
@@ -16,7 +17,7 @@ from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import AnyFrame, FrameInput, TrackedFrame, TrackState, on_device, on_host
 from sogjax.tracking.tracker import Tracker
 
-_step = eqx.filter_jit(Tracker.step)
+_step = compiled(Tracker.step)
 Told = Callable[[TrackState, FrameInput, Capacities], object]
 """Is told of the first frame, and the capacities for it, before the step is compiled."""
 
@@ -57,13 +58,13 @@ def track(
         yield TrackedFrame(index, on_host(result), capacities, tracker.reader.color_space, seconds)
 
 
-@eqx.filter_jit
+@compiled
 def image_blobs(tracker: Tracker, state: TrackState, frame: FrameInput, capacities: Capacities) -> Sog:
     """The image blobs of a frame that was tracked already."""
     return tracker.views(frame, tracker.led(state, frame), capacities)[0].images
 
 
-@eqx.filter_jit
+@compiled
 def best_after(
     tracker: Tracker,
     state: TrackState,
@@ -98,7 +99,7 @@ def confidence_of_poses(
         yield found
 
 
-@eqx.filter_jit
+@compiled
 def _judged(
     tracker: Tracker, frame: FrameInput, pose: Float[Array, "dof"], baseline: Float[Array, "2 blob"]
 ) -> LimbConfidence:

@@ -17,6 +17,7 @@ from sogjax.energy.posed import Posed
 from sogjax.energy.priors import LimitPenalty
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
+from sogjax.model.program import compiled
 from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.solve.solution import QuadraticModel, Scales
 
@@ -85,7 +86,7 @@ class _Sums(NamedTuple):
     stiffness: Float[Array, "point 3 3"]
 
 
-@eqx.filter_jit
+@compiled
 def estimated_offsets(
     pull: KeypointTerm,
     body: Body,

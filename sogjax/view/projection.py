@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import cast
 
 import cv2
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -16,6 +15,7 @@ from sogjax.io.calibration.rig import CameraRig
 from sogjax.io.motion import Motion
 from sogjax.io.recording import Recording
 from sogjax.model.camera import NEAR, Camera, distort, near_picture, project_points
+from sogjax.model.program import compiled
 from sogjax.view.tiles import shrink
 
 POINTS_AT_ONCE = 8192
@@ -59,7 +59,7 @@ def unfolded_radii(rig: CameraRig) -> Float[np.ndarray, "camera"]:
     return radii
 
 
-@eqx.filter_jit
+@compiled
 def _project(
     cameras: Camera, bounds: Float[Array, "camera"], points: Float[Array, "n 3"]
 ) -> tuple[Float[Array, "camera n 2"], Float[Array, "camera n"]]:

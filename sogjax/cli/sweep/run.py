@@ -40,6 +40,7 @@ from sogjax.cli.sweep.takes import is_of_takes, track_takes
 from sogjax.cli.words import composed, parsed, ready_for_hydra
 from sogjax.errors import InputError
 from sogjax.run.compile_once import compile_once
+from sogjax.run.kept_programs import hold_programs
 from sogjax.run.memory import forget_programs_if_many
 from sogjax.run.result import Numbers, row_numbers
 from sogjax.run.shared import SHARED
@@ -153,6 +154,7 @@ def run_hydra(words: Sequence[str]) -> int:
 
     def member(tree: Any) -> Any:
         compile_once()  # in whatever process this is
+        hold_programs()
         forget_programs_if_many()
         try:
             return track_member()

@@ -1,0 +1,247 @@
+"""Programs kept on disk as they run, so that the next process neither traces nor compiles them.
+
+A program is named by all that it follows from: the function, the shapes of its arrays and everything else that it is
+given, the package's files, the versions of what traces it, jax's settings. What is given must consist of values and of
+classes and functions of these packages; a function that is given anything else, or that calls back into Python, is
+compiled as usual.
+"""
+
+import contextlib
+import hashlib
+import io
+import os
+import pickle
+import threading
+import weakref
+from collections.abc import Callable
+from functools import cache, cached_property
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax._src import compilation_cache as of_jax
+from jax.experimental import serialize_executable
+from jax.experimental.serialize_executable import deserialize_and_load
+
+import sogjax
+from sogjax.io.files import atomic_path
+from sogjax.model.program import keep_programs
+from sogjax.run.compilation_cache import programs_folder
+from sogjax.run.compile_once import reading
+
+KNOWN = ("sogjax", "jax", "jaxlib", "equinox", "numpy", "optimistix", "builtins", "collections", "functools", "copyreg")
+"""Packages whose classes and functions are the same as long as their versions, or files, are."""
+TRACING = ("jax", "jaxlib", "equinox", "optimistix", "lineax", "numpy")
+SETTINGS = ("JAX_", "XLA_", "EQX_")
+"""How variables of the environment begin that may change a program."""
+
+_WRITING = threading.Lock()
+"""While one thread has jax write something else, no other has it write."""
+
+Program = Callable[[list[jax.Array]], Any]
+
+
+def hold_programs() -> None:
+    """Read and keep programs where compiled ones are kept, if they are; to be called when jax is imported."""
+    folder = programs_folder()
+    if folder is not None and os.environ.get("JAX_COMPILATION_CACHE_DIR") == str(folder):
+        keep_programs(KeptPrograms(folder))
+
+
+class UnknownError(Exception):
+    """Something is given that is not the same in the next process, as far as its name says."""
+
+
+class KeptPrograms:
+    """A folder with programs."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._held: dict[bytes, Program | None] = {}
+        self._modules: dict[int, tuple[weakref.ref[eqx.Module], bytes]] = {}
+        self._locks: dict[bytes, threading.Lock] = {}
+        self._lock = threading.Lock()
+
+    @cached_property
+    def _here(self) -> bytes:
+        """What all programs of this process follow from."""
+        root, digest = Path(sogjax.__file__).parent, hashlib.sha256()
+        for path in sorted(path for kind in ("*.py", "*.yaml") for path in root.rglob(kind)):
+            digest.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
+        settings = sorted((key, value) for key, value in os.environ.items() if key.startswith(SETTINGS))
+        digest.update(repr([(name, version(name)) for name in TRACING] + settings + _flags()).encode())
+        return digest.digest()
+
+    @cached_property
+    def _usual(self) -> bool:
+        """Whether programs run on the one CPU that they are compiled for."""
+        return jax.default_backend() == "cpu" and jax.device_count() == 1
+
+    def program(
+        self, function: Callable[..., Any], options: dict[str, Any], given: tuple[tuple, dict]
+    ) -> Program | None:
+        """The program of a function for what it is given, read or compiled and kept; None: it cannot be kept."""
+        if not self._usual or not function.__module__.startswith("sogjax."):
+            return None
+        try:
+            key = self._key(function, options, given)
+        except UnknownError:
+            return None
+        if key in self._held:
+            return self._held[key]
+        with self._lock:
+            lock = self._locks.setdefault(key, threading.Lock())
+        with lock:
+            if key not in self._held:
+                self._held[key] = self._made(key, function, options, given)
+            return self._held[key]
+
+    def forget(self) -> None:
+        """Hold nothing in memory."""
+        with self._lock:
+            self._held.clear()
+            self._locks.clear()
+
+    def _key(self, function: Callable[..., Any], options: dict[str, Any], given: tuple[tuple, dict]) -> bytes:
+        """What tells a program from all others of this process."""
+        named = function.__module__, function.__qualname__, function.__code__.co_firstlineno
+        (arguments, keywords), told = given, []
+        for value in (*arguments, *keywords.values()):
+            told.append(self._described_once(value) if isinstance(value, eqx.Module) else _described(value))
+        return _described((named, options, len(arguments), [*keywords], told))
+
+    def _described_once(self, module: eqx.Module) -> bytes:
+        """What describes a module, which never changes: a tracker takes a fourth of a frame's time to be described."""
+        place = id(module)
+        known = self._modules.get(place)
+        if known is None or known[0]() is not module:
+            gone = weakref.ref(module, lambda _: self._modules.pop(place, None))
+            known = self._modules[place] = gone, _described(module)
+        return known[1]
+
+    def _made(
+        self, key: bytes, function: Callable[..., Any], options: dict[str, Any], given: tuple[tuple, dict]
+    ) -> Program | None:
+        path = self.folder / f"traced-{hashlib.sha256(self._here + key).hexdigest()[:40]}-cache"
+        with contextlib.suppress(Exception):  # whatever is wrong with a kept file, the program can be compiled
+            executable, results = pickle.loads(path.read_bytes())
+            os.utime(path)
+            _prepare_lapack()
+            return _callable(deserialize_and_load(*executable), results)
+        leaves, static = eqx.partition(given, eqx.is_array)
+        arrays, structure = jax.tree.flatten(leaves)
+        found: list[Any] = []
+
+        def of_arrays(*arrays: jax.Array) -> list[jax.Array]:
+            arguments, keywords = eqx.combine(jax.tree.unflatten(structure, arrays), static)
+            results = function(*arguments, **keywords)
+            found.append(jax.tree.map(lambda leaf: Array() if eqx.is_array(leaf) else leaf, results))
+            return [leaf for leaf in jax.tree.leaves(results) if eqx.is_array(leaf)]
+
+        jitted = jax.jit(of_arrays, compiler_options=options or None)
+        with reading() as last_read:
+            executable = jitted.lower(*map(jnp.asarray, arrays)).compile()
+            with contextlib.suppress(Exception):  # what cannot be written runs all the same
+                _described(found[0])
+                content = pickle.dumps((_written(executable, last_read()), found[0]))
+                with atomic_path(path) as file:
+                    file.write_bytes(content)
+        return _callable(executable, found[0])
+
+
+def _written(executable: Any, read: bytes | None) -> tuple[bytes, Any, Any]:
+    """What `serialize` writes of an executable; `read` is what jax kept of it, if it was not compiled anew.
+
+    One that was read cannot be written again: kernels are missing then. jax has no way to say what to write instead.
+    """
+    if read is None:
+        with _WRITING:
+            return serialize_executable.serialize(executable)
+    program, _ = of_jax.extract_executable_and_time(of_jax.decompress_executable(read))
+
+    class Writing(serialize_executable._JaxPjrtPickler):
+        """Writes what was read in place of the executable."""
+
+        def persistent_id(self, obj: Any) -> Any:
+            found = super().persistent_id(obj)
+            return ("exec", program) if found is not None and found[0] == "exec" else found
+
+    with _WRITING:
+        before = serialize_executable._JaxPjrtPickler
+        serialize_executable._JaxPjrtPickler = Writing
+        try:
+            return serialize_executable.serialize(executable)
+        finally:
+            serialize_executable._JaxPjrtPickler = before
+
+
+@cache
+def _prepare_lapack() -> None:
+    """Let executables find LAPACK, which jax does when it lowers a program that needs it: without, they crash."""
+    from jax._src.lax import linalg
+
+    if hasattr(linalg, "initialize_lapack"):
+        linalg.initialize_lapack()
+    else:
+        jax.jit(jnp.linalg.cholesky).lower(jnp.eye(2))
+
+
+class Array:
+    """Stands for an array among results."""
+
+
+def _callable(executable: Callable[..., list[jax.Array]], results: Any) -> Program:
+    """What runs an executable, and puts the arrays that it computes where they belong among the results."""
+    leaves, structure = jax.tree.flatten(results)
+    places = [k for k, leaf in enumerate(leaves) if isinstance(leaf, Array)]
+
+    def run(arrays: list[jax.Array]) -> Any:
+        filled = leaves.copy()
+        for place, array in zip(places, executable(*arrays), strict=True):
+            filled[place] = array
+        return jax.tree.unflatten(structure, filled)
+
+    return run
+
+
+def _without_arrays(given: Any) -> Any:
+    """The same with shape, type and weakness of each array in its place."""
+    kind = lambda leaf: (leaf.shape, str(jax.dtypes.canonicalize_dtype(leaf.dtype)), getattr(leaf, "weak_type", False))
+    return jax.tree.map(lambda leaf: kind(leaf) if eqx.is_array(leaf) else leaf, given)
+
+
+class _Describing(pickle.Pickler):
+    """Writes values, and the names of classes and functions that are known."""
+
+    def __init__(self, file: io.BytesIO) -> None:
+        super().__init__(file, protocol=5)
+        self.fast = True  # what is equal is written alike, be it one thing or two
+
+    def reducer_override(self, value: Any) -> Any:
+        module = getattr(value, "__module__", None) if callable(value) else None
+        named = isinstance(value, type) or hasattr(value, "__code__")
+        if named and module is not None and module.partition(".")[0] not in KNOWN:
+            raise UnknownError(f"{module}.{value}")
+        return NotImplemented
+
+
+def _described(value: Any) -> bytes:
+    """The same bytes for the same values, in every process.
+
+    Raises:
+        UnknownError: something is no value.
+    """
+    file = io.BytesIO()
+    try:
+        _Describing(file).dump(_without_arrays(value))
+    except (pickle.PicklingError, AttributeError, TypeError, RecursionError) as error:
+        raise UnknownError(str(error)) from error
+    return file.getvalue()
+
+
+def _flags() -> list[tuple[str, str]]:
+    """Jax's settings, but for where programs are kept."""
+    return sorted((key, str(value)) for key, value in jax.config.values.items() if "cache" not in key)
