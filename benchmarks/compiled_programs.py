@@ -5,8 +5,8 @@
 Runs a command of sogjax in this process, then prints a row for each name of a program: how often it was compiled, or
 taken from those that are kept; seconds of tracing, lowering and compiling, and how many of these passed in other
 threads than the main one; how often it was called, and seconds of its calls without those before. Seconds of tracing
-count what is traced within it again; those of threads pass beside each other. Calls of equinox's programs alone are
-known.
+count what is traced within it again; those of threads pass beside each other. Calls of equinox's programs, and of those
+that are kept as they run, are known; reading one of these counts as compiling.
 """
 
 import sys
@@ -21,6 +21,7 @@ import equinox._jit as equinox_programs
 from jax import monitoring
 
 from sogjax.cli.main import main as sogjax
+from sogjax.run.kept_programs import KeptPrograms
 
 TRACING = "/jax/core/compile/jaxpr_trace_duration"
 LOWERING = "/jax/core/compile/jaxpr_to_mlir_module_duration"
@@ -67,6 +68,7 @@ def main() -> int:
             program.beside += duration_secs if threading.current_thread() is not threading.main_thread() else 0.0
 
     equinox_programs._call = _timed(equinox_programs._call, programs)
+    KeptPrograms.program = _asked(KeptPrograms.program, programs)
     monitoring.register_event_duration_secs_listener(note)
     begin, cpu = time.perf_counter(), time.process_time()
     status = sogjax(sys.argv[1:])
@@ -91,6 +93,28 @@ def _timed(call: Callable[..., Any], programs: dict[str, Program]) -> Callable[.
             program.calls.append(time.perf_counter() - begin - (program.seconds - before))
 
     return timed
+
+
+def _asked(program_of: Callable[..., Any], programs: dict[str, Program]) -> Callable[..., Any]:
+    """The method that hands out kept programs, noting the seconds of reading and of running each."""
+
+    def asked(kept: KeptPrograms, function: Any, *given: Any) -> Any:
+        known, begin, held = programs[function.__name__], time.perf_counter(), kept.num_held
+        before = known.seconds
+        program = program_of(kept, function, *given)
+        if kept.num_held > held and known.seconds == before:
+            known.compiled.append(time.perf_counter() - begin)
+
+        def timed(arrays: list[Any]) -> Any:
+            begin = time.perf_counter()
+            try:
+                return program(arrays)
+            finally:
+                known.calls.append(time.perf_counter() - begin)
+
+        return program and timed
+
+    return asked
 
 
 def print_table(programs: dict[str, Program]) -> None:

@@ -12,8 +12,10 @@ import xdist
 CACHE = Path(__file__).parent.parent / ".pytest_cache"
 # Most of the tests' time is compilation: without what makes programs faster, for the demo of `.ci/run` has that, and
 # in one piece, as a piece for each core costs more.
-FLAGS = ["backend_optimization_level=1", "cpu_parallel_codegen_split_count=1"]
-if version("jaxlib").startswith("0.10."):  # XLA ends the process at a flag that it does not know
+FLAGS = ["backend_optimization_level=1"]
+if version("jaxlib").startswith(("0.10.", "0.11.")):  # XLA ends the process at a flag that it does not know
+    FLAGS.append("cpu_parallel_codegen_split_count=1")
+if version("jaxlib").startswith("0.10."):
     FLAGS.append("cpu_use_fusion_emitters=false")
 
 os.environ.setdefault("JAX_PLATFORMS", "cpu")

@@ -92,11 +92,12 @@ def test_other_files_settings_or_versions_are_other_programs(tmp_path, monkeypat
     assert len(traced) == 4
 
 
-def test_a_damaged_file_is_compiled_again(tmp_path, traced):
+@pytest.mark.parametrize("damaged", [lambda content: content[:100], lambda c: c[:500] + bytes([c[500] ^ 1]) + c[501:]])
+def test_a_damaged_file_is_compiled_again(damaged, tmp_path, traced):
     given = values(5), values(5), values(5)
     first = ask(KeptPrograms(tmp_path), limit_penalty, *given)
     for path in tmp_path.iterdir():
-        path.write_bytes(path.read_bytes()[:100])
+        path.write_bytes(damaged(path.read_bytes()))
     np.testing.assert_array_equal(ask(KeptPrograms(tmp_path), limit_penalty, *given), first)
     np.testing.assert_array_equal(ask(KeptPrograms(tmp_path), limit_penalty, *given), first)
     assert len(traced) == 2
@@ -112,6 +113,32 @@ def test_modules_go_in_and_come_out(tmp_path, traced):
     found = [ask(KeptPrograms(tmp_path), QuadraticModel.__add__, model, model) for _ in range(2)]
     assert all(isinstance(each, QuadraticModel) for each in found)
     assert float(found[1].value) == 2.0
+    assert len(traced) == 2
+
+
+def test_nothing_is_kept_once_the_package_was_edited(tmp_path, monkeypatch):
+    kept = KeptPrograms(tmp_path)
+    files = kept_programs._files()
+    monkeypatch.setattr(kept_programs, "_files", lambda: [(path, when + 1, size) for path, when, size in files])
+    assert ask(kept, limit_penalty, values(5), values(5), values(5)) is not None
+    assert [*tmp_path.iterdir()] == []
+
+
+def calls_back(numbers):
+    return jax.pure_callback(lambda given: np.asarray(given), jax.ShapeDtypeStruct((5,), jnp.float32), numbers)
+
+
+def test_what_calls_back_into_python_is_left_to_jax(tmp_path, monkeypatch):
+    monkeypatch.setattr(calls_back, "__module__", "sogjax.tests")
+    assert ask(KeptPrograms(tmp_path), calls_back, values(5)) is None
+    assert [*tmp_path.iterdir()] == []
+
+
+def test_settings_that_change_meanwhile_are_other_programs(tmp_path, traced):
+    kept = KeptPrograms(tmp_path)
+    for precision in ("default", "highest", "default"):
+        with jax.default_matmul_precision(precision):
+            ask(kept, limit_penalty, values(5), values(5), values(5))
     assert len(traced) == 2
 
 
@@ -180,3 +207,22 @@ def test_another_process_reads_a_program_that_calls_lapack(tmp_path):
     found.append(subprocess.run(command, capture_output=True, text=True, env=told, check=True).stdout)
     assert len(set(found)) == 1
     assert len([*(tmp_path / "one").iterdir()]) == len([*(tmp_path / "two").iterdir()]) == 1
+
+
+@pytest.mark.slow
+def test_a_command_finds_the_same_again_and_traces_nothing_of_ours(tmp_path):
+    told = os.environ | {
+        "SOGJAX_CACHE": str(tmp_path / "cache"),
+        "SOGJAX_COMPILATION_CACHE": str(tmp_path / "programs"),
+    }
+    sizes = ["frames=6", "cameras=3", "width=160", "height=120"]
+    motions = []
+    for name in ("one", "two"):
+        command = [sys.executable, "-m", "sogjax", "demo", *sizes, f"out={tmp_path / name}"]
+        subprocess.run(command, check=True, env=told, capture_output=True)
+        motions.append(dict(np.load(tmp_path / name / "motion.npz")))
+        kept = {path.name for path in (tmp_path / "programs").rglob("traced-*")}
+    assert len(kept) > 20
+    assert motions[0].keys() == motions[1].keys()
+    for key, values in motions[0].items():
+        np.testing.assert_array_equal(motions[1][key], values, err_msg=key)

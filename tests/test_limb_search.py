@@ -20,7 +20,7 @@ from sogjax.energy.posed import History
 from sogjax.energy.views import Windows
 from sogjax.model.body import concatenate
 from sogjax.model.limbs import limb_names
-from sogjax.model.solid import Solid, impossible
+from sogjax.model.solid import Solid, impossibilities
 from sogjax.search import limb_search
 from sogjax.search.limb_search import LimbSearch, climbed_in, compile_search
 from sogjax.search.limb_ways import Units, drawn_ways, look_alikes, units_of
@@ -166,7 +166,7 @@ def test_a_pose_is_the_less_likely_the_deeper_a_leg_is_in_the_other():
     solid, side = Solid.of(body), body.skeleton.dof_names.index("left_hip_side")
     poses = np.tile(np.asarray(body.poses["rest"]), (5, 1))
     poses[:, side] = (0.0, -0.1, -0.3, -0.4, -0.8)
-    none, apart, slight, deep, deepest = np.asarray(impossible(solid, body, jnp.asarray(poses)))
+    none, apart, slight, deep, deepest = np.asarray(impossibilities(solid, body, jnp.asarray(poses)))
     assert none == apart == 0.0
     assert 0.0 < slight < deep <= deepest == 1.0
 

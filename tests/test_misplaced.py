@@ -1,6 +1,8 @@
 """Actors that are followed where they are not: where they are looked for, and that they are found."""
 
 from dataclasses import replace
+from inspect import unwrap
+from types import SimpleNamespace
 
 import jax.numpy as jnp
 import numpy as np
@@ -12,6 +14,8 @@ from test_both_ways import reader
 from walking_dog import DEPTH, judging_tracker, pass_of
 
 from sogjax.model.body import concatenate
+from sogjax.model.limbs import limb_names
+from sogjax.run import merge
 from sogjax.search.combination import trunk_blobs
 from sogjax.search.merge_passes import merge_passes
 from sogjax.search.misplaced import Misplaced
@@ -19,6 +23,7 @@ from sogjax.search.placed_body import means_of
 from sogjax.tracking.frame_by_frame import track
 
 HUMAN = shipped("human")
+unseen = unwrap(merge.unseen)
 FRAMES = 5
 
 
@@ -73,3 +78,15 @@ def test_he_is_not_looked_for_where_he_was_found_meanwhile():
     assert next(places) == (5, 0)
     misplaced.explained[:10] = 0.7
     assert [*places] == [(20, 0), (17, 0), (23, 0)]
+
+
+def test_who_is_not_seen_is_not_misplaced():
+    """Out of all views nothing is explained; behind things little may be, of what is not hidden."""
+    both = concatenate([replace(HUMAN, name="anna"), replace(HUMAN, name="ben")])
+    of_ben = np.array([name.startswith("ben/") for name in limb_names(both)])
+    hidden = np.zeros((3, len(of_ben)))
+    hidden[1, of_ben] = 0.95
+    hidden[2, np.flatnonzero(of_ben)[1:]] = 0.95  # one limb is in view
+    table = SimpleNamespace(explained=np.array([[0.0, 0.1]] * 3), limb_hidden=hidden)
+    setup = SimpleNamespace(tracker=SimpleNamespace(body=both))
+    np.testing.assert_array_equal(unseen(setup, table), [[True, False], [True, True], [True, False]])

@@ -12,7 +12,7 @@ from typing import Any, ParamSpec, Protocol, TypeVar, runtime_checkable
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jax.core import Tracer
+from jax._src.core import trace_state_clean
 
 Arguments = ParamSpec("Arguments")
 Results = TypeVar("Results")
@@ -41,6 +41,11 @@ def keep_programs(keeper: Keeper | None) -> None:
     _keepers[:] = [] if keeper is None else [keeper]
 
 
+def keeper() -> Keeper | None:
+    """Who is asked for programs."""
+    return _keepers[0] if _keepers else None
+
+
 def forget_programs() -> None:
     """Drop all programs of this process, jax's as well: they are read or compiled again when needed."""
     for keeper in _keepers:
@@ -51,7 +56,7 @@ def forget_programs() -> None:
 def compiled(function: Callable[Arguments, Results], **options: Any) -> Callable[Arguments, Results]:
     """The function as a compiled program for arrays, as `eqx.filter_jit`; `options` are the compiler's.
 
-    Only a function of a module may be kept, not one that knows more than its arguments and what its module says.
+    Only plain functions of modules are kept: closures, local and wrapped functions stay what `eqx.filter_jit` makes.
     """
     plain = eqx.filter_jit(function, compiler_options=options or None)  # pyright: ignore[reportCallIssue]
     if not isinstance(function, FunctionType) or function.__closure__ or "<locals>" in function.__qualname__:
@@ -61,9 +66,9 @@ def compiled(function: Callable[Arguments, Results], **options: Any) -> Callable
 
     @wraps(function)
     def call(*arguments: Arguments.args, **keywords: Arguments.kwargs) -> Results:
-        leaves = jax.tree.leaves((arguments, keywords)) if _keepers else []
-        if not _keepers or any(isinstance(leaf, Tracer) for leaf in leaves):
+        if not _keepers or not trace_state_clean():  # as a part of another program
             return plain(*arguments, **keywords)
+        leaves = jax.tree.leaves((arguments, keywords))
         program = _keepers[0].program(function, options, (arguments, keywords))
         if program is None:
             return plain(*arguments, **keywords)

@@ -93,7 +93,7 @@ class Solid(eqx.Module):
         """By how much each pair is deeper than is allowed (metres); 0 where it is not."""
         return jnp.maximum(self.depths(means) - self.allowed, 0.0)
 
-    def impossible(self, means: Float[Array, "blob 3"]) -> Float[Array, ""]:
+    def impossibility(self, means: Float[Array, "blob 3"]) -> Float[Array, ""]:
         """How impossible it is that the blobs are there, 0 to 1, as the pair says that is deepest."""
         deepest = jnp.max(self.excess(means), initial=0.0)
         return jnp.clip((deepest - UNLIKELY) / (IMPOSSIBLE - UNLIKELY), 0.0, 1.0)
@@ -111,9 +111,9 @@ def _excess(solid: Solid, body: Body, poses: Float[Array, "start dof"]) -> Float
 
 
 @compiled
-def impossible(solid: Solid, body: Body, poses: Float[Array, "start dof"]) -> Float[Array, "start"]:
+def impossibilities(solid: Solid, body: Body, poses: Float[Array, "start dof"]) -> Float[Array, "start"]:
     """How impossible poses are, 0 to 1."""
-    return jax.vmap(lambda pose: solid.impossible(body.posed_blobs(pose).means))(poses)
+    return jax.vmap(lambda pose: solid.impossibility(body.posed_blobs(pose).means))(poses)
 
 
 def segment_distance(one: Float[Array, "2 3"], two: Float[Array, "2 3"]) -> Float[Array, ""]:

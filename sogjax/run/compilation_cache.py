@@ -27,7 +27,7 @@ from sogjax.run.compile_once import compile_once
 VARIABLE = "SOGJAX_COMPILATION_CACHE"
 """The environment variable with the folder, or `off`; without it programs lie beside other things that are kept."""
 LARGEST = 1_000_000_000
-"""Bytes to which kept programs are cut back once a day; a recording of its own takes about three million."""
+"""Bytes to which kept programs are cut back once a day; a recording of its own takes about ten million."""
 TRIED, REFUSED = "tried", "refused"
 """Names of files in the folder: kept programs were taken there; were not, and why."""
 COMPILER_VARIABLE, LEVEL = "XLA_FLAGS", "--xla_backend_optimization_level"

@@ -30,8 +30,8 @@ COMPILED = "/jax/core/compile/backend_compile_duration"
 """What jax calls the end of a compilation, or of reading in its place, failed or not."""
 
 _held = threading.local()
-"""The lock of each thread, as file and byte: a thread compiles one program after the other, so none waits for two. And
-what it read last."""
+"""The lock of each thread, as file and byte: a thread compiles one program after the other, so none waits for two.
+Also the program that it read last, as `read`."""
 
 
 def compile_once() -> None:
@@ -70,9 +70,18 @@ def _found_or_locked(file: int, read: Callable[[str], bytes | None], key: str) -
     return program
 
 
+def watches() -> bool:
+    """Whether what jax reads is seen here."""
+    from jax._src import compilation_cache as of_jax
+
+    return isinstance(getattr(of_jax, "get_file_cache", None), partial)
+
+
 @contextlib.contextmanager
 def reading() -> Iterator[Callable[[], bytes | None]]:
     """Within the block, tell what this thread read last as it was kept; None: what it asked for was not there.
+
+    An executable that jax has read cannot be written again.
 
     Raises:
         LookupError: it asked for nothing.

@@ -1,9 +1,9 @@
-"""Programs kept on disk as they run, so that the next process neither traces nor compiles them.
+"""Executables kept on disk, so that the next process neither traces nor compiles what this one did.
 
-A program is named by all that it follows from: the function, the shapes of its arrays and everything else that it is
-given, the package's files, the versions of what traces it, jax's settings. What is given must consist of values and of
-classes and functions of these packages; a function that is given anything else, or that calls back into Python, is
-compiled as usual.
+An executable is named by all that it follows from: the function, the shapes of its arrays and everything else that it
+is given, the package's files, the versions of what traces it, jax's settings. What is given must consist of values and
+of classes and functions of these packages; a function that is given anything else, or that calls back into Python, is
+left to jax.
 """
 
 import contextlib
@@ -13,7 +13,8 @@ import os
 import pickle
 import threading
 import weakref
-from collections.abc import Callable
+import zlib
+from collections.abc import Callable, Iterable
 from functools import cache, cached_property
 from importlib.metadata import version
 from pathlib import Path
@@ -23,18 +24,21 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax._src import compilation_cache as of_jax
+from jax._src.config import trace_context
 from jax.experimental import serialize_executable
 from jax.experimental.serialize_executable import deserialize_and_load
 
 import sogjax
+from sogjax.errors import InputError
 from sogjax.io.files import atomic_path
-from sogjax.model.program import keep_programs
+from sogjax.model.program import keep_programs, keeper
 from sogjax.run.compilation_cache import programs_folder
-from sogjax.run.compile_once import reading
+from sogjax.run.compile_once import reading, watches
 
 KNOWN = ("sogjax", "jax", "jaxlib", "equinox", "numpy", "optimistix", "builtins", "collections", "functools", "copyreg")
 """Packages whose classes and functions are the same as long as their versions, or files, are."""
-TRACING = ("jax", "jaxlib", "equinox", "optimistix", "lineax", "numpy")
+TRACING = ("jax", "jaxlib", "equinox", "optimistix", "lineax", "jaxtyping", "opt_einsum", "numpy")
+"""Those that a program follows from."""
 SETTINGS = ("JAX_", "XLA_", "EQX_")
 """How variables of the environment begin that may change a program."""
 
@@ -46,8 +50,10 @@ Program = Callable[[list[jax.Array]], Any]
 
 def hold_programs() -> None:
     """Read and keep programs where compiled ones are kept, if they are; to be called when jax is imported."""
-    folder = programs_folder()
-    if folder is not None and os.environ.get("JAX_COMPILATION_CACHE_DIR") == str(folder):
+    folder, present = programs_folder(), keeper()
+    if isinstance(present, KeptPrograms) and present.folder == folder:
+        return
+    if folder is not None and os.environ.get("JAX_COMPILATION_CACHE_DIR") == str(folder) and watches():
         keep_programs(KeptPrograms(folder))
 
 
@@ -60,20 +66,12 @@ class KeptPrograms:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._held: dict[bytes, Program | None] = {}
-        self._modules: dict[int, tuple[weakref.ref[eqx.Module], bytes]] = {}
-        self._locks: dict[bytes, threading.Lock] = {}
+        self._held: dict[Any, Program | None] = {}
+        self._modules: dict[int, tuple[weakref.ref[eqx.Module], bytes | None]] = {}
+        self._locks: dict[Any, threading.Lock] = {}
         self._lock = threading.Lock()
-
-    @cached_property
-    def _here(self) -> bytes:
-        """What all programs of this process follow from."""
-        root, digest = Path(sogjax.__file__).parent, hashlib.sha256()
-        for path in sorted(path for kind in ("*.py", "*.yaml") for path in root.rglob(kind)):
-            digest.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
-        settings = sorted((key, value) for key, value in os.environ.items() if key.startswith(SETTINGS))
-        digest.update(repr([(name, version(name)) for name in TRACING] + settings + _flags()).encode())
-        return digest.digest()
+        self._files = _files()  # as they are when the package is imported
+        self._package = _digest(path.read_bytes() for path, _, _ in self._files)
 
     @cached_property
     def _usual(self) -> bool:
@@ -86,18 +84,23 @@ class KeptPrograms:
         """The program of a function for what it is given, read or compiled and kept; None: it cannot be kept."""
         if not self._usual or not function.__module__.startswith("sogjax."):
             return None
-        try:
-            key = self._key(function, options, given)
-        except UnknownError:
+        key = self._key(function, options, given)
+        if key is None:
             return None
-        if key in self._held:
-            return self._held[key]
+        place = trace_context(), key
         with self._lock:
-            lock = self._locks.setdefault(key, threading.Lock())
+            if place in self._held:
+                return self._held[place]
+            lock = self._locks.setdefault(place, threading.Lock())
         with lock:
-            if key not in self._held:
-                self._held[key] = self._made(key, function, options, given)
-            return self._held[key]
+            found = self._held[place] if place in self._held else self._made(key, function, options, given)
+            self._held[place] = found
+        return found
+
+    @property
+    def num_held(self) -> int:
+        """How many programs are in memory."""
+        return len(self._held)
 
     def forget(self) -> None:
         """Hold nothing in memory."""
@@ -105,16 +108,16 @@ class KeptPrograms:
             self._held.clear()
             self._locks.clear()
 
-    def _key(self, function: Callable[..., Any], options: dict[str, Any], given: tuple[tuple, dict]) -> bytes:
-        """What tells a program from all others of this process."""
+    def _key(self, function: Callable[..., Any], options: dict[str, Any], given: tuple[tuple, dict]) -> bytes | None:
+        """What tells a program from all others of this process; None: it is given something unknown."""
         named = function.__module__, function.__qualname__, function.__code__.co_firstlineno
         (arguments, keywords), told = given, []
         for value in (*arguments, *keywords.values()):
             told.append(self._described_once(value) if isinstance(value, eqx.Module) else _described(value))
-        return _described((named, options, len(arguments), [*keywords], told))
+        return None if None in told else _described((named, options, len(arguments), [*keywords], told))
 
-    def _described_once(self, module: eqx.Module) -> bytes:
-        """What describes a module, which never changes: a tracker takes a fourth of a frame's time to be described."""
+    def _described_once(self, module: eqx.Module) -> bytes | None:
+        """What describes a module, which never changes: a tracker takes a tenth of a frame's time to be described."""
         place = id(module)
         known = self._modules.get(place)
         if known is None or known[0]() is not module:
@@ -122,13 +125,17 @@ class KeptPrograms:
             known = self._modules[place] = gone, _described(module)
         return known[1]
 
+    def _path(self, key: bytes) -> Path:
+        settings = sorted((name, value) for name, value in os.environ.items() if name.startswith(SETTINGS))
+        follows = repr([(name, version(name)) for name in TRACING] + settings + _flags()).encode()
+        return self.folder / f"traced-{_digest([self._package, follows, key]).hex()[:40]}-cache"
+
     def _made(
         self, key: bytes, function: Callable[..., Any], options: dict[str, Any], given: tuple[tuple, dict]
     ) -> Program | None:
-        path = self.folder / f"traced-{hashlib.sha256(self._here + key).hexdigest()[:40]}-cache"
-        with contextlib.suppress(Exception):  # whatever is wrong with a kept file, the program can be compiled
-            executable, results = pickle.loads(path.read_bytes())
-            os.utime(path)
+        path = self._path(key)
+        with contextlib.suppress(Exception):  # whatever a file of another writer has, the program can be compiled
+            executable, results = pickle.loads(_read(path))
             _prepare_lapack()
             return _callable(deserialize_and_load(*executable), results)
         leaves, static = eqx.partition(given, eqx.is_array)
@@ -141,15 +148,53 @@ class KeptPrograms:
             found.append(jax.tree.map(lambda leaf: Array() if eqx.is_array(leaf) else leaf, results))
             return [leaf for leaf in jax.tree.leaves(results) if eqx.is_array(leaf)]
 
+        of_arrays.__name__ = function.__name__  # as profiles show it
         jitted = jax.jit(of_arrays, compiler_options=options or None)
         with reading() as last_read:
             executable = jitted.lower(*map(jnp.asarray, arrays)).compile()
-            with contextlib.suppress(Exception):  # what cannot be written runs all the same
-                _described(found[0])
+            try:
                 content = pickle.dumps((_written(executable, last_read()), found[0]))
-                with atomic_path(path) as file:
-                    file.write_bytes(content)
+            except Exception:  # jax writes no program that calls back, and says so in many ways
+                return None
+        if _described(found[0]) is not None and _files() == self._files:
+            _write(path, content)
         return _callable(executable, found[0])
+
+
+def _files() -> list[tuple[Path, int, int]]:
+    """The package's files, when they changed last, and their sizes."""
+    root = Path(sogjax.__file__).parent
+    paths = sorted(path for kind in ("*.py", "*.yaml") for path in root.rglob(kind))
+    return [(path, status.st_mtime_ns, status.st_size) for path in paths for status in [path.stat()]]
+
+
+def _digest(parts: Iterable[bytes]) -> bytes:
+    digest = hashlib.sha256()
+    for part in parts:
+        digest.update(len(part).to_bytes(8, "big") + part)
+    return digest.digest()
+
+
+def _write(path: Path, content: bytes) -> None:
+    """Keep something, where that is possible, so that damage is noticed: a damaged executable may do anything."""
+    packed = zlib.compress(content, 1)
+    with contextlib.suppress(InputError, OSError), atomic_path(path) as file:
+        file.write_bytes(_digest([packed]) + packed)
+
+
+def _read(path: Path) -> bytes:
+    """What was kept.
+
+    Raises:
+        OSError, ValueError: there is nothing, or it is damaged.
+    """
+    content = path.read_bytes()
+    digest, packed = content[:32], content[32:]
+    if _digest([packed]) != digest:
+        raise ValueError(f"{path} is damaged")
+    with contextlib.suppress(OSError):  # another user's
+        os.utime(path)
+    return zlib.decompress(packed)
 
 
 def _written(executable: Any, read: bytes | None) -> tuple[bytes, Any, Any]:
@@ -228,17 +273,13 @@ class _Describing(pickle.Pickler):
         return NotImplemented
 
 
-def _described(value: Any) -> bytes:
-    """The same bytes for the same values, in every process.
-
-    Raises:
-        UnknownError: something is no value.
-    """
+def _described(value: Any) -> bytes | None:
+    """The same bytes for the same values, in every process; None: something is no value of a known kind."""
     file = io.BytesIO()
     try:
         _Describing(file).dump(_without_arrays(value))
-    except (pickle.PicklingError, AttributeError, TypeError, RecursionError) as error:
-        raise UnknownError(str(error)) from error
+    except Exception:  # pickle has many ways to say so
+        return None
     return file.getvalue()
 
 

@@ -4,11 +4,13 @@ from collections.abc import Iterable
 from functools import partial
 
 import numpy as np
+from jaxtyping import Bool
 
 from sogjax.errors import InputError, counted
 from sogjax.io.frame_table import TERM, FramesRecord, FrameTable
+from sogjax.model.limbs import limb_blobs
 from sogjax.quality.fitted import fitted_numbers
-from sogjax.quality.verdict import expected_of
+from sogjax.quality.verdict import NEARLY_ALL, expected_of
 from sogjax.run.frames import capacities_of
 from sogjax.run.setup import Setup
 from sogjax.run.terminal import alive, say
@@ -85,8 +87,21 @@ def misplaced(setup: Setup, tracked: FrameTable) -> Misplaced | None:
         bounds.other_subject * expected[body.name] if body.name in expected else bounds.least_explained
         for body in setup.bodies
     ]
-    up = setup.clip.recording.up
-    return Misplaced(setup.tracker, setup.bodies, up, np.asarray(tracked.explained, float), np.array(least))
+    explained = np.where(unseen(setup, tracked), np.inf, np.asarray(tracked.explained, float))
+    return Misplaced(setup.tracker, setup.bodies, setup.clip.recording.up, explained, np.array(least))
+
+
+def unseen(setup: Setup, tracked: FrameTable) -> Bool[np.ndarray, "frame actor"]:
+    """Where nothing tells who an actor is: he is out of all views, or nearly all of him is hidden by things."""
+    assert tracked.explained is not None
+    found, body = np.asarray(tracked.explained) == 0.0, setup.tracker.body
+    if tracked.limb_hidden is None or not tracked.limb_hidden.size:
+        return found
+    actors = np.array([body.blob_actors[blobs][0] if blobs.any() else -1 for blobs in limb_blobs(body)])
+    for actor in range(found.shape[1]):
+        hidden = np.asarray(tracked.limb_hidden)[:, actors == actor]
+        found[:, actor] |= hidden.min(axis=1, initial=1.0) >= NEARLY_ALL if hidden.size else False
+    return found
 
 
 def _columns(revised: Revised) -> dict[str, object]:

@@ -17,11 +17,11 @@ from sogjax.energy.part_energy import PartEnergy, PartIndex
 from sogjax.energy.posed import History
 from sogjax.energy.views import Views
 from sogjax.model.program import compiled
-from sogjax.model.solid import DEEP, impossible
+from sogjax.model.solid import DEEP, impossibilities
 from sogjax.search.limb_ways import CROSSED, Unit, Units, drawn_ways, look_alikes, units_of
 from sogjax.search.other_pass import REACH, Pass
 from sogjax.search.placed_body import means_of
-from sogjax.search.worth import IMPOSSIBLE, worth
+from sogjax.search.worth import IMPOSSIBLE_COST, worth
 from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.tracking.capacity import views_near
 from sogjax.tracking.culling import Capacities
@@ -181,7 +181,7 @@ class LimbSearch:
     ) -> tuple[Float[np.ndarray, "start dof"], Float[np.ndarray, "crossed dof"]]:
         """What is possible and worth climbing: the best ways of all units together, single ones; and crossed ends."""
         known = self._impossible(pose[None])[0]
-        cheaper = lambda poses: IMPOSSIBLE * energy * (known - self._impossible(np.asarray(poses)))
+        cheaper = lambda poses: IMPOSSIBLE_COST * energy * (known - self._impossible(np.asarray(poses)))
         gains = np.where(found.apart > APART, found.gains + cheaper(found.poses), -np.inf)
         best, starts = gains.argmax(axis=1), []
         gaining = [k for k, way in enumerate(best) if gains[k, way] > 0.0]
@@ -212,7 +212,7 @@ class LimbSearch:
         """How impossible poses are, 0 to 1."""
         if self.tracker.solid is None:
             return np.zeros(poses.shape[:-1], poses.dtype)
-        found = impossible(self.tracker.solid, self.tracker.body, jnp.asarray(poses.reshape(-1, poses.shape[-1])))
+        found = impossibilities(self.tracker.solid, self.tracker.body, jnp.asarray(poses.reshape(-1, poses.shape[-1])))
         return np.asarray(found).reshape(poses.shape[:-1])
 
     def _tried(self, number: int, unit: Unit, pose: Float[np.ndarray, "dof"]) -> Float[np.ndarray, "seed dof"]:

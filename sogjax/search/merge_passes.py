@@ -51,6 +51,8 @@ MOST_LOOKS, MORE_LOOKS = 1, 2
 """Frames of other passes that gain nothing, at most, in lengths of the clip; and how many more, from where a limb is
 likely lost, in numbers of such frames."""
 
+LOOK_FOR_ACTOR = 20
+"""Frames of a pass that take as long as looking for an actor in one."""
 TURNED_PATIENCE = 20
 """`PATIENCE` of a pass with an actor turned: while he stands still, front and back are worth the same."""
 
@@ -149,6 +151,7 @@ class _Revising:
         for row, actor in misplaced.places():
             if search is None or self._tired():
                 break
+            self._looked_at += LOOK_FOR_ACTOR
             pose = misplaced.pose(search, self._frame(row), self.passed, row, actor)
             if pose is not None:
                 self._pass_from(search, row, pose, TURNED_PATIENCE)

@@ -1,7 +1,7 @@
-"""Actors that are followed where they are not, looked for again where the other actors are not.
+"""Actors that are followed where they are not, searched for again in frames out of which the other actors are taken.
 
-Little of such an actor is explained by what is seen. His neighbours are known there, which they were not when tracking
-began.
+Little of such an actor is explained by what is seen. Where his neighbours are is known by now, which it was not when
+tracking began.
 """
 
 from collections.abc import Iterator, Sequence
@@ -47,16 +47,16 @@ class Misplaced:
         return [PoseSearch.of_body(body, self.tracker.terms, self.up) for body in self.bodies]
 
     @property
-    def _where(self) -> Bool[np.ndarray, "frame actor"]:
+    def _is_misplaced(self) -> Bool[np.ndarray, "frame actor"]:
         return self.explained < self.least
 
     def places(self) -> Iterator[tuple[int, int]]:
         """Frames to look in, and actors: in the middle of each stretch and, where nothing is found, elsewhere in it."""
         for actor in range(len(self.bodies)):
-            for first, stop in stretches(self._where[:, actor], at_least=SURE_FRAMES, gap=SURE_FRAMES):
+            for first, stop in stretches(self._is_misplaced[:, actor], at_least=SURE_FRAMES, gap=SURE_FRAMES):
                 for share in LOOKS:
                     row = first + int(share * (stop - first))
-                    if self._where[row, actor]:
+                    if self._is_misplaced[row, actor]:
                         yield row, actor
 
     def pose(

@@ -6,7 +6,7 @@ from jaxtyping import Array, Float
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.model.solid import Solid
 
-IMPOSSIBLE = 0.02
+IMPOSSIBLE_COST = 0.02
 """Part of its energy that an impossible pose costs: where legs are hidden, the wrong one explains up to 1 % more."""
 
 
@@ -17,4 +17,4 @@ def worth(
     value = energy(pose) if value is None else value
     if solid is None:
         return value
-    return value - IMPOSSIBLE * jnp.abs(value) * solid.impossible(energy.body.posed_blobs(pose).means)
+    return value - IMPOSSIBLE_COST * jnp.abs(value) * solid.impossibility(energy.body.posed_blobs(pose).means)
