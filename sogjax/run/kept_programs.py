@@ -7,15 +7,13 @@ left to jax.
 """
 
 import contextlib
-import hashlib
 import io
 import os
 import pickle
 import threading
 import weakref
-import zlib
-from collections.abc import Callable, Iterable
-from functools import cache, cached_property
+from collections.abc import Callable
+from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -23,17 +21,21 @@ from typing import Any
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jax._src import compilation_cache as of_jax
 from jax._src.config import trace_context
-from jax.experimental import serialize_executable
-from jax.experimental.serialize_executable import deserialize_and_load
 
 import sogjax
-from sogjax.errors import InputError
-from sogjax.io.files import atomic_path
 from sogjax.model.program import keep_programs, keeper
 from sogjax.run.compilation_cache import programs_folder
 from sogjax.run.compile_once import reading, watches
+from sogjax.run.executable_file import (
+    Array,
+    Program,
+    callable_program,
+    digest_of,
+    executable_content,
+    read_executable,
+    write_content,
+)
 
 KNOWN = ("sogjax", "jax", "jaxlib", "equinox", "numpy", "optimistix", "builtins", "collections", "functools", "copyreg")
 """Packages whose classes and functions are the same as long as their versions, or files, are."""
@@ -41,11 +43,6 @@ TRACING = ("jax", "jaxlib", "equinox", "optimistix", "lineax", "jaxtyping", "opt
 """Those that a program follows from."""
 SETTINGS = ("JAX_", "XLA_", "EQX_")
 """How variables of the environment begin that may change a program."""
-
-_WRITING = threading.Lock()
-"""While one thread has jax write something else, no other has it write."""
-
-Program = Callable[[list[jax.Array]], Any]
 
 
 def hold_programs() -> None:
@@ -71,7 +68,7 @@ class KeptPrograms:
         self._locks: dict[Any, threading.Lock] = {}
         self._lock = threading.Lock()
         self._files = _files()  # as they are when the package is imported
-        self._package = _digest(path.read_bytes() for path, _, _ in self._files)
+        self._package = digest_of(path.read_bytes() for path, _, _ in self._files)
 
     @cached_property
     def _usual(self) -> bool:
@@ -128,16 +125,14 @@ class KeptPrograms:
     def _path(self, key: bytes) -> Path:
         settings = sorted((name, value) for name, value in os.environ.items() if name.startswith(SETTINGS))
         follows = repr([(name, version(name)) for name in TRACING] + settings + _flags()).encode()
-        return self.folder / f"traced-{_digest([self._package, follows, key]).hex()[:40]}-cache"
+        return self.folder / f"traced-{digest_of([self._package, follows, key]).hex()[:40]}-cache"
 
     def _made(
         self, key: bytes, function: Callable[..., Any], options: dict[str, Any], given: tuple[tuple, dict]
     ) -> Program | None:
         path = self._path(key)
         with contextlib.suppress(Exception):  # whatever a file of another writer has, the program can be compiled
-            executable, results = pickle.loads(_read(path))
-            _prepare_lapack()
-            return _callable(deserialize_and_load(*executable), results)
+            return read_executable(path)
         leaves, static = eqx.partition(given, eqx.is_array)
         arrays, structure = jax.tree.flatten(leaves)
         found: list[Any] = []
@@ -153,12 +148,12 @@ class KeptPrograms:
         with reading() as last_read:
             executable = jitted.lower(*map(jnp.asarray, arrays)).compile()
             try:
-                content = pickle.dumps((_written(executable, last_read()), found[0]))
+                content = executable_content(executable, found[0], last_read())
             except Exception:  # jax writes no program that calls back, and says so in many ways
                 return None
         if _described(found[0]) is not None and _files() == self._files:
-            _write(path, content)
-        return _callable(executable, found[0])
+            write_content(path, content)
+        return callable_program(executable, found[0])
 
 
 def _files() -> list[tuple[Path, int, int]]:
@@ -166,90 +161,6 @@ def _files() -> list[tuple[Path, int, int]]:
     root = Path(sogjax.__file__).parent
     paths = sorted(path for kind in ("*.py", "*.yaml") for path in root.rglob(kind))
     return [(path, status.st_mtime_ns, status.st_size) for path in paths for status in [path.stat()]]
-
-
-def _digest(parts: Iterable[bytes]) -> bytes:
-    digest = hashlib.sha256()
-    for part in parts:
-        digest.update(len(part).to_bytes(8, "big") + part)
-    return digest.digest()
-
-
-def _write(path: Path, content: bytes) -> None:
-    """Keep something, where that is possible, so that damage is noticed: a damaged executable may do anything."""
-    packed = zlib.compress(content, 1)
-    with contextlib.suppress(InputError, OSError), atomic_path(path) as file:
-        file.write_bytes(_digest([packed]) + packed)
-
-
-def _read(path: Path) -> bytes:
-    """What was kept.
-
-    Raises:
-        OSError, ValueError: there is nothing, or it is damaged.
-    """
-    content = path.read_bytes()
-    digest, packed = content[:32], content[32:]
-    if _digest([packed]) != digest:
-        raise ValueError(f"{path} is damaged")
-    with contextlib.suppress(OSError):  # another user's
-        os.utime(path)
-    return zlib.decompress(packed)
-
-
-def _written(executable: Any, read: bytes | None) -> tuple[bytes, Any, Any]:
-    """What `serialize` writes of an executable; `read` is what jax kept of it, if it was not compiled anew.
-
-    One that was read cannot be written again: kernels are missing then. jax has no way to say what to write instead.
-    """
-    if read is None:
-        with _WRITING:
-            return serialize_executable.serialize(executable)
-    program, _ = of_jax.extract_executable_and_time(of_jax.decompress_executable(read))
-
-    class Writing(serialize_executable._JaxPjrtPickler):
-        """Writes what was read in place of the executable."""
-
-        def persistent_id(self, obj: Any) -> Any:
-            found = super().persistent_id(obj)
-            return ("exec", program) if found is not None and found[0] == "exec" else found
-
-    with _WRITING:
-        before = serialize_executable._JaxPjrtPickler
-        serialize_executable._JaxPjrtPickler = Writing
-        try:
-            return serialize_executable.serialize(executable)
-        finally:
-            serialize_executable._JaxPjrtPickler = before
-
-
-@cache
-def _prepare_lapack() -> None:
-    """Let executables find LAPACK, which jax does when it lowers a program that needs it: without, they crash."""
-    from jax._src.lax import linalg
-
-    if hasattr(linalg, "initialize_lapack"):
-        linalg.initialize_lapack()
-    else:
-        jax.jit(jnp.linalg.cholesky).lower(jnp.eye(2))
-
-
-class Array:
-    """Stands for an array among results."""
-
-
-def _callable(executable: Callable[..., list[jax.Array]], results: Any) -> Program:
-    """What runs an executable, and puts the arrays that it computes where they belong among the results."""
-    leaves, structure = jax.tree.flatten(results)
-    places = [k for k, leaf in enumerate(leaves) if isinstance(leaf, Array)]
-
-    def run(arrays: list[jax.Array]) -> Any:
-        filled = leaves.copy()
-        for place, array in zip(places, executable(*arrays), strict=True):
-            filled[place] = array
-        return jax.tree.unflatten(structure, filled)
-
-    return run
 
 
 def _without_arrays(given: Any) -> Any:
