@@ -59,19 +59,24 @@ def compiled(function: Callable[Arguments, Results], **options: Any) -> Callable
     Only plain functions of modules are kept: closures, local and wrapped functions stay what `eqx.filter_jit` makes.
     """
     plain = eqx.filter_jit(function, compiler_options=options or None)  # pyright: ignore[reportCallIssue]
-    if not isinstance(function, FunctionType) or function.__closure__ or "<locals>" in function.__qualname__:
-        return plain
-    if hasattr(function, "__wrapped__"):
+    if not _of_module(function):
         return plain
 
     @wraps(function)
     def call(*arguments: Arguments.args, **keywords: Arguments.kwargs) -> Results:
         if not _keepers or not trace_state_clean():  # as a part of another program
             return plain(*arguments, **keywords)
-        leaves = jax.tree.leaves((arguments, keywords))
         program = _keepers[0].program(function, options, (arguments, keywords))
         if program is None:
             return plain(*arguments, **keywords)
+        leaves = jax.tree.leaves((arguments, keywords))
         return program([jnp.asarray(leaf) for leaf in leaves if eqx.is_array(leaf)])
 
     return call
+
+
+def _of_module(function: Callable[..., Any]) -> bool:
+    """Whether a function's module and name say all that it does."""
+    if not isinstance(function, FunctionType) or hasattr(function, "__wrapped__"):
+        return False
+    return not function.__closure__ and "<locals>" not in function.__qualname__

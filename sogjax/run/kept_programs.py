@@ -71,7 +71,7 @@ class KeptPrograms:
         self._package = digest_of(path.read_bytes() for path, _, _ in self._files)
 
     @cached_property
-    def _usual(self) -> bool:
+    def _on_one_cpu(self) -> bool:
         """Whether programs run on the one CPU that they are compiled for."""
         return jax.default_backend() == "cpu" and jax.device_count() == 1
 
@@ -79,7 +79,7 @@ class KeptPrograms:
         self, function: Callable[..., Any], options: dict[str, Any], given: tuple[tuple, dict]
     ) -> Program | None:
         """The program of a function for what it is given, read or compiled and kept; None: it cannot be kept."""
-        if not self._usual or not function.__module__.startswith("sogjax."):
+        if not self._on_one_cpu or not function.__module__.startswith("sogjax."):
             return None
         key = self._key(function, options, given)
         if key is None:
