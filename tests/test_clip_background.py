@@ -108,9 +108,9 @@ def test_light_that_drifts_or_jumps_is_taken_out_and_counted_as_spread():
     found = learnt(drifting)
     assert found.known.mean() > 0.95
     assert (apart(found)[found.known] > 14).mean() < 0.01
-    drift = even_samples(np.stack(list(drifting.values()))).drift
+    drift = even_samples([*drifting.values()]).drift
     assert 0.08 < np.median(drift / EMPTY.mean(axis=-1)) < 0.16  # standard deviation of 0.8 to 1.2: 0.118
-    assert np.median(even_samples(np.stack(list(steady.values()))).drift) < 0.5
+    assert np.median(even_samples([*steady.values()]).drift) < 0.5
     assert np.median(found.spread) > 2 * np.median(learnt(steady).spread)
 
 

@@ -144,10 +144,10 @@ def _informed(setup: Setup, background: Background, table: FrameTable) -> Setup:
     """The setup that knows what the poses tell of keypoints and background."""
     rows = np.unique(np.linspace(0, len(table) - 1, FRAMES).astype(int))
     bias = bias_of_poses(setup, table.frame[rows], table.pose[rows])
-    setup = replace(setup, tracker=bias.in_tracker(setup.tracker))
+    setup = bias.in_setup(setup)
     poses = {int(frame): jnp.asarray(pose) for frame, pose in zip(table.frame, table.pose, strict=True)}
     start = InitialPose(int(table.frame[0]), table.pose[0], "tracked")
-    return replace(setup, tracker=relearn_background(setup, background, start, poses).in_tracker(setup))
+    return relearn_background(setup, background, start, poses).in_setup(setup)
 
 
 def _found_setup(setup: Setup, body: Body, moves: Float[np.ndarray, "camera 7"] | None) -> Setup:

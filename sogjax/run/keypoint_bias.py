@@ -1,6 +1,6 @@
 """The pass that learns where a detector puts its keypoints on the actors, from the clip's first frames."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import equinox as eqx
@@ -32,13 +32,14 @@ class KeypointBias:
     offsets: Float[np.ndarray, "actor keypoint 3"] | None
     """Metres, in the landmarks' joint frames; None: nothing is known, or there are no keypoints."""
 
-    def in_tracker(self, tracker: Tracker) -> Tracker:
-        """The tracker that knows it."""
+    def in_setup(self, setup: Setup) -> Setup:
+        """The setup whose tracker knows it."""
         if self.offsets is None:
-            return tracker
-        term = keypoint_term_among(tracker.terms)
+            return setup
+        term = keypoint_term_among(setup.tracker.terms)
         assert term is not None
-        return _with_term(tracker, eqx.tree_at(lambda t: t.offsets, term, jnp.asarray(self.offsets)))
+        known = eqx.tree_at(lambda t: t.offsets, term, jnp.asarray(self.offsets))
+        return replace(setup, tracker=_with_term(setup.tracker, known))
 
     def save(self, folder: Path) -> None:
         """Keep it in a run's folder."""

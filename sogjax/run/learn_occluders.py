@@ -59,9 +59,12 @@ class LearntOccluders:
     rows: tuple[int, int] = (0, 0)
     """The first and the last row of the frames in which it hides a part of the body."""
 
-    def in_tracker(self, tracker: Tracker) -> Tracker:
-        """The tracker that knows it."""
-        return tracker if self.hidden is None else replace(tracker, reader=tracker.reader.behind(self.hidden))
+    def in_setup(self, setup: Setup) -> Setup:
+        """The setup whose tracker knows it."""
+        if self.hidden is None:
+            return setup
+        tracker = setup.tracker
+        return replace(setup, tracker=replace(tracker, reader=tracker.reader.behind(self.hidden)))
 
     def save(self, folder: Path) -> None:
         """Keep it in a run's folder."""

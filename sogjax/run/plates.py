@@ -20,7 +20,7 @@ from sogjax.run.clip import Clip, SampleKind, spread_frames
 from sogjax.run.terminal import say
 from sogjax.scene.background import BackgroundImage
 from sogjax.scene.background_difference import background_difference, disc, working_size
-from sogjax.scene.plates import FittedPlate, fitted_plate
+from sogjax.scene.plates import FittedPlate, fitted_plate, median_picture
 
 LOOKED_AT = 9
 """Frames whose median is what a camera shows; somebody who moves is not in it."""
@@ -56,19 +56,6 @@ def fitted_plates(clip: Clip, more: Sequence[SampleKind] = ()) -> dict[str, Fitt
     names = [name for name in recording.rig.names if name in recording.background]
     with ThreadPoolExecutor() as pool:
         return dict(zip(names, pool.map(fitted, names), strict=True))
-
-
-def median_picture(frames: Sequence[UInt8[np.ndarray, "rows columns 3"]]) -> UInt8[np.ndarray, "rows columns 3"]:
-    """The median of every number of some pictures, rounded down.
-
-    Whole pictures are compared and exchanged (odd-even transposition), thirty times as fast as what numpy does.
-    """
-    ordered = list(frames)
-    for turn in range(len(ordered)):
-        for k in range(turn % 2, len(ordered) - 1, 2):
-            ordered[k : k + 2] = np.minimum(*ordered[k : k + 2]), np.maximum(*ordered[k : k + 2])
-    low, high = ordered[(len(ordered) - 1) // 2], ordered[len(ordered) // 2]
-    return low + (high - low) // 2
 
 
 def say_plates(clip: Clip, plates: Mapping[str, FittedPlate], choice: str) -> list[str]:

@@ -23,11 +23,10 @@ from sogjax.run.initial_pose import InitialPose
 from sogjax.run.setup import Setup
 from sogjax.run.terminal import progress, say
 from sogjax.scene.background import BackgroundImage
-from sogjax.scene.background_difference import working_size
+from sogjax.scene.background_difference import channel_max, working_size
 from sogjax.scene.clip_background import FEWEST_AGREEING
 from sogjax.search.search_energy import DISC
 from sogjax.tracking.frame_by_frame import track
-from sogjax.tracking.tracker import Tracker
 from sogjax.view.projection import picture_points
 
 FOLDER, FIRST = "relearnt", "first"
@@ -49,14 +48,15 @@ class RelearntBackground:
     first: Background | None = None
     """The first background without what turned out to be the body; it holds where nothing was learnt."""
 
-    def in_tracker(self, setup: Setup) -> Tracker:
-        """The tracker with this background where something is known of it, and with its own elsewhere."""
+    def in_setup(self, setup: Setup) -> Setup:
+        """The setup with this background where something is known of it, and with its own elsewhere."""
         if self.background is None:
-            return setup.tracker
+            return setup
         again, before = (found and found.model(setup.clip.grids) for found in (self.background, self.first))
         assert again is not None
         assert before is not None
-        return eqx.tree_at(lambda t: t.reader.background, setup.tracker, again.filled_by(before))
+        tracker = eqx.tree_at(lambda t: t.reader.background, setup.tracker, again.filled_by(before))
+        return replace(setup, tracker=tracker)
 
     def save(self, folder: Path) -> None:
         """Keep it in a run's folder."""
@@ -124,12 +124,11 @@ def without_body(
     """
     if first.origin != "clip":
         return first
-    count, same = np.zeros(first.known.shape), np.zeros(first.known.shape)
-    picture = first.picture.astype(np.int16)
+    count, same = np.zeros(first.known.shape, np.uint16), np.zeros(first.known.shape, np.uint16)
     for frame in shown.keys() & covered.keys():
         if not covered[frame].all():
             count += covered[frame]
-            same += covered[frame] & (np.abs(picture - shown[frame]).max(axis=-1) <= SAME)
+            same += covered[frame] & (channel_max(cv2.absdiff(first.picture, np.asarray(shown[frame]))) <= SAME)
     stays = count >= max(FEWEST_AGREEING, STAYS * len(shown))
     taken = stays & (same >= MOSTLY * count)
     return replace(first, known=first.known & ~taken)

@@ -22,9 +22,7 @@ from sogjax.run.clip import Clip, SampleKind
 from sogjax.run.clock import StageTimes
 from sogjax.run.filter import filter_name
 from sogjax.run.initial_pose import SOURCES, InitialPose, PoseRequest, PoseSource
-from sogjax.run.keypoint_bias import KeypointBias
 from sogjax.run.learn_occluders import LearntOccluders
-from sogjax.run.relearn_background import RelearntBackground
 from sogjax.run.result import RunResult
 from sogjax.run.run_files import GUESS
 from sogjax.run.sampled_masks import mask_samples
@@ -62,6 +60,7 @@ class Run:
 
     def __post_init__(self) -> None:
         self._lock = Lock()
+        self._setup: tuple[list[Any], Setup | None] = ([None] * 3, None)
 
     @property
     def makes_actors(self) -> bool:
@@ -114,15 +113,14 @@ class Run:
     def setup(self) -> Setup:
         """What is tracked with, knowing what was learnt so far."""
         with self._lock:  # a thread makes it while the initial pose is searched for
-            found = self.first_setup
-        relearnt: RelearntBackground | None = self.records.get("relearnt")
-        bias: KeypointBias | None = self.records.get("keypoint_bias")
-        occluders: LearntOccluders | None = self.records.get("occluders")
-        if relearnt is not None:
-            found = replace(found, tracker=relearnt.in_tracker(found))
-        if occluders is not None:
-            found = replace(found, tracker=occluders.in_tracker(found.tracker))
-        return found if bias is None else replace(found, tracker=bias.in_tracker(found.tracker))
+            learnt = [self.records.get(name) for name in ("relearnt", "occluders", "keypoint_bias")]
+            known, made = self._setup
+            if made is None or any(now is not before for now, before in zip(learnt, known, strict=True)):
+                made = self.first_setup
+                for record in learnt:
+                    made = made if record is None else record.in_setup(made)
+                self._setup = learnt, made
+            return made
 
     @property
     def hides_something(self) -> bool:

@@ -9,7 +9,7 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Bool, Float, UInt8
 
-from sogjax.scene.background_difference import EDGE_NOISE
+from sogjax.scene.background_difference import EDGE_NOISE, channel_max
 from sogjax.scene.cells import CellGrid, stack_shape
 from sogjax.scene.plates import FittedPlate
 
@@ -66,7 +66,7 @@ class BackgroundImage:
 
 def local_contrast(picture: np.ndarray) -> Float[np.ndarray, "_h _w"]:
     """The largest difference of neighbouring pixels, in grey levels."""
-    return cv2.morphologyEx(picture, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8)).max(axis=-1).astype(np.float32)
+    return channel_max(cv2.morphologyEx(picture, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))).astype(np.float32)
 
 
 def stack_background(backgrounds: Sequence[BackgroundImage], grids: Sequence[CellGrid]) -> BackgroundCells:
@@ -102,8 +102,7 @@ def cell_means(values: Float[np.ndarray, "..."], grid: CellGrid) -> Float[np.nda
     """
     rows = _edges(grid.rows, grid.cell_size, grid.height, values.shape[0])
     columns = _edges(grid.columns, grid.cell_size, grid.width, values.shape[1])
-    sums = np.zeros((values.shape[0] + 1, values.shape[1] + 1, *values.shape[2:]))
-    sums[1:, 1:] = values.cumsum(axis=0, dtype=float).cumsum(axis=1)
+    sums = cv2.integral(values, sdepth=cv2.CV_64F)
     across = _between(_between(sums, rows, 0), columns, 1)
     whole = np.diff(across, axis=0)
     area = np.outer(np.diff(rows), np.diff(columns))

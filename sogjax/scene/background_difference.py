@@ -1,6 +1,7 @@
 """Where a picture differs from the empty scene, as opposed to being in shadow or exposed differently."""
 
 from dataclasses import dataclass
+from functools import reduce
 
 import cv2
 import numpy as np
@@ -122,6 +123,11 @@ def disc(width: int) -> np.ndarray:
     return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (width, width))
 
 
+def channel_max(picture: np.ndarray) -> np.ndarray:
+    """The largest channel of each pixel, several times faster than numpy's maximum along an axis that short."""
+    return reduce(cv2.max, cv2.split(picture))
+
+
 def same_exposure(
     light: np.ndarray, background: np.ndarray, every: int = 3
 ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
@@ -129,18 +135,21 @@ def same_exposure(
 
     What differs for another reason is left out by itself; of rows and columns only one in `every` is looked at.
     """
-    seen, empty = (part[::every, ::every].reshape(-1, 3).astype(float) for part in (light, background))
+    seen, empty = (
+        np.ascontiguousarray(part[::every, ::every].reshape(-1, 3).T, dtype=float) for part in (light, background)
+    )
     low, high = SATURATED
-    usable = ((seen > low) & (seen < high) & (empty > low) & (empty < high)).all(axis=1)
+    usable = ((seen > low) & (seen < high) & (empty > low) & (empty < high)).all(axis=0)
     gain, offset = np.ones(3), np.zeros(3)
     for _ in range(4):
-        rest = np.abs(seen - gain * empty - offset).max(axis=1)
+        rest = np.abs(seen - gain[:, None] * empty - offset[:, None]).max(axis=0)
         kept = usable & (rest <= max(3.0 * float(np.median(rest)), 4.0))
         if kept.sum() < 100:
             break
-        spread = np.maximum(empty[kept].var(axis=0), 1e-6)
-        middle_seen, middle_empty = seen[kept].mean(axis=0), empty[kept].mean(axis=0)
-        covariance = ((seen[kept] - middle_seen) * (empty[kept] - middle_empty)).mean(axis=0)
+        seen_there, empty_there = seen[:, kept], empty[:, kept]
+        spread = np.maximum(empty_there.var(axis=1), 1e-6)
+        middle_seen, middle_empty = seen_there.mean(axis=1), empty_there.mean(axis=1)
+        covariance = ((seen_there - middle_seen[:, None]) * (empty_there - middle_empty[:, None])).mean(axis=1)
         gain = np.where(spread > 1.0, np.clip(covariance / spread, 0.3, 3.0), 1.0)
         offset = middle_seen - gain * middle_empty
     return gain, offset

@@ -4,7 +4,7 @@ The samples are brought into one light first; then each pixel's background is a 
 What keeps it from being learnt is a camera that did not stand still, or nothing that moves.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -12,9 +12,9 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from sogjax.scene.background import NOISE_FLOOR, BackgroundImage, local_contrast
-from sogjax.scene.background_difference import EDGE_NOISE, disc, opened, same_exposure
+from sogjax.scene.background_difference import EDGE_NOISE, channel_max, disc, opened, same_exposure
 from sogjax.scene.neighbour_growth import grown, modes_of
-from sogjax.scene.plates import FARTHEST, FEWEST_BLOCKS, block_shifts
+from sogjax.scene.plates import FARTHEST, FEWEST_BLOCKS, block_shifts, median_picture
 
 MEDIAN_OF = 15
 """Samples that the reference is the median of."""
@@ -25,27 +25,29 @@ NOTICED = 1.0
 
 Picture = UInt8[np.ndarray, "rows columns 3"]
 Mask = Bool[np.ndarray, "rows columns"]
-Samples = UInt8[np.ndarray, "sample rows columns 3"]
 
 
 @dataclass(frozen=True)
 class EvenSamples:
     """Samples in the light of their median, and how far the light moved."""
 
-    images: Samples
+    images: Sequence[Picture]
+    """Those whose light needed no evening are the very samples, perhaps mapped from disk."""
     reference: UInt8[np.ndarray, "rows columns 3"]
     """Median over time: mostly background, where the subject does not stand for long."""
     drift: Float[np.ndarray, "rows columns"]
     """Standard deviation over time of what the light alone did to a grey level."""
 
 
-def even_samples(images: Samples) -> EvenSamples:
+def even_samples(images: Sequence[Picture]) -> EvenSamples:
     """Bring every sample into the light of the median by a gain and an offset for each channel."""
     reference = _median(images)
     every = max(round(np.sqrt(reference[..., 0].size / LOOKED_AT)), 1)
     fits = [same_exposure(image, reference, every=every) for image in images]
-    evened = np.stack([_without(image, *fit) for image, fit in zip(images, fits, strict=True)])
-    again = reference if np.array_equal(evened, images) else _median(evened)
+    evened = [_without(image, *fit) for image, fit in zip(images, fits, strict=True)]
+    again = reference
+    if any(after is not before for after, before in zip(evened, images, strict=True)):
+        again = _median(evened)
     gains, offsets = (np.array(part) for part in zip(*fits, strict=True))
     return EvenSamples(evened, again, _drift(again, gains - 1.0, offsets))
 
@@ -72,10 +74,9 @@ def _without(
     return cv2.LUT(image, np.rint(table).clip(0, 255).astype(np.uint8)[None])
 
 
-def _median(images: Samples) -> UInt8[np.ndarray, "rows columns 3"]:
-    chosen = images[np.unique(np.linspace(0, len(images) - 1, min(MEDIAN_OF, len(images))).round().astype(int))]
-    flat = np.ascontiguousarray(chosen.reshape(len(chosen), -1).T)
-    return np.partition(flat, len(chosen) // 2, axis=-1)[:, len(chosen) // 2].reshape(images.shape[1:])
+def _median(images: Sequence[Picture]) -> Picture:
+    chosen = np.unique(np.linspace(0, len(images) - 1, min(MEDIAN_OF, len(images))).round().astype(int))
+    return median_picture([images[k] for k in chosen])
 
 
 MOST_SAMPLES = 60
@@ -105,13 +106,13 @@ class SampledCamera:
     @classmethod
     def from_images(cls, images: Mapping[int, Picture]) -> "SampledCamera":
         """What the pictures of some frames tell."""
-        even = even_samples(np.stack(list(images.values())))
+        even = even_samples([*map(np.asarray, images.values())])
         noise = _noise(even)
         contrast = local_contrast(even.reference)
         tolerance = np.clip(4.0 + 3.0 * noise + EDGE_NOISE * contrast, 0, 60).astype(np.uint8)
         spans = np.array_split(np.arange(len(images)), min(SPANS, len(images)))
         overlapping = [np.arange(max(span[0] - 1, 0), span[-1] + 1) for span in spans]
-        moving = tuple(_moving(even.images[span], tolerance) for span in overlapping)
+        moving = tuple(_moving([even.images[k] for k in span], tolerance) for span in overlapping)
         return cls(tuple(images), even, noise, tolerance, moving)
 
 
@@ -136,7 +137,8 @@ def learnt_background(
     picture, spread = _means(images)
     known = np.ones(zone.shape, bool)
     if zone.any():
-        samples = np.ascontiguousarray(images[:, zone].transpose(0, 2, 1))
+        pixels = np.flatnonzero(zone)
+        samples = np.stack([np.ascontiguousarray(image.reshape(-1, 3).take(pixels, axis=0).T) for image in images])
         usable = np.ones((len(images), samples.shape[2]), bool)
         for k, frame in enumerate(camera.frames):
             if left_out is not None and frame in left_out:
@@ -157,28 +159,27 @@ def learnt_background(
 
 def _noise(even: EvenSamples) -> float:
     """The noise of a channel, by the median of the differences from the reference: that is where nothing happens."""
-    chosen = even.images[:: max(len(even.images) // 12, 1), ::2, ::2]
+    chosen = np.stack([image[::2, ::2] for image in even.images[:: max(len(even.images) // 12, 1)]])
     apart = cv2.absdiff(chosen, np.broadcast_to(even.reference[::2, ::2], chosen.shape).copy())
     return float(1.48 * np.median(apart.mean(axis=0)))
 
 
-def _moving(images: Samples, tolerance: UInt8[np.ndarray, "rows columns"]) -> Mask:
+def _moving(images: Sequence[Picture], tolerance: UInt8[np.ndarray, "rows columns"]) -> Mask:
     """Where the samples differ by more than noise, over more than an edge's width."""
     low, high = images[0].copy(), images[0].copy()
     for image in images[1:]:
         cv2.min(low, image, low)
         cv2.max(high, image, high)
-    differs = (high - low).max(axis=-1) > 2.0 * tolerance
+    differs = channel_max(high - low) > 2.0 * tolerance
     width = 2 * max(round(0.5 * MOVING_WIDTH * max(differs.shape)), 1) + 1
     return cv2.morphologyEx(differs.astype(np.uint8), cv2.MORPH_OPEN, disc(width)) > 0
 
 
 def _means(
-    images: Samples,
+    images: Sequence[Picture],
 ) -> tuple[Float[np.ndarray, "rows columns 3"], Float[np.ndarray, "rows columns"]]:
     """Mean and standard deviation over time."""
-    total = np.zeros(images.shape[1:], np.float32)
-    squares = np.zeros(images.shape[1:], np.float32)
+    total, squares = np.zeros(images[0].shape, np.float32), np.zeros(images[0].shape, np.float32)
     for image in images:
         cv2.accumulate(image, total)
         cv2.accumulateSquare(image, squares)
@@ -190,7 +191,7 @@ COMPARED = 12
 """Samples that are compared with the middle one."""
 
 
-def picture_shifts(images: UInt8[np.ndarray, "sample rows columns 3"]) -> Float[np.ndarray, "compared 2"]:
+def picture_shifts(images: Sequence[Picture]) -> Float[np.ndarray, "compared 2"]:
     """How far the picture lies from that of the middle sample (pixels to the right and down), for some of the samples.
 
     The shift of a sample is the median over blocks of the picture, by phase correlation, so neither the subject nor

@@ -79,9 +79,9 @@ def _mean_and_deviation(
 ) -> tuple[Float[np.ndarray, "3 pixel"], Float[np.ndarray, "pixel"]]:
     total, squares = np.zeros(samples.shape[1:], np.float32), np.zeros(samples.shape[1:], np.float32)
     for sample, member in zip(samples, members, strict=True):
-        light = sample * member.astype(np.float32)
-        total += light
-        squares += light * light
+        light = sample * member
+        cv2.accumulate(light, total)
+        cv2.accumulateSquare(light, squares)
     count = np.maximum(members.sum(axis=0), 1).astype(np.float32)
     mean = total / count
     return mean, np.sqrt(np.maximum(squares / count - mean * mean, 0.0).mean(axis=0))
@@ -140,11 +140,10 @@ class _Field:
         fewest: int,
     ):
         num_samples = modes.members.shape[1]
-        bits = np.uint64(1) << np.arange(num_samples, dtype=np.uint64)
         self.rows, self.columns = np.nonzero(zone)
         self.chosen = np.full(len(self.rows), -1)
         self._colors = modes.colors
-        self._seen = (modes.members * bits[None, :, None]).sum(axis=1, dtype=np.uint64)
+        self._seen = _bits(modes.members)
         self._enough = (modes.counts >= fewest) & (
             modes.counts < num_samples
         )  # nothing tells whose a colour is that is always there
@@ -152,7 +151,7 @@ class _Field:
         self._number[self.rows + 1, self.columns + 1] = np.arange(len(self.rows))
         self._known = np.pad(~zone, 1)
         self._picture = np.pad(picture, ((1, 1), (1, 1), (0, 0)))
-        self._all = bits.sum(dtype=np.uint64)
+        self._all = _bits(np.ones((num_samples, 1), bool))[0]
         self._times = np.full(self._known.shape, self._all)
 
     def beside_known(self) -> Int[np.ndarray, "pixel"]:
@@ -190,6 +189,14 @@ class _Field:
         around = np.concatenate([self._number[row + down, column + right] for down, right in _STEPS])
         around = np.unique(around[around >= 0])
         return around[self.chosen[around] < 0]
+
+
+def _bits(members: Bool[np.ndarray, "*mode sample pixel"]) -> np.ndarray:
+    """Which samples are members, at most 64, as the bits of a number for each mode and pixel."""
+    packed = np.packbits(members, axis=-2, bitorder="little")
+    whole = np.zeros((*members.shape[:-2], members.shape[-1], 8), np.uint8)
+    whole[..., : packed.shape[-2]] = np.moveaxis(packed, -2, -1)
+    return whole.view(np.uint64)[..., 0]
 
 
 def _overlap(a: np.ndarray, b: np.ndarray) -> Float[np.ndarray, "mode pixel"]:
