@@ -10,6 +10,7 @@ from rig_cases import opencv_pixels, ring_rig
 
 from sogjax.model.camera import distort, project_points
 from sogjax.scene.background_difference import background_difference
+from sogjax.scene.coarse_views import CoarseViews
 from sogjax.scene.segmentation import masks_from_backgrounds
 from sogjax.scene.still_zone import still_zones
 from sogjax.scene.visual_hull import (
@@ -157,7 +158,9 @@ def who_hardly_moves(num_cameras):
 def test_who_stands_still_in_a_pillar_of_the_room_is_told_by_colour(num_cameras):
     rig, pictures, truth, arms, pillars = who_hardly_moves(num_cameras)
     cameras = {k: rig.camera(name) for k, name in enumerate(rig.names)}
-    still = still_zones(pillars, arms, pictures, cameras)
+    views = CoarseViews.of(arms, pictures, cameras, UP)
+    assert views is not None
+    still = still_zones(pillars, views)
     for k, mask in truth.items():
         assert (still[k] & mask).sum() > 0.95 * mask.sum(), k
         assert still[k].sum() < 0.6 * pillars[k].sum(), k

@@ -14,9 +14,11 @@ from sogjax.run.terminal import say
 from sogjax.scene.background import BackgroundImage
 from sogjax.scene.background_difference import working_size
 from sogjax.scene.clip_background import FEWEST_SAMPLES, MOST_SAMPLES, SampledCamera, learnt_background, moves, shaking
+from sogjax.scene.coarse_views import CoarseViews
+from sogjax.scene.floor import seen_floors, with_floor
 from sogjax.scene.moving_zone import moving_zones
 from sogjax.scene.still_body import still_bodies, with_room_behind
-from sogjax.scene.still_zone import still_zones
+from sogjax.scene.still_zone import standing_zones, still_zones
 
 MOST_BYTES = 2**30
 """Bytes of samples in memory; beyond, fewer frames are looked at."""
@@ -76,14 +78,23 @@ def learnt_from(
         zones, still = moving_zones(movements, cameras, up), dict[int, Bool[np.ndarray, "rows columns"]]()
         moving = {k: np.any(one.movements, axis=0) for k, one in sampled.items()}
         shown = {k: one.even.reference for k, one in sampled.items()}
-        if left_out is None and np.mean([zone.mean() for zone in zones.values()]) > MUCH_UNKNOWN:
-            still = still_zones(zones, moving, shown, cameras)
+        views = CoarseViews.of(moving, shown, cameras, up) if left_out is None else None
+        floors = seen_floors(views) if views is not None and not recording.masked else {}
+        if views is not None and np.mean([zone.mean() for zone in zones.values()]) > MUCH_UNKNOWN:
+            still = still_zones(zones, views)
+        if views is not None and floors:
+            still = standing_zones(still or zones, views, floors)
         of_one = lambda k: learnt_background(sampled[k], zones[k], still.get(k), (left_out or {}).get(names[k]))
         learnt = dict(zip(sampled, pool.map(of_one, sampled), strict=True))
         _say_unknown(recording, 1.0 - float(np.mean([background.known.mean() for background in learnt.values()])))
-        if left_out is None and not recording.masked:
-            bodies = still_bodies(moving, shown, cameras, up)
-            behind = lambda k: with_room_behind(learnt[k], bodies[k], moving[k], shown[k])
+        if views is not None and not recording.masked:
+            bodies = still_bodies(views, floors)
+
+            def behind(k: int) -> BackgroundImage:
+                """A camera's background with what the other cameras tell of it."""
+                own = with_floor(learnt[k], floors[k], sampled[k].even.images, zones[k]) if k in floors else learnt[k]
+                return with_room_behind(own, bodies[k], moving[k], shown[k], floors.get(k))
+
             learnt = dict(zip(sampled, pool.map(behind, sampled), strict=True))
     nothing = lambda name: BackgroundImage.nothing(*working_size(*recording.rig.image_size(name)))
     return tuple(learnt.get(k) or nothing(name) for k, name in enumerate(names))

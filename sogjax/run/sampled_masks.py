@@ -18,6 +18,7 @@ from sogjax.io.threads import usable_cores
 from sogjax.model.camera import Camera
 from sogjax.run.clip import Clip, SampleKind, cell_grids, spread_frames
 from sogjax.scene.background import BackgroundImage, stack_background
+from sogjax.scene.background_difference import closed
 from sogjax.scene.cells import CellGrid
 from sogjax.scene.foreground import BackgroundModel, log_odds
 from sogjax.scene.occluders import painted
@@ -29,6 +30,8 @@ DEPTH = 9
 """Depth of the quad-tree whose cells are looked at."""
 FOREGROUND = 0.5
 """Log odds above which a cell counts as foreground."""
+SEAM = 5
+"""Cells: a narrower gap in what is not the background lies between what was told from it in two ways."""
 
 Picture = UInt8[np.ndarray, "_rows _columns 3"]
 
@@ -61,7 +64,7 @@ class SampledMasks:
         with ThreadPoolExecutor(usable_cores()) as pool:
             masks: list[dict[int, Mask]] = [{} for _ in self.frames]
             for (frame, camera), mask in zip(frames, pool.map(cut, frames), strict=True):
-                masks[frame][camera] = largest_parts(mask)
+                masks[frame][camera] = largest_parts(closed(mask, SEAM))
         return replace(self, masks=masks, unknown={k: np.zeros_like(mask) for k, mask in self.unknown.items()})
 
 

@@ -2,7 +2,7 @@
 
 Through a place that is empty each camera sees another part of the room; through a leg all of them see its trousers. So
 places under and over what moves are somebody's, where most cameras see the same colour there, lit as it may be. The
-floor is seen alike by all cameras, too: it goes on around the person.
+floor is seen alike by all cameras, too: it goes on around the person, and cameras show it to each other.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,10 +15,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 from scipy.ndimage import label
 
-from sogjax.model.camera import Camera
 from sogjax.scene.background import BackgroundImage
 from sogjax.scene.background_difference import disc, opened, widened
-from sogjax.scene.coarse_views import CoarseViews, enlarged, small
+from sogjax.scene.coarse_views import CoarseViews, enlarged
+from sogjax.scene.floor import Floor, seen_through
 from sogjax.scene.foreground import own_color
 from sogjax.scene.moving_zone import CORE, NEAR, REACH, TALLEST, WHOLE_BODY, convex, moving_height
 from sogjax.scene.visual_hull import MANY, VoxelPixels, from_upright, upright
@@ -51,30 +51,31 @@ class Standing(NamedTuple):
     """What is surely somebody, and its rim."""
 
 
-def still_bodies(
-    movements: Mapping[int, Mask],
-    pictures: Mapping[int, Picture],
-    cameras: Mapping[int, Camera],
-    up: Float[np.ndarray, "3"],
-) -> dict[int, Standing]:
+def still_bodies(views: CoarseViews, floors: Mapping[int, Floor]) -> dict[int, Standing]:
     """Where each camera shows somebody who stands still; nowhere, if fewer than five cameras see anything move.
 
-    By camera, `movements` are where anything moves in the clip, and `pictures` (BGR) are typical ones of it.
+    `floors` are what cameras show of the floor to each other (`seen_floors`).
     """
-    nowhere = {k: Standing(np.zeros_like(mask), np.zeros_like(mask)) for k, mask in movements.items()}
-    views = CoarseViews.of(movements, cameras)
-    if views is None or len(views.moving) < MANY:
+    nowhere = {k: Standing(np.zeros_like(mask), np.zeros_like(mask)) for k, mask in views.movements.items()}
+    if len(views.moving) < MANY:
         return nowhere
     misses = np.sum([*views.missed(views.moving).values()], axis=0)
-    moving = upright(views.inside & (misses <= 1), up)
+    moving = upright(views.inside & (misses <= 1), views.up)
     if not moving.any():
         return nowhere
-    colors, share = _one_color([(small(pictures[k], cv2.INTER_AREA), at) for k, at in views.pixels.items()])
-    alike = upright(views.inside & (share >= AGREEING), up)
-    still = from_upright(_still(moving, alike, colors, up, views.cube.spacing), up)
+    colors, share = _one_color([(views.small_picture(k), at) for k, at in views.pixels.items()])
+    alike = upright(views.inside & (share >= AGREEING), views.up)
+    spacing = views.cube.spacing
+    trunks, plan = _trunks(moving, spacing)
+    if floors:
+        empty, ground = seen_through(views, floors)
+    else:
+        empty, ground = _floor_by_color(alike, colors, trunks, views.up, spacing)
+    body = alike & plan[:, :, None] & _heights(moving, spacing)
+    still = from_upright(_standing(body & ~empty, float(ground), spacing), views.up)
     shown = {k: at.silhouette_of(still) for k, at in views.pixels.items()}
-    rim = {k: round(RIM / views.cube.spacing * at.footprint) for k, at in views.pixels.items()}
-    large = lambda k, mask: enlarged(mask, movements[k].shape) & ~movements[k]
+    rim = {k: round(RIM / spacing * at.footprint) for k, at in views.pixels.items()}
+    large = lambda k, mask: views.enlarged(k, mask) & ~views.movements[k]
     return nowhere | {k: Standing(large(k, mask), large(k, widened(mask, rim[k]))) for k, mask in shown.items()}
 
 
@@ -95,34 +96,49 @@ def _alike(seen: Float[np.ndarray, "*n 3"], color: Float[np.ndarray, "*m 3"]) ->
     return np.asarray(own_color(jnp.asarray(seen), jnp.asarray(expected)) > ALIKE)
 
 
-def _still(
-    moving: Bool[np.ndarray, "x y z"],
-    alike: Bool[np.ndarray, "x y z"],
-    colors: Float[np.ndarray, "voxel 3"],
-    up: Float[np.ndarray, "3"],
-    spacing: float,
-) -> Bool[np.ndarray, "x y z"]:
-    """What is seen in one colour around what moves, as high as legs; not the floor."""
+def _trunks(
+    moving: Bool[np.ndarray, "x y z"], spacing: float
+) -> tuple[Bool[np.ndarray, "x y"], Bool[np.ndarray, "x y"]]:
+    """Seen from above: where a body moves, or parts of it, and the places around that belong to it."""
     heights = moving.sum(axis=2)
     whole = moving_height(moving) * spacing >= WHOLE_BODY
     trunks = (heights > 0) & (heights >= (CORE if whole else 0.0) * heights.max())
-    plan = convex(trunks, (NEAR if whole else REACH) / spacing)
+    return trunks, convex(trunks, (NEAR if whole else REACH) / spacing)
+
+
+def _heights(moving: Bool[np.ndarray, "x y z"], spacing: float) -> Bool[np.ndarray, "z"]:
+    """The levels at which a body may be."""
+    top, levels = round(float(np.percentile(np.nonzero(moving)[2], 99))), np.arange(moving.shape[2])
+    return (levels <= top) & (levels >= round(top - TALLEST / spacing))
+
+
+def _floor_by_color(
+    alike: Bool[np.ndarray, "x y z"],
+    colors: Float[np.ndarray, "voxel 3"],
+    trunks: Bool[np.ndarray, "x y"],
+    up: Float[np.ndarray, "3"],
+    spacing: float,
+) -> tuple[Bool[np.ndarray, "x y z"], float]:
+    """What has the colour of the floor, which is at the level that is seen in one colour around trunks; and that level.
+
+    Nothing, where no level is.
+    """
     wide = lambda reach: cv2.dilate(trunks.astype(np.uint8), disc(2 * round(reach / spacing) + 1)) > 0
     ring = wide(BEYOND) & ~wide(AROUND)
-    top = round(float(np.percentile(np.nonzero(moving)[2], 99)))
-    body = alike & plan[:, :, None]
-    body[:, :, top + 1 :] = False
-    body[:, :, : max(round(top - TALLEST / spacing), 0)] = False
     shares = (alike & ring[:, :, None]).sum(axis=(0, 1)) / max(ring.sum(), 1)
     floor, number = int(np.argmax(shares)), upright(np.arange(len(colors)), up)
-    seen_floor = shares[floor] >= FLOOR
-    if seen_floor:
-        its_color = np.median(colors[number[:, :, floor][ring & alike[:, :, floor]]], axis=0)
-        body &= ~_alike(colors, its_color)[number]
+    if shares[floor] < FLOOR:
+        return np.zeros_like(alike), np.inf
+    its_color = np.median(colors[number[:, :, floor][ring & alike[:, :, floor]]], axis=0)
+    return _alike(colors, its_color)[number], float(floor)
+
+
+def _standing(body: Bool[np.ndarray, "x y z"], ground: float, spacing: float) -> Bool[np.ndarray, "x y z"]:
+    """The connected parts that stand on the ground (a level), as high as legs."""
     connected: Any = label(body)
     labels: Int[np.ndarray, "x y z"] = connected[0]
-    ground = floor * spacing if seen_floor else np.inf
-    kept = [_stands(np.nonzero(labels == k)[2] * spacing, ground) for k in range(1, connected[1] + 1)]
+    stands = lambda part: _stands(np.nonzero(labels == part)[2] * spacing, ground * spacing)
+    kept = [stands(part) for part in range(1, connected[1] + 1)]
     return body & np.isin(labels, np.flatnonzero(kept) + 1)
 
 
@@ -132,9 +148,13 @@ def _stands(heights: Float[np.ndarray, "place"], floor: float) -> bool:
 
 
 def with_room_behind(
-    background: BackgroundImage, somebody: Standing, moving: Mask, shown: UInt8[np.ndarray, "_h _w 3"]
+    background: BackgroundImage,
+    somebody: Standing,
+    moving: Mask,
+    shown: UInt8[np.ndarray, "_h _w 3"],
+    floor: Floor | None = None,
 ) -> BackgroundImage:
-    """The background, which goes on behind somebody who stands still as it is around him.
+    """The background, which goes on behind somebody who stands still as it is around him, or as others show the floor.
 
     Not as it is where something is `moving`. In the rim, what is `shown` all the time and looks like that is the room
     itself. Where somebody surely stands and looks like it, nothing is known.
@@ -144,6 +164,11 @@ def with_room_behind(
     left_out = somebody.perhaps | moving | ~background.known
     around = cv2.inpaint(background.picture, left_out.astype(np.uint8), INPAINTED, cv2.INPAINT_TELEA)
     other = ~_alike(shown / np.float32(255.0), around / np.float32(255.0))
+    if floor is not None:
+        size = shown.shape[1::-1]
+        known, off = (enlarged(mask, moving.shape) for mask in (floor.known, ~floor.shown(shown)))
+        around = np.where(known[..., None], cv2.resize(floor.picture, size, interpolation=cv2.INTER_LINEAR), around)
+        other = np.where(known, off, other)
     hiding = opened(somebody.perhaps & other, 3)
     room, unsure = somebody.perhaps & ~somebody.surely & ~hiding, somebody.surely & ~hiding
     picture = np.where(hiding[..., None], around, np.where(room[..., None], shown, background.picture))

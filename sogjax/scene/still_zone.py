@@ -10,35 +10,29 @@ from concurrent.futures import ThreadPoolExecutor
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, UInt8
+from jaxtyping import Bool
 
-from sogjax.model.camera import Camera
-from sogjax.scene.coarse_views import CoarseViews, enlarged, small
+from sogjax.scene.background_difference import disc
+from sogjax.scene.coarse_views import CoarseViews, small
+from sogjax.scene.floor import Floor, seen_through
 from sogjax.scene.segmentation import unlike_the_room
-from sogjax.scene.visual_hull import MANY
+from sogjax.scene.visual_hull import MANY, from_upright, upright
 
+SUPPORT, REACH = 0.4, 0.35
+"""Metres over the floor in which something stands where somebody does, and how far he leans from there."""
 MISTAKEN = 0.25
 """Share of the other cameras that may take somebody for the room where a camera tells him from it."""
 Mask = Bool[np.ndarray, "_h _w"]
 
 
-def still_zones(
-    zones: Mapping[int, Mask],
-    movements: Mapping[int, Mask],
-    pictures: Mapping[int, UInt8[np.ndarray, "_h _w 3"]],
-    cameras: Mapping[int, Camera],
-) -> dict[int, Mask]:
+def still_zones(zones: Mapping[int, Mask], views: CoarseViews) -> dict[int, Mask]:
     """The parts of the zones (`moving_zones`) in which what never changes may be somebody.
 
     That is what a camera tells from the room and most others do not take for it; and what all the others tell from it.
-    By camera, `movements` are where anything moves in the clip, and `pictures` (BGR) are typical ones of it.
     """
-    views = CoarseViews.of({k: movements[k] for k in zones}, cameras)
-    if views is None:
-        return dict(zones)
     seeing, pixels = [*views.moving], views.pixels
     small_zone = lambda k: small(zones[k].astype(np.uint8), cv2.INTER_NEAREST) > 0
-    cut = lambda k: unlike_the_room(small(pictures[k], cv2.INTER_AREA), small_zone(k)) | views.moving[k]
+    cut = lambda k: unlike_the_room(views.small_picture(k), small_zone(k)) | views.moving[k]
     with ThreadPoolExecutor() as pool:
         unlike = dict(zip(seeing, pool.map(cut, seeing), strict=True))
     missed = views.missed(unlike)
@@ -48,5 +42,18 @@ def still_zones(
     for k in seeing:
         perhaps = views.inside & (misses - missed[k] <= int(MISTAKEN * len(seeing)))
         told = (pixels[k].silhouette_of(perhaps) & unlike[k]) | pixels[k].silhouette_of(surely)
-        still[k] = enlarged(told, zones[k].shape)
+        still[k] = views.enlarged(k, told)
     return still
+
+
+def standing_zones(zones: Mapping[int, Mask], views: CoarseViews, floors: Mapping[int, Floor]) -> dict[int, Mask]:
+    """The parts of the zones that lie over places where the floor is not seen: who stands still hides it.
+
+    As `still_zones`; `floors` are what cameras show of it to each other (`seen_floors`).
+    """
+    (empty, ground), spacing = seen_through(views, floors), views.cube.spacing
+    low = slice(max(ground + 1, 0), max(ground + 1 + round(SUPPORT / spacing), 1))
+    stands = (~empty & upright(views.inside, views.up))[:, :, low].mean(axis=2) > 0.5
+    plan = cv2.dilate(stands.astype(np.uint8), disc(2 * round(REACH / spacing) + 1)) > 0
+    pillars = from_upright(plan[:, :, None] & ~empty, views.up)
+    return {**zones} | {k: zones[k] & views.enlarged(k, at.silhouette_of(pillars)) for k, at in views.pixels.items()}

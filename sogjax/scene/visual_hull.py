@@ -63,6 +63,10 @@ class VoxelPixels:
         """Which voxels lie in a region, or outside of the picture, where nothing is known."""
         return region[self.rows, self.columns] | ~self.inside
 
+    def shows(self, region: Bool[np.ndarray, "rows columns"]) -> Bool[np.ndarray, "voxel"]:
+        """Which voxels lie in a region of the picture."""
+        return region[self.rows, self.columns] & self.inside
+
     def silhouette_of(self, voxels: Bool[np.ndarray, "voxel"]) -> Bool[np.ndarray, "rows columns"]:
         """The picture of some of the voxels."""
         shown = voxels & self.inside
