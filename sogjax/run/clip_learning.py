@@ -1,6 +1,6 @@
 """Learning the backgrounds of a recording's cameras from its clip: reading samples, and refusing unsuitable clips."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -24,6 +24,7 @@ MOST_BYTES = 2**30
 """Bytes of samples in memory; beyond, fewer frames are looked at."""
 MUCH_UNKNOWN = 0.15
 """Share of the pictures from which on an unknown background is said."""
+Zone = Bool[np.ndarray, "rows columns"]
 LeftOut = Mapping[str, Mapping[int, Bool[np.ndarray, "rows columns"]]]
 """Where, by camera and frame, the tracked bodies are."""
 
@@ -62,42 +63,67 @@ def learnt_from(
     few = next((k for k, of_camera in enumerate(samples) if len(of_camera) < FEWEST_SAMPLES), None)
     if few is not None:
         raise _too_few(f"{len(samples[few]) or len(kind.frames)} frames of {names[few]}")
+    cameras = {k: recording.rig.camera(name) for k, name in enumerate(names)}
     with ThreadPoolExecutor(min(len(names), usable_cores())) as pool:
         sampled = dict(enumerate(pool.map(SampledCamera.from_images, samples)))
-        if not moves(sampled):
-            raise UnsuitableError(
-                "nobody moves in the clip, and who stands still cannot be told from the room; give pictures of the "
-                "empty scene as background/CAMERA.jpg, or a clip in which the subject moves about"
-            )
-        shaken = _shaken(recording, list(pool.map(shaking, sampled.values())))
-        sampled = {k: one for k, one in sampled.items() if names[k] not in shaken}
-        cameras = {k: recording.rig.camera(name) for k, name in enumerate(names)}
+        sampled = _steady(recording, sampled, list(pool.map(shaking, sampled.values())))
+        each = lambda make: dict(zip(sampled, pool.map(make, sampled), strict=True))
         spans = range(min(len(one.movements) for one in sampled.values()))
         movements = [{k: one.movements[span] for k, one in sampled.items()} for span in spans]
-        up = axis_vector(recording.up)
-        zones, still = moving_zones(movements, cameras, up), dict[int, Bool[np.ndarray, "rows columns"]]()
-        moving = {k: np.any(one.movements, axis=0) for k, one in sampled.items()}
-        shown = {k: one.even.reference for k, one in sampled.items()}
-        views = CoarseViews.of(moving, shown, cameras, up) if left_out is None else None
-        floors = seen_floors(views) if views is not None and not recording.masked else {}
-        if views is not None and np.mean([zone.mean() for zone in zones.values()]) > MUCH_UNKNOWN:
-            still = still_zones(zones, views)
-        if views is not None and floors:
-            still = standing_zones(still or zones, views, floors)
-        of_one = lambda k: learnt_background(sampled[k], zones[k], still.get(k), (left_out or {}).get(names[k]))
-        learnt = dict(zip(sampled, pool.map(of_one, sampled), strict=True))
-        _say_unknown(recording, 1.0 - float(np.mean([background.known.mean() for background in learnt.values()])))
-        if views is not None and not recording.masked:
-            bodies = still_bodies(views, floors)
-
-            def behind(k: int) -> BackgroundImage:
-                """A camera's background with what the other cameras tell of it."""
-                own = with_floor(learnt[k], floors[k], sampled[k].even.images, zones[k]) if k in floors else learnt[k]
-                return with_room_behind(own, bodies[k], moving[k], shown[k], floors.get(k))
-
-            learnt = dict(zip(sampled, pool.map(behind, sampled), strict=True))
+        zones = moving_zones(movements, cameras, axis_vector(recording.up))
+        if left_out is None:
+            learnt = _told_together(recording, sampled, zones, each)
+        else:
+            learnt = each(lambda k: learnt_background(sampled[k], zones[k], None, left_out.get(names[k])))
+            _say_unknown(recording, learnt)
     nothing = lambda name: BackgroundImage.nothing(*working_size(*recording.rig.image_size(name)))
     return tuple(learnt.get(k) or nothing(name) for k, name in enumerate(names))
+
+
+def _steady(
+    recording: Recording, sampled: Mapping[int, SampledCamera], shifts: Sequence[float]
+) -> dict[int, SampledCamera]:
+    """The cameras that do not move, if anything moves in their pictures.
+
+    Raises:
+        UnsuitableError: nothing moves, or hardly a camera stands still.
+    """
+    if not moves(sampled):
+        raise UnsuitableError(
+            "nobody moves in the clip, and who stands still cannot be told from the room; give pictures of the "
+            "empty scene as background/CAMERA.jpg, or a clip in which the subject moves about"
+        )
+    shaken = _shaken(recording, shifts)
+    return {k: one for k, one in sampled.items() if recording.rig.names[k] not in shaken}
+
+
+def _told_together(
+    recording: Recording,
+    sampled: Mapping[int, SampledCamera],
+    zones: Mapping[int, Zone],
+    each: Callable[[Callable[[int], BackgroundImage]], dict[int, BackgroundImage]],
+) -> dict[int, BackgroundImage]:
+    """The background of each camera, in which all of them together tell who stands still.
+
+    `each` makes it of every camera, several at a time.
+    """
+    moving = {k: np.any(one.movements, axis=0) for k, one in sampled.items()}
+    shown = {k: one.even.reference for k, one in sampled.items()}
+    cameras = {k: recording.rig.camera(recording.rig.names[k]) for k in sampled}
+    views, still, floors = CoarseViews.of(moving, shown, cameras, axis_vector(recording.up)), dict(zones), {}
+    if views is not None:
+        floors = {} if recording.masked else seen_floors(views)
+        wide = np.mean([zone.mean() for zone in zones.values()]) > MUCH_UNKNOWN
+        still = still_zones(zones, views) if wide else still
+        still = standing_zones(still, views, floors) if floors else still
+    learnt = each(lambda k: learnt_background(sampled[k], zones[k], still[k]))
+    _say_unknown(recording, learnt)
+    if floors:
+        learnt = each(lambda k: with_floor(learnt[k], floors.get(k), sampled[k].even.images, zones[k]))
+    if views is None or recording.masked:
+        return learnt
+    bodies = still_bodies(views, floors)
+    return each(lambda k: with_room_behind(learnt[k], bodies[k], moving[k], shown[k], floors.get(k)))
 
 
 def _too_few(frames: str) -> UnsuitableError:
@@ -124,7 +150,8 @@ def _shaken(recording: Recording, shifts: Sequence[float]) -> set[str]:
     return set(moved)
 
 
-def _say_unknown(recording: Recording, share: float) -> None:
+def _say_unknown(recording: Recording, learnt: Mapping[int, BackgroundImage]) -> None:
+    share = 1.0 - float(np.mean([background.known.mean() for background in learnt.values()]))
     if share > MUCH_UNKNOWN:
         say(
             f"warning: {recording.path}: the background of {share:.0%} of the pictures stays unknown, since the "

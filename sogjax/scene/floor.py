@@ -18,8 +18,8 @@ from sogjax.model.camera import Camera, undistort
 from sogjax.scene.background import BackgroundImage, local_contrast
 from sogjax.scene.background_difference import channel_max, opened
 from sogjax.scene.coarse_views import CoarseViews, enlarged, small
-from sogjax.scene.plane_view import PlaneView, from_others, pixel_grid, sampled
-from sogjax.scene.visual_hull import MANY, VOXELS, resized, upright
+from sogjax.scene.plane_view import FEWEST_SEEING, PlaneView, from_others, pixel_grid, sampled
+from sogjax.scene.visual_hull import VOXELS, resized, upright
 
 BELOW, ABOVE, STEP = 2.0, 0.3, 0.02
 """Metres under and over the middle of what moves between which the floor is looked for, and how finely."""
@@ -67,16 +67,18 @@ class Floor:
 
 
 def with_floor(
-    background: BackgroundImage, floor: Floor, images: Sequence[UInt8[np.ndarray, "rows columns 3"]], zone: Mask
+    background: BackgroundImage, floor: Floor | None, images: Sequence[UInt8[np.ndarray, "rows columns 3"]], zone: Mask
 ) -> BackgroundImage:
     """The background, which is the floor where some samples show it, and unknown where the floor is always hidden.
 
     Args:
         background: learnt from the samples; at their size.
-        floor: what the other cameras show of it.
+        floor: what the other cameras show of it; None: nothing.
         images: the samples.
         zone: where the subject may stand; elsewhere nothing is changed.
     """
+    if floor is None:
+        return background
     large = lambda mask: enlarged(mask, zone.shape) & zone
     count = np.sum([floor.shown(image) for image in images], axis=0)
     hidden = opened(floor.known & (count < FEWEST_SHOWN), 3)
@@ -95,8 +97,8 @@ def with_floor(
 
 
 def seen_floors(views: CoarseViews) -> dict[int, Floor]:
-    """The floor around what moves, by camera; none where fewer than five cameras see that, or they agree on none."""
-    if len(views.moving) < MANY:
+    """The floor around what moves, by camera; none where fewer than four cameras see that, or they agree on none."""
+    if len(views.moving) <= FEWEST_SEEING:
         return {}
     cameras, up = views.cameras, views.up
     first = np.roll(np.abs(up), 1)

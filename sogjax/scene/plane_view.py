@@ -12,8 +12,8 @@ from jaxtyping import Bool, Float, UInt8
 from sogjax.model.camera import Camera, distort
 from sogjax.scene.visual_hull import resized
 
-FEWEST_SEEING = 4
-"""Cameras beside one that must have a place in their pictures."""
+FEWEST_SEEING = 3
+"""Cameras beside one that must have a place in their pictures: something may hide it from one of them."""
 
 Picture = UInt8[np.ndarray, "_h _w 3"]
 
