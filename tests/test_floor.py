@@ -3,12 +3,14 @@
 from dataclasses import replace
 
 import cv2
+import equinox as eqx
 import numpy as np
 import pytest
 from waving_person import OTHER_UPS, WavingPerson
 
 from sogjax.scene.background import BackgroundImage
-from sogjax.scene.floor import Floor, seen_floors, seen_through, with_floor
+from sogjax.scene.coarse_views import CoarseViews
+from sogjax.scene.floor import Floor, over_floor, seen_floors, with_floor
 from sogjax.scene.still_zone import standing_zones
 
 CAMERAS = range(8)
@@ -43,6 +45,7 @@ def test_legs_are_told_from_the_floor_that_the_other_cameras_see_behind_them(wav
 @pytest.mark.parametrize("turn", OTHER_UPS)
 def test_whichever_axis_points_upwards_the_same_floor_is_found(waving, floors, turn):
     turned = seen_floors(waving.seen(CAMERAS, turn))
+    assert sorted(turned) == list(CAMERAS)
     for k, floor in turned.items():
         both = floor.known & floors[k].known
         assert both.sum() > 0.95 * floors[k].known.sum()
@@ -65,9 +68,9 @@ def test_a_floor_without_a_pattern_or_with_few_cameras_is_not_told(waving):
     assert seen_floors(replace(views, pictures=grey)) == {}
 
 
-def test_voxels_of_legs_are_not_seen_through_and_what_stands_over_them_may_be_somebody(waving, floors):
+def test_voxels_of_legs_are_not_over_floor_and_what_stands_over_them_may_be_somebody(waving, floors):
     views = waving.seen(CAMERAS)
-    empty, ground = seen_through(views, floors)
+    empty, _, ground = over_floor(views, floors)
     places = np.rint((waving.knees - [0.0, 0.0, 0.15] - views.cube.points[0]) / views.cube.spacing).astype(int)
     assert not empty[tuple(places.T)].any()
     low = empty[:, :, ground + 1 : ground + 5]
@@ -88,9 +91,40 @@ def test_the_floor_is_the_background_where_samples_show_it_and_nothing_is_where_
     learnt = BackgroundImage(film[0], np.full((48, 64), 2.0, np.float32), np.ones((48, 64), bool), "clip")
     zone = np.zeros((48, 64), bool)
     zone[:, 16:] = True
-    found = with_floor(learnt, Floor(boards, np.full((48, 64), 6.0, np.float32), 0.0), film, zone)
+    found = with_floor(
+        learnt, Floor(boards, np.full((48, 64), 6.0, np.float32), np.ones((48, 64), bool), 0.0), film, zone
+    )
     assert not found.known[12:28, 22:28].any()
     assert found.known[10:30, 40:50].all()
     np.testing.assert_array_equal(found.picture[10:30, 40:50], boards[10:30, 40:50])
     assert (found.spread[10:30, 40:50] >= 3.0).all()
     np.testing.assert_array_equal(found.picture[:, :16], learnt.picture[:, :16])
+
+
+def test_four_cameras_are_enough(waving):
+    assert sorted(seen_floors(waving.seen(range(0, 8, 2)))) == [0, 2, 4, 6]
+
+
+def test_where_pictures_show_no_floor_somebody_may_stand_near_what_moves(waving):
+    views, cut = waving.seen(CAMERAS), {}
+    for k, mask in views.movements.items():
+        rows = len(mask) if k > 2 else round(0.55 * len(mask))
+        size = np.array([mask.shape[1], rows], np.float32)
+        camera = eqx.tree_at(lambda c: c.image_size, views.cameras[k], size)
+        cut[k] = mask[:rows], views.pictures[k][:rows], camera
+    parts = [{k: one[part] for k, one in cut.items()} for part in range(3)]
+    seen = CoarseViews.of(*parts, views.up)
+    assert seen is not None
+    zones = standing_zones({k: np.ones_like(mask) for k, mask in parts[0].items()}, seen, seen_floors(seen))
+    assert waving.shown_at({k: zones[k] for k in range(3, 8)}, waving.knees).mean() > 0.7
+
+
+def test_a_picture_larger_than_the_floor_has_no_dark_rim():
+    boards, known = np.full((243, 324, 3), 150, np.uint8), np.zeros((243, 324), bool)
+    known[:, :162] = True
+    samples = [np.full((486, 648, 3), 150, np.uint8)] * 10
+    nothing = BackgroundImage.nothing(648, 486)
+    floor = Floor(boards, np.full((243, 324), 6.0, np.float32), known, 0.0)
+    found = with_floor(nothing, floor, samples, np.ones((486, 648), bool))
+    assert found.known.sum() == 486 * 324
+    assert (found.picture[found.known] == 150).all()

@@ -69,8 +69,16 @@ def test_behind_somebody_the_floor_is_as_other_cameras_show_it():
     surely = np.zeros((60, 80), bool)
     surely[20:50, 30:40] = True
     background = BackgroundImage(shown, np.full((60, 80), 2.0, np.float32), ~surely, "clip")
-    floor = Floor(planks, np.full((60, 80), 6.0, np.float32), 0.0)
+    floor = Floor(planks, np.full((60, 80), 6.0, np.float32), np.ones((60, 80), bool), 0.0)
     found = with_room_behind(background, Standing(surely, surely), np.zeros_like(surely), shown, floor)
     np.testing.assert_array_equal(found.picture[22:48, 31:35], planks[22:48, 31:35])
     assert found.known[22:48, 31:35].all()
     assert not found.known[22:48, 37:39].any()  # it looks like the floor
+
+
+@pytest.mark.parametrize("cameras", [range(5), (0, 1, 2, 3, 7)])
+def test_cameras_in_an_arc_do_not_take_a_floor_that_they_do_not_show_each_other_for_somebody(waving, cameras):
+    floors = seen_floors(waving.seen(cameras))
+    masks, _ = found_in(waving, cameras, floors=floors)
+    assert floors
+    assert np.mean([mask.perhaps.mean() for mask in masks.values()]) < 0.08

@@ -117,9 +117,9 @@ def _told_together(
         still = still_zones(zones, views) if wide else still
         still = standing_zones(still, views, floors) if floors else still
     learnt = each(lambda k: learnt_background(sampled[k], zones[k], still[k]))
-    _say_unknown(recording, learnt)
     if floors:
         learnt = each(lambda k: with_floor(learnt[k], floors.get(k), sampled[k].even.images, zones[k]))
+    _say_unknown(recording, learnt)
     if views is None or recording.masked:
         return learnt
     bodies = still_bodies(views, floors)

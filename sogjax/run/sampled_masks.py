@@ -18,7 +18,7 @@ from sogjax.io.threads import usable_cores
 from sogjax.model.camera import Camera
 from sogjax.run.clip import Clip, SampleKind, cell_grids, spread_frames
 from sogjax.scene.background import BackgroundImage, stack_background
-from sogjax.scene.background_difference import closed
+from sogjax.scene.background_difference import closed, widened
 from sogjax.scene.cells import CellGrid
 from sogjax.scene.foreground import BackgroundModel, log_odds
 from sogjax.scene.occluders import painted
@@ -64,7 +64,8 @@ class SampledMasks:
         with ThreadPoolExecutor(usable_cores()) as pool:
             masks: list[dict[int, Mask]] = [{} for _ in self.frames]
             for (frame, camera), mask in zip(frames, pool.map(cut, frames), strict=True):
-                masks[frame][camera] = largest_parts(closed(mask, SEAM))
+                seams = closed(mask, SEAM) & widened(self.unknown[camera], SEAM)
+                masks[frame][camera] = largest_parts(mask | seams)
         return replace(self, masks=masks, unknown={k: np.zeros_like(mask) for k, mask in self.unknown.items()})
 
 

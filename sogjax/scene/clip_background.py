@@ -127,7 +127,7 @@ def learnt_background(
     Args:
         camera: its samples.
         zone: where the subject may stand (`moving_zones`).
-        still: where in it what never changes may be the subject (`still_zones`); None: everywhere.
+        still: where in it what never changes may be the subject (`still_zones`, `standing_zones`); None: everywhere.
         left_out: by frame where the tracked body is, widened; these pixels are not looked at. Everything else then
             is background, wherever enough samples agree.
     """

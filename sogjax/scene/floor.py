@@ -8,11 +8,13 @@ the cameras agree most.
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import cv2
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
+from scipy.ndimage import distance_transform_edt
 
 from sogjax.model.camera import Camera, undistort
 from sogjax.scene.background import BackgroundImage, local_contrast
@@ -41,6 +43,9 @@ MISTAKEN = 1 / 8
 FEWEST_SHOWN = 3
 """Samples that must show the floor before it counts as uncovered."""
 
+AT_ONCE = 2
+"""Cameras of which the floor is put together at the same time: each takes what all others show, tens of MB."""
+
 Mask = Bool[np.ndarray, "_h _w"]
 Picture = UInt8[np.ndarray, "_h _w 3"]
 
@@ -50,26 +55,26 @@ class Floor:
     """The floor where the others show it to a camera, at the small size (`small`)."""
 
     picture: Picture
-    """BGR, in this camera's light."""
+    """BGR, in this camera's light; where nothing is known of the floor, as the nearest place of it."""
     tolerance: Float[np.ndarray, "_h _w"]
-    """Difference up to which a pixel shows it, grey levels; negative: nothing is known of the floor there."""
+    """Difference up to which a pixel shows it, grey levels."""
+    known: Mask
+    """Where the other cameras tell how it looks."""
     height: float
     """Where it lies along the vertical, metres."""
 
     def shown(self, picture: UInt8[np.ndarray, "_rows _columns 3"]) -> Mask:
-        """Where a picture of any size shows the floor, at the small size."""
-        return channel_max(cv2.absdiff(small(picture, cv2.INTER_AREA), self.picture)) <= self.tolerance
-
-    @property
-    def known(self) -> Mask:
-        """Where the other cameras tell how it looks."""
-        return self.tolerance >= 0
+        """Where a picture of the clip's size, or of that of its samples, shows the floor, at the small size."""
+        apart = channel_max(cv2.absdiff(small(picture, cv2.INTER_AREA), self.picture))
+        return self.known & (apart <= self.tolerance)
 
 
 def with_floor(
     background: BackgroundImage, floor: Floor | None, images: Sequence[UInt8[np.ndarray, "rows columns 3"]], zone: Mask
 ) -> BackgroundImage:
     """The background, which is the floor where some samples show it, and unknown where the floor is always hidden.
+
+    What is hidden and narrower than three small pixels stays as it was learnt.
 
     Args:
         background: learnt from the samples; at their size.
@@ -80,9 +85,8 @@ def with_floor(
     if floor is None:
         return background
     large = lambda mask: enlarged(mask, zone.shape) & zone
-    count = np.sum([floor.shown(image) for image in images], axis=0)
-    hidden = opened(floor.known & (count < FEWEST_SHOWN), 3)
-    uncovered, hidden = large(floor.known & ~hidden), large(hidden)
+    seen = np.sum([floor.shown(image) for image in images], axis=0) >= FEWEST_SHOWN
+    uncovered, hidden = large(seen), large(opened(floor.known & ~seen, 3))
     other = uncovered & ~(background.known & large(floor.shown(background.picture)))
     size = zone.shape[::-1]
     picture, tolerance = (
@@ -110,20 +114,29 @@ def seen_floors(views: CoarseViews) -> dict[int, Floor]:
         return {}
     lights = _lights(seen, height, np.array(centre))
     room = cv2.convexHull(np.array([one.place for one in seen.values()], np.float32))[:, 0]
-    with ThreadPoolExecutor() as pool:
+    with ThreadPoolExecutor(AT_ONCE) as pool:
         found = pool.map(lambda k: _floor(k, seen, lights, height, room, cameras[k]), seen)
         return dict(zip(seen, found, strict=True))
 
 
-def seen_through(views: CoarseViews, floors: Mapping[int, Floor]) -> tuple[Bool[np.ndarray, "x y z"], int]:
-    """The voxels, upright, through which cameras see the floor, and the level at which it lies.
+class OverFloor(NamedTuple):
+    """What is told of the voxels of a room, upright, by where cameras show its floor."""
 
-    Of many cameras one may be mistaken.
-    """
-    through = [views.pixels[k].shows(floor.shown(views.pictures[k])) for k, floor in floors.items()]
+    empty: Bool[np.ndarray, "x y z"]
+    """Those through which cameras see the floor; of many cameras one may be mistaken."""
+    told: Bool[np.ndarray, "x y z"]
+    """Those behind which some camera knows the floor."""
+    level: int
+    """At which the floor lies."""
+
+
+def over_floor(views: CoarseViews, floors: Mapping[int, Floor]) -> OverFloor:
+    """What the floors of cameras tell of the room over them."""
+    through = np.sum([views.pixels[k].shows(floor.shown(views.pictures[k])) for k, floor in floors.items()], axis=0)
+    told = np.any([views.pixels[k].shows(floor.known) for k, floor in floors.items()], axis=0)
     height = next(iter(floors.values())).height
     level = round((height - float(views.up @ views.cube.centre)) / views.cube.spacing + 0.5 * (VOXELS - 1))
-    return upright(np.sum(through, axis=0) > MISTAKEN * len(through), views.up), level
+    return OverFloor(upright(through > MISTAKEN * len(floors), views.up), upright(told, views.up), level)
 
 
 def _near(
@@ -162,7 +175,7 @@ def _lights(
     seen: Mapping[int, PlaneView], height: float, centre: Float[np.ndarray, "2"]
 ) -> dict[int, Float[np.ndarray, "3"]]:
     """How bright each camera shows the floor, by channel, as a multiple of what the others do."""
-    lights = {k: np.ones(3) for k in seen}
+    lights = {k: np.ones(3, np.float32) for k in seen}
     for _ in range(2):
         found = {}
         for k, one in seen.items():
@@ -188,14 +201,23 @@ def _floor(
     places = one.on_floor(pixel_grid(rows, columns), height)
     others = from_others(camera, seen, lights, np.where(_within(room, places)[..., None], places, np.nan), height)
     sure = others.enough & (others.spread < AGREED)
-    colors = np.where(sure[..., None], others.colors * lights[camera], 0.0)
-    spread = np.where(sure, others.spread, np.nan)[..., None]
+    told = np.where(sure[..., None], np.dstack([others.colors * lights[camera], others.spread]), np.nan)
     recorded, pixels = resized(lens, (columns, rows)), pixel_grid(rows, columns).reshape(-1, 2)
     straight = np.asarray(undistort(recorded, jnp.asarray(pixels))).reshape(rows, columns, 2)
-    colors, spread = (sampled(part.astype(np.float32), straight) for part in (colors, spread))
-    shown = np.nan_to_num(colors).clip(0, 255).round().astype(np.uint8)
-    tolerance = LEAST_APART + BY_SPREAD * spread.reshape(rows, columns) + BY_CONTRAST * local_contrast(shown)
-    return Floor(shown, np.nan_to_num(tolerance, nan=-1.0), height)
+    colors, spread = (sampled(part.astype(np.float32), straight) for part in (told[..., :3], told[..., 3:]))
+    known = np.isfinite(colors[..., 0])
+    colors, spread = _filled(colors, known), _filled(spread.reshape(rows, columns), known)
+    picture = colors.clip(0, 255).round().astype(np.uint8)
+    tolerance = LEAST_APART + BY_SPREAD * spread + BY_CONTRAST * local_contrast(picture)
+    return Floor(picture, tolerance, known, height)
+
+
+def _filled(values: np.ndarray, known: Mask) -> np.ndarray:
+    """Values of a picture, elsewhere those of the nearest place where they are known; 0, where that is nowhere."""
+    if not known.any():
+        return np.zeros_like(values)
+    rows, columns = distance_transform_edt(~known, return_distances=False, return_indices=True)  # pyright: ignore[reportGeneralTypeIssues]
+    return values[rows, columns]
 
 
 def _within(outline: Float[np.ndarray, "corner 2"], places: Float[np.ndarray, "*n 3"]) -> Bool[np.ndarray, "*n"]:

@@ -18,7 +18,7 @@ from scipy.ndimage import label
 from sogjax.scene.background import BackgroundImage
 from sogjax.scene.background_difference import disc, opened, widened
 from sogjax.scene.coarse_views import CoarseViews, enlarged
-from sogjax.scene.floor import Floor, seen_through
+from sogjax.scene.floor import Floor, over_floor
 from sogjax.scene.foreground import own_color
 from sogjax.scene.moving_zone import CORE, NEAR, REACH, TALLEST, WHOLE_BODY, convex, moving_height
 from sogjax.scene.visual_hull import MANY, VoxelPixels, from_upright, upright
@@ -67,10 +67,10 @@ def still_bodies(views: CoarseViews, floors: Mapping[int, Floor]) -> dict[int, S
     alike = upright(views.inside & (share >= AGREEING), views.up)
     spacing = views.cube.spacing
     trunks, plan = _trunks(moving, spacing)
+    empty, ground = _floor_by_color(alike, colors, trunks, views.up, spacing)
     if floors:
-        empty, ground = seen_through(views, floors)
-    else:
-        empty, ground = _floor_by_color(alike, colors, trunks, views.up, spacing)
+        over = over_floor(views, floors)
+        empty, ground = over.empty | (empty & ~over.told), over.level
     body = alike & plan[:, :, None] & _heights(moving, spacing)
     still = from_upright(_standing(body & ~empty, float(ground), spacing), views.up)
     shown = {k: at.silhouette_of(still) for k, at in views.pixels.items()}

@@ -1,4 +1,4 @@
-"""Where somebody may stand still in a clip, told by colour: what looks like the room to most cameras is empty.
+"""Where somebody may stand still in a clip: where the floor is hidden, and most cameras do not take it for the room.
 
 Where somebody only talks, little moves, and `moving_zones` are whole pillars of the room. OpenCV's grabCut tells in
 each picture what in the zone looks unlike the room around it. One camera may be wrong, as trousers may look like the
@@ -14,12 +14,14 @@ from jaxtyping import Bool
 
 from sogjax.scene.background_difference import disc
 from sogjax.scene.coarse_views import CoarseViews, small
-from sogjax.scene.floor import Floor, seen_through
+from sogjax.scene.floor import Floor, over_floor
 from sogjax.scene.segmentation import unlike_the_room
 from sogjax.scene.visual_hull import MANY, from_upright, upright
 
 SUPPORT, REACH = 0.4, 0.35
 """Metres over the floor in which something stands where somebody does, and how far he leans from there."""
+UNSEEN = 0.6
+"""Metres from what moves within which somebody may stand where too few cameras see the floor."""
 MISTAKEN = 0.25
 """Share of the other cameras that may take somebody for the room where a camera tells him from it."""
 Mask = Bool[np.ndarray, "_h _w"]
@@ -51,9 +53,12 @@ def standing_zones(zones: Mapping[int, Mask], views: CoarseViews, floors: Mappin
 
     As `still_zones`; `floors` are what cameras show of it to each other (`seen_floors`).
     """
-    (empty, ground), spacing = seen_through(views, floors), views.cube.spacing
-    low = slice(max(ground + 1, 0), max(ground + 1 + round(SUPPORT / spacing), 1))
-    stands = (~empty & upright(views.inside, views.up))[:, :, low].mean(axis=2) > 0.5
-    plan = cv2.dilate(stands.astype(np.uint8), disc(2 * round(REACH / spacing) + 1)) > 0
+    (empty, _, ground), spacing = over_floor(views, floors), views.cube.spacing
+    low = slice(max(ground + 1, 0), max(ground + 1, 0) + max(round(SUPPORT / spacing), 1))
+    inside = upright(views.inside, views.up)[:, :, low].sum(axis=2)
+    filled = (~empty & upright(views.inside, views.up))[:, :, low].sum(axis=2)
+    wide = lambda places, reach: cv2.dilate(places.astype(np.uint8), disc(2 * round(reach / spacing) + 1)) > 0
+    moves = upright(np.sum([*views.missed(views.moving).values()], axis=0) == 0, views.up).any(axis=2)
+    plan = wide(filled > 0.5 * inside, REACH) | ((inside == 0) & wide(moves, UNSEEN))
     pillars = from_upright(plan[:, :, None] & ~empty, views.up)
     return {**zones} | {k: zones[k] & views.enlarged(k, at.silhouette_of(pillars)) for k, at in views.pixels.items()}
