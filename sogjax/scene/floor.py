@@ -37,12 +37,10 @@ AGREED = 12.0
 LEAST_APART, BY_SPREAD, BY_CONTRAST = 6.0, 1.5, 0.15
 """Difference up to which a picture shows the floor: grey levels, of what the cameras differ by, of what neighbouring
 pixels do."""
-
 MISTAKEN = 1 / 8
 """Share of the cameras that may take something for the floor."""
 FEWEST_SHOWN = 3
 """Samples that must show the floor before it counts as uncovered."""
-
 AT_ONCE = 2
 """Cameras of which the floor is put together at the same time: each takes what all others show, tens of MB."""
 
@@ -144,7 +142,7 @@ def _near(
 ) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
     """Places of the plane near the centre that a camera shows in one pixel of so many, and their colours."""
     rows, columns = one.picture.shape[:2]
-    places = one.on_floor(pixel_grid(rows, columns).reshape(-1, 2)[::every], height)
+    places = one.on_plane(pixel_grid(rows, columns).reshape(-1, 2)[::every], height)
     own = one.picture.reshape(-1, 3)[::every]
     near = (np.linalg.norm(places[:, :2] - centre, axis=1) < WITHIN) & np.isfinite(own[:, 0])
     return places[near], own[near]
@@ -162,20 +160,25 @@ def _height(seen: Mapping[int, PlaneView], centre: Float[np.ndarray, "2"], middl
 
 def _apart(seen: Mapping[int, PlaneView], height: float, centre: Float[np.ndarray, "2"]) -> float:
     """By how many grey levels cameras differ from the median of the others, where the plane at this height is seen."""
-    off = []
+    off, lights = [], _one_light(seen)
     for k, one in seen.items():
         places, own = _near(one, height, centre, COMPARED)
-        others = from_others(k, seen, None, places, height)
+        others = from_others(k, seen, lights, places, height)
         off.append(np.abs(own - others.colors).max(axis=1)[others.enough])
     every = np.concatenate(off)
     return float(np.median(every)) if len(every) else np.nan
+
+
+def _one_light(seen: Mapping[int, PlaneView]) -> dict[int, Float[np.ndarray, "3"]]:
+    """The lights of cameras that show everything alike."""
+    return {k: np.ones(3, np.float32) for k in seen}
 
 
 def _lights(
     seen: Mapping[int, PlaneView], height: float, centre: Float[np.ndarray, "2"]
 ) -> dict[int, Float[np.ndarray, "3"]]:
     """How bright each camera shows the floor, by channel, as a multiple of what the others do."""
-    lights = {k: np.ones(3, np.float32) for k in seen}
+    lights = _one_light(seen)
     for _ in range(2):
         found = {}
         for k, one in seen.items():
@@ -198,7 +201,7 @@ def _floor(
     """What the others show of the floor of a room, which is the convex outline of where cameras stand."""
     one = seen[camera]
     rows, columns = one.picture.shape[:2]
-    places = one.on_floor(pixel_grid(rows, columns), height)
+    places = one.on_plane(pixel_grid(rows, columns), height)
     others = from_others(camera, seen, lights, np.where(_within(room, places)[..., None], places, np.nan), height)
     sure = others.enough & (others.spread < AGREED)
     told = np.where(sure[..., None], np.dstack([others.colors * lights[camera], others.spread]), np.nan)

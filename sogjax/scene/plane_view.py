@@ -24,10 +24,10 @@ class PlaneView:
 
     picture: Float[np.ndarray, "rows columns 3"]
     """BGR; not a number where the lens shows nothing."""
-    matrix: Float[np.ndarray, "3 3"]
-    flat: Float[np.ndarray, "3 3"]
-    """From the two directions along the floor and up to the camera's directions."""
-    shift: Float[np.ndarray, "3"]
+    intrinsics: Float[np.ndarray, "3 3"]
+    rotation: Float[np.ndarray, "3 3"]
+    """From two directions along planes, and up, to the camera's directions."""
+    translation: Float[np.ndarray, "3"]
     """The world's origin, in the camera's frame."""
 
     @classmethod
@@ -41,22 +41,23 @@ class PlaneView:
 
     @property
     def place(self) -> Float[np.ndarray, "2"]:
-        """Where the camera stands, along the floor."""
-        return -(self.flat.T @ self.shift)[:2]
+        """Where the camera stands, along planes."""
+        return -(self.rotation.T @ self.translation)[:2]
 
-    def plane(self, height: float) -> Float[np.ndarray, "3 3"]:
+    def pixels_from_plane(self, height: float) -> Float[np.ndarray, "3 3"]:
         """From places on the plane at this height (metres, and 1) to pixels, times their depth."""
-        return self.matrix @ np.column_stack([self.flat[:, :2], height * self.flat[:, 2] + self.shift])
+        along, up = self.rotation[:, :2], self.rotation[:, 2]
+        return self.intrinsics @ np.column_stack([along, height * up + self.translation])
 
-    def on_floor(self, pixels: Float[np.ndarray, "*n 2"], height: float) -> Float[np.ndarray, "*n 3"]:
+    def on_plane(self, pixels: Float[np.ndarray, "*n 2"], height: float) -> Float[np.ndarray, "*n 3"]:
         """The places (metres, and 1) that pixels show on the plane; not numbers above the horizon."""
-        straight = np.linalg.inv(self.plane(height))
+        straight = np.linalg.inv(self.pixels_from_plane(height))
         places = pixels @ straight[:, :2].T + straight[:, 2]
         return places / np.where(places[..., 2:] > 1e-6, places[..., 2:], np.nan)
 
     def colors(self, places: Float[np.ndarray, "*n 3"], height: float) -> Float[np.ndarray, "*n 3"]:
         """The colours of places on the plane, not numbers where they are not seen."""
-        seen = places @ self.plane(height).T
+        seen = places @ self.pixels_from_plane(height).T
         pixels = seen[..., :2] / np.where(seen[..., 2:] > 0, seen[..., 2:], np.nan)
         return sampled(self.picture, pixels) if pixels.ndim > 2 else sampled(self.picture, pixels[None])[0]
 
@@ -95,13 +96,12 @@ class Others(NamedTuple):
 def from_others(
     camera: int,
     seen: Mapping[int, PlaneView],
-    lights: Mapping[int, Float[np.ndarray, "3"]] | None,
+    lights: Mapping[int, Float[np.ndarray, "3"]],
     places: Float[np.ndarray, "*n 3"],
     height: float,
 ) -> Others:
     """What all but one of some cameras show at places of the plane at a height, each in its light, as far as known."""
-    light = lambda k: 1.0 if lights is None else lights[k]
-    shown = np.stack([one.colors(places, height) / light(k) for k, one in seen.items() if k != camera])
+    shown = np.stack([one.colors(places, height) / lights[k] for k, one in seen.items() if k != camera])
     middle = _middle(shown)
     spread = 1.48 * _middle(np.abs(shown - middle)).max(axis=-1)
     return Others(middle, spread, np.isfinite(shown[..., 0]).sum(axis=0) >= FEWEST_SEEING)

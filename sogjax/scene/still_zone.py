@@ -15,13 +15,12 @@ from jaxtyping import Bool
 from sogjax.scene.background_difference import disc
 from sogjax.scene.coarse_views import CoarseViews, small
 from sogjax.scene.floor import Floor, over_floor
+from sogjax.scene.moving_zone import REACH
 from sogjax.scene.segmentation import unlike_the_room
 from sogjax.scene.visual_hull import MANY, from_upright, upright
 
-SUPPORT, REACH = 0.4, 0.35
+SUPPORT, LEANING = 0.4, 0.35
 """Metres over the floor in which something stands where somebody does, and how far he leans from there."""
-UNSEEN = 0.6
-"""Metres from what moves within which somebody may stand where too few cameras see the floor."""
 MISTAKEN = 0.25
 """Share of the other cameras that may take somebody for the room where a camera tells him from it."""
 Mask = Bool[np.ndarray, "_h _w"]
@@ -51,7 +50,8 @@ def still_zones(zones: Mapping[int, Mask], views: CoarseViews) -> dict[int, Mask
 def standing_zones(zones: Mapping[int, Mask], views: CoarseViews, floors: Mapping[int, Floor]) -> dict[int, Mask]:
     """The parts of the zones that lie over places where the floor is not seen: who stands still hides it.
 
-    As `still_zones`; `floors` are what cameras show of it to each other (`seen_floors`).
+    Where too few cameras see what is over it, near what moves. `floors` are what cameras show of it to each other
+    (`seen_floors`).
     """
     (empty, _, ground), spacing = over_floor(views, floors), views.cube.spacing
     low = slice(max(ground + 1, 0), max(ground + 1, 0) + max(round(SUPPORT / spacing), 1))
@@ -59,6 +59,6 @@ def standing_zones(zones: Mapping[int, Mask], views: CoarseViews, floors: Mappin
     filled = (~empty & upright(views.inside, views.up))[:, :, low].sum(axis=2)
     wide = lambda places, reach: cv2.dilate(places.astype(np.uint8), disc(2 * round(reach / spacing) + 1)) > 0
     moves = upright(np.sum([*views.missed(views.moving).values()], axis=0) == 0, views.up).any(axis=2)
-    plan = wide(filled > 0.5 * inside, REACH) | ((inside == 0) & wide(moves, UNSEEN))
+    plan = wide(filled > 0.5 * inside, LEANING) | ((inside == 0) & wide(moves, REACH))
     pillars = from_upright(plan[:, :, None] & ~empty, views.up)
     return {**zones} | {k: zones[k] & views.enlarged(k, at.silhouette_of(pillars)) for k, at in views.pixels.items()}
