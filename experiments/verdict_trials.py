@@ -9,7 +9,7 @@ from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
-import numpy as np
+from beside_truth import beside_truth
 from repeatability import moved_starts
 
 from sogjax.errors import InputError
@@ -20,8 +20,6 @@ from sogjax.io.motion_data import save_motion
 from sogjax.io.recording_files import GROUND_TRUTH
 from sogjax.model.body import Body
 from sogjax.quality.limb_warnings import limits_of
-from sogjax.quality.markers import joint_errors
-from sogjax.quality.metrics import mean_per_frame, stretches
 from sogjax.quality.passages import passages
 from sogjax.quality.verdict import Verdict, expected_of, verdicts
 from sogjax.run.initial_pose import SOURCES, PoseSource
@@ -30,16 +28,9 @@ from sogjax.run.track import track_recording
 from sogjax.settings.compose import track_config
 from sogjax.study.few_cameras import evenly
 from sogjax.study.tracked import kept_actors
-from sogjax.study.true_poses import limb_of
 from sogjax.synth.cache import cached_recording
 from sogjax.synth.settings import SynthSettings
 
-FAR = 0.1
-"""Metres from the truth, beyond which a limb is lost."""
-FOR = 3
-"""Frames: a limb that is far off for fewer is not lost."""
-ASTRAY, OFTEN = 0.15, 0.01
-"""Metres from the truth, beyond which a single joint is astray, and the part of the frames in which one may be."""
 TRIAL = "trial.json"
 """Name of the file that says what came of a trial, beside its motions."""
 
@@ -219,19 +210,10 @@ def _read(place: Path) -> dict[str, Any] | None:
 def judged_run(trial: VerdictTrial, name: str, motion: Motion, truth: GroundTruth, verdict: Verdict) -> JudgedRun:
     """A run beside the truth of the subject of this name, or of the only one."""
     subject = name if name in truth.subjects else next(iter(truth.subjects), None)
-    found = joint_errors(motion, truth.subject(subject) if subject else truth)
-    if found is None:
+    beside = beside_truth(motion, truth.subject(subject) if subject else truth)
+    if beside is None:
         raise InputError(f"{trial.sequence}: its truth has no joints of the actor")
-    lost = {limb: count for limb in dict.fromkeys(map(limb_of, found.names)) if (count := _lost(found, limb))}
-    known = found.errors[np.isfinite(found.errors).any(axis=1)]
-    astray = float(np.mean(np.nanmax(known, axis=1) > ASTRAY)) if len(known) else 0.0
-    return JudgedRun(trial, name, "", verdict, float(np.nanmean(found.errors)), lost, astray)
-
-
-def _lost(found: Any, limb: str) -> int:
-    columns = [k for k, name in enumerate(found.names) if limb_of(name) == limb]
-    far = np.nan_to_num(mean_per_frame(found.errors[:, columns])) > FAR
-    return sum(stop - first for first, stop in stretches(far, FOR))
+    return JudgedRun(trial, name, "", verdict, beside.mean, beside.lost, beside.astray)
 
 
 def share(runs: Sequence[JudgedRun], holds: Callable[[JudgedRun], bool]) -> str:

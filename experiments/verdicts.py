@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
 
-from verdict_trials import CASES, OFTEN, JudgedRun, VerdictTrial, VerdictTrials, share
+from beside_truth import OFTEN
+from verdict_trials import CASES, JudgedRun, VerdictTrial, VerdictTrials, share
 
 from sogjax.errors import InputError
 from sogjax.io.files import write_file

@@ -5,17 +5,18 @@
 A row is: motion, people, cameras, what is given beside the videos (`plates`: pictures of the empty scene and example
 poses; `poses`: example poses; `videos`: nothing), the seed of people, clothes and room, and settings of `sogjax synth`.
 Each recording is rendered, `sogjax track` is run on it without a pose, and its motions are held against the truth. Runs
-are kept in `out` and not made again. The table is printed, and written as table.md.
+are kept in `out` and not made again. The table is printed, with how often verdicts hold, and written as table.md.
 """
 
 import json
 import os
 import subprocess
 import sys
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
+from beside_truth import OFTEN, beside_truth
 from scipy.optimize import linear_sum_assignment
 
 from sogjax.errors import InputError
@@ -25,8 +26,8 @@ from sogjax.io.files import write_file, write_json
 from sogjax.io.ground_truth import GroundTruth, load_ground_truth
 from sogjax.io.motion import Motion, load_motion
 from sogjax.io.recording_files import BACKGROUND, CALIBRATION, EXAMPLE_POSES, GROUND_TRUTH, SETTINGS, VIDEOS
-from sogjax.quality.markers import joint_errors
-from sogjax.run.run_files import METRICS
+from sogjax.quality.verdict import Verdict
+from sogjax.run.run_files import METRICS, MOTION
 from sogjax.study.experiment import synth_settings
 from sogjax.study.script import machine_line, run_script, settings_from
 from sogjax.synth.cache import cached_recording
@@ -101,6 +102,8 @@ GIVEN = {
     "poses": (SETTINGS, EXAMPLE_POSES),
     "videos": (),
 }
+COLUMNS = ("recording", "joints, mm", "a joint > 15 cm off, % of frames", "verdict")
+SHOWN = ((1e3, "mean"), (100, "astray"))
 LEAN = ("outputs.rerun=false", "outputs.overlay=false", "overwrite=true")
 
 
@@ -116,21 +119,38 @@ class Settings:
 def main() -> None:
     """Run what is not there yet, and write the table."""
     settings = settings_from(Settings)
-    lines = [machine_line(), "", "| recording | joints, mm | verdict |", "|---|---|---|"]
+    head = [
+        machine_line(),
+        "",
+        "| recording | joints, mm | a joint astray, % of frames | verdict |",
+        "|---|---|---|---|",
+    ]
+    runs, lines = [], []
     for row in settings.rows:
         name = f"{row} {settings.frames}".replace(" ", "_").replace("=", "-")
         folder = Path(settings.out) / name
-        found = _kept(folder) or _run(row, settings.frames, folder)
-        lines.append(f"| {row} | {', '.join(f'{1e3 * mean:.0f}' for mean in found['joints'])} | {found['said']} |")
+        runs.append(_kept(folder) or _run(row, settings.frames, folder))
+        lines.append(_line(row, runs[-1]))
         print(lines[-1], flush=True)
-    text = "\n".join(lines) + "\n"
+    text = "\n".join([*head, *lines, "", *_of_verdicts(runs)]) + "\n"
     write_file(Path(settings.out) / "table.md", text)
     print(f"\n{text}")
 
 
+def _line(row: str, run: dict) -> str:
+    actors = run["actors"]
+    means, astray = (" / ".join(f"{scale * one[key]:.0f}" for one in actors) for scale, key in SHOWN)
+    said = "; ".join(dict.fromkeys(one["sentence"] for one in actors)) or f"refused: {run['refused']}"
+    return f"| {row} | {means} | {astray} | {said} |"
+
+
 def _kept(folder: Path) -> dict | None:
     path = folder / "found.json"
-    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+    return _read(path) if path.is_file() else None
+
+
+def _read(path: Path) -> dict:
+    return json.loads(path.read_text(encoding="utf-8"))
 
 
 def _run(row: str, frames: int, folder: Path) -> dict:
@@ -156,31 +176,49 @@ def _run(row: str, frames: int, folder: Path) -> dict:
     write_file(folder / "log.txt", ran.stdout + ran.stderr)
     if ran.returncode:
         said = next((line for line in ran.stderr.splitlines() if line.startswith("sogjax:")), "failed; see log.txt")
-        found = {"joints": [], "said": f"refused: {said.removeprefix('sogjax: ')}"}
+        found = {"actors": [], "refused": said.removeprefix("sogjax: ")}
     else:
-        found = {"joints": _errors(results, GROUND_TRUTH.of(rendered)), "said": _verdicts(results)}
+        found = {"actors": _actors(results, GROUND_TRUTH.of(rendered)), "refused": ""}
     write_json(folder / "found.json", found)
     return found
 
 
-def _errors(results: Path, truth: Path) -> list[float]:
-    """The mean error of the joints of each motion (metres), each held against the person that it suits best."""
-    motions = [load_motion(path) for path in sorted(results.glob("motion*.npz"))]
+def _actors(results: Path, truth: Path) -> list[dict]:
+    """Each motion held against the person that it suits best: how far it is off, and what the run says of it."""
     known = load_ground_truth(truth)
     people = [known.subject(name) for name in known.subjects] if known.subjects else [known]
+    verdicts = [Verdict.from_dict(entry) for entry in _read(results / METRICS.name)["verdicts"].values()]
+    motions = [load_motion(MOTION.of(results, verdict.actor, len(verdicts))) for verdict in verdicts]
     errors = np.array([[_mean(motion, person) for person in people] for motion in motions])
-    rows, columns = linear_sum_assignment(errors)
-    return errors[rows, columns].tolist()
+    pairs = zip(*linear_sum_assignment(errors), strict=True)
+    return [_actor(motions[row], people[column], verdicts[row]) for row, column in pairs]
 
 
 def _mean(motion: Motion, person: GroundTruth) -> float:
-    errors = joint_errors(motion, person)
-    return float("inf") if errors is None else float(errors.errors.mean())
+    beside = beside_truth(motion, person)
+    return float("inf") if beside is None else beside.mean
 
 
-def _verdicts(results: Path) -> str:
-    content = json.loads((results / METRICS.name).read_text(encoding="utf-8"))
-    return "; ".join(dict.fromkeys(verdict["sentence"] for verdict in content["verdicts"].values()))
+def _actor(motion: Motion, person: GroundTruth, verdict: Verdict) -> dict:
+    beside = beside_truth(motion, person)
+    assert beside is not None
+    named = sorted({limb.name for limb in verdict.doubtful})
+    said = {"sentence": verdict.sentence, "looks_right": verdict.looks_right, "subject_wrong": verdict.wrong}
+    return asdict(beside) | said | {"named": named}
+
+
+def _of_verdicts(runs: list[dict]) -> list[str]:
+    """How often verdicts are silently wrong, and how often they doubt what is right: actors that were tracked."""
+    actors = [actor for run in runs for actor in run["actors"]]
+    wrong, right = [[one for one in actors if (one["astray"] > OFTEN) == off] for off in (True, False)]
+    lost = [one for one in actors if one["lost"] and not one["subject_wrong"]]
+    groups = {
+        "a joint is astray, and it looks right": [one["looks_right"] for one in wrong],
+        "none is, and it is doubted": [not one["looks_right"] for one in right],
+        "a limb is lost, and one of these is named": [bool({*one["lost"]} & {*one["named"]}) for one in lost],
+        "refused": [not run["actors"] for run in runs],
+    }
+    return [f"- {name}: {sum(true)} of {len(true)}" for name, true in groups.items()]
 
 
 if __name__ == "__main__":

@@ -8,10 +8,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import verdict_trials
+from beside_truth import OFTEN
 from motion_cases import walking_motion
 from small_recording import make_recording
 from tiny_body import make_body
-from verdict_trials import CASES, OFTEN, VerdictTrial, VerdictTrials, judged_run, scaled
+from verdict_trials import CASES, VerdictTrial, VerdictTrials, judged_run, scaled
 
 from sogjax.errors import InputError
 from sogjax.io.ground_truth import GroundTruth
