@@ -27,7 +27,7 @@ from sogjax.errors import InputError
 from sogjax.io import source
 from sogjax.io.image_file import read_image, read_mask
 from sogjax.io.recording import open_recording
-from sogjax.io.video import VideoWriter, read_frames
+from sogjax.io.video import VideoWriter, read_chosen, read_frames
 from sogjax.io.video_file import frame_times
 
 
@@ -64,6 +64,17 @@ def test_offsets_and_first_frame(tmp_path):
     recording = open_recording(make_recording(tmp_path / "r", frames=8, settings=yaml))
     assert frames_read(recording) == [[4, 1], [5, 2], [6, 3]]
     assert frames_read(recording, 3, 4) == [[5, 2]]
+
+
+@pytest.mark.parametrize("gap", [0, 2, 99])
+@pytest.mark.parametrize("start", [0, 2])
+def test_chosen_frames_are_those_of_the_whole_however_they_are_reached(tmp_path, monkeypatch, gap, start):
+    monkeypatch.setattr("sogjax.io.video.WORTH_A_JUMP", gap)
+    yaml = f"up: z\nframe_offset: {{left: {start}, right: -1}}\nfirst_frame: 1\n"
+    recording = open_recording(make_recording(tmp_path / "r", frames=8, settings=yaml))
+    found = [(frame, [frame_of(image) for image in images]) for frame, images in read_chosen(recording, [5, 1, 2, 5])]
+    assert found == [(t, [t + start, t - 1]) for t in (1, 2, 5)]
+    assert list(read_chosen(recording, [])) == []
 
 
 def test_image_folders_are_read_as_videos_are(tmp_path):

@@ -21,6 +21,8 @@ from sogjax.model.color import COLOR_RADIUS, to_rgb
 from sogjax.model.rotation import UP_AXES, axis_vector
 from sogjax.model.skeleton import Skeleton
 
+ADULT = "human"
+"""The body that comes with the package and has an adult's size."""
 _SHAPE_FIELDS = ("joint_offsets", "blob_offsets", "blob_sigmas", "landmark_offsets")
 """The lists of names in a row of `shape`."""
 
@@ -41,10 +43,16 @@ def _bundled() -> dict[str, Path]:
     return {path.stem: path for path in sorted((Path(__file__).parent / "bodies").glob("*.yaml"))}
 
 
+def bundled_like(body: Body) -> Body | None:
+    """The body that comes with the package and has the same joints."""
+    joints = lambda one: (one.skeleton.names, one.skeleton.parents)
+    found = map(_bundled_body, sorted(_bundled(), key=lambda name: name != ADULT))
+    return next((one for one in found if joints(one) == joints(body)), None)
+
+
 @cache
-def bundled_bodies() -> tuple[Body, ...]:
-    """The bodies that come with the package."""
-    return tuple(load_body(path) for path in _bundled().values())
+def _bundled_body(name: str) -> Body:
+    return load_body(_bundled()[name])
 
 
 def load_body(path: Path) -> Body:

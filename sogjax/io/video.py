@@ -1,8 +1,9 @@
 """The images of a recording, time step by time step, and the writer of videos."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack
+from itertools import pairwise
 from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeVar
@@ -22,6 +23,9 @@ from sogjax.model.yuv_picture import YuvPicture
 
 Item = TypeVar("Item")
 
+WORTH_A_JUMP = 60
+"""Frames from one that is read to the next, beyond which a jump (from the key frame before it) is likely cheaper."""
+
 
 def read_frames(recording: Recording, start: int | None = None, stop: int | None = None) -> Iterator[list[Any]]:
     """The images of each time step, BGR, in the order of the rig's cameras; None where a camera is missing.
@@ -33,6 +37,16 @@ def read_frames(recording: Recording, start: int | None = None, stop: int | None
         InputError: a video ends early or changes its size.
     """
     return read_prepared(recording, lambda camera, frame, image: image, start, stop)
+
+
+def read_chosen(recording: Recording, frames: Iterable[int]) -> Iterator[tuple[int, list[Any]]]:
+    """Some frames with their images, in the order of time; as `read_frames`."""
+    chosen = sorted({*frames})
+    starts = [k for k, frame in enumerate(chosen) if k == 0 or frame - chosen[k - 1] > WORTH_A_JUMP]
+    for first, stop in pairwise([*starts, len(chosen)]):
+        part = chosen[first:stop]
+        images = _decoded_ahead(recording, lambda camera, frame, image: image, part, planes=False)
+        yield from zip(part, images, strict=True)
 
 
 def read_prepared(
@@ -55,13 +69,13 @@ def read_prepared(
     start, stop = known.start if start is None else start, known.stop if stop is None else min(stop, known.stop)
     if not known.start <= start <= stop:
         raise ValueError(f"frames {start} to {stop} are not in a recording of the frames {known.start} to {known[-1]}")
-    return _decoded_ahead(recording, prepare, start, stop, planes)
+    return _decoded_ahead(recording, prepare, range(start, stop), planes)
 
 
 def _decoded_ahead(
-    recording: Recording, prepare: Callable[[int, int, Any], Item], start: int, stop: int, planes: bool
+    recording: Recording, prepare: Callable[[int, int, Any], Item], frames: Sequence[int], planes: bool
 ) -> Iterator[list[Item]]:
-    if start == stop:
+    if not frames:
         return
     cameras, workers = recording.rig.names, usable_cores()
     threads = max(1, workers // len(cameras))
@@ -71,7 +85,7 @@ def _decoded_ahead(
             pool.submit(
                 open_with_least_work if planes and camera not in recording.color_gains else open_source,
                 recording.sources[camera],
-                max(start + recording.frame_offset[camera], 0),
+                max(frames[0] + recording.frame_offset[camera], 0),
                 threads,
                 recording.picked.get(camera),
             )
@@ -81,22 +95,26 @@ def _decoded_ahead(
         sources = [future.result() for future in opened]
 
         ended: set[int] = set()
+        passed_over = {frame: range(last + 1, frame) for last, frame in pairwise([frames[0] - 1, *frames])}
 
         def decoded(camera: int, frame: int) -> Item:
             name = cameras[camera]
             if camera in ended or not recording.has_image(name, frame):
                 return prepare(camera, frame, None)
+            for passed in passed_over[frame]:
+                if recording.has_image(name, passed):
+                    sources[camera].skip()
             image = _checked(recording, name, sources[camera].read(), frame)
             if image is None:
                 ended.add(camera)  # what might still come would be images of other frames
             return prepare(camera, frame, None if recording.is_missing(name, frame) else image)
 
         decode = lambda frame: [pool.submit(decoded, camera, frame) for camera in range(len(cameras))]
-        upcoming = decode(start)
+        upcoming = decode(frames[0])
         stack.callback(lambda: wait(upcoming))
-        for frame in range(start, stop):
+        for following in [*frames[1:], None]:
             images = [future.result() for future in upcoming]
-            upcoming[:] = decode(frame + 1) if frame + 1 < stop else []
+            upcoming[:] = [] if following is None else decode(following)
             yield images
 
 

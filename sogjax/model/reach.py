@@ -2,9 +2,10 @@
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Array, Bool, Float
 
 from sogjax.model.body import Body
+from sogjax.model.compiled import compiled_hastily
 
 TOLD = 4.5
 """Reach of a turn from which on pictures tell it. Of rendered people (`experiments/degrees.py`) wrists (3.8), head (1.3
@@ -30,7 +31,13 @@ def told_dofs(body: Body) -> Bool[np.ndarray, "dof"]:
     limited = np.isfinite(lower) & np.isfinite(upper)
     middle = 0.5 * (np.where(limited, lower, 0.0) + np.where(limited, upper, 0.0))
     pose = jnp.asarray(np.where(limited, middle, np.asarray(body.poses["rest"])), skeleton.offsets.dtype)
-    frames = skeleton.world_from_joint(pose)
-    moved = skeleton.point_jacobian(frames, body.blobs.joints, body.blobs.points_world(frames))
-    reaches = reach(np.moveaxis(np.asarray(moved, float), -1, 0), np.asarray(body.blob_sigmas, float))
+    moved = np.asarray(_blob_velocities(body, pose), float)
+    reaches = reach(np.moveaxis(moved, -1, 0), np.asarray(body.blob_sigmas, float))
     return (reaches >= TOLD) | ~skeleton.turning
+
+
+@compiled_hastily
+def _blob_velocities(body: Body, pose: Float[Array, "dof"]) -> Float[Array, "blob 3 dof"]:
+    """How the blobs move (metres a unit of each degree of freedom)."""
+    frames = body.skeleton.world_from_joint(pose)
+    return body.skeleton.point_jacobian(frames, body.blobs.joints, body.blobs.points_world(frames))

@@ -8,13 +8,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from sogjax.io.actor_file import bundled_bodies
+from sogjax.io.actor_file import ADULT, bundled_like
 from sogjax.model.body import Body
 from sogjax.model.bones import WIDTHS, bone_lengths
 from sogjax.quality.fitted import fitted_numbers
 
-ADULT = "human"
-"""The body that comes with the package and has an adult's size."""
 FEWEST = 3
 """Long bones from which the size of a body is told."""
 LONG = 0.5
@@ -27,7 +25,7 @@ def odd_bones(body: Body, start: Body | None = None) -> dict[str, float]:
     `start` is the body that the actor was made from; None: the one with its joints that comes with the package, or else
     nothing is odd. The size of the whole is the median over the long bones, so a bone that is wrong hardly moves it.
     """
-    ratios = _ratios(start or _bundled_like(body), body)
+    ratios = _ratios(start or bundled_like(body), body)
     if len(ratios) < FEWEST:
         return {}
     whole = float(np.median([*ratios.values()]))
@@ -37,7 +35,7 @@ def odd_bones(body: Body, start: Body | None = None) -> dict[str, float]:
 
 def odd_size(body: Body) -> float | None:
     """How many times as long as an adult's the bones of a human are, if they are odd."""
-    like = _bundled_like(body)
+    like = bundled_like(body)
     ratios = _ratios(like, body) if like is not None and like.name == ADULT else {}
     if len(ratios) < FEWEST:
         return None
@@ -97,9 +95,3 @@ def _sides_together(odd: Mapping[str, float]) -> dict[str, float]:
         else:
             found[name] = factor
     return found
-
-
-def _bundled_like(body: Body) -> Body | None:
-    """The body that comes with the package and has the same joints."""
-    joints = lambda one: (one.skeleton.names, one.skeleton.parents)
-    return next((one for one in bundled_bodies() if joints(one) == joints(body)), None)

@@ -67,7 +67,7 @@ class Background:
         for k, camera in enumerate(self.cameras or ()):
             arrays |= {f"{k}.picture": camera.picture, f"{k}.spread": camera.spread, f"{k}.known": camera.known}
             arrays[f"{k}.learnt"] = np.array(camera.origin == "clip")
-        save_npz(folder / FILE, arrays)
+        save_npz(folder / FILE, arrays, packed=False)
 
     @classmethod
     def load(cls, folder: Path) -> "Background | None":

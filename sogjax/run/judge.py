@@ -1,7 +1,7 @@
 """What a run thinks of itself: its verdict in numbers and in a line, and what its worst frames show."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from sogjax.io.files import write_json
 from sogjax.io.ground_truth import load_ground_truth
 from sogjax.io.motion import Motion
 from sogjax.io.recording import Recording
-from sogjax.io.video import read_frames
+from sogjax.io.video import read_chosen
 from sogjax.quality.evaluation import GroupEvaluation, evaluate_motions
 from sogjax.quality.limb_warnings import limits_of
 from sogjax.quality.passages import passages
@@ -96,7 +96,7 @@ def kept_verdicts(path: Path) -> dict[str, Verdict]:
 def worst_images(result: RunResult) -> dict[int, list[Any]]:
     """The pictures (BGR) of all cameras in the frames that fit worst; none where they cannot be read, which is said."""
     try:
-        return dict(_pictures(result.recording, _worst(result)))
+        return dict(read_chosen(result.recording, _worst(result)))
     except InputError as error:
         say(f"warning: no {WORST.name}: {error}")
         return {}
@@ -108,8 +108,3 @@ def _worst(result: RunResult) -> list[int]:
     for row in range(NUM_WORST):
         found |= {verdict.worst[row]: None for verdict in result.verdicts.values() if row < len(verdict.worst)}
     return sorted(list(found)[:NUM_WORST])
-
-
-def _pictures(recording: Recording, frames: Sequence[int]) -> Iterator[tuple[int, list[Any]]]:
-    for frame in frames:
-        yield frame, next(iter(read_frames(recording, frame, frame + 1)))
