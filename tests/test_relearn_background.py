@@ -5,28 +5,46 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sogjax.run import relearn_background
+from sogjax.run.background import Background
 from sogjax.run.relearn_background import frames_to_learn_from, without_body
+from sogjax.run.setup import Setup
 from sogjax.scene.background import BackgroundImage
 
 SAMPLES = [*range(0, 300, 30)]
 
 
 @pytest.mark.parametrize(
-    ("unknown", "numbers", "expected"),
-    [(0.5, range(0, 300), SAMPLES), (0.5, range(110, 190), []), (0.001, range(0, 300), [])],
-    ids=["whole clip", "part with too few samples", "hardly anything unknown"],
+    ("unknown", "overlap", "expected"),
+    [
+        (0.5, {}, "50.0% of the background is unknown"),
+        (0.001, {"a": 0.7, "b": 0.3, "c": 0.8}, "in b the body is taken for background"),
+        (0.001, {"a": 0.7, "b": 0.6, "c": 0.8}, None),
+        (0.001, {}, None),
+    ],
 )
-def test_a_clip_is_tracked_for_its_background_only_where_that_can_help(unknown, numbers, expected):
-    assert frames_to_learn_from(unknown, SAMPLES, numbers) == expected
+def test_a_background_is_learnt_again_only_where_that_can_help(monkeypatch, unknown, overlap, expected):
+    learnt = Background((replace(BackgroundImage.nothing(6, 4), origin="clip"),))
+    monkeypatch.setattr(relearn_background, "unknown_share", lambda setup: unknown)
+    monkeypatch.setattr(relearn_background, "overlap_of", lambda setup, known: overlap)
+    unseen = Setup.__new__(Setup)
+    assert relearn_background.why_learn_again(unseen, learnt, {}) == expected
+    photographed = Background((replace(BackgroundImage.nothing(6, 4), origin="picture"),))
+    assert relearn_background.why_learn_again(unseen, photographed, {}) is None
+
+
+@pytest.mark.parametrize(("numbers", "expected"), [(range(0, 300), SAMPLES), (range(110, 190), [])])
+def test_too_few_samples_that_are_tracked_tell_nothing(numbers, expected):
+    assert frames_to_learn_from(SAMPLES, numbers) == expected
 
 
 def test_every_second_frame_has_the_samples_that_it_has():
-    assert frames_to_learn_from(0.5, SAMPLES, range(0, 300, 2)) == SAMPLES
+    assert frames_to_learn_from(SAMPLES, range(0, 300, 2)) == SAMPLES
 
 
 def test_samples_that_are_not_tracked_are_told(capsys):
     samples = [*range(0, 600, 30)]
-    assert frames_to_learn_from(0.5, samples, range(0, 600, 20)) == samples[::2]
+    assert frames_to_learn_from(samples, range(0, 600, 20)) == samples[::2]
     assert "of 20 frames to learn the background from, 10 are tracked" in capsys.readouterr().err
 
 

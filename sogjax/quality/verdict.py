@@ -175,11 +175,17 @@ def _bad_overlaps(overlap: Mapping[str, float]) -> list[str]:
     """Silhouettes that overlap little in all cameras, or in some."""
     if not overlap:
         return []
-    bounds, usual = fitted_numbers().verdict, float(np.median(list(overlap.values())))
-    if usual < bounds.good_overlap:
+    usual = float(np.median(list(overlap.values())))
+    if usual < fitted_numbers().verdict.good_overlap:
         return [f"look at all of it: silhouettes overlap to {usual:.0%} (65 % is usual)"]
-    worse = [name for name, value in overlap.items() if value < bounds.worse_than_most * usual]
+    worse = worse_cameras(overlap)
     return _shortened([f"look at {name}: overlaps to {overlap[name]:.0%}, others to {usual:.0%}" for name in worse])
+
+
+def worse_cameras(overlap: Mapping[str, float]) -> list[str]:
+    """Cameras in which silhouettes overlap with the foreground much less than in most."""
+    least = fitted_numbers().verdict.worse_than_most * float(np.median([*overlap.values()] or [0.0]))
+    return [name for name, value in overlap.items() if value < least]
 
 
 def _inside(name: str, motions: Mapping[str, Motion]) -> list[str]:

@@ -147,7 +147,7 @@ def _informed(setup: Setup, background: Background, table: FrameTable) -> Setup:
     setup = bias.in_setup(setup)
     poses = {int(frame): jnp.asarray(pose) for frame, pose in zip(table.frame, table.pose, strict=True)}
     start = InitialPose(int(table.frame[0]), table.pose[0], "tracked")
-    return relearn_background(setup, background, start, poses).in_setup(setup)
+    return relearn_background(setup, background, start, poses=poses).in_setup(setup)
 
 
 def _found_setup(setup: Setup, body: Body, moves: Float[np.ndarray, "camera 7"] | None) -> Setup:

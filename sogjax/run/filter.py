@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.signal import butter, sosfiltfilt
 
 from sogjax.errors import InputError
 from sogjax.io.frame_table import FramesRecord, FrameTable
@@ -61,6 +60,8 @@ def smooth(
     poses: Float[np.ndarray, "frame dof"], cutoff: float, fps: float, turns: Bool[np.ndarray, "dof"]
 ) -> Float[np.ndarray, "frame dof"]:
     """A zero-phase Butterworth filter of `ORDER` over every degree of freedom; of few frames nothing is changed."""
+    from scipy.signal import butter, sosfiltfilt  # half a second, which runs without a filter need not wait
+
     if len(poses) < LEAST:
         return poses
     values = np.asarray(poses, float)

@@ -109,7 +109,7 @@ PASSES: tuple[Pass, ...] = (
     Pass(
         "relearnt",
         BACKGROUND,
-        lambda run: relearn_background(run.setup, run.background, run.initial_pose),
+        lambda run: relearn_background(run.setup, run.background, run.initial_pose, run.actors.known_frames),
         RelearntBackground,
         wanted=lambda run: run.tracks and run.background.is_learnt,
     ),

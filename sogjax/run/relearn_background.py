@@ -17,6 +17,9 @@ from jaxtyping import Array, Bool, Float, UInt8
 from sogjax.errors import InputError
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
+from sogjax.model.compiled import compiled_hastily
+from sogjax.quality.verdict import worse_cameras
+from sogjax.run.actors import KnownFrame
 from sogjax.run.background import MUCH_UNKNOWN, Background
 from sogjax.run.clip_learning import LeftOut, UnsuitableError, background_samples, learnt_from
 from sogjax.run.initial_pose import InitialPose
@@ -26,7 +29,9 @@ from sogjax.scene.background import BackgroundImage
 from sogjax.scene.background_difference import channel_max, working_size
 from sogjax.scene.clip_background import FEWEST_AGREEING
 from sogjax.search.search_energy import DISC
+from sogjax.tracking.frame import FrameInput, TrackState, on_device
 from sogjax.tracking.frame_by_frame import track
+from sogjax.tracking.tracker import Tracker
 from sogjax.view.projection import picture_points
 
 FOLDER, FIRST = "relearnt", "first"
@@ -73,29 +78,31 @@ class RelearntBackground:
 
 
 def relearn_background(
-    setup: Setup, background: Background, start: InitialPose, poses: Mapping[int, Array] | None = None
+    setup: Setup,
+    background: Background,
+    start: InitialPose,
+    known: Sequence[KnownFrame] = (),
+    poses: Mapping[int, Array] | None = None,
 ) -> RelearntBackground:
-    """The background once more where the first one left much open, with the poses of sampled frames known.
+    """The background once more where the first one left much open or took the body, with poses of sampled frames known.
 
     Args:
         setup: what is tracked with.
         background: the first one.
         start: where tracking begins.
-        poses: those that are known, by frame; None: the clip is tracked for them.
+        known: other frames whose poses are known.
+        poses: those of the frames that are tracked, by frame; None: the clip is tracked for them.
 
     Raises:
         InputError: a video cannot be read, the clip is unsuitable, or a picture has too many image blobs.
     """
-    numbers = setup.clip.numbers
-    unknown = unknown_share(setup, background)
-    samples = frames_to_learn_from(unknown, background_samples(setup.clip.recording).frames, numbers)
+    told = {each.frame: each.pose for each in known if each.frame in setup.clip.numbers} | {start.frame: start.pose}
+    reason = why_learn_again(setup, background, told)
+    samples = reason and frames_to_learn_from(background_samples(setup.clip.recording).frames, setup.clip.numbers)
     if not samples:
         return RelearntBackground(None)
     if poses is None:
-        say(
-            f"{unknown:.1%} of the background is unknown: the clip is tracked once to learn it where the body is not, "
-            "then again"
-        )
+        say(f"{reason}: the clip is tracked once to learn the background where the body is not, then again")
         poses = _tracked_poses(setup, start, frozenset(samples))
     body = setup.tracker.body
     try:
@@ -134,13 +141,11 @@ def without_body(
     return replace(first, known=first.known & ~taken)
 
 
-def frames_to_learn_from(unknown: float, samples: Sequence[int], numbers: range) -> list[int]:
-    """The sampled frames that are tracked; none where little is unknown, or few of them are tracked.
+def frames_to_learn_from(samples: Sequence[int], numbers: range) -> list[int]:
+    """The sampled frames that are tracked; none where few of them are.
 
     Where frames between those to track are left out, it is said how many samples are.
     """
-    if unknown < MUCH_UNKNOWN:
-        return []
     spanned = [frame for frame in samples if numbers[0] <= frame <= numbers[-1]]
     found = [frame for frame in spanned if frame in numbers]
     if len(found) < len(spanned):
@@ -148,10 +153,47 @@ def frames_to_learn_from(unknown: float, samples: Sequence[int], numbers: range)
     return found if len(found) >= FEWEST_AGREEING else []
 
 
-def unknown_share(setup: Setup, background: Background) -> float:
-    """How much of the pictures a background that was learnt from the clip leaves open; 0 without such a one."""
+def why_learn_again(setup: Setup, background: Background, known: Mapping[int, Float[np.ndarray, "dof"]]) -> str | None:
+    """What speaks for learning a background again; None: nothing does. Poses are `known` of some frames."""
+    if not background.is_learnt:
+        return None
+    unknown = unknown_share(setup)
+    if unknown >= MUCH_UNKNOWN:
+        return f"{unknown:.1%} of the background is unknown"
+    taken = worse_cameras(overlap_of(setup, known))
+    return f"in {' and '.join(taken)} the body is taken for background" if taken else None
+
+
+def overlap_of(setup: Setup, known: Mapping[int, Float[np.ndarray, "dof"]]) -> dict[str, float]:
+    """How far the silhouettes of known poses are foreground (IoU), by camera: the median over frames and actors.
+
+    Cameras of which too little is known are absent.
+    """
+    tracker = setup.tracker
+    if tracker.limbs is None or tracker.reader.subject is None:
+        return {}
+    found = []
+    for number, pose in known.items():
+        frame = on_device(next(iter(setup.clip.frames(number, number + 1))))
+        found.append(np.asarray(_overlap(tracker, frame, jnp.asarray(pose, tracker.body.blob_sigmas.dtype))))
+    overlap = np.median(np.concatenate(found), axis=0)
+    names = setup.clip.recording.rig.names
+    return {name: float(value) for name, value in zip(names, overlap, strict=True) if np.isfinite(value)}
+
+
+@compiled_hastily
+def _overlap(tracker: Tracker, frame: FrameInput, pose: Float[Array, "dof"]) -> Float[Array, "actor camera"]:
+    state = tracker.with_memory(TrackState.from_pose(pose))
+    assert state.baseline is not None
+    overlap = tracker.judged(pose, state.baseline, tracker.windows(frame, state), frame).overlap
+    assert overlap is not None
+    return overlap
+
+
+def unknown_share(setup: Setup) -> float:
+    """How much of the pictures a background that was learnt from the clip leaves open."""
     model = setup.tracker.reader.background
-    if model is None or not background.is_learnt:
+    if model is None:
         return 0.0
     inside = np.zeros(np.asarray(model.known).shape, bool)
     for k, grid in enumerate(setup.clip.grids):
