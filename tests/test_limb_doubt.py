@@ -96,6 +96,19 @@ def test_a_limb_in_another_light_is_in_doubt_only_elsewhere(dog, light):
     assert float(judged(tracker, elsewhere, shown, baseline).error_probability[k]) > 0.5
 
 
+def test_a_background_of_a_limbs_own_color_does_not_contradict_it():
+    """Bare arms before planks of the skin's colour: what looks like the background is the arm as well."""
+    body, rig = in_colors(shipped("dog")), ring_rig(5, (160, 120), distance=1.6)
+    pose, limb = standing(body, 1.1), limb_blobs(body)[limb_names(body).index(LIMB)]
+    colors = np.array(body.blob_colors)
+    colors[limb] = np.array(BACKGROUND) / 255.0
+    like_the_room = eqx.tree_at(lambda b: b.blob_colors, body, jnp.asarray(colors, jnp.float32))
+    shown = jnp.asarray(cells_of(rig, draw(like_the_room, pose, rig), DEPTH))
+    of_limb = lambda one: evidence_of(judging(one, rig, True), jnp.asarray(pose), shown).contradicted[limb]
+    assert float(of_limb(like_the_room).max()) < 0.1
+    assert float(of_limb(body).mean()) > 0.5  # of other colours, it is not there
+
+
 def test_a_limb_in_doubt_does_not_become_usual(dog):
     tracker, pose, cells = dog
     baseline = judged(tracker, pose, cells, jnp.full((2, tracker.body.num_blobs), jnp.nan)).baseline

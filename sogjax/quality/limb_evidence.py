@@ -73,7 +73,8 @@ class BlobEvidence(NamedTuple):
     """Log likelihood of the colours seen, in the limb's light, as the blob's own against any of the subject's; mean of
     the samples."""
     contradicted: Float[Array, "blob"]
-    """Part of the samples that are background; 0 where none is known."""
+    """Part of the samples that are background; 0 where none is known. What looks like the background and like the blob
+    is either: it counts as far as the blob's own colour is another."""
     seen: Float[Array, "blob"]
     """Part of its area in all pictures that is seen."""
     explained: Float[Array, "blob"]
@@ -125,7 +126,7 @@ def blob_evidence(
     lit = jnp.clip(colors / light, 0.0, 1.0)
     return BlobEvidence(
         own=mean(own_density(lit, own_colors) - subject_density(lit, subject)),
-        contradicted=mean(against.astype(alike.dtype)),
+        contradicted=mean(jnp.where(against, 1.0 - alike, 0.0)),
         seen=whole / (len(SAMPLES) * jnp.sum(areas, axis=0) + 1e-6),
         explained=mean(jnp.where(against, 0.0, alike)),
         hidden=hidden,
