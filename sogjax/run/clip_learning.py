@@ -112,7 +112,7 @@ def _told_together(
     cameras = {k: recording.rig.camera(recording.rig.names[k]) for k in sampled}
     views, still, floors = CoarseViews.of(moving, shown, cameras, axis_vector(recording.up)), dict(zones), {}
     if views is not None:
-        floors = {} if recording.masked else seen_floors(views)
+        floors = seen_floors(views)
         wide = np.mean([zone.mean() for zone in zones.values()]) > MUCH_UNKNOWN
         still = still_zones(zones, views) if wide else still
         still = standing_zones(still, views, floors) if floors else still
