@@ -29,11 +29,6 @@ class BesideTruth:
     astray: float = 0.0
     """Part of the frames in which some joint is astray."""
 
-    @property
-    def wrong(self) -> bool:
-        """By the strict rule: a joint is astray too often."""
-        return self.astray > OFTEN
-
 
 def beside_truth(motion: Motion, truth: GroundTruth) -> BesideTruth | None:
     """The motion of a subject held against its truth; None: they have no joints in common."""

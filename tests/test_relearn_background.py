@@ -15,18 +15,17 @@ SAMPLES = [*range(0, 300, 30)]
 
 
 @pytest.mark.parametrize(
-    ("unknown", "overlap", "expected"),
+    ("unknown", "taken", "expected"),
     [
-        (0.5, {}, "50.0% of the background is unknown"),
-        (0.001, {"a": 0.7, "b": 0.3, "c": 0.8}, "in b the body is taken for background"),
-        (0.001, {"a": 0.7, "b": 0.6, "c": 0.8}, None),
-        (0.001, {}, None),
+        (0.5, [], "50.0% of the background is unknown"),
+        (0.001, ["b", "d"], "b and d took the body for background"),
+        (0.001, [], None),
     ],
 )
-def test_a_background_is_learnt_again_only_where_that_can_help(monkeypatch, unknown, overlap, expected):
+def test_a_background_is_learnt_again_only_where_that_can_help(monkeypatch, unknown, taken, expected):
     learnt = Background((replace(BackgroundImage.nothing(6, 4), origin="clip"),))
     monkeypatch.setattr(relearn_background, "unknown_share", lambda setup: unknown)
-    monkeypatch.setattr(relearn_background, "overlap_of", lambda setup, known: overlap)
+    monkeypatch.setattr(relearn_background, "cameras_that_took_bodies", lambda *_: taken)
     unseen = Setup.__new__(Setup)
     assert relearn_background.why_learn_again(unseen, learnt, {}) == expected
     photographed = Background((replace(BackgroundImage.nothing(6, 4), origin="picture"),))

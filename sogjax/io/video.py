@@ -40,8 +40,10 @@ def read_frames(recording: Recording, start: int | None = None, stop: int | None
 
 
 def read_chosen(recording: Recording, frames: Iterable[int]) -> Iterator[tuple[int, list[Any]]]:
-    """Some frames with their images, in the order of time; as `read_frames`."""
+    """Some of the recording's frames with their images, in the order of time; as `read_frames`."""
     chosen = sorted({*frames})
+    if not {*chosen} <= {*recording.frames}:
+        raise ValueError(f"of the frames {chosen}, some are not in a recording of the frames {recording.frames}")
     starts = [k for k, frame in enumerate(chosen) if k == 0 or frame - chosen[k - 1] > WORTH_A_JUMP]
     for first, stop in pairwise([*starts, len(chosen)]):
         part = chosen[first:stop]

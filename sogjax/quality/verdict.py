@@ -149,7 +149,12 @@ def _overlaps(motion: Motion) -> dict[str, float]:
     """Of the cameras that tell it in at least half of the frames."""
     if motion.overlap is None or motion.camera_names is None:
         return {}
-    columns = zip(motion.camera_names.tolist(), np.asarray(motion.overlap, float).T, strict=True)
+    return usual_overlaps(motion.camera_names.tolist(), np.asarray(motion.overlap, float))
+
+
+def usual_overlaps(names: Sequence[str], overlap: Float[np.ndarray, "frame camera"]) -> dict[str, float]:
+    """The median overlap of silhouettes and foreground of cameras that tell it in at least half of the frames."""
+    columns = zip(names, overlap.T, strict=True)
     return {name: float(np.nanmedian(column)) for name, column in columns if np.isfinite(column).mean() >= 0.5}
 
 
@@ -183,9 +188,11 @@ def _bad_overlaps(overlap: Mapping[str, float]) -> list[str]:
 
 
 def worse_cameras(overlap: Mapping[str, float]) -> list[str]:
-    """Cameras in which silhouettes overlap with the foreground much less than in most."""
-    least = fitted_numbers().verdict.worse_than_most * float(np.median([*overlap.values()] or [0.0]))
-    return [name for name, value in overlap.items() if value < least]
+    """Cameras in which silhouettes overlap with the foreground much less than in most; none if they do so nowhere."""
+    bounds, usual = fitted_numbers().verdict, float(np.median([*overlap.values()] or [0.0]))
+    if usual < bounds.good_overlap:
+        return []
+    return [name for name, value in overlap.items() if value < bounds.worse_than_most * usual]
 
 
 def _inside(name: str, motions: Mapping[str, Motion]) -> list[str]:

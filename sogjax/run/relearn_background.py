@@ -1,7 +1,8 @@
 """A background that is learnt a second time, once the subject was tracked: where its body is, no sample counts.
 
 Somebody who stays in one place hides what is around: a trunk that never moves and a wall look alike, so nothing around
-it counts as background at first. When the body was followed, it does.
+it counts as background at first. When the body was followed, it does. And somebody who walks towards a camera is seen
+in one place for most of the clip, and becomes background there, though the other cameras see him well.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,21 +18,18 @@ from jaxtyping import Array, Bool, Float, UInt8
 from sogjax.errors import InputError
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
-from sogjax.model.compiled import compiled_hastily
-from sogjax.quality.verdict import worse_cameras
 from sogjax.run.actors import KnownFrame
 from sogjax.run.background import MUCH_UNKNOWN, Background
 from sogjax.run.clip_learning import LeftOut, UnsuitableError, background_samples, learnt_from
 from sogjax.run.initial_pose import InitialPose
 from sogjax.run.setup import Setup
+from sogjax.run.taken_bodies import cameras_that_took_bodies
 from sogjax.run.terminal import progress, say
 from sogjax.scene.background import BackgroundImage
 from sogjax.scene.background_difference import channel_max, working_size
 from sogjax.scene.clip_background import FEWEST_AGREEING
 from sogjax.search.search_energy import DISC
-from sogjax.tracking.frame import FrameInput, TrackState, on_device
 from sogjax.tracking.frame_by_frame import track
-from sogjax.tracking.tracker import Tracker
 from sogjax.view.projection import picture_points
 
 FOLDER, FIRST = "relearnt", "first"
@@ -160,34 +158,8 @@ def why_learn_again(setup: Setup, background: Background, known: Mapping[int, Fl
     unknown = unknown_share(setup)
     if unknown >= MUCH_UNKNOWN:
         return f"{unknown:.1%} of the background is unknown"
-    taken = worse_cameras(overlap_of(setup, known))
-    return f"in {' and '.join(taken)} the body is taken for background" if taken else None
-
-
-def overlap_of(setup: Setup, known: Mapping[int, Float[np.ndarray, "dof"]]) -> dict[str, float]:
-    """How far the silhouettes of known poses are foreground (IoU), by camera: the median over frames and actors.
-
-    Cameras of which too little is known are absent.
-    """
-    tracker = setup.tracker
-    if tracker.limbs is None or tracker.reader.subject is None:
-        return {}
-    found = []
-    for number, pose in known.items():
-        frame = on_device(next(iter(setup.clip.frames(number, number + 1))))
-        found.append(np.asarray(_overlap(tracker, frame, jnp.asarray(pose, tracker.body.blob_sigmas.dtype))))
-    overlap = np.median(np.concatenate(found), axis=0)
-    names = setup.clip.recording.rig.names
-    return {name: float(value) for name, value in zip(names, overlap, strict=True) if np.isfinite(value)}
-
-
-@compiled_hastily
-def _overlap(tracker: Tracker, frame: FrameInput, pose: Float[Array, "dof"]) -> Float[Array, "actor camera"]:
-    state = tracker.with_memory(TrackState.from_pose(pose))
-    assert state.baseline is not None
-    overlap = tracker.judged(pose, state.baseline, tracker.windows(frame, state), frame).overlap
-    assert overlap is not None
-    return overlap
+    taken = cameras_that_took_bodies(setup, background.required(), known)
+    return f"{' and '.join(taken)} took the body for background" if taken else None
 
 
 def unknown_share(setup: Setup) -> float:
