@@ -26,7 +26,7 @@ from sogjax.refine.adjustment import Adjustment, adjusted
 from sogjax.refine.clip_priors import floor_height, standing, step_of, undersides
 from sogjax.refine.pictures import ClipPictures, Reader
 from sogjax.run import build
-from sogjax.run.actors import Actors, KnownFrame
+from sogjax.run.actors import Actors
 from sogjax.run.adjust_cameras import camera_numbers, moved_rig, moves_of
 from sogjax.run.adjust_checks import WINDOW, check_length
 from sogjax.run.adjust_colors import color_rows, judged_with_colors, mean_similarity
@@ -147,7 +147,7 @@ def _informed(setup: Setup, background: Background, table: FrameTable) -> Setup:
     setup = bias.in_setup(setup)
     poses = {int(frame): jnp.asarray(pose) for frame, pose in zip(table.frame, table.pose, strict=True)}
     start = InitialPose(int(table.frame[0]), table.pose[0], "tracked")
-    known = [KnownFrame(int(table.frame[row]), table.pose[row], 1.0) for row in rows]
+    known = {int(table.frame[row]): table.pose[row] for row in rows}
     return relearn_background(setup, background, start, known, poses).in_setup(setup)
 
 

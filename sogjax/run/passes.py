@@ -109,7 +109,9 @@ PASSES: tuple[Pass, ...] = (
     Pass(
         "relearnt",
         BACKGROUND,
-        lambda run: relearn_background(run.setup, run.background, run.initial_pose, run.actors.known_frames),
+        lambda run: relearn_background(
+            run.setup, run.background, run.initial_pose, {each.frame: each.pose for each in run.actors.known_frames}
+        ),
         RelearntBackground,
         wanted=lambda run: run.tracks and run.background.is_learnt,
     ),

@@ -18,7 +18,6 @@ from jaxtyping import Array, Bool, Float, UInt8
 from sogjax.errors import InputError
 from sogjax.io.recording import Recording
 from sogjax.model.body import Body
-from sogjax.run.actors import KnownFrame
 from sogjax.run.background import MUCH_UNKNOWN, Background
 from sogjax.run.clip_learning import LeftOut, UnsuitableError, background_samples, learnt_from
 from sogjax.run.initial_pose import InitialPose
@@ -79,7 +78,7 @@ def relearn_background(
     setup: Setup,
     background: Background,
     start: InitialPose,
-    known: Sequence[KnownFrame] = (),
+    known: Mapping[int, Float[np.ndarray, "dof"]],
     poses: Mapping[int, Array] | None = None,
 ) -> RelearntBackground:
     """The background once more where the first one left much open or took the body, with poses of sampled frames known.
@@ -88,14 +87,14 @@ def relearn_background(
         setup: what is tracked with.
         background: the first one.
         start: where tracking begins.
-        known: other frames whose poses are known.
+        known: the poses of other frames that are known, by frame.
         poses: those of the frames that are tracked, by frame; None: the clip is tracked for them.
 
     Raises:
         InputError: a video cannot be read, the clip is unsuitable, or a picture has too many image blobs.
     """
-    told = {each.frame: each.pose for each in known if each.frame in setup.clip.numbers} | {start.frame: start.pose}
-    reason = why_learn_again(setup, background, told)
+    told = {frame: pose for frame, pose in known.items() if frame in setup.clip.numbers}
+    reason = why_learn_again(setup, background, told | {start.frame: start.pose})
     samples = reason and frames_to_learn_from(background_samples(setup.clip.recording).frames, setup.clip.numbers)
     if not samples:
         return RelearntBackground(None)
