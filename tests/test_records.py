@@ -68,6 +68,16 @@ def test_a_background_is_kept_and_so_is_why_there_is_none(tmp_path):
     assert Background.load(tmp_path) == Background(None, "nobody moves")
 
 
+@pytest.mark.parametrize("lost", ["reason", "0.picture", "1.picture", "1.learnt"])
+def test_a_background_that_misses_a_part_is_refused(tmp_path, lost):
+    Background((BackgroundImage.nothing(4, 2),) * 2).save(tmp_path)
+    with np.load(tmp_path / "background.npz") as arrays:
+        content = {name: array for name, array in arrays.items() if name != lost}
+    np.savez(tmp_path / "background.npz", **content)
+    with pytest.raises(InputError, match=rf"background\.npz: has no array '{lost}'"):
+        Background.load(tmp_path)
+
+
 def test_a_log_without_all_columns_is_not_gone_on_from(tmp_path):
     ArrayLog(tmp_path / "frames", {}, {"pose": np.zeros((4, 5))}).close()
     assert kept_rows(tmp_path, InitialPose(0, np.zeros(5), "file"), range(4)) is None

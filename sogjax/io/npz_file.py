@@ -16,6 +16,19 @@ from sogjax.errors import InputError
 from sogjax.io.files import atomic_path
 
 Arrays = dict[str, np.ndarray]
+
+
+class NpzArrays(Arrays):
+    """The arrays of a file; one that it does not have is an error that names the file."""
+
+    def __init__(self, path: Path, arrays: Arrays) -> None:
+        super().__init__(arrays)
+        self.path = path
+
+    def __missing__(self, key: str) -> np.ndarray:
+        raise _missing_array(self.path, self, key)
+
+
 Shape = tuple[int | None, ...]
 """The lengths of an array's axes; None: any."""
 
@@ -27,7 +40,7 @@ _DAMAGED_HEADER = (TokenError, SyntaxError, TypeError, LookupError, RecursionErr
 _UNREADABLE = (OSError, ValueError, zipfile.BadZipFile, zlib.error, EOFError, KeyError, MemoryError, RuntimeError)
 
 
-def read_npz(path: Path) -> Arrays:
+def read_npz(path: Path) -> NpzArrays:
     """All arrays of an npz file.
 
     Raises:
@@ -44,7 +57,7 @@ def read_npz(path: Path) -> Arrays:
                 with archive.open(member) as file:
                     _check_claim(path, file, member.file_size)
         with np.load(path, allow_pickle=False) as arrays:
-            return {key: arrays[key] for key in arrays.files}
+            return NpzArrays(path, {key: arrays[key] for key in arrays.files})
     except InputError:
         raise
     except _UNREADABLE as error:
@@ -143,7 +156,7 @@ def number(path: Path, arrays: Arrays, key: str) -> float:
 
 def _array(path: Path, arrays: Arrays, key: str, shape: Shape, kinds: str, what: str) -> np.ndarray:
     if key not in arrays:
-        raise InputError(f"{path}: has no array {key!r}; add it (there are: {', '.join(sorted(arrays))})")
+        raise _missing_array(path, arrays, key)
     values = arrays[key]
     if values.dtype.kind not in kinds:
         raise InputError(f"{path}: {key!r} is of type {values.dtype}; it should hold {what}")
@@ -152,3 +165,7 @@ def _array(path: Path, arrays: Arrays, key: str, shape: Shape, kinds: str, what:
         wanted = ", ".join("any" if n is None else str(n) for n in shape)
         raise InputError(f"{path}: {key!r} has the shape {values.shape}; it should be ({wanted})")
     return values
+
+
+def _missing_array(path: Path, arrays: Arrays, key: str) -> InputError:
+    return InputError(f"{path}: has no array {key!r}; add it (there are: {', '.join(sorted(arrays))})")

@@ -9,7 +9,7 @@ import numpy as np
 
 from sogjax.errors import InputError
 from sogjax.io.background_cache import Arrays, background_origin, kept_background
-from sogjax.io.npz_file import read_npz, save_npz
+from sogjax.io.npz_file import bool_array, float_array, int_array, read_npz, save_npz, text_array
 from sogjax.io.source import fingerprint
 from sogjax.model.compiled import compiled_hastily
 from sogjax.run.clip import Clip, SampleKind
@@ -71,15 +71,26 @@ class Background:
 
     @classmethod
     def load(cls, folder: Path) -> "Background | None":
-        """What was kept, if it was."""
-        if not (folder / FILE).is_file():
+        """What was kept, if it was.
+
+        Raises:
+            InputError: what was kept does not fit together.
+        """
+        path = folder / FILE
+        if not path.is_file():
             return None
-        arrays, cameras = read_npz(folder / FILE), []
-        while f"{len(cameras)}.picture" in arrays:
-            picture, spread, known = (arrays[f"{len(cameras)}.{part}"] for part in ("picture", "spread", "known"))
-            learnt = bool(arrays[f"{len(cameras)}.learnt"])
-            cameras.append(BackgroundImage(picture, spread, known, _ORIGINS[learnt]))
-        return cls(tuple(cameras) or None, str(arrays["reason"]))
+        arrays = read_npz(path)
+        reason = str(text_array(path, arrays, "reason", ()))
+        numbers = range(len({key.partition(".")[0] for key in arrays if "." in key}))
+        return cls(tuple(_kept_camera(path, arrays, f"{k}.") for k in numbers) or None, reason)
+
+
+def _kept_camera(path: Path, arrays: Arrays, prefix: str) -> BackgroundImage:
+    picture = int_array(path, arrays, prefix + "picture", (None, None, 3)).astype(np.uint8)
+    spread = float_array(path, arrays, prefix + "spread", picture.shape[:2])
+    known = bool_array(path, arrays, prefix + "known", picture.shape[:2])
+    learnt = bool(bool_array(path, arrays, prefix + "learnt", ()))
+    return BackgroundImage(picture, spread, known, _ORIGINS[learnt])
 
 
 def learn_background(clip: Clip, choice: str, cache: str | None = None, more: Sequence[SampleKind] = ()) -> Background:

@@ -13,7 +13,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.errors import counted
 from sogjax.io.frame_table import FramesRecord, FrameTable
-from sogjax.io.npz_file import read_npz, save_npz
+from sogjax.io.npz_file import float_array, int_array, read_npz, save_npz
 from sogjax.model.limbs import limb_blobs
 from sogjax.model.program import compiled
 from sogjax.run.frames import continued, rows_of
@@ -73,11 +73,18 @@ class LearntOccluders:
 
     @classmethod
     def load(cls, folder: Path) -> "LearntOccluders | None":
-        """What was kept, if it was."""
-        if not (folder / FILE).is_file():
+        """What was kept, if it was.
+
+        Raises:
+            InputError: what was kept does not fit together.
+        """
+        path = folder / FILE
+        if not path.is_file():
             return None
-        arrays = read_npz(folder / FILE)
-        return cls(arrays.get("hidden"), (int(arrays["rows"][0]), int(arrays["rows"][1])))
+        arrays = read_npz(path)
+        first, last = int_array(path, arrays, "rows", (2,)).tolist()
+        hidden = float_array(path, arrays, "hidden", (None, None, None)) if "hidden" in arrays else None
+        return cls(hidden, (first, last))
 
 
 class Retracked(FramesRecord):

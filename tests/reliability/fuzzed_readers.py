@@ -31,10 +31,12 @@ from sogjax.io.source import look_at_source, open_source
 from sogjax.run.actors import Actors
 from sogjax.run.background import Background
 from sogjax.run.initial_pose import InitialPose
+from sogjax.run.learn_occluders import LearntOccluders
 from sogjax.run.merge import Merged
 from sogjax.run.run_files import KEPT as PARTIAL
 from sogjax.run.run_files import NOTE
 from sogjax.run.run_folder import read_note, write_note
+from sogjax.scene.background import BackgroundImage
 
 Read = Callable[[Path], object]
 
@@ -107,7 +109,8 @@ def _runs(place: Path) -> dict[str, tuple[Path, Read]]:
     write_note(NOTE.of(kept), {"command": "track", "origin": {"version": "1"}})
     Actors((load_body(place / "actor.yaml"),)).save(kept)
     InitialPose(0, motion.pose[0], "file").save(kept)
-    Background(None, "nobody moves").save(kept)
+    Background((BackgroundImage.nothing(8, 6),) * 2).save(kept)
+    LearntOccluders(np.ones((2, 6, 8)), (3, 9)).save(kept)
     ClipFacts.of(recording).save(kept)
     table = _table(motion)
     with FrameLog(kept / FRAMES) as log:
@@ -122,6 +125,7 @@ def _runs(place: Path) -> dict[str, tuple[Path, Read]]:
         "actor_0.yaml": lambda _: Actors.load(kept),
         "initial_pose.npz": lambda _: InitialPose.load(kept),
         "background.npz": lambda _: Background.load(kept),
+        "occluders.npz": lambda _: LearntOccluders.load(kept),
         "merged.npz": lambda _: Merged.load(kept),
     }
     return {f"run.partial, {name}": (kept / name, read) for name, read in loads.items()}
