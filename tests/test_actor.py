@@ -65,14 +65,14 @@ def test_the_colours_of_a_drawn_body_come_back(space):
     body = three_blobs(rig, apart=True)
     grey = colored(body, np.full((3, 3), 0.5))
     for masks in (True, False):
-        found = back_projected_colors(grey, views_of(body, rig, masks=masks), space)
+        found = back_projected_colors(grey, views_of(body, rig, masks=masks), space).colors
         np.testing.assert_allclose(found, COLORS, atol=COLOR)
 
 
 def test_views_in_which_a_blob_is_hidden_are_left_out():
     rig = ring_rig(3)
     body = three_blobs(rig)
-    found = back_projected_colors(body, views_of(body, rig), "rgb")
+    found = back_projected_colors(body, views_of(body, rig), "rgb").colors
     np.testing.assert_allclose(found, COLORS, atol=COLOR)
 
 
@@ -80,7 +80,7 @@ def test_a_blob_that_no_picture_shows_takes_the_colour_of_the_nearest():
     """The first camera sees the far blob only behind the near one."""
     rig = ring_rig(3)
     body = three_blobs(rig)
-    found = back_projected_colors(body, views_of(body, rig, cameras=[0]), "rgb")
+    found = back_projected_colors(body, views_of(body, rig, cameras=[0]), "rgb").colors
     nearest = 2 if np.linalg.norm(_offset(body, 0, 2)) < np.linalg.norm(_offset(body, 0, 1)) else 1
     np.testing.assert_allclose(found[0], COLORS[nearest], atol=COLOR)
     np.testing.assert_allclose(found[1:], COLORS[1:], atol=COLOR)
@@ -94,7 +94,7 @@ def test_where_nothing_is_seen_a_body_keeps_its_colours():
     rig = ring_rig(3)
     body = three_blobs(rig)
     views = [replace(view, mask=np.zeros_like(view.mask)) for view in views_of(body, rig)]
-    np.testing.assert_allclose(back_projected_colors(body, views, "rgb"), COLORS, atol=1e-6)
+    np.testing.assert_allclose(back_projected_colors(body, views, "rgb").colors, COLORS, atol=1e-6)
 
 
 def test_what_the_mask_leaves_out_is_not_looked_at():
@@ -109,7 +109,7 @@ def test_what_the_mask_leaves_out_is_not_looked_at():
             image[rod], mask[rod] = (255, 0, 255), False
             del y
         views.append(replace(view, image=image, mask=mask))
-    np.testing.assert_allclose(back_projected_colors(body, views, "rgb"), COLORS, atol=COLOR)
+    np.testing.assert_allclose(back_projected_colors(body, views, "rgb").colors, COLORS, atol=COLOR)
 
 
 def write_example(folder, name, body, pose, rig, initial_pose=None, actor=None, with_masks=True):

@@ -14,15 +14,25 @@ from rig_cases import opencv_pixels, ring_rig
 from tiny_body import make_body
 
 from sogjax.actor.coverage import body_silhouette, overlap_ratio, silhouette_iou
-from sogjax.actor.make import MadeActor, doubt_of
+from sogjax.actor.make import MadeActor, doubt_of, unseen_limbs
 from sogjax.actor.report import actor_report
 from sogjax.actor.silhouette_fit import Estimate
 from sogjax.actor.silhouettes import PosedPictures
 from sogjax.model.body import Attachments
 from sogjax.model.bones import bone_lengths
+from sogjax.model.limbs import limb_blobs, limb_names
 from sogjax.model.shape import ShapeModel
 from sogjax.run.actor_report import report_folder, report_page, write_actor_report
-from sogjax.view.sheets import BACKGROUND, BOTH, ONLY_BODY, ONLY_MASK, SilhouetteView, body_picture, silhouette_sheet
+from sogjax.view.sheets import (
+    BACKGROUND,
+    BOTH,
+    ONLY_BODY,
+    ONLY_MASK,
+    UNTOLD,
+    SilhouetteView,
+    body_picture,
+    silhouette_sheet,
+)
 
 SIGMA = 0.2
 HALF = np.sqrt(2.0 * np.log(2.0))
@@ -64,6 +74,25 @@ def test_the_iou_of_two_discs_is_the_ratio_of_their_areas(ratio):
         one_blob(place), make_body().poses["rest"], rig.camera("cam0"), disc(rig, "cam0", place, ratio * HALF * SIGMA)
     )
     assert abs(found - min(ratio, 1.0 / ratio) ** 2) < 0.02
+
+
+def test_what_a_mask_does_not_tell_is_left_out_of_the_iou():
+    place, rig = np.array([0.0, 0.0, 1.2]), ring_rig(1, distortion=(0.0,) * 5)
+    body, mask = one_blob(place), disc(rig, "cam0", place, HALF * SIGMA)
+    left = np.arange(mask.shape[1]) < np.nonzero(mask)[1].mean()
+    seen = lambda untold: silhouette_iou(body, body.poses["rest"], rig.camera("cam0"), mask & ~left, untold)
+    assert seen(None) < 0.55
+    assert seen(np.broadcast_to(left, mask.shape)) > 0.95
+
+
+def test_limbs_that_no_mask_shows_are_said():
+    made = made_dog()
+    members = limb_blobs(made.body)
+    assert unseen_limbs(made.body, np.ones(made.body.num_blobs, bool), made.pictures) is None
+    said = unseen_limbs(made.body, ~members[1], made.pictures)
+    assert said is not None
+    assert said.startswith(f"the {limb_names(made.body)[1]} of the actor may be anywhere")
+    assert "background/CAMERA.jpg" in said
 
 
 def test_a_body_behind_the_camera_has_no_silhouette():
@@ -214,13 +243,14 @@ def test_colours_of_a_sheet_tell_mask_and_body_apart():
     mask = (rows >= 20) & (rows < 40) & (columns >= 20) & (columns < 50)
     body = (rows >= 20) & (rows < 40) & (columns >= 30) & (columns < 60)
     image = np.full((120, 160, 3), 200, np.uint8)
-    sheet = silhouette_sheet([SilhouetteView("cam0", 0.5, image, mask, body)], "dog").astype(float)
+    untold = columns >= 55
+    sheet = silhouette_sheet([SilhouetteView("cam0", 0.5, image, mask, body, untold)], "dog").astype(float)
     painted = {
         color: int((np.abs(sheet - (0.55 * 100 + 0.45 * np.array(color))) < 0.51).all(axis=-1).sum())
-        for color in (BOTH, ONLY_MASK, ONLY_BODY)
+        for color in (BOTH, ONLY_MASK, ONLY_BODY, UNTOLD)
     }
-    for color in (ONLY_MASK, ONLY_BODY):
-        assert painted[color] / painted[BOTH] == pytest.approx(0.5, abs=0.06)
+    for color, share in ((ONLY_MASK, 0.5), (ONLY_BODY, 0.25), (UNTOLD, 0.25)):
+        assert painted[color] / painted[BOTH] == pytest.approx(share, abs=0.06)
 
 
 def test_the_picture_of_a_body_shows_left_and_front_where_they_belong():

@@ -14,6 +14,7 @@ from sogjax.actor.example_masks import FROM_FILE, FROM_PHOTOGRAPH, example_masks
 from sogjax.actor.silhouettes import load_images, load_pictures
 from sogjax.errors import InputError
 from sogjax.io.example_poses import ExamplePose
+from sogjax.scene.background import BackgroundImage
 
 RIG = ring_rig(4, (160, 120), distance=1.6)
 BODY = in_colors(shipped("dog"))
@@ -94,6 +95,29 @@ def test_a_mask_of_something_else_is_left_out_and_said(tmp_path):
     assert len(said) == 1
     assert "'stand': cam2 is left out" in said[0]
     assert "cam2.mask.png" in said[0]
+
+
+def test_where_furniture_hides_the_room_masks_say_nothing(tmp_path):
+    """A table before the legs in two of four cameras, and nobody knows what is behind it."""
+    recording = example_recording(tmp_path)
+    example, learnt, tables = replace(recording.example_poses[0], frame=0), [], {}
+    pictures = {k: image.copy() for k, image in load_images(recording, recording.example_poses[0]).items()}
+    for k in range(4):
+        rows, columns = np.nonzero(TRUTH[k])
+        table = np.zeros((120, 160), bool)
+        if k in (1, 2):
+            table[int(np.median(rows)) : 118, columns.min() - 12 : columns.max() + 12] = True
+        pictures[k][table] = (30 * k, 80, 220)
+        empty = np.where(table[..., None], pictures[k], photo(scene((160, 120), seed=k, contrast=10.0), 50 + k))
+        learnt.append(BackgroundImage(empty.astype(np.uint8), np.full((120, 160), 2.0, np.float32), ~table, "clip"))
+        tables[k] = table
+    found = example_masks(recording, example, pictures, learnt)
+    assert sorted(found.masks) == [0, 1, 2, 3]
+    for k, mask in found.masks.items():
+        assert iou(mask & ~tables[k], TRUTH[k] & ~tables[k]) > 0.8
+        if k in (1, 2):
+            assert found.untold[k][tables[k] & ~mask].all()
+            assert mask[tables[k]].mean() < 0.1
 
 
 def test_two_masks_that_do_not_fit_are_said(tmp_path):

@@ -132,12 +132,22 @@ def test_a_start_a_little_off_ends_at_the_truth(case):
 def test_cells_cover_what_the_mask_does():
     mask = np.zeros((300, 200), bool)
     mask[100:220, 60:130] = True
-    centres, sigma, covered = cells_of(mask)
+    centres, sigma, covered, told = cells_of(mask)
+    assert told.all()
     assert len(covered) <= MAX_CELLS
     np.testing.assert_allclose((2.0 * sigma) ** 2 * covered.sum(), mask.sum(), rtol=0.02)
     inside = covered > 0.99
     assert centres[inside].min(axis=0)[0] >= 59.0
     assert centres[inside].max(axis=0)[1] <= 220.0
+
+
+def test_cells_tell_nothing_where_a_mask_does_not():
+    mask, untold = np.zeros((2, 300, 200), bool)
+    mask[100:160, 60:130] = True
+    untold[160:220, 60:130] = True
+    cut = cells_of(mask, untold)
+    below = (cut.centres[:, 1] > 160) & (cut.centres[:, 0] > 60) & (cut.centres[:, 0] < 130)
+    np.testing.assert_array_equal(cut.told, ~below)
 
 
 def test_left_and_right_are_tied_unless_asked_otherwise():

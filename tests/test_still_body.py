@@ -7,7 +7,7 @@ from waving_person import OTHER_UPS, WavingPerson
 
 from sogjax.scene.background import BackgroundImage
 from sogjax.scene.floor import Floor, seen_floors
-from sogjax.scene.still_body import Standing, still_bodies, with_room_behind
+from sogjax.scene.still_body import Standing, legs_of, still_bodies, with_room_behind
 
 
 @pytest.fixture(scope="module")
@@ -29,6 +29,17 @@ def test_legs_that_never_move_are_found_in_nearly_all_cameras(waving, by_floor):
     assert np.mean([mask.mean() for mask in perhaps.values()]) < 0.05  # legs, trunk, and a rim
     assert all((surely[k] <= perhaps[k]).all() for k in masks)
     assert not any((perhaps[k] & movements[k]).any() for k in masks)
+
+
+def test_furniture_is_nobody():
+    """Legs, a table, and a leg of a table, 4 cm a voxel: the second is too wide, the third too narrow."""
+    spacing, still = 0.04, np.zeros((64, 64, 30), bool)
+    still[10:20, 10:18, :22] = True
+    still[30:60, 30:48, 17:19] = still[30:32, 30:32, :19] = True
+    still[50, 10, :20] = True
+    legs = still.copy()
+    legs[22:] = False
+    np.testing.assert_array_equal(legs_of(still, 0.0, spacing), legs)
 
 
 @pytest.mark.parametrize("turn", OTHER_UPS)

@@ -5,6 +5,7 @@ How differently cameras show the same colours, from the blobs of an actor that s
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -44,11 +45,16 @@ class ColoredView:
     pose: Float[Array, "dof"]
 
 
-def back_projected_colors(body: Body, views: Sequence[ColoredView], color_space: str) -> Float[np.ndarray, "blob 3"]:
-    """Robust mean colour (sRGB, 0..1) of what the pictures show of every blob.
+class BlobColors(NamedTuple):
+    """What pictures show of every blob."""
 
-    A blob that no picture shows takes the colour of the nearest blob that is shown.
-    """
+    colors: Float[np.ndarray, "blob 3"]
+    """Robust mean (sRGB, 0..1); a blob that no picture shows takes the colour of the nearest blob that is shown."""
+    shown: Bool[np.ndarray, "blob"]
+
+
+def back_projected_colors(body: Body, views: Sequence[ColoredView], color_space: str) -> BlobColors:
+    """The colours of every blob, averaged in a colour space."""
     samples: list[list[np.ndarray]] = [[] for _ in range(body.num_blobs)]
     for view in views:
         for blob, colors in enumerate(blob_samples(body, view)):
@@ -57,9 +63,9 @@ def back_projected_colors(body: Body, views: Sequence[ColoredView], color_space:
     space = averaging_space(color_space)
     converted = np.asarray(_from_rgb(jnp.asarray(np.concatenate(stacked), jnp.float32), space))
     parts = np.split(converted, np.cumsum([len(part) for part in stacked])[:-1])
-    seen = np.array([len(part) >= MIN_SAMPLES for part in parts])
-    means = np.stack([_robust_mean(part) if enough else np.zeros(3) for part, enough in zip(parts, seen, strict=True)])
-    return _filled(body, np.asarray(_to_rgb(jnp.asarray(means, jnp.float32), space), float), seen)
+    shown = np.array([len(part) >= MIN_SAMPLES for part in parts])
+    means = np.stack([_robust_mean(part) if enough else np.zeros(3) for part, enough in zip(parts, shown, strict=True)])
+    return BlobColors(_filled(body, np.asarray(_to_rgb(jnp.asarray(means, jnp.float32), space), float), shown), shown)
 
 
 def blob_samples(body: Body, view: ColoredView) -> list[Float[np.ndarray, "n 3"]]:
@@ -204,4 +210,4 @@ def measured_colors(
         for k, image in enumerate(images)
         if image is not None
     ]
-    return colored(body, back_projected_colors(body, views, space))
+    return colored(body, back_projected_colors(body, views, space).colors)

@@ -143,11 +143,19 @@ BODY_LEVEL = 0.5
 
 
 def silhouette_iou(
-    body: Body, pose: Float[Array, "dof"], camera: Camera, mask: Bool[np.ndarray, "height width"]
+    body: Body,
+    pose: Float[Array, "dof"],
+    camera: Camera,
+    mask: Bool[np.ndarray, "height width"],
+    untold: Bool[np.ndarray, "height width"] | None = None,
 ) -> float:
-    """Intersection over union of the body's silhouette and a mask of the camera's picture, as recorded."""
+    """Intersection over union of the body's silhouette and a mask of the camera's picture, as recorded.
+
+    Where the mask is `untold`, nothing counts.
+    """
     small = reduced_mask(mask)
-    return overlap_ratio(body_silhouette(body, pose, camera, small.shape), small)
+    shown = body_silhouette(body, pose, camera, small.shape)
+    return overlap_ratio(shown if untold is None else shown & ~reduced_mask(untold), small)
 
 
 def overlap_ratio(first: Bool[np.ndarray, "rows columns"], second: Bool[np.ndarray, "rows columns"]) -> float:

@@ -17,10 +17,14 @@ from sogjax.io.video import read_still
 from sogjax.model.rotation import axis_vector
 from sogjax.scene.background import BackgroundImage
 from sogjax.scene.background_difference import working_size
+from sogjax.scene.coarse_views import enlarged
 from sogjax.scene.plates import FittedPlate, fitted_plate
 from sogjax.scene.segmentation import largest_parts, masks_from_backgrounds
 from sogjax.scene.visual_hull import AGREEING, disagreeing_cameras, hull_coverage
 
+MOST_WRONG = 0.25
+"""Share of the cameras whose masks may disagree with the others before nothing is said where the background is unknown.
+Colours tell who stands still from the room, but not from a table and a chair."""
 FROM_FILE, FROM_PHOTOGRAPH, FROM_CLIP = "file", "empty scene", "background from the clip"
 
 Mask = Bool[np.ndarray, "_h _w"]
@@ -35,6 +39,8 @@ class ExampleMasks:
     """`FROM_FILE`, `FROM_PHOTOGRAPH` or `FROM_CLIP`, of masks that are left out too."""
     left_out: dict[int, Mask]
     """Masks that do not agree with the others."""
+    untold: dict[int, Mask]
+    """Where a mask says nothing: something stands in front, or what is behind is unknown and colours do not tell."""
     warnings: tuple[str, ...]
     """One sentence each."""
 
@@ -72,11 +78,18 @@ def example_masks(
     _check_count(recording, example, len(images), [*files, *backgrounds])
     cameras = {camera: recording.rig.camera(names[camera]) for camera in images}
     up = axis_vector(recording.up)
-    made = masks_from_backgrounds(images, backgrounds, files, cameras, up, unknown) if backgrounds else {}
-    found = _subject_alone(example, names, dict(sorted({**files, **made}.items())))
+    make = lambda decide: masks_from_backgrounds(images, backgrounds, files, cameras, up, unknown, decide)
+    alone = lambda made: _subject_alone(example, names, dict(sorted({**files, **made}.items())))
+    made = make(True) if backgrounds else {}
+    found = alone(made)
     _check_found(recording, example, list(found), [camera for camera in backgrounds if camera not in found])
     hidden = {camera: mask for camera, mask in enumerate(painted_masks(recording)) if mask is not None}
     wrong = disagreeing_cameras(found, cameras, hidden)
+    if unknown and len(wrong) > MOST_WRONG * len(found):
+        less, further = make(False), hidden | _further(hidden, unknown, images)
+        agreeing = disagreeing_cameras(alone(less), cameras, further)
+        if len(alone(less)) - len(agreeing) > len(found) - len(wrong):
+            made, found, hidden, wrong = less, alone(less), further, agreeing
     masks = {camera: mask for camera, mask in found.items() if camera not in wrong}
     warnings = [_unlike(example, names[camera], share) for camera, share in wrong.items()]
     warnings += [_moved(recording, example, names[k], plate) for k, plate in plates.items() if plate.pixels]
@@ -91,8 +104,17 @@ def example_masks(
         masks=masks,
         origins={k: FROM_FILE if k in files else FROM_CLIP if k in of_clip else FROM_PHOTOGRAPH for k in found},
         left_out={camera: found[camera] for camera in wrong},
+        untold={k: hidden[k] & ~masks[k] for k in masks if k in hidden},
         warnings=tuple(warnings),
     )
+
+
+def _further(
+    hidden: Mapping[int, Mask], unknown: Mapping[int, Mask], images: Mapping[int, UInt8[np.ndarray, "_h _w 3"]]
+) -> dict[int, Mask]:
+    """Where masks say nothing, at the pictures' size, if that is so where the background is unknown, too."""
+    sized = {k: enlarged(mask, images[k].shape) for k, mask in unknown.items()}
+    return {k: mask | hidden[k] if k in hidden else mask for k, mask in sized.items()}
 
 
 def _plate_of(recording: Recording, camera: str, image: UInt8[np.ndarray, "_h _w 3"]) -> FittedPlate:
@@ -117,9 +139,7 @@ def _subject_alone(example: ExamplePose, names: Sequence[str], masks: Mapping[in
     alone: dict[int, Mask] = {}
     for camera, mask in masks.items():
         if (region := example.within.get(names[camera])) is not None:
-            size = (mask.shape[1], mask.shape[0])
-            enlarged = cv2.resize(region.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
-            alone[camera] = largest_parts(mask & enlarged)
+            alone[camera] = largest_parts(mask & enlarged(region, mask.shape))
     return {camera: mask for camera, mask in alone.items() if mask.any()}
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from sogjax.actor.colors import back_projected_colors, colored
 from sogjax.actor.posed_examples import (
@@ -30,12 +30,19 @@ from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.compiled import compiled_hastily
+from sogjax.model.limbs import limb_blobs, limb_names
 from sogjax.model.rotation import world_from_upright
 from sogjax.model.shape import ShapeModel
 from sogjax.scene.background import BackgroundImage
+from sogjax.search.search_energy import RestPrior
 
 _shaped = compiled_hastily(ShapeModel.shaped)
 
+UNTOLD_REST = 3e-4
+"""Weight of being near the rest pose (`RestPrior`) where masks say nothing somewhere: a leg behind a table may be
+anywhere else."""
+LEAST_SHOWN = 0.7
+"""Share of a limb's blobs that the masks must show."""
 POSE_FOUND = 0.5
 """Least IoU of masks and silhouettes, the mean over the cameras. Good fits have 0.8 to 0.9."""
 
@@ -120,20 +127,23 @@ def make_actor(
     upright = body.rotated(jnp.asarray(turn, body.blob_sigmas.dtype))
     model = ShapeModel.from_body(upright, symmetric)
     pictures = [load_pictures(recording, e, report, learnt) for e in progress(examples, len(examples), "masks")]
+    terms = (*terms, RestPrior(UNTOLD_REST)) if any(posed.untold for posed in pictures) else terms
     found = _found_poses(upright, model, examples, pictures, rig, recording.up, terms, best, report, progress)
     examples, pictures = found.examples, found.pictures
     report("shape")
     estimate = _best_estimate(model, found, rig, terms, ways=1 if best is None else 2)
     shaped = _shaped(model, estimate.shape_params)
     _check_fit(recording, shaped, estimate, pictures, rig)
-    doubt = None if best is None else doubt_of(shaped, estimate.poses, pictures, rig)
-    if doubt is not None:
-        report(f"warning: {doubt}")
     report("colours")
     shown = [
         view for posed, pose in zip(pictures, estimate.poses, strict=True) for view in colored_views(posed, rig, pose)
     ]
-    actor = replace(colored(shaped, back_projected_colors(shaped, shown, color_space)), name=subject or body.name)
+    found_colors = back_projected_colors(shaped, shown, color_space)
+    doubt = None if best is None else doubt_of(shaped, estimate.poses, pictures, rig)
+    doubt = doubt or unseen_limbs(shaped, found_colors.shown, pictures)
+    if doubt is not None:
+        report(f"warning: {doubt}")
+    actor = replace(colored(shaped, found_colors.colors), name=subject or body.name)
     explained = explained_examples(actor, list(estimate.poses), pictures, rig)
     actor = replace(actor, explained=jnp.asarray(explained, jnp.float32))
     return MadeActor(
@@ -234,6 +244,24 @@ def doubt_of(body: Body, poses: Float[Array, "pose dof"], pictures: Sequence[Pos
         f"the actor is doubtful, and with it the motion: in the frames that suit best ({shown}) masks and body overlap "
         f"by only {overlap:.2f} (IoU; 0.8 and more is usual); name frames with an upright body and clear limbs in "
         "recording.yaml, such as `example_poses: [0, 150]`, or add example_poses/POSE/CAMERA.jpg with CAMERA.mask.png"
+    )
+
+
+def unseen_limbs(body: Body, shown: Bool[np.ndarray, "blob"], pictures: Sequence[PosedPictures]) -> str | None:
+    """Of which limbs the pictures show too little, with the remedy; None: they show enough of all.
+
+    `shown` are the blobs that some mask shows.
+    """
+    members = limb_blobs(body)
+    little = (members & shown).sum(axis=1) < LEAST_SHOWN * members.sum(axis=1)
+    if not little.any():
+        return None
+    names = " and ".join(name for name, less in zip(limb_names(body), little, strict=True) if less)
+    frames = ", ".join(posed.name for posed in pictures)
+    return (
+        f"the {names} of the actor may be anywhere: hardly anything of them is seen apart from the room in the frames "
+        f"that it is made of ({frames}); add pictures of the empty scene (background/CAMERA.jpg), or "
+        "example_poses/POSE/CAMERA.jpg with CAMERA.mask.png, that show them"
     )
 
 

@@ -78,7 +78,14 @@ def colored_views(posed: PosedPictures, rig: Camera, pose: Float[Array, "dof"]) 
 
 def agreement(body: Body, pose: Float[Array, "dof"], posed: PosedPictures, rig: Camera) -> float:
     """How well the body's silhouettes and the masks agree (IoU, mean over the cameras)."""
-    return float(np.mean([silhouette_iou(body, pose, camera_of(rig, k), mask) for k, mask in posed.masks.items()]))
+    return float(np.mean([*camera_agreements(body, pose, posed, rig).values()]))
+
+
+def camera_agreements(body: Body, pose: Float[Array, "dof"], posed: PosedPictures, rig: Camera) -> dict[int, float]:
+    """How well the body's silhouette and the mask agree (IoU) in each camera."""
+    return {
+        k: silhouette_iou(body, pose, camera_of(rig, k), mask, posed.untold.get(k)) for k, mask in posed.masks.items()
+    }
 
 
 def _starts(

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from sogjax.actor.coverage import silhouette_iou
 from sogjax.actor.make import MadeActor
+from sogjax.actor.posed_examples import camera_agreements
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.model.bones import bone_lengths
 from sogjax.quality.proportions import odd_sentence
@@ -67,8 +67,8 @@ def actor_report(made: MadeActor, rig: CameraRig) -> ActorReport:
     """Compare the actor with its pictures."""
     ious = {
         posed.name: {
-            rig.names[camera]: silhouette_iou(made.upright_body, pose, rig.camera(rig.names[camera]), mask)
-            for camera, mask in posed.masks.items()
+            rig.names[camera]: iou
+            for camera, iou in camera_agreements(made.upright_body, pose, posed, rig.cameras).items()
         }
         for posed, pose in zip(made.pictures, made.example_poses.values(), strict=True)
     }

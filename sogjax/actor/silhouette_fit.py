@@ -9,6 +9,7 @@ silhouettes themselves, which say exactly where limbs end.
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import cv2
 import equinox as eqx
@@ -62,29 +63,41 @@ def _pose_cells(pictures: PosedPictures, num_cameras: int) -> tuple[np.ndarray, 
     sigmas, coverage = np.ones((num_cameras, MAX_CELLS)), np.zeros((num_cameras, MAX_CELLS))
     mask = np.zeros((num_cameras, MAX_CELLS), bool)
     for camera, picture in pictures.masks.items():
-        centres, sigma, covered = cells_of(picture)
-        count = len(covered)
-        means[camera, :count], sigmas[camera, :count], coverage[camera, :count] = centres, sigma, covered
-        mask[camera, :count] = True
+        cut = cells_of(picture, pictures.untold.get(camera))
+        count = len(cut.coverage)
+        means[camera, :count], sigmas[camera, :count] = cut.centres, cut.sigma
+        coverage[camera, :count], mask[camera, :count] = cut.coverage, cut.told
     return means, sigmas, coverage, mask
 
 
-def cells_of(
-    mask: Bool[np.ndarray, "_h _w"],
-) -> tuple[Float[np.ndarray, "cell 2"], float, Float[np.ndarray, "cell"]]:
-    """Centres (pixels as recorded), half a side (pixels), and what part of each cell the mask covers."""
+class MaskCells(NamedTuple):
+    """A mask, cut into cells of equal size."""
+
+    centres: Float[np.ndarray, "cell 2"]
+    """Pixels as recorded."""
+    sigma: float
+    """Half a side, pixels."""
+    coverage: Float[np.ndarray, "cell"]
+    """What part of each cell the mask covers."""
+    told: Bool[np.ndarray, "cell"]
+    """Whether the mask says something of most of the cell."""
+
+
+def cells_of(mask: Bool[np.ndarray, "_h _w"], untold: Bool[np.ndarray, "_h _w"] | None = None) -> MaskCells:
+    """The cells of a mask around its subject; it says nothing where it is `untold`."""
     top, bottom, left, right = _box(mask)
-    crop = mask[top:bottom, left:right].astype(np.float32)
-    height, width = crop.shape
+    height, width = bottom - top, right - left
     side = max(1.0, np.sqrt(height * width / MAX_CELLS))
     columns = max(1, int(width / side))
     rows = max(1, min(int(height / side), MAX_CELLS // columns))
-    covered = cv2.resize(crop, (columns, rows), interpolation=cv2.INTER_AREA)
+    crop = lambda region: region[top:bottom, left:right].astype(np.float32)
+    share = lambda region: cv2.resize(crop(region), (columns, rows), interpolation=cv2.INTER_AREA).reshape(-1)
     wide, high = width / columns, height / rows
     x = left + (np.arange(columns) + 0.5) * wide - 0.5
     y = top + (np.arange(rows) + 0.5) * high - 0.5
     centres = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    return centres, float(np.sqrt(wide * high) / 2.0), covered.reshape(-1).astype(float)
+    told = np.ones(len(centres), bool) if untold is None else share(untold) < 0.5
+    return MaskCells(centres, float(np.sqrt(wide * high) / 2.0), share(mask).astype(float), told)
 
 
 def _box(mask: Bool[np.ndarray, "_h _w"]) -> tuple[int, int, int, int]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import jax
@@ -42,6 +42,8 @@ class PosedPictures:
     images: dict[int, UInt8[np.ndarray, "_h _w 3"]]
     """BGR."""
     masks: dict[int, Bool[np.ndarray, "_h _w"]]
+    untold: dict[int, Bool[np.ndarray, "_h _w"]] = field(default_factory=dict)
+    """Where masks say nothing; none where a camera's says something everywhere."""
     warnings: tuple[str, ...] = ()
     """What was noticed about the masks, one sentence each."""
 
@@ -62,7 +64,8 @@ def load_pictures(
     masks = example_masks(recording, example, images, learnt)
     for warning in masks.warnings:
         report(f"warning: {warning}")
-    return PosedPictures(example.name, {k: images[k] for k in masks.masks}, masks.masks, masks.warnings)
+    shown = {k: images[k] for k in masks.masks}
+    return PosedPictures(example.name, shown, masks.masks, masks.untold, masks.warnings)
 
 
 def load_images(recording: Recording, example: ExamplePose) -> dict[int, UInt8[np.ndarray, "_h _w 3"]]:
@@ -94,12 +97,13 @@ def _check_picture(path: Path, image: UInt8[np.ndarray, "_h _w 3"], size: tuple[
 def silhouette_views(pictures: Sequence[PosedPictures], rig: Camera, num_blobs: int, depth: int = DEPTH) -> list[Views]:
     """The masks of each example pose as Sogs: blobs of the subject match the body, others repel it a little.
 
-    A camera without a picture shows nothing. All have one shape, so that one program serves them.
+    Where a mask says nothing, and in a camera without a picture, blobs do neither. All have one shape, so that one
+    program serves them.
     """
     sizes = np.asarray(rig.image_size).astype(int)
     grids = tuple(CellGrid.from_depth(int(width), int(height), depth) for width, height in sizes)
     candidates, normalizers = Candidates.from_grids(grids, rig), whole_image_overlap(rig.image_size)
-    cells = [jnp.asarray(_white_cells(posed, sizes, grids)) for posed in pictures]
+    cells = [jnp.asarray(_mask_cells(posed, sizes, grids)) for posed in pictures]
     leaves = [_leaves(of_pose, candidates) for of_pose in cells]
     capacity = capacity_for(max(int(np.asarray(chosen).sum(axis=1).max()) for _, chosen in leaves))
     views = []
@@ -110,15 +114,14 @@ def silhouette_views(pictures: Sequence[PosedPictures], rig: Camera, num_blobs: 
     return views
 
 
-def _white_cells(
+def _mask_cells(
     pictures: PosedPictures, sizes: Int[np.ndarray, "camera 2"], grids: tuple[CellGrid, ...]
 ) -> UInt8[np.ndarray, "camera rows columns 3"]:
-    """Cells of pictures that are white where the masks are."""
-    white = [
-        np.repeat(pictures.masks.get(k, np.zeros((height, width), bool))[..., None], 3, axis=-1).astype(np.uint8) * 255
-        for k, (width, height) in enumerate(sizes)
-    ]
-    return stack_cells(white, grids)
+    """Cells of pictures, as RGB: red where the masks are, green and blue where they say nothing."""
+    nothing = {k: np.zeros((height, width), bool) for k, (width, height) in enumerate(sizes)}
+    level = lambda masks, k: masks.get(k, nothing[k]).astype(np.uint8) * 255
+    drawn = [np.dstack([*2 * (level(pictures.untold, k),), level(pictures.masks, k)]) for k in nothing]
+    return stack_cells(drawn, grids)
 
 
 @compiled_hastily
@@ -143,8 +146,8 @@ def _silhouette_sogs(
     leaves = leaves & present[:, None]
     select = jax.vmap(keep_blobs, in_axes=(0, 0, 0, 0, None))
     images, _, _ = select(candidates.means, candidates.sigmas, colors, leaves, capacity)
-    coverage = images.colors[..., 0]
-    match = coverage + (1.0 - coverage) * BACKGROUND_SIMILARITY
+    coverage, untold = images.colors[..., 0], images.colors[..., 1]
+    match = coverage + (1.0 - coverage - untold) * BACKGROUND_SIMILARITY
     match = jnp.where(images.mask, match, 0.0)
     return images, jnp.repeat(match[:, None, :], num_blobs, axis=1)
 

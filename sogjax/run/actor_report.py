@@ -90,5 +90,6 @@ def _pose_sheet(made: MadeActor, rig: CameraRig, report: ActorReport, name: str)
     for camera, mask in posed.masks.items():
         small, label = reduced_mask(mask), rig.names[camera]
         silhouette = body_silhouette(made.upright_body, made.example_poses[name], rig.camera(label), small.shape)
-        views.append(SilhouetteView(label, report.ious[name][label], posed.images[camera], small, silhouette))
+        untold = reduced_mask(posed.untold[camera]) if camera in posed.untold else np.zeros_like(small)
+        views.append(SilhouetteView(label, report.ious[name][label], posed.images[camera], small, silhouette, untold))
     return silhouette_sheet(views, f"{report.name}, {name}: IoU {report.pose_iou(name):.2f}")

@@ -117,7 +117,11 @@ class SampledCamera:
 
 
 def learnt_background(
-    camera: SampledCamera, zone: Mask, still: Mask | None = None, left_out: Mapping[int, Mask] | None = None
+    camera: SampledCamera,
+    zone: Mask,
+    still: Mask | None = None,
+    left_out: Mapping[int, Mask] | None = None,
+    mostly: bool = False,
 ) -> BackgroundImage:
     """The background of one camera.
 
@@ -130,6 +134,7 @@ def learnt_background(
         still: where in it what never changes may be the subject (`still_zones`, `standing_zones`); None: everywhere.
         left_out: by frame where the tracked body is, widened; these pixels are not looked at. Everything else then
             is background, wherever enough samples agree.
+        mostly: whether a colour that is only seen at the same times must be there more often than any other.
     """
     images = camera.even.images
     if left_out:
@@ -146,7 +151,7 @@ def learnt_background(
         modes = modes_of(samples, usable, camera.tolerance[zone])
         if left_out is None:
             hidden = np.ones_like(zone) if still is None else still
-            chosen = grown(modes, zone, hidden, picture, camera.tolerance, FEWEST_AGREEING)
+            chosen = grown(modes, zone, hidden, picture, camera.tolerance, FEWEST_AGREEING, mostly)
         else:
             chosen = np.where(modes.counts[0] >= FEWEST_AGREEING, 0, -1)
         pick = np.maximum(chosen, 0)

@@ -104,6 +104,7 @@ def grown(
     picture: Float[np.ndarray, "rows columns 3"],
     tolerance: UInt8[np.ndarray, "rows columns"],
     fewest: int,
+    mostly: bool = False,
 ) -> Int[np.ndarray, "pixel"]:
     """Which mode of each of the zone's pixels is the background, -1 where that is unknown.
 
@@ -116,8 +117,9 @@ def grown(
         picture: the background there.
         tolerance: for each pixel, the step of colour up to which it may show the same thing as its neighbour.
         fewest: samples that must show a colour.
+        mostly: whether, across an edge, a pixel must show the colour most often.
     """
-    field = _Field(modes, zone, picture, fewest)
+    field = _Field(modes, zone, picture, fewest, mostly)
     always = np.flatnonzero((modes.counts[0] == modes.members.shape[1]) & ~still[field.rows, field.columns])
     field.take(always, np.zeros(len(always), int))
     front = field.beside_known()
@@ -138,6 +140,7 @@ class _Field:
         zone: Bool[np.ndarray, "rows columns"],
         picture: Float[np.ndarray, "rows columns 3"],
         fewest: int,
+        mostly: bool,
     ):
         num_samples = modes.members.shape[1]
         self.rows, self.columns = np.nonzero(zone)
@@ -147,6 +150,7 @@ class _Field:
         self._enough = (modes.counts >= fewest) & (
             modes.counts < num_samples
         )  # nothing tells whose a colour is that is always there
+        self._across = 1 if mostly else MODES
         self._number = np.pad(np.full(zone.shape, -1), 1, constant_values=-1)
         self._number[self.rows + 1, self.columns + 1] = np.arange(len(self.rows))
         self._known = np.pad(~zone, 1)
@@ -176,8 +180,9 @@ class _Field:
         self, front: Int[np.ndarray, "pixel"], times: UInt8[np.ndarray, "pixel"] | np.ndarray
     ) -> Float[np.ndarray, "mode pixel"]:
         """How much both were seen, and both hidden, at the same times: the smaller of the two overlaps."""
-        seen = self._seen[:, front]
-        return np.minimum(_overlap(seen, times), _overlap(~seen & self._all, ~times & self._all))
+        seen = self._seen[: self._across, front]
+        overlap = np.minimum(_overlap(seen, times), _overlap(~seen & self._all, ~times & self._all))
+        return np.pad(overlap, ((0, MODES - self._across), (0, 0)))
 
     def take(self, pixels: Int[np.ndarray, "pixel"], modes: Int[np.ndarray, "pixel"]) -> Int[np.ndarray, "next"]:
         """Add pixels to the known background; returns the undecided ones beside them."""

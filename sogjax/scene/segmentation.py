@@ -43,6 +43,7 @@ def masks_from_backgrounds(
     cameras: Mapping[int, Camera],
     up: Float[np.ndarray, "3"],
     unknown: Mapping[int, Mask] | None = None,
+    decide: bool = True,
 ) -> dict[int, Mask]:
     """Masks of the cameras that have a picture of the empty scene, at the pictures' size.
 
@@ -55,19 +56,21 @@ def masks_from_backgrounds(
         known: masks of other cameras, which help.
         cameras: all of these cameras.
         up: the world's vertical.
-        unknown: where the empty scene is not known, by camera at any size; None: it is known everywhere. There the
-            other cameras decide.
+        unknown: where the empty scene is not known, by camera at any size; None: it is known everywhere.
+        decide: whether colours and the other cameras decide there; else it is in no mask.
 
     Returns:
         Masks by camera; a camera is absent if no subject could be told apart from its background.
     """
     with ThreadPoolExecutor() as pool:
-        compare = lambda k: _decided(background_difference(images[k], backgrounds[k], (unknown or {}).get(k)))
-        found = pool.map(compare, backgrounds)
+        compare = lambda k: background_difference(images[k], backgrounds[k], (unknown or {}).get(k))
+        found = pool.map(lambda k: _decided(compare(k)) if decide else compare(k), backgrounds)
         differences = dict(zip(backgrounds, found, strict=True))
         guesses = {camera: first_guess(difference) for camera, difference in differences.items()}
         guesses = {camera: guess for camera, guess in guesses.items() if is_subject(guess)}
         better, hull = _seen_together({c: differences[c] for c in guesses}, guesses, known, cameras, up)
+        if not decide:
+            better, hull = {c: mask & ~differences[c].unknown for c, mask in better.items()}, {}
         guesses |= better
         cuts = pool.map(lambda camera: cut_out(differences[camera], guesses[camera], hull.get(camera)), guesses)
         sized = {camera: _enlarged(mask, images[camera]) for camera, mask in zip(guesses, cuts, strict=True)}

@@ -28,6 +28,8 @@ ALIKE, AGREEING = 0.5, 0.7
 else may be before some."""
 LEAST_HEIGHT, SHOES = 0.35, 0.35
 """Metres: what is less high is no leg; and a leg begins so far above the floor, whose colour shoes may have."""
+NARROWEST, WIDEST = 0.1, 0.9
+"""Metres on the floor that legs take, with the ground between them; a table's leg takes less, a table more."""
 RIM = 0.08
 """Metres around what is seen in one colour that may be somebody, too: at its edge, some cameras look past it."""
 INPAINTED = 5
@@ -72,7 +74,7 @@ def still_bodies(views: CoarseViews, floors: Mapping[int, Floor]) -> dict[int, S
         over = over_floor(views, floors)
         empty, ground = over.empty | (empty & ~over.told), over.level
     body = alike & plan[:, :, None] & _heights(moving, spacing)
-    still = from_upright(_standing(body & ~empty, float(ground), spacing), views.up)
+    still = from_upright(legs_of(body & ~empty, float(ground), spacing), views.up)
     shown = {k: at.silhouette_of(still) for k, at in views.pixels.items()}
     rim = {k: round(RIM / spacing * at.footprint) for k, at in views.pixels.items()}
     large = lambda k, mask: views.enlarged(k, mask) & ~views.movements[k]
@@ -133,18 +135,20 @@ def _floor_by_color(
     return _alike(colors, its_color)[number], float(floor)
 
 
-def _standing(body: Bool[np.ndarray, "x y z"], ground: float, spacing: float) -> Bool[np.ndarray, "x y z"]:
-    """The connected parts that stand on the ground (a level), as high as legs."""
-    connected: Any = label(body)
+def legs_of(still: Bool[np.ndarray, "x y z"], ground: float, spacing: float) -> Bool[np.ndarray, "x y z"]:
+    """The connected parts that stand on the ground (a level) as legs do: high, and not wide."""
+    connected: Any = label(still)
     labels: Int[np.ndarray, "x y z"] = connected[0]
-    stands = lambda part: _stands(np.nonzero(labels == part)[2] * spacing, ground * spacing)
-    kept = [stands(part) for part in range(1, connected[1] + 1)]
-    return body & np.isin(labels, np.flatnonzero(kept) + 1)
+    places = (spacing * np.argwhere(labels == part) for part in range(1, connected[1] + 1))
+    kept = [_stands(of_part, ground * spacing) for of_part in places]
+    return still & np.isin(labels, np.flatnonzero(kept) + 1)
 
 
-def _stands(heights: Float[np.ndarray, "place"], floor: float) -> bool:
-    """Whether a part is as high as a leg and reaches down to the floor, at most to its shoes; metres."""
-    return bool(np.ptp(heights) >= LEAST_HEIGHT and heights.min() <= floor + SHOES)
+def _stands(places: Float[np.ndarray, "place 3"], floor: float) -> bool:
+    """Whether a part is as high and wide as legs and reaches down to the floor, at most to its shoes; metres."""
+    *wide, high = np.ptp(places, axis=0)
+    low = places[:, 2].min() <= floor + SHOES
+    return bool(low and high >= LEAST_HEIGHT and NARROWEST <= max(wide) <= WIDEST)
 
 
 def with_room_behind(

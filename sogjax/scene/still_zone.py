@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool
 
-from sogjax.scene.background_difference import disc
+from sogjax.scene.background_difference import disc, widened
 from sogjax.scene.coarse_views import CoarseViews, small
 from sogjax.scene.floor import Floor, over_floor
 from sogjax.scene.moving_zone import REACH
@@ -29,7 +29,8 @@ Mask = Bool[np.ndarray, "_h _w"]
 def still_zones(zones: Mapping[int, Mask], views: CoarseViews) -> dict[int, Mask]:
     """The parts of the zones (`moving_zones`) in which what never changes may be somebody.
 
-    That is what a camera tells from the room and most others do not take for it; and what all the others tell from it.
+    That is what a camera tells from the room and most others do not take for it; and what all the others tell from it,
+    without the rim of its voxels: a ring of wall that never changes keeps what moved before it from being learnt.
     """
     seeing, pixels = [*views.moving], views.pixels
     small_zone = lambda k: small(zones[k].astype(np.uint8), cv2.INTER_NEAREST) > 0
@@ -42,8 +43,8 @@ def still_zones(zones: Mapping[int, Mask], views: CoarseViews) -> dict[int, Mask
     still = dict(zones)
     for k in seeing:
         perhaps = views.inside & (misses - missed[k] <= int(MISTAKEN * len(seeing)))
-        told = (pixels[k].silhouette_of(perhaps) & unlike[k]) | pixels[k].silhouette_of(surely)
-        still[k] = views.enlarged(k, told)
+        by_others = ~widened(~pixels[k].silhouette_of(surely), pixels[k].footprint)
+        still[k] = views.enlarged(k, (pixels[k].silhouette_of(perhaps) & unlike[k]) | by_others)
     return still
 
 

@@ -44,22 +44,23 @@ def _grey(values: Float[np.ndarray, "_h _w"]) -> Picture:
     return cv2.cvtColor(levels, cv2.COLOR_GRAY2BGR)
 
 
-BOTH, ONLY_MASK, ONLY_BODY = (70, 200, 70), (230, 120, 40), (50, 50, 240)
-"""BGR: green, blue, red."""
-LEGEND = "green: both, blue: only the mask, red: only the body"
+BOTH, ONLY_MASK, ONLY_BODY, UNTOLD = (70, 200, 70), (230, 120, 40), (50, 50, 240), (60, 200, 230)
+"""BGR: green, blue, red, yellow."""
+LEGEND = "green: both, blue: only the mask, red: only the body, yellow: the body where a mask says nothing"
 TILE = 320
 """Side of one camera's tile in pixels."""
 
 
 @dataclass(frozen=True)
 class SilhouetteView:
-    """One camera: its picture, and mask and silhouette, which may be smaller than it."""
+    """One camera: its picture, and mask and silhouette, which may be smaller, and where the mask says nothing."""
 
     camera: str
     iou: float
     image: Picture
     mask: Bool[np.ndarray, "rows columns"]
     silhouette: Bool[np.ndarray, "rows columns"]
+    untold: Bool[np.ndarray, "rows columns"]
 
 
 def silhouette_sheet(views: Sequence[SilhouetteView], title: str) -> UInt8[np.ndarray, "h w 3"]:
@@ -74,8 +75,11 @@ def _silhouette_tile(view: SilhouetteView) -> Tile:
     side = int(1.16 * (1 + max(np.ptp(rows), np.ptp(columns))))
     corner = ((rows.min() + rows.max() - side) / 2, (columns.min() + columns.max() - side) / 2)
     cut = lambda picture: _square(picture, both.shape, corner, side)
-    mask, silhouette = (cut(part.astype(np.float32)) > 0.5 for part in (view.mask, view.silhouette))
-    regions = [(mask & silhouette, BOTH), (mask & ~silhouette, ONLY_MASK), (silhouette & ~mask, ONLY_BODY)]
+    parts = (view.mask, view.silhouette, view.untold)
+    mask, silhouette, untold = (cut(part.astype(np.float32)) > 0.5 for part in parts)
+    only = silhouette & ~mask
+    colored = ((mask & silhouette, BOTH), (mask & ~silhouette, ONLY_MASK), (only & ~untold, ONLY_BODY))
+    regions = [*colored, (only & untold, UNTOLD)]
     dim = cv2.cvtColor(cv2.cvtColor(cut(view.image), cv2.COLOR_BGR2GRAY) // 2, cv2.COLOR_GRAY2BGR)
     return Tile(dim, regions, f"{view.camera}: {view.iou:.2f}", outlined=False)
 
