@@ -113,11 +113,38 @@ def test_where_furniture_hides_the_room_masks_say_nothing(tmp_path):
         tables[k] = table
     found = example_masks(recording, example, pictures, learnt)
     assert sorted(found.masks) == [0, 1, 2, 3]
+    assert found.undecided
     for k, mask in found.masks.items():
         assert iou(mask & ~tables[k], TRUTH[k] & ~tables[k]) > 0.8
         if k in (1, 2):
             assert found.untold[k][tables[k] & ~mask].all()
             assert mask[tables[k]].mean() < 0.1
+
+
+def test_who_is_hidden_in_all_cameras_leaves_the_masks_as_colours_tell(tmp_path):
+    """Nothing at all is certain where the background is unknown around the whole subject."""
+    recording = example_recording(tmp_path)
+    example, learnt = replace(recording.example_poses[0], frame=0), []
+    images = load_images(recording, recording.example_poses[0])
+    for k in range(4):
+        empty = photo(scene((160, 120), seed=k, contrast=10.0), 50 + k)
+        around = cv2.dilate(TRUTH[k].astype(np.uint8), np.ones((25 + 14 * k, 25))) > 0
+        learnt.append(BackgroundImage(empty, np.full((120, 160), 2.0, np.float32), ~around, "clip"))
+    found = example_masks(recording, example, images, learnt)
+    assert len(found.masks) >= 2
+    assert not found.undecided
+    assert not found.untold
+
+
+def test_what_is_painted_in_front_is_told_by_no_mask(tmp_path):
+    recording = example_recording(tmp_path, masks=(0, 1, 2, 3))
+    painted = np.zeros((120, 160), np.uint8)
+    painted[60:, :80] = 255
+    recording = replace(recording, occluders={"cam1": write(tmp_path / "occluders" / "cam1.png", painted)})
+    found = masks_of(recording)
+    assert list(found.untold) == [1]
+    np.testing.assert_array_equal(found.untold[1], (painted > 0) & ~TRUTH[1])
+    assert not found.undecided
 
 
 def test_two_masks_that_do_not_fit_are_said(tmp_path):

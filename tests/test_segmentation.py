@@ -274,3 +274,23 @@ def test_three_cameras_tell_which_mask_lacks_a_part():
     masks, cameras = sphere_masks(3)
     masks[1] = lower_half_missing(masks[1])
     assert list(disagreeing_cameras(masks, cameras)) == [1]
+
+
+@pytest.mark.parametrize("corner", [(2, 2), (106, 2), (2, 140), (106, 140)])
+def test_undecided_masks_hold_nothing_that_is_unknown(corner):
+    """One camera's subject is wholly unknown, and a lamp shines elsewhere in its picture."""
+    body = in_colors(shipped("dog"))
+    rig = ring_rig(4, (160, 120), distance=1.6)
+    cameras = {k: rig.camera(name) for k, name in enumerate(rig.names)}
+    truth = draw(body, standing(body, 1.15), rig, masks=True, disc=FLESH)
+    drawn = draw(body, standing(body, 1.15), rig, disc=FLESH)
+    empty = {k: scene((160, 120), seed=k, contrast=10.0) for k in cameras}
+    pictures = {k: photo(np.where(truth[k][..., None], drawn[k], empty[k]), k) for k in cameras}
+    row, column = corner
+    pictures[0][row : row + 12, column : column + 16] = (20, 20, 250)
+    unknown = {0: cv2.dilate(truth[0].astype(np.uint8), np.ones((13, 13))) > 0}
+    plates = {k: photo(picture, 50 + k) for k, picture in empty.items()}
+    found = masks_from_backgrounds(pictures, plates, {}, cameras, UP, unknown, decide=False)
+    assert not (found.get(0, np.zeros((120, 160), bool)) & unknown[0]).any()
+    for k in (1, 2, 3):
+        assert iou(found[k], truth[k]) > 0.8

@@ -41,6 +41,8 @@ class ExampleMasks:
     """Masks that do not agree with the others."""
     untold: dict[int, Mask]
     """Where a mask says nothing: something stands in front, or what is behind is unknown and colours do not tell."""
+    undecided: bool
+    """Whether that is so for the second reason."""
     warnings: tuple[str, ...]
     """One sentence each."""
 
@@ -85,11 +87,14 @@ def example_masks(
     _check_found(recording, example, list(found), [camera for camera in backgrounds if camera not in found])
     hidden = {camera: mask for camera, mask in enumerate(painted_masks(recording)) if mask is not None}
     wrong = disagreeing_cameras(found, cameras, hidden)
-    if unknown and len(wrong) > MOST_WRONG * len(found):
-        less, further = make(False), hidden | _further(hidden, unknown, images)
-        agreeing = disagreeing_cameras(alone(less), cameras, further)
-        if len(alone(less)) - len(agreeing) > len(found) - len(wrong):
-            made, found, hidden, wrong = less, alone(less), further, agreeing
+    undecided = False
+    if unknown and example.within is None and len(wrong) > MOST_WRONG * len(found):
+        certain = alone(make(False))
+        nowhere = hidden | _with_unknown(hidden, unknown, images)
+        fewer = disagreeing_cameras(certain, cameras, nowhere) if len(certain) >= 2 else dict.fromkeys(certain, 0.0)
+        undecided = len(certain) - len(fewer) > len(found) - len(wrong)
+        if undecided:
+            made, found, hidden, wrong = certain, certain, nowhere, fewer
     masks = {camera: mask for camera, mask in found.items() if camera not in wrong}
     warnings = [_unlike(example, names[camera], share) for camera, share in wrong.items()]
     warnings += [_moved(recording, example, names[k], plate) for k, plate in plates.items() if plate.pixels]
@@ -104,12 +109,13 @@ def example_masks(
         masks=masks,
         origins={k: FROM_FILE if k in files else FROM_CLIP if k in of_clip else FROM_PHOTOGRAPH for k in found},
         left_out={camera: found[camera] for camera in wrong},
+        undecided=undecided,
         untold={k: hidden[k] & ~masks[k] for k in masks if k in hidden},
         warnings=tuple(warnings),
     )
 
 
-def _further(
+def _with_unknown(
     hidden: Mapping[int, Mask], unknown: Mapping[int, Mask], images: Mapping[int, UInt8[np.ndarray, "_h _w 3"]]
 ) -> dict[int, Mask]:
     """Where masks say nothing, at the pictures' size, if that is so where the background is unknown, too."""

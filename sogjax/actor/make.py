@@ -38,9 +38,9 @@ from sogjax.search.search_energy import RestPrior
 
 _shaped = compiled_hastily(ShapeModel.shaped)
 
-UNTOLD_REST = 3e-4
-"""Weight of being near the rest pose (`RestPrior`) where masks say nothing somewhere: a leg behind a table may be
-anywhere else."""
+UNDECIDED_REST = 0.005
+"""Weight of being near the rest pose (`RestPrior`), in units of the masks' area, where masks say nothing of what is
+unknown: a leg behind a table may be anywhere else."""
 LEAST_SHOWN = 0.7
 """Share of a limb's blobs that the masks must show."""
 POSE_FOUND = 0.5
@@ -127,7 +127,9 @@ def make_actor(
     upright = body.rotated(jnp.asarray(turn, body.blob_sigmas.dtype))
     model = ShapeModel.from_body(upright, symmetric)
     pictures = [load_pictures(recording, e, report, learnt) for e in progress(examples, len(examples), "masks")]
-    terms = (*terms, RestPrior(UNTOLD_REST)) if any(posed.untold for posed in pictures) else terms
+    undecided = any(posed.undecided for posed in pictures)
+    if undecided:
+        terms = (*terms, RestPrior(UNDECIDED_REST * float(np.mean([posed.mask_share() for posed in pictures]))))
     found = _found_poses(upright, model, examples, pictures, rig, recording.up, terms, best, report, progress)
     examples, pictures = found.examples, found.pictures
     report("shape")
@@ -139,8 +141,9 @@ def make_actor(
         view for posed, pose in zip(pictures, estimate.poses, strict=True) for view in colored_views(posed, rig, pose)
     ]
     found_colors = back_projected_colors(shaped, shown, color_space)
-    doubt = None if best is None else doubt_of(shaped, estimate.poses, pictures, rig)
-    doubt = doubt or unseen_limbs(shaped, found_colors.shown, pictures)
+    unsuitable = None if best is None else doubt_of(shaped, estimate.poses, pictures, rig)
+    unseen = unseen_limbs(shaped, found_colors.shown, pictures) if undecided else None
+    doubt = "; ".join(said for said in (unsuitable, unseen) if said is not None) or None
     if doubt is not None:
         report(f"warning: {doubt}")
     actor = replace(colored(shaped, found_colors.colors), name=subject or body.name)
@@ -259,8 +262,8 @@ def unseen_limbs(body: Body, shown: Bool[np.ndarray, "blob"], pictures: Sequence
     names = " and ".join(name for name, less in zip(limb_names(body), little, strict=True) if less)
     frames = ", ".join(posed.name for posed in pictures)
     return (
-        f"the {names} of the actor may be anywhere: hardly anything of them is seen apart from the room in the frames "
-        f"that it is made of ({frames}); add pictures of the empty scene (background/CAMERA.jpg), or "
+        f"the {names} of the actor may be anywhere: the frames that it is made of ({frames}) show less than "
+        f"{LEAST_SHOWN:.0%} of them apart from the room; add pictures of the empty scene (background/CAMERA.jpg), or "
         "example_poses/POSE/CAMERA.jpg with CAMERA.mask.png, that show them"
     )
 

@@ -46,6 +46,12 @@ class PosedPictures:
     """Where masks say nothing; none where a camera's says something everywhere."""
     warnings: tuple[str, ...] = ()
     """What was noticed about the masks, one sentence each."""
+    undecided: bool = False
+    """Whether the masks say nothing where the background is unknown."""
+
+    def mask_share(self) -> float:
+        """Share of the pictures that the masks take."""
+        return float(np.mean([mask.mean() for mask in self.masks.values()]))
 
 
 def load_pictures(
@@ -65,7 +71,7 @@ def load_pictures(
     for warning in masks.warnings:
         report(f"warning: {warning}")
     shown = {k: images[k] for k in masks.masks}
-    return PosedPictures(example.name, shown, masks.masks, masks.untold, masks.warnings)
+    return PosedPictures(example.name, shown, masks.masks, masks.untold, masks.warnings, masks.undecided)
 
 
 def load_images(recording: Recording, example: ExamplePose) -> dict[int, UInt8[np.ndarray, "_h _w 3"]]:
@@ -117,11 +123,11 @@ def silhouette_views(pictures: Sequence[PosedPictures], rig: Camera, num_blobs: 
 def _mask_cells(
     pictures: PosedPictures, sizes: Int[np.ndarray, "camera 2"], grids: tuple[CellGrid, ...]
 ) -> UInt8[np.ndarray, "camera rows columns 3"]:
-    """Cells of pictures, as RGB: red where the masks are, green and blue where they say nothing."""
+    """Cells of pictures that are white where the masks are, and blue where they say nothing."""
     nothing = {k: np.zeros((height, width), bool) for k, (width, height) in enumerate(sizes)}
-    level = lambda masks, k: masks.get(k, nothing[k]).astype(np.uint8) * 255
-    drawn = [np.dstack([*2 * (level(pictures.untold, k),), level(pictures.masks, k)]) for k in nothing]
-    return stack_cells(drawn, grids)
+    white = {k: pictures.masks.get(k, nothing[k]) for k in nothing}
+    drawn = [np.dstack([white[k] | pictures.untold.get(k, nothing[k]), white[k], white[k]]) for k in nothing]
+    return stack_cells([picture.astype(np.uint8) * 255 for picture in drawn], grids)
 
 
 @compiled_hastily
@@ -146,8 +152,8 @@ def _silhouette_sogs(
     leaves = leaves & present[:, None]
     select = jax.vmap(keep_blobs, in_axes=(0, 0, 0, 0, None))
     images, _, _ = select(candidates.means, candidates.sigmas, colors, leaves, capacity)
-    coverage, untold = images.colors[..., 0], images.colors[..., 1]
-    match = coverage + (1.0 - coverage - untold) * BACKGROUND_SIMILARITY
+    coverage, told = images.colors[..., 0], 1.0 - (images.colors[..., 2] - images.colors[..., 0])
+    match = coverage + (told - coverage) * BACKGROUND_SIMILARITY
     match = jnp.where(images.mask, match, 0.0)
     return images, jnp.repeat(match[:, None, :], num_blobs, axis=1)
 

@@ -19,6 +19,7 @@ from sogjax.scene.floor import seen_floors, with_floor
 from sogjax.scene.moving_zone import moving_zones
 from sogjax.scene.still_body import Standing, still_bodies, with_room_behind
 from sogjax.scene.still_zone import standing_zones, still_zones
+from sogjax.scene.visual_hull import MANY
 
 MOST_BYTES = 2**30
 """Bytes of samples in memory; beyond, fewer frames are looked at."""
@@ -26,7 +27,7 @@ MUCH_UNKNOWN = 0.15
 """Share of the pictures from which on an unknown background is said."""
 FURNITURE = 0.75
 """What never moves, may be somebody and is no body, in units of what moves: 1.1 to 1.3 beside a table and a chair, 0 to
-0.5 without."""
+0.6 without. Fewer than five cameras do not tell a body."""
 Zone = Bool[np.ndarray, "rows columns"]
 LeftOut = Mapping[str, Mapping[int, Bool[np.ndarray, "rows columns"]]]
 """Where, by camera and frame, the tracked bodies are."""
@@ -121,7 +122,7 @@ def _told_together(
         wide = np.mean([zone.mean() for zone in zones.values()]) > MUCH_UNKNOWN
         still = still_zones(zones, views) if wide else still
         still = standing_zones(still, views, floors) if floors else still
-    furniture = bool(bodies) and _beside_furniture(still, moving, bodies)
+    furniture = len(moving) >= MANY and bool(bodies) and _beside_furniture(still, moving, bodies)
     learnt = each(lambda k: learnt_background(sampled[k], zones[k], still[k], mostly=furniture))
     if floors:
         learnt = each(lambda k: with_floor(learnt[k], floors.get(k), sampled[k].even.images, zones[k]))

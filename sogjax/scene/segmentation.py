@@ -69,10 +69,11 @@ def masks_from_backgrounds(
         guesses = {camera: first_guess(difference) for camera, difference in differences.items()}
         guesses = {camera: guess for camera, guess in guesses.items() if is_subject(guess)}
         better, hull = _seen_together({c: differences[c] for c in guesses}, guesses, known, cameras, up)
-        if not decide:
-            better, hull = {c: mask & ~differences[c].unknown for c, mask in better.items()}, {}
-        guesses |= better
-        cuts = pool.map(lambda camera: cut_out(differences[camera], guesses[camera], hull.get(camera)), guesses)
+        told = lambda camera, mask: mask if decide else mask & ~differences[camera].unknown
+        guesses = {c: told(c, mask) for c, mask in (guesses | better).items()}
+        guesses = {c: mask for c, mask in guesses.items() if is_subject(mask)}
+        cut = lambda c: told(c, cut_out(differences[c], guesses[c], hull.get(c) if decide else None))
+        cuts = pool.map(cut, guesses)
         sized = {camera: _enlarged(mask, images[camera]) for camera, mask in zip(guesses, cuts, strict=True)}
     return {camera: mask for camera, mask in sized.items() if is_subject(mask)}
 

@@ -140,13 +140,13 @@ def legs_of(still: Bool[np.ndarray, "x y z"], ground: float, spacing: float) -> 
     connected: Any = label(still)
     labels: Int[np.ndarray, "x y z"] = connected[0]
     places = (spacing * np.argwhere(labels == part) for part in range(1, connected[1] + 1))
-    kept = [_stands(of_part, ground * spacing) for of_part in places]
+    kept = [_stands(of_part, ground * spacing, spacing) for of_part in places]
     return still & np.isin(labels, np.flatnonzero(kept) + 1)
 
 
-def _stands(places: Float[np.ndarray, "place 3"], floor: float) -> bool:
+def _stands(places: Float[np.ndarray, "place 3"], floor: float, spacing: float) -> bool:
     """Whether a part is as high and wide as legs and reaches down to the floor, at most to its shoes; metres."""
-    *wide, high = np.ptp(places, axis=0)
+    *wide, high = np.ptp(places, axis=0) + spacing
     low = places[:, 2].min() <= floor + SHOES
     return bool(low and high >= LEAST_HEIGHT and NARROWEST <= max(wide) <= WIDEST)
 
