@@ -38,7 +38,7 @@ from sogjax.search.search_energy import RestPrior
 
 _shaped = compiled_hastily(ShapeModel.shaped)
 
-UNDECIDED_REST = 0.005
+UNDECIDED_REST = 0.03
 """Weight of being near the rest pose (`RestPrior`), in units of the masks' area, where masks say nothing of what is
 unknown: a leg behind a table may be anywhere else."""
 LEAST_SHOWN = 0.7
