@@ -14,6 +14,7 @@ from sogjax.io.image_file import read_mask
 from sogjax.io.painted import painted_masks
 from sogjax.io.recording import Recording
 from sogjax.io.video import read_still
+from sogjax.model.camera import Camera
 from sogjax.model.rotation import axis_vector
 from sogjax.scene.background import BackgroundImage
 from sogjax.scene.background_difference import working_size
@@ -85,21 +86,17 @@ def example_masks(
     made = make(True) if backgrounds else {}
     found = alone(made)
     _check_found(recording, example, list(found), [camera for camera in backgrounds if camera not in found])
-    hidden = {camera: mask for camera, mask in enumerate(painted_masks(recording)) if mask is not None}
-    wrong = disagreeing_cameras(found, cameras, hidden)
-    undecided = False
-    if unknown and example.within is None and len(wrong) > MOST_WRONG * len(found):
-        certain = alone(make(False))
-        nowhere = hidden | _with_unknown(hidden, unknown, images)
-        fewer = disagreeing_cameras(certain, cameras, nowhere) if len(certain) >= 2 else dict.fromkeys(certain, 0.0)
-        undecided = len(certain) - len(fewer) > len(found) - len(wrong)
-        if undecided:
-            made, found, hidden, wrong = certain, certain, nowhere, fewer
-    masks = {camera: mask for camera, mask in found.items() if camera not in wrong}
-    warnings = [_unlike(example, names[camera], share) for camera, share in wrong.items()]
+    painted = {camera: mask for camera, mask in enumerate(painted_masks(recording)) if mask is not None}
+    told, undecided = _Told.of_masks(found, cameras, painted), False
+    if unknown and example.within is None and len(told.wrong) > MOST_WRONG * len(found):
+        certain = _Told.of_masks(alone(make(False)), cameras, _with_unknown(painted, unknown, images))
+        undecided = len(certain.right) > len(told.right)
+        made, told = (certain.found, certain) if undecided else (made, told)
+    masks = told.right
+    warnings = [_unlike(example, names[camera], share) for camera, share in told.wrong.items()]
     warnings += [_moved(recording, example, names[k], plate) for k, plate in plates.items() if plate.pixels]
     warnings += [_no_subject(recording, example, names[camera]) for camera in backgrounds if camera not in made]
-    if len(masks) == 2 and (share := min(hull_coverage(masks, cameras, hidden).values())) < AGREEING:
+    if len(masks) == 2 and (share := min(hull_coverage(masks, cameras, told.hidden).values())) < AGREEING:
         pair = " and ".join(names[camera] for camera in masks)
         warnings.append(
             f"example pose {example.name!r}: the masks of {pair} agree by only {share:.0%}; look at them with "
@@ -107,12 +104,34 @@ def example_masks(
         )
     return ExampleMasks(
         masks=masks,
-        origins={k: FROM_FILE if k in files else FROM_CLIP if k in of_clip else FROM_PHOTOGRAPH for k in found},
-        left_out={camera: found[camera] for camera in wrong},
+        origins={k: FROM_FILE if k in files else FROM_CLIP if k in of_clip else FROM_PHOTOGRAPH for k in told.found},
+        left_out={camera: told.found[camera] for camera in told.wrong},
         undecided=undecided,
-        untold={k: hidden[k] & ~masks[k] for k in masks if k in hidden},
+        untold={k: told.hidden[k] & ~masks[k] for k in masks if k in told.hidden},
         warnings=tuple(warnings),
     )
+
+
+@dataclass(frozen=True)
+class _Told:
+    """Masks of one subject, and which of them the others do not confirm."""
+
+    found: dict[int, Mask]
+    wrong: dict[int, float]
+    """What part of each the others confirm."""
+    hidden: dict[int, Mask]
+    """Where masks say nothing."""
+
+    @classmethod
+    def of_masks(cls, found: dict[int, Mask], cameras: Mapping[int, Camera], hidden: dict[int, Mask]) -> "_Told":
+        """The masks held against each other; a single one is confirmed by none."""
+        enough = len(found) >= 2
+        return cls(found, disagreeing_cameras(found, cameras, hidden) if enough else dict.fromkeys(found, 0.0), hidden)
+
+    @property
+    def right(self) -> dict[int, Mask]:
+        """The masks that agree."""
+        return {camera: mask for camera, mask in self.found.items() if camera not in self.wrong}
 
 
 def _with_unknown(
@@ -120,7 +139,7 @@ def _with_unknown(
 ) -> dict[int, Mask]:
     """Where masks say nothing, at the pictures' size, if that is so where the background is unknown, too."""
     sized = {k: enlarged(mask, images[k].shape) for k, mask in unknown.items()}
-    return {k: mask | hidden[k] if k in hidden else mask for k, mask in sized.items()}
+    return {**hidden} | {k: mask | hidden[k] if k in hidden else mask for k, mask in sized.items()}
 
 
 def _plate_of(recording: Recording, camera: str, image: UInt8[np.ndarray, "_h _w 3"]) -> FittedPlate:
