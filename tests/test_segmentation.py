@@ -160,10 +160,13 @@ def test_who_stands_still_in_a_pillar_of_the_room_is_told_by_colour(num_cameras)
     cameras = {k: rig.camera(name) for k, name in enumerate(rig.names)}
     views = CoarseViews.of(arms, pictures, cameras, UP)
     assert views is not None
-    still = still_zones(pillars, views)
+    narrow, still = still_zones(pillars, views)
     for k, mask in truth.items():
         assert (still[k] & mask).sum() > 0.95 * mask.sum(), k
         assert still[k].sum() < 0.6 * pillars[k].sum(), k
+        assert not (narrow[k] & ~still[k]).any()
+        assert (narrow[k] & mask).sum() > 0.9 * mask.sum(), k
+        assert narrow[k].sum() < 0.9 * still[k].sum(), k
 
 
 def test_who_stands_where_nothing_is_known_gets_masks_by_colour():

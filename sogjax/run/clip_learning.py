@@ -18,7 +18,7 @@ from sogjax.scene.coarse_views import CoarseViews
 from sogjax.scene.floor import seen_floors, with_floor
 from sogjax.scene.moving_zone import moving_zones
 from sogjax.scene.still_body import Standing, still_bodies, with_room_behind
-from sogjax.scene.still_zone import standing_zones, still_zones
+from sogjax.scene.still_zone import StillZones, standing_zones, still_zones
 from sogjax.scene.visual_hull import MANY
 
 MOST_BYTES = 2**30
@@ -115,14 +115,16 @@ def _told_together(
     shown = {k: one.even.reference for k, one in sampled.items()}
     cameras = {k: recording.rig.camera(recording.rig.names[k]) for k in sampled}
     views = CoarseViews.of(moving, shown, cameras, axis_vector(recording.up))
-    still, floors, bodies = dict(zones), {}, {}
+    still, floors, bodies, furniture = dict(zones), {}, {}, False
     if views is not None:
         floors = seen_floors(views)
         bodies = {} if recording.masked else still_bodies(views, floors)
-        wide = np.mean([zone.mean() for zone in zones.values()]) > MUCH_UNKNOWN
-        still = still_zones(zones, views) if wide else still
-        still = standing_zones(still, views, floors) if floors else still
-    furniture = len(moving) >= MANY and bool(bodies) and _beside_furniture(still, moving, bodies)
+        large = np.mean([zone.mean() for zone in zones.values()]) > MUCH_UNKNOWN
+        found = still_zones(zones, views) if large else StillZones(still, still)
+        over_floor = lambda masks: standing_zones(masks, views, floors) if floors else masks
+        still, many = over_floor(found.narrow), len(views.moving) >= MANY
+        furniture = many and bool(bodies) and _beside_furniture(still, moving, bodies)
+        still = over_floor(found.wide) if many and not furniture else still
     learnt = each(lambda k: learnt_background(sampled[k], zones[k], still[k], mostly=furniture))
     if floors:
         learnt = each(lambda k: with_floor(learnt[k], floors.get(k), sampled[k].even.images, zones[k]))

@@ -7,6 +7,7 @@ floor; so it is told from all of them together.
 
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -26,11 +27,19 @@ MISTAKEN = 0.25
 Mask = Bool[np.ndarray, "_h _w"]
 
 
-def still_zones(zones: Mapping[int, Mask], views: CoarseViews) -> dict[int, Mask]:
+class StillZones(NamedTuple):
+    """Where what never changes may be somebody, by camera."""
+
+    narrow: dict[int, Mask]
+    wide: dict[int, Mask]
+    """With the rim of the voxels that tell it: a ring of wall that never changes, which keeps what moved before it from
+    being learnt."""
+
+
+def still_zones(zones: Mapping[int, Mask], views: CoarseViews) -> StillZones:
     """The parts of the zones (`moving_zones`) in which what never changes may be somebody.
 
-    That is what a camera tells from the room and most others do not take for it; and what all the others tell from it,
-    without the rim of its voxels: a ring of wall that never changes keeps what moved before it from being learnt.
+    That is what a camera tells from the room and most others do not take for it; and what all the others tell from it.
     """
     seeing, pixels = [*views.moving], views.pixels
     small_zone = lambda k: small(zones[k].astype(np.uint8), cv2.INTER_NEAREST) > 0
@@ -40,11 +49,12 @@ def still_zones(zones: Mapping[int, Mask], views: CoarseViews) -> dict[int, Mask
     missed = views.missed(unlike)
     misses = np.sum([*missed.values()], axis=0)
     surely = views.inside & (misses <= (1 if len(seeing) >= MANY else 0))
-    still = dict(zones)
+    still = StillZones(dict(zones), dict(zones))
     for k in seeing:
         perhaps = views.inside & (misses - missed[k] <= int(MISTAKEN * len(seeing)))
-        by_others = ~widened(~pixels[k].silhouette_of(surely), pixels[k].footprint)
-        still[k] = views.enlarged(k, (pixels[k].silhouette_of(perhaps) & unlike[k]) | by_others)
+        by_others, told = pixels[k].silhouette_of(surely), pixels[k].silhouette_of(perhaps) & unlike[k]
+        still.wide[k] = views.enlarged(k, told | by_others)
+        still.narrow[k] = views.enlarged(k, told | ~widened(~by_others, pixels[k].footprint))
     return still
 
 
