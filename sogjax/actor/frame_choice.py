@@ -16,8 +16,7 @@ from sogjax.scene.visual_hull import MANY, VOXELS, Cube, VoxelPixels, cube_aroun
 SMALLEST_BODY = 0.1
 """Volume of a separate part of a hull, as a share of the largest, from which on it may be somebody else."""
 LEAST_PARTS, LEAST_BESIDE = 0.5, 0.25
-"""Least share of the cameras that must show the subject; somebody beside others, who hide him from the rest, and a
-part of a subject."""
+"""Least share of the cameras that must show the subject; somebody beside others, who hide him from the rest."""
 SHAPE_VOXELS = 16
 """Voxels along each side of the cube in which shapes are compared."""
 
@@ -73,16 +72,17 @@ def seen_shape(
     cameras: Mapping[int, Camera],
     cube: Cube,
     up: Float[np.ndarray, "3"],
+    least_shown: float = 0.0,
 ) -> SeenShape | None:
     """What the silhouettes of one frame tell; None if they do not meet anywhere.
 
-    The hull is what enough of them show: furniture that no camera knows the room behind is in none.
+    The hull is what this share of the masks show at least: furniture that no camera knows the room behind is in none.
 
     By camera, `masks` say what is not the background and `unknown` where nothing is known of it; the cameras are those
     of pictures of the masks' size. The subject is in the cube.
     """
     pixels = {k: voxel_pixels(cube, cameras[k], mask.shape) for k, mask in masks.items()}
-    seen = np.sum([pixels[k].shows(widened(mask)) for k, mask in masks.items()], axis=0) >= LEAST_BESIDE * len(masks)
+    seen = np.sum([pixels[k].shows(widened(mask)) for k, mask in masks.items()], axis=0) >= least_shown * len(masks)
     connected: Any = label((hull_within(masks, unknown, pixels) & seen).reshape(VOXELS, VOXELS, VOXELS))
     labels, count = connected
     volumes = np.bincount(labels.ravel())[1:]

@@ -38,6 +38,8 @@ OTHER_WAYS = (
 """What else can be done where a recording has no example poses, the easiest first."""
 LEAST_KNOWN, MOSTLY_KNOWN = 0.2, 0.95
 """Part of the silhouettes where the background must be, and had better be, known."""
+LEAST_SHOWN = 0.25
+"""Share of the masks that must show a place for it to be the subject's."""
 FEW_CAMERAS = 4
 """Fewer of them see too little of a body."""
 
@@ -224,7 +226,7 @@ def seen_shapes(seen: SampledMasks, up: str) -> list[SeenShape]:
     """What frames spread over the videos show, where somebody is seen."""
     cubes = subject_cubes(seen.masks, seen.cameras)
     shapes = [
-        seen_shape(frame, masks, seen.unknown, seen.cameras, cube, axis_vector(up))
+        seen_shape(frame, masks, seen.unknown, seen.cameras, cube, axis_vector(up), LEAST_SHOWN)
         for frame, masks, cube in zip(seen.frames, seen.masks, cubes, strict=True)
         if cube is not None
     ]
