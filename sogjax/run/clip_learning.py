@@ -124,7 +124,7 @@ def _told_together(
         over_floor = lambda masks: standing_zones(masks, views, floors) if floors else masks
         still, many = over_floor(found.narrow), len(views.moving) >= MANY
         furniture = many and bool(bodies) and _beside_furniture(still, moving, bodies)
-        still = over_floor(found.wide) if many and not furniture else still
+        still = over_floor(found.wide) if large and many and not furniture else still
     learnt = each(lambda k: learnt_background(sampled[k], zones[k], still[k], mostly=furniture))
     if floors:
         learnt = each(lambda k: with_floor(learnt[k], floors.get(k), sampled[k].even.images, zones[k]))
