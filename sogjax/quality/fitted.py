@@ -127,6 +127,8 @@ class MergeCosts:
     """Metres from which on a part is taken from the other pass."""
     change: float
     """The part of a frame's energy that a change from one pass to the other costs for each metre between them."""
+    leap: float
+    """The same for each metre by which a part leaps from one frame to the next, in a pass or between two."""
     bias: float
     """The part of a frame's energy that a frame must gain at least."""
 

@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Int
 from sogjax.io.motion import Motion
 from sogjax.model.body import Body
 from sogjax.quality.fitted import fitted_numbers
+from sogjax.quality.jumps import jumps
 from sogjax.quality.limb_warnings import DoubtfulLimb, Limits, doubtful_limbs, joints_at_limits
 from sogjax.quality.metrics import stretches
 
@@ -121,7 +122,7 @@ def _verdict(
     overlap = _overlaps(motion)
     wrong = [*_wrong(explained, expected, overlap), *others]
     doubtful = doubtful_limbs(motion)
-    parts = [*_limbs(doubtful), *_shortened([*inside]), *_bent(motion, limits)]
+    parts = [*_limbs(doubtful), *_shortened(jumps(motion)), *_shortened([*inside]), *_bent(motion, limits)]
     look = [] if wrong else [*_bad_overlaps(overlap), *_bad_stretches(motion), *parts]
     look = [*odd, *look]
     if begun is not None and (wrong or look):

@@ -10,6 +10,7 @@ from sogjax.errors import InputError, counted
 from sogjax.io.frame_table import TERM, FramesRecord, FrameTable
 from sogjax.model.limbs import limb_blobs
 from sogjax.quality.fitted import fitted_numbers
+from sogjax.quality.jumps import NEAR, largest_step
 from sogjax.quality.verdict import NEARLY_ALL, expected_of
 from sogjax.run.frames import capacities_of
 from sogjax.run.setup import Setup
@@ -47,7 +48,8 @@ def merge_backward(setup: Setup, tracked: FrameTable) -> Merged:
             keys = key_rows(len(numbers), setup.clip.fps)
             turning = turning_rows(len(numbers), setup.clip.fps)
             report = partial(setattr, work, "share")
-            found = merge_passes(setup.tracker, passed, of_rows, keys, turning, misplaced(setup, tracked), report)
+            elsewhere, jump = misplaced(setup, tracked), NEAR * largest_step(setup.clip.fps)
+            found = merge_passes(setup.tracker, passed, of_rows, keys, turning, elsewhere, report, jump)
     except InputError as error:
         say(f"warning: limbs were not searched over the clip, which stays as it was tracked: {error}")
         return Merged(tracked)

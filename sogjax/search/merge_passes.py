@@ -6,7 +6,7 @@ backwards from behind: a limb that is lost is often found again by itself, and w
 frame, comes from the other side.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import jax
@@ -24,6 +24,7 @@ from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.quality.limb_warnings import LIKELY_LOST
 from sogjax.quality.metrics import stretches
 from sogjax.search.body_parts import body_parts, merged_pose, select_parts
+from sogjax.search.jump_passes import Jump, chosen_rows, largest_jump, passes_without
 from sogjax.search.limb_search import MORE, LimbSearch, climbed_in
 from sogjax.search.misplaced import Misplaced
 from sogjax.search.other_pass import (
@@ -88,11 +89,13 @@ def merge_passes(
     turning_rows: Sequence[int] = (),
     misplaced: Misplaced | None = None,
     report: Report = unreported,
+    jump: float = np.inf,
 ) -> Revision:
     """Where another pass explains parts of the body better.
 
-    Limbs are searched in `key_rows`, actors turned back to front in `turning_rows`, and those `misplaced` looked for.
-    `frames` reads what is seen in rows of `passed`; the tracker must judge limbs.
+    Limbs are searched in `key_rows` and held as before where they `jump` (metres, of a blob from a frame to the next),
+    actors turned back to front in `turning_rows`, and those `misplaced` looked for. `frames` reads what is seen in rows
+    of `passed`; the tracker must judge limbs.
     """
     own = {name: getattr(passed, name).copy() for name in ("poses", "doubts", "energies")}
     revising = _Revising(tracker, replace(passed, **own), frames)
@@ -100,6 +103,7 @@ def merge_passes(
         revising.place_actors(misplaced)
     revising.turn_actors(turning_rows)
     revising.search_limbs(key_rows, report)
+    revising.smooth_jumps(jump)
     while (stretch := revising.next_stretch()) is not None:
         revising.take(compared_backwards(tracker, revising.passed, frames, revising.parts, *stretch))
     return revising.revision
@@ -172,6 +176,33 @@ class _Revising:
         self._changed.clear()  # limbs are searched all over the clip next
         self._looked_at = 0
 
+    def smooth_jumps(self, least: float) -> None:
+        """See where it leads if limbs that are elsewhere in the next frame go on as they were, or were so before.
+
+        First one limb by itself, then all that jump there.
+        """
+        search = LimbSearch.of(self.tracker)
+        for together in (False, True):
+            tried: set[int] = set()
+            while search is not None and not self._tired():
+                jump = largest_jump(self.tracker.body, self.passed, least, tried)
+                if jump is None:
+                    break
+                tried.add(jump.row)
+                if not together or len(jump.limbs) > 1:
+                    self._smooth_jump(search, jump, together)
+        self._looked_at = 0
+
+    def _smooth_jump(self, search: LimbSearch, jump: Jump, together: bool) -> None:
+        """Take the pass that is worth most of those in which limbs do not jump, if it is worth anything."""
+        held = [jump.limbs] if together else [limb[None] for limb in jump.limbs]
+        passes = [each for limbs in held for each in passes_without(search, self.passed, self.frames, jump, limbs)]
+        choices = [chosen_rows(self.tracker.body, self.passed, each) for each in passes]
+        for choice in sorted(choices, key=lambda each: -each.value)[:1]:
+            self._revise_rows(choice.found, choice.poses)
+            self._looked_at -= len(choice.taken) if choice.taken.any() else 0
+        self._looked_at += sum(len(each.rows) for each in passes)
+
     def _search_limbs(self, search: LimbSearch, rows: Sequence[int], report: Report) -> None:
         for number, row in enumerate(rows):
             report(number / len(rows))
@@ -206,25 +237,44 @@ class _Revising:
 
     def take(self, found: Compared) -> set[int]:
         """Revise what another pass explains better, if that raises the energy of the stretch; the rows that changed."""
-        rows, total = np.array(found.rows), len(self.passed.poses)
-        ends = (bool(rows[0] in (0, total - 1)), bool(rows[-1] in (0, total - 1)))
+        rows = np.array(found.rows)
         apart, gains = np.stack(found.apart), np.stack(found.gains)
-        taken = select_parts(self.parts, apart, gains, self.passed.energy, ends, self._doubts(rows))
+        ends, doubts = self._open_ends(found.rows), self._doubts(rows)
+        taken = select_parts(self.parts, apart, gains, self.passed.energy, ends, doubts)
         changed = [(k, int(rows[k])) for k in np.flatnonzero(taken.any(axis=1))]
         merged = {row: self._merged(self.passed.poses[row], found, int(k), taken[k]) for k, row in changed}
         better = sum(self._gained(found, int(k), self.passed.poses[row], merged[row]) for k, row in changed) > 0.0
         if not better:
             self._looked_at += len(rows)
-        else:
-            for row, pose in merged.items():
-                self.passed.poses[row] = pose
-            for k, row in changed:
+            return set()
+        self._revise_rows(found, merged, taken)
+        return set(merged)
+
+    def _open_ends(self, rows: Sequence[int]) -> tuple[bool, bool]:
+        """Whether the clip ends before the first and behind the last of some rows."""
+        ends = (0, len(self.passed.poses) - 1)
+        return rows[0] in ends, rows[-1] in ends
+
+    def _revise_rows(
+        self,
+        found: Compared,
+        merged: Mapping[int, Float[np.ndarray, "dof"]],
+        taken: Bool[np.ndarray, "frame part"] | None = None,
+    ) -> None:
+        """Put poses into the rows of another pass, of which parts were `taken`; None: what is elsewhere then."""
+        rows = np.array(found.rows)
+        if taken is None:
+            elsewhere = np.stack(found.apart) > fitted_numbers().merge_passes.apart
+            taken = elsewhere & np.isin(rows, [*merged])[:, None]
+        for row, pose in merged.items():
+            self.passed.poses[row] = pose
+        for k, row in enumerate(found.rows):
+            if row in merged:
                 self._revise(row, found.cells[k])
-            self._changed |= set(merged)
+        self._changed |= set(merged)
         for part, of_part in zip(self.parts, taken.T, strict=True):
-            for name in part.names if better and of_part.any() else ():
+            for name in part.names if of_part.any() else ():
                 self.revision.parts.setdefault(name, set()).update(rows[of_part].tolist())
-        return set(merged) if better else set()
 
     def _doubts(self, rows: Int[np.ndarray, "frame"]) -> Float[np.ndarray, "frame part"]:
         """How likely a limb of each part is lost; 0 for whole actors."""

@@ -135,10 +135,13 @@ def compared(
     rows: range,
     at_least: int,
     patience: int | None = None,
+    spared: Float[np.ndarray, "row"] | None = None,
 ) -> Compared:
     """Track some rows, one after the other, until both passes agree again after at least so many.
 
-    With `patience` the pass ends, too, where it has explained less than the known one for so many frames.
+    With `patience` the pass ends, too, where it has explained less than the known one for so many frames. With what is
+    `spared` in each row, energy as well, that must be less in sum, too, and no parts are compared: such a pass is taken
+    as it is, or not at all.
     """
     found, choices, numbers = Compared(), PartArrays.of(tracker.body, parts), fitted_numbers().merge_passes
     # Parts are compared once the pass is promising; views are large, so few frames wait for that.
@@ -154,6 +157,7 @@ def compared(
 
     differ = lambda k: _differ(parts, found.apart[k] > numbers.compared)
     agree, promising = 0, patience is None
+    least = np.zeros(len(rows)) if spared is None else -np.cumsum(spared)
     for k, (row, tracked) in enumerate(zip(rows, track(tracker, start, coming(), passed.capacities), strict=False)):
         both = (jnp.asarray(passed.poses[row]), jnp.asarray(tracked.result.pose))
         apart = np.asarray(_apart(tracker.body, choices.blobs, *both))
@@ -162,13 +166,16 @@ def compared(
             seen = BothSeen.of(tracker, found.cells[k], tracked.capacities, *both)
             found.gained[k] = seen.gain
             waiting.append((k, seen))
+        if spared is not None:
+            waiting.clear()
         promising = promising or sum(found.gained) >= LEAST_GAIN * passed.energy
         while waiting and (promising or len(waiting) > MOST_WAITING):
             compare(*waiting.popleft())
         agree = agree + 1 if apart.max(initial=0.0) <= numbers.together else 0
         if k + 1 >= at_least and agree >= SURE_FRAMES:
             break
-        if patience is not None and k + 1 >= patience and sum(found.gained[-patience:]) < 0.0:
+        worse = patience is not None and k + 1 >= patience and sum(found.gained[-patience:]) < 0.0
+        if worse and (spared is None or sum(found.gained) < least[k]):
             break
     if not promising:
         found.gains = [np.zeros(len(parts)) for _ in found.gains]
@@ -183,9 +190,10 @@ class BothSeen:
     """
 
     poses: Float[Array, "2 dof"]
-    views: tuple[Views, Views]
-    values: Float[np.ndarray, "2 2"]
-    """The energy of both poses, in the views of the one and of the other."""
+    views: tuple[Views, ...]
+    """What is seen around both; where something stands in front, with what that hides of the one, and of the other."""
+    values: Float[np.ndarray, "view 2"]
+    """The energy of both poses."""
 
     @classmethod
     def of(
@@ -198,8 +206,8 @@ class BothSeen:
     ) -> "BothSeen":
         """Look at a frame around both poses, with at least so much room for image blobs."""
         poses, seen = jnp.stack([jnp.asarray(known), jnp.asarray(other)]), on_device(frame)
-        near_known, near_other = (views_near(tracker, seen, pose, capacities, REACH) for pose in poses)
-        views = near_known, near_other
+        orders = (poses,) if tracker.reader.occluders is None else (poses, poses[::-1])
+        views = tuple(views_near(tracker, seen, one, capacities, REACH, two) for one, two in orders)
         return cls(poses, views, np.stack([_energies(tracker, around, poses) for around in views]))
 
     @property

@@ -11,7 +11,7 @@ from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History
 from sogjax.energy.views import Views
 from sogjax.model.program import compiled
-from sogjax.tracking.culling import CAPACITIES, Capacities, block_capacity, capacity_for
+from sogjax.tracking.culling import CAPACITIES, Capacities, block_capacity, capacity_for, union_boxes
 from sogjax.tracking.frame import FrameInput, TrackState
 from sogjax.tracking.tracker import Tracker
 
@@ -41,25 +41,32 @@ def with_room(compute: Callable[[Capacities], tuple[Found, Needed]], capacities:
 
 
 def views_near(
-    tracker: Tracker, frame: FrameInput, pose: Float[Array, "dof"], capacities: Capacities, beyond: float = 0.0
+    tracker: Tracker,
+    frame: FrameInput,
+    pose: Float[Array, "dof"],
+    capacities: Capacities,
+    beyond: float = 0.0,
+    other: Float[Array, "dof"] | None = None,
 ) -> Views:
     """What the cameras see around a pose, with larger capacities where that needs them.
 
-    Boxes are wider by the part `beyond` of their longer sides: limbs may be held elsewhere.
+    Boxes are wider by the part `beyond` of their longer sides, since limbs may be held elsewhere, and hold the `other`
+    pose, too; what stands in front hides what it does of the first.
     """
     part = jnp.asarray(beyond, tracker.body.blob_sigmas.dtype)
-    return with_room(lambda room: _views_near(tracker, frame, pose, part, room), capacities)
+    poses = jnp.stack([pose, pose if other is None else other])
+    return with_room(lambda room: _views_near(tracker, frame, poses, part, room), capacities)
 
 
 @compiled
 def _views_near(
-    tracker: Tracker, frame: FrameInput, pose: Float[Array, "dof"], beyond: Float[Array, ""], capacities: Capacities
+    tracker: Tracker, frame: FrameInput, poses: Float[Array, "2 dof"], beyond: Float[Array, ""], capacities: Capacities
 ) -> tuple[Views, Needed]:
-    state = TrackState.from_pose(pose)
-    boxes = tracker.boxes(state)
+    states = [TrackState.from_pose(pose) for pose in poses]
+    boxes = union_boxes(*map(tracker.boxes, states))
     more = beyond * jnp.max(boxes[..., 1, :] - boxes[..., 0, :], axis=-1, keepdims=True)
     wide = jnp.stack([boxes[..., 0, :] - more, boxes[..., 1, :] + more], axis=-2)
-    views, near, matching = tracker.views(frame, state, capacities, wide)
+    views, near, matching = tracker.views(frame, states[0], capacities, wide)
     return views, (jnp.max(near), jnp.max(matching))
 
 
