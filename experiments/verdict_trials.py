@@ -19,6 +19,7 @@ from sogjax.io.motion import Motion, load_motion
 from sogjax.io.motion_data import save_motion
 from sogjax.io.recording_files import GROUND_TRUTH
 from sogjax.model.body import Body
+from sogjax.quality.jumps import jumps
 from sogjax.quality.limb_warnings import limits_of
 from sogjax.quality.passages import passages
 from sogjax.quality.verdict import Verdict, expected_of, verdicts
@@ -147,9 +148,10 @@ class VerdictTrials:
         motions = {name: load_motion(place / f"{name}.npz") for name in kept["expected"]}
         expected = {name: value for name, value in kept["expected"].items() if value}
         bodies = self._bodies(trial)
-        inside = {body.name: passages(body, motions[body.name]) for body in bodies}
+        moved = {body.name: (body, motions[body.name]) for body in bodies}
+        odd = {name: [*jumps(*of_body), *passages(*of_body)] for name, of_body in moved.items()}
         limits = {body.name: limits_of(body) for body in bodies}
-        found = verdicts(motions, expected, limits, inside=inside)
+        found = verdicts(motions, expected, limits, limbs=odd)
         truth = self._truth(trial.sequence)
         return [judged_run(trial, name, motion, truth, found[name]) for name, motion in motions.items()]
 

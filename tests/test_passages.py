@@ -38,6 +38,6 @@ def test_legs_that_stay_inside_each_other_are_named_and_an_instant_is_not():
     assert said == ["look at frames 5-16, left leg through right leg"]
     assert passages(HUMAN, clip_of([apart] * 5 + [inside] * 4 + [apart] * 5)) == []
     motion = clip_of([inside] * 12)
-    found = verdicts({"human": motion}, {}, inside={"human": passages(HUMAN, motion)})["human"]
+    found = verdicts({"human": motion}, {}, limbs={"human": passages(HUMAN, motion)})["human"]
     assert found.sentence == "look at frames 0-11, left leg through right leg"
     assert not found.wrong

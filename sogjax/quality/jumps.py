@@ -5,7 +5,9 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Bool, Float
 
-from sogjax.io.motion import Motion
+from sogjax.io.motion import Motion, motion_from_poses
+from sogjax.model.body import Body
+from sogjax.model.limbs import limb_blobs, limb_names
 from sogjax.quality.metrics import stretches
 
 FAR, FPS = 0.2, 25.0
@@ -15,20 +17,22 @@ NEAR = 0.6
 
 
 def largest_step(fps: float) -> float:
-    """Metres that a blob may be off what the frames around it foretell; where these lie apart, more."""
+    """Metres that a blob may be off what the frames around it foretell: where these lie apart, more, soon anything."""
     return FAR * max(FPS / fps, 1.0) ** 3
 
 
 def steps(means: Float[np.ndarray, "frame *blob 3"]) -> Float[np.ndarray, "frame *blob"]:
-    """How far each blob jumps behind each frame, in metres, beyond how it moves before and after.
+    """How far each blob jumps behind each frame, in metres, beyond how it moves before and after; 0 behind the last.
 
-    Where it goes on beside its old path that is how far beside; 0 where too few frames are around.
+    Beside a single jump half of it is seen. The clip goes on at its ends as it moves there.
     """
     if len(means) < 4:
         return np.zeros(means.shape[:-1])
-    bend = means[1:-1] - 0.5 * (means[2:] + means[:-2])
-    return np.concatenate([np.zeros((1, *means.shape[1:-1])), np.linalg.norm(np.diff(bend, axis=0), axis=-1),
-                           np.zeros((2, *means.shape[1:-1]))])  # fmt: skip
+    first, last = means[:1] - means[2:3] + means[1:2], means[-1:] + means[-2:-1] - means[-3:-2]
+    path = np.concatenate([first, means, last])
+    bend = path[1:-1] - 0.5 * (path[2:] + path[:-2])
+    found = np.linalg.norm(np.diff(bend, axis=0), axis=-1)
+    return np.concatenate([found, np.zeros_like(found[:1])])
 
 
 def limb_jumps(
@@ -36,29 +40,29 @@ def limb_jumps(
     limbs: Bool[np.ndarray, "limb blob"],
     of_blobs: Callable[..., np.ndarray] = np.max,
 ) -> Float[np.ndarray, "frame limb"]:
-    """How far each limb jumps behind each frame, in metres: the blob that does so most, or `of_blobs`."""
-    found = steps(means)
-    return np.stack([of_blobs(found[:, blobs], axis=1) for blobs in limbs], axis=1)
+    """How far each limb jumps behind each frame, in metres: the blob that does so most, or `of_blobs`; 0 of none."""
+    found, jumps = steps(means), np.zeros((len(means), len(limbs)))
+    for k, blobs in enumerate(limbs):
+        if blobs.any():
+            jumps[:, k] = of_blobs(found[:, blobs], axis=1)
+    return jumps
 
 
-def peaks(jumps: Float[np.ndarray, "frame"]) -> Bool[np.ndarray, "frame"]:
-    """Which jumps are no smaller than those beside: a single one is seen, half as large, in the frames beside it."""
-    padded = np.pad(jumps, 1)
-    return (jumps >= padded[:-2]) & (jumps >= padded[2:])
+def peaks(jumps: Float[np.ndarray, "frame *limb"]) -> Float[np.ndarray, "frame *limb"]:
+    """The jumps that are no smaller than those beside; 0 for the others."""
+    beside = np.pad(jumps, [(1, 1), *[(0, 0)] * (jumps.ndim - 1)])
+    return np.where((jumps >= beside[:-2]) & (jumps >= beside[2:]), jumps, 0.0)
 
 
-def jumps(motion: Motion) -> list[str]:
-    """What to look at, one sentence for each jump, by their frames."""
-    if motion.limb_names is None or motion.joint_limb is None or motion.num_frames < 4:
+def jumps(body: Body, motion: Motion) -> list[str]:
+    """What to look at, one sentence for each jump, by their frames; what was filtered is judged as it was before."""
+    if motion.num_frames < 4:
         return []
-    of_blob = np.asarray(motion.joint_limb)[motion.blob_joint]
-    limbs = of_blob[None] == np.arange(len(motion.limb_names))[:, None]
-    names, limbs = motion.limb_names[limbs.any(axis=1)], limbs[limbs.any(axis=1)]
-    found = limb_jumps(motion.blob_means, limbs)
+    unfiltered = motion.unfiltered_pose
+    means = motion.blob_means if unfiltered is None else motion_from_poses(body, unfiltered, motion.fps).blob_means
+    found, said = peaks(limb_jumps(means, limb_blobs(body))), []
     least = largest_step(float(motion.fps) / float(np.median(np.diff(motion.frame))))
-    said = []
-    for name, column in zip(names, found.T, strict=True):
+    for name, column in zip(limb_names(body), found.T, strict=True):
         for first, stop in stretches(column > least, gap=2):
-            far = 100.0 * column[first:stop].max()
-            said.append((int(motion.frame[first]), f"{name} jumps by {far:.0f} cm", int(motion.frame[stop])))
-    return [f"look at frames {first}-{last}, {what}" for first, what, last in sorted(said)]
+            said.append((int(motion.frame[first]), int(motion.frame[stop]), f"{name} jumps"))
+    return [f"look at frames {first}-{last}, {what}" for first, last, what in sorted(said)]

@@ -17,6 +17,8 @@ LOOK = {
     "silhouettes overlap": "Silhouettes overlap too little everywhere: look at the actor's silhouettes below, and make "
     "the actor again with more or better example poses if it is too thick, too thin, too long or too short.",
     "fits badly": "Look at the stretches in which the body fits badly; start= and stop= leave them out.",
+    " jumps": "A limb that jumps is wrong on one side of the jump: the pictures of both frames show which. It may be "
+    "exchanged with another, or behind somebody; more cameras on other sides tell it.",
     " through ": "Limbs are inside each other or the trunk: they were exchanged, or one is lost. More cameras or "
     "keypoints tell them apart; start= begins in a frame in which they are clear of each other.",
     "at its limit": "A joint at its limit is drawn to something dark or alike behind it: light from behind, another "

@@ -10,7 +10,6 @@ from jaxtyping import Bool, Float, Int
 from sogjax.io.motion import Motion
 from sogjax.model.body import Body
 from sogjax.quality.fitted import fitted_numbers
-from sogjax.quality.jumps import jumps
 from sogjax.quality.limb_warnings import DoubtfulLimb, Limits, doubtful_limbs, joints_at_limits
 from sogjax.quality.metrics import stretches
 
@@ -83,22 +82,22 @@ def verdicts(
     limits: Mapping[str, Mapping[str, Limits]] | None = None,
     begun: Mapping[str, str] | None = None,
     odd: Mapping[str, Sequence[str]] | None = None,
-    inside: Mapping[str, Sequence[str]] | None = None,
+    limbs: Mapping[str, Sequence[str]] | None = None,
 ) -> dict[str, Verdict]:
     """Of the actors of a run.
 
     `expected` is what actors explain in their example poses, where that is known; `limits` are those of their bodies
     (`limits_of`); `begun` says of actors that their initial pose was not sure, which counts where there is more; `odd`
-    says what is odd or doubtful about bodies, `inside` where limbs are in each other (`passages`).
+    says what is odd or doubtful about bodies, `limbs` where they jump (`jumps`) or are in each other (`passages`).
     """
-    limits, begun, odd, inside = limits or {}, begun or {}, odd or {}, inside or {}
+    limits, begun, odd, limbs = limits or {}, begun or {}, odd or {}, limbs or {}
     return {
         name: _verdict(
             name,
             motion,
             expected=expected.get(name),
             others=_inside(name, motions),
-            inside=inside.get(name, ()),
+            limbs=limbs.get(name, ()),
             limits=limits.get(name, {}),
             begun=begun.get(name),
             odd=odd.get(name, ()),
@@ -112,7 +111,7 @@ def _verdict(
     motion: Motion,
     expected: float | None,
     others: Sequence[str],
-    inside: Sequence[str],
+    limbs: Sequence[str],
     limits: Mapping[str, Limits],
     begun: str | None,
     odd: Sequence[str],
@@ -122,7 +121,7 @@ def _verdict(
     overlap = _overlaps(motion)
     wrong = [*_wrong(explained, expected, overlap), *others]
     doubtful = doubtful_limbs(motion)
-    parts = [*_limbs(doubtful), *_shortened(jumps(motion)), *_shortened([*inside]), *_bent(motion, limits)]
+    parts = [*_limbs(doubtful), *_shortened([*limbs]), *_bent(motion, limits)]
     look = [] if wrong else [*_bad_overlaps(overlap), *_bad_stretches(motion), *parts]
     look = [*odd, *look]
     if begun is not None and (wrong or look):

@@ -13,6 +13,7 @@ from sogjax.io.motion import Motion
 from sogjax.io.recording import Recording
 from sogjax.io.video import read_chosen
 from sogjax.quality.evaluation import GroupEvaluation, evaluate_motions
+from sogjax.quality.jumps import jumps
 from sogjax.quality.limb_warnings import limits_of
 from sogjax.quality.passages import passages
 from sogjax.quality.proportions import odd_sentence
@@ -30,11 +31,12 @@ def judged_result(run: Run) -> RunResult:
     limits = {body.name: limits_of(body) for body in result.bodies}
     doubts = dict(zip((body.name for body in run.actors.bodies), run.actors.doubts, strict=False))
     odd = {body.name: [said for said in (doubts.get(body.name), odd_sentence(body)) if said] for body in result.bodies}
-    inside = {body.name: passages(body, result.motions[body.name]) for body in result.bodies}
+    moved = {body.name: (body, result.motions[body.name]) for body in result.bodies}
+    limbs = {name: [*jumps(*of_body), *passages(*of_body)] for name, of_body in moved.items()}
     return replace(
         result,
         evaluation=compared(result.recording, result.motions),
-        verdicts=verdicts(result.motions, expected_of(result.bodies), limits, _doubtful_begin(run), odd, inside),
+        verdicts=verdicts(result.motions, expected_of(result.bodies), limits, _doubtful_begin(run), odd, limbs),
     )
 
 

@@ -1,9 +1,9 @@
 """Other passes: each part of the body is taken from the pass that explains it better, over time.
 
 In key frames all over the clip limbs are held in other ways, and in a few frames actors are turned back to front. Where
-that is worth more than what was tracked, a pass goes from there both ways. Where limbs are in doubt then, a pass comes
-backwards from behind: a limb that is lost is often found again by itself, and what hid it, or moved too far for one
-frame, comes from the other side.
+that is worth more than what was tracked, a pass goes from there both ways. Where limbs jump, passes hold them as they
+are before or behind, and are taken whole. Where limbs are in doubt then, a pass comes backwards from behind: a limb
+that is lost is often found again by itself, and what hid it, or moved too far for one frame, comes from the other side.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,7 +24,7 @@ from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.quality.limb_warnings import LIKELY_LOST
 from sogjax.quality.metrics import stretches
 from sogjax.search.body_parts import body_parts, merged_pose, select_parts
-from sogjax.search.jump_passes import Jump, chosen_rows, largest_jump, passes_without
+from sogjax.search.jump_passes import ChosenRows, Jump, chosen_rows, largest_jump, passes_without
 from sogjax.search.limb_search import MORE, LimbSearch, climbed_in
 from sogjax.search.misplaced import Misplaced
 from sogjax.search.other_pass import (
@@ -181,27 +181,28 @@ class _Revising:
 
         First one limb by itself, then all that jump there.
         """
-        search = LimbSearch.of(self.tracker)
-        for together in (False, True):
+        search, body = LimbSearch.of(self.tracker), self.tracker.body
+        for at_once in (1, 2):
             tried: set[int] = set()
             while search is not None and not self._tired():
-                jump = largest_jump(self.tracker.body, self.passed, least, tried)
+                jump = largest_jump(body, self.passed, least, tried, at_once)
                 if jump is None:
                     break
                 tried.add(jump.row)
-                if not together or len(jump.limbs) > 1:
-                    self._smooth_jump(search, jump, together)
+                self._smooth_jump(search, jump, [jump.limbs] if at_once > 1 else [(limb,) for limb in jump.limbs])
         self._looked_at = 0
 
-    def _smooth_jump(self, search: LimbSearch, jump: Jump, together: bool) -> None:
-        """Take the pass that is worth most of those in which limbs do not jump, if it is worth anything."""
-        held = [jump.limbs] if together else [limb[None] for limb in jump.limbs]
-        passes = [each for limbs in held for each in passes_without(search, self.passed, self.frames, jump, limbs)]
-        choices = [chosen_rows(self.tracker.body, self.passed, each) for each in passes]
-        for choice in sorted(choices, key=lambda each: -each.value)[:1]:
-            self._revise_rows(choice.found, choice.poses)
-            self._looked_at -= len(choice.taken) if choice.taken.any() else 0
-        self._looked_at += sum(len(each.rows) for each in passes)
+    def _smooth_jump(self, search: LimbSearch, jump: Jump, ways: Sequence[Sequence[int]]) -> None:
+        """Take the pass that is worth most of those in which some limbs do not jump, if it is worth anything."""
+        best: ChosenRows | None = None
+        for held in ways:
+            for found in passes_without(search, self.passed, self.frames, jump, held):
+                self._looked_at += len(found.rows)
+                choice = chosen_rows(self.tracker.body, self.passed, found)
+                best = choice if best is None or choice.value > best.value else best
+        if best is not None and best.taken.any():
+            self._looked_at -= len(best.taken)
+            self._revise_rows(best.found, best.poses)
 
     def _search_limbs(self, search: LimbSearch, rows: Sequence[int], report: Report) -> None:
         for number, row in enumerate(rows):
@@ -264,8 +265,9 @@ class _Revising:
         """Put poses into the rows of another pass, of which parts were `taken`; None: what is elsewhere then."""
         rows = np.array(found.rows)
         if taken is None:
+            by_itself = np.array([len(part.names) == 1 for part in self.parts])
             elsewhere = np.stack(found.apart) > fitted_numbers().merge_passes.apart
-            taken = elsewhere & np.isin(rows, [*merged])[:, None]
+            taken = elsewhere & by_itself & np.isin(rows, [*merged])[:, None]
         for row, pose in merged.items():
             self.passed.poses[row] = pose
         for k, row in enumerate(found.rows):

@@ -1,6 +1,7 @@
 """A pass from elsewhere beside one that is known: where they are apart, and which explains each part better.
 
-It begins behind frames in doubt and goes backwards, or at another pose of a key frame and goes both ways.
+It begins behind frames in doubt and goes backwards, at another pose of a key frame and goes both ways, or where a limb
+jumps.
 """
 
 from collections import deque
@@ -13,6 +14,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.energy.frame_energy import FrameEnergy
+from sogjax.energy.keypoints import keypoint_term_among
 from sogjax.energy.posed import History
 from sogjax.energy.views import Views
 from sogjax.model.body import Body
@@ -139,9 +141,9 @@ def compared(
 ) -> Compared:
     """Track some rows, one after the other, until both passes agree again after at least so many.
 
-    With `patience` the pass ends, too, where it has explained less than the known one for so many frames. With what is
-    `spared` in each row, energy as well, that must be less in sum, too, and no parts are compared: such a pass is taken
-    as it is, or not at all.
+    With `patience` the pass ends, too, where it has explained less than the known one for so many frames; if there is
+    energy that it has `spared` in each row, only once it has lost more than that. Then no parts are compared, since
+    such a pass is taken whole.
     """
     found, choices, numbers = Compared(), PartArrays.of(tracker.body, parts), fitted_numbers().merge_passes
     # Parts are compared once the pass is promising; views are large, so few frames wait for that.
@@ -165,9 +167,7 @@ def compared(
         if patience is not None or differ(k).any():
             seen = BothSeen.of(tracker, found.cells[k], tracked.capacities, *both)
             found.gained[k] = seen.gain
-            waiting.append((k, seen))
-        if spared is not None:
-            waiting.clear()
+            waiting.extend([(k, seen)] if spared is None else [])
         promising = promising or sum(found.gained) >= LEAST_GAIN * passed.energy
         while waiting and (promising or len(waiting) > MOST_WAITING):
             compare(*waiting.popleft())
@@ -184,14 +184,15 @@ def compared(
 
 @dataclass(frozen=True)
 class BothSeen:
-    """A known pose of a frame and another one, and what is seen around either, wider by `REACH`.
+    """A known pose of a frame and another one, and what is seen around both, wider by `REACH`.
 
     Tracking valued each in views of its own, in which other image blobs count: these energies cannot be compared.
     """
 
     poses: Float[Array, "2 dof"]
     views: tuple[Views, ...]
-    """What is seen around both; where something stands in front, with what that hides of the one, and of the other."""
+    """What is seen around both. Where something stands in front, or there are keypoints, twice: with what is hidden of
+    the one, and whose keypoints they are beside it, and with that of the other."""
     values: Float[np.ndarray, "view 2"]
     """The energy of both poses."""
 
@@ -206,7 +207,8 @@ class BothSeen:
     ) -> "BothSeen":
         """Look at a frame around both poses, with at least so much room for image blobs."""
         poses, seen = jnp.stack([jnp.asarray(known), jnp.asarray(other)]), on_device(frame)
-        orders = (poses,) if tracker.reader.occluders is None else (poses, poses[::-1])
+        alike = tracker.reader.occluders is None and keypoint_term_among(tracker.terms) is None
+        orders = (poses,) if alike else (poses, poses[::-1])
         views = tuple(views_near(tracker, seen, one, capacities, REACH, two) for one, two in orders)
         return cls(poses, views, np.stack([_energies(tracker, around, poses) for around in views]))
 
