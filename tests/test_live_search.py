@@ -46,8 +46,11 @@ def step(walking_dog):
     return found
 
 
-def frames_until(following, cells, stop, begin=0, most=400):
-    """Feed frames, the last one again and again, at their rate; the frame at which `stop` holds."""
+def frames_until(following, cells, stop, begin=0, most=4000):
+    """Feed frames, the last one again and again, at their rate; the frame at which `stop` holds.
+
+    So many at most, since on a busy machine the search beside takes its time.
+    """
     for k in range(begin, begin + most):
         solved = following.follow(cells[min(k, len(cells) - 1)], ALL, k * PERIOD)
         if stop(solved):
