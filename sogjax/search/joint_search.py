@@ -1,7 +1,7 @@
 """The poses of all actors in one frame without a hint, found alone and judged together, followed into later frames."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -9,7 +9,7 @@ from jaxtyping import Float
 from sogjax.search.cell_evidence import cell_evidence
 from sogjax.search.combination import Combination, Optima, best_combination, in_one_place
 from sogjax.search.found_pose import Followed, Path, judged
-from sogjax.search.placed_body import centres_of
+from sogjax.search.placed_body import centres_of, uprightness
 from sogjax.search.pose_search import (
     NUM_LAST,
     Hypotheses,
@@ -37,6 +37,9 @@ SEARCHING = 0.7
 """Part of the work that is searching; the rest is weighing and following."""
 LEFT_OVER = 0.5
 """Part of what the best of an actor's optima is worth alone: one who keeps less beside the others is searched again."""
+UPSIDE_DOWN = 0.1
+"""What being upside down costs, as a part of the likelihood that a body gains by being seen for each of its cells: few
+people are, and shadows on the floor look like arms that are held up."""
 
 Poses = Float[np.ndarray, "hypothesis dof"]
 
@@ -79,9 +82,14 @@ class Sought:
         return frame
 
     def scored(self, frame: SeenFrame) -> Float[np.ndarray, "hypothesis"]:
-        """The energies of its optima in a frame."""
+        """How likely its optima are in a frame, as energies."""
         placed, tried = _placed(self.searcher, frame, self.poses)
-        return placed.scored(tried).values
+        return self.likely(placed.scored(tried)).values
+
+    def likely(self, tried: Hypotheses) -> Hypotheses:
+        """Hypotheses with their energies less what being upside down costs."""
+        downwards = np.maximum(-uprightness(self.searcher.body, tried.poses, self.searcher.up), 0.0)
+        return replace(tried, values=tried.values - UPSIDE_DOWN * downwards)
 
 
 def _searched(searcher: PoseSearch, frame: SeenFrame, report: Report = unreported) -> Poses:
@@ -146,7 +154,7 @@ def _beside_others(actors: Sequence[Sought], k: int, at: Sequence[Float[np.ndarr
     """
     actor, others = actors[k], [(other, at[j]) for j, other in enumerate(actors) if j != k]
     placed, tried = _placed(actor.searcher, actor.given(0, others), at[k][None])
-    held = with_look_alikes(placed, with_better_limbs(placed, tried))
+    held = actor.likely(with_look_alikes(placed, with_better_limbs(placed, tried)))
     poses = np.concatenate([held.poses, actor.poses]).astype(np.float32)
     values = np.concatenate([held.values, actor.scored(actor.given(0, others))])
     values[np.argmax(held.values)] = values.max() + 1.0  # first, whatever those in another place are worth
@@ -182,7 +190,7 @@ def _climbed_beside(
     """Hypotheses of one actor climbed in a frame in which the others are in some poses."""
     others = [(other, pose) for j, (other, pose) in enumerate(zip(actors, at, strict=True)) if j != k]
     placed, tried = _placed(actors[k].searcher, actors[k].given(number, others), poses)
-    return placed.climbed(tried, ITERATIONS)
+    return actors[k].likely(placed.climbed(tried, ITERATIONS))
 
 
 def _best_beside(actors: Sequence[Sought], k: int, climbed: Hypotheses, at: Sequence[Float[np.ndarray, "dof"]]) -> int:

@@ -1,5 +1,6 @@
 """Places where a body may be in one frame: the parts of space that look like it in all cameras, and how they lie."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import jax
@@ -25,10 +26,18 @@ SEEN_BY = 0.5
 """Part of the cameras (and two of them) that must see a place."""
 TRUNK = 0.13
 """Metres, standard deviation: what is smoothed over to find the thickest part of a body."""
+STANDING = 0.4
+"""The same along the vertical, to find people who stand: feet and shadows of several on the floor are no body then."""
+POOR = 0.3
+"""Places that look less like the body than this part of the best are left out."""
 APART = 0.4
 """Metres between places that count as different."""
 BODY_REACH = 0.95
 """Metres around a place in which the rest of the body is."""
+COLUMN = 0.2
+"""Metres around the axis of somebody who stands, in which nobody else is."""
+BESIDE = 0.25
+"""Metres between two who stand and embrace, at least."""
 BETWEEN = 0.35
 """Metres between the halves of a place from which on they may be two bodies that touch; of somebody with his arms
 stretched out 0.3, of two who embrace 0.45."""
@@ -54,23 +63,52 @@ class Place:
 def places(frame: SeenFrame, up: str, count: int, among: int = 1) -> list[Place]:
     """The places that look most like the body, best first, at most `count`.
 
-    `among` is how many actors there are: the best place may be two of them who touch, and its halves come before it.
+    `among` is how many actors there are: where so many people stand comes first then; where fewer are told apart, the
+    best place may be two of them who touch, and its halves come before it.
     """
     grid, spacing = _voxels(frame.cameras, up)
-    shape = grid.shape[:3]
     flat = jnp.asarray(grid.reshape(-1, 3), frame.odds.dtype)
-    scores = np.array(_voxel_scores(frame, flat), float).reshape(shape)
-    smooth = gaussian_filter(np.maximum(scores, -1.0), TRUNK / spacing, mode="constant", cval=-1.0)
+    scores = np.array(_voxel_scores(frame, flat), float).reshape(grid.shape[:3])
+    return places_among(grid, spacing, scores, up, count, among)
+
+
+def places_among(
+    grid: Float[np.ndarray, "a b c 3"],
+    spacing: float,
+    scores: Float[np.ndarray, "a b c"],
+    up: str,
+    count: int,
+    among: int,
+) -> list[Place]:
+    """`places` in voxels (metres, world), so far from each other, by how much each looks like the body."""
+    bodies = _apart((_place_at(grid, scores, *peak) for peak in _peaks(scores, np.full(3, TRUNK / spacing))), count)
+    if among == 1 or not bodies:
+        return bodies
+    tall = _peaks(scores, np.where(np.abs(axis_vector(up)) > 0.5, STANDING, TRUNK) / spacing)
+    people = _apart((_standing_at(grid, scores, *peak, up) for peak in tall), among, BESIDE)
+    if len(people) < among:
+        people = _halves(grid, scores, bodies[0], up) or people
+    return [*people, *bodies][:count]
+
+
+def _peaks(scores: Float[np.ndarray, "a b c"], width: Float[np.ndarray, "3"]) -> list[tuple[tuple[int, ...], float]]:
+    """The voxels around which the scores are highest, smoothed over so many voxels, and their values; best first."""
+    smooth = gaussian_filter(np.maximum(scores, -1.0), width, mode="constant", cval=-1.0)
     peaks = np.argwhere((smooth == maximum_filter(smooth, size=3)) & (smooth > -0.9))
-    peaks = peaks[np.argsort(-smooth[tuple(peaks.T)])]
-    found: list[Place] = []
-    for peak in peaks:
-        place = _place_at(grid, scores, tuple(map(int, peak)), float(smooth[tuple(peak)]))
-        if all(np.linalg.norm(place.centre - other.centre) >= APART for other in found):
-            found.append(place)
-        if len(found) == count:
+    values = smooth[tuple(peaks.T)]
+    order = np.argsort(-values)
+    return [(tuple(map(int, peak)), float(value)) for peak, value in zip(peaks[order], values[order], strict=True)]
+
+
+def _apart(found: Iterable[Place], count: int, apart: float = APART) -> list[Place]:
+    """The first of them that look nearly as much like the body as the best, so far (metres) from those before."""
+    kept: list[Place] = []
+    for place in found:
+        if kept and (len(kept) == count or place.score < POOR * kept[0].score):
             break
-    return [*_halves(grid, scores, found[0], up), *found][:count] if among > 1 and found else found
+        if all(np.linalg.norm(place.centre - other.centre) >= apart for other in kept):
+            kept.append(place)
+    return kept
 
 
 def _place_at(grid: np.ndarray, scores: np.ndarray, peak: tuple[int, ...], score: float) -> Place:
@@ -88,6 +126,17 @@ def _place_at(grid: np.ndarray, scores: np.ndarray, peak: tuple[int, ...], score
     solid = (weights > 0.0) & (np.linalg.norm(np.cross(off, axis), axis=1) < THICK) & (np.abs(off @ axis) < TALL)
     low, high = np.percentile(off[solid] @ axis, (0.5, 99.5)) if solid.any() else (0.0, 0.0)
     return Place(centre, axis, float(np.sqrt(values[2] / max(values[1], 1e-9))), score, float(high - low))
+
+
+def _standing_at(grid: np.ndarray, scores: np.ndarray, peak: tuple[int, ...], score: float, up: str) -> Place:
+    """Where somebody stands around a peak: the middle of what looks like the body above and below it."""
+    vertical, points = np.abs(axis_vector(up)), grid.reshape(-1, 3)
+    off = points - grid[peak]
+    along = off @ vertical
+    near = (np.linalg.norm(off - along[:, None] * vertical, axis=1) < COLUMN) & (np.abs(along) < TALL)
+    weights = near * np.maximum(scores - 0.5 * score, 0.0).reshape(-1)
+    centre = weights @ points / weights.sum() if weights.sum() > 0.0 else grid[peak]
+    return Place(centre, vertical, 1.0, score, 0.0)
 
 
 def _halves(grid: np.ndarray, scores: np.ndarray, place: Place, up: str) -> list[Place]:

@@ -21,7 +21,14 @@ from sogjax.model.program import compiled
 from sogjax.model.rotation import axis_vector
 from sogjax.scene.color_clusters import ColorClusters
 from sogjax.search.mirrored import look_alikes
-from sogjax.search.placed_body import centred, centres_of, headings, means_of, turned_to, turns_with_vertical
+from sogjax.search.placed_body import (
+    centred,
+    centres_of,
+    headings,
+    means_of,
+    turned_to,
+    turns_with_vertical,
+)
 from sogjax.search.places import APART, Place, places
 from sogjax.search.search_energy import LARGEST_ANGLE, LARGEST_TRANSLATION, SearchEnergy, climbed, scores
 from sogjax.search.seen_frame import SeenFrame
@@ -49,8 +56,6 @@ NUM_DRAWN = 16
 """Ways to hold a limb that are drawn at random, beside those of the named poses."""
 LIMB_APART = 0.01
 """`DIFFERENT`, for poses that differ in one limb."""
-POOR = 0.3
-"""Places that look less like the body than this part of the best are left out."""
 DIFFERENT = 0.1
 """Metres, mean distance of the blobs: poses farther apart are different optima."""
 
@@ -105,7 +110,6 @@ def search(searcher: PoseSearch, frame: SeenFrame, count: int = NUM_LAST, report
     found = places(frame, searcher.up, NUM_PLACES, searcher.among)
     if not found:
         return []
-    found = [place for place in found if place.score >= POOR * found[0].score] or found[:1]
     placed = PlacedSearch.of_places(searcher, frame, np.stack([place.centre for place in found]))
     tried = _starts(searcher, found)
     with ThreadPoolExecutor(2) as beside:
