@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8, UInt64
 
 MODES = 3
 """Groups that are looked for in each pixel."""
@@ -94,7 +94,7 @@ FEWEST_NEIGHBOURS = 3
 SHARE = 0.25
 """Share of the tolerance within which a colour clearly continues the background: with all of it, the subject is entered
 through the one place where it looks like what is beside it, and then taken as a whole."""
-_STEPS = [(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)]
+_STEPS = np.array([(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)])
 
 
 def grown(
@@ -161,28 +161,33 @@ class _Field:
     def beside_known(self) -> Int[np.ndarray, "pixel"]:
         """Undecided pixels of the zone that lie beside known background."""
         near = np.zeros_like(self._known)
-        for down, right in _STEPS:
+        for down, right in _STEPS.tolist():
             near |= np.roll(self._known, (down, right), (0, 1))
         return np.flatnonzero(near[self.rows + 1, self.columns + 1] & (self.chosen < 0))
 
     def costs(self, front: Int[np.ndarray, "pixel"]) -> Float[np.ndarray, "mode pixel"]:
         """Mean step of colour from each mode to the known neighbours that it suits best."""
-        found = np.full((len(_STEPS), MODES, len(front)), MOST_APART, np.float32)
-        for k, (down, right) in enumerate(_STEPS):
-            row, column = self.rows[front] + 1 + down, self.columns[front] + 1 + right
-            step = np.abs(self._colors[:, :, front] - self._picture[row, column].T[None]).max(axis=1)
-            cost = np.minimum(step, MOST_APART) * (1.0 - self._together(front, self._times[row, column]))
-            found[k] = np.where(self._known[row, column], cost, MOST_APART)
+        row, column = self._around(self.rows[front] + 1, self.columns[front] + 1)
+        colors, beside = self._colors[:, :, front], np.moveaxis(self._picture[row, column], -1, 0)
+        steps = [np.abs(colors[:, k] - beside[k][:, None]) for k in range(3)]
+        step = np.minimum(np.maximum(np.maximum(steps[0], steps[1]), steps[2]), MOST_APART)
+        step[:, : self._across] *= 1.0 - self._together(front, self._times[row, column][:, None])
+        found = np.where(self._known[row, column][:, None], step, MOST_APART).astype(np.float32)
         nearest = np.partition(found, FEWEST_NEIGHBOURS - 1, axis=0)[:FEWEST_NEIGHBOURS].mean(axis=0)
         return np.where(self._enough[:, front], nearest, np.inf)
 
     def _together(
-        self, front: Int[np.ndarray, "pixel"], times: UInt8[np.ndarray, "pixel"] | np.ndarray
-    ) -> Float[np.ndarray, "mode pixel"]:
+        self, front: Int[np.ndarray, "pixel"], times: UInt64[np.ndarray, "step 1 pixel"]
+    ) -> Float[np.ndarray, "step mode pixel"]:
         """How much both were seen, and both hidden, at the same times: the smaller of the two overlaps."""
         seen = self._seen[: self._across, front]
-        overlap = np.minimum(_overlap(seen, times), _overlap(~seen & self._all, ~times & self._all))
-        return np.pad(overlap, ((0, MODES - self._across), (0, 0)))
+        return np.minimum(_overlap(seen, times), _overlap(~seen & self._all, ~times & self._all))
+
+    def _around(
+        self, row: Int[np.ndarray, "pixel"], column: Int[np.ndarray, "pixel"]
+    ) -> tuple[Int[np.ndarray, "step pixel"], Int[np.ndarray, "step pixel"]]:
+        """The neighbours of pixels."""
+        return row + _STEPS[:, :1], column + _STEPS[:, 1:]
 
     def take(self, pixels: Int[np.ndarray, "pixel"], modes: Int[np.ndarray, "pixel"]) -> Int[np.ndarray, "next"]:
         """Add pixels to the known background; returns the undecided ones beside them."""
@@ -191,7 +196,7 @@ class _Field:
         self._known[row, column] = True
         self._picture[row, column] = self._colors[modes, :, pixels]
         self._times[row, column] = self._seen[modes, pixels]
-        around = np.concatenate([self._number[row + down, column + right] for down, right in _STEPS])
+        around = self._number[self._around(row, column)]
         around = np.unique(around[around >= 0])
         return around[self.chosen[around] < 0]
 
