@@ -209,7 +209,7 @@ def _bits(members: Bool[np.ndarray, "*mode sample pixel"]) -> np.ndarray:
     return whole.view(np.uint64)[..., 0]
 
 
-def _overlap(a: np.ndarray, b: np.ndarray) -> Float[np.ndarray, "mode pixel"]:
+def _overlap(a: np.ndarray, b: np.ndarray) -> Float[np.ndarray, "step mode pixel"]:
     """Samples that both sets have, as a share of those that one of them has."""
     both, either = np.bitwise_count(a & b), np.bitwise_count(a | b)
     return both / np.maximum(either, 1).astype(np.float32)
