@@ -1,6 +1,5 @@
 """Places where a body may be, in voxels that look more or less like it."""
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from body_cases import shipped
@@ -69,4 +68,4 @@ def test_who_stands_on_his_head_is_not_upright():
     heads_down = turns_with_vertical(human, [rest], up, -up)
     assert (uprightness(human, heads_down, "z") < -0.9).all()
     assert uprightness(human, rest[None], "z") == pytest.approx([1.0], abs=1e-5)
-    assert jnp.asarray(heads_down).shape[0] > 3
+    assert len(heads_down) > 3

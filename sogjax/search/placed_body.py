@@ -14,13 +14,14 @@ from sogjax.model.rotation import axis_vector
 
 
 def means_of(body: Body, poses: Float[np.ndarray, "start dof"]) -> Float[np.ndarray, "start blob 3"]:
-    """The blobs of a body in poses (metres, world), so many poses at a time that one program serves any number."""
+    """The blobs of a body in poses (metres, world)."""
     return _padded(_means, body, poses)
 
 
 def _padded(
     of: Callable[[Body, Array], Array], body: Body, poses: Float[np.ndarray, "start dof"]
 ) -> Float[np.ndarray, "start ..."]:
+    """What `of` gives for each pose, so many poses at a time that one program serves any number."""
     size = 64
     padded = np.concatenate([poses, np.repeat(poses[-1:], -len(poses) % size, axis=0)])
     parts = [np.asarray(of(body, jnp.asarray(padded[k : k + size]))) for k in range(0, len(poses), size)]
@@ -51,8 +52,8 @@ def centres_of(body: Body, poses: Float[np.ndarray, "start dof"]) -> Float[np.nd
 def uprightness(body: Body, poses: Float[np.ndarray, "start dof"], up: str) -> Float[np.ndarray, "start"]:
     """The cosine of the angle between the vertical and what is its vertical at rest: -1 upside down."""
     vertical, root = axis_vector(up), _root_joints(body)[-1]
-    rest = _joint_frames(body, np.asarray(body.poses["rest"])[None])[0, root, :3, :3]
-    turns = _joint_frames(body, poses)[:, root, :3, :3] @ rest.T
+    rest = _joint_frames(body, body.poses["rest"])[root, :3, :3]
+    turns = _padded(_posed_joints, body, poses)[:, root, :3, :3] @ rest.T
     return np.einsum("i,sij,j->s", vertical, turns, vertical)
 
 
@@ -153,7 +154,7 @@ def turns_with_vertical(
 
 def _root_turns(body: Body) -> list[tuple[Float[np.ndarray, "3"], int, float]]:
     """The joints of the root that turn the whole body, in their order: axis in the rest pose, dof, weight."""
-    axes, frames = np.asarray(body.skeleton.axes, float), _joint_frames(body, np.asarray(body.poses["rest"])[None])[0]
+    axes, frames = np.asarray(body.skeleton.axes, float), _joint_frames(body, body.poses["rest"])
     root = root_position(body, body.poses["rest"])
     return [
         (frames[joint, :3, :3] @ axes[joint], dof, weight)
@@ -179,16 +180,16 @@ def root_position(body: Body, pose: Float[Array, "dof"]) -> Float[np.ndarray, "3
     chain = _root_joints(body)
     at_root = [joint for joint in chain[1:] if np.linalg.norm(offsets[joint]) > 1e-9]
     last = chain[chain.index(at_root[0]) - 1] if at_root else chain[-1]
-    return _joint_frames(body, np.asarray(pose)[None])[0, last, :3, 3]
+    return _joint_frames(body, pose)[last, :3, 3]
 
 
 def root_rotation(body: Body, pose: Float[Array, "dof"]) -> Float[np.ndarray, "3 3"]:
     """The turn of the trunk in a pose: the rotation of the joint where the tree first branches."""
-    return _joint_frames(body, np.asarray(pose)[None])[0, _root_joints(body)[-1], :3, :3]
+    return _joint_frames(body, pose)[_root_joints(body)[-1], :3, :3]
 
 
-def _joint_frames(body: Body, poses: Float[np.ndarray, "start dof"]) -> Float[np.ndarray, "start joint 4 4"]:
-    return _padded(_posed_joints, body, poses).astype(float)
+def _joint_frames(body: Body, pose: Float[Array, "dof"]) -> Float[np.ndarray, "joint 4 4"]:
+    return _padded(_posed_joints, body, np.asarray(pose)[None])[0].astype(float)
 
 
 @compiled

@@ -21,14 +21,7 @@ from sogjax.model.program import compiled
 from sogjax.model.rotation import axis_vector
 from sogjax.scene.color_clusters import ColorClusters
 from sogjax.search.mirrored import look_alikes
-from sogjax.search.placed_body import (
-    centred,
-    centres_of,
-    headings,
-    means_of,
-    turned_to,
-    turns_with_vertical,
-)
+from sogjax.search.placed_body import centred, centres_of, headings, means_of, turned_to, turns_with_vertical
 from sogjax.search.places import APART, Place, places
 from sogjax.search.search_energy import LARGEST_ANGLE, LARGEST_TRANSLATION, SearchEnergy, climbed, scores
 from sogjax.search.seen_frame import SeenFrame
