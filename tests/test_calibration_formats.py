@@ -233,6 +233,14 @@ def test_large_nonsense_is_refused_at_once(tmp_path, content):
     assert time.perf_counter() - begin < 10.0
 
 
+@pytest.mark.parametrize("first", ["[1]", "{a: 1}", "  a: 1", '  - "a"', "- 1", "a: 1\n---\n  - 1", "a: 1\n..."])
+def test_what_opencv_would_read_for_ever_is_refused(tmp_path, first):
+    path = tmp_path / "intri.yml"
+    path.write_text(f"%YAML:1.0\n---\n{first}\nK_a:\n  - 1\n")
+    with pytest.raises(InputError, match="not one map of keys"):
+        load_calibration(path)
+
+
 def only_input_errors(path, text):
     path.write_bytes(text.encode("utf-8", errors="surrogatepass"))
     try:

@@ -116,6 +116,8 @@ def _content(path: Path, text: str) -> Content:
     """The content by key: a matrix as a row of numbers, or a number; all else is None."""
     if _too_deep(text) or "\0" in text:
         raise InputError(f"{path}: is not YAML as OpenCV writes it (nested too deeply); export it again")
+    if not _is_one_map(text):
+        raise InputError(f"{path}: is not YAML as OpenCV writes it (not one map of keys); export it again")
     try:
         storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
         root = storage.root()
@@ -133,6 +135,13 @@ def _too_deep(text: str) -> bool:
         deepest = max(deepest, depth)
     indent = max((len(space) for space in re.findall(r"^[ \t-]*", text, re.M)), default=0)
     return deepest > 16 or indent > 64
+
+
+def _is_one_map(text: str) -> bool:
+    """Whether all is one map from its first line to its last; behind anything else OpenCV's parser may not end."""
+    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith(("#", "%"))]
+    lines = lines[1:] if lines and lines[0].strip() == "---" else lines
+    return bool(lines) and lines[0][0] not in " [{-" and not any(line.startswith(("---", "...")) for line in lines)
 
 
 def _value(node: cv2.FileNode) -> object:
