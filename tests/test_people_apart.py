@@ -210,7 +210,7 @@ def test_who_stands_where_nothing_is_known_is_found_by_colour():
     around = {k: cv2.dilate(mask.astype(np.uint8), np.ones((41, 41))) > 0 for k, mask in seen.masks[0].items()}
     hidden = replace(seen, pictures=pictures, unknown=around, masks=[NOTHING, NOTHING])
     assert isinstance(examples_of_masks(recording_of(RIG, 2), hidden, 2, 2), str)
-    decided = hidden.decided()
+    decided = hidden.decided(np.array([0.0, 0.0, 1.0]))
     for found, truth in zip(decided.masks, seen.masks, strict=True):
         assert min((found[k] & truth[k]).sum() / (found[k] | truth[k]).sum() for k in truth) > 0.9
     assert not isinstance(examples_of_masks(recording_of(RIG, 2), decided, 2, 2), str)

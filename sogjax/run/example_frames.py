@@ -138,7 +138,7 @@ def _person_examples(clip: Clip, learnt: Sequence[BackgroundImage]) -> tuple[Exa
     shapes = seen_shapes(seen, recording.up)
     problem = unsuitable(shapes, lambda: num_people_seen(clip, learnt), has_plates(recording))
     if problem is not None and seen.undecided:
-        decided = seen_shapes(seen.decided(), recording.up)
+        decided = seen_shapes(seen.decided(axis_vector(recording.up)), recording.up)
         if unsuitable(decided, lambda: most_seen([shape.num_bodies for shape in decided])) is None:
             shapes, problem = decided, None
     if problem is not None:

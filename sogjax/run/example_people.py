@@ -62,7 +62,7 @@ def people_examples(
     examples = examples_of_masks(clip.recording, seen, actors, count)
     if not isinstance(examples, str) or not seen.undecided:
         return examples
-    second = examples_of_masks(clip.recording, seen.decided(), actors, count)
+    second = examples_of_masks(clip.recording, seen.decided(axis_vector(clip.recording.up)), actors, count)
     return examples if isinstance(second, str) else second
 
 

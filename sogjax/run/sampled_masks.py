@@ -22,7 +22,8 @@ from sogjax.scene.background_difference import closed, widened
 from sogjax.scene.cells import CellGrid
 from sogjax.scene.foreground import BackgroundModel, log_odds
 from sogjax.scene.occluders import painted
-from sogjax.scene.segmentation import largest_parts, unlike_the_room
+from sogjax.scene.segmentation import largest_parts
+from sogjax.scene.subject_colors import Scene, subject_colors
 from sogjax.scene.visual_hull import resized
 
 MOST_LOOKED_AT = 40
@@ -30,6 +31,8 @@ DEPTH = 9
 """Depth of the quad-tree whose cells are looked at."""
 FOREGROUND = 0.5
 """Log odds above which a cell counts as foreground."""
+LEARNT_FROM = 8
+"""So many of the frames show the people's colours."""
 SEAM = 5
 """Cells: a narrower gap in what is not the background lies between what was told from it in two ways."""
 
@@ -57,16 +60,24 @@ class SampledMasks:
         """Whether anything is unknown."""
         return any(mask.any() for mask in self.unknown.values())
 
-    def decided(self) -> "SampledMasks":
-        """The same without anything unknown: there, what looks unlike the room around it is not the background."""
-        frames = [(frame, camera) for frame in range(len(self.frames)) for camera in self.masks[frame]]
-        cut = lambda at: unlike_the_room(self.pictures[at[0]][at[1]], self.unknown[at[1]], self.masks[at[0]][at[1]])
+    def decided(self, up: Float[np.ndarray, "3"]) -> "SampledMasks":
+        """The same, in which colours tell the people from the room where nothing is known.
+
+        What they do not tell in most frames stays unknown. As it is, where no frame shows anybody.
+        """
+        scenes = [Scene(shown, masks, self.unknown) for shown, masks in zip(self.pictures, self.masks, strict=True)]
+        colors = subject_colors(scenes[:: -(-len(scenes) // LEARNT_FROM)], self.cameras, up)
+        if colors is None:
+            return self
+        told = lambda scene: {k: colors.decided(k, scene.pictures[k], unknown) for k, unknown in self.unknown.items()}
         with ThreadPoolExecutor(usable_cores()) as pool:
-            masks: list[dict[int, Mask]] = [{} for _ in self.frames]
-            for (frame, camera), mask in zip(frames, pool.map(cut, frames), strict=True):
-                seams = closed(mask, SEAM) & widened(self.unknown[camera], SEAM)
-                masks[frame][camera] = largest_parts(mask | seams)
-        return replace(self, masks=masks, unknown={k: np.zeros_like(mask) for k, mask in self.unknown.items()})
+            decided = [*pool.map(told, scenes)]
+        masks = [
+            {k: _joined(mask | subject[k][0], self.unknown[k]) for k, mask in scene.masks.items()}
+            for scene, subject in zip(scenes, decided, strict=True)
+        ]
+        untold = {k: np.mean([of_frame[k][1] for of_frame in decided], axis=0) > 0.5 for k in self.unknown}
+        return replace(self, masks=masks, unknown=untold)
 
 
 def mask_samples(recording: Recording, frames: Sequence[int] | None = None) -> SampleKind:
@@ -98,6 +109,11 @@ def masks_of_samples(
         cameras={k: resized(recording.rig.camera(name), sides[k]) for k, name in enumerate(recording.rig.names)},
         grids=grids,
     )
+
+
+def _joined(mask: Mask, unknown: Mask) -> Mask:
+    """A mask without its seams and small parts."""
+    return largest_parts(mask | (closed(mask, SEAM) & widened(unknown, SEAM)))
 
 
 def _odds(

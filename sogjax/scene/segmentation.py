@@ -10,7 +10,6 @@ from jaxtyping import Bool, Float, UInt8
 
 from sogjax.model.camera import Camera
 from sogjax.scene.background_difference import (
-    CHANGED,
     Difference,
     background_difference,
     closed,
@@ -19,6 +18,7 @@ from sogjax.scene.background_difference import (
     widened,
     without_holes,
 )
+from sogjax.scene.subject_colors import Scene, subject_colors
 from sogjax.scene.visual_hull import LOW_VOXELS, MANY, VoxelPixels, cube_around, resized, voxel_pixels, without_floor
 
 LARGEST_SHARE = 0.5
@@ -30,8 +30,9 @@ SMALLEST_PART = 0.1
 GRAB_CUT_ITERATIONS = 2
 COARSE_SIDE = 324
 """Longer side, in pixels, of pictures of which only a rough outline is wanted."""
-UNCHANGED = 3.0
-"""Squared differences, in units of the noise, below which a pixel is certainly background."""
+UNCHANGED, CERTAIN = 3.0, 10.0
+"""Squared differences, in units of the noise, below which a pixel is certainly background, and above which it is
+certainly the subject where no shadow explains them."""
 
 Mask = Bool[np.ndarray, "_h _w"]
 
@@ -64,11 +65,12 @@ def masks_from_backgrounds(
     """
     with ThreadPoolExecutor() as pool:
         compare = lambda k: background_difference(images[k], backgrounds[k], (unknown or {}).get(k))
-        found = pool.map(lambda k: _decided(compare(k)) if decide else compare(k), backgrounds)
-        differences = dict(zip(backgrounds, found, strict=True))
+        compared = dict(zip(backgrounds, pool.map(compare, backgrounds), strict=True))
+        differences = _decided(compared, cameras, up) if decide else compared
         guesses = {camera: first_guess(difference) for camera, difference in differences.items()}
         guesses = {camera: guess for camera, guess in guesses.items() if is_subject(guess)}
-        better, hull = _seen_together({c: differences[c] for c in guesses}, guesses, known, cameras, up)
+        possible = {c: compared[c].open | guess for c, guess in guesses.items()}
+        better, hull = _seen_together(differences, guesses, possible, known, cameras, up)
         told = lambda camera, mask: mask if decide else mask & ~differences[camera].unknown
         guesses = {c: told(c, mask) for c, mask in (guesses | better).items()}
         guesses = {c: mask for c, mask in guesses.items() if is_subject(mask)}
@@ -84,18 +86,37 @@ def first_guess(difference: Difference) -> Bool[np.ndarray, "rows columns"]:
     return largest_parts(different | (without_holes(different) & difference.changed))
 
 
-def _decided(difference: Difference) -> Difference:
-    """The difference, in which what is unlike the room is different, where more is unknown than seems the subject."""
-    guess = first_guess(difference)
-    if difference.unknown.sum() <= guess.sum():
-        return difference
-    subject = largest_parts(unlike_the_room(difference.image, difference.unknown, guess))
+def _decided(
+    differences: Mapping[int, Difference], cameras: Mapping[int, Camera], up: Float[np.ndarray, "3"]
+) -> dict[int, Difference]:
+    """The differences, in which colours tell the subject from the room where more is unknown than seems the subject."""
+    guesses = {k: first_guess(difference) for k, difference in differences.items()}
+    unsure = [k for k, difference in differences.items() if difference.unknown.any()]
+    if not unsure:
+        return {**differences}
+    scene = Scene(
+        {k: difference.image for k, difference in differences.items()},
+        guesses,
+        {k: difference.unknown for k, difference in differences.items()},
+    )
+    small = {k: resized(cameras[k], guess.shape[::-1]) for k, guess in guesses.items()}
+    if (colors := subject_colors([scene], small, up)) is None:
+        return {**differences}
+    told = lambda k: colors.decided(k, scene.pictures[k], scene.unknown[k])
+    return {**differences} | {k: _with_subject(differences[k], *told(k)) for k in unsure}
+
+
+def _with_subject(difference: Difference, subject: Mask, untold: Mask) -> Difference:
+    """The difference, in which the subject is different, and less is unknown."""
+    decided = difference.unknown & ~untold
+    told = lambda before: np.where(decided, np.where(subject, 2.0 * CERTAIN, 0.0), before)
     return replace(
         difference,
-        change=np.where(difference.unknown, np.where(subject, CHANGED, 0.0), difference.change),
-        changed=difference.changed | subject,
+        change=told(difference.change),
+        unexplained=told(difference.unexplained),
+        changed=np.where(decided, subject, difference.changed),
         different=difference.different | subject,
-        unknown=np.zeros_like(subject),
+        unknown=untold,
     )
 
 
@@ -160,7 +181,7 @@ def _labels(guess: Mask, change: np.ndarray, unexplained: np.ndarray, unknown: M
     """What grabCut may change: pixels near the guess's outline that the difference leaves open, and unknown ones."""
     inside, around = guess.astype(np.uint8), widened(guess, 4) | unknown
     labels = np.where(guess, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
-    labels[(cv2.erode(inside, disc(5)) > 0) & (unexplained > 10.0)] = cv2.GC_FGD
+    labels[(cv2.erode(inside, disc(5)) > 0) & (unexplained > CERTAIN)] = cv2.GC_FGD
     labels[~around | ((change < UNCHANGED) & ~guess)] = cv2.GC_BGD
     return labels
 
@@ -168,16 +189,20 @@ def _labels(guess: Mask, change: np.ndarray, unexplained: np.ndarray, unknown: M
 def _seen_together(
     differences: Mapping[int, Difference],
     guesses: Mapping[int, Mask],
+    possible: Mapping[int, Mask],
     known: Mapping[int, Mask],
     cameras: Mapping[int, Camera],
     up: Float[np.ndarray, "3"],
 ) -> tuple[dict[int, Mask], dict[int, Mask]]:
-    """Better guesses from all cameras together, and their hull's silhouettes; empty if their regions do not meet."""
+    """Better guesses from all cameras together, and their hull's silhouettes; empty if their regions do not meet.
+
+    The subject is nowhere but where it is `possible`: what colours decide may be a table in front.
+    """
     small_known = {camera: reduced_mask(mask) for camera, mask in known.items()}
     subjects = {**guesses, **small_known}
     if len(subjects) < 2 or not guesses:
         return {}, {}
-    regions = {c: differences[c].open | guesses[c] if c in guesses else small_known[c] for c in subjects}
+    regions = {**small_known, **possible}
     small = {c: resized(cameras[c], (mask.shape[1], mask.shape[0])) for c, mask in subjects.items()}
     cube = cube_around([largest_parts(regions[c]) for c in subjects], [small[c] for c in subjects])
     pixels = {c: voxel_pixels(cube, small[c], mask.shape) for c, mask in subjects.items()}

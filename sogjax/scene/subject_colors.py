@@ -1,0 +1,194 @@
+"""Who stands where the background is not known: told by colours that the cameras share, against each one's own room.
+
+All cameras show the same clothes, hair and skin, and each of them another part of the room: what is common in front of
+all backgrounds is somebody, what a camera also shows beside him is the room.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt8
+from scipy.ndimage import gaussian_filter
+
+from sogjax.model.camera import Camera
+from sogjax.scene.background_difference import widened
+from sogjax.scene.visual_hull import MANY, SIDE, Cube, VoxelPixels, cube_around, voxel_pixels, without_floor
+
+COLOR_BINS = 24
+"""Bins of each channel: brown hair is not a brown floor."""
+BLUR = 0.7
+"""Standard deviation of a colour, in bins."""
+ANY_COLOR = 0.05
+"""Share of pixels whose colour says nothing."""
+NEAR = 0.12
+"""How far beside the subject a camera's room is looked at, as a share of the picture's longer side: what is behind the
+subject is likely to look the same."""
+PIXELS = 1.0
+"""Standard deviation in pixels over which colours are told together."""
+DECISIVE = 0.5
+"""Logarithm of odds from which on a camera says that a place is the subject's, or the room's."""
+LEAST = 0.1
+"""The same, where a camera alone decides: what is not like the room is the subject if the others show its colours."""
+MOST = 0.85
+"""Share of the cameras that say anything of a place where nothing is known that must say it is the subject's."""
+OWN = 0.1
+"""A colour that the other cameras show this many times as often as a camera where it does not know its room, or less,
+is not the subject's: it is of something that stands in front of that camera alone."""
+ROUNDS = 3
+"""How often colours and places follow from each other; after two, little changes."""
+NONE = np.zeros(COLOR_BINS**3)
+
+Counts = Float[np.ndarray, "bin"]
+Mask = Bool[np.ndarray, "_h _w"]
+Picture = UInt8[np.ndarray, "_h _w 3"]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One moment; everything by camera, of one size in each."""
+
+    pictures: Mapping[int, Picture]
+    masks: Mapping[int, Mask]
+    """What is certainly not the background."""
+    unknown: Mapping[int, Mask]
+    """Where nothing is known of the background."""
+
+
+@dataclass(frozen=True)
+class SubjectColors:
+    """Logarithm of how much likelier each colour is of the subject than of the room, by camera."""
+
+    odds: Mapping[int, Float[np.ndarray, "bin"]]
+
+    def decided(self, camera: int, picture: Picture, unknown: Mask) -> tuple[Mask, Mask]:
+        """Where colours say that what is unknown is the subject, and where they do not tell.
+
+        A camera that is absent tells nothing.
+        """
+        if camera not in self.odds:
+            return np.zeros_like(unknown), unknown
+        odds = self.told(camera, picture)
+        subject = unknown & (odds > LEAST)
+        return subject, unknown & ~subject & (odds > -DECISIVE)
+
+    def told(self, camera: int, picture: Picture) -> Float[np.ndarray, "_h _w"]:
+        """The logarithm of the odds that a pixel shows the subject, from its colour and its neighbours'."""
+        each = self.odds[camera][_bins(picture)].astype(np.float32)
+        return cv2.GaussianBlur(np.clip(each, -3.0, 3.0), (0, 0), PIXELS)
+
+
+@dataclass(frozen=True)
+class _Space:
+    """Where somebody may be in one moment."""
+
+    scene: Scene
+    pixels: Mapping[int, VoxelPixels]
+    open: Bool[np.ndarray, "voxel"]
+    """What no camera rules out."""
+
+
+def subject_colors(
+    scenes: Sequence[Scene], cameras: Mapping[int, Camera], up: Float[np.ndarray, "3"]
+) -> SubjectColors | None:
+    """Learn the colours from some moments of the same people; None where cameras do not show anybody together.
+
+    A camera that shows nothing of the room beside them is absent. The cameras are those of pictures of the masks' size.
+    """
+    spaces = [space for scene in scenes if (space := _space(scene, cameras, up)) is not None]
+    rooms = {k: sum((_beside(space, k) for space in spaces if k in space.pixels), NONE) for k in cameras}
+    room = {k: counts for k, counts in rooms.items() if counts.any()}
+    if not room:
+        return None
+    certain = sum((_in_masks(space) for space in spaces), NONE)
+    bodies, found = [space.open for space in spaces], SubjectColors({})
+    for _ in range(ROUNDS):
+        both = list(zip(spaces, bodies, strict=True))
+        mixed = {k: sum((_covered(*each, k) for each in both if k in each[0].pixels), NONE) for k in room}
+        left = {k: _unmixed(mixed[k], room[k]) for k in room}
+        every = sum(left.values(), certain)
+        other = {k: np.maximum(_density(room[k]), OWN * _density(left[k])) for k in room}
+        found = SubjectColors({k: np.log(_density(every - left[k]) / other[k]) for k in room})
+        bodies = [_body(space, found) for space in spaces]
+    return found
+
+
+def _space(scene: Scene, cameras: Mapping[int, Camera], up: Float[np.ndarray, "3"]) -> _Space | None:
+    """What all cameras allow around their masks, in voxels that are as small as its size permits."""
+    touched = {k: _touched(mask, scene.unknown[k]) for k, mask in scene.masks.items() if mask.any()}
+    regions = {k: mask for k, mask in scene.unknown.items() if mask.any()} | touched
+    if len(regions) < 2:
+        return None
+    around = touched if len(touched) >= 2 else regions
+    cube = cube_around(list(around.values()), [cameras[k] for k in around])
+    for last in (False, True):
+        pixels = {k: voxel_pixels(cube, cameras[k], region.shape) for k, region in regions.items()}
+        misses = np.sum([~pixels[k].hits(widened(region, 1)) for k, region in regions.items()], axis=0)
+        shown = np.sum([pixels[k].inside for k in regions], axis=0)
+        hull = without_floor((misses <= (1 if len(regions) >= MANY else 0)) & (shown >= 2), up)
+        if not hull.any():
+            return None
+        if not last:
+            ends = np.array([cube.points[hull].min(axis=0), cube.points[hull].max(axis=0)])
+            cube = Cube(ends.mean(axis=0), float(np.ptp(ends, axis=0).max() + 2.0 * cube.spacing) / SIDE)
+    return _Space(scene, pixels, hull)
+
+
+def _touched(mask: Mask, unknown: Mask) -> Mask:
+    """The mask, with what is unknown beside it."""
+    _, labels = cv2.connectedComponents((mask | unknown).astype(np.uint8), connectivity=8)
+    return np.isin(labels, np.unique(labels[mask])) & (mask | unknown)
+
+
+def _unmixed(mixed: Counts, room: Counts) -> Counts:
+    """What is left of some pixels' colours without as much of the room as most of its colours allow."""
+    share = room / max(float(room.sum()), 1.0)
+    order = np.argsort(mixed / np.maximum(share, 1e-12))
+    middle = order[min(int(np.searchsorted(np.cumsum(share[order]), 0.5)), len(order) - 1)]
+    return np.maximum(mixed - mixed[middle] / max(float(share[middle]), 1e-12) * share, 0.0)
+
+
+def _beside(space: _Space, camera: int) -> Counts:
+    """The colours of the room near where somebody may be."""
+    scene, open_ = space.scene, space.pixels[camera].silhouette_of(space.open)
+    away = cv2.distanceTransform((~open_).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    near = away <= NEAR * max(open_.shape)
+    return _counts(scene.pictures[camera], near & ~scene.masks[camera] & ~(scene.unknown[camera] & open_))
+
+
+def _in_masks(space: _Space) -> Counts:
+    """The colours of what is certainly the subject, in all cameras."""
+    return sum((_counts(space.scene.pictures[k], space.scene.masks[k]) for k in space.pixels), NONE)
+
+
+def _covered(space: _Space, body: Bool[np.ndarray, "voxel"], camera: int) -> Counts:
+    """The colours where somebody is seen before what is unknown, if he is a `body`."""
+    unknown = space.scene.unknown[camera]
+    return _counts(space.scene.pictures[camera], unknown & space.pixels[camera].silhouette_of(body))
+
+
+def _body(space: _Space, colors: SubjectColors) -> Bool[np.ndarray, "voxel"]:
+    """The places that most cameras with an opinion give to the subject."""
+    told = dict.fromkeys((True, False), np.zeros(len(space.open), int))
+    for k, pixels in ((k, space.pixels[k]) for k in space.pixels if k in colors.odds):
+        odds, unknown = colors.told(k, space.scene.pictures[k]), space.scene.unknown[k]
+        told[True] = told[True] + pixels.shows(unknown & (odds > DECISIVE))
+        told[False] = told[False] + pixels.shows(unknown & (odds < -DECISIVE))
+    return space.open & (told[True] >= MOST * (told[True] + told[False]))
+
+
+def _bins(picture: Picture) -> Int[np.ndarray, "_h _w"]:
+    each = (picture.astype(np.int64) * COLOR_BINS) >> 8
+    return (each[..., 0] * COLOR_BINS + each[..., 1]) * COLOR_BINS + each[..., 2]
+
+
+def _counts(picture: Picture, mask: Mask) -> Counts:
+    """How many pixels have each colour, a little blurred."""
+    found = np.bincount(_bins(picture)[mask], minlength=COLOR_BINS**3).astype(float)
+    return gaussian_filter(found.reshape(3 * (COLOR_BINS,)), BLUR).ravel()
+
+
+def _density(counts: Counts) -> Counts:
+    """The density of colours, relative to that of any colour."""
+    return (1.0 - ANY_COLOR) * counts * COLOR_BINS**3 / max(float(counts.sum()), 1.0) + ANY_COLOR

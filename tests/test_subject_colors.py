@@ -1,0 +1,60 @@
+"""Who stands where the background is not known, by colours that the cameras share."""
+
+import numpy as np
+from test_segmentation import UP, iou, who_hardly_moves
+
+from sogjax.scene.subject_colors import Scene, subject_colors
+
+CAMERAS = 6
+
+
+def whole(rig):
+    return {k: rig.camera(name) for k, name in enumerate(rig.names)}
+
+
+def nothing(masks):
+    return {k: np.zeros_like(mask) for k, mask in masks.items()}
+
+
+def test_colours_before_all_walls_are_the_subject():
+    """Nothing is certain: who stands in a pillar of the room is told by his colours alone, seen in one moment."""
+    rig, pictures, truth, _, pillars = who_hardly_moves(CAMERAS)
+    colors = subject_colors([Scene(pictures, nothing(truth), pillars)], whole(rig), UP)
+    assert colors is not None
+    for k, mask in truth.items():
+        subject, untold = colors.decided(k, pictures[k], pillars[k])
+        assert iou(subject, mask) > 0.85, k
+        assert (untold & ~mask).sum() < 0.02 * (pillars[k] & ~mask).sum(), k
+
+
+def test_what_one_camera_alone_shows_is_not_taken_for_the_subject():
+    """A board as wide as the pillar, in front of one camera: neither the room beside nor the others have its colour."""
+    rig, pictures, truth, _, pillars = who_hardly_moves(CAMERAS)
+    board = pillars[2] & (np.arange(len(pillars[2])) > 0.7 * len(pillars[2]))[:, None]
+    pictures[2] = np.where(board[..., None], np.array([40, 230, 40], np.uint8), pictures[2])
+    colors = subject_colors([Scene(pictures, nothing(truth), pillars)], whole(rig), UP)
+    assert colors is not None
+    inner = board.copy()
+    inner[: np.nonzero(board)[0].min() + 4] = False
+    assert not colors.decided(2, pictures[2], pillars[2])[0][inner].any()
+    for k in set(truth) - {2}:
+        assert iou(colors.decided(k, pictures[k], pillars[k])[0], truth[k]) > 0.85, k
+
+
+def test_a_camera_that_shows_no_room_tells_nothing():
+    rig, pictures, truth, _, pillars = who_hardly_moves(CAMERAS)
+    unknown = {**pillars, 1: np.ones_like(pillars[1])}
+    colors = subject_colors([Scene(pictures, nothing(truth), unknown)], whole(rig), UP)
+    assert colors is not None
+    if 1 not in colors.odds:  # else its hull leaves some of the picture to the room
+        subject, untold = colors.decided(1, pictures[1], unknown[1])
+        assert not subject.any()
+        assert untold.all()
+    for k in set(truth) - {1}:
+        assert iou(colors.decided(k, pictures[k], pillars[k])[0], truth[k]) > 0.85, k
+
+
+def test_pictures_without_anybody_tell_nothing():
+    rig, pictures, truth, _, _ = who_hardly_moves(CAMERAS)
+    assert subject_colors([Scene(pictures, nothing(truth), nothing(truth))], whole(rig), UP) is None
+    assert subject_colors([], whole(rig), UP) is None
