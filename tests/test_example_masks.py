@@ -129,7 +129,7 @@ def test_who_is_hidden_in_all_cameras_leaves_the_masks_as_colours_tell(tmp_path)
     for k in range(4):
         empty = photo(scene((160, 120), seed=k, contrast=10.0), 50 + k)
         around = cv2.dilate(TRUTH[k].astype(np.uint8), np.ones((25 + 14 * k, 25))) > 0
-        learnt.append(BackgroundImage(empty, np.full((120, 160), 2.0, np.float32), ~around, "clip"))
+        learnt.append(BackgroundImage(empty, np.where(around, 6.0, 2.0).astype(np.float32), ~around, "clip"))
     found = example_masks(recording, example, images, learnt)
     assert len(found.masks) >= 2
     assert not found.undecided

@@ -172,6 +172,7 @@ def sampled(clip, first=0):
         masks=[masks for masks, _ in seen],
         pictures=[pictures for _, pictures in seen],
         unknown=NOTHING,
+        calm=NOTHING,
         cameras=CAMERAS,
         grids=tuple(CellGrid(*SIZE, 1) for _ in CAMERAS),
     )

@@ -3,6 +3,7 @@
 import numpy as np
 from test_segmentation import UP, iou, who_hardly_moves
 
+from sogjax.scene.background import BackgroundImage
 from sogjax.scene.subject_colors import Scene, subject_colors
 
 CAMERAS = 6
@@ -19,10 +20,11 @@ def nothing(masks):
 def test_colours_before_all_walls_are_the_subject():
     """Nothing is certain: who stands in a pillar of the room is told by his colours alone, seen in one moment."""
     rig, pictures, truth, _, pillars = who_hardly_moves(CAMERAS)
-    colors = subject_colors([Scene(pictures, nothing(truth), pillars)], whole(rig), UP)
+    scene = Scene(pictures, nothing(truth), pillars, nothing(truth))
+    colors = subject_colors([scene], whole(rig), UP)
     assert colors is not None
     for k, mask in truth.items():
-        subject, untold = colors.decided(k, pictures[k], pillars[k])
+        subject, untold = colors.decided(k, scene)
         assert iou(subject, mask) > 0.85, k
         assert (untold & ~mask).sum() < 0.02 * (pillars[k] & ~mask).sum(), k
 
@@ -32,29 +34,65 @@ def test_what_one_camera_alone_shows_is_not_taken_for_the_subject():
     rig, pictures, truth, _, pillars = who_hardly_moves(CAMERAS)
     board = pillars[2] & (np.arange(len(pillars[2])) > 0.7 * len(pillars[2]))[:, None]
     pictures[2] = np.where(board[..., None], np.array([40, 230, 40], np.uint8), pictures[2])
-    colors = subject_colors([Scene(pictures, nothing(truth), pillars)], whole(rig), UP)
+    scene = Scene(pictures, nothing(truth), pillars, nothing(truth))
+    colors = subject_colors([scene], whole(rig), UP)
     assert colors is not None
     inner = board.copy()
     inner[: np.nonzero(board)[0].min() + 4] = False
-    assert not colors.decided(2, pictures[2], pillars[2])[0][inner].any()
+    assert not colors.decided(2, scene)[0][inner].any()
     for k in set(truth) - {2}:
-        assert iou(colors.decided(k, pictures[k], pillars[k])[0], truth[k]) > 0.85, k
+        assert iou(colors.decided(k, scene)[0], truth[k]) > 0.85, k
+
+
+def test_what_never_moves_is_not_taken_for_the_subject():
+    """A table before everybody's legs, of a colour that no room has, in all cameras."""
+    rig, pictures, truth, _, pillars = who_hardly_moves(CAMERAS)
+    table = {k: pillar & (np.arange(len(pillar)) > 0.7 * len(pillar))[:, None] for k, pillar in pillars.items()}
+    pictures = {
+        k: np.where(table[k][..., None], np.array([40, 230, 40], np.uint8), image) for k, image in pictures.items()
+    }
+    for calm in (nothing(truth), table):
+        scene = Scene(pictures, nothing(truth), pillars, calm)
+        colors = subject_colors([scene], whole(rig), UP)
+        assert colors is not None
+        for k, mask in truth.items():
+            subject, untold = colors.decided(k, scene)
+            if calm is table:
+                assert iou(subject, mask & ~table[k]) > 0.85, k
+                assert untold[table[k]].all()
+            else:
+                assert subject[table[k]].mean() > 0.5, k
+
+
+def test_only_what_is_unknown_and_never_moves_is_calm():
+    spread = np.full((40, 60), 3.0, np.float32)
+    known = np.ones((40, 60), bool)
+    known[:, 30:] = False
+    spread[20:, 30:] = 6.0
+    picture = np.zeros((40, 60, 3), np.uint8)
+    calm = BackgroundImage(picture, spread, known, "clip").calm
+    assert calm[:16, 34:].all()
+    assert not calm[24:].any()
+    assert not calm[:, :30].any()
+    assert not BackgroundImage(picture, spread, known, "picture").calm.any()
+    assert not BackgroundImage(picture, spread, np.zeros_like(known), "clip").calm.any()
 
 
 def test_a_camera_that_shows_no_room_tells_nothing():
     rig, pictures, truth, _, pillars = who_hardly_moves(CAMERAS)
     unknown = {**pillars, 1: np.ones_like(pillars[1])}
-    colors = subject_colors([Scene(pictures, nothing(truth), unknown)], whole(rig), UP)
+    scene = Scene(pictures, nothing(truth), unknown, nothing(truth))
+    colors = subject_colors([scene], whole(rig), UP)
     assert colors is not None
     if 1 not in colors.odds:  # else its hull leaves some of the picture to the room
-        subject, untold = colors.decided(1, pictures[1], unknown[1])
+        subject, untold = colors.decided(1, scene)
         assert not subject.any()
         assert untold.all()
     for k in set(truth) - {1}:
-        assert iou(colors.decided(k, pictures[k], pillars[k])[0], truth[k]) > 0.85, k
+        assert iou(colors.decided(k, scene)[0], truth[k]) > 0.85, k
 
 
 def test_pictures_without_anybody_tell_nothing():
     rig, pictures, truth, _, _ = who_hardly_moves(CAMERAS)
-    assert subject_colors([Scene(pictures, nothing(truth), nothing(truth))], whole(rig), UP) is None
+    assert subject_colors([Scene(pictures, nothing(truth), nothing(truth), nothing(truth))], whole(rig), UP) is None
     assert subject_colors([], whole(rig), UP) is None

@@ -81,7 +81,8 @@ def example_masks(
     _check_count(recording, example, len(images), [*files, *backgrounds])
     cameras = {camera: recording.rig.camera(names[camera]) for camera in images}
     up = axis_vector(recording.up)
-    make = lambda decide: masks_from_backgrounds(images, backgrounds, files, cameras, up, unknown, decide)
+    calm = {camera: background.calm for camera, background in from_clip.items()}
+    make = lambda decide: masks_from_backgrounds(images, backgrounds, files, cameras, up, unknown, calm, decide)
     alone = lambda made: _subject_alone(example, names, dict(sorted({**files, **made}.items())))
     made = make(True) if backgrounds else {}
     found = alone(made)

@@ -17,7 +17,7 @@ from sogjax.io.recording import Recording
 from sogjax.io.threads import usable_cores
 from sogjax.model.camera import Camera
 from sogjax.run.clip import Clip, SampleKind, cell_grids, spread_frames
-from sogjax.scene.background import BackgroundImage, stack_background
+from sogjax.scene.background import BackgroundImage, cell_means, stack_background
 from sogjax.scene.background_difference import closed, widened
 from sogjax.scene.cells import CellGrid
 from sogjax.scene.foreground import BackgroundModel, log_odds
@@ -51,6 +51,8 @@ class SampledMasks:
     """The cells' colours, BGR."""
     unknown: dict[int, Mask]
     """Where nothing is known of the background, or something stands in front."""
+    calm: dict[int, Mask]
+    """Where nothing moves there."""
     cameras: dict[int, Camera]
     """The cameras, for pictures of the masks' size."""
     grids: tuple[CellGrid, ...]
@@ -65,11 +67,13 @@ class SampledMasks:
 
         What they do not tell in most frames stays unknown. As it is, where no frame shows anybody.
         """
-        scenes = [Scene(shown, masks, self.unknown) for shown, masks in zip(self.pictures, self.masks, strict=True)]
+        scenes = [
+            Scene(shown, masks, self.unknown, self.calm) for shown, masks in zip(self.pictures, self.masks, strict=True)
+        ]
         colors = subject_colors(scenes[:: -(-len(scenes) // LEARNT_FROM)], self.cameras, up)
         if colors is None:
             return self
-        told = lambda scene: {k: colors.decided(k, scene.pictures[k], unknown) for k, unknown in self.unknown.items()}
+        told = lambda scene: {k: colors.decided(k, scene) for k in scene.masks}
         with ThreadPoolExecutor(usable_cores()) as pool:
             decided = [*pool.map(told, scenes)]
         masks = [
@@ -106,6 +110,7 @@ def masks_of_samples(
         masks=[_masks(_odds(list(shown.values()), grids, empty), grids) for shown in pictures],
         pictures=pictures,
         unknown={k: ~known[k, : grid.rows, : grid.columns] for k, grid in enumerate(grids)},
+        calm={k: cell_means(learnt[k].calm.astype(np.float32), grid) > 0.5 for k, grid in enumerate(grids)},
         cameras={k: resized(recording.rig.camera(name), sides[k]) for k, name in enumerate(recording.rig.names)},
         grids=grids,
     )

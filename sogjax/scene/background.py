@@ -30,6 +30,9 @@ NOISE_FLOOR = 2.0
 KNOWN_SHARE = 0.75
 """A cell is known if so much of it is."""
 
+CALM, CALM_SIDE = 1.3, 7
+"""Where less than this many times a camera's usual spread varies over squares of so many pixels, nothing moves."""
+
 Origin = Literal["picture", "clip"]
 
 
@@ -56,6 +59,14 @@ class BackgroundImage:
     def from_plate(cls, plate: FittedPlate) -> "BackgroundImage":
         """The background from a photograph that was held against the videos."""
         return replace(cls.from_photograph(plate.picture), known=plate.known)
+
+    @property
+    def calm(self) -> Bool[np.ndarray, "_h _w"]:
+        """Where the background is not known, and nothing ever moved before it, either: a table is, nobody alive is."""
+        if self.origin != "clip" or not self.known.any():
+            return np.zeros_like(self.known)
+        usual = float(np.median(self.spread[self.known]))
+        return ~self.known & (cv2.blur(self.spread, (CALM_SIDE, CALM_SIDE)) < CALM * usual)
 
     @classmethod
     def nothing(cls, width: int, height: int) -> "BackgroundImage":

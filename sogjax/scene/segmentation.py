@@ -44,6 +44,7 @@ def masks_from_backgrounds(
     cameras: Mapping[int, Camera],
     up: Float[np.ndarray, "3"],
     unknown: Mapping[int, Mask] | None = None,
+    calm: Mapping[int, Mask] | None = None,
     decide: bool = True,
 ) -> dict[int, Mask]:
     """Masks of the cameras that have a picture of the empty scene, at the pictures' size.
@@ -58,6 +59,7 @@ def masks_from_backgrounds(
         cameras: all of these cameras.
         up: the world's vertical.
         unknown: where the empty scene is not known, by camera at any size; None: it is known everywhere.
+        calm: where nothing moves there, by camera at any size; None: nowhere.
         decide: whether colours and the other cameras decide there; else it is in no mask.
 
     Returns:
@@ -66,7 +68,7 @@ def masks_from_backgrounds(
     with ThreadPoolExecutor() as pool:
         compare = lambda k: background_difference(images[k], backgrounds[k], (unknown or {}).get(k))
         compared = dict(zip(backgrounds, pool.map(compare, backgrounds), strict=True))
-        differences = _decided(compared, cameras, up) if decide else compared
+        differences = _decided(compared, calm or {}, cameras, up) if decide else compared
         guesses = {camera: first_guess(difference) for camera, difference in differences.items()}
         guesses = {camera: guess for camera, guess in guesses.items() if is_subject(guess)}
         possible = {c: compared[c].open | guess for c, guess in guesses.items()}
@@ -87,9 +89,12 @@ def first_guess(difference: Difference) -> Bool[np.ndarray, "rows columns"]:
 
 
 def _decided(
-    differences: Mapping[int, Difference], cameras: Mapping[int, Camera], up: Float[np.ndarray, "3"]
+    differences: Mapping[int, Difference],
+    calm: Mapping[int, Mask],
+    cameras: Mapping[int, Camera],
+    up: Float[np.ndarray, "3"],
 ) -> dict[int, Difference]:
-    """The differences, in which colours tell the subject from the room where more is unknown than seems the subject."""
+    """The differences, in which colours tell the subject from the room where that is unknown."""
     guesses = {k: first_guess(difference) for k, difference in differences.items()}
     unsure = [k for k, difference in differences.items() if difference.unknown.any()]
     if not unsure:
@@ -98,11 +103,12 @@ def _decided(
         {k: difference.image for k, difference in differences.items()},
         guesses,
         {k: difference.unknown for k, difference in differences.items()},
+        {k: reduced_mask(calm[k]) if k in calm else np.zeros_like(guess) for k, guess in guesses.items()},
     )
     small = {k: resized(cameras[k], guess.shape[::-1]) for k, guess in guesses.items()}
     if (colors := subject_colors([scene], small, up)) is None:
         return {**differences}
-    told = lambda k: colors.decided(k, scene.pictures[k], scene.unknown[k])
+    told = lambda k: colors.decided(k, scene)
     return {**differences} | {k: _with_subject(differences[k], *told(k)) for k in unsure}
 
 

@@ -54,6 +54,12 @@ class Scene:
     """What is certainly not the background."""
     unknown: Mapping[int, Mask]
     """Where nothing is known of the background."""
+    calm: Mapping[int, Mask]
+    """Where nothing ever moves: that is not looked at."""
+
+    def moving(self, camera: int) -> Mask:
+        """What is unknown, and looked at."""
+        return self.unknown[camera] & ~self.calm[camera]
 
 
 @dataclass(frozen=True)
@@ -62,16 +68,17 @@ class SubjectColors:
 
     odds: Mapping[int, Float[np.ndarray, "bin"]]
 
-    def decided(self, camera: int, picture: Picture, unknown: Mask) -> tuple[Mask, Mask]:
+    def decided(self, camera: int, scene: Scene) -> tuple[Mask, Mask]:
         """Where colours say that what is unknown is the subject, and where they do not tell.
 
         A camera that is absent tells nothing.
         """
+        unknown, moving = scene.unknown[camera], scene.moving(camera)
         if camera not in self.odds:
             return np.zeros_like(unknown), unknown
-        odds = self.told(camera, picture)
-        subject = unknown & (odds > LEAST)
-        return subject, unknown & ~subject & (odds > -DECISIVE)
+        odds = self.told(camera, scene.pictures[camera])
+        subject = moving & (odds > LEAST)
+        return subject, unknown & ~subject & ~(moving & (odds <= -DECISIVE))
 
     def told(self, camera: int, picture: Picture) -> Float[np.ndarray, "_h _w"]:
         """The logarithm of the odds that a pixel shows the subject, from its colour and its neighbours'."""
@@ -164,15 +171,15 @@ def _in_masks(space: _Space) -> Counts:
 
 def _covered(space: _Space, body: Bool[np.ndarray, "voxel"], camera: int) -> Counts:
     """The colours where somebody is seen before what is unknown, if he is a `body`."""
-    unknown = space.scene.unknown[camera]
-    return _counts(space.scene.pictures[camera], unknown & space.pixels[camera].silhouette_of(body))
+    moving = space.scene.moving(camera)
+    return _counts(space.scene.pictures[camera], moving & space.pixels[camera].silhouette_of(body))
 
 
 def _body(space: _Space, colors: SubjectColors) -> Bool[np.ndarray, "voxel"]:
     """The places that most cameras with an opinion give to the subject."""
     told = dict.fromkeys((True, False), np.zeros(len(space.open), int))
     for k, pixels in ((k, space.pixels[k]) for k in space.pixels if k in colors.odds):
-        odds, unknown = colors.told(k, space.scene.pictures[k]), space.scene.unknown[k]
+        odds, unknown = colors.told(k, space.scene.pictures[k]), space.scene.moving(k)
         told[True] = told[True] + pixels.shows(unknown & (odds > DECISIVE))
         told[False] = told[False] + pixels.shows(unknown & (odds < -DECISIVE))
     return space.open & (told[True] >= MOST * (told[True] + told[False]))
