@@ -227,7 +227,7 @@ def _confirmed(difference: Difference, pixels: VoxelPixels, hull: np.ndarray, ab
     away = cv2.distanceTransform((~stands).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     near = widened(pixels.silhouette_of(hull), pixels.footprint) & (away <= low)
     different = closed(difference.different & near, 5) & difference.changed
-    return largest_parts(different | (difference.open & stands))
+    return largest_parts(different | (difference.changed & stands))
 
 
 def is_subject(mask: Mask) -> bool:

@@ -55,7 +55,7 @@ class Scene:
     unknown: Mapping[int, Mask]
     """Where nothing is known of the background."""
     calm: Mapping[int, Mask]
-    """Where nothing ever moves: that is not looked at."""
+    """Where nothing ever moves, in what is unknown or anywhere: it may be furniture, and nobody is told by it."""
 
     def moving(self, camera: int) -> Mask:
         """What is unknown, and looked at."""
@@ -157,11 +157,11 @@ def _unmixed(mixed: Counts, room: Counts) -> Counts:
 
 
 def _beside(space: _Space, camera: int) -> Counts:
-    """The colours of the room near where somebody may be."""
+    """The colours of the room near where somebody may be, and of what never moves in front of it."""
     scene, open_ = space.scene, space.pixels[camera].silhouette_of(space.open)
     away = cv2.distanceTransform((~open_).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     near = away <= NEAR * max(open_.shape)
-    return _counts(scene.pictures[camera], near & ~scene.masks[camera] & ~(scene.unknown[camera] & open_))
+    return _counts(scene.pictures[camera], near & ~scene.masks[camera] & ~(scene.moving(camera) & open_))
 
 
 def _in_masks(space: _Space) -> Counts:
