@@ -14,7 +14,8 @@ from rig_cases import opencv_pixels, ring_rig
 from tiny_body import make_body
 
 from sogjax.actor.coverage import body_silhouette, overlap_ratio, silhouette_iou
-from sogjax.actor.make import MadeActor, doubt_of, unseen_limbs
+from sogjax.actor.doubts import doubt_of, unlike_sides, unseen_limbs
+from sogjax.actor.make import MadeActor
 from sogjax.actor.report import actor_report
 from sogjax.actor.silhouette_fit import Estimate
 from sogjax.actor.silhouettes import PosedPictures
@@ -23,6 +24,7 @@ from sogjax.model.bones import bone_lengths
 from sogjax.model.limbs import limb_blobs, limb_names
 from sogjax.model.shape import ShapeModel
 from sogjax.run.actor_report import report_folder, report_page, write_actor_report
+from sogjax.search.body_parts import limb_groups
 from sogjax.view.sheets import (
     BACKGROUND,
     BOTH,
@@ -93,6 +95,20 @@ def test_limbs_that_no_mask_shows_are_said():
     assert said is not None
     assert said.startswith(f"the {limb_names(made.body)[1]} of the actor may be anywhere")
     assert "background/CAMERA.jpg" in said
+
+
+def test_limbs_whose_sides_have_other_colours_are_said():
+    made = made_dog()
+    members = limb_blobs(made.body)
+    one, other = next(pair for pair in limb_groups(made.body) if len(pair) == 2)
+    colors = np.full((made.body.num_blobs, 3), 0.5)
+    assert unlike_sides(made.body, colors, made.pictures) is None
+    colors[members[other]] = 0.3
+    said = unlike_sides(made.body, colors, made.pictures)
+    names = limb_names(made.body)
+    assert said is not None
+    assert said.startswith(f"the {names[one]} or {names[other]} (0.35 apart) of the actor was not found")
+    assert "example_poses" in said
 
 
 def test_a_body_behind_the_camera_has_no_silhouette():

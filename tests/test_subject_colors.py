@@ -64,18 +64,18 @@ def test_what_never_moves_is_not_taken_for_the_subject():
                 assert subject[table[k]].mean() > 0.5, k
 
 
-def test_only_what_is_unknown_and_never_moves_is_calm():
+def test_only_what_is_unknown_and_never_moves_beside_furniture_is_calm():
     spread = np.full((40, 60), 3.0, np.float32)
     known = np.ones((40, 60), bool)
     known[:, 30:] = False
     spread[20:, 30:] = 6.0
     picture = np.zeros((40, 60, 3), np.uint8)
-    calm = BackgroundImage(picture, spread, known, "clip").calm
+    calm = BackgroundImage(picture, spread, known, "clip", furnished=True).calm
     assert calm[:16, 34:].all()
     assert not calm[24:].any()
     assert not calm[:, :30].any()
-    assert not BackgroundImage(picture, spread, known, "picture").calm.any()
-    assert not BackgroundImage(picture, spread, np.zeros_like(known), "clip").calm.any()
+    assert not BackgroundImage(picture, spread, known, "clip").calm.any()
+    assert not BackgroundImage(picture, spread, np.zeros_like(known), "clip", furnished=True).calm.any()
 
 
 def test_a_camera_that_shows_no_room_tells_nothing():

@@ -8,9 +8,10 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
 from sogjax.actor.colors import back_projected_colors, colored
+from sogjax.actor.doubts import doubt_of, unlike_sides, unseen_limbs
 from sogjax.actor.posed_examples import (
     Progress,
     Report,
@@ -18,6 +19,7 @@ from sogjax.actor.posed_examples import (
     colored_views,
     explained_examples,
     found_best,
+    overlap_of,
     rough_poses,
 )
 from sogjax.actor.silhouette_fit import Estimate, compile_estimate, estimate_shape, silhouettes_of
@@ -30,7 +32,6 @@ from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.compiled import compiled_hastily
-from sogjax.model.limbs import limb_blobs, limb_names
 from sogjax.model.rotation import world_from_upright
 from sogjax.model.shape import ShapeModel
 from sogjax.scene.background import BackgroundImage
@@ -41,15 +42,8 @@ _shaped = compiled_hastily(ShapeModel.shaped)
 UNDECIDED_REST = 0.03
 """Weight of being near the rest pose (`RestPrior`), in units of the masks' area, where masks say nothing of what is
 unknown: a leg behind a table may be anywhere else."""
-LEAST_SHOWN = 0.7
-"""Share of a limb's blobs that the masks must show."""
 POSE_FOUND = 0.5
 """Least IoU of masks and silhouettes, the mean over the cameras. Good fits have 0.8 to 0.9."""
-
-
-FRAMES_SUIT = 0.75
-"""Mean IoU of frames that nobody chose below which the actor is doubtful: its limbs may be of the wrong sizes. Good
-frames have 0.86 to 0.89, and 0.81 to 0.83 where masks say nothing of the legs; at 0.70 and 0.68 all was wrong."""
 
 
 @dataclass(frozen=True)
@@ -142,7 +136,8 @@ def make_actor(
     found_colors = back_projected_colors(shaped, shown, color_space)
     unsuitable = None if best is None else doubt_of(shaped, estimate.poses, pictures, rig)
     unseen = unseen_limbs(shaped, found_colors.shown, pictures) if undecided else None
-    doubt = "; ".join(said for said in (unsuitable, unseen) if said is not None) or None
+    uneven = None if best is None else unlike_sides(shaped, np.asarray(found_colors.colors), pictures)
+    doubt = "; ".join(said for said in (unsuitable, unseen, uneven) if said is not None) or None
     if doubt is not None:
         report(f"warning: {doubt}")
     actor = replace(colored(shaped, found_colors.colors), name=subject or body.name)
@@ -213,7 +208,7 @@ def _best_estimate(model: ShapeModel, found: _FoundPoses, rig: Camera, terms: Te
         estimate_shape(model, jnp.stack([poses[way] for poses in found.ways]), views, silhouettes, terms)
         for way in range(min(ways, *map(len, found.ways)))
     ]
-    agrees = lambda estimate: _overlap(_shaped(model, estimate.shape_params), estimate.poses, found.pictures, rig)
+    agrees = lambda estimate: overlap_of(_shaped(model, estimate.shape_params), estimate.poses, found.pictures, rig)
     return max(estimates, key=agrees) if len(estimates) > 1 else estimates[0]
 
 
@@ -234,42 +229,6 @@ def _check_fit(
                 f"its rough pose in recording.yaml, as `example_poses: [{{name: {posed.name}, initial_pose: "
                 "{pose: ..., position: [x, y, z], heading: ...}}]`"
             )
-
-
-def doubt_of(body: Body, poses: Float[Array, "pose dof"], pictures: Sequence[PosedPictures], rig: Camera) -> str | None:
-    """Why an actor of frames that nobody chose may be of the wrong sizes, with the remedy; None: they suited."""
-    overlap = _overlap(body, poses, pictures, rig)
-    if overlap >= FRAMES_SUIT:
-        return None
-    shown = ", ".join(posed.name for posed in pictures)
-    return (
-        f"the actor is doubtful, and with it the motion: in the frames that suit best ({shown}) masks and body overlap "
-        f"by only {overlap:.2f} (IoU; 0.8 and more is usual); name frames with an upright body and clear limbs in "
-        "recording.yaml, such as `example_poses: [0, 150]`, or add example_poses/POSE/CAMERA.jpg with CAMERA.mask.png"
-    )
-
-
-def unseen_limbs(body: Body, shown: Bool[np.ndarray, "blob"], pictures: Sequence[PosedPictures]) -> str | None:
-    """Of which limbs the pictures show too little, with the remedy; None: they show enough of all.
-
-    `shown` are the blobs that some mask shows.
-    """
-    members = limb_blobs(body)
-    little = (members & shown).sum(axis=1) < LEAST_SHOWN * members.sum(axis=1)
-    if not little.any():
-        return None
-    names = " and ".join(name for name, less in zip(limb_names(body), little, strict=True) if less)
-    frames = ", ".join(posed.name for posed in pictures)
-    return (
-        f"the {names} of the actor may be anywhere: the frames that it is made of ({frames}) show less than "
-        f"{LEAST_SHOWN:.0%} of them apart from the room; add pictures of the empty scene (background/CAMERA.jpg), or "
-        "example_poses/POSE/CAMERA.jpg with CAMERA.mask.png, that show them"
-    )
-
-
-def _overlap(body: Body, poses: Float[Array, "pose dof"], pictures: Sequence[PosedPictures], rig: Camera) -> float:
-    """How well the body's silhouettes and all masks agree (mean IoU)."""
-    return float(np.mean([agreement(body, pose, posed, rig) for pose, posed in zip(poses, pictures, strict=True)]))
 
 
 def subjects_of(recording: Recording) -> tuple[str | None, ...]:

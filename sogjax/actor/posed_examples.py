@@ -81,6 +81,11 @@ def agreement(body: Body, pose: Float[Array, "dof"], posed: PosedPictures, rig: 
     return float(np.mean([*camera_agreements(body, pose, posed, rig).values()]))
 
 
+def overlap_of(body: Body, poses: Float[Array, "pose dof"], pictures: Sequence[PosedPictures], rig: Camera) -> float:
+    """How well the body's silhouettes and all masks agree (mean IoU)."""
+    return float(np.mean([agreement(body, pose, posed, rig) for pose, posed in zip(poses, pictures, strict=True)]))
+
+
 def camera_agreements(body: Body, pose: Float[Array, "dof"], posed: PosedPictures, rig: Camera) -> dict[int, float]:
     """How well the body's silhouette and the mask agree (IoU) in each camera."""
     return {

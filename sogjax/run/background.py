@@ -66,7 +66,7 @@ class Background:
         arrays = {"reason": np.array(self.reason)}
         for k, camera in enumerate(self.cameras or ()):
             arrays |= {f"{k}.picture": camera.picture, f"{k}.spread": camera.spread, f"{k}.known": camera.known}
-            arrays[f"{k}.learnt"] = np.array(camera.origin == "clip")
+            arrays |= {f"{k}.learnt": np.array(camera.origin == "clip"), f"{k}.furnished": np.array(camera.furnished)}
         save_npz(folder / FILE, arrays, packed=False)
 
     @classmethod
@@ -90,7 +90,8 @@ def _kept_camera(path: Path, arrays: Arrays, prefix: str) -> BackgroundImage:
     spread = float_array(path, arrays, prefix + "spread", picture.shape[:2])
     known = bool_array(path, arrays, prefix + "known", picture.shape[:2])
     learnt = bool(bool_array(path, arrays, prefix + "learnt", ()))
-    return BackgroundImage(picture, spread, known, _ORIGINS[learnt])
+    furnished = bool(bool_array(path, arrays, prefix + "furnished", ()))
+    return BackgroundImage(picture, spread, known, _ORIGINS[learnt], furnished)
 
 
 def learn_background(clip: Clip, choice: str, cache: str | None = None, more: Sequence[SampleKind] = ()) -> Background:
@@ -193,11 +194,11 @@ def _of_clip(clip: Clip, cache: str | None, more: Sequence[SampleKind]) -> Backg
 
 
 def _arrays(clip: Clip, cameras: Sequence[BackgroundImage]) -> Arrays:
-    parts = ("picture", "spread", "known")
+    parts = ("picture", "spread", "known", "furnished")
     named = zip(clip.recording.rig.names, cameras, strict=True)
-    return {f"{name}.{part}": getattr(camera, part) for name, camera in named for part in parts}
+    return {f"{name}.{part}": np.asarray(getattr(camera, part)) for name, camera in named for part in parts}
 
 
 def _of_arrays(arrays: Arrays, name: str) -> BackgroundImage:
     picture, spread, known = (arrays[f"{name}.{part}"] for part in ("picture", "spread", "known"))
-    return BackgroundImage(picture, spread, known, "clip")
+    return BackgroundImage(picture, spread, known, "clip", bool(arrays[f"{name}.furnished"]))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool
@@ -129,7 +130,9 @@ def _told_together(
     if floors:
         learnt = each(lambda k: with_floor(learnt[k], floors.get(k), sampled[k].even.images, zones[k]))
     _say_unknown(recording, learnt)
-    if furniture or not bodies:
+    if furniture:
+        return {k: replace(background, furnished=True) for k, background in learnt.items()}
+    if not bodies:
         return learnt
     return each(lambda k: with_room_behind(learnt[k], bodies[k], moving[k], shown[k], floors.get(k)))
 

@@ -155,4 +155,4 @@ def _filled(own: BackgroundImage, plates: Sequence[FittedPlate]) -> BackgroundIm
     shown[there] = np.ma.median(values, axis=0)
     added = BackgroundImage.from_photograph(np.rint(shown).astype(np.uint8))
     picture = np.where(there[..., None], added.picture, own.picture)
-    return BackgroundImage(picture, np.where(there, added.spread, own.spread), own.known | there, own.origin)
+    return replace(own, picture=picture, spread=np.where(there, added.spread, own.spread), known=own.known | there)

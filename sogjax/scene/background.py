@@ -48,6 +48,8 @@ class BackgroundImage:
     """False where the background was never seen, or may be the subject."""
     origin: Origin
     """A photograph of the empty scene, or learnt from the clip."""
+    furnished: bool = False
+    """Whether much that never moves stands beside the people and is nobody: a table, chairs."""
 
     @classmethod
     def from_photograph(cls, picture: UInt8[np.ndarray, "_h _w 3"]) -> "BackgroundImage":
@@ -62,8 +64,11 @@ class BackgroundImage:
 
     @property
     def calm(self) -> Bool[np.ndarray, "_h _w"]:
-        """Where the background is not known, and nothing ever moved before it, either: a table is, nobody alive is."""
-        if self.origin != "clip" or not self.known.any():
+        """Beside furniture, where the background is not known, and nothing ever moved before it, either.
+
+        Elsewhere nothing is: who stands still hardly moves.
+        """
+        if not self.furnished or not self.known.any():
             return np.zeros_like(self.known)
         usual = float(np.median(self.spread[self.known]))
         return ~self.known & (cv2.blur(self.spread, (CALM_SIDE, CALM_SIDE)) < CALM * usual)

@@ -55,7 +55,7 @@ class Scene:
     unknown: Mapping[int, Mask]
     """Where nothing is known of the background."""
     calm: Mapping[int, Mask]
-    """Where nothing ever moves, in what is unknown or anywhere: it may be furniture, and nobody is told by it."""
+    """Where nothing ever moves beside furniture, in what is unknown or anywhere: nobody is told by it."""
 
     def moving(self, camera: int) -> Mask:
         """What is unknown, and looked at."""

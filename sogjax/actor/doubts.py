@@ -1,0 +1,75 @@
+"""Why an actor may be wrong: frames that do not suit it, limbs that they do not show, or that were not found."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from sogjax.actor.posed_examples import overlap_of
+from sogjax.actor.silhouettes import PosedPictures
+from sogjax.model.body import Body
+from sogjax.model.camera import Camera
+from sogjax.model.limbs import limb_blobs, limb_names
+from sogjax.search.body_parts import limb_groups
+
+LEAST_SHOWN = 0.7
+"""Share of a limb's blobs that the masks must show."""
+FRAMES_SUIT = 0.75
+"""Mean IoU of frames that nobody chose below which the actor is doubtful: its limbs may be of the wrong sizes. Good
+frames have 0.86 to 0.89, and 0.81 to 0.83 where masks say nothing of the legs; at 0.70 and 0.68 all was wrong."""
+UNLIKE = 0.1
+"""Mean distance of the colours (sRGB, 0 to 1) of left and right blobs from which on a limb was not found: 0.02 to 0.09
+where both arms were, 0.12 to 0.29 where one was not, in the recordings of `experiments/whole_runs.py`."""
+
+
+def doubt_of(body: Body, poses: Float[Array, "pose dof"], pictures: Sequence[PosedPictures], rig: Camera) -> str | None:
+    """Why an actor of frames that nobody chose may be of the wrong sizes, with the remedy; None: they suited."""
+    overlap = overlap_of(body, poses, pictures, rig)
+    if overlap >= FRAMES_SUIT:
+        return None
+    shown = ", ".join(posed.name for posed in pictures)
+    return (
+        f"the actor is doubtful, and with it the motion: in the frames that suit best ({shown}) masks and body overlap "
+        f"by only {overlap:.2f} (IoU; 0.8 and more is usual); name frames with an upright body and clear limbs in "
+        "recording.yaml, such as `example_poses: [0, 150]`, or add example_poses/POSE/CAMERA.jpg with CAMERA.mask.png"
+    )
+
+
+def unseen_limbs(body: Body, shown: Bool[np.ndarray, "blob"], pictures: Sequence[PosedPictures]) -> str | None:
+    """Of which limbs the pictures show too little, with the remedy; None: they show enough of all.
+
+    `shown` are the blobs that some mask shows.
+    """
+    members = limb_blobs(body)
+    little = (members & shown).sum(axis=1) < LEAST_SHOWN * members.sum(axis=1)
+    if not little.any():
+        return None
+    names = " and ".join(name for name, less in zip(limb_names(body), little, strict=True) if less)
+    frames = ", ".join(posed.name for posed in pictures)
+    return (
+        f"the {names} of the actor may be anywhere: the frames that it is made of ({frames}) show less than "
+        f"{LEAST_SHOWN:.0%} of them apart from the room; add pictures of the empty scene (background/CAMERA.jpg), or "
+        "example_poses/POSE/CAMERA.jpg with CAMERA.mask.png, that show them"
+    )
+
+
+def unlike_sides(body: Body, colors: Float[np.ndarray, "blob 3"], pictures: Sequence[PosedPictures]) -> str | None:
+    """Of which pairs of limbs one was not found, as its colours (sRGB) are not the other one's; None: of none."""
+    blobs, names = limb_blobs(body), limb_names(body)
+    unlike = [
+        (
+            f"{names[one]} or {names[other]}",
+            float(np.linalg.norm(colors[blobs[one]] - colors[blobs[other]], axis=1).mean()),
+        )
+        for one, other in (members for members in limb_groups(body) if len(members) == 2)
+        if blobs[one].sum() == blobs[other].sum()
+    ]
+    said = [f"{pair} ({off:.2f} apart)" for pair, off in unlike if off > UNLIKE]
+    if not said:
+        return None
+    frames = ", ".join(posed.name for posed in pictures)
+    return (
+        f"the {', and the '.join(said)} of the actor was not found in the frames that it is made of ({frames}), unless "
+        f"clothes differ: left and right have other colours ({UNLIKE:g} and less is usual); name frames with clear "
+        "limbs in recording.yaml, such as `example_poses: [0, 150]`"
+    )
