@@ -163,6 +163,12 @@ ROWS = (
     "arms 1 6 videos 189",
     "couple 2 12 plates 190",
     "squat_kick 1 6 plates 191",
+    "talk 2 12 videos 192",
+    "hug 2 12 videos 193",
+    "couple 2 12 videos 194",
+    "fight 2 12 videos 195",
+    "sit 1 12 videos 196",
+    "arms 1 4 videos 197",
 )
 GIVEN = {
     "plates": (SETTINGS, BACKGROUND, EXAMPLE_POSES),
