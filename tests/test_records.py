@@ -1,5 +1,7 @@
 """Records of passes that a run keeps: exactly what was found, and one sentence where they are damaged."""
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -66,6 +68,18 @@ def test_a_background_is_kept_and_so_is_why_there_is_none(tmp_path):
     assert found.is_learnt
     Background(None, "nobody moves").save(tmp_path)
     assert Background.load(tmp_path) == Background(None, "nobody moves")
+
+
+def test_a_background_that_an_earlier_version_kept_is_read(tmp_path):
+    camera = BackgroundImage(
+        np.zeros((2, 4, 3), np.uint8), np.ones((2, 4), np.float32), np.eye(2, 4, dtype=bool), "clip"
+    )
+    Background((replace(camera, furnished=True),)).save(tmp_path)
+    assert Background.load(tmp_path).cameras[0].furnished
+    with np.load(tmp_path / "background.npz") as arrays:
+        content = {name: array for name, array in arrays.items() if name != "0.furnished"}
+    np.savez(tmp_path / "background.npz", **content)
+    assert not Background.load(tmp_path).cameras[0].furnished
 
 
 @pytest.mark.parametrize("lost", ["reason", "0.picture", "1.picture", "1.learnt"])

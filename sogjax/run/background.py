@@ -90,7 +90,8 @@ def _kept_camera(path: Path, arrays: Arrays, prefix: str) -> BackgroundImage:
     spread = float_array(path, arrays, prefix + "spread", picture.shape[:2])
     known = bool_array(path, arrays, prefix + "known", picture.shape[:2])
     learnt = bool(bool_array(path, arrays, prefix + "learnt", ()))
-    furnished = bool(bool_array(path, arrays, prefix + "furnished", ()))
+    key = prefix + "furnished"
+    furnished = key in arrays and bool(bool_array(path, arrays, key, ()))  # which earlier versions did not keep
     return BackgroundImage(picture, spread, known, _ORIGINS[learnt], furnished)
 
 
