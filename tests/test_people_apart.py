@@ -217,6 +217,11 @@ def test_who_stands_where_nothing_is_known_is_found_by_colour():
     assert not isinstance(examples_of_masks(recording_of(RIG, 2), decided, 2, 2), str)
 
 
+def test_no_common_frame_leaves_all_unknown():
+    empty = replace(sampled(passing(2)), frames=[], masks=[], pictures=[])
+    assert empty.decided(np.array([0.0, 0.0, 1.0])) is empty
+
+
 @pytest.mark.parametrize(
     ("clip", "actors", "words"),
     [

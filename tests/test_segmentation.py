@@ -177,6 +177,14 @@ def test_who_stands_where_nothing_is_known_gets_masks_by_colour():
     assert min(iou(masks[k], truth[k]) for k in masks) > 0.8
 
 
+def test_masks_that_are_given_tell_the_colours_of_who_is_not_known_elsewhere():
+    rig, pictures, truth, _, pillars = who_hardly_moves(6)
+    cameras = {k: rig.camera(name) for k, name in enumerate(rig.names)}
+    given = {k: mask for k, mask in truth.items() if k}
+    masks = masks_from_backgrounds(pictures, {0: pictures[0]}, given, cameras, UP, {0: pillars[0]})
+    assert iou(masks[0], truth[0]) > 0.8
+
+
 def test_a_plate_of_another_place_gives_no_mask():
     rig = ring_rig(2)
     images = {k: photo(scene(seed=k, contrast=60.0)) for k in range(2)}

@@ -70,7 +70,7 @@ class SampledMasks:
         scenes = [
             Scene(shown, masks, self.unknown, self.calm) for shown, masks in zip(self.pictures, self.masks, strict=True)
         ]
-        colors = subject_colors(scenes[:: -(-len(scenes) // LEARNT_FROM)], self.cameras, up)
+        colors = subject_colors(scenes[:: max(-(-len(scenes) // LEARNT_FROM), 1)], self.cameras, up)
         if colors is None:
             return self
         told = lambda scene: {k: colors.decided(k, scene) for k in scene.masks}

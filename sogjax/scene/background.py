@@ -31,7 +31,8 @@ KNOWN_SHARE = 0.75
 """A cell is known if so much of it is."""
 
 CALM, CALM_SIDE = 1.3, 7
-"""Where less than this many times a camera's usual spread varies over squares of so many pixels, nothing moves."""
+"""Where the spread, over squares of so many pixels, is less than this many times a camera's usual one, something stands
+still."""
 
 Origin = Literal["picture", "clip"]
 
@@ -64,7 +65,7 @@ class BackgroundImage:
 
     @property
     def calm(self) -> Bool[np.ndarray, "_h _w"]:
-        """Beside furniture, where the background is not known, and nothing ever moved before it, either.
+        """Beside furniture, where the background is not known, and its most frequent colour hardly varies.
 
         Elsewhere nothing is: who stands still hardly moves.
         """

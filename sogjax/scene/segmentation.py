@@ -17,6 +17,7 @@ from sogjax.scene.background_difference import (
     reduced_mask,
     widened,
     without_holes,
+    working_size,
 )
 from sogjax.scene.subject_colors import Scene, subject_colors
 from sogjax.scene.visual_hull import LOW_VOXELS, MANY, VoxelPixels, cube_around, resized, voxel_pixels, without_floor
@@ -59,7 +60,7 @@ def masks_from_backgrounds(
         cameras: all of these cameras.
         up: the world's vertical.
         unknown: where the empty scene is not known, by camera at any size; None: it is known everywhere.
-        calm: where nothing moves there, by camera at any size; None: nowhere.
+        calm: where its colour never varies, by camera at the pictures' size; None: nowhere.
         decide: whether colours and the other cameras decide there; else it is in no mask.
 
     Returns:
@@ -68,7 +69,8 @@ def masks_from_backgrounds(
     with ThreadPoolExecutor() as pool:
         compare = lambda k: background_difference(images[k], backgrounds[k], (unknown or {}).get(k))
         compared = dict(zip(backgrounds, pool.map(compare, backgrounds), strict=True))
-        differences = _decided(compared, calm or {}, cameras, up) if decide else compared
+        given = {k: (cv2.resize(images[k], working_size(*mask.shape[::-1])), mask) for k, mask in known.items()}
+        differences = _decided(compared, calm or {}, given, cameras, up) if decide else compared
         guesses = {camera: first_guess(difference) for camera, difference in differences.items()}
         guesses = {camera: guess for camera, guess in guesses.items() if is_subject(guess)}
         possible = {c: compared[c].open | guess for c, guess in guesses.items()}
@@ -91,21 +93,27 @@ def first_guess(difference: Difference) -> Bool[np.ndarray, "rows columns"]:
 def _decided(
     differences: Mapping[int, Difference],
     calm: Mapping[int, Mask],
+    given: Mapping[int, tuple[UInt8[np.ndarray, "_h _w 3"], Mask]],
     cameras: Mapping[int, Camera],
     up: Float[np.ndarray, "3"],
 ) -> dict[int, Difference]:
-    """The differences, in which colours tell the subject from the room where that is unknown."""
+    """The differences, in which colours tell the subject from the room where that is unknown.
+
+    `given` are pictures and masks of other cameras.
+    """
     guesses = {k: first_guess(difference) for k, difference in differences.items()}
     unsure = [k for k, difference in differences.items() if difference.unknown.any()]
     if not unsure:
         return {**differences}
+    masks = guesses | {k: reduced_mask(mask) for k, (_, mask) in given.items()}
+    nothing = {k: np.zeros_like(mask) for k, mask in masks.items()}
     scene = Scene(
-        {k: difference.image for k, difference in differences.items()},
-        guesses,
-        {k: difference.unknown for k, difference in differences.items()},
-        {k: reduced_mask(calm[k]) if k in calm else np.zeros_like(guess) for k, guess in guesses.items()},
+        {k: difference.image for k, difference in differences.items()} | {k: image for k, (image, _) in given.items()},
+        masks,
+        nothing | {k: difference.unknown for k, difference in differences.items()},
+        nothing | {k: reduced_mask(calm[k]) for k in guesses if k in calm},
     )
-    small = {k: resized(cameras[k], guess.shape[::-1]) for k, guess in guesses.items()}
+    small = {k: resized(cameras[k], mask.shape[::-1]) for k, mask in masks.items()}
     if (colors := subject_colors([scene], small, up)) is None:
         return {**differences}
     told = lambda k: colors.decided(k, scene)
