@@ -169,17 +169,14 @@ def _grab_cut(picture: UInt8[np.ndarray, "_h _w 3"], labels: UInt8[np.ndarray, "
     return np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
 
 
-def unlike_the_room(picture: UInt8[np.ndarray, "_h _w 3"], unknown: Mask, subject: Mask | None = None) -> Mask:
-    """The subject and what is unlike the room around it where the background is unknown, by OpenCV's grabCut."""
-    subject = np.zeros_like(unknown) if subject is None else subject
+def unlike_the_room(picture: UInt8[np.ndarray, "_h _w 3"], unknown: Mask) -> Mask:
+    """What is unlike the room around it where the background is unknown, by OpenCV's grabCut."""
     scale = min(COARSE_SIDE / max(unknown.shape), 1.0)
     size = (round(scale * unknown.shape[1]), round(scale * unknown.shape[0]))
-    small = lambda mask: cv2.resize(mask.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
-    labels = np.where(small(unknown), cv2.GC_PR_FGD, cv2.GC_BGD).astype(np.uint8)
-    labels[small(subject)] = cv2.GC_FGD
+    small = cv2.resize(unknown.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
+    labels = np.where(small, cv2.GC_PR_FGD, cv2.GC_BGD).astype(np.uint8)
     cut = _grab_cut(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), labels)
-    cut = cv2.resize(cut.astype(np.uint8), unknown.shape[::-1], interpolation=cv2.INTER_NEAREST) > 0
-    return subject | (cut & unknown)
+    return (cv2.resize(cut.astype(np.uint8), unknown.shape[::-1], interpolation=cv2.INTER_NEAREST) > 0) & unknown
 
 
 def largest_parts(mask: Bool[np.ndarray, "rows columns"]) -> Bool[np.ndarray, "rows columns"]:
