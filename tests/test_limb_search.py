@@ -23,7 +23,7 @@ from sogjax.model.limbs import limb_names
 from sogjax.model.solid import Solid, impossibilities
 from sogjax.search import limb_search
 from sogjax.search.limb_search import LimbSearch, climbed_in, compile_search
-from sogjax.search.limb_ways import Units, drawn_ways, look_alikes, units_of
+from sogjax.search.limb_ways import UnitArrays, drawn_ways, look_alikes, units_of
 from sogjax.search.merge_passes import merge_passes
 from sogjax.search.placed_body import means_of
 from sogjax.tracking.frame import on_device
@@ -53,7 +53,7 @@ def test_what_a_part_adds_is_what_the_energy_of_the_whole_gains(number):
         views = with_random_foreground(views, rng)
         terms = standard_terms(floats(0.7), foreground_weight=floats(0.2))
         units = units_of(body)
-        index = jax.tree.map(lambda leaf: leaf[number], Units.of(body, units).index)
+        index = UnitArrays.of(body, units)[number].index
         moves = np.isin(np.arange(len(pose)), units[number].all_dofs)
         others = [pose, *(pose + moves * rng.normal(0.0, 0.4, len(pose)) for _ in range(2))]
         energy = FrameEnergy(body, views, History.unknown(floats(pose)), terms)
@@ -79,9 +79,8 @@ def test_units_are_pairs_of_limbs_of_each_actor():
 
 
 def alike_of(number, pose):
-    units = Units.of(HUMAN, units_of(HUMAN))
-    one = jax.tree.map(lambda leaf: leaf[number], (units.index, units.limbs, units.ends, units.outer))
-    found = jax.jit(look_alikes)(HUMAN, jnp.asarray(pose), *one, units.counterparts)
+    unit = UnitArrays.of(HUMAN, units_of(HUMAN))[number]
+    found = jax.jit(look_alikes)(HUMAN, jnp.asarray(pose), unit)
     return np.asarray(found)
 
 
@@ -176,11 +175,10 @@ def test_no_pass_begins_where_one_went_in_vain(walking_dog, monkeypatch):
     search = LimbSearch.of(tracker)
     other = right.poses[1].copy()
     other[search.units[0].all_dofs] += 0.5
-    ends, values = jnp.stack([jnp.asarray(other)] * 4), jnp.array([1.0, -jnp.inf, -jnp.inf, -jnp.inf])
     monkeypatch.setattr(LimbSearch, "held_otherwise", lambda *_: None)
     monkeypatch.setattr(LimbSearch, "_starts", lambda *_: (other[None], other[:0].reshape(0, len(other))))
     monkeypatch.setattr(LimbSearch, "possible", lambda _, known, poses: np.ones(len(poses), bool))
-    monkeypatch.setattr(limb_search, "climbed_in", lambda *_: (ends, values, jnp.asarray(0.0)))
+    monkeypatch.setattr(limb_search, "climbed_in", lambda _, views, start, share: (start, jnp.ceil(share)))
     better = lambda row: search.better_pose(cells[row], right, row)
     assert np.array_equal(better(1), other)
     search.note_in_vain([1], [other], [0.1])
@@ -199,15 +197,16 @@ def test_no_pass_begins_where_one_went_in_vain(walking_dog, monkeypatch):
 def test_a_climb_makes_its_share_of_the_solvers_iterations(walking_dog):
     tracker, cells, right = walking_dog
     pose = right.poses[1]
-    starts = jnp.asarray(np.stack([pose + np.float32(0.1)] * 4))
-    views = LimbSearch.of(tracker).views(on_device(cells[1]), pose, right.capacities)
-    shares = jnp.array([0.0, 0.04, 1.0, 1.0])
-    ends, values, before = climbed_in(tracker, views, jnp.asarray(pose), starts, jnp.asarray(3), shares)
-    np.testing.assert_array_equal(ends[0], starts[0])
-    np.testing.assert_array_equal(ends[3], starts[3])
-    assert values[0] < values[1] < values[2]
-    assert values[3] == -jnp.inf
-    assert float(values[2]) == pytest.approx(float(before), rel=0.01)
+    search, start = LimbSearch.of(tracker), pose + np.float32(0.1)
+    views = search.views(on_device(cells[1]), pose, right.capacities)
+    climb = lambda share: climbed_in(tracker, views, jnp.asarray(start), jnp.asarray(share, pose.dtype))
+    (unmoved, first), (_, few), (_, last) = map(climb, (0.0, 0.04, 1.0))
+    np.testing.assert_array_equal(unmoved, start)
+    assert first < few < last
+    ends, gains = search.climbed(views, pose, np.stack([start, pose]), np.array([1.0, 0.0]))
+    known = climbed_in(tracker, views, jnp.asarray(pose), jnp.asarray(0.0, pose.dtype))[1]
+    np.testing.assert_array_equal(ends[1], pose)
+    np.testing.assert_allclose(gains, [last - known, 0.0], atol=1e-3)
 
 
 @pytest.mark.slow

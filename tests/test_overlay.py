@@ -136,6 +136,17 @@ def test_grids_hold_all_pictures_and_stay_within_the_width(count, size):
     assert max(fit.top + fit.height for fit in fits) <= grid.size[1]
 
 
+@pytest.mark.parametrize("count", range(1, 14))
+@pytest.mark.parametrize("size", [(1296, 972), (1024, 1024), (1080, 1920)])
+def test_a_grid_stays_within_a_height_as_well(count, size):
+    bounded, free = grid_for([size] * count, 1920, 1080), grid_for([size] * count, 1920)
+    assert bounded.size[0] <= 1920
+    assert bounded.size[1] <= 1080
+    assert (bounded.columns, bounded.rows) == (free.columns, free.rows)
+    if free.size[1] <= 1080:
+        assert bounded == free
+
+
 @pytest.mark.parametrize(("count", "shape"), [(1, (1, 1)), (4, (2, 2)), (9, (3, 3)), (12, (4, 3))])
 def test_a_grid_has_few_empty_places(count, shape):
     grid = grid_for([(1296, 972)] * count, 1920)

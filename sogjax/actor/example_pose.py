@@ -4,7 +4,6 @@ Front or back: what the silhouettes of one picture set hardly tell, several of t
 """
 
 from collections.abc import Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from itertools import product
 from typing import NamedTuple
 
@@ -18,6 +17,7 @@ from sogjax.energy.frame_energy import still_energy
 from sogjax.energy.term import Terms
 from sogjax.energy.views import Views
 from sogjax.model.body import Body
+from sogjax.model.cores import in_threads
 from sogjax.model.program import compiled
 from sogjax.model.rotation import world_from_upright
 from sogjax.search.placed_body import centred, headings, root_rotation, turned
@@ -66,8 +66,7 @@ def poses_from_silhouettes(
             return Candidate(found, float(energy))
 
         first, *others = poses
-        with ThreadPoolExecutor() as pool:
-            return [candidate(first), *pool.map(candidate, others)]
+        return [candidate(first), *in_threads(candidate, others)]
 
     num_headings, num_named, num_dofs = starts.shape
     if num_headings * num_named == 1:

@@ -1,7 +1,6 @@
 """Example poses as silhouettes: what Eq. 9 compares a body of unknown shape and pose with."""
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from sogjax.io.recording import Recording
 from sogjax.io.video import read_frames, read_still
 from sogjax.model.camera import Camera, camera_of
 from sogjax.model.compiled import compiled_hastily
+from sogjax.model.cores import in_threads
 from sogjax.model.sog import Sog
 from sogjax.scene.background import BackgroundImage
 from sogjax.scene.cells import CellGrid, stack_cells
@@ -84,8 +84,7 @@ def load_images(recording: Recording, example: ExamplePose) -> dict[int, UInt8[n
         shown = next(iter(read_frames(recording, example.frame, example.frame + 1)))
         return {k: image for k, image in enumerate(shown) if image is not None}
     cameras = [(k, name) for k, name in enumerate(recording.rig.names) if name in example.images]
-    with ThreadPoolExecutor() as pool:
-        images = list(pool.map(lambda camera: read_still(recording, camera[1], example.images[camera[1]]), cameras))
+    images = in_threads(lambda camera: read_still(recording, camera[1], example.images[camera[1]]), cameras)
     for (_, name), image in zip(cameras, images, strict=True):
         _check_picture(example.images[name], image, recording.rig.image_size(name))
     return {k: image for (k, _), image in zip(cameras, images, strict=True)}

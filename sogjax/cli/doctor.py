@@ -25,8 +25,8 @@ from sogjax.energy.overlap import overlaps
 from sogjax.energy.similarity import Similarity
 from sogjax.energy.views import Views, whole_image_overlap
 from sogjax.errors import InputError
-from sogjax.io.threads import usable_cores
 from sogjax.model.camera import Camera, project
+from sogjax.model.cores import usable_cores
 from sogjax.model.sog import Sog
 from sogjax.run.compilation_cache import why_not_kept
 from sogjax.run.fingerprint import installed_version

@@ -18,6 +18,7 @@ from jaxtyping import Array, Float
 
 from sogjax.energy.posed import Frame, Moving, Posed
 from sogjax.errors import InputError
+from sogjax.solve.linear import eigen
 from sogjax.solve.solution import QuadraticModel
 
 
@@ -94,7 +95,7 @@ def _across(rates: Moving, bends: Moving) -> Float[Array, "dof dof"]:
 
 def _positive_part(matrix: Float[Array, "dof dof"]) -> Float[Array, "dof dof"]:
     """The matrix without its negative eigenvalues."""
-    values, vectors = jnp.linalg.eigh(matrix)
+    values, vectors = eigen(matrix)
     return jnp.matmul(vectors * jnp.maximum(values, 0.0)[None, :], vectors.T, precision="highest")
 
 

@@ -1,6 +1,5 @@
 """Stages of work in threads of their own with few items between them: a slow stage makes the others wait."""
 
-import os
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -12,11 +11,6 @@ from typing import Any, Generic, TypeVar
 Item = TypeVar("Item")
 
 _END: Any = object()
-
-
-def usable_cores() -> int:
-    """How many processor cores this process may use, which can be fewer than the machine has."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def prefetch(items: Iterable[Item], capacity: int) -> Generator[Item, None, None]:

@@ -17,8 +17,8 @@ from sogjax.io.files import atomic_path
 from sogjax.io.image_file import evened, read_image
 from sogjax.io.recording import Recording
 from sogjax.io.source import ImageStream, open_source, open_with_least_work
-from sogjax.io.threads import usable_cores
 from sogjax.io.video_file import frame_times
+from sogjax.model.cores import usable_cores
 from sogjax.model.yuv_picture import YuvPicture
 
 Item = TypeVar("Item")

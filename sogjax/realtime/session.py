@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from sogjax.io.threads import usable_cores
+from sogjax.model.cores import usable_cores
 from sogjax.realtime.assembler import Assembler
 from sogjax.realtime.camera_threads import CameraThreads
 from sogjax.realtime.figures import Figures, Stamps

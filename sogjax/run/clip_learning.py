@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from sogjax.io.recording import Recording
-from sogjax.io.threads import usable_cores
+from sogjax.model.cores import usable_cores
 from sogjax.model.rotation import axis_vector
 from sogjax.run.clip import Clip, SampleKind, spread_frames
 from sogjax.run.terminal import say

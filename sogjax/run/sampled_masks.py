@@ -2,7 +2,6 @@
 
 import hashlib
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import cv2
@@ -14,8 +13,8 @@ from jaxtyping import Float, UInt8
 from sogjax.actor.frame_choice import Mask
 from sogjax.io.painted import painted_masks
 from sogjax.io.recording import Recording
-from sogjax.io.threads import usable_cores
 from sogjax.model.camera import Camera
+from sogjax.model.cores import in_threads
 from sogjax.run.clip import Clip, SampleKind, cell_grids, spread_frames
 from sogjax.scene.background import BackgroundImage, cell_means, stack_background
 from sogjax.scene.background_difference import closed, widened
@@ -74,8 +73,7 @@ class SampledMasks:
         if colors is None:
             return self
         told = lambda scene: {k: colors.decided(k, scene) for k in scene.masks}
-        with ThreadPoolExecutor(usable_cores()) as pool:
-            decided = [*pool.map(told, scenes)]
+        decided = in_threads(told, scenes)
         masks = [
             {k: _joined(mask | subject[k][0], self.unknown[k]) for k, mask in scene.masks.items()}
             for scene, subject in zip(scenes, decided, strict=True)

@@ -6,13 +6,13 @@ floor; so it is told from all of them together.
 """
 
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 from jaxtyping import Bool
 
+from sogjax.model.cores import in_threads
 from sogjax.scene.background_difference import disc, widened
 from sogjax.scene.coarse_views import CoarseViews, small
 from sogjax.scene.floor import Floor, over_floor
@@ -44,8 +44,7 @@ def still_zones(zones: Mapping[int, Mask], views: CoarseViews) -> StillZones:
     seeing, pixels = [*views.moving], views.pixels
     small_zone = lambda k: small(zones[k].astype(np.uint8), cv2.INTER_NEAREST) > 0
     cut = lambda k: unlike_the_room(views.small_picture(k), small_zone(k)) | views.moving[k]
-    with ThreadPoolExecutor() as pool:
-        unlike = dict(zip(seeing, pool.map(cut, seeing), strict=True))
+    unlike = dict(zip(seeing, in_threads(cut, seeing), strict=True))
     missed = views.missed(unlike)
     misses = np.sum([*missed.values()], axis=0)
     surely = views.inside & (misses <= (1 if len(seeing) >= MANY else 0))

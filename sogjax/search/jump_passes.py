@@ -5,7 +5,7 @@ jump as it is before leads to where it would be all the time, if it was right be
 is behind, the other way round.
 """
 
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 
 import jax.numpy as jnp
@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from sogjax.model.body import Body
+from sogjax.model.cores import in_threads
 from sogjax.model.limbs import limb_blobs, limbs
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.jumps import limb_jumps, peaks
@@ -53,7 +54,7 @@ def largest_jump(body: Body, passed: Pass, least: float, tried: Set[int], at_onc
 
 def passes_without(
     search: LimbSearch, passed: Pass, frames: FramesOfRows, jump: Jump, held: Sequence[int]
-) -> Iterator[Compared]:
+) -> list[Compared]:
     """The pass that goes on from a jump with some limbs as they are before it, and the one that goes back from it."""
     body, row, total = search.tracker.body, jump.row, len(passed.poses)
     dofs = np.concatenate([limbs(body.skeleton)[limb] for limb in held])
@@ -61,7 +62,8 @@ def passes_without(
         (row, range(row + 1, min(row + 1 + MOST_FRAMES, total)), -1),
         (row + 1, range(row, max(row - MOST_FRAMES, -1), -1), 0),
     )
-    for source, rows, before in ways:
+
+    def compared_from(source: int, rows: range, before: int) -> Compared | None:
         pose = passed.poses[rows[0]]
         other = pose.copy()
         other[dofs] = passed.poses[source, dofs]
@@ -70,10 +72,13 @@ def passes_without(
         other = search.climbed(views, pose, other[None], np.array([MORE]))[0][0]
         moved = np.linalg.norm(np.diff(means_of(body, np.stack([other, pose])), axis=0)[0], axis=-1)
         apart = max(moved[blobs].mean() for blobs in limb_blobs(body)[[*held]])
-        if apart > fitted_numbers().merge_passes.apart and search.possible(pose, other[None])[0]:
-            start = replace(TrackState.from_pose(jnp.asarray(other)), baseline=jnp.asarray(passed.baseline[rows[0]]))
-            spared = jump.spared[np.array(rows) + before]
-            yield compared(search.tracker, passed, frames, body_parts(body), start, rows, 1, PATIENCE, spared)
+        if apart <= fitted_numbers().merge_passes.apart or not search.possible(pose, other[None])[0]:
+            return None
+        start = replace(TrackState.from_pose(jnp.asarray(other)), baseline=jnp.asarray(passed.baseline[rows[0]]))
+        spared = jump.spared[np.array(rows) + before]
+        return compared(search.tracker, passed, frames, body_parts(body), start, rows, 1, PATIENCE, spared)
+
+    return [found for found in in_threads(lambda way: compared_from(*way), ways) if found is not None]
 
 
 @dataclass(frozen=True)

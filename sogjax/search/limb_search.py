@@ -13,12 +13,13 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.energy.frame_energy import FrameEnergy
-from sogjax.energy.part_energy import PartEnergy, PartIndex
+from sogjax.energy.part_energy import PartEnergy
 from sogjax.energy.posed import History
 from sogjax.energy.views import Views
+from sogjax.model.cores import in_threads
 from sogjax.model.program import compiled
 from sogjax.model.solid import DEEP, impossibilities
-from sogjax.search.limb_ways import CROSSED, Unit, Units, drawn_ways, look_alikes, units_of
+from sogjax.search.limb_ways import CROSSED, Unit, UnitArrays, drawn_ways, look_alikes, units_of
 from sogjax.search.other_pass import REACH, Pass
 from sogjax.search.placed_body import means_of
 from sogjax.search.worth import IMPOSSIBLE_COST, worth
@@ -53,8 +54,8 @@ MOST_ROUNDS = 3
 class LimbSearch:
     """Looks for better ways to hold limbs, in one key frame after the other."""
 
-    def __init__(self, tracker: Tracker, units: Sequence[Unit], arrays: Units) -> None:
-        self.tracker, self.units, self.arrays = tracker, units, arrays
+    def __init__(self, tracker: Tracker, units: Sequence[Unit]) -> None:
+        self.tracker, self.units, self.arrays = tracker, units, UnitArrays.of(tracker.body, units)
         self._turn = 0
         self._carried: HeldOtherwise | None = None
         self._in_vain: dict[int, list[tuple[np.ndarray, int]]] = {}
@@ -63,7 +64,7 @@ class LimbSearch:
     def of(cls, tracker: Tracker) -> "LimbSearch | None":
         """The search for the limbs of a tracker's body; None: it has none."""
         units = units_of(tracker.body)
-        return cls(tracker, units, Units.of(tracker.body, units)) if units else None
+        return cls(tracker, units) if units else None
 
     def note_in_vain(
         self, rows: Sequence[int], poses: Sequence[Float[np.ndarray, "dof"]], gained: Sequence[float]
@@ -123,10 +124,11 @@ class LimbSearch:
 
     def held_otherwise(self, views: Views, pose: Float[np.ndarray, "dof"]) -> "HeldOtherwise":
         """Ways to hold limbs around a pose; some of the next frame's are those found here."""
-        tried = np.stack([self._tried(k, unit, pose) for k, unit in enumerate(self.units)]).astype(pose.dtype)
-        found = held_otherwise(self.tracker, views, jnp.asarray(pose), self.arrays, jnp.asarray(tried))
-        found = self._carried = jax.device_get(found)
-        return found
+        tried = [self._tried(k, unit, pose).astype(pose.dtype) for k, unit in enumerate(self.units)]
+        held = lambda k: held_otherwise(self.tracker, views, jnp.asarray(pose), self.arrays[k], jnp.asarray(tried[k]))
+        found = in_threads(lambda k: jax.device_get(held(k)), range(len(self.units)))
+        together = self._carried = jax.tree.map(lambda *of_units: np.stack(of_units), *found)
+        return together
 
     def _better(
         self,
@@ -158,19 +160,13 @@ class LimbSearch:
         shares: Float[np.ndarray, "start"],
     ) -> tuple[Float[np.ndarray, "start dof"], Float[np.ndarray, "start"]]:
         """Poses climbed, each by a share of the solver's most iterations, and what they gain over a known pose."""
-        most = MOST_WHOLE + 1
-        if len(starts) > most:
-            parts = [slice(k, k + most) for k in range(0, len(starts), most)]
-            found_there = [self.climbed(views, known, starts[part], shares[part]) for part in parts]
-            return np.concatenate([ends for ends, _ in found_there]), np.concatenate(
-                [gains for _, gains in found_there]
-            )
-        more = most - len(starts)
-        padded = np.stack([*starts, *[known] * more]).astype(known.dtype)
-        arrays = jnp.asarray(known), jnp.asarray(padded), jnp.asarray(len(starts))
-        found = climbed_in(self.tracker, views, *arrays, jnp.asarray(np.pad(shares, (0, more)), known.dtype))
-        ends, values, before = jax.device_get(found)
-        return ends[: len(starts)], values[: len(starts)] - before
+        tried = [*zip(starts, shares, strict=True), (known, 0.0)]
+        climb = lambda start, share: climbed_in(
+            self.tracker, views, *(jnp.asarray(x, known.dtype) for x in (start, share))
+        )
+        found = in_threads(lambda each: jax.device_get(climb(*each)), tried)
+        values = np.array([value for _, value in found])
+        return np.stack([end for end, _ in found])[:-1], values[:-1] - values[-1]
 
     def _starts(
         self,
@@ -240,33 +236,18 @@ MOST_WHOLE = 3
 
 @compiled
 def climbed_in(
-    tracker: Tracker,
-    views: Views,
-    known: Float[Array, "dof"],
-    starts: Float[Array, "start dof"],
-    count: Int[Array, ""],
-    shares: Float[Array, "start"],
-) -> tuple[Float[Array, "start dof"], Float[Array, "start"], Float[Array, ""]]:
-    """The first `count` poses climbed with the tracker's energy and solver, and what they are worth (others: nothing).
-
-    From each, a share of the solver's most iterations is made. Last, what the known pose is worth.
-    """
-    energy = FrameEnergy(tracker.body, views, History.unknown(known), tracker.terms)
-
-    def climb(k: Int[Array, ""], found: tuple[Array, Array]) -> tuple[Array, Array]:
-        most = jnp.ceil(shares[k] * tracker.solver.max_iterations).astype(jnp.int32)
-        solver = eqx.tree_at(lambda solver: solver.max_iterations, tracker.solver, most)
-        solution = solver.maximize(energy, starts[k], tracker.scales)
-        value = worth(energy, tracker.solid, solution.params, solution.value)
-        return found[0].at[k].set(solution.params), found[1].at[k].set(value)
-
-    nothing = jnp.full(len(starts), -jnp.inf, starts.dtype)
-    ends, values = jax.lax.fori_loop(0, count, climb, (starts, nothing))
-    return ends, values, worth(energy, tracker.solid, known)
+    tracker: Tracker, views: Views, start: Float[Array, "dof"], share: Float[Array, ""]
+) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
+    """A pose climbed with the tracker's energy and a share of its solver's most iterations, and what it is worth."""
+    energy = FrameEnergy(tracker.body, views, History.unknown(start), tracker.terms)
+    most = jnp.ceil(share * tracker.solver.max_iterations).astype(jnp.int32)
+    solver = eqx.tree_at(lambda solver: solver.max_iterations, tracker.solver, most)
+    found = solver.maximize(energy, start, tracker.scales)
+    return found.params, worth(energy, tracker.solid, found.params, found.value)
 
 
 class HeldOtherwise(eqx.Module):
-    """Ways to hold each unit, climbed, with the rest of the body as it was tracked; the first from where it was."""
+    """Ways to hold one unit or each, climbed, with the rest of the body as it was tracked; the first is as tracked."""
 
     poses: Float[Array, "*unit way dof"]
     gains: Float[Array, "*unit way"]
@@ -283,33 +264,26 @@ class HeldOtherwise(eqx.Module):
 
 @compiled
 def held_otherwise(
-    tracker: Tracker, views: Views, pose: Float[Array, "dof"], units: Units, tried: Float[Array, "unit seed dof"]
+    tracker: Tracker, views: Views, pose: Float[Array, "dof"], unit: UnitArrays, tried: Float[Array, "seed dof"]
 ) -> HeldOtherwise:
-    """The best different ways to hold each unit in what is seen, climbed.
+    """The best different ways to hold a unit in what is seen, climbed.
 
     Compared are the tracked one, those that look like it, and those that are `tried`.
     """
     scales = replace(tracker.scales, largest_steps=jnp.maximum(tracker.scales.largest_steps, LARGEST_ANGLE))
-    solver = GaussNewton(max_iterations=ITERATIONS)
-
-    def of_unit(each: tuple[PartIndex, Array, Array, Array, Array]) -> HeldOtherwise:
-        index, of_limb, ends, outer, others = each
-        energy = PartEnergy.around(tracker.body, views, tracker.terms, pose, index)
-        held = lambda params: index.put(pose, params)
-        means = lambda params: tracker.body.posed_blobs(held(params)).means[index.blobs]
-        alike = look_alikes(tracker.body, pose, index, of_limb, ends, outer, units.counterparts)
-        params = jax.vmap(index.params)(jnp.concatenate([pose[None], alike, others]))
-        values = _in_parts(energy, params)
-        chosen = _different(jax.vmap(means)(params), values, of_limb)
-        climb = lambda start: solver.maximize(energy, start, replace(scales, kinds=scales.kinds[index.dofs]))
-        found = jax.vmap(climb)(params[chosen])
-        places = jax.vmap(means)(found.params)
-        apart = jax.vmap(lambda each: _apart(each, means(params[0]), of_limb))(places)
-        ways = jax.vmap(held)(found.params), found.value - values[0], apart
-        crossed = held(params[CROSSED]), values[CROSSED] - values[0]
-        return HeldOtherwise(*ways, *crossed, _apart(means(params[CROSSED]), means(params[0]), of_limb))
-
-    return jax.lax.map(of_unit, (units.index, units.limbs, units.ends, units.outer, tried))
+    solver, index, limbs = GaussNewton(max_iterations=ITERATIONS), unit.index, unit.limbs
+    energy = PartEnergy.around(tracker.body, views, tracker.terms, pose, index)
+    held = lambda params: index.put(pose, params)
+    means = lambda params: tracker.body.posed_blobs(held(params)).means[index.blobs]
+    params = jax.vmap(index.params)(jnp.concatenate([pose[None], look_alikes(tracker.body, pose, unit), tried]))
+    values = _in_parts(energy, params)
+    chosen = _different(jax.vmap(means)(params), values, limbs)
+    climb = lambda start: solver.maximize(energy, start, replace(scales, kinds=scales.kinds[index.dofs]))
+    found = jax.vmap(climb)(params[chosen])
+    apart = jax.vmap(lambda each: _apart(each, means(params[0]), limbs))(jax.vmap(means)(found.params))
+    ways = jax.vmap(held)(found.params), found.value - values[0], apart
+    crossed = held(params[CROSSED]), values[CROSSED] - values[0]
+    return HeldOtherwise(*ways, *crossed, _apart(means(params[CROSSED]), means(params[0]), limbs))
 
 
 def _in_parts(energy: PartEnergy, params: Float[Array, "seed param"]) -> Float[Array, "seed"]:

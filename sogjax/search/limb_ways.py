@@ -65,36 +65,36 @@ def units_of(body: Body) -> tuple[Unit, ...]:
     )
 
 
-class Units(eqx.Module):
-    """Units as arrays of one shape."""
+class UnitArrays(eqx.Module):
+    """A unit as arrays, which have the shape of those of the body's other units."""
 
     index: PartIndex
-    limbs: Bool[Array, "unit limb slot"]
+    limbs: Bool[Array, "limb slot"]
     """Which of the unit's blobs are those of each limb; none where there is no second one."""
-    ends: Int[Array, "unit limb 2"]
+    ends: Int[Array, "limb 2"]
     """The first and the last blob of each limb."""
-    outer: Float[Array, "unit slot"]
+    outer: Float[Array, "slot"]
     """How far beyond the middle of its limb a blob is: 0 up to there, 1 at the end."""
     counterparts: Int[Array, "blob"]
     """The blob of the other side, or the same."""
 
     @classmethod
-    def of(cls, body: Body, units: Sequence[Unit]) -> "Units":
-        """Padded to the largest."""
+    def of(cls, body: Body, units: Sequence[Unit]) -> "list[UnitArrays]":
+        """Each unit, padded to the largest."""
         dofs, blobs = _padded([unit.all_dofs for unit in units]), _padded([unit.all_blobs for unit in units])
-        of_limb = np.zeros((len(units), 2, blobs[0].shape[1]), bool)
-        ends, outer = np.zeros((len(units), 2, 2), int), np.zeros(blobs[0].shape)
+        counterparts, found = jnp.asarray(other_side(body.blobs.names)), []
         for k, unit in enumerate(units):
+            slots, has_blob = blobs[0][k], blobs[1][k]
+            of_limb, outer = np.zeros((2, len(slots)), bool), np.zeros(len(slots))
             for j, each in enumerate(unit.blobs):
-                of_limb[k, j] = np.isin(blobs[0][k], each) & blobs[1][k]
-            ends[k] = [[each[0], each[-1]] for each in (unit.blobs[0], unit.blobs[-1])]
+                of_limb[j] = np.isin(slots, each) & has_blob
+            ends = [[each[0], each[-1]] for each in (unit.blobs[0], unit.blobs[-1])]
             along = [np.linspace(-1.0, 1.0, len(each)) for each in unit.blobs]
-            outer[k, : len(unit.all_blobs)] = np.maximum(np.concatenate(along), 0.0)
-        index = PartIndex(*(jnp.asarray(array) for array in (*dofs, *blobs)))
-        counterparts = jnp.asarray(other_side(body.blobs.names))
-        return cls(
-            index, jnp.asarray(of_limb), jnp.asarray(ends), jnp.asarray(outer, body.blob_sigmas.dtype), counterparts
-        )
+            outer[: len(unit.all_blobs)] = np.maximum(np.concatenate(along), 0.0)
+            index = PartIndex(*(jnp.asarray(array[k]) for array in (*dofs, *blobs)))
+            arrays = jnp.asarray(of_limb), jnp.asarray(ends), jnp.asarray(outer, body.blob_sigmas.dtype)
+            found.append(cls(index, *arrays, counterparts))
+        return found
 
 
 def _padded(rows: Sequence[Int[np.ndarray, "_n"]]) -> tuple[Int[np.ndarray, "row n"], Bool[np.ndarray, "row n"]]:
@@ -110,28 +110,20 @@ CROSSED = 2
 """Where the way with exchanged ends is among those compared: the tracked one, then what looks like it."""
 
 
-def look_alikes(
-    body: Body,
-    pose: Float[Array, "dof"],
-    index: PartIndex,
-    of_limb: Bool[Array, "limb slot"],
-    ends: Int[Array, "limb 2"],
-    outer: Float[Array, "slot"],
-    counterparts: Int[Array, "blob"],
-) -> Float[Array, "5 dof"]:
+def look_alikes(body: Body, pose: Float[Array, "dof"], unit: UnitArrays) -> Float[Array, "5 dof"]:
     """What looks like a unit as it is held.
 
     Its limbs exchanged; their ends exchanged, with knees and elbows about where they are; each of them turned by a half
     from root to end; both turned.
     """
-    means = body.posed_blobs(pose).means
+    means, index = body.posed_blobs(pose).means, unit.index
     here = means[index.blobs]
-    turned = jax.vmap(lambda two: _half_turned(here, means[two[0]], means[two[1]]))(ends)
+    turned = jax.vmap(lambda two: _half_turned(here, means[two[0]], means[two[1]]))(unit.ends)
     place = lambda moved: means.at[jnp.where(index.blob_mask, index.blobs, len(means))].set(moved, mode="drop")
-    first, second = (jnp.where(each[:, None], moved, here) for each, moved in zip(of_limb, turned, strict=True))
-    both = jnp.where(of_limb[1][:, None], second, first)
-    exchanged = means[counterparts[index.blobs]]
-    crossed = here + outer[:, None] * (exchanged - here)
+    first, second = (jnp.where(each[:, None], moved, here) for each, moved in zip(unit.limbs, turned, strict=True))
+    both = jnp.where(unit.limbs[1][:, None], second, first)
+    exchanged = means[unit.counterparts[index.blobs]]
+    crossed = here + unit.outer[:, None] * (exchanged - here)
     targets = jnp.stack([place(each) for each in (exchanged, crossed, first, second, both)])
     fitted = fitted_to_blobs(body, jnp.tile(pose, (len(targets), 1)), targets, FIT_ITERATIONS)[0]
     return jax.vmap(lambda each: index.put(pose, index.params(each)))(fitted)

@@ -17,6 +17,7 @@ from jaxtyping import Array, Bool, Float, Int
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History
 from sogjax.energy.views import Views
+from sogjax.model.cores import in_threads
 from sogjax.model.limbs import limb_names
 from sogjax.model.program import compiled
 from sogjax.quality.fitted import fitted_numbers
@@ -242,10 +243,11 @@ class _Revising:
         apart, gains = np.stack(found.apart), np.stack(found.gains)
         ends, doubts = self._open_ends(found.rows), self._doubts(rows)
         taken = select_parts(self.parts, apart, gains, self.passed.energy, ends, doubts)
-        changed = [(k, int(rows[k])) for k in np.flatnonzero(taken.any(axis=1))]
-        merged = {row: self._merged(self.passed.poses[row], found, int(k), taken[k]) for k, row in changed}
-        better = sum(self._gained(found, int(k), self.passed.poses[row], merged[row]) for k, row in changed) > 0.0
-        if not better:
+        changed = [(int(k), int(rows[k])) for k in np.flatnonzero(taken.any(axis=1))]
+        poses = in_threads(lambda at: self._merged(self.passed.poses[at[1]], found, at[0], taken[at[0]]), changed)
+        merged = {row: pose for (_, row), pose in zip(changed, poses, strict=True)}
+        gained = in_threads(lambda at: self._gained(found, at[0], self.passed.poses[at[1]], merged[at[1]]), changed)
+        if not sum(gained) > 0.0:
             self._looked_at += len(rows)
             return set()
         self._revise_rows(found, merged, taken)
@@ -270,9 +272,7 @@ class _Revising:
             taken = elsewhere & by_itself & np.isin(rows, [*merged])[:, None]
         for row, pose in merged.items():
             self.passed.poses[row] = pose
-        for k, row in enumerate(found.rows):
-            if row in merged:
-                self._revise(row, found.cells[k])
+        in_threads(lambda k: self._revise(found.rows[k], found.cells[k]), np.flatnonzero(np.isin(rows, [*merged])))
         self._changed |= set(merged)
         for part, of_part in zip(self.parts, taken.T, strict=True):
             for name in part.names if of_part.any() else ():
@@ -303,8 +303,7 @@ class _Revising:
             return found.poses[k].copy()
         mixed = jnp.asarray(merged_pose(self.tracker.body, self.parts, pose, found.poses[k], taken))
         views = views_near(self.tracker, on_device(found.cells[k]), mixed, self.passed.capacities)
-        arrays = mixed, mixed[None], jnp.asarray(1), jnp.asarray([MORE])
-        return np.asarray(climbed_in(self.tracker, views, *arrays)[0][0])
+        return np.asarray(climbed_in(self.tracker, views, mixed, jnp.asarray(MORE, mixed.dtype))[0])
 
     def _revise(self, row: int, frame: AnyFrame) -> None:
         """Note what the pose of a frame, which changed, is worth."""

@@ -11,6 +11,7 @@ from sogjax.model.body import Body
 from sogjax.model.limbs import limb_blobs, limbs
 from sogjax.model.program import compiled
 from sogjax.search.placed_body import means_of
+from sogjax.solve.linear import solve_positive
 
 SIDES = (("left", "right"), ("Left", "Right"), ("l_", "r_"), ("L_", "R_"))
 """Beginnings or parts of names that tell the two sides."""
@@ -105,7 +106,7 @@ def _fit(body: Body, iterations: int, start: Array, target: Array) -> tuple[Arra
         curvature = jnp.matmul(jacobian.T, jacobian, precision="highest")
         curvature = curvature + POSE_SPREAD**2 * jnp.eye(pose.shape[0], dtype=pose.dtype)
         pull = jnp.matmul(jacobian.T, (target - means).reshape(-1), precision="highest")
-        move = jnp.linalg.solve(curvature, pull)
+        move = solve_positive(curvature, pull)
         move = move / jnp.maximum(jnp.max(jnp.abs(move)) / 0.5, 1.0)
         return jnp.clip(pose + move, lower, upper)
 

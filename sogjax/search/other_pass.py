@@ -18,6 +18,7 @@ from sogjax.energy.keypoints import keypoint_term_among
 from sogjax.energy.posed import History
 from sogjax.energy.views import Views
 from sogjax.model.body import Body
+from sogjax.model.cores import in_threads
 from sogjax.model.program import compiled
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.search.body_parts import Part, PartArrays
@@ -124,7 +125,7 @@ def compared_both_ways(
         range(row, max(row - MOST_FRAMES, -1), -1),
         range(row, min(row + MOST_FRAMES, len(passed.poses))),
     )
-    back, forth = (compared(tracker, passed, frames, parts, start, way, 1, patience) for way in ways)
+    back, forth = in_threads(lambda way: compared(tracker, passed, frames, parts, start, way, 1, patience), ways)
     return back.joined(forth)
 
 

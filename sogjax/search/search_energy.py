@@ -1,7 +1,6 @@
 """The energy of a search: how well a pose explains the pictures, within the joints' limits, and climbing it."""
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any
 
@@ -21,6 +20,7 @@ from sogjax.energy.term import Penalty, Term, Terms
 from sogjax.energy.views import Views, whole_image_overlap
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
+from sogjax.model.cores import in_threads
 from sogjax.model.program import compiled
 from sogjax.model.skeleton import Skeleton
 from sogjax.model.sog import Sog
@@ -41,9 +41,7 @@ LARGEST_ANGLE, LARGEST_TRANSLATION = 0.3, 0.15
 DISC = 1.35
 """Radius of the disc that a blob of sigma 1 stands for."""
 AT_ONCE, SCORED_AT_ONCE = 8, 64
-"""Poses that are climbed, and scored, in one call."""
-THREADS = 2
-"""Calls at the same time: one alone leaves half of two cores idle."""
+"""Poses that are climbed, and scored, in one call; each call is another thread's."""
 
 
 class RestPrior(Penalty):
@@ -147,9 +145,8 @@ def _in_parts(function: Callable[..., tuple[Array, ...]], size: int, place: np.n
     """The results for all starts, always the same number at once, so that one program serves all."""
     count = len(poses)
     padded = [np.concatenate([part, np.repeat(part[-1:], -count % size, axis=0)]) for part in (place, poses)]
-    with ThreadPoolExecutor(THREADS) as pool:
-        part_at = lambda k: jax.device_get(function(*(part[k : k + size] for part in padded)))
-        parts = [*pool.map(part_at, range(0, count, size))]
+    part_at = lambda k: jax.device_get(function(*(part[k : k + size] for part in padded)))
+    parts = in_threads(part_at, range(0, count, size))
     return [np.concatenate(part)[:count] for part in zip(*parts, strict=True)]
 
 

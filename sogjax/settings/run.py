@@ -18,7 +18,9 @@ class OutputsConfig:
     )
     page: bool = expert(True, "index.html, the whole result on one page for a browser", inert=True)
     overlay: bool = option(True, "overlay.mp4, the skeleton on every camera's pictures", inert=True)
-    overlay_width: int = expert(1920, "width of the overlay video, px", inert=True)
+    overlay_width: int = expert(
+        1920, "largest width of the overlay video, px; its height is 9/16 of that at most", inert=True
+    )
     rerun: bool = expert(True, "motion.rrd, for the Rerun viewer", inert=True)
     rerun_images: bool = expert(True, "put the pictures into motion.rrd", inert=True)
     bvh: bool = expert(True, "motion.bvh", inert=True)

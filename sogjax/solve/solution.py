@@ -8,6 +8,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
+from sogjax.solve.linear import solve_positive
+
 Params = Float[Array, "param"]
 
 
@@ -42,8 +44,7 @@ class QuadraticModel(eqx.Module):
         diagonal = jnp.diag(curvature)
         held = jnp.maximum(diagonal + common * jnp.mean(diagonal), jnp.finfo(diagonal.dtype).tiny)
         damped = curvature + jnp.diag(damping * held)
-        factor = jax.scipy.linalg.cho_factor(damped)
-        step = jax.scipy.linalg.cho_solve(factor, self.gradient * bounds)
+        step = solve_positive(damped, self.gradient * bounds)
         return bounds * step / jnp.maximum(jnp.max(jnp.abs(step)), 1.0)
 
     def expected_gain(self, step: Params) -> Float[Array, ""]:

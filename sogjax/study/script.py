@@ -10,7 +10,7 @@ from typing import TypeVar
 import jax
 
 from sogjax.errors import InputError, counted
-from sogjax.io.threads import usable_cores
+from sogjax.model.cores import usable_cores
 from sogjax.run.compilation_cache import use_compilation_cache, use_compiler_options
 from sogjax.settings.compose import composed_config, pair_of
 from sogjax.settings.option import help_lines

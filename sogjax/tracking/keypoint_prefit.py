@@ -19,6 +19,7 @@ from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.program import compiled
 from sogjax.solve.gauss_newton import GaussNewton
+from sogjax.solve.linear import solve_positive
 from sogjax.solve.solution import QuadraticModel, Scales
 
 WIDTHS = (0.2, 0.08)
@@ -119,7 +120,7 @@ def estimated_offsets(
         held = jnp.eye(3, dtype=offsets.dtype)[None] / (EXPECTED**2 * used * INDEPENDENT)
         flat = offsets.reshape(-1, 3)
         pulled = sums.by_offset - jnp.einsum("nij,nj->ni", jnp.broadcast_to(held, sums.stiffness.shape), flat)
-        moved = flat + jnp.linalg.solve(sums.stiffness + held, pulled[..., None])[..., 0]
+        moved = flat + jax.vmap(solve_positive)(sums.stiffness + held, pulled)
         length = jnp.linalg.norm(moved, axis=-1, keepdims=True)
         return (moved * jnp.minimum(1.0, FARTHEST / jnp.maximum(length, 1e-9))).reshape(offsets.shape)
 

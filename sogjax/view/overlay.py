@@ -47,6 +47,7 @@ class Overlay:
         motions: one for each actor.
         cameras: the names of those to show, in this order; default all.
         width: largest width of the grid in pixels.
+        height: its largest height; None: it may be as high as it is.
         bones: the lines of each actor; default those of its motion.
 
     Raises:
@@ -60,6 +61,7 @@ class Overlay:
         *,
         cameras: Sequence[str] | None = None,
         width: int = WIDTH,
+        height: int | None = None,
         bones: Sequence[Bones] | None = None,
     ) -> None:
         names = tuple(rig.names if cameras is None else cameras)
@@ -70,7 +72,7 @@ class Overlay:
         self.shown = [rig.names.index(name) for name in names]
         chosen = rig.select(names)
         sizes = [chosen.image_size(name) for name in names]
-        self.grid = grid_for(sizes, width)
+        self.grid = grid_for(sizes, width, height)
         self.fits = [self.grid.fit(k, size) for k, size in enumerate(sizes)]
         lines = [bones_from_motion(motion) for motion in motions] if bones is None else bones
         self.actors = [
@@ -173,6 +175,8 @@ def _bgr(rgb: UInt8[np.ndarray, "3"]) -> tuple[int, int, int]:
 class OverlayVideo:
     """A video (mp4) of motions over the pictures of all cameras, within a `with` block; whole or not there.
 
+    It fits a screen of its width and 16:9.
+
     Args:
         path: the video.
         recording: what is tracked.
@@ -184,11 +188,14 @@ class OverlayVideo:
         self._rig, self._width = recording.rig, width
         self._video = VideoWriter(Path(path), fps)
         self._bones: list[Bones] | None = None
-        self._empty = Overlay(recording.rig, [], width=width)
+        self._empty = self._overlay([])
 
     def __enter__(self) -> "OverlayVideo":
         self._video.__enter__()
         return self
+
+    def _overlay(self, motions: Sequence[Motion]) -> Overlay:
+        return Overlay(self._rig, motions, width=self._width, height=self._width * 9 // 16, bones=self._bones)
 
     def tile(self, camera: int, image: np.ndarray) -> np.ndarray:
         """A camera's picture (BGR) at the size that is shown; thread-safe."""
@@ -198,7 +205,7 @@ class OverlayVideo:
         """Append the frames of motions, one for each actor, that follow; `tiles` of all cameras for each of them."""
         if self._bones is None:
             self._bones = [bones_from_motion(motion) for motion in motions]
-        overlay = Overlay(self._rig, motions, width=self._width, bones=self._bones)
+        overlay = self._overlay(motions)
         for frame, pictures in zip(motions[0].frame, tiles, strict=True):
             self._video.write(overlay.draw(pictures, int(frame)))
 

@@ -66,8 +66,8 @@ class Fit:
         return area
 
 
-def grid_for(image_sizes: Sequence[tuple[int, int]], width: int) -> TileGrid:
-    """A grid at most `width` pixels wide for pictures of the given sizes, none of them enlarged.
+def grid_for(image_sizes: Sequence[tuple[int, int]], width: int, height: int | None = None) -> TileGrid:
+    """A grid at most `width` pixels wide, and `height` high if it is given, for pictures of such sizes, none enlarged.
 
     Its shape comes as near to 16:9 as its number of tiles allows.
     """
@@ -77,6 +77,8 @@ def grid_for(image_sizes: Sequence[tuple[int, int]], width: int) -> TileGrid:
     empty = lambda n: (n * rows(n) - count) / count
     columns = min(range(1, count + 1), key=lambda n: abs(np.log(n * aspect / rows(n) / (16 / 9))) + empty(n))
     tile = min(width // columns, max(w for w, _ in image_sizes))
+    if height is not None:
+        tile = min(tile, int(height // rows(columns) * aspect))
     even = lambda side: max(2, int(side) // 2 * 2)
     return TileGrid(columns, rows(columns), (even(tile), even(round(tile / aspect))))
 

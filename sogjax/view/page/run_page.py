@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,6 +12,7 @@ from sogjax.errors import counted
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.io.motion import Motion, motion_from_poses
 from sogjax.model.body import Body
+from sogjax.model.cores import in_threads
 from sogjax.model.rotation import world_from_upright
 from sogjax.quality.remedies import remedies
 from sogjax.quality.verdict import Verdict
@@ -125,9 +125,8 @@ def _drawn(
     drawing = SkeletonPictures(
         run.rig, [motion.of_rows(np.isin(motion.frame, numbers)) for motion in motions], shown, run.width
     )
-    with ThreadPoolExecutor() as threads:  # OpenCV works beside Python
-        contents = threads.map(lambda each: data_uri(jpeg(drawing.draw(*each), QUALITY)), pictures)
-        return list(zip(numbers, contents, strict=True))
+    contents = in_threads(lambda each: data_uri(jpeg(drawing.draw(*each), QUALITY)), pictures)
+    return list(zip(numbers, contents, strict=True))
 
 
 def _silhouettes(
