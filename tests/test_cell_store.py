@@ -1,6 +1,7 @@
 """Kept cells: the same as those of the videos, and made again where they may not be."""
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -62,6 +63,18 @@ def test_kept_cells_are_those_of_the_videos(walk, tmp_path, decoded):
     assert taken(decoded) == [0, 1, 2, 3]
     np.testing.assert_array_equal(cells(opened(walk, cache)), direct)
     assert taken(decoded) == []
+
+
+def test_frames_that_two_threads_keep_at_once_are_all_kept(walk, tmp_path):
+    store = opened(walk, tmp_path / "cache").store
+    present = np.ones(store._shape[0], bool)
+    content = lambda frame: np.full(store._shape, frame % 251, np.uint8)
+    keep = lambda first: [store.keep(frame, content(frame), present) for frame in range(first, 400, 2)]
+    with ThreadPoolExecutor(2) as pool:
+        [*pool.map(keep, range(2))]
+    assert store.kept(range(400)).all()
+    assert all((store.find(frame)[0] == content(frame)).all() for frame in range(400))
+    store.close()
 
 
 def test_only_what_is_missing_is_decoded(walk, tmp_path, decoded):

@@ -32,7 +32,16 @@ def test_solutions_and_eigenvectors_are_those_of_numpy_in_batches_of_batches():
     )
 
 
-def test_slopes_of_a_solution_can_be_asked_for():
+@pytest.mark.parametrize("function", [lambda m: solve_positive(m, m[0]), lambda m: eigen(m)[0]])
+def test_no_kernel_gets_a_batch_of_matrices_also_in_batches_of_batches(function):
+    every = jnp.asarray(matrices(6, 5).reshape(2, 3, 5, 5))
+    text = jax.jit(jax.vmap(jax.vmap(function))).lower(every).as_text()
+    calls = [line for line in text.splitlines() if "lapack_s" in line]
+    assert calls
+    assert all("x5x5x" not in line for line in calls)
+
+
+def test_forward_slopes_of_a_solution_can_be_asked_for():
     matrix, vector = matrices(1, 4)[0], jnp.arange(4.0)
     slope = jax.jvp(solve_positive, (matrix, vector), (jnp.zeros((4, 4)), jnp.ones(4)))[1]
     np.testing.assert_allclose(slope, np.linalg.solve(matrix, np.ones(4)), rtol=1e-4)

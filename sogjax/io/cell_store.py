@@ -13,6 +13,7 @@ import zlib
 from collections.abc import Callable
 from io import FileIO
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -50,7 +51,7 @@ class CellStore:
     def __init__(
         self, folder: Path, recording: Recording, depth: int, shape: tuple[int, int, int], say: Callable[[str], None]
     ):
-        self.folder, self._files = folder, dict[str, FileIO]()
+        self.folder, self._files, self._writing = folder, dict[str, FileIO](), Lock()
         self._shape, self._size = (*shape, 3), int(np.prod(shape)) * 3
         self._entry = np.dtype([("kept", "u1"), ("checksum", "<u4"), ("present", "u1", (shape[0],))])
         self.is_full = False
@@ -146,12 +147,13 @@ class CellStore:
 
     def _write(self, name: str, content: bytes, offset: int) -> None:
         """Write at a place, without a buffer: a full disk shows here and not in whoever reads the mapped file."""
-        if name not in self._files:
-            self._files[name] = (self.folder / name).open("r+b", buffering=0)
-        self._files[name].seek(offset)
-        left = memoryview(content)
-        while left:
-            left = left[self._files[name].write(left) :]
+        with self._writing:
+            if name not in self._files:
+                self._files[name] = (self.folder / name).open("r+b", buffering=0)
+            self._files[name].seek(offset)
+            left = memoryview(content)
+            while left:
+                left = left[self._files[name].write(left) :]
 
     def _read_note(self) -> dict[str, Any] | None:
         try:

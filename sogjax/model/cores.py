@@ -2,11 +2,14 @@
 
 import os
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import CancelledError, ThreadPoolExecutor
+from threading import Event, local
 from typing import TypeVar
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+_here = local()
+"""In a thread of `in_threads`: `left`, the event of its caller having left."""
 
 
 def usable_cores() -> int:
@@ -14,11 +17,35 @@ def usable_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def in_threads(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
-    """What a function makes of each item, with a thread for each core: jax and OpenCV work beside Python."""
+def in_threads(function: Callable[[Item], Result], items: Iterable[Item], most: int | None = None) -> list[Result]:
+    """What a function makes of each item, with a thread for each core, or `most`: jax and OpenCV work beside Python.
+
+    Within one of these threads items are taken in order. After an error, or Ctrl-C, those begun end first: where that
+    takes long, the function calls `go_on`.
+    """
     given = [*items]
-    threads = min(len(given), usable_cores())
-    if threads < 2:
+    threads = min(len(given), usable_cores(), most or len(given))
+    if threads < 2 or hasattr(_here, "left"):
         return [function(item) for item in given]
+    left = Event()
+
+    def of_item(item: Item) -> Result:
+        _here.left = left
+        return function(item)
+
     with ThreadPoolExecutor(threads) as pool:
-        return [*pool.map(function, given)]
+        try:
+            return [*pool.map(of_item, given)]
+        except BaseException:
+            left.set()
+            raise
+
+
+def go_on() -> None:
+    """Go on, unless what is done here is no longer wanted.
+
+    Raises:
+        CancelledError: who called `in_threads` has left.
+    """
+    if hasattr(_here, "left") and _here.left.is_set():
+        raise CancelledError

@@ -247,7 +247,7 @@ def climbed_in(
 
 
 class HeldOtherwise(eqx.Module):
-    """Ways to hold one unit or each, climbed, with the rest of the body as it was tracked; the first is as tracked."""
+    """Ways to hold a unit, or all, climbed from where they were and elsewhere; the rest is as it was tracked."""
 
     poses: Float[Array, "*unit way dof"]
     gains: Float[Array, "*unit way"]

@@ -18,7 +18,7 @@ from sogjax.energy.keypoints import keypoint_term_among
 from sogjax.energy.posed import History
 from sogjax.energy.views import Views
 from sogjax.model.body import Body
-from sogjax.model.cores import in_threads
+from sogjax.model.cores import go_on, in_threads
 from sogjax.model.program import compiled
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.search.body_parts import Part, PartArrays
@@ -152,6 +152,7 @@ def compared(
 
     def coming() -> Iterable[AnyFrame]:
         for frame in frames(rows):
+            go_on()
             found.cells.append(frame)
             yield frame
 

@@ -41,7 +41,9 @@ LARGEST_ANGLE, LARGEST_TRANSLATION = 0.3, 0.15
 DISC = 1.35
 """Radius of the disc that a blob of sigma 1 stands for."""
 AT_ONCE, SCORED_AT_ONCE = 8, 64
-"""Poses that are climbed, and scored, in one call; each call is another thread's."""
+"""Poses that are climbed, and scored, in one call."""
+THREADS = 2
+"""Calls at the same time: one alone leaves half of two cores idle; each takes memory."""
 
 
 class RestPrior(Penalty):
@@ -146,7 +148,7 @@ def _in_parts(function: Callable[..., tuple[Array, ...]], size: int, place: np.n
     count = len(poses)
     padded = [np.concatenate([part, np.repeat(part[-1:], -count % size, axis=0)]) for part in (place, poses)]
     part_at = lambda k: jax.device_get(function(*(part[k : k + size] for part in padded)))
-    parts = in_threads(part_at, range(0, count, size))
+    parts = in_threads(part_at, range(0, count, size), THREADS)
     return [np.concatenate(part)[:count] for part in zip(*parts, strict=True)]
 
 

@@ -18,14 +18,14 @@ Found = TypeVar("Found")
 
 
 def one_by_one(function: Callable[Arguments, Found]) -> Callable[Arguments, Found]:
-    """The function, of which `vmap` makes a loop on a CPU; elsewhere the batch stays one."""
+    """The function, of which `vmap` makes a loop on a CPU; elsewhere the batch stays one. Slopes: `jax.jvp` only."""
     single = custom_vmap(function)
 
     @single.def_vmap
     def batched(size: int, has_batch: list[bool], *given: Any):
         wide = lambda array, has: array if has else jnp.broadcast_to(array, (size, *array.shape))
         every = map(wide, given, has_batch)
-        loop = lambda *arrays: jax.lax.map(lambda one: cast(Any, function)(*one), arrays)
+        loop = lambda *arrays: jax.lax.map(lambda one: single(*one), arrays)  # which may be in a batch itself
         found = jax.lax.platform_dependent(*every, cpu=loop, default=jax.vmap(function))
         return found, jax.tree.map(lambda _: True, found)
 

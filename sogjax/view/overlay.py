@@ -47,7 +47,7 @@ class Overlay:
         motions: one for each actor.
         cameras: the names of those to show, in this order; default all.
         width: largest width of the grid in pixels.
-        height: its largest height; None: it may be as high as it is.
+        height: its largest height in pixels; None: any.
         bones: the lines of each actor; default those of its motion.
 
     Raises:
@@ -175,7 +175,7 @@ def _bgr(rgb: UInt8[np.ndarray, "3"]) -> tuple[int, int, int]:
 class OverlayVideo:
     """A video (mp4) of motions over the pictures of all cameras, within a `with` block; whole or not there.
 
-    It fits a screen of its width and 16:9.
+    It is 9/16 as high as `width` at most.
 
     Args:
         path: the video.

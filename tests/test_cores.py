@@ -1,0 +1,59 @@
+"""What is done on all cores: results in order, errors told, and nobody goes on in vain."""
+
+import time
+from concurrent.futures import CancelledError
+from threading import Event
+
+import pytest
+
+from sogjax.model import cores
+from sogjax.model.cores import go_on, in_threads
+
+
+@pytest.fixture(params=[1, 2, 4])
+def number(request, monkeypatch):
+    monkeypatch.setattr(cores, "usable_cores", lambda: request.param)
+    return request.param
+
+
+@pytest.mark.parametrize("count", [0, 1, 7])
+def test_results_come_in_the_order_of_the_items(number, count):
+    def later_first(k):
+        time.sleep(0.002 * (count - k))
+        return k * k
+
+    assert in_threads(later_first, range(count)) == [k * k for k in range(count)]
+
+
+def test_threads_within_a_thread_take_items_in_order(number):
+    inner = lambda k: in_threads(lambda j: (k, j, hasattr(cores._here, "left")), range(3))
+    assert in_threads(inner, range(2)) == [[(k, j, number > 1) for j in range(3)] for k in range(2)]
+    assert not hasattr(cores._here, "left")
+
+
+def test_no_more_threads_than_asked_for(monkeypatch):
+    monkeypatch.setattr(cores, "usable_cores", lambda: 4)
+    assert in_threads(lambda k: hasattr(cores._here, "left"), range(3), 1) == [False] * 3
+
+
+def test_an_error_is_raised_and_ends_what_goes_on_beside_it(monkeypatch):
+    monkeypatch.setattr(cores, "usable_cores", lambda: 2)
+    begun, ended = Event(), []
+
+    def work(k):
+        if k == 0:
+            begun.wait(10.0)
+            raise ValueError("the first one fails")
+        begun.set()
+        try:
+            for _ in range(1000):
+                go_on()
+                time.sleep(0.01)
+        except CancelledError:
+            ended.append(k)
+            raise
+
+    with pytest.raises(ValueError, match="the first one fails"):
+        in_threads(work, range(2))
+    assert ended == [1]
+    go_on()  # here nobody has left
