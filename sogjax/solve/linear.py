@@ -34,7 +34,7 @@ def one_by_one(function: Callable[Arguments, Found]) -> Callable[Arguments, Foun
 
 @one_by_one
 def solve_positive(matrix: Float[Array, "n n"], vector: Float[Array, "n"]) -> Float[Array, "n"]:
-    """X with matrix x = vector; the matrix is symmetric and positive definite, else numbers are not finite."""
+    """The x of matrix x = vector, of a symmetric and positive definite matrix; of another it is not finite."""
     return jax.scipy.linalg.cho_solve(jax.scipy.linalg.cho_factor(matrix), vector)
 
 
