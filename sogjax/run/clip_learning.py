@@ -1,14 +1,13 @@
 """Learning the backgrounds of a recording's cameras from its clip: reading samples, and refusing unsuitable clips."""
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool
 
 from sogjax.io.recording import Recording
-from sogjax.model.cores import usable_cores
+from sogjax.model.cores import in_threads
 from sogjax.model.rotation import axis_vector
 from sogjax.run.clip import Clip, SampleKind, spread_frames
 from sogjax.run.terminal import say
@@ -69,18 +68,17 @@ def learnt_from(
     if few is not None:
         raise _too_few(f"{len(samples[few]) or len(kind.frames)} frames of {names[few]}")
     cameras = {k: recording.rig.camera(name) for k, name in enumerate(names)}
-    with ThreadPoolExecutor(min(len(names), usable_cores())) as pool:
-        sampled = dict(enumerate(pool.map(SampledCamera.from_images, samples)))
-        sampled = _steady(recording, sampled, list(pool.map(shaking, sampled.values())))
-        each = lambda make: dict(zip(sampled, pool.map(make, sampled), strict=True))
-        spans = range(min(len(one.movements) for one in sampled.values()))
-        movements = [{k: one.movements[span] for k, one in sampled.items()} for span in spans]
-        zones = moving_zones(movements, cameras, axis_vector(recording.up))
-        if left_out is None:
-            learnt = _told_together(recording, sampled, zones, each)
-        else:
-            learnt = each(lambda k: learnt_background(sampled[k], zones[k], None, left_out.get(names[k])))
-            _say_unknown(recording, learnt)
+    sampled = dict(enumerate(in_threads(SampledCamera.from_images, samples)))
+    sampled = _steady(recording, sampled, in_threads(shaking, sampled.values()))
+    each = lambda make: dict(zip(sampled, in_threads(make, sampled), strict=True))
+    spans = range(min(len(one.movements) for one in sampled.values()))
+    movements = [{k: one.movements[span] for k, one in sampled.items()} for span in spans]
+    zones = moving_zones(movements, cameras, axis_vector(recording.up))
+    if left_out is None:
+        learnt = _told_together(recording, sampled, zones, each)
+    else:
+        learnt = each(lambda k: learnt_background(sampled[k], zones[k], None, left_out.get(names[k])))
+        _say_unknown(recording, learnt)
     nothing = lambda name: BackgroundImage.nothing(*working_size(*recording.rig.image_size(name)))
     return tuple(learnt.get(k) or nothing(name) for k, name in enumerate(names))
 

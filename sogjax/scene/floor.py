@@ -6,7 +6,6 @@ the cameras agree most.
 """
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -17,6 +16,7 @@ from jaxtyping import Bool, Float, UInt8
 from scipy.ndimage import distance_transform_edt
 
 from sogjax.model.camera import Camera, undistort
+from sogjax.model.cores import in_threads
 from sogjax.scene.background import BackgroundImage, local_contrast
 from sogjax.scene.background_difference import channel_max, opened
 from sogjax.scene.coarse_views import CoarseViews, enlarged, small
@@ -112,9 +112,8 @@ def seen_floors(views: CoarseViews) -> dict[int, Floor]:
         return {}
     lights = _lights(seen, height, np.array(centre))
     room = cv2.convexHull(np.array([one.place for one in seen.values()], np.float32))[:, 0]
-    with ThreadPoolExecutor(AT_ONCE) as pool:
-        found = pool.map(lambda k: _floor(k, seen, lights, height, room, cameras[k]), seen)
-        return dict(zip(seen, found, strict=True))
+    found = in_threads(lambda k: _floor(k, seen, lights, height, room, cameras[k]), seen, AT_ONCE)
+    return dict(zip(seen, found, strict=True))
 
 
 class OverFloor(NamedTuple):

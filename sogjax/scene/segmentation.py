@@ -1,7 +1,6 @@
 """Masks of a subject from pictures of several cameras and of the empty scene."""
 
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import cv2
@@ -9,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from sogjax.model.camera import Camera
+from sogjax.model.cores import in_threads
 from sogjax.scene.background_difference import (
     Difference,
     background_difference,
@@ -66,21 +66,20 @@ def masks_from_backgrounds(
     Returns:
         Masks by camera; a camera is absent if no subject could be told apart from its background.
     """
-    with ThreadPoolExecutor() as pool:
-        compare = lambda k: background_difference(images[k], backgrounds[k], (unknown or {}).get(k))
-        compared = dict(zip(backgrounds, pool.map(compare, backgrounds), strict=True))
-        given = {k: (cv2.resize(images[k], working_size(*mask.shape[::-1])), mask) for k, mask in known.items()}
-        differences = _decided(compared, calm or {}, given, cameras, up) if decide else compared
-        guesses = {camera: first_guess(difference) for camera, difference in differences.items()}
-        guesses = {camera: guess for camera, guess in guesses.items() if is_subject(guess)}
-        possible = {c: compared[c].open | guess for c, guess in guesses.items()}
-        better, hull = _seen_together(differences, guesses, possible, known, cameras, up)
-        told = lambda camera, mask: mask if decide else mask & ~differences[camera].unknown
-        guesses = {c: told(c, mask) for c, mask in (guesses | better).items()}
-        guesses = {c: mask for c, mask in guesses.items() if is_subject(mask)}
-        cut = lambda c: told(c, cut_out(differences[c], guesses[c], hull.get(c) if decide else None))
-        cuts = pool.map(cut, guesses)
-        sized = {camera: _enlarged(mask, images[camera]) for camera, mask in zip(guesses, cuts, strict=True)}
+    compare = lambda k: background_difference(images[k], backgrounds[k], (unknown or {}).get(k))
+    compared = dict(zip(backgrounds, in_threads(compare, backgrounds), strict=True))
+    given = {k: (cv2.resize(images[k], working_size(*mask.shape[::-1])), mask) for k, mask in known.items()}
+    differences = _decided(compared, calm or {}, given, cameras, up) if decide else compared
+    guesses = {camera: first_guess(difference) for camera, difference in differences.items()}
+    guesses = {camera: guess for camera, guess in guesses.items() if is_subject(guess)}
+    possible = {c: compared[c].open | guess for c, guess in guesses.items()}
+    better, hull = _seen_together(differences, guesses, possible, known, cameras, up)
+    told = lambda camera, mask: mask if decide else mask & ~differences[camera].unknown
+    guesses = {c: told(c, mask) for c, mask in (guesses | better).items()}
+    guesses = {c: mask for c, mask in guesses.items() if is_subject(mask)}
+    cut = lambda c: told(c, cut_out(differences[c], guesses[c], hull.get(c) if decide else None))
+    cuts = in_threads(cut, guesses)
+    sized = {camera: _enlarged(mask, images[camera]) for camera, mask in zip(guesses, cuts, strict=True)}
     return {camera: mask for camera, mask in sized.items() if is_subject(mask)}
 
 

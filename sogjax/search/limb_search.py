@@ -161,10 +161,9 @@ class LimbSearch:
     ) -> tuple[Float[np.ndarray, "start dof"], Float[np.ndarray, "start"]]:
         """Poses climbed, each by a share of the solver's most iterations, and what they gain over a known pose."""
         tried = [*zip(starts, shares, strict=True), (known, 0.0)]
-        climb = lambda start, share: climbed_in(
-            self.tracker, views, *(jnp.asarray(x, known.dtype) for x in (start, share))
-        )
-        found = in_threads(lambda each: jax.device_get(climb(*each)), tried)
+        number = lambda value: jnp.asarray(value, known.dtype)
+        climb = lambda each: jax.device_get(climbed_in(self.tracker, views, *map(number, each)))
+        found = in_threads(climb, tried)
         values = np.array([value for _, value in found])
         return np.stack([end for end, _ in found])[:-1], values[:-1] - values[-1]
 
