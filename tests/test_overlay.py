@@ -54,10 +54,11 @@ def test_bones_join_distinct_joints_and_reach_to_the_tips():
         ("right_shoulder_flexion", "right_elbow", RIGHT),
     ]
     lines = [(origin(a), origin(b), side) for a, b, side in expected]
-    lines += [
-        (origin("left_elbow"), motion.blob_means[:, 4], LEFT),
-        (origin("right_elbow"), motion.blob_means[:, 5], RIGHT),
-    ]
+    for elbow, blob, side in (("left_elbow", 4, LEFT), ("right_elbow", 5, RIGHT)):
+        forearm = motion.blob_means[:, blob] - origin(elbow)
+        length = np.linalg.norm(forearm, axis=1, keepdims=True)
+        end = origin(elbow) + forearm * (length + np.sqrt(2.0 * np.log(2.0)) * motion.blob_sigma[blob]) / length
+        lines.append((origin(elbow), end, side))
     assert bones.num_joints == 5
     assert len(bones.edges) == len(lines)
     for (a, b), side, (start, end, expected_side) in zip(bones.edges, bones.sides, lines, strict=True):

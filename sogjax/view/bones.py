@@ -21,6 +21,9 @@ _PALETTE = np.array(
 )
 """RGB of left, middle and right for one actor after the other."""
 
+SURFACE = float(np.sqrt(2.0 * np.log(2.0)))
+"""Sigmas from a blob's centre to where it alone is worth one half, which is where a body ends."""
+
 
 @dataclass(frozen=True)
 class Bones:
@@ -29,7 +32,7 @@ class Bones:
     joints: Int[np.ndarray, "joint"]
     """The distinct joints."""
     tips: Int[np.ndarray, "tip"]
-    """The blobs that the last joints point to."""
+    """The blobs through which the last joints point, to where they end."""
     edges: Int[np.ndarray, "edge 2"]
     """Numbers of the two points of each line: joints first, then tips."""
     sides: Int[np.ndarray, "edge"]
@@ -47,9 +50,12 @@ class Bones:
         return len(self.joints)
 
     def points(self, motion: Motion) -> Float[np.ndarray, "frame point 3"]:
-        """Metres, world: the distinct joints, then the tips of the last ones."""
-        parts = [motion.world_from_joint[:, self.joints][..., :3, 3], motion.blob_means[:, self.tips]]
-        return np.concatenate(parts, axis=1).astype(np.float32)
+        """Metres, world: the distinct joints, then the tips of the last ones: where the blob behind each bone ends."""
+        joints = motion.world_from_joint[:, self.joints][..., :3, 3]
+        centres, pointed = motion.blob_means[:, self.tips], self.edges[len(self.edges) - len(self.tips) :, 0]
+        along = centres - joints[:, pointed]
+        beyond = SURFACE * motion.blob_sigma[self.tips][:, None] / np.linalg.norm(along, axis=-1, keepdims=True)
+        return np.concatenate([joints, centres + beyond * along], axis=1).astype(np.float32)
 
 
 def doubtful_edges(motion: Motion, bones: Bones) -> Bool[np.ndarray, "frame edge"]:
