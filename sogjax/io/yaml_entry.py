@@ -14,6 +14,11 @@ from yaml.constructor import ConstructorError, SafeConstructor
 from sogjax.errors import InputError, counted
 from sogjax.io.files import objection, read_bounded
 
+try:
+    from yaml import CSafeLoader as LibyamlLoader
+except ImportError:  # PyYAML was built without libyaml
+    from yaml import SafeLoader as LibyamlLoader
+
 MAX_BYTES = 1_000_000
 """No person writes a larger file."""
 _LARGEST = float(np.finfo(np.float32).max)
@@ -179,7 +184,7 @@ class _StrictLoader(_UniqueKeys, yaml.SafeLoader):
         return super().compose_node(parent, index)
 
 
-class _FastLoader(_UniqueKeys, getattr(yaml, "CSafeLoader", yaml.SafeLoader)):
+class _FastLoader(_UniqueKeys, LibyamlLoader):  # pyright: ignore[reportGeneralTypeIssues]
     """The same with libyaml, which gives the same node for an alias as for what it stands for."""
 
     def get_single_node(self):
