@@ -190,3 +190,42 @@ def test_plates_from_which_no_subject_can_be_told(tmp_path):
         write(recording.background[f"cam{k}"], cv2.imread(str(recording.example_poses[0].images[f"cam{k}"])))
     with pytest.raises(InputError, match=r"in the pictures of cam0, cam1 no subject.*CAMERA\.mask\.png"):
         masks_of(recording)
+
+
+def beside_others(folder, others=None):
+    """The untold of a dog whose region ends halfway up, where the background around it is not known."""
+    recording = example_recording(folder)
+    lower = [rows_below(mask, float(np.nonzero(mask)[0].mean())) for mask in TRUTH]
+    example = replace(recording.example_poses[0], frame=0, actor="rex", within=dict(zip(RIG.names, lower, strict=True)))
+    images, learnt = load_images(recording, recording.example_poses[0]), []
+    for k, mask in enumerate(TRUTH):
+        around = cv2.dilate(mask.astype(np.uint8), np.ones((13, 13))) > 0
+        empty = photo(scene((160, 120), seed=k, contrast=10.0), 50 + k)
+        learnt.append(BackgroundImage(empty, np.full((120, 160), 2.0, np.float32), ~around, "clip"))
+    everybody = (example, *([] if others is None else [replace(example, actor="fido", within=others)]))
+    return example_masks(replace(recording, example_poses=everybody), example, images, learnt), lower
+
+
+def rows_below(mask, row):
+    return mask & (np.arange(len(mask)) > row)[:, None]
+
+
+def test_what_is_cut_off_beside_others_is_not_said_to_be_nobody(tmp_path):
+    found, lower = beside_others(tmp_path)
+    assert len(found.masks) >= 3
+    for k, mask in found.masks.items():
+        assert not (mask & ~lower[k]).any()
+        assert found.untold[k][TRUTH[k] & ~lower[k]].mean() > 0.9
+        assert not (found.untold[k] & mask).any()
+        far = cv2.dilate(TRUTH[k].astype(np.uint8), np.ones((31, 31))) == 0
+        assert not found.untold[k][far].any()
+
+
+def test_where_another_person_is_the_subject_is_not(tmp_path):
+    upper = {
+        name: mask & ~rows_below(mask, float(np.nonzero(mask)[0].mean()))
+        for name, mask in zip(RIG.names, TRUTH, strict=True)
+    }
+    found, _ = beside_others(tmp_path, upper)
+    for k in found.masks:
+        assert not found.untold[k][upper[RIG.names[k]]].any()

@@ -106,7 +106,7 @@ def test_masks_of_a_body_with_its_shadow(num_cameras):
     known = {0: truth[0]}
     for given in ({}, known):
         wanted = {k: plates[k] for k in plates if k not in given}
-        masks = masks_from_backgrounds(images, wanted, given, cameras, UP)
+        masks = masks_from_backgrounds(images, wanted, given, cameras, UP).masks
         assert set(masks) == set(wanted)
         for k, mask in masks.items():
             assert mask.shape == truth[k].shape
@@ -130,7 +130,7 @@ def test_legs_that_never_moved_are_told_from_an_unknown_floor_by_their_colours()
         images[k] = photo(np.where(mask[..., None], drawn[k], empty), k)
         plates[k] = photo(np.where(still[..., None], drawn[k], empty), 50 + k)
     cameras = {k: rig.camera(name) for k, name in enumerate(rig.names)}
-    masks = masks_from_backgrounds(images, plates, {}, cameras, UP, unknown)
+    masks = masks_from_backgrounds(images, plates, {}, cameras, UP, unknown).masks
     assert min(iou(masks[k], truth[k]) for k in images) > 0.8
 
 
@@ -172,7 +172,7 @@ def test_who_stands_still_in_a_pillar_of_the_room_is_told_by_colour(num_cameras)
 def test_who_stands_where_nothing_is_known_gets_masks_by_colour():
     rig, pictures, truth, _, pillars = who_hardly_moves(6)
     cameras = {k: rig.camera(name) for k, name in enumerate(rig.names)}
-    masks = masks_from_backgrounds(pictures, pictures, {}, cameras, UP, pillars)
+    masks = masks_from_backgrounds(pictures, pictures, {}, cameras, UP, pillars).masks
     assert set(masks) == set(truth)
     assert min(iou(masks[k], truth[k]) for k in masks) > 0.8
 
@@ -181,7 +181,7 @@ def test_masks_that_are_given_tell_the_colours_of_who_is_not_known_elsewhere():
     rig, pictures, truth, _, pillars = who_hardly_moves(6)
     cameras = {k: rig.camera(name) for k, name in enumerate(rig.names)}
     given = {k: mask for k, mask in truth.items() if k}
-    masks = masks_from_backgrounds(pictures, {0: pictures[0]}, given, cameras, UP, {0: pillars[0]})
+    masks = masks_from_backgrounds(pictures, {0: pictures[0]}, given, cameras, UP, {0: pillars[0]}).masks
     assert iou(masks[0], truth[0]) > 0.8
 
 
@@ -190,7 +190,7 @@ def test_a_plate_of_another_place_gives_no_mask():
     images = {k: photo(scene(seed=k, contrast=60.0)) for k in range(2)}
     plates = {k: photo(scene(seed=k + 10, contrast=60.0)) for k in range(2)}
     cameras = {k: rig.camera(name) for k, name in enumerate(rig.names)}
-    assert masks_from_backgrounds(images, plates, {}, cameras, UP) == {}
+    assert masks_from_backgrounds(images, plates, {}, cameras, UP).masks == {}
 
 
 def sphere_masks(num_cameras=5):
@@ -301,7 +301,7 @@ def test_undecided_masks_hold_nothing_that_is_unknown(corner):
     pictures[0][row : row + 12, column : column + 16] = (20, 20, 250)
     unknown = {0: cv2.dilate(truth[0].astype(np.uint8), np.ones((13, 13))) > 0}
     plates = {k: photo(picture, 50 + k) for k, picture in empty.items()}
-    found = masks_from_backgrounds(pictures, plates, {}, cameras, UP, unknown, decide=False)
+    found = masks_from_backgrounds(pictures, plates, {}, cameras, UP, unknown, decide=False).masks
     assert not (found.get(0, np.zeros((120, 160), bool)) & unknown[0]).any()
     for k in (1, 2, 3):
         assert iou(found[k], truth[k]) > 0.8

@@ -20,7 +20,7 @@ from sogjax.scene.background import BackgroundImage
 from sogjax.scene.background_difference import working_size
 from sogjax.scene.coarse_views import enlarged
 from sogjax.scene.plates import FittedPlate, fitted_plate
-from sogjax.scene.segmentation import largest_parts, masks_from_backgrounds
+from sogjax.scene.segmentation import FoundMasks, largest_parts, masks_from_backgrounds
 from sogjax.scene.visual_hull import AGREEING, disagreeing_cameras, hull_coverage
 
 MOST_WRONG = 0.25
@@ -41,7 +41,9 @@ class ExampleMasks:
     left_out: dict[int, Mask]
     """Masks that do not agree with the others."""
     untold: dict[int, Mask]
-    """Where a mask says nothing: something stands in front, or what is behind is unknown and colours do not tell."""
+    """Where a mask says nothing: something stands in front, or what is behind is unknown and colours do not tell.
+
+    Beside others they hardly tell what is not in the mask."""
     undecided: bool
     """Whether that is so for the second reason."""
     warnings: tuple[str, ...]
@@ -84,13 +86,13 @@ def example_masks(
     calm = {camera: background.calm for camera, background in from_clip.items()}
     make = lambda decide: masks_from_backgrounds(images, backgrounds, files, cameras, up, unknown, calm, decide)
     alone = lambda made: _subject_alone(example, names, dict(sorted({**files, **made}.items())))
-    made = make(True) if backgrounds else {}
+    made, by_colors = make(True) if backgrounds else FoundMasks({}, {})
     found = alone(made)
     _check_found(recording, example, list(found), [camera for camera in backgrounds if camera not in found])
     painted = {camera: mask for camera, mask in enumerate(painted_masks(recording)) if mask is not None}
     told, undecided = _Told.of_masks(found, cameras, painted), False
     if unknown and example.within is None and len(told.wrong) > MOST_WRONG * len(found):
-        certain = _Told.of_masks(alone(make(False)), cameras, _with_unknown(painted, unknown, images))
+        certain = _Told.of_masks(alone(make(False).masks), cameras, _with_unknown(painted, unknown, images))
         undecided = len(certain.right) > len(told.right)
         made, told = (certain.found, certain) if undecided else (made, told)
     masks = told.right
@@ -103,14 +105,37 @@ def example_masks(
             f"example pose {example.name!r}: the masks of {pair} agree by only {share:.0%}; look at them with "
             "`sogjax segment` and replace the wrong one, or add a camera"
         )
+    untold = {k: told.hidden[k] & ~masks[k] for k in masks if k in told.hidden}
+    for k, mask in _beside_others(recording, example, made, by_colors).items():
+        if k in masks:
+            untold[k] = untold.get(k, False) | (mask & ~masks[k])
     return ExampleMasks(
         masks=masks,
         origins={k: FROM_FILE if k in files else FROM_CLIP if k in of_clip else FROM_PHOTOGRAPH for k in told.found},
         left_out={camera: told.found[camera] for camera in told.wrong},
         undecided=undecided,
-        untold={k: told.hidden[k] & ~masks[k] for k in masks if k in told.hidden},
+        untold=untold,
         warnings=tuple(warnings),
     )
+
+
+def _beside_others(
+    recording: Recording, example: ExamplePose, made: Mapping[int, Mask], by_colors: Mapping[int, Mask]
+) -> dict[int, Mask]:
+    """Where the subject may be beside other people, though no mask of theirs says so; nowhere if there are none.
+
+    Where the background is unknown colours tell people from it, and heads and forearms of the floor's colour are cut
+    off: a body would be made shorter by them.
+    """
+    if example.within is None:
+        return {}
+    names, found = recording.rig.names, dict[int, Mask]()
+    others = [e.within for e in recording.example_poses if e.frame == example.frame and e.actor != example.actor]
+    for k in made.keys() & by_colors.keys():
+        taken = [region[names[k]] for region in others if region is not None and names[k] in region]
+        free = ~np.any([enlarged(region, made[k].shape) for region in taken], axis=0) if taken else True
+        found[k] = (made[k] | by_colors[k]) & free
+    return found
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -38,6 +39,15 @@ certainly the subject where no shadow explains them."""
 Mask = Bool[np.ndarray, "_h _w"]
 
 
+class FoundMasks(NamedTuple):
+    """What is found of a subject, by camera, at the pictures' size."""
+
+    masks: dict[int, Mask]
+    """A camera is absent if no subject could be told apart from its background."""
+    undecided: dict[int, Mask]
+    """Where the background is unknown and no other camera rules the subject out: colours alone tell there."""
+
+
 def masks_from_backgrounds(
     images: Mapping[int, UInt8[np.ndarray, "_h _w 3"]],
     backgrounds: Mapping[int, UInt8[np.ndarray, "_h _w 3"]],
@@ -47,8 +57,8 @@ def masks_from_backgrounds(
     unknown: Mapping[int, Mask] | None = None,
     calm: Mapping[int, Mask] | None = None,
     decide: bool = True,
-) -> dict[int, Mask]:
-    """Masks of the cameras that have a picture of the empty scene, at the pictures' size.
+) -> FoundMasks:
+    """Masks of the cameras that have a picture of the empty scene.
 
     What differs from the background in colour is the subject; what is only darker may be its shadow, and is the subject
     where the other cameras' changed regions meet above the floor. OpenCV's grabCut then finds the outline.
@@ -62,9 +72,6 @@ def masks_from_backgrounds(
         unknown: where the empty scene is not known, by camera at any size; None: it is known everywhere.
         calm: where its colour never varies, by camera at the pictures' size; None: nowhere.
         decide: whether colours and the other cameras decide there; else it is in no mask.
-
-    Returns:
-        Masks by camera; a camera is absent if no subject could be told apart from its background.
     """
     compare = lambda k: background_difference(images[k], backgrounds[k], (unknown or {}).get(k))
     compared = dict(zip(backgrounds, in_threads(compare, backgrounds), strict=True))
@@ -80,7 +87,8 @@ def masks_from_backgrounds(
     cut = lambda c: told(c, cut_out(differences[c], guesses[c], hull.get(c) if decide else None))
     cuts = in_threads(cut, guesses)
     sized = {camera: _enlarged(mask, images[camera]) for camera, mask in zip(guesses, cuts, strict=True)}
-    return {camera: mask for camera, mask in sized.items() if is_subject(mask)}
+    undecided = {c: _enlarged(mask & compared[c].unknown, images[c]) for c, mask in hull.items()}
+    return FoundMasks({camera: mask for camera, mask in sized.items() if is_subject(mask)}, undecided)
 
 
 def first_guess(difference: Difference) -> Bool[np.ndarray, "rows columns"]:
