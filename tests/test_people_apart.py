@@ -134,7 +134,7 @@ def test_a_part_of_the_hull_that_no_camera_shows_apart_is_nobody():
 def moment(frame, *people):
     """People at places (metres along a line) with a share of the first of two colours."""
     empty = {}
-    return [PersonSeen(frame, np.array([x, 0.0, 1.0]), empty, empty, np.array([c, 1.0 - c])) for x, c in people]
+    return [PersonSeen(frame, np.array([x, 0.0, 1.0]), empty, empty, empty, np.array([c, 1.0 - c])) for x, c in people]
 
 
 def test_places_tell_while_nobody_can_have_changed_places():

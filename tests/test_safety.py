@@ -21,7 +21,8 @@ from sogjax.io.files import objection
 from sogjax.io.image_file import claimed_size, read_image
 from sogjax.io.npz_file import read_npz
 from sogjax.io.recording import open_recording
-from sogjax.io.yaml_entry import read_yaml
+from sogjax.io.yaml_entry import _FastLoader, read_yaml
+from sogjax.settings.files import conf_dir
 
 LEADING_OUT = ("../../x", "..", "a/b", "/etc/passwd", "..\\x", "a\0b", "x" * 300, ".hidden", "a\nb", "é" * 80)
 PLAIN = ("cam01", "left camera", "Kamera (1)", "カメラ1", "a.b-c_d")
@@ -191,3 +192,26 @@ def test_a_video_that_claims_too_many_pixels_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(video_file, "MAX_PIXELS", 64 * 48 - 1)
     with pytest.raises(InputError, match="64x48 pixels"):
         open_recording(recording)
+
+
+@pytest.mark.parametrize("levels", [90, 300, 480, 900, 20000])
+def test_deep_yaml_is_read_or_refused(tmp_path, levels):
+    path = tmp_path / "recording.yaml"
+    path.write_text(f"version: {'[' * levels}{']' * levels}")
+    with pytest.raises(InputError, match=r"recording.yaml: (.*expected|is nested too deeply)"):
+        read_yaml(path).mapping()["version"].text()
+
+
+def test_both_readers_of_yaml_say_the_same(tmp_path, monkeypatch):
+    if not yaml.__with_libyaml__:
+        pytest.skip("PyYAML was built without libyaml")
+    files = [actor_file(tmp_path / "actor.yaml"), *conf_dir().rglob("*.yaml")]
+    fast = [read_yaml(path).value for path in files]
+    monkeypatch.setattr(yaml, "__with_libyaml__", False)
+    assert fast == [read_yaml(path).value for path in files]
+
+
+@pytest.mark.parametrize("text", ["a: &a [1]\nb: *a", "a: &a x\nb: *a", "a: &a\nb: *a", "a: &a [*a]", "a: 1\na: 2"])
+def test_the_fast_reader_takes_neither_aliases_nor_keys_twice(text):
+    with pytest.raises(yaml.YAMLError):
+        yaml.load(text, Loader=_FastLoader)

@@ -43,7 +43,7 @@ class ExampleMasks:
     untold: dict[int, Mask]
     """Where a mask says nothing: something stands in front, or what is behind is unknown and colours do not tell.
 
-    Beside others they hardly tell what is not in the mask."""
+    Beside other people colours alone do not tell that nobody is there."""
     undecided: bool
     """Whether that is so for the second reason."""
     warnings: tuple[str, ...]
@@ -106,7 +106,7 @@ def example_masks(
             "`sogjax segment` and replace the wrong one, or add a camera"
         )
     untold = {k: told.hidden[k] & ~masks[k] for k in masks if k in told.hidden}
-    for k, mask in _beside_others(recording, example, made, by_colors).items():
+    for k, mask in _beside_others(example, names, made, by_colors).items():
         if k in masks:
             untold[k] = untold.get(k, False) | (mask & ~masks[k])
     return ExampleMasks(
@@ -120,21 +120,16 @@ def example_masks(
 
 
 def _beside_others(
-    recording: Recording, example: ExamplePose, made: Mapping[int, Mask], by_colors: Mapping[int, Mask]
+    example: ExamplePose, names: Sequence[str], made: Mapping[int, Mask], by_colors: Mapping[int, Mask]
 ) -> dict[int, Mask]:
-    """Where the subject may be beside other people, though no mask of theirs says so; nowhere if there are none.
+    """Beside other people, what colours alone tell or was cut off the mask, but for where others are; else nothing.
 
-    Where the background is unknown colours tell people from it, and heads and forearms of the floor's colour are cut
-    off: a body would be made shorter by them.
+    Heads and forearms of the floor's colour are cut off there: they would make a body shorter.
     """
-    if example.within is None:
-        return {}
-    names, found = recording.rig.names, dict[int, Mask]()
-    others = [e.within for e in recording.example_poses if e.frame == example.frame and e.actor != example.actor]
+    found, seen = dict[int, Mask](), example.others or {}
     for k in made.keys() & by_colors.keys():
-        taken = [region[names[k]] for region in others if region is not None and names[k] in region]
-        free = ~np.any([enlarged(region, made[k].shape) for region in taken], axis=0) if taken else True
-        found[k] = (made[k] | by_colors[k]) & free
+        if (others := seen.get(names[k])) is not None:
+            found[k] = (made[k] | by_colors[k]) & ~enlarged(others, made[k].shape)
     return found
 
 

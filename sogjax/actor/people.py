@@ -5,7 +5,7 @@ Who is who, among people that are seen apart in several frames: by their places,
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -43,8 +43,10 @@ class PersonSeen:
     regions: dict[int, Mask]
     """Where each camera shows nobody else: the silhouette, a little widened. A camera in which another one hides the
     person, or is hidden by him, is absent."""
+    others: dict[int, Mask]
+    """Where each of these cameras shows others, likewise."""
     masks: dict[int, Mask]
-    """What is not the background there."""
+    """What is not the background in the person's regions."""
     colors: Float[np.ndarray, "bin"]
     """Share of each colour, all cameras together."""
 
@@ -73,17 +75,17 @@ def people_apart(
     if len(bodies) < count:
         bodies, most = cut_apart(bodies, count, cube.spacing, up), TOUCHED
     regions = {
-        k: _regions(
-            [pixels[k].silhouette_of(body) for body in bodies], _depths(bodies, cube, cameras[k]), pixels[k], most
-        )
+        k: _regions([pixels[k].silhouette_of(body) for body in bodies], _depths(bodies, cube, cameras[k]), pixels[k])
         for k in masks
     }
     people = []
     for number, body in enumerate(bodies):
-        own = {k: region for k in masks if (region := regions[k][number]) is not None}
+        own = {k: of_camera[number].around for k, of_camera in regions.items() if of_camera[number].hidden <= most}
+        others = {k: np.any([one.around for j, one in enumerate(regions[k]) if j != number], axis=0) for k in own}
+        others = {k: np.broadcast_to(mask, own[k].shape) for k, mask in others.items()}  # False of one person
         limited = {k: masks[k] & region for k, region in own.items()}
         place = cube.points[body].mean(axis=0)
-        people.append(PersonSeen(frame, place, own, limited, color_histogram(pictures, limited)))
+        people.append(PersonSeen(frame, place, own, others, limited, color_histogram(pictures, limited)))
     return people
 
 
@@ -155,21 +157,27 @@ def _depths(bodies: Sequence[Bool[np.ndarray, "voxel"]], cube: Cube, camera: Cam
     return [float(pose[2, :3] @ cube.points[body].mean(axis=0) + pose[2, 3]) for body in bodies]
 
 
-def _regions(silhouettes: Sequence[Mask], away: Sequence[float], pixels: VoxelPixels, most: float) -> list[Mask | None]:
-    """Around each silhouette of one camera, what is nearer to it than to the others; None: too much is others', too.
+class _Region(NamedTuple):
+    """Where one camera shows one of several people."""
 
-    Cells of two silhouettes belong to who is nearer to the camera (`away`, metres).
-    """
+    around: Mask
+    """What is nearer to the silhouette than to the others, and not far from it."""
+    hidden: float
+    """Share of the silhouette that is also another one's; infinite where there is none."""
+
+
+def _regions(silhouettes: Sequence[Mask], away: Sequence[float], pixels: VoxelPixels) -> list[_Region]:
+    """What one camera shows of each of some people; two silhouettes' cells belong to who is nearer (`away`, metres)."""
     width = 2 * pixels.footprint + 2
     distances = [cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 3) for mask in silhouettes]
     ranked = [distance + 1e-3 * rank for distance, rank in zip(distances, np.argsort(np.argsort(away)), strict=True)]
-    regions: list[Mask | None] = []
+    regions: list[_Region] = []
     for number, (mask, distance) in enumerate(zip(silhouettes, distances, strict=True)):
         others = [k for k in range(len(distances)) if k != number]
         nearest = np.min([distances[k] for k in others], axis=0) if others else np.full(mask.shape, np.inf)
         own = np.all([ranked[number] < ranked[k] for k in others], axis=0)
-        covered = float((mask & (nearest <= 1.0)).sum() / max(mask.sum(), 1))
-        regions.append((distance <= width) & own if mask.any() and covered <= most else None)
+        hidden = float((mask & (nearest <= 1.0)).sum() / mask.sum()) if mask.any() else np.inf
+        regions.append(_Region((distance <= width) & own & mask.any(), hidden))
     return regions
 
 

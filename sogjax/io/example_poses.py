@@ -86,6 +86,8 @@ class ExamplePose:
     within: dict[str, Bool[np.ndarray, "_rows _columns"]] | None = None
     """Where each camera sees the subject, at any size, if others are seen too; a camera without an entry is not used.
     None: nobody else is seen."""
+    others: dict[str, Bool[np.ndarray, "_rows _columns"]] | None = None
+    """Where these cameras see the others, likewise."""
 
 
 def find_background(folder: Path, rig: CameraRig, calibrated: Iterable[str]) -> dict[str, Path]:

@@ -222,5 +222,5 @@ def _shapes(person: Sequence[PersonSeen], seen: SampledMasks, up: str) -> dict[i
 
 def _example(recording: Recording, actor: str, person: PersonSeen, grids: Sequence[CellGrid]) -> ExamplePose:
     name = frame_name(person.frame)
-    within = {recording.rig.names[k]: reduced_mask(grids[k].enlarged(mask)) for k, mask in person.regions.items()}
-    return ExamplePose(name, actor, {}, {}, None, person.frame, within)
+    of_cameras = lambda masks: {recording.rig.names[k]: reduced_mask(grids[k].enlarged(m)) for k, m in masks.items()}
+    return ExamplePose(name, actor, {}, {}, None, person.frame, of_cameras(person.regions), of_cameras(person.others))

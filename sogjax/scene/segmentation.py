@@ -44,8 +44,10 @@ class FoundMasks(NamedTuple):
 
     masks: dict[int, Mask]
     """A camera is absent if no subject could be told apart from its background."""
-    undecided: dict[int, Mask]
-    """Where the background is unknown and no other camera rules the subject out: colours alone tell there."""
+    by_colors: dict[int, Mask]
+    """Where the background is unknown and all cameras, or all but one of many, allow the subject: colours alone tell.
+
+    Empty if what they allow does not meet."""
 
 
 def masks_from_backgrounds(
@@ -87,8 +89,8 @@ def masks_from_backgrounds(
     cut = lambda c: told(c, cut_out(differences[c], guesses[c], hull.get(c) if decide else None))
     cuts = in_threads(cut, guesses)
     sized = {camera: _enlarged(mask, images[camera]) for camera, mask in zip(guesses, cuts, strict=True)}
-    undecided = {c: _enlarged(mask & compared[c].unknown, images[c]) for c, mask in hull.items()}
-    return FoundMasks({camera: mask for camera, mask in sized.items() if is_subject(mask)}, undecided)
+    by_colors = {c: _enlarged(mask & compared[c].unknown, images[c]) for c, mask in hull.items()}
+    return FoundMasks({camera: mask for camera, mask in sized.items() if is_subject(mask)}, by_colors)
 
 
 def first_guess(difference: Difference) -> Bool[np.ndarray, "rows columns"]:

@@ -21,7 +21,7 @@ _PALETTE = np.array(
 )
 """RGB of left, middle and right for one actor after the other."""
 
-SURFACE = float(np.sqrt(2.0 * np.log(2.0)))
+_SURFACE = float(np.sqrt(2.0 * np.log(2.0)))
 """Sigmas from a blob's centre to where it alone is worth one half, which is where a body ends."""
 
 
@@ -50,11 +50,12 @@ class Bones:
         return len(self.joints)
 
     def points(self, motion: Motion) -> Float[np.ndarray, "frame point 3"]:
-        """Metres, world: the distinct joints, then the tips of the last ones: where the blob behind each bone ends."""
+        """Metres, world: the distinct joints, then where the blobs end that the last ones point to."""
         joints = motion.world_from_joint[:, self.joints][..., :3, 3]
         centres, pointed = motion.blob_means[:, self.tips], self.edges[len(self.edges) - len(self.tips) :, 0]
         along = centres - joints[:, pointed]
-        beyond = SURFACE * motion.blob_sigma[self.tips][:, None] / np.linalg.norm(along, axis=-1, keepdims=True)
+        lengths = np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-6)
+        beyond = _SURFACE * motion.blob_sigma[self.tips][:, None] / lengths
         return np.concatenate([joints, centres + beyond * along], axis=1).astype(np.float32)
 
 
@@ -68,7 +69,7 @@ def doubtful_edges(motion: Motion, bones: Bones) -> Bool[np.ndarray, "frame edge
 
 
 def bones_from_motion(motion: Motion) -> Bones:
-    """Every joint to its nearest ancestor at another place; the last ones also to their farthest blob."""
+    """Every joint to its nearest ancestor at another place; the last ones also to where their farthest blob ends."""
     drawn_as = _drawn_as(motion)
     parents = np.asarray(motion.joint_parents, int)
     joints: list[int] = sorted({int(joint) for joint in drawn_as if joint >= 0})
