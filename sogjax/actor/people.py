@@ -44,7 +44,7 @@ class PersonSeen:
     """Where each camera shows nobody else: the silhouette, a little widened. A camera in which another one hides the
     person, or is hidden by him, is absent."""
     others: dict[int, Mask]
-    """Where each of these cameras shows others, likewise."""
+    """Where each of these cameras shows others likewise: somebody whom another one hides may be behind him."""
     masks: dict[int, Mask]
     """What is not the background in the person's regions."""
     colors: Float[np.ndarray, "bin"]
@@ -81,8 +81,8 @@ def people_apart(
     people = []
     for number, body in enumerate(bodies):
         own = {k: of_camera[number].around for k, of_camera in regions.items() if of_camera[number].hidden <= most}
-        others = {k: np.any([one.around for j, one in enumerate(regions[k]) if j != number], axis=0) for k in own}
-        others = {k: np.broadcast_to(mask, own[k].shape) for k, mask in others.items()}  # False of one person
+        apart = {k: [one for j, one in enumerate(regions[k]) if j != number and one.hidden <= most] for k in own}
+        others = {k: np.any([np.zeros_like(own[k]), *(one.around for one in apart[k])], axis=0) for k in own}
         limited = {k: masks[k] & region for k, region in own.items()}
         place = cube.points[body].mean(axis=0)
         people.append(PersonSeen(frame, place, own, others, limited, color_histogram(pictures, limited)))
