@@ -122,7 +122,7 @@ def example_masks(
 def _beside_others(
     example: ExamplePose, names: Sequence[str], made: Mapping[int, Mask], by_colors: Mapping[int, Mask]
 ) -> dict[int, Mask]:
-    """Beside other people, what colours alone tell or was cut off the mask, but for where others are; else nothing.
+    """Beside other people, where colours alone tell, or the mask was cut, but not where others are; else nothing.
 
     Heads and forearms of the floor's colour are cut off there: they would make a body shorter.
     """

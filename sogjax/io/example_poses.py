@@ -87,7 +87,7 @@ class ExamplePose:
     """Where each camera sees the subject, at any size, if others are seen too; a camera without an entry is not used.
     None: nobody else is seen."""
     others: dict[str, Bool[np.ndarray, "_rows _columns"]] | None = None
-    """Where these cameras see the others, likewise."""
+    """Where these cameras see others who are not hidden from them, at any size. None: nobody else is seen."""
 
 
 def find_background(folder: Path, rig: CameraRig, calibrated: Iterable[str]) -> dict[str, Path]:

@@ -32,7 +32,7 @@ class Bones:
     joints: Int[np.ndarray, "joint"]
     """The distinct joints."""
     tips: Int[np.ndarray, "tip"]
-    """The blobs through which the last joints point, to where they end."""
+    """The blobs at whose far side the last bones end."""
     edges: Int[np.ndarray, "edge 2"]
     """Numbers of the two points of each line: joints first, then tips."""
     sides: Int[np.ndarray, "edge"]
@@ -50,7 +50,7 @@ class Bones:
         return len(self.joints)
 
     def points(self, motion: Motion) -> Float[np.ndarray, "frame point 3"]:
-        """Metres, world: the distinct joints, then where the blobs end that the last ones point to."""
+        """Metres, world: the distinct joints, then the far sides of the tips."""
         joints = motion.world_from_joint[:, self.joints][..., :3, 3]
         centres, pointed = motion.blob_means[:, self.tips], self.edges[len(self.edges) - len(self.tips) :, 0]
         along = centres - joints[:, pointed]
