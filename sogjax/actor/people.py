@@ -44,7 +44,7 @@ class PersonSeen:
     """Where each camera shows nobody else: the silhouette, a little widened. A camera in which another one hides the
     person, or is hidden by him, is absent."""
     others: dict[int, Mask]
-    """Where each of these cameras shows those of the others who are seen apart there; the rest may be behind somebody."""
+    """Where each of these cameras shows others who are seen apart there; the rest may be behind somebody."""
     masks: dict[int, Mask]
     """What is not the background in the person's regions."""
     colors: Float[np.ndarray, "bin"]
