@@ -206,6 +206,7 @@ def test_several_motions_come_in_the_order_of_the_actors(tmp_path, recording, ac
     assert [each.actor for each in sogjax.track(recording, [actor], stop=1, **SMALL)] == ["puppet"]
 
 
+@pytest.mark.slow
 def test_the_pure_step_finds_what_track_finds_and_is_compiled_once(recording, tracker, motion):
     traces = []
 

@@ -75,6 +75,7 @@ def test_what_holds_then_is_said_with_it(walking_dog):
     np.testing.assert_allclose(found.judged.error_probability[limb], right.doubts[LOST.start, limb], atol=0.05)
 
 
+@pytest.mark.slow
 def test_nothing_is_read_where_no_limb_is_in_doubt(walking_dog):
     tracker, cells, _ = walking_dog
     asked = []
@@ -110,6 +111,7 @@ def test_a_clip_of_one_frame_that_is_in_doubt_is_looked_at_once(walking_dog):
     assert asked == [range(0, -1, -1)]
 
 
+@pytest.mark.slow
 def test_a_frame_that_two_passes_revise_counts_once(walking_dog, monkeypatch):
     """A part that was taken in two overlapping passes was taken in as many frames as are said to be revised."""
     tracker, cells, right = walking_dog

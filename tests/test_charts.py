@@ -56,6 +56,7 @@ def test_a_higher_bar_is_drawn_higher():
     assert np.diff(columns).max() > 100
 
 
+@pytest.mark.slow
 def test_a_chart_without_values_or_with_many_rows_is_drawn():
     for rows in (["a"], [f"weight={number}" for number in range(3000)]):
         assert bar_chart([Bars("x", rows, {"": [np.nan] * len(rows)}, [0])], value="mm").startswith(b"\x89PNG")

@@ -199,6 +199,7 @@ def test_exposure_compares_those_whose_subject_is_known():
     assert not exposure([Moment(pictures, dict.fromkeys(range(2), mask))], 4).of_subject
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["real_tpose"])
 def test_nearly_still_pictures_give_no_offsets(name):
     path = shared_recording(name)

@@ -83,6 +83,7 @@ def two_people(tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plates", [True, False])
 def test_a_person_of_the_keypoints_who_is_never_in_the_pictures_is_told(two_people, plates):
     recording = open_recording(two_people)

@@ -75,6 +75,7 @@ def test_one_start_on_a_full_disk_does_not_switch_it_off_for_good(tmp_path, room
     assert hits({VARIABLE: str(kept)}) >= 1
 
 
+@pytest.mark.slow
 def test_a_refusal_that_does_not_speak_of_the_machine_counts_for_nothing(tmp_path):
     kept = tmp_path / "kept"
     hits({VARIABLE: str(kept)})
@@ -84,6 +85,7 @@ def test_a_refusal_that_does_not_speak_of_the_machine_counts_for_nothing(tmp_pat
     assert hits({VARIABLE: str(kept)}) >= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [0, 50])
 def test_a_damaged_program_is_compiled_again_and_kept_again(tmp_path, size):
     kept = tmp_path / "kept"

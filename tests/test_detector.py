@@ -88,6 +88,7 @@ def test_what_stands_behind_is_hidden():
 TINY = ("cameras=2", "frames=3", "width=96", "height=72", "example_poses=false", "background=false", "shadows=false")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("program", "scheme"), [("openpose", "BODY_25"), ("pose2sim", "HALPE_26")])
 def test_the_command_writes_them_beside_the_recording(capsys, tmp_path, program, scheme):
     folder = tmp_path / "walk"

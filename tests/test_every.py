@@ -18,6 +18,7 @@ def command(tmp_path):
     return ["track", f"recording={recording}", f"actor={actor}", f"out={tmp_path / 'run'}", *SMALL]
 
 
+@pytest.mark.slow
 def test_every_second_frame_is_at_its_time_in_all_files(capsys, tmp_path, command):
     files = ("outputs.rerun=false", "outputs.overlay_width=128", "outputs.formats=[trc,csv]")
     done(capsys, *command, *files, "start=1", "every=2")

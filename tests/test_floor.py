@@ -13,6 +13,8 @@ from sogjax.scene.coarse_views import CoarseViews
 from sogjax.scene.floor import Floor, over_floor, seen_floors, with_floor
 from sogjax.scene.still_zone import standing_zones
 
+pytestmark = pytest.mark.slow
+
 CAMERAS = range(8)
 
 

@@ -102,6 +102,7 @@ def test_the_derivative_of_the_pose_is_that_of_solving_again(optimum, name):
         )
 
 
+@pytest.mark.slow
 def test_the_account_says_that_it_is_an_optimum_and_all_is_determined(optimum):
     with jax.enable_x64(True):
         energy, scales, pose = optimum

@@ -194,6 +194,7 @@ print(program([model.value, model.gradient, model.curvature, *given[1:]]))
 """
 
 
+@pytest.mark.slow
 def test_another_process_reads_a_program_that_calls_lapack(tmp_path):
     told = os.environ | {"SOGJAX_COMPILATION_CACHE": str(tmp_path / "programs")}
     found = []

@@ -25,6 +25,8 @@ from sogjax.synth.detector import DetectorSettings
 from sogjax.synth.render import render_recording
 from sogjax.synth.settings import SynthSettings
 
+pytestmark = pytest.mark.slow
+
 FRAMES = 3
 HUMAN = shipped("human")
 

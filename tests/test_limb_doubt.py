@@ -69,6 +69,7 @@ def judged(tracker, pose, cells, baseline):
     return limb_confidence(tracker.limbs, evidence, baseline, tracker.reader.background is not None)
 
 
+@pytest.mark.slow
 def test_only_a_limb_that_is_elsewhere_is_in_doubt(dog):
     tracker, pose, cells = dog
     names = limb_names(tracker.body)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from body_cases import shipped
 from rig_cases import ring_rig
-from slow_values import fast_and_slow
 from sog_cases import floats, random_views
 from test_both_ways import LOST, reader, with_lost_limb
 from test_energy_gradient import precise
@@ -43,7 +42,8 @@ def with_random_foreground(views, rng):
     )
 
 
-@pytest.mark.parametrize("number", fast_and_slow(0, 1))
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [0, 1])
 def test_what_a_part_adds_is_what_the_energy_of_the_whole_gains(number):
     """To rounding, with the caps and the cover of the rest; its gradient is that of autodiff."""
     with jax.enable_x64(True):

@@ -47,6 +47,7 @@ def test_forward_slopes_of_a_solution_can_be_asked_for():
     np.testing.assert_allclose(slope, np.linalg.solve(matrix, np.ones(4)), rtol=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("function", ["solve_positive(m, v)", "eigen(m)[0]"])
 def test_programs_with_batches_end_in_two_threads_on_two_cores(function):
     """jaxlib's own batched kernels do not: they wait for the pool's threads in these threads."""

@@ -70,6 +70,7 @@ def test_what_is_recorded_has_the_rate_at_which_pictures_came_and_their_own_colo
     np.testing.assert_allclose(kept.rig.cameras.camera_from_world, given.rig.cameras.camera_from_world, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_ctrl_c_keeps_the_motion(capsys, tmp_path, monkeypatch, rendered):
     monkeypatch.chdir(tmp_path)
     actor, take, sets = actor_file(tmp_path / "actor.yaml"), Slot.take, []

@@ -15,6 +15,8 @@ from sogjax.realtime.stepping import LiveStep
 from sogjax.run.clip_search import NUM_FOLLOWED, SECONDS
 from sogjax.search.found_pose import FoundPose, Path
 
+pytestmark = pytest.mark.slow
+
 PERIOD = 0.04
 ALL = np.ones(5, bool)
 

@@ -18,6 +18,8 @@ from sogjax.scene.cells import stack_cells
 from sogjax.scene.occluders import DepthCounts, cells_covered
 from sogjax.tracking.frame import FrameInput
 
+pytestmark = pytest.mark.slow
+
 DEPTH, LOOKS = 6, 14
 SIZE = (160, 120)
 BOARD = (200, 120, 40)

@@ -28,6 +28,8 @@ from sogjax.tracking.capacity import views_near
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import FrameInput
 
+pytestmark = pytest.mark.slow
+
 DEPTH = 6
 ROOM = Capacities(1024, 1024)
 
@@ -74,7 +76,6 @@ def hidden_at(tracker, rig, masks, depth=0.0):
     return replace(tracker, reader=tracker.reader.behind(np.where(cells == 0.0, depth, np.inf).astype(np.float32)))
 
 
-@pytest.mark.slow
 def test_colors_of_what_is_in_front_do_not_count_in_the_energy(dog):
     tracker, rig, pose, masks = dog
     one, other = (with_board(rig, draw(tracker.body, pose, rig), masks, colors) for colors in BOARDS)
@@ -86,7 +87,6 @@ def test_colors_of_what_is_in_front_do_not_count_in_the_energy(dog):
     assert unseen < 0.01 * seen  # the boards change the light that is estimated, a little
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("pairs", ["sparse", "dense"])
 def test_only_what_is_farther_than_the_thing_in_front_is_hidden(dog, pairs):
     tracker, rig, pose, masks = dog

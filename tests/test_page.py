@@ -18,6 +18,8 @@ from sogjax.run.small_pictures import SmallPictures
 from sogjax.settings.compose import track_config
 from sogjax.view.page.run_page import _fitting
 
+pytestmark = pytest.mark.slow
+
 FRAMES = 14
 SMALL = ("images.depth=4", "solver.max_iterations=2", "solver.min_iterations=1")
 LIGHT = (*SMALL, "outputs.overlay=false", "outputs.rerun=false")
@@ -115,7 +117,6 @@ def test_a_resumed_run_shows_the_frames_before_it_was_stopped(capsys, monkeypatc
     assert [frame for frame, _ in known["pictures"]] == list(range(FRAMES))
 
 
-@pytest.mark.slow
 def test_two_actors_have_a_timeline_each(capsys, tracked, tmp_path):
     place, words = tracked
 
@@ -137,7 +138,6 @@ def test_two_actors_have_a_timeline_each(capsys, tracked, tmp_path):
     assert faults_of(tmp_path / "run" / "index.html") == []
 
 
-@pytest.mark.slow
 def test_a_single_frame_of_which_nothing_is_judged(capsys, tracked, tmp_path):
     _, words = tracked
     done(capsys, *words, f"out={tmp_path / 'run'}", "start=3", "stop=4", "outputs.confidence=false")

@@ -222,6 +222,7 @@ def test_no_common_frame_leaves_all_unknown():
     assert empty.decided(np.array([0.0, 0.0, 1.0])) is empty
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("clip", "actors", "words"),
     [
@@ -237,6 +238,7 @@ def test_clips_that_show_other_numbers_of_people_are_refused(clip, actors, words
         assert word in problem
 
 
+@pytest.mark.slow
 def test_people_in_the_same_clothes_are_refused_where_places_do_not_tell():
     clip = [[(corners, RED) for corners, _ in boxes] for boxes in passing(4)]
     recording, seen = recording_of(RIG, 4), sampled(clip)

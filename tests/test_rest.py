@@ -76,6 +76,7 @@ def test_its_model_is_that_of_its_value(human, frame):
     np.testing.assert_allclose(model.curvature, curvature, rtol=1e-5, atol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("weight", "bent"), [(0.0, True), (5e-5, False)])
 def test_a_head_that_looks_as_the_background_comes_to_rest(human, weight, bent):
     rig, rest = ring_rig(3, (160, 120)), standing(human, 1.0)

@@ -46,6 +46,7 @@ def farther(monkeypatch):
     monkeypatch.setattr(merge, "merge_passes", merge_passes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("overlay", "rerun"), SHOWN.values(), ids=SHOWN)
 def test_the_motion_that_is_written_is_the_revised_one(capsys, tmp_path, request, command, overlay, rerun):
     outputs = [f"outputs.overlay={overlay}", f"outputs.rerun={rerun}", "outputs.page=false"]

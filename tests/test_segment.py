@@ -2,6 +2,7 @@
 
 import cv2
 import numpy as np
+import pytest
 from command_line import done, refused
 from rig_cases import ring_rig
 from small_recording import make_recording, write_image
@@ -16,6 +17,7 @@ def iou(a, b):
     return (a & b).sum() / (a | b).sum()
 
 
+@pytest.mark.slow
 def test_masks_and_sheets_of_a_rendered_person(capsys, tmp_path):
     """One camera keeps its mask, one has neither mask nor plate, the others' masks are made from plates."""
     recording = tmp_path / "person"

@@ -56,6 +56,7 @@ def moved(params, fit):
     return params + jnp.asarray(0.03 * rng.normal(size=params.shape), params.dtype)
 
 
+@pytest.mark.slow
 def test_the_quadratic_model_has_the_value_and_the_gradient_of_the_objective(case):
     fit, truth = case
     params = moved(truth, fit)

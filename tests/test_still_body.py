@@ -9,6 +9,8 @@ from sogjax.scene.background import BackgroundImage
 from sogjax.scene.floor import Floor, seen_floors
 from sogjax.scene.still_body import Standing, legs_of, still_bodies, with_room_behind
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def waving(tmp_path_factory):

@@ -58,6 +58,7 @@ def test_a_refused_command_keeps_the_rows_of_what_has_ended(capsys, tmp_path, pa
     assert rows_of(tmp_path / "outputs") == rows
 
 
+@pytest.mark.slow
 def test_what_kept_a_recording_from_any_result_is_told(capsys, pair):
     assert main([*pair[:2], "recording=glob(a)", *pair[3:]]) == 0
     capsys.readouterr()
