@@ -18,7 +18,8 @@ from sogjax.model.limbs import limb_names, limbs
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.metrics import stretches
 from sogjax.search import merge_passes as both_ways
-from sogjax.search.body_parts import PartArrays, best_choice, body_parts, changes_between, merged_pose, select_parts
+from sogjax.search.best_passes import best_passes
+from sogjax.search.body_parts import PartArrays, body_parts, changes_between, merged_pose, select_parts
 from sogjax.search.merge_passes import merge_passes
 from sogjax.search.other_pass import REACH, BothSeen, Compared, part_gains
 from sogjax.search.placed_body import means_of
@@ -222,7 +223,7 @@ def test_the_choice_over_time_is_the_best_of_all(seed, open_ends):
         ends = [cost * taken[t] for t, cost, free in zip((0, -1), change[[0, -1]], open_ends, strict=True) if not free]
         return worth @ taken - inside - sum(ends)
 
-    found = best_choice(worth, changes_between(change, open_ends))[0]
+    found = best_passes(worth[:, None], changes_between(change, open_ends))[0] > 0
     assert value(found.astype(float)) == pytest.approx(
         max(value(np.array(way, float)) for way in product((0, 1), repeat=9))
     )

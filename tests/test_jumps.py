@@ -126,7 +126,7 @@ def test_a_pass_without_the_jump_is_taken_unless_it_loses_more_than_that_is_wort
     far = np.linalg.norm(np.diff(means, axis=0)[0], axis=-1)
     leaps = [float(far[blobs].mean()) - COSTS.apart for blobs in limb_blobs(tracker.body) if blobs.any()]
     worth = COSTS.leap * sum(max(leap, 0.0) for leap in leaps)
-    gained = [float(-lost * worth / len(rows) + COSTS.bias)] * len(rows)
+    gained = [float(-lost * worth / len(rows))] * len(rows)
     parts = np.zeros((len(rows), 1))
     found = Compared(rows, [], [*good[5:]], [*parts], [*parts], gained)
     chosen = chosen_rows(tracker.body, passed_of(poses, walking_dog), found)

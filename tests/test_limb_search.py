@@ -21,7 +21,8 @@ from sogjax.model.body import concatenate
 from sogjax.model.limbs import limb_names
 from sogjax.model.solid import Solid, impossibilities
 from sogjax.search import limb_search
-from sogjax.search.limb_search import LimbSearch, climbed_in, compile_search
+from sogjax.search.climbed import climbed_in
+from sogjax.search.limb_search import LimbSearch, compile_search
 from sogjax.search.limb_ways import UnitArrays, drawn_ways, look_alikes, units_of
 from sogjax.search.merge_passes import merge_passes
 from sogjax.search.placed_body import means_of

@@ -13,6 +13,7 @@ from sogjax.model.limbs import limb_blobs, limb_names, limbs
 from sogjax.model.program import compiled
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.metrics import stretches
+from sogjax.search.best_passes import best_passes
 from sogjax.search.mirrored import fitted_to_blobs, other_side
 
 ITERATIONS = 8
@@ -156,8 +157,9 @@ def select_parts(
         more = gains[:, k] - np.maximum(gains[:, alone], 0.0).sum(axis=1)  # of a pair, than of its limbs by themselves
         worth = np.where(whole > costs.apart, 0.0, more / energy) - bias[:, k]
         own = [j for j, other in enumerate(parts) if other.whole == k]  # an actor moves as far as its limbs do
-        found, _ = best_choice(worth, costs.change * changes_between(apart[:, [k, *own]].max(axis=1), open_ends))
-        for stretch in (slice(*ends) for ends in stretches(found)):
+        changes = costs.change * changes_between(apart[:, [k, *own]].max(axis=1), open_ends)
+        found, _ = best_passes(worth[:, None], changes)
+        for stretch in (slice(*ends) for ends in stretches(found > 0)):
             taken[stretch, k] = apart[stretch, k].max() > costs.apart
     return taken
 
@@ -173,23 +175,3 @@ def changes_between(
     between = 0.5 * (apart[:-1] + apart[1:])
     ends = [0.0 if is_open else cost for is_open, cost in zip(open_ends, apart[[0, -1]], strict=True)]
     return np.concatenate([ends[:1], between, ends[1:]])[:, None, None] * (1.0 - np.eye(2))
-
-
-def best_choice(
-    worth: Float[np.ndarray, "frame"], changes: Float[np.ndarray, "change 2 2"]
-) -> tuple[Bool[np.ndarray, "frame"], float]:
-    """Where to take the other pass, by dynamic programming, and the sum: `worth` for each frame, less the changes.
-
-    The known pass holds before the first frame and behind the last.
-    """
-    count = len(worth)
-    best, chosen = np.array([0.0, -np.inf]), np.zeros((count + 1, 2), int)
-    for t in range(count + 1):
-        ways = best[:, None] - changes[t]
-        chosen[t], best = ways.argmax(axis=0), ways.max(axis=0)
-        best = best + np.array([0.0, worth[t] if t < count else -np.inf])
-    taken, at = np.zeros(count, bool), 0
-    for t in range(count, 0, -1):
-        at = chosen[t, at]
-        taken[t - 1] = at == 1
-    return taken, float(best[0])

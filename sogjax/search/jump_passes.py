@@ -17,8 +17,10 @@ from sogjax.model.cores import in_threads
 from sogjax.model.limbs import limb_blobs, limbs
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.jumps import limb_jumps, peaks
-from sogjax.search.body_parts import best_choice, body_parts
-from sogjax.search.limb_search import MORE, LimbSearch
+from sogjax.search.best_passes import best_passes
+from sogjax.search.body_parts import body_parts
+from sogjax.search.climbed import MORE
+from sogjax.search.limb_search import LimbSearch
 from sogjax.search.other_pass import MOST_FRAMES, PATIENCE, REACH, Compared, FramesOfRows, Pass, compared
 from sogjax.search.placed_body import means_of
 from sogjax.tracking.capacity import views_near
@@ -108,8 +110,8 @@ def chosen_rows(body: Body, passed: Pass, found: Compared) -> ChosenRows:
     leaps = leaps_between(known, other, members[members.any(axis=1)])
     leaps[[0, -1]] *= ~np.isin([found.rows[0], found.rows[-1]], [0, last])[:, None, None]  # nothing is beside the clip
     costs = fitted_numbers().merge_passes
-    taken, value = best_choice(np.array(found.gained) / passed.energy - costs.bias, costs.leap * leaps)
-    return ChosenRows(found, taken, value + costs.leap * float(leaps[:, 0, 0].sum()))
+    taken, value = best_passes(np.array(found.gained)[:, None] / passed.energy, costs.leap * leaps)
+    return ChosenRows(found, taken > 0, value + costs.leap * float(leaps[:, 0, 0].sum()))
 
 
 def leaps_between(

@@ -12,17 +12,16 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.part_energy import PartEnergy
-from sogjax.energy.posed import History
 from sogjax.energy.views import Views
 from sogjax.model.cores import in_threads
 from sogjax.model.program import compiled
 from sogjax.model.solid import DEEP, impossibilities
+from sogjax.search.climbed import FEW, MORE, climbed_in
 from sogjax.search.limb_ways import CROSSED, Unit, UnitArrays, drawn_ways, look_alikes, units_of
 from sogjax.search.other_pass import REACH, Pass
 from sogjax.search.placed_body import means_of
-from sogjax.search.worth import IMPOSSIBLE_COST, worth
+from sogjax.search.worth import IMPOSSIBLE_COST
 from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.tracking.capacity import views_near
 from sogjax.tracking.culling import Capacities
@@ -226,23 +225,8 @@ def compile_search(tracker: Tracker, state: TrackState, frame: FrameInput, capac
         search.held_otherwise(search.views(frame, pose, capacities), pose)
 
 
-FEW, MORE = 0.16, 0.64
-"""Parts of the solver's most iterations that the whole body makes, from limbs that were climbed already, and from those
-that were not."""
 MOST_WHOLE = 3
 """Poses that are climbed with all degrees of freedom in a frame, beside the tracked one and that with crossed ends."""
-
-
-@compiled
-def climbed_in(
-    tracker: Tracker, views: Views, start: Float[Array, "dof"], share: Float[Array, ""]
-) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
-    """A pose climbed with the tracker's energy and a share of its solver's most iterations, and what it is worth."""
-    energy = FrameEnergy(tracker.body, views, History.unknown(start), tracker.terms)
-    most = jnp.ceil(share * tracker.solver.max_iterations).astype(jnp.int32)
-    solver = eqx.tree_at(lambda solver: solver.max_iterations, tracker.solver, most)
-    found = solver.maximize(energy, start, tracker.scales)
-    return found.params, worth(energy, tracker.solid, found.params, found.value)
 
 
 class HeldOtherwise(eqx.Module):

@@ -25,8 +25,9 @@ from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.quality.limb_warnings import LIKELY_LOST
 from sogjax.quality.metrics import stretches
 from sogjax.search.body_parts import body_parts, merged_pose, select_parts
+from sogjax.search.climbed import MORE, climbed_in
 from sogjax.search.jump_passes import ChosenRows, Jump, chosen_rows, largest_jump, passes_without
-from sogjax.search.limb_search import MORE, LimbSearch, climbed_in
+from sogjax.search.limb_search import LimbSearch
 from sogjax.search.misplaced import Misplaced
 from sogjax.search.other_pass import (
     PATIENCE,
@@ -38,7 +39,9 @@ from sogjax.search.other_pass import (
     compared_backwards,
     compared_both_ways,
 )
+from sogjax.search.placed_body import means_of
 from sogjax.search.pose_search import Report, unreported
+from sogjax.search.tracklets import Path, Tracklets
 from sogjax.search.turned_body import turned_pose
 from sogjax.tracking.capacity import views_near
 from sogjax.tracking.frame import AnyFrame, FrameInput, on_device
@@ -119,6 +122,7 @@ class _Revising:
         self._tried: set[int] = set()
         self._changed: set[int] = set()
         self._looked_at = 0
+        self._tracklets = Tracklets(tracker.body)
 
     def _tired(self, row: int | None = None) -> bool:
         """Whether too much was looked at in vain for another pass, which begins in a row."""
@@ -214,6 +218,21 @@ class _Revising:
             if pose is not None:
                 self._pass_from(search, row, pose)
 
+        if path := self._tracklets.best_path(self.passed):
+            search.forget_in_vain(self._take_path(path))
+
+    def _take_path(self, path: Path) -> set[int]:
+        """Take poses of several passes, by row; the rows."""
+        rows = range(min(path), max(path) + 1)
+        known = self.passed.poses[rows.start : rows.stop]
+        found = Compared(rows=[*rows], cells=[*self.frames(rows)])
+        found.poses = [path[row] if row in path else known[k] for k, row in enumerate(rows)]
+        means = [means_of(self.tracker.body, poses) for poses in (known, np.stack(found.poses))]
+        moved = np.linalg.norm(means[1] - means[0], axis=-1)
+        found.apart = [np.array([row[part.blobs].mean() for part in self.parts]) for row in moved]
+        self._revise_rows(found, path)
+        return set(path)
+
     def _frame(self, row: int) -> AnyFrame:
         return next(iter(self.frames(range(row, row + 1))))
 
@@ -224,6 +243,8 @@ class _Revising:
         found = compared_both_ways(self.tracker, self.passed, self.frames, self.parts, row, pose, patience)
         changed = self.take(found)
         search.forget_in_vain(changed)
+        self._tracklets.add(found)
+        self._tracklets.forget(changed)
         if not changed:
             search.note_in_vain(found.rows, found.poses, found.gained)
 
@@ -274,6 +295,7 @@ class _Revising:
             self.passed.poses[row] = pose
         in_threads(lambda k: self._revise(found.rows[k], found.cells[k]), np.flatnonzero(np.isin(rows, [*merged])))
         self._changed |= set(merged)
+        self._tracklets.forget(merged)
         for part, of_part in zip(self.parts, taken.T, strict=True):
             for name in part.names if of_part.any() else ():
                 self.revision.parts.setdefault(name, set()).update(rows[of_part].tolist())

@@ -11,7 +11,8 @@ from jaxtyping import Float
 
 from sogjax.model.body import Body
 from sogjax.search.body_parts import Part
-from sogjax.search.limb_search import FEW, WORTH, LimbSearch
+from sogjax.search.climbed import FEW
+from sogjax.search.limb_search import WORTH, LimbSearch
 from sogjax.search.mirrored import limb_pairs, look_alikes
 from sogjax.search.other_pass import Pass
 from sogjax.tracking.frame import AnyFrame, on_device
