@@ -13,8 +13,6 @@ from sogjax.scene.coarse_views import CoarseViews
 from sogjax.scene.floor import Floor, over_floor, seen_floors, with_floor
 from sogjax.scene.still_zone import standing_zones
 
-pytestmark = pytest.mark.slow
-
 CAMERAS = range(8)
 
 
@@ -34,6 +32,7 @@ def on_floor(waving, floors, pictures):
     return shown, {k: floor.known & ~shown[k] for k, floor in floors.items()}
 
 
+@pytest.mark.slow
 def test_legs_are_told_from_the_floor_that_the_other_cameras_see_behind_them(waving, floors):
     shown, hidden = on_floor(waving, floors, waving.seen(CAMERAS).pictures)
     assert sorted(floors) == list(CAMERAS)
@@ -44,6 +43,7 @@ def test_legs_are_told_from_the_floor_that_the_other_cameras_see_behind_them(wav
     assert np.mean([shown[k].sum() / floors[k].known.sum() for k in floors]) > 0.85
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turn", OTHER_UPS)
 def test_whichever_axis_points_upwards_the_same_floor_is_found(waving, floors, turn):
     turned = seen_floors(waving.seen(CAMERAS, turn))
@@ -54,6 +54,7 @@ def test_whichever_axis_points_upwards_the_same_floor_is_found(waving, floors, t
         assert np.abs(floor.picture[both].astype(int) - floors[k].picture[both]).mean() < 2.0
 
 
+@pytest.mark.slow
 def test_a_camera_in_another_light_sees_the_floor_in_its_own(waving, floors):
     views = waving.seen(CAMERAS)
     darker = views.pictures | {2: cv2.convertScaleAbs(views.pictures[2], alpha=0.7)}
@@ -63,6 +64,7 @@ def test_a_camera_in_another_light_sees_the_floor_in_its_own(waving, floors):
         assert (shown & before).sum() > 0.9 * before.sum()
 
 
+@pytest.mark.slow
 def test_a_floor_without_a_pattern_or_with_few_cameras_is_not_told(waving):
     views = waving.seen(CAMERAS)
     assert seen_floors(waving.seen(range(3))) == {}
@@ -70,6 +72,7 @@ def test_a_floor_without_a_pattern_or_with_few_cameras_is_not_told(waving):
     assert seen_floors(replace(views, pictures=grey)) == {}
 
 
+@pytest.mark.slow
 def test_voxels_of_legs_are_not_over_floor_and_what_stands_over_them_may_be_somebody(waving, floors):
     views = waving.seen(CAMERAS)
     empty, _, ground = over_floor(views, floors)
@@ -103,10 +106,12 @@ def test_the_floor_is_the_background_where_samples_show_it_and_nothing_is_where_
     np.testing.assert_array_equal(found.picture[:, :16], learnt.picture[:, :16])
 
 
+@pytest.mark.slow
 def test_four_cameras_are_enough(waving):
     assert sorted(seen_floors(waving.seen(range(0, 8, 2)))) == [0, 2, 4, 6]
 
 
+@pytest.mark.slow
 def test_where_pictures_show_no_floor_somebody_may_stand_near_what_moves(waving):
     views, cut = waving.seen(CAMERAS), {}
     for k, mask in views.movements.items():

@@ -18,8 +18,6 @@ from sogjax.scene.cells import stack_cells
 from sogjax.scene.occluders import DepthCounts, cells_covered
 from sogjax.tracking.frame import FrameInput
 
-pytestmark = pytest.mark.slow
-
 DEPTH, LOOKS = 6, 14
 SIZE = (160, 120)
 BOARD = (200, 120, 40)
@@ -99,6 +97,7 @@ def covered_by(scene, camera, poses):
                      for m in masks])  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_board_before_the_legs_is_learnt_where_there_is_evidence(scene):
     _, _, poses, boards = scene
     hidden, shares, counts = looked(scene, boards, poses, poses)
@@ -115,6 +114,7 @@ def test_a_board_before_the_legs_is_learnt_where_there_is_evidence(scene):
     assert max(shares) > 0.05
 
 
+@pytest.mark.slow
 def test_nothing_is_learnt_where_nothing_stands_in_front(scene):
     _, _, poses, _ = scene
     hidden, shares, _ = looked(scene, [None] * 8, poses, poses)
@@ -122,6 +122,7 @@ def test_nothing_is_learnt_where_nothing_stands_in_front(scene):
     assert max(shares) == 0.0
 
 
+@pytest.mark.slow
 def test_a_limb_that_is_held_wrong_is_not_taken_for_hidden(scene):
     """No camera sees it there, so that none can miss it."""
     tracker, _, poses, _ = scene

@@ -28,8 +28,6 @@ from sogjax.tracking.capacity import views_near
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import FrameInput
 
-pytestmark = pytest.mark.slow
-
 DEPTH = 6
 ROOM = Capacities(1024, 1024)
 
@@ -76,6 +74,7 @@ def hidden_at(tracker, rig, masks, depth=0.0):
     return replace(tracker, reader=tracker.reader.behind(np.where(cells == 0.0, depth, np.inf).astype(np.float32)))
 
 
+@pytest.mark.slow
 def test_colors_of_what_is_in_front_do_not_count_in_the_energy(dog):
     tracker, rig, pose, masks = dog
     one, other = (with_board(rig, draw(tracker.body, pose, rig), masks, colors) for colors in BOARDS)
@@ -87,6 +86,7 @@ def test_colors_of_what_is_in_front_do_not_count_in_the_energy(dog):
     assert unseen < 0.01 * seen  # the boards change the light that is estimated, a little
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pairs", ["sparse", "dense"])
 def test_only_what_is_farther_than_the_thing_in_front_is_hidden(dog, pairs):
     tracker, rig, pose, masks = dog
@@ -100,6 +100,7 @@ def test_only_what_is_farther_than_the_thing_in_front_is_hidden(dog, pairs):
     assert behind < 0.9 * plain
 
 
+@pytest.mark.slow
 def test_image_blobs_end_where_the_thing_in_front_does(dog):
     tracker, rig, _, masks = dog
     hidden = painted(masks, grids_of(rig, DEPTH))
@@ -118,6 +119,7 @@ def test_image_blobs_end_where_the_thing_in_front_does(dog):
     assert tracker.reader.behind(nothing_hidden(grids_of(rig, DEPTH))) is tracker.reader
 
 
+@pytest.mark.slow
 def test_a_hidden_limb_is_said_to_be_hidden_and_not_contradicted(dog):
     tracker, rig, pose, _ = dog
     names = limb_names(tracker.body)
@@ -139,6 +141,7 @@ def test_a_hidden_limb_is_said_to_be_hidden_and_not_contradicted(dog):
     assert np.nanmin(known.overlap) > np.nanmin(blind.overlap) + 0.1
 
 
+@pytest.mark.slow
 def test_a_search_hears_nothing_from_hidden_cells(dog):
     tracker, rig, pose, masks = dog
     searcher = PoseSearch.of_body(tracker.body, tracker.terms, "z")

@@ -18,8 +18,6 @@ from sogjax.run.small_pictures import SmallPictures
 from sogjax.settings.compose import track_config
 from sogjax.view.page.run_page import _fitting
 
-pytestmark = pytest.mark.slow
-
 FRAMES = 14
 SMALL = ("images.depth=4", "solver.max_iterations=2", "solver.min_iterations=1")
 LIGHT = (*SMALL, "outputs.overlay=false", "outputs.rerun=false")
@@ -40,6 +38,7 @@ def tracked(tmp_path_factory):
     return place, words
 
 
+@pytest.mark.slow
 def test_a_run_writes_a_page_that_needs_nothing_beside_it(tracked):
     place, _ = tracked
     path = place / "run" / "index.html"
@@ -66,6 +65,7 @@ def test_a_run_writes_a_page_that_needs_nothing_beside_it(tracked):
     assert not (place / "run" / "run.partial").exists()
 
 
+@pytest.mark.slow
 def test_no_page_where_none_is_asked_for(capsys, tracked, tmp_path):
     _, words = tracked
     for name, word in (("page", "outputs.page=false"), ("only", "outputs.motion_only=true")):
@@ -73,11 +73,13 @@ def test_no_page_where_none_is_asked_for(capsys, tracked, tmp_path):
         assert not (tmp_path / name / "index.html").exists()
 
 
+@pytest.mark.slow
 def test_a_browser_shows_it_without_a_fault(tracked):
     place, _ = tracked
     assert faults_of(place / "run" / "index.html") == []
 
 
+@pytest.mark.slow
 def test_pictures_follow_clicks_keys_and_links(tracked):
     place, _ = tracked
     with Browser() as browser:
@@ -106,6 +108,7 @@ def test_pictures_follow_clicks_keys_and_links(tracked):
         assert not browser.said
 
 
+@pytest.mark.slow
 def test_a_resumed_run_shows_the_frames_before_it_was_stopped(capsys, monkeypatch, tracked, tmp_path):
     _, words = tracked
     last = 10
@@ -117,6 +120,7 @@ def test_a_resumed_run_shows_the_frames_before_it_was_stopped(capsys, monkeypatc
     assert [frame for frame, _ in known["pictures"]] == list(range(FRAMES))
 
 
+@pytest.mark.slow
 def test_two_actors_have_a_timeline_each(capsys, tracked, tmp_path):
     place, words = tracked
 
@@ -138,6 +142,7 @@ def test_two_actors_have_a_timeline_each(capsys, tracked, tmp_path):
     assert faults_of(tmp_path / "run" / "index.html") == []
 
 
+@pytest.mark.slow
 def test_a_single_frame_of_which_nothing_is_judged(capsys, tracked, tmp_path):
     _, words = tracked
     done(capsys, *words, f"out={tmp_path / 'run'}", "start=3", "stop=4", "outputs.confidence=false")
@@ -159,6 +164,7 @@ def test_fewer_pictures_where_they_would_be_too_large():
     assert [frame for frame, _ in kept] == [0, 4, 8, 12, 16, 20, 24, 28]
 
 
+@pytest.mark.slow
 def test_small_pictures_are_taken_while_a_clip_is_decoded_and_outlive_the_process(tracked, tmp_path, monkeypatch):
     place, _ = tracked
     recording = open_recording(place / "walk")
@@ -173,6 +179,7 @@ def test_small_pictures_are_taken_while_a_clip_is_decoded_and_outlive_the_proces
             assert abs(float(picture[:, picture.shape[1] * 3 // 4 :].mean()) - (20 + 12 * frame)) < 6
 
 
+@pytest.mark.slow
 def test_small_pictures_that_no_pass_came_by_are_read(tracked):
     place, _ = tracked
     recording = open_recording(place / "walk")

@@ -9,8 +9,6 @@ from sogjax.scene.background import BackgroundImage
 from sogjax.scene.floor import Floor, seen_floors
 from sogjax.scene.still_body import Standing, legs_of, still_bodies, with_room_behind
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture(scope="module")
 def waving(tmp_path_factory):
@@ -23,6 +21,7 @@ def found_in(waving, cameras, turn=None, floors=None):
     return still_bodies(views, floors or {}), views.movements
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("by_floor", [False, True])
 def test_legs_that_never_move_are_found_in_nearly_all_cameras(waving, by_floor):
     masks, movements = found_in(waving, range(8), floors=seen_floors(waving.seen(range(8))) if by_floor else None)
@@ -44,6 +43,7 @@ def test_furniture_is_nobody():
     np.testing.assert_array_equal(legs_of(still, 0.0, spacing), legs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turn", OTHER_UPS)
 def test_whichever_axis_points_upwards_the_same_is_found(waving, turn):
     masks, others = found_in(waving, range(8))[0], found_in(waving, range(8), turn)[0]
@@ -52,6 +52,7 @@ def test_whichever_axis_points_upwards_the_same_is_found(waving, turn):
     assert both > 0.85 * either
 
 
+@pytest.mark.slow
 def test_four_cameras_do_not_tell(waving):
     assert not any(mask.perhaps.any() for mask in found_in(waving, range(4))[0].values())
 
@@ -89,6 +90,7 @@ def test_behind_somebody_the_floor_is_as_other_cameras_show_it():
     assert not found.known[22:48, 37:39].any()  # it looks like the floor
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cameras", [range(5), (0, 1, 2, 3, 7)])
 def test_cameras_in_an_arc_do_not_take_a_floor_that_they_do_not_show_each_other_for_somebody(waving, cameras):
     floors = seen_floors(waving.seen(cameras))

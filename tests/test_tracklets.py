@@ -1,11 +1,16 @@
 """Passes of which little is taken by themselves: the best path through several of them."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from body_cases import shipped
+from hypothesis import given
+from hypothesis import strategies as st
 
 from sogjax.model.limbs import limb_blobs, limb_names, limbs
 from sogjax.quality.fitted import fitted_numbers
+from sogjax.search.best_passes import best_passes
 from sogjax.search.other_pass import Compared, Pass
 from sogjax.search.placed_body import means_of
 from sogjax.search.tracklets import Tracklets
@@ -71,6 +76,53 @@ def test_nothing_is_changed_to_or_from_at_an_end_of_the_clip(rows):
 
 def test_what_loses_energy_is_not_taken_though_it_changes_nothing():
     assert not kept(found_in(range(FRAMES), -0.01)).best_path(known_pass())
+
+
+def test_what_is_as_good_as_where_the_known_one_is_stays_as_it_is():
+    """Else frames would change to and fro by what is left of rounding."""
+    near = np.where(RIGHT != LOST, LOST + 0.02, LOST).astype(LOST.dtype)
+    assert not kept(found_in(range(FRAMES), 0.01 * change(), near)).best_path(known_pass())
+
+
+def test_a_change_between_two_others_costs_as_well():
+    passed, other_arm = known_pass(), limb_names(BODY).index("right arm")
+    opposite = np.where(np.isin(np.arange(len(LOST)), limbs(BODY.skeleton)[other_arm]), BODY.poses["tpose"], LOST)
+    first, second = range(15), range(15, FRAMES)
+    gained = 1.5 * change() / 15
+    alike = kept(found_in(first, gained), found_in(second, gained)).best_path(passed)
+    other = kept(found_in(first, gained), found_in(second, 0.1 * gained, opposite.astype(LOST.dtype))).best_path(passed)
+    assert {*alike} == {*range(FRAMES)}
+    assert {*other} == {*first}
+
+
+def test_a_row_of_which_nothing_is_known_is_not_taken():
+    gains = np.full(FRAMES, change())
+    gains[10] = np.nan
+    found = found_in(range(FRAMES), 0.0)
+    found.gained[:] = gains.tolist()
+    assert sorted(kept(found).best_path(known_pass())) == [*range(10), *range(11, FRAMES)]
+
+
+def test_nothing_is_asked_twice_of_the_same_passes():
+    tracklets = kept(found_in(range(5, 20), change()))
+    assert tracklets.best_path(known_pass())
+    assert not tracklets.best_path(known_pass())
+
+
+@given(seed=st.integers(0, 1000))
+def test_the_best_of_all_choices_of_passes_is_found(seed):
+    rng = np.random.default_rng(seed)
+    worth, changes = rng.normal(size=(5, 2)), rng.random((6, 3, 3))
+    worth[rng.random(worth.shape) < 0.2] = -np.inf
+    values = np.concatenate([np.zeros((5, 1)), worth], axis=1)
+
+    def value(chosen):
+        path = [0, *chosen, 0]
+        return values[np.arange(5), chosen].sum() - sum(changes[t, path[t], path[t + 1]] for t in range(6))
+
+    taken, total = best_passes(worth, changes)
+    assert total == pytest.approx(max(value(np.array(each)) for each in product(range(3), repeat=5)))
+    assert value(taken) == pytest.approx(total)
 
 
 def test_what_gained_beside_a_row_that_changed_is_forgotten():

@@ -130,7 +130,8 @@ class MergeCosts:
     leap: float
     """The same for each metre by which a part leaps from one frame to the next, in a pass or between two."""
     bias: float
-    """The part of a frame's energy that a frame must gain at least."""
+    """The part of a frame's energy that a part of the body must gain in a frame at least; of passes that are taken
+    whole, nothing is asked but what changes cost."""
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from sogjax.search.worth import worth
 from sogjax.tracking.tracker import Tracker
 
 FEW, MORE = 0.16, 0.64
-"""Parts of the solver's most iterations that the whole body makes, from limbs that were climbed already, and from those
-that were not."""
+"""Parts of the solver's most iterations that the whole body makes, from a pose that was tracked or whose limbs were
+climbed already, and from others."""
 
 
 @compiled

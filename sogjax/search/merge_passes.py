@@ -1,7 +1,8 @@
 """Other passes: each part of the body is taken from the pass that explains it better, over time.
 
 In key frames all over the clip limbs are held in other ways, and in a few frames actors are turned back to front. Where
-that is worth more than what was tracked, a pass goes from there both ways. Where limbs jump, passes hold them as they
+that is worth more than what was tracked, a pass goes from there both ways; what of several such passes is worth more
+together is taken as well. Where limbs jump, passes hold them as they
 are before or behind, and are taken whole. Where limbs are in doubt then, a pass comes backwards from behind: a limb
 that is lost is often found again by itself, and what hid it, or moved too far for one frame, comes from the other side.
 """
@@ -30,6 +31,7 @@ from sogjax.search.jump_passes import ChosenRows, Jump, chosen_rows, largest_jum
 from sogjax.search.limb_search import LimbSearch
 from sogjax.search.misplaced import Misplaced
 from sogjax.search.other_pass import (
+    MOST_FRAMES,
     PATIENCE,
     SURE_FRAMES,
     BothSeen,
@@ -41,7 +43,7 @@ from sogjax.search.other_pass import (
 )
 from sogjax.search.placed_body import means_of
 from sogjax.search.pose_search import Report, unreported
-from sogjax.search.tracklets import Path, Tracklets
+from sogjax.search.tracklets import PosesOfRows, Tracklets
 from sogjax.search.turned_body import turned_pose
 from sogjax.tracking.capacity import views_near
 from sogjax.tracking.frame import AnyFrame, FrameInput, on_device
@@ -218,20 +220,23 @@ class _Revising:
             if pose is not None:
                 self._pass_from(search, row, pose)
 
-        if path := self._tracklets.best_path(self.passed):
-            search.forget_in_vain(self._take_path(path))
+        path = self._tracklets.best_path(self.passed)
+        self._take_path(path)
+        search.forget_in_vain(path)
+        self._looked_at = max(self._looked_at - len(path), 0)  # what leads somewhere together was not in vain
 
-    def _take_path(self, path: Path) -> set[int]:
-        """Take poses of several passes, by row; the rows."""
-        rows = range(min(path), max(path) + 1)
-        known = self.passed.poses[rows.start : rows.stop]
-        found = Compared(rows=[*rows], cells=[*self.frames(rows)])
-        found.poses = [path[row] if row in path else known[k] for k, row in enumerate(rows)]
-        means = [means_of(self.tracker.body, poses) for poses in (known, np.stack(found.poses))]
-        moved = np.linalg.norm(means[1] - means[0], axis=-1)
-        found.apart = [np.array([row[part.blobs].mean() for part in self.parts]) for row in moved]
-        self._revise_rows(found, path)
-        return set(path)
+    def _take_path(self, path: PosesOfRows) -> None:
+        """Take poses of several passes, in the order of the rows; the cells of so many are held as of a pass."""
+        moved = np.isin(np.arange(len(self.passed.poses)), [*path])
+        for first, stop in stretches(moved):
+            for begin in range(first, stop, MOST_FRAMES):
+                rows = range(begin, min(begin + MOST_FRAMES, stop))
+                poses = np.stack([path[row] for row in rows])
+                means = [means_of(self.tracker.body, each) for each in (self.passed.poses[begin : rows.stop], poses)]
+                apart = np.linalg.norm(means[1] - means[0], axis=-1)
+                of_parts = [np.array([row[part.blobs].mean() for part in self.parts]) for row in apart]
+                found = Compared([*rows], [*self.frames(rows)], [*poses], apart=of_parts)
+                self._revise_rows(found, dict(zip(rows, poses, strict=True)))
 
     def _frame(self, row: int) -> AnyFrame:
         return next(iter(self.frames(range(row, row + 1))))
@@ -241,10 +246,9 @@ class _Revising:
     ) -> None:
         """Go both ways from another pose of a frame, and take what that explains better."""
         found = compared_both_ways(self.tracker, self.passed, self.frames, self.parts, row, pose, patience)
+        self._tracklets.add(found)  # what of it is taken is forgotten
         changed = self.take(found)
         search.forget_in_vain(changed)
-        self._tracklets.add(found)
-        self._tracklets.forget(changed)
         if not changed:
             search.note_in_vain(found.rows, found.poses, found.gained)
 
@@ -259,7 +263,7 @@ class _Revising:
         return left[-1] if left else None
 
     def take(self, found: Compared) -> set[int]:
-        """Revise what another pass explains better, if that raises the energy of the stretch; the rows that changed."""
+        """Revise what another pass explains better, if the stretch gains, each pose climbed; the rows that changed."""
         rows = np.array(found.rows)
         apart, gains = np.stack(found.apart), np.stack(found.gains)
         ends, doubts = self._open_ends(found.rows), self._doubts(rows)
@@ -309,10 +313,11 @@ class _Revising:
     def _gained(
         self, found: Compared, k: int, pose: Float[np.ndarray, "dof"], merged: Float[np.ndarray, "dof"]
     ) -> float:
-        """The rise of a frame's energy with a merged pose, which may be that of the other pass."""
+        """What a frame gains with a merged pose, which may be that of the other pass, once both are climbed."""
         if np.array_equal(merged, found.poses[k]):
             return found.gained[k]
-        return BothSeen.of(self.tracker, found.cells[k], self.passed.capacities, pose, merged).gain
+        seen = BothSeen.of(self.tracker, found.cells[k], self.passed.capacities, pose, merged)
+        return seen.climbed_gain(self.tracker)
 
     def _merged(
         self, pose: Float[np.ndarray, "dof"], found: Compared, k: int, taken: Bool[np.ndarray, "part"]

@@ -81,7 +81,7 @@ class Compared:
     apart: list[Float[np.ndarray, "part"]] = field(default_factory=list)
     """Metres."""
     gained: list[float] = field(default_factory=list)
-    """The rise of the energy with the other pass's pose; 0 where that was not asked."""
+    """The rise of the energy with the other pass's pose, once both are climbed; 0 where that was not asked."""
 
     def add(self, row: int, pose: Float[np.ndarray, "dof"], apart: Float[np.ndarray, "part"]) -> None:
         """Add a frame, of which no rise is known yet."""
@@ -221,7 +221,7 @@ class BothSeen:
         return float(np.mean(self.values[:, 1] - self.values[:, 0]))
 
     def climbed_gain(self, tracker: Tracker) -> float:
-        """The rise with the other pose once both are climbed from where they are.
+        """The rise of the energy with the other pose once both are climbed from where they are.
 
         Tracking leaves each pose short of its optimum, by 0.2 to 0.5 % of the energy and by more where it was tracked
         less long: that is more than two ways to hold an arm differ by.
