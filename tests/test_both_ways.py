@@ -147,6 +147,19 @@ def test_what_needs_more_room_is_computed_again():
 
 
 @pytest.mark.slow
+def test_what_tracking_left_to_be_gained_does_not_tell_poses_apart(walking_dog):
+    """One pose is where it was tracked, the other a little short of that: both are climbed to the same."""
+    tracker, cells, right = walking_dog
+    row = LOST.start
+    short = right.poses[row].copy()
+    short[6:] += 0.03
+    lost, _ = with_lost_limb(walking_dog)
+    of = lambda other: BothSeen.of(tracker, cells[row], right.capacities, right.poses[row], other)
+    assert abs(of(short).climbed_gain(tracker)) < 0.2 * abs(of(short).gain)
+    assert of(lost.poses[row]).climbed_gain(tracker) < -5.0 * abs(of(short).climbed_gain(tracker))
+
+
+@pytest.mark.slow
 def test_what_sees_more_image_blobs_than_there_is_room_for_is_valued_with_more_room(walking_dog, monkeypatch):
     """Else blobs would be cut off, and poses valued by what is left."""
     tracker, cells, right = walking_dog
