@@ -83,6 +83,7 @@ def passed_of(poses, walking_dog):
     return replace(right, poses=poses, energies=np.ones(len(poses)))
 
 
+@pytest.mark.slow
 def test_the_largest_jump_is_found_and_none_twice(walking_dog):
     tracker, _, right = walking_dog
     passed, limb = with_lost_limb(walking_dog)
@@ -112,6 +113,7 @@ def test_leaps_count_beyond_how_limbs_move_and_not_what_moves_less():
     np.testing.assert_allclose(still[:, 0, 0], still[:, 1, 1], atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("lost", "is_taken"), [(0.1, True), (1.5, False)])
 def test_a_pass_without_the_jump_is_taken_unless_it_loses_more_than_that_is_worth(walking_dog, lost, is_taken):
     """To the end of the clip, behind which there is nothing to which it would have to go back."""

@@ -171,6 +171,7 @@ def test_a_pose_is_the_less_likely_the_deeper_a_leg_is_in_the_other():
     assert 0.0 < slight < deep <= deepest == 1.0
 
 
+@pytest.mark.slow
 def test_no_pass_begins_where_one_went_in_vain(walking_dog, monkeypatch):
     tracker, cells, right = walking_dog
     search = LimbSearch.of(tracker)

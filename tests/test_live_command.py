@@ -91,6 +91,7 @@ def test_ctrl_c_keeps_the_motion(capsys, tmp_path, monkeypatch, rendered):
     assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["live.json", "motion.npz"]
 
 
+@pytest.mark.slow
 def test_python_iterates_over_states(rendered, tmp_path):
     actor = sogjax.load_actor(actor_file(tmp_path / "actor.yaml"))
     recording = sogjax.open_recording(rendered)

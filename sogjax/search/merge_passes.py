@@ -316,8 +316,7 @@ class _Revising:
         """What a frame gains with a merged pose, which may be that of the other pass, once both are climbed."""
         if np.array_equal(merged, found.poses[k]):
             return found.gained[k]
-        seen = BothSeen.of(self.tracker, found.cells[k], self.passed.capacities, pose, merged)
-        return seen.climbed_gain(self.tracker)
+        return BothSeen.of(self.tracker, found.cells[k], self.passed.capacities, pose, merged).climbed_gain
 
     def _merged(
         self, pose: Float[np.ndarray, "dof"], found: Compared, k: int, taken: Bool[np.ndarray, "part"]

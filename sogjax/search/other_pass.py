@@ -7,6 +7,7 @@ jumps.
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 
 import jax
 import jax.numpy as jnp
@@ -169,7 +170,7 @@ def compared(
         found.add(row, np.asarray(both[1]), apart)
         if patience is not None or differ(k).any():
             seen = BothSeen.of(tracker, found.cells[k], tracked.capacities, *both)
-            found.gained[k] = seen.climbed_gain(tracker)
+            found.gained[k] = seen.climbed_gain
             waiting.extend([(k, seen)] if spared is None else [])
         promising = promising or sum(found.gained) >= LEAST_GAIN * passed.energy
         while waiting and (promising or len(waiting) > MOST_WAITING):
@@ -192,12 +193,11 @@ class BothSeen:
     Tracking valued each in views of its own, in which other image blobs count: these energies cannot be compared.
     """
 
+    tracker: Tracker
     poses: Float[Array, "2 dof"]
     views: tuple[Views, ...]
     """What is seen around both. Where something stands in front, or there are keypoints, twice: with what is hidden of
     the one, and whose keypoints they are beside it, and with that of the other."""
-    values: Float[np.ndarray, "view 2"]
-    """The energy of both poses."""
 
     @classmethod
     def of(
@@ -213,22 +213,28 @@ class BothSeen:
         alike = tracker.reader.occluders is None and keypoint_term_among(tracker.terms) is None
         orders = (poses,) if alike else (poses, poses[::-1])
         views = tuple(views_near(tracker, seen, one, capacities, REACH, two) for one, two in orders)
-        return cls(poses, views, np.stack([_energies(tracker, around, poses) for around in views]))
+        return cls(tracker, poses, views)
+
+    @cached_property
+    def values(self) -> Float[np.ndarray, "view 2"]:
+        """The energy of both poses."""
+        return np.stack([_energies(self.tracker, around, self.poses) for around in self.views])
 
     @property
     def gain(self) -> float:
         """The rise of the energy with the other pose: the mean over the views."""
         return float(np.mean(self.values[:, 1] - self.values[:, 0]))
 
-    def climbed_gain(self, tracker: Tracker) -> float:
+    @cached_property
+    def climbed_gain(self) -> float:
         """The rise of the energy with the other pose once both are climbed from where they are.
 
         Tracking leaves each pose short of its optimum, by 0.2 to 0.5 % of the energy and by more where it was tracked
         less long: that is more than two ways to hold an arm differ by.
         """
         few = jnp.asarray(FEW, self.poses.dtype)
-        values = [[float(climbed_in(tracker, near, pose, few)[1]) for pose in self.poses] for near in self.views]
-        return float(np.mean(np.diff(values)))
+        value = lambda near, pose: float(climbed_in(self.tracker, near, pose, few)[1])
+        return float(np.mean([value(near, self.poses[1]) - value(near, self.poses[0]) for near in self.views]))
 
 
 def _differ(parts: Sequence[Part], apart: Bool[np.ndarray, "part"]) -> Bool[np.ndarray, "part"]:
