@@ -2,9 +2,9 @@
 
 In key frames all over the clip limbs are held in other ways, and in a few frames actors are turned back to front. Where
 that is worth more than what was tracked, a pass goes from there both ways; what of several such passes is worth more
-together is taken as well. Where limbs jump, passes hold them as they
-are before or behind, and are taken whole. Where limbs are in doubt then, a pass comes backwards from behind: a limb
-that is lost is often found again by itself, and what hid it, or moved too far for one frame, comes from the other side.
+together is taken as well. Where limbs jump, passes hold them as they are before or behind, and are taken whole. Where
+limbs are in doubt then, a pass comes backwards from behind: a limb that is lost is often found again by itself, and
+what hid it, or moved too far for one frame, comes from the other side.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,7 +25,7 @@ from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.quality.limb_warnings import LIKELY_LOST
 from sogjax.quality.metrics import stretches
-from sogjax.search.body_parts import body_parts, merged_pose, select_parts
+from sogjax.search.body_parts import PartArrays, body_parts, merged_pose, select_parts
 from sogjax.search.climbed import MORE, climbed_in
 from sogjax.search.jump_passes import ChosenRows, Jump, chosen_rows, largest_jump, passes_without
 from sogjax.search.limb_search import LimbSearch
@@ -40,8 +40,8 @@ from sogjax.search.other_pass import (
     Pass,
     compared_backwards,
     compared_both_ways,
+    parts_apart,
 )
-from sogjax.search.placed_body import means_of
 from sogjax.search.pose_search import Report, unreported
 from sogjax.search.tracklets import PosesOfRows, Tracklets
 from sogjax.search.turned_body import turned_pose
@@ -228,15 +228,15 @@ class _Revising:
     def _take_path(self, path: PosesOfRows) -> None:
         """Take poses of several passes, in the order of the rows; the cells of so many are held as of a pass."""
         moved = np.isin(np.arange(len(self.passed.poses)), [*path])
+        blobs = PartArrays.of(self.tracker.body, self.parts).blobs
         for first, stop in stretches(moved):
             for begin in range(first, stop, MOST_FRAMES):
                 rows = range(begin, min(begin + MOST_FRAMES, stop))
-                poses = np.stack([path[row] for row in rows])
-                means = [means_of(self.tracker.body, each) for each in (self.passed.poses[begin : rows.stop], poses)]
-                apart = np.linalg.norm(means[1] - means[0], axis=-1)
-                of_parts = [np.array([row[part.blobs].mean() for part in self.parts]) for row in apart]
-                found = Compared([*rows], [*self.frames(rows)], [*poses], apart=of_parts)
-                self._revise_rows(found, dict(zip(rows, poses, strict=True)))
+                found = Compared(cells=[*self.frames(rows)])
+                for row in rows:
+                    both = jnp.asarray(self.passed.poses[row]), jnp.asarray(path[row])
+                    found.add(row, path[row], np.asarray(parts_apart(self.tracker.body, blobs, *both)))
+                self._revise_rows(found, {row: path[row] for row in rows})
 
     def _frame(self, row: int) -> AnyFrame:
         return next(iter(self.frames(range(row, row + 1))))

@@ -166,7 +166,7 @@ def compared(
     least = np.zeros(len(rows)) if spared is None else -np.cumsum(spared)
     for k, (row, tracked) in enumerate(zip(rows, track(tracker, start, coming(), passed.capacities), strict=False)):
         both = (jnp.asarray(passed.poses[row]), jnp.asarray(tracked.result.pose))
-        apart = np.asarray(_apart(tracker.body, choices.blobs, *both))
+        apart = np.asarray(parts_apart(tracker.body, choices.blobs, *both))
         found.add(row, np.asarray(both[1]), apart)
         if patience is not None or differ(k).any():
             seen = BothSeen.of(tracker, found.cells[k], tracked.capacities, *both)
@@ -244,7 +244,7 @@ def _differ(parts: Sequence[Part], apart: Bool[np.ndarray, "part"]) -> Bool[np.n
 
 
 @compiled
-def _apart(
+def parts_apart(
     body: Body, blobs: Bool[Array, "part blob"], pose: Float[Array, "dof"], other: Float[Array, "dof"]
 ) -> Float[Array, "part"]:
     """How far the blobs of each part are from those in another pose, in metres, on average."""
