@@ -61,9 +61,27 @@ def mismatch(blobs: Float[Array, "blob 4"], silhouettes: Silhouettes) -> Float[A
 
     `blobs` are means and sigmas in the world (metres).
     """
-    per_camera = jax.vmap(_camera_mismatch, in_axes=(None, 0, 0, 0, 0, 0))
-    values = per_camera(blobs, *_by_camera(silhouettes))
-    return jnp.sum(values) / _num_seen(silhouettes)
+    body = Sog.from_arrays(blobs[:, :3], blobs[:, 3], jnp.zeros_like(blobs[:, :3]))
+    return mismatch_of(times_cap(body, silhouettes), silhouettes)
+
+
+def times_cap(blobs: Sog, silhouettes: Silhouettes) -> Float[Array, "camera cell"]:
+    """How often blobs of a body (metres, world) together fill the cap of each cell; masked ones fill nothing."""
+
+    def of_camera(camera: Camera, means: Float[Array, "cell 2"], sigmas: Float[Array, "cell"]) -> Float[Array, "cell"]:
+        cells = Sog.from_arrays(means, sigmas, jnp.zeros_like(means))
+        same_color = jnp.ones((blobs.capacity, cells.capacity), sigmas.dtype)
+        pairs = overlaps(cells, project(camera, blobs), same_color, jnp.asarray(EXACT_EXPONENT, sigmas.dtype))
+        return jnp.sum(pairs, axis=0) / self_overlaps(cells)
+
+    return jax.vmap(of_camera)(silhouettes.cameras, silhouettes.means, silhouettes.sigmas)
+
+
+def mismatch_of(times_cap: Float[Array, "camera cell"], silhouettes: Silhouettes) -> Float[Array, ""]:
+    """`mismatch` of a body, or of parts that together fill the cap of each cell so often."""
+    weights = jax.vmap(_cell_weights)(silhouettes.coverage, silhouettes.mask)
+    difference = jax.vmap(jax.vmap(_covered))(times_cap) - silhouettes.coverage
+    return jnp.sum(weights * difference**2) / _num_seen(silhouettes)
 
 
 def mismatch_equations(
@@ -110,14 +128,6 @@ def _covered(times_cap: Float[Array, ""]) -> Float[Array, ""]:
 def _cell_weights(coverage: Float[Array, "cell"], mask: Bool[Array, "cell"]) -> Float[Array, "cell"]:
     area = jnp.maximum(jnp.sum(jnp.where(mask, coverage, 0.0)), 1.0)
     return jnp.where(mask, 1.0, 0.0) / area
-
-
-def _camera_mismatch(blobs, camera, means, sigmas, coverage, mask) -> Float[Array, ""]:
-    seen = jax.vmap(_seen, in_axes=(None, 0))(camera, blobs)
-    over_blobs = jax.vmap(_times_cap, in_axes=(0, None, None))
-    times_cap = jax.vmap(lambda mean, sigma: jnp.sum(over_blobs(seen, mean, sigma)))(means, sigmas)
-    difference = jax.vmap(_covered)(times_cap) - coverage
-    return jnp.sum(_cell_weights(coverage, mask) * difference**2)
 
 
 def _camera_equations(blobs, jacobian, camera, means, sigmas, coverage, mask) -> NormalEquations:

@@ -55,12 +55,14 @@ def example_masks(
     example: ExamplePose,
     images: Mapping[int, UInt8[np.ndarray, "_h _w 3"]],
     learnt: Sequence[BackgroundImage] | None = None,
+    known: dict[bool, FoundMasks] | None = None,
 ) -> ExampleMasks:
     """Find the masks of one example pose.
 
     `images` are those of all its cameras, `learnt` is the background of every camera of the recording, as its videos
     show it: for frames of these, and where there is neither a mask nor a picture of the empty scene. A photograph is
-    compared with the picture of the empty scene, moved to its place if the camera was touched in between.
+    compared with the picture of the empty scene, moved to its place if the camera was touched in between. `known` keeps
+    what is told from the background, for the next subject that the same pictures show.
 
     Raises:
         InputError: fewer than two cameras have a picture and a mask, or one of the empty scene; a mask that is empty
@@ -84,7 +86,13 @@ def example_masks(
     cameras = {camera: recording.rig.camera(names[camera]) for camera in images}
     up = axis_vector(recording.up)
     calm = {camera: background.calm for camera, background in from_clip.items()}
-    make = lambda decide: masks_from_backgrounds(images, backgrounds, files, cameras, up, unknown, calm, decide)
+    known = {} if known is None else known
+
+    def make(decide: bool) -> FoundMasks:
+        if decide not in known:
+            known[decide] = masks_from_backgrounds(images, backgrounds, files, cameras, up, unknown, calm, decide)
+        return known[decide]
+
     alone = lambda made: _subject_alone(example, names, dict(sorted({**files, **made}.items())))
     made, by_colors = make(True) if backgrounds else FoundMasks({}, {})
     found = alone(made)

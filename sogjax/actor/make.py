@@ -1,16 +1,16 @@
 """An actor from a recording's example poses: a named body, scaled to the subject and coloured."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from sogjax.actor.colors import back_projected_colors, colored
+from sogjax.actor.colors import BlobColors, back_projected_colors, colored
 from sogjax.actor.doubts import doubt_of, unlike_sides, unseen_limbs
 from sogjax.actor.posed_examples import (
     Progress,
@@ -22,8 +22,23 @@ from sogjax.actor.posed_examples import (
     overlap_of,
     rough_poses,
 )
-from sogjax.actor.silhouette_fit import Estimate, compile_estimate, estimate_shape, silhouettes_of
-from sogjax.actor.silhouettes import COARSE_DEPTH, PosedPictures, load_pictures, silhouette_views, stack_views
+from sogjax.actor.silhouette_fit import (
+    COARSE_CELLS,
+    MAX_CELLS,
+    Estimate,
+    compile_estimate,
+    estimate_shape,
+    fit_edges,
+    silhouettes_of,
+)
+from sogjax.actor.silhouettes import (
+    COARSE_DEPTH,
+    PosedPictures,
+    SharedFrames,
+    load_pictures,
+    silhouette_views,
+    stack_views,
+)
 from sogjax.energy.term import Terms
 from sogjax.energy.views import Views
 from sogjax.errors import InputError
@@ -65,6 +80,10 @@ class MadeActor:
     shape_model: ShapeModel
     """How the shape parameters scale the upright starting body."""
     estimate: Estimate
+    rough_poses: dict[str, Float[Array, "dof"]] = field(default_factory=dict)
+    """As the masks alone tell them, also of examples that it is not made of."""
+    unsuitable: str | None = None
+    """Why the frames that were chosen for it may not suit it, with the remedy."""
     doubt: str | None = None
     """Why its sizes may be wrong, with the remedy."""
 
@@ -94,6 +113,109 @@ class MadeActor:
         return np.asarray(self.estimate.pose_deviations, float)
 
 
+@dataclass(frozen=True)
+class Making:
+    """What an actor is made of and from."""
+
+    recording: Recording
+    start: Body
+    subject: str | None
+    color_space: str
+    shape_model: ShapeModel
+    rig: Camera
+    best: int | None
+    """How many of its example poses are used, those that are found best, where nobody chose them; None: all."""
+    report: Report
+
+    @classmethod
+    def of(
+        cls, recording: Recording, start: Body, subject: str | None, color_space: str, symmetric: bool, **more: Any
+    ) -> "Making":
+        """With the body upright in the recording's world; `symmetric`: left and right alike."""
+        upright = start.rotated(jnp.asarray(world_from_upright(recording.up), start.blob_sigmas.dtype))
+        rig, model = jax.tree.map(jnp.asarray, recording.rig.cameras), ShapeModel.from_body(upright, symmetric)
+        return cls(recording, start, subject, color_space, model, rig, **more)
+
+    def made(
+        self,
+        terms: Terms,
+        progress: Progress = lambda items, total, label: items,
+        learnt: Sequence[BackgroundImage] | None = None,
+        shared: SharedFrames | None = None,
+    ) -> MadeActor:
+        """The body scaled and coloured after the example poses of the subject.
+
+        `learnt` is the background of every camera, for pictures that have neither masks nor pictures of the empty
+        scene; `shared` keeps frames for other subjects.
+
+        Raises:
+            InputError: no example poses of the subject, or pictures without masks.
+        """
+        recording, model, rig, best = self.recording, self.shape_model, self.rig, self.best
+        examples = examples_of(recording, self.subject)
+        shown = progress(examples, len(examples), "masks")
+        pictures = [load_pictures(recording, example, self.report, learnt, shared) for example in shown]
+        if any(posed.undecided for posed in pictures):
+            share = float(np.mean([posed.mask_share() for posed in pictures]))
+            terms = (*terms, RestPrior(UNDECIDED_REST * share))
+        found = _found_poses(
+            model.body, model, examples, pictures, rig, recording.up, terms, best, self.report, progress
+        )
+        self.report("shape")
+        estimate = _best_estimate(model, found, rig, terms, ways=1 if best is None else 2)
+        _check_fit(recording, _shaped(model, estimate.shape_params), estimate, found.pictures, rig)
+        return self.finished(found.pictures, estimate, found.rough, self.unsuitable(found.pictures, estimate))
+
+    def unsuitable(self, pictures: Sequence[PosedPictures], estimate: Estimate) -> str | None:
+        """Why frames that were chosen do not suit, with the remedy; None: they do, or somebody chose them."""
+        shaped = _shaped(self.shape_model, estimate.shape_params)
+        return doubt_of(shaped, estimate.poses, pictures, self.rig) if self.best is not None else None
+
+    def finished(
+        self,
+        pictures: Sequence[PosedPictures],
+        estimate: Estimate,
+        rough: Mapping[str, Float[Array, "dof"]],
+        unsuitable: str | None,
+    ) -> MadeActor:
+        """The actor of an estimate, in the colours that the pictures of its poses show, and what is doubtful of it."""
+        self.report("colours")
+        shaped, rig = _shaped(self.shape_model, estimate.shape_params), self.rig
+        pairs = zip(pictures, estimate.poses, strict=True)
+        shown = [view for posed, pose in pairs for view in colored_views(posed, rig, pose)]
+        found = back_projected_colors(shaped, shown, self.color_space)
+        doubts = (unsuitable, *self._doubts(shaped, found, pictures))
+        actor = replace(colored(shaped, found.colors), name=self.subject or self.start.name)
+        explained = explained_examples(actor, list(estimate.poses), pictures, rig)
+        actor = replace(actor, explained=jnp.asarray(explained, jnp.float32))
+        names, turn = [posed.name for posed in pictures], world_from_upright(self.recording.up)
+        frames = {example.name: example.frame for example in examples_of(self.recording, self.subject)}
+        return MadeActor(
+            body=actor.rotated(jnp.asarray(turn.T, self.start.blob_sigmas.dtype)),
+            start=self.start,
+            upright_body=actor,
+            example_poses=dict(zip(names, estimate.poses, strict=True)),
+            frames={name: frame for name in names if (frame := frames[name]) is not None},
+            pictures=tuple(pictures),
+            rig=rig,
+            shape_model=self.shape_model,
+            estimate=estimate,
+            rough_poses={**rough},
+            unsuitable=unsuitable,
+            doubt="; ".join(said for said in doubts if said is not None) or None,
+        )
+
+    def _doubts(
+        self, shaped: Body, found: BlobColors, pictures: Sequence[PosedPictures]
+    ) -> tuple[str | None, str | None]:
+        """Which limbs the pictures do not show, and which were not found."""
+        undecided = any(posed.undecided for posed in pictures)
+        return (
+            unseen_limbs(shaped, found.shown, pictures) if undecided else None,
+            unlike_sides(shaped, np.asarray(found.colors), pictures) if self.best is not None else None,
+        )
+
+
 def make_actor(
     recording: Recording,
     body: Body,
@@ -101,71 +223,29 @@ def make_actor(
     color_space: str,
     terms: Terms,
     report: Report = lambda _: None,
-    progress: Progress = lambda items, total, label: items,
-    symmetric: bool = True,
-    learnt: Sequence[BackgroundImage] | None = None,
     best: int | None = None,
 ) -> MadeActor:
-    """Scale and colour a body after the example poses of one subject; `symmetric`: left and right alike.
+    """Scale and colour a body after the example poses of one subject, left and right alike (`Making`).
 
-    `learnt` is the background of every camera, for pictures that have neither masks nor pictures of the empty scene. Of
-    the example poses the `best` that are found best are used; None: all.
+    Of the example poses the `best` that are found best are used; None: all.
 
     Raises:
         InputError: no example poses of the subject, or pictures without masks.
     """
-    examples = examples_of(recording, subject)
-    rig = jax.tree.map(jnp.asarray, recording.rig.cameras)
-    turn = world_from_upright(recording.up)
-    upright = body.rotated(jnp.asarray(turn, body.blob_sigmas.dtype))
-    model = ShapeModel.from_body(upright, symmetric)
-    pictures = [load_pictures(recording, e, report, learnt) for e in progress(examples, len(examples), "masks")]
-    undecided = any(posed.undecided for posed in pictures)
-    if undecided:
-        terms = (*terms, RestPrior(UNDECIDED_REST * float(np.mean([posed.mask_share() for posed in pictures]))))
-    found = _found_poses(upright, model, examples, pictures, rig, recording.up, terms, best, report, progress)
-    examples, pictures = found.examples, found.pictures
-    report("shape")
-    estimate = _best_estimate(model, found, rig, terms, ways=1 if best is None else 2)
-    shaped = _shaped(model, estimate.shape_params)
-    _check_fit(recording, shaped, estimate, pictures, rig)
-    report("colours")
-    shown = [
-        view for posed, pose in zip(pictures, estimate.poses, strict=True) for view in colored_views(posed, rig, pose)
-    ]
-    found_colors = back_projected_colors(shaped, shown, color_space)
-    unsuitable = None if best is None else doubt_of(shaped, estimate.poses, pictures, rig)
-    unseen = unseen_limbs(shaped, found_colors.shown, pictures) if undecided else None
-    uneven = None if best is None else unlike_sides(shaped, np.asarray(found_colors.colors), pictures)
-    doubt = "; ".join(said for said in (unsuitable, unseen, uneven) if said is not None) or None
-    if doubt is not None:
-        report(f"warning: {doubt}")
-    actor = replace(colored(shaped, found_colors.colors), name=subject or body.name)
-    explained = explained_examples(actor, list(estimate.poses), pictures, rig)
-    actor = replace(actor, explained=jnp.asarray(explained, jnp.float32))
-    return MadeActor(
-        body=actor.rotated(jnp.asarray(turn.T, body.blob_sigmas.dtype)),
-        start=body,
-        upright_body=actor,
-        example_poses={example.name: pose for example, pose in zip(examples, estimate.poses, strict=True)},
-        frames={example.name: example.frame for example in examples if example.frame is not None},
-        pictures=tuple(pictures),
-        rig=rig,
-        shape_model=model,
-        estimate=estimate,
-        doubt=doubt,
-    )
+    making = Making.of(recording, body, subject, color_space, True, best=best, report=report)
+    return making.made(terms)
 
 
 class _FoundPoses(NamedTuple):
     """The example poses that an actor is made of, and the rough poses in them."""
 
-    examples: list[ExamplePose]
     pictures: list[PosedPictures]
     views: list[Views]
     """The silhouettes."""
     ways: list[list[Float[Array, "dof"]]]
     """The pose of each that is believed, and after it that of the body turned round, if it was looked for."""
+    rough: dict[str, Float[Array, "dof"]]
+    """The pose that is believed of all examples, by name."""
 
 
 def _found_poses(
@@ -187,15 +267,17 @@ def _found_poses(
     chooses = best is not None and len(examples) > best
     with ThreadPoolExecutor(1) as beside:
         if not chooses:
-            beside.submit(compile_estimate, model, stack_views(views), silhouettes_of(pictures, rig), terms)
+            coarse_masks, masks = (silhouettes_of(pictures, rig, most) for most in (COARSE_CELLS, MAX_CELLS))
+            beside.submit(compile_estimate, model, stack_views(views), coarse_masks, masks, terms)
         ways = rough_poses(upright, shown, rig, up, terms, report, progress)
-    found = _FoundPoses(examples, pictures, views, ways)
+    rough = {posed.name: poses[0] for posed, poses in zip(pictures, ways, strict=True)}
+    found = _FoundPoses(pictures, views, ways, rough)
     if best is None or not chooses:
         return found
     kept = found_best(upright, [poses[0] for poses in ways], pictures, rig, best)
     report(f"uses {', '.join(examples[k].name for k in kept)}")
     some = lambda values: [values[k] for k in kept]
-    return _FoundPoses(some(examples), some(pictures), some(views), some(ways))
+    return _FoundPoses(some(pictures), some(views), some(ways), rough)
 
 
 def _best_estimate(model: ShapeModel, found: _FoundPoses, rig: Camera, terms: Terms, ways: int) -> Estimate:
@@ -203,13 +285,14 @@ def _best_estimate(model: ShapeModel, found: _FoundPoses, rig: Camera, terms: Te
 
     Rough silhouettes hardly tell front from back; the fitted body does.
     """
-    silhouettes, views = silhouettes_of(found.pictures, rig), stack_views(found.views)
+    coarse, views = silhouettes_of(found.pictures, rig, COARSE_CELLS), stack_views(found.views)
     estimates = [
-        estimate_shape(model, jnp.stack([poses[way] for poses in found.ways]), views, silhouettes, terms)
+        estimate_shape(model, jnp.stack([poses[way] for poses in found.ways]), views, coarse, terms)
         for way in range(min(ways, *map(len, found.ways)))
     ]
     agrees = lambda estimate: overlap_of(_shaped(model, estimate.shape_params), estimate.poses, found.pictures, rig)
-    return max(estimates, key=agrees) if len(estimates) > 1 else estimates[0]
+    best = max(estimates, key=agrees) if len(estimates) > 1 else estimates[0]
+    return fit_edges(model, best, silhouettes_of(found.pictures, rig))
 
 
 def _check_fit(

@@ -33,15 +33,15 @@ from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.solve.solution import QuadraticModel, Scales, Solution
 from sogjax.tracking.solving import pose_scales
 
-MAX_CELLS = 2048
-"""Cells of each camera, at most."""
+MAX_CELLS, COARSE_CELLS = 2048, 512
+"""Cells of each camera, at most, and where limbs are only looked for or two fits compared: a hand is about two wide."""
 BORDER = 0.12
 """Border around the subject's box, as a part of its longer side."""
 
 
-def silhouettes_of(pictures: Sequence[PosedPictures], rig: Camera) -> Silhouettes:
-    """The masks of all poses, with a leading axis for the poses."""
-    poses = [_pose_cells(posed, int(rig.image_size.shape[0])) for posed in pictures]
+def silhouettes_of(pictures: Sequence[PosedPictures], rig: Camera, most: int = MAX_CELLS) -> Silhouettes:
+    """The masks of all poses, with a leading axis for the poses; each camera's has at most so many cells."""
+    poses = [_pose_cells(posed, int(rig.image_size.shape[0]), most) for posed in pictures]
     means, sigmas, coverage, mask = (np.stack(part) for part in zip(*poses, strict=True))
     dtype = rig.intrinsics.dtype
     as_dtype = lambda array: jnp.asarray(array, dtype)
@@ -58,12 +58,12 @@ def _undistorted(
     return by_pose(undistort, means), by_pose(undistorted_sizes, means, sigmas)
 
 
-def _pose_cells(pictures: PosedPictures, num_cameras: int) -> tuple[np.ndarray, ...]:
-    means = np.zeros((num_cameras, MAX_CELLS, 2))
-    sigmas, coverage = np.ones((num_cameras, MAX_CELLS)), np.zeros((num_cameras, MAX_CELLS))
-    mask = np.zeros((num_cameras, MAX_CELLS), bool)
+def _pose_cells(pictures: PosedPictures, num_cameras: int, most: int) -> tuple[np.ndarray, ...]:
+    means = np.zeros((num_cameras, most, 2))
+    sigmas, coverage = np.ones((num_cameras, most)), np.zeros((num_cameras, most))
+    mask = np.zeros((num_cameras, most), bool)
     for camera, picture in pictures.masks.items():
-        cut = cells_of(picture, pictures.untold.get(camera))
+        cut = cells_of(picture, pictures.untold.get(camera), most)
         count = len(cut.coverage)
         means[camera, :count], sigmas[camera, :count] = cut.centres, cut.sigma
         coverage[camera, :count], mask[camera, :count] = cut.coverage, cut.told
@@ -83,13 +83,15 @@ class MaskCells(NamedTuple):
     """Whether the mask says something of most of the cell."""
 
 
-def cells_of(mask: Bool[np.ndarray, "_h _w"], untold: Bool[np.ndarray, "_h _w"] | None = None) -> MaskCells:
-    """The cells of a mask around its subject; it says nothing where it is `untold`."""
+def cells_of(
+    mask: Bool[np.ndarray, "_h _w"], untold: Bool[np.ndarray, "_h _w"] | None = None, most: int = MAX_CELLS
+) -> MaskCells:
+    """The cells of a mask around its subject, at most so many; it says nothing where it is `untold`."""
     top, bottom, left, right = _box(mask)
     height, width = bottom - top, right - left
-    side = max(1.0, np.sqrt(height * width / MAX_CELLS))
+    side = max(1.0, np.sqrt(height * width / most))
     columns = max(1, int(width / side))
-    rows = max(1, min(int(height / side), MAX_CELLS // columns))
+    rows = max(1, min(int(height / side), most // columns))
     crop = lambda region: region[top:bottom, left:right].astype(np.float32)
     share = lambda region: cv2.resize(crop(region), (columns, rows), interpolation=cv2.INTER_AREA).reshape(-1)
     wide, high = width / columns, height / rows
@@ -263,17 +265,31 @@ def estimate_shape(
     start = jnp.concatenate([poses.reshape(-1), jnp.zeros(model.num_shape_params, poses.dtype)])
     with_shape = scales_with_shape(scales, num_poses, model.num_shape_params)
     start = _climb(model, start, num_poses, views, terms, with_shape, jnp.asarray(max_iterations[0]))
+    return _edges(model, start, silhouettes, max_iterations[1])
+
+
+def fit_edges(
+    model: ShapeModel, near: Estimate, silhouettes: Silhouettes, max_iterations: int = MAX_ITERATIONS
+) -> Estimate:
+    """The poses and the one shape near an estimate that fit the edges of all masks best."""
+    return _edges(model, jnp.append(near.poses, near.shape_params), silhouettes, max_iterations)
+
+
+def _edges(model: ShapeModel, start: Float[Array, "param"], silhouettes: Silhouettes, max_iterations: int) -> Estimate:
     fit = SilhouetteFit(model, silhouettes)
-    solution = fitted(fit, start, scales, max_iterations[1])
+    solution = fitted(fit, start, pose_scales(model.body.skeleton), max_iterations)
     poses_deviation, shape_deviation = fit.split(_deviations(fit, solution.params))
     best_poses, shape = fit.split(solution.params)
     return Estimate(best_poses, shape, poses_deviation, shape_deviation)
 
 
-def compile_estimate(model: ShapeModel, views: Views, silhouettes: Silhouettes, terms: Terms) -> None:
-    """Compile beforehand what `estimate_shape` needs, while other work goes on."""
+def compile_estimate(
+    model: ShapeModel, views: Views, coarse: Silhouettes, silhouettes: Silhouettes, terms: Terms
+) -> None:
+    """Compile beforehand what `estimate_shape` and `fit_edges` need, while other work goes on."""
     num_poses = silhouettes.mask.shape[0]
-    estimate_shape(model, jnp.tile(model.body.poses["rest"], (num_poses, 1)), views, silhouettes, terms, (0, 0))
+    poses = jnp.tile(model.body.poses["rest"], (num_poses, 1))
+    fit_edges(model, estimate_shape(model, poses, views, coarse, terms, (0, 0)), silhouettes, 0)
 
 
 _deviations = compiled(SilhouetteFit.deviations)

@@ -22,6 +22,7 @@ from sogjax.model.sog import Sog
 from sogjax.scene.background import BackgroundImage
 from sogjax.scene.cells import CellGrid, stack_cells
 from sogjax.scene.quadtree import Candidates, keep_blobs, quadtree
+from sogjax.scene.segmentation import FoundMasks
 from sogjax.scene.visual_hull import central_ray, nearest_point
 from sogjax.tracking.culling import capacity_for
 
@@ -54,11 +55,32 @@ class PosedPictures:
         return float(np.mean([mask.mean() for mask in self.masks.values()]))
 
 
+@dataclass
+class SharedFrames:
+    """What example poses share that are the same frames of the videos: each is read and told from the room once."""
+
+    images: dict[int, dict[int, UInt8[np.ndarray, "_h _w 3"]]] = field(default_factory=dict)
+    """All pictures (BGR) of each frame, by camera."""
+    masks: dict[int, dict[bool, FoundMasks]] = field(default_factory=dict)
+    """What `example_masks` keeps of each frame."""
+
+    def of(
+        self, recording: Recording, example: ExamplePose
+    ) -> tuple[dict[int, UInt8[np.ndarray, "_h _w 3"]], dict[bool, FoundMasks]]:
+        """The pictures of an example pose, and what is kept of its masks: nothing where they are files."""
+        if example.frame is None:
+            return load_images(recording, example), {}
+        if example.frame not in self.images:
+            self.images[example.frame] = load_images(recording, example)
+        return self.images[example.frame], self.masks.setdefault(example.frame, {})
+
+
 def load_pictures(
     recording: Recording,
     example: ExamplePose,
     report: Callable[[str], None] = lambda _: None,
     learnt: Sequence[BackgroundImage] | None = None,
+    shared: SharedFrames | None = None,
 ) -> PosedPictures:
     """The pictures of an example pose that have masks, or for which masks can be made (`example_masks`).
 
@@ -66,8 +88,8 @@ def load_pictures(
         InputError: fewer than two cameras have a picture and a mask, or one of the empty scene; a mask that is empty
             or full; a picture of another size.
     """
-    images = load_images(recording, example)
-    masks = example_masks(recording, example, images, learnt)
+    images, known = (shared or SharedFrames()).of(recording, example)
+    masks = example_masks(recording, example, images, learnt, known)
     for warning in masks.warnings:
         report(f"warning: {warning}")
     shown = {k: images[k] for k in masks.masks}

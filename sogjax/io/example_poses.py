@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -88,6 +88,11 @@ class ExamplePose:
     None: nobody else is seen."""
     others: dict[str, Bool[np.ndarray, "_rows _columns"]] | None = None
     """Where these cameras see others who are not hidden from them, at any size. None: nobody else is seen."""
+
+    def of_everybody(self, cameras: Iterable[str]) -> "ExamplePose":
+        """The same pictures with all people in them as the subject: nobody else is anywhere."""
+        nowhere = np.zeros((1, 1), bool)
+        return replace(self, within=None, others=dict.fromkeys(cameras, nowhere))
 
 
 def find_background(folder: Path, rig: CameraRig, calibrated: Iterable[str]) -> dict[str, Path]:

@@ -69,6 +69,12 @@ class Solid(eqx.Module):
         allowed = jnp.where(same, jnp.maximum(deepest, 0.0), 0.0) + SOFT
         return eqx.tree_at(lambda solid: solid.allowed, known, allowed)
 
+    def regardless_of(self, blobs: Int[np.ndarray, "_blob"]) -> "Solid":
+        """The same, but that whatever some blobs are in does not matter."""
+        of_pairs = np.asarray(self.ends)[np.asarray(self.pairs)].reshape(-1, 4)
+        allowed = jnp.where(np.isin(of_pairs, blobs).any(axis=1), jnp.inf, self.allowed)
+        return eqx.tree_at(lambda solid: solid.allowed, self, allowed)
+
     def deeper(
         self, body: Body, known: Float[np.ndarray, "dof"], poses: Float[np.ndarray, "start dof"]
     ) -> Float[np.ndarray, "start pair"]:

@@ -11,7 +11,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from sogjax.actor.make import MadeActor, make_actor, subjects_of
+from sogjax.actor.make import MadeActor, Making, subjects_of
+from sogjax.actor.silhouettes import PosedPictures, SharedFrames, load_pictures
+from sogjax.actor.together import made_together
 from sogjax.energy.term import Terms
 from sogjax.errors import InputError
 from sogjax.io.actor_file import load_body, save_body
@@ -29,6 +31,7 @@ from sogjax.run.keypoint_actor import keypoint_actor, with_rough_poses
 from sogjax.run.recordings import body_named, check_scale, file_list
 from sogjax.run.shared import SHARED
 from sogjax.run.terminal import progress, say
+from sogjax.scene.background import BackgroundImage
 from sogjax.settings.method import ColorConfig, EnergyConfig, ImagesConfig
 from sogjax.settings.run import ActorConfig, TrackConfig
 
@@ -216,25 +219,37 @@ def actors_of_pictures(request: ActorRequest) -> list[MadeActor]:
     start = body_named(request.body)
     recording, learnt, best = with_examples(request.clip, request.background, request.number)
     recording = with_rough_poses(recording, start)
-    made: list[MadeActor] = []
-    for subject in subjects_of(recording) if request.subjects is None else request.subjects:
-        label = "actor" if subject is None else f"actor {subject}"
-        said = lambda stage, label=label: say(f"{label}: {stage}")
-        made.append(
-            make_actor(
-                recording,
-                start,
-                subject,
-                request.color_space,
-                request.terms,
-                said,
-                progress,
-                request.symmetric,
-                learnt,
-                best,
-            )
-        )
+    subjects = subjects_of(recording) if request.subjects is None else request.subjects
+    makings, shared = [_making(request, recording, start, subject, best) for subject in subjects], SharedFrames()
+    made = [making.made(request.terms, progress, learnt, shared) for making in makings]
+    if len(made) > 1:
+        made = made_together(makings, made, _of_everybody(recording, made, learnt, shared))
+    for making, actor in zip(makings, made, strict=True):
+        if actor.doubt is not None:
+            making.report(f"warning: {actor.doubt}")
     return made
+
+
+def _making(request: ActorRequest, recording: Recording, start: Body, subject: str | None, best: int | None) -> Making:
+    label = "actor" if subject is None else f"actor {subject}"
+    said = lambda stage: say(f"{label}: {stage}")
+    return Making.of(recording, start, subject, request.color_space, request.symmetric, best=best, report=said)
+
+
+def _of_everybody(
+    recording: Recording,
+    made: Sequence[MadeActor],
+    learnt: Sequence[BackgroundImage] | None,
+    shared: SharedFrames,
+) -> dict[str, PosedPictures]:
+    """The masks of all people in the frames of the videos that show several actors, by the names of the examples."""
+    used = {name for actor in made for name in actor.frames}
+    examples = {example.name: example for example in recording.example_poses if example.within and example.name in used}
+    names = recording.rig.names
+    return {
+        name: load_pictures(recording, example.of_everybody(names), learnt=learnt, shared=shared)
+        for name, example in examples.items()
+    }
 
 
 def known_frames(made: Sequence[MadeActor]) -> tuple[KnownFrame, ...]:

@@ -54,12 +54,17 @@ class RestPrior(Penalty):
 
     def value(self, posed: Posed, frame: Frame) -> Float[Array, ""]:
         """The sum over the degrees of freedom that have limits."""
-        return jnp.sum((posed.pose / _ranges(posed.body.skeleton, posed.pose)) ** 2)
+        return from_rest(posed.body.skeleton, posed.pose)
 
     def quadratic(self, posed: Posed, frame: Frame) -> QuadraticModel:
         """The exact model: the prior is quadratic."""
         inverse = 2.0 * self.weight / _ranges(posed.body.skeleton, posed.pose) ** 2
         return QuadraticModel(self.part(posed, frame), -inverse * posed.pose, jnp.diag(inverse))
+
+
+def from_rest(skeleton: Skeleton, pose: Float[Array, "dof"]) -> Float[Array, ""]:
+    """How far joints that have limits are from the rest pose, as a part of their range, squared and added up."""
+    return jnp.sum((pose / _ranges(skeleton, pose)) ** 2)
 
 
 def _ranges(skeleton: Skeleton, pose: Float[Array, "dof"]) -> Float[Array, "dof"]:

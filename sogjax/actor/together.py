@@ -1,0 +1,97 @@
+"""Actors whose example poses are fitted again together: each to what the bodies of the others leave of all masks.
+
+Where people reach for each other, no border between them tells whose an arm is, but bodies that are roughly known do.
+So masks are not cut, and cameras in which one hides the other tell of both.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from sogjax.actor.coverage import body_silhouette
+from sogjax.actor.limb_silhouettes import Everybody, with_limbs_found
+from sogjax.actor.make import MadeActor, Making
+from sogjax.actor.silhouette_fit import COARSE_CELLS, fit_edges, silhouettes_of
+from sogjax.actor.silhouettes import PosedPictures
+from sogjax.model.camera import camera_of
+from sogjax.scene.background_difference import reduced_mask, widened
+from sogjax.scene.coarse_views import enlarged
+
+ROUNDS = 2
+"""Times that each is searched for limbs, given the others."""
+AROUND = 2
+"""Pixels of a mask at the working size around a body that are its own, too: sizes are only roughly known."""
+LEAST_LEFT = 0.2
+"""Share of somebody's silhouettes, the mean over the cameras, that others must leave in one for it to tell."""
+Poses = dict[str, Float[np.ndarray, "dof"]]
+
+
+def made_together(
+    makings: Sequence[Making], made: Sequence[MadeActor], shown: Mapping[str, PosedPictures]
+) -> list[MadeActor]:
+    """The actors, each made alone before, fitted again where all others are roughly known.
+
+    `shown` are the masks of all people of such an example pose, by its name. Others keep their own masks.
+    """
+    poses: list[Poses] = [
+        {name: np.asarray(pose) for name, pose in (actor.rough_poses | actor.example_poses).items()} for actor in made
+    ]
+    shared = {name for name in shown if all(name in of_actor for of_actor in poses)}
+    if not shared:
+        return list(made)
+    people = People(tuple(made), {name: shown[name] for name in shared})
+    everybody = Everybody.of([actor.upright_body for actor in made])
+    for turn in range(ROUNDS):
+        for k, actor in enumerate(made):
+            for name in [name for name in actor.example_poses if name in shared]:
+                now = [of_actor[name] for of_actor in poses]
+                cells = silhouettes_of([people.left_by_others(k, name, now)], actor.rig, COARSE_CELLS)
+                of_pose = jax.tree.map(lambda leaf: leaf[0], cells)
+                poses[k][name] = with_limbs_found(everybody, k, now, of_pose, turn)
+    return [people.fitted_again(k, making, poses) for k, making in enumerate(makings)]
+
+
+@dataclass(frozen=True)
+class People:
+    """Some actors, and the masks of all of them in example poses, by name."""
+
+    made: tuple[MadeActor, ...]
+    shown: Mapping[str, PosedPictures]
+
+    def fitted_again(self, k: int, making: Making, poses: Sequence[Poses]) -> MadeActor:
+        """One of the actors, its shape and poses fitted to what the others leave."""
+        actor = self.made[k]
+        pictures = [
+            self.left_by_others(k, posed.name, [of_actor[posed.name] for of_actor in poses])
+            if posed.name in self.shown
+            else posed
+            for posed in actor.pictures
+        ]
+        found = jnp.stack([jnp.asarray(poses[k][posed.name]) for posed in pictures])
+        near = eqx.tree_at(lambda estimate: estimate.poses, actor.estimate, found)
+        estimate = fit_edges(actor.shape_model, near, silhouettes_of(pictures, actor.rig))
+        return making.finished(pictures, estimate, actor.rough_poses, actor.unsuitable)
+
+    def left_by_others(self, k: int, name: str, poses: Sequence[Float[np.ndarray, "dof"]]) -> PosedPictures:
+        """The masks of all people, which say nothing where the bodies of others than one of them are."""
+        shown, masks, untold, parts = self.shown[name], {}, {}, {}
+        for camera, mask in shown.masks.items():
+            small = reduced_mask(mask)
+            seen = [
+                body_silhouette(each.upright_body, jnp.asarray(pose), camera_of(each.rig, camera), small.shape)
+                for each, pose in zip(self.made, poses, strict=True)
+            ]
+            others = widened(np.any(seen[:k] + seen[k + 1 :], axis=0), AROUND)
+            parts[camera] = float((seen[k] & ~others).sum()), float(seen[k].sum())
+            covered = enlarged(others, mask.shape)
+            masks[camera] = mask & ~covered
+            untold[camera] = (shown.untold.get(camera, np.zeros_like(mask)) | covered) & ~masks[camera]
+        usual = np.median([whole for _, whole in parts.values()])
+        kept = [camera for camera, (left, _) in parts.items() if left > LEAST_LEFT * usual and masks[camera].any()]
+        some = lambda of_cameras: {camera: of_cameras[camera] for camera in kept}
+        return replace(shown, images=some(shown.images), masks=some(masks), untold=some(untold))

@@ -1,0 +1,77 @@
+"""What the bodies of others leave of the masks of all people."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from body_cases import shipped
+from drawn_scene import moved, standing
+from rig_cases import ring_rig
+
+from sogjax.actor.coverage import body_silhouette
+from sogjax.actor.make import MadeActor
+from sogjax.actor.silhouette_fit import Estimate
+from sogjax.actor.silhouettes import PosedPictures
+from sogjax.actor.together import People, made_together
+from sogjax.io.example_poses import ExamplePose
+from sogjax.model.shape import ShapeModel
+
+RIG = ring_rig(4, (160, 120), distance=3.5)
+DOG = shipped("dog")
+MODEL = ShapeModel.from_body(DOG)
+SIZE = RIG.image_size(RIG.names[0])[::-1]
+CAMERAS = range(len(RIG.names))
+
+
+def silhouette(pose, camera):
+    return body_silhouette(DOG, jnp.asarray(pose), RIG.camera(RIG.names[camera]), SIZE)
+
+
+def made(pose):
+    zeros = jnp.zeros(MODEL.num_shape_params)
+    estimate = Estimate(jnp.asarray(pose)[None], zeros, jnp.zeros((1, len(pose))), zeros)
+    return MadeActor(DOG, DOG, DOG, {"a": jnp.asarray(pose)}, {"a": 0}, (), RIG.cameras, MODEL, estimate)
+
+
+@pytest.fixture(scope="module")
+def poses():
+    first = standing(DOG, 1.2)
+    return [first, moved(DOG, first, {"root_x": 0.7, "root_y": 0.3})]
+
+
+def all_people(poses):
+    masks = {k: silhouette(poses[0], k) | silhouette(poses[1], k) for k in CAMERAS}
+    images = {k: np.zeros((*SIZE, 3), np.uint8) for k in CAMERAS}
+    return PosedPictures("a", images, masks)
+
+
+def test_masks_say_nothing_where_somebody_else_is(poses):
+    left = People(tuple(map(made, poses)), {"a": all_people(poses)}).left_by_others(0, "a", poses)
+    assert left.masks.keys() == left.untold.keys() == left.images.keys()
+    assert len(left.masks) >= 2
+    for k in left.masks:
+        own, other = silhouette(poses[0], k), silhouette(poses[1], k)
+        assert not (left.masks[k] & other).any()
+        assert left.untold[k][other].all()
+        assert not (left.masks[k] & left.untold[k]).any()
+        assert not (left.masks[k] & ~own).any()
+        assert left.masks[k].sum() > 0.3 * own.sum()
+
+
+def test_a_camera_that_sees_somebody_only_behind_another_is_left_out(poses):
+    same = [poses[0], poses[0]]
+    assert not People(tuple(map(made, same)), {"a": all_people(same)}).left_by_others(0, "a", same).masks
+
+
+def test_actors_without_a_common_pose_stay_as_they_were_made(poses):
+    people = [made(pose) for pose in poses]
+    assert made_together([], people, {}) == people
+
+
+def test_everybody_is_the_subject_of_pictures_of_everybody():
+    alone = {"left": np.ones((2, 2), bool)}
+    example = ExamplePose("frame_3", "anna", {}, {}, None, 3, alone, alone)
+    of_all = example.of_everybody(["left", "right"])
+    assert of_all.within is None
+    assert of_all.others is not None
+    assert of_all.others.keys() == {"left", "right"}
+    assert not any(mask.any() for mask in of_all.others.values())

@@ -1,0 +1,76 @@
+"""Limbs of example poses, searched by the edges of masks, beside others."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from body_cases import shipped
+from drawn_scene import moved, standing
+from rig_cases import ring_rig
+
+from sogjax.actor.coverage import body_silhouette
+from sogjax.actor.limb_silhouettes import Everybody, with_limbs_found
+from sogjax.actor.silhouette_fit import COARSE_CELLS, silhouettes_of
+from sogjax.actor.silhouettes import PosedPictures
+from sogjax.model.body import concatenate
+from sogjax.model.solid import Solid
+
+pytestmark = pytest.mark.slow
+
+RIG = ring_rig(4, (320, 240), distance=3.5)
+HUMAN = shipped("human")
+
+
+def hands_off(pose, truth):
+    joints = [HUMAN.landmarks.names.index(name) for name in ("left_wrist", "right_wrist")]
+    places = [np.asarray(HUMAN.posed_landmarks(jnp.asarray(each)))[joints] for each in (pose, truth)]
+    return np.linalg.norm(places[0] - places[1], axis=1)
+
+
+def masks_of(pose):
+    size = RIG.image_size(RIG.names[0])[::-1]
+    return {k: body_silhouette(HUMAN, jnp.asarray(pose), RIG.camera(name), size) for k, name in enumerate(RIG.names)}
+
+
+def cells_of_masks(masks):
+    pictures = PosedPictures("a", {}, masks)
+    return jax.tree.map(lambda leaf: leaf[0], silhouettes_of([pictures], RIG.cameras, COARSE_CELLS))
+
+
+def raised():
+    """An arm held up sideways, and the rest pose."""
+    start = standing(HUMAN, 1.0)
+    return moved(HUMAN, start, {"left_shoulder_raise": -1.2}), start
+
+
+def test_an_arm_is_found_where_the_masks_show_it():
+    truth, start = raised()
+    masks = masks_of(truth)
+    assert hands_off(start, truth).max() > 0.4
+    found = with_limbs_found(Everybody.of([HUMAN]), 0, [start], cells_of_masks(masks), 0)
+    np.testing.assert_array_less(hands_off(found, truth), (0.1, 0.05))
+    legs = [k for k, name in enumerate(HUMAN.skeleton.dof_names) if "knee" in name or "hip" in name]
+    np.testing.assert_array_equal(found[legs], start[legs])
+
+
+def test_limbs_that_cover_the_masks_stay():
+    _, start = raised()
+    masks = masks_of(start)
+    found = with_limbs_found(Everybody.of([HUMAN]), 0, [start], cells_of_masks(masks), 0)
+    assert hands_off(found, start).max() < 0.05
+
+
+def test_a_limb_in_somebody_elses_trunk_is_impossible_but_in_his_arm_not():
+    start = standing(HUMAN, 1.0)
+    beside = moved(HUMAN, start, {"root_y": 0.18})
+    apart = moved(HUMAN, start, {"root_y": 3.0})
+    everybody, nothing = Everybody.of([HUMAN, HUMAN]), np.zeros(0, int)
+    inside, free = (everybody.impossibility(0, start[None], [start, other], nothing) for other in (beside, apart))
+    assert inside > 0.5
+    assert free == 0.0
+    own = np.arange(HUMAN.num_blobs)
+    assert everybody.impossibility(0, start[None], [start, beside], own) == 0.0  # wherever its own blobs are
+    whole = concatenate([HUMAN, HUMAN])
+    np.testing.assert_array_equal(everybody.blobs(1), own + HUMAN.num_blobs)
+    means = whole.posed_blobs(jnp.asarray(np.concatenate([start, beside]))).means
+    assert Solid.of(whole).regardless_of(np.arange(whole.num_blobs)).impossibility(means) == 0.0
