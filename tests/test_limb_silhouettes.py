@@ -48,7 +48,7 @@ def test_an_arm_is_found_where_the_masks_show_it():
     masks = masks_of(truth)
     assert hands_off(start, truth).max() > 0.4
     found = with_limbs_found(Everybody.of([HUMAN]), 0, [start], cells_of_masks(masks), 0)
-    np.testing.assert_array_less(hands_off(found, truth), (0.1, 0.05))
+    assert hands_off(found, truth).max() < 0.15  # half a hand: the cells are as wide
     legs = [k for k, name in enumerate(HUMAN.skeleton.dof_names) if "knee" in name or "hip" in name]
     np.testing.assert_array_equal(found[legs], start[legs])
 

@@ -35,8 +35,8 @@ ITERATIONS = 15
 AT_ONCE = 16
 """Ways that are compared in one step."""
 
-LEAST_GAIN = 0.007
-"""Mismatch by which another way to hold a limb must be better: masks are not that exact."""
+LEAST_GAIN = 0.05
+"""Part of its cost by which a unit held in another way must be better: masks are not that exact."""
 REST = 0.003
 """What being at the end of a joint's range costs beside the mismatch, which is 0.1 to 0.2: of two ways that cover the
 masks alike, the one that twists less is more likely."""
@@ -134,7 +134,8 @@ class _SeenUnit:
             held[:, limb.all_dofs] = of_limb[row][:, limb.all_dofs]
         together = sum(fills[row] for fills, row in zip(covered, rows, strict=True))
         cost = self._cost(held, rest, jnp.asarray(together), np.zeros(0, int))
-        return held[np.argmin(cost + LEAST_GAIN * np.count_nonzero(rows, axis=0))]
+        best = int(np.argmin(cost))
+        return held[best] if cost[best] < (1.0 - LEAST_GAIN) * cost[0] else self.pose
 
     def _best_ways(
         self, limb: Unit, part: PartIndex, rest: Float[Array, "camera cell"]

@@ -22,15 +22,7 @@ from sogjax.actor.posed_examples import (
     overlap_of,
     rough_poses,
 )
-from sogjax.actor.silhouette_fit import (
-    COARSE_CELLS,
-    MAX_CELLS,
-    Estimate,
-    compile_estimate,
-    estimate_shape,
-    fit_edges,
-    silhouettes_of,
-)
+from sogjax.actor.silhouette_fit import Estimate, compile_estimate, estimate_shape, silhouettes_of
 from sogjax.actor.silhouettes import (
     COARSE_DEPTH,
     PosedPictures,
@@ -267,8 +259,7 @@ def _found_poses(
     chooses = best is not None and len(examples) > best
     with ThreadPoolExecutor(1) as beside:
         if not chooses:
-            coarse_masks, masks = (silhouettes_of(pictures, rig, most) for most in (COARSE_CELLS, MAX_CELLS))
-            beside.submit(compile_estimate, model, stack_views(views), coarse_masks, masks, terms)
+            beside.submit(compile_estimate, model, stack_views(views), silhouettes_of(pictures, rig), terms)
         ways = rough_poses(upright, shown, rig, up, terms, report, progress)
     rough = {posed.name: poses[0] for posed, poses in zip(pictures, ways, strict=True)}
     found = _FoundPoses(pictures, views, ways, rough)
@@ -285,14 +276,13 @@ def _best_estimate(model: ShapeModel, found: _FoundPoses, rig: Camera, terms: Te
 
     Rough silhouettes hardly tell front from back; the fitted body does.
     """
-    coarse, views = silhouettes_of(found.pictures, rig, COARSE_CELLS), stack_views(found.views)
+    silhouettes, views = silhouettes_of(found.pictures, rig), stack_views(found.views)
     estimates = [
-        estimate_shape(model, jnp.stack([poses[way] for poses in found.ways]), views, coarse, terms)
+        estimate_shape(model, jnp.stack([poses[way] for poses in found.ways]), views, silhouettes, terms)
         for way in range(min(ways, *map(len, found.ways)))
     ]
     agrees = lambda estimate: overlap_of(_shaped(model, estimate.shape_params), estimate.poses, found.pictures, rig)
-    best = max(estimates, key=agrees) if len(estimates) > 1 else estimates[0]
-    return fit_edges(model, best, silhouettes_of(found.pictures, rig))
+    return max(estimates, key=agrees) if len(estimates) > 1 else estimates[0]
 
 
 def _check_fit(

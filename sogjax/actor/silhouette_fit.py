@@ -34,7 +34,7 @@ from sogjax.solve.solution import QuadraticModel, Scales, Solution
 from sogjax.tracking.solving import pose_scales
 
 MAX_CELLS, COARSE_CELLS = 2048, 512
-"""Cells of each camera, at most, and where limbs are only looked for or two fits compared: a hand is about two wide."""
+"""Cells of each camera, at most, and where limbs are only looked for: a hand is about two wide."""
 BORDER = 0.12
 """Border around the subject's box, as a part of its longer side."""
 
@@ -283,13 +283,10 @@ def _edges(model: ShapeModel, start: Float[Array, "param"], silhouettes: Silhoue
     return Estimate(best_poses, shape, poses_deviation, shape_deviation)
 
 
-def compile_estimate(
-    model: ShapeModel, views: Views, coarse: Silhouettes, silhouettes: Silhouettes, terms: Terms
-) -> None:
-    """Compile beforehand what `estimate_shape` and `fit_edges` need, while other work goes on."""
+def compile_estimate(model: ShapeModel, views: Views, silhouettes: Silhouettes, terms: Terms) -> None:
+    """Compile beforehand what `estimate_shape` needs, while other work goes on."""
     num_poses = silhouettes.mask.shape[0]
-    poses = jnp.tile(model.body.poses["rest"], (num_poses, 1))
-    fit_edges(model, estimate_shape(model, poses, views, coarse, terms, (0, 0)), silhouettes, 0)
+    estimate_shape(model, jnp.tile(model.body.poses["rest"], (num_poses, 1)), views, silhouettes, terms, (0, 0))
 
 
 _deviations = compiled(SilhouetteFit.deviations)

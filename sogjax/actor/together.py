@@ -28,6 +28,9 @@ AROUND = 2
 """Pixels of a mask at the working size around a body that are its own, too: sizes are only roughly known."""
 LEAST_LEFT = 0.2
 """Share of somebody's silhouettes, the mean over the cameras, that others must leave in one for it to tell."""
+FEWEST_CAMERAS = 2
+"""Cameras that must tell of somebody in a pose."""
+
 Poses = dict[str, Float[np.ndarray, "dof"]]
 
 
@@ -48,11 +51,11 @@ def made_together(
     everybody = Everybody.of([actor.upright_body for actor in made])
     for turn in range(ROUNDS):
         for k, actor in enumerate(made):
-            for name in [name for name in actor.example_poses if name in shared]:
-                now = [of_actor[name] for of_actor in poses]
-                cells = silhouettes_of([people.left_by_others(k, name, now)], actor.rig, COARSE_CELLS)
+            for posed in [posed for posed in actor.pictures if posed.name in shared]:
+                now = [of_actor[posed.name] for of_actor in poses]
+                cells = silhouettes_of([people.left_by_others(k, posed, now)], actor.rig, COARSE_CELLS)
                 of_pose = jax.tree.map(lambda leaf: leaf[0], cells)
-                poses[k][name] = with_limbs_found(everybody, k, now, of_pose, turn)
+                poses[k][posed.name] = with_limbs_found(everybody, k, now, of_pose, turn)
     return [people.fitted_again(k, making, poses) for k, making in enumerate(makings)]
 
 
@@ -67,7 +70,7 @@ class People:
         """One of the actors, its shape and poses fitted to what the others leave."""
         actor = self.made[k]
         pictures = [
-            self.left_by_others(k, posed.name, [of_actor[posed.name] for of_actor in poses])
+            self.left_by_others(k, posed, [of_actor[posed.name] for of_actor in poses])
             if posed.name in self.shown
             else posed
             for posed in actor.pictures
@@ -77,9 +80,12 @@ class People:
         estimate = fit_edges(actor.shape_model, near, silhouettes_of(pictures, actor.rig))
         return making.finished(pictures, estimate, actor.rough_poses, actor.unsuitable)
 
-    def left_by_others(self, k: int, name: str, poses: Sequence[Float[np.ndarray, "dof"]]) -> PosedPictures:
-        """The masks of all people, which say nothing where the bodies of others than one of them are."""
-        shown, masks, untold, parts = self.shown[name], {}, {}, {}
+    def left_by_others(self, k: int, own: PosedPictures, poses: Sequence[Float[np.ndarray, "dof"]]) -> PosedPictures:
+        """The masks of all people, which say nothing where the bodies of others than one of them are.
+
+        `own` are the masks of that one in the same pictures, which are kept where the others leave too little.
+        """
+        shown, masks, untold, parts = self.shown[own.name], {}, {}, {}
         for camera, mask in shown.masks.items():
             small = reduced_mask(mask)
             seen = [
@@ -93,5 +99,7 @@ class People:
             untold[camera] = (shown.untold.get(camera, np.zeros_like(mask)) | covered) & ~masks[camera]
         usual = np.median([whole for _, whole in parts.values()])
         kept = [camera for camera, (left, _) in parts.items() if left > LEAST_LEFT * usual and masks[camera].any()]
+        if len(kept) < FEWEST_CAMERAS:
+            return own
         some = lambda of_cameras: {camera: of_cameras[camera] for camera in kept}
         return replace(shown, images=some(shown.images), masks=some(masks), untold=some(untold))
