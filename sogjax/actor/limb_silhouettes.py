@@ -20,6 +20,7 @@ from sogjax.model.limbs import limb_blobs
 from sogjax.model.program import compiled
 from sogjax.model.solid import Solid, impossibilities
 from sogjax.search.limb_ways import Unit, UnitArrays, drawn_ways, units_of
+from sogjax.search.mirrored import look_alikes
 from sogjax.search.search_energy import from_rest
 from sogjax.solve.ascent import ConditionedAscent
 from sogjax.solve.solution import Scales
@@ -95,6 +96,21 @@ def with_limbs_found(
         seen = _SeenUnit(everybody, number, now, silhouettes, turn, unit)
         pose = seen.found(pair.index, [(limb, next(arrays).index) for limb in of_limbs])
     return pose
+
+
+def way_round(
+    everybody: Everybody, number: int, poses: Sequence[Float[np.ndarray, "dof"]], silhouettes: Silhouettes, turn: int
+) -> Float[np.ndarray, "dof"]:
+    """As `with_limbs_found`, from the pose or from that of the body turned round, as covers the masks better.
+
+    Cut masks of a few cameras hardly tell front from back.
+    """
+    body, pose = everybody.bodies[number], poses[number]
+    starts = [pose, *look_alikes(body, pose)[:1]]
+    given = lambda start: [start if k == number else other for k, other in enumerate(poses)]
+    found = [with_limbs_found(everybody, number, given(start), silhouettes, turn) for start in starts]
+    costs = [float(_whole_cost(body, jnp.asarray(pose), silhouettes)) for pose in found]
+    return found[-1] if costs[-1] < (1.0 - LEAST_GAIN) * costs[0] else found[0]
 
 
 def _limbs_of(unit: Unit) -> list[Unit]:
@@ -177,6 +193,14 @@ def _different(angles: Float[np.ndarray, "way param"], cost: Float[np.ndarray, "
         if np.abs(angles[kept] - angles[k]).max(axis=1).min() > APART:
             kept.append(k)
     return kept + [0] * (NUM_KEPT - len(kept))
+
+
+@compiled
+def _whole_cost(body: Body, pose: Float[Array, "dof"], silhouettes: Silhouettes) -> Float[Array, ""]:
+    """The mismatch of the body, with `REST`."""
+    return mismatch_of(times_cap(body.posed_blobs(pose), silhouettes), silhouettes) + REST * from_rest(
+        body.skeleton, pose
+    )
 
 
 @compiled

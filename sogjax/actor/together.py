@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sogjax.actor.coverage import body_silhouette
-from sogjax.actor.limb_silhouettes import Everybody, with_limbs_found
+from sogjax.actor.limb_silhouettes import Everybody, way_round, with_limbs_found
 from sogjax.actor.make import MadeActor, Making
 from sogjax.actor.silhouette_fit import COARSE_CELLS, fit_edges, silhouettes_of
 from sogjax.actor.silhouettes import PosedPictures
@@ -55,7 +55,8 @@ def made_together(
                 now = [of_actor[posed.name] for of_actor in poses]
                 cells = silhouettes_of([people.left_by_others(k, posed, now)], actor.rig, COARSE_CELLS)
                 of_pose = jax.tree.map(lambda leaf: leaf[0], cells)
-                poses[k][posed.name] = with_limbs_found(everybody, k, now, of_pose, turn)
+                find = way_round if turn == 0 else with_limbs_found
+                poses[k][posed.name] = find(everybody, k, now, of_pose, turn)
     return [people.fitted_again(k, making, poses) for k, making in enumerate(makings)]
 
 
