@@ -9,11 +9,12 @@ from drawn_scene import moved, standing
 from rig_cases import ring_rig
 
 from sogjax.actor.coverage import body_silhouette
-from sogjax.actor.limb_silhouettes import Everybody, with_limbs_found
+from sogjax.actor.limb_silhouettes import Everybody, way_round, with_limbs_found
 from sogjax.actor.silhouette_fit import COARSE_CELLS, silhouettes_of
 from sogjax.actor.silhouettes import PosedPictures
 from sogjax.model.body import concatenate
 from sogjax.model.solid import Solid
+from sogjax.search.mirrored import look_alikes
 
 pytestmark = pytest.mark.slow
 
@@ -51,6 +52,16 @@ def test_an_arm_is_found_where_the_masks_show_it():
     assert hands_off(found, truth).max() < 0.15  # half a hand: the cells are as wide
     legs = [k for k, name in enumerate(HUMAN.skeleton.dof_names) if "knee" in name or "hip" in name]
     np.testing.assert_array_equal(found[legs], start[legs])
+
+
+def test_a_pose_that_covers_the_masks_is_not_turned_round():
+    bent = {"left_shoulder_swing": 1.3, "right_shoulder_swing": 1.3, "left_knee": 0.6}
+    truth = moved(HUMAN, standing(HUMAN, 1.0), bent)
+    found = way_round(Everybody.of([HUMAN]), 0, [truth], cells_of_masks(masks_of(truth)), 0)
+    nose = HUMAN.landmarks.names.index("nose")
+    places = [np.asarray(HUMAN.posed_landmarks(jnp.asarray(pose)))[nose] for pose in (found, truth)]
+    assert np.linalg.norm(places[0] - places[1]) < 0.05
+    assert len(look_alikes(HUMAN, truth))  # there was another way
 
 
 def test_limbs_that_cover_the_masks_stay():

@@ -99,7 +99,7 @@ def example_masks(
     _check_found(recording, example, list(found), [camera for camera in backgrounds if camera not in found])
     painted = {camera: mask for camera, mask in enumerate(painted_masks(recording)) if mask is not None}
     told, undecided = _Told.of_masks(found, cameras, painted), False
-    if unknown and example.within is None and len(told.wrong) > MOST_WRONG * len(found):
+    if unknown and example.within is None and example.others is None and len(told.wrong) > MOST_WRONG * len(found):
         certain = _Told.of_masks(alone(make(False).masks), cameras, _with_unknown(painted, unknown, images))
         undecided = len(certain.right) > len(told.right)
         made, told = (certain.found, certain) if undecided else (made, told)

@@ -89,6 +89,8 @@ def with_limbs_found(
     """
     body, pose = everybody.bodies[number], poses[number]
     units = units_of(body)
+    if not units:
+        return pose
     singles = [_limbs_of(unit) for unit in units]
     arrays = iter(UnitArrays.of(body, [single for of_unit in singles for single in of_unit]))
     for unit, pair, of_limbs in zip(units, UnitArrays.of(body, units), singles, strict=True):

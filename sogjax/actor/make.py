@@ -158,6 +158,11 @@ class Making:
         _check_fit(recording, _shaped(model, estimate.shape_params), estimate, found.pictures, rig)
         return self.finished(found.pictures, estimate, found.rough, self.unsuitable(found.pictures, estimate))
 
+    @property
+    def described(self) -> set[str]:
+        """The example poses of which somebody, or keypoints, say roughly how the subject stands."""
+        return {e.name for e in examples_of(self.recording, self.subject) if e.initial_pose is not None}
+
     def unsuitable(self, pictures: Sequence[PosedPictures], estimate: Estimate) -> str | None:
         """Why frames that were chosen do not suit, with the remedy; None: they do, or somebody chose them."""
         shaped = _shaped(self.shape_model, estimate.shape_params)

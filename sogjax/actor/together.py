@@ -27,7 +27,7 @@ ROUNDS = 2
 AROUND = 2
 """Pixels of a mask at the working size around a body that are its own, too: sizes are only roughly known."""
 LEAST_LEFT = 0.2
-"""Share of somebody's silhouettes, the mean over the cameras, that others must leave in one for it to tell."""
+"""Share of somebody's silhouettes, the median of the cameras, that others must leave in one for it to tell."""
 FEWEST_CAMERAS = 2
 """Cameras that must tell of somebody in a pose."""
 
@@ -50,12 +50,13 @@ def made_together(
     people = People(tuple(made), {name: shown[name] for name in shared})
     everybody = Everybody.of([actor.upright_body for actor in made])
     for turn in range(ROUNDS):
-        for k, actor in enumerate(made):
+        for k, (making, actor) in enumerate(zip(makings, made, strict=True)):
+            described = making.described
             for posed in [posed for posed in actor.pictures if posed.name in shared]:
                 now = [of_actor[posed.name] for of_actor in poses]
                 cells = silhouettes_of([people.left_by_others(k, posed, now)], actor.rig, COARSE_CELLS)
                 of_pose = jax.tree.map(lambda leaf: leaf[0], cells)
-                find = way_round if turn == 0 else with_limbs_found
+                find = way_round if turn == 0 and posed.name not in described else with_limbs_found
                 poses[k][posed.name] = find(everybody, k, now, of_pose, turn)
     return [people.fitted_again(k, making, poses) for k, making in enumerate(makings)]
 
@@ -87,6 +88,8 @@ class People:
         `own` are the masks of that one in the same pictures, which are kept where the others leave too little.
         """
         shown, masks, untold, parts = self.shown[own.name], {}, {}, {}
+        if len(shown.masks) < FEWEST_CAMERAS:
+            return own
         for camera, mask in shown.masks.items():
             small = reduced_mask(mask)
             seen = [

@@ -220,9 +220,10 @@ def actors_of_pictures(request: ActorRequest) -> list[MadeActor]:
     recording, learnt, best = with_examples(request.clip, request.background, request.number)
     recording = with_rough_poses(recording, start)
     subjects = subjects_of(recording) if request.subjects is None else request.subjects
-    makings, shared = [_making(request, recording, start, subject, best) for subject in subjects], SharedFrames()
+    makings = [_making(request, recording, start, subject, best) for subject in subjects]
+    shared = SharedFrames() if len(makings) > 1 else None
     made = [making.made(request.terms, progress, learnt, shared) for making in makings]
-    if len(made) > 1:
+    if shared is not None:
         made = made_together(makings, made, _of_everybody(recording, made, learnt, shared))
     for making, actor in zip(makings, made, strict=True):
         if actor.doubt is not None:
