@@ -8,7 +8,7 @@ import pytest
 from body_cases import shipped
 from rig_cases import ring_rig
 
-from sogjax.actor.coverage import Silhouettes, _covered, _seen, _times_cap, mismatch
+from sogjax.actor.coverage import Silhouettes, _blobs, _covered, _fills, mismatch
 from sogjax.actor.silhouette_fit import MAX_CELLS, SilhouetteFit, cells_of, fitted
 from sogjax.model.camera import project
 from sogjax.model.shape import LENGTH_SPREAD, ShapeModel
@@ -89,9 +89,8 @@ def soft_coverage(fit, params):
     silhouettes = jax.tree.map(lambda leaf: leaf[0], fit.silhouettes)
 
     def camera(cameras, means, sigmas):
-        seen = jax.vmap(_seen, in_axes=(None, 0))(cameras, points)
-        over = jax.vmap(_times_cap, in_axes=(0, None, None))
-        return jax.vmap(lambda m, s: _covered(jnp.sum(over(seen, m, s))))(means, sigmas)
+        fills = _fills(project(cameras, _blobs(points)), means, sigmas)
+        return jax.vmap(_covered)(jnp.sum(fills, axis=0))
 
     return eqx.filter_jit(jax.vmap(camera))(silhouettes.cameras, silhouettes.means, silhouettes.sigmas)[None]
 
@@ -102,8 +101,8 @@ def test_one_blob_covers_a_half_where_its_gaussian_is_a_half():
     cameras = jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float32), rig.cameras)
     blob = jnp.asarray([[0.0, 0.0, 1.0, 0.2]], jnp.float32)
     camera = jax.tree.map(lambda leaf: leaf[0], cameras)
-    seen = np.asarray(_seen(camera, blob[0]))
-    edge = seen[:2] + np.array([seen[2] * np.sqrt(2.0 * np.log(2.0)), 0.0])
+    seen = project(camera, _blobs(blob))
+    edge = np.asarray(seen.means)[0] + np.array([float(seen.sigmas[0]) * np.sqrt(2.0 * np.log(2.0)), 0.0])
     at_edge = Silhouettes(
         cameras,
         jnp.asarray(edge, jnp.float32)[None, None],

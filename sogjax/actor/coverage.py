@@ -3,10 +3,9 @@
 In the terms of Eq. 8: a cell of the picture is an image blob, and the body covers it where the sum of the overlaps
 reaches the cap. Eq. 9 counts that sum up to the cap, so it hardly tells where the edge of the body is; here the sum
 goes through a step at the cap, so that the edge of the body is compared with the edge of the mask.
-
-The silhouette that a body casts, and how well it covers a mask.
 """
 
+from functools import partial
 from typing import NamedTuple
 
 import equinox as eqx
@@ -17,7 +16,8 @@ from jaxtyping import Array, Bool, Float
 
 from sogjax.energy.overlap import EXACT_EXPONENT, overlaps, self_overlaps
 from sogjax.model.body import Body
-from sogjax.model.camera import Camera, distort, project, project_points
+from sogjax.model.camera import Camera, distort, project
+from sogjax.model.compiled import stage_barrier
 from sogjax.model.program import compiled
 from sogjax.model.sog import Sog
 from sogjax.scene.background_difference import reduced_mask
@@ -50,31 +50,31 @@ class NormalEquations(NamedTuple):
     matrix: Float[Array, "param param"]
 
 
-SeenBlob = Float[Array, "3"]
-"""Mean (undistorted pixels) and sigma (pixels) of a projected blob."""
-SpaceBlob = Float[Array, "4"]
-"""Mean and sigma (metres, world)."""
-
-
 def mismatch(blobs: Float[Array, "blob 4"], silhouettes: Silhouettes) -> Float[Array, ""]:
     """Mean over the cameras of the squared difference of coverages, as a part of the mask's area.
 
     `blobs` are means and sigmas in the world (metres).
     """
-    body = Sog.from_arrays(blobs[:, :3], blobs[:, 3], jnp.zeros_like(blobs[:, :3]))
-    return mismatch_of(times_cap(body, silhouettes), silhouettes)
+    return mismatch_of(times_cap(_blobs(blobs), silhouettes), silhouettes)
 
 
 def times_cap(blobs: Sog, silhouettes: Silhouettes) -> Float[Array, "camera cell"]:
     """How often blobs of a body (metres, world) together fill the cap of each cell; masked ones fill nothing."""
-
-    def of_camera(camera: Camera, means: Float[Array, "cell 2"], sigmas: Float[Array, "cell"]) -> Float[Array, "cell"]:
-        cells = Sog.from_arrays(means, sigmas, jnp.zeros_like(means))
-        same_color = jnp.ones((blobs.capacity, cells.capacity), sigmas.dtype)
-        pairs = overlaps(cells, project(camera, blobs), same_color, jnp.asarray(EXACT_EXPONENT, sigmas.dtype))
-        return jnp.sum(pairs, axis=0) / self_overlaps(cells)
-
+    of_camera = lambda camera, *cells: jnp.sum(_fills(project(camera, blobs), *cells), axis=0)
     return jax.vmap(of_camera)(silhouettes.cameras, silhouettes.means, silhouettes.sigmas)
+
+
+def _fills(seen: Sog, means: Float[Array, "cell 2"], sigmas: Float[Array, "cell"]) -> Float[Array, "blob cell"]:
+    """E_ij / E_ii of Eq. 6: how often each of the projected blobs alone fills the cap of a cell."""
+    cells = _blobs(jnp.column_stack([means, sigmas]))
+    same_color = jnp.ones((seen.capacity, cells.capacity), sigmas.dtype)
+    return overlaps(cells, seen, same_color, jnp.asarray(EXACT_EXPONENT, sigmas.dtype)) / self_overlaps(cells)[None]
+
+
+def _blobs(rows: Float[Array, "blob dim_and_1"]) -> Sog:
+    """Means and sigmas of blobs, one after the other, as a Sog without colours."""
+    means = rows[:, :-1]
+    return Sog.from_arrays(means, rows[:, -1], jnp.zeros((len(means), 3), means.dtype))
 
 
 def mismatch_of(times_cap: Float[Array, "camera cell"], silhouettes: Silhouettes) -> Float[Array, ""]:
@@ -89,9 +89,13 @@ def mismatch_equations(
 ) -> NormalEquations:
     """`mismatch` with its derivatives, given those of the blobs.
 
-    One camera after the other: the pairs of one stay in the cache; those of twelve take three times as long.
+    One camera after the other: the pairs of one stay in the cache. A camera without cells costs nothing; the barrier
+    has the cells of the others copied before their pairs are computed, which takes a quarter of the time of pairs that
+    look each up among those of all cameras.
     """
-    parts = jax.lax.map(lambda camera: _camera_equations(blobs, jacobian, *camera), _by_camera(silhouettes))
+    of_camera = partial(_camera_equations, blobs, jacobian)
+    if_seen = lambda camera: stage_barrier(jnp.any(camera[-1]), of_camera, *camera)
+    parts = jax.lax.map(if_seen, _by_camera(silhouettes))
     return jax.tree.map(lambda part: jnp.sum(part, axis=0) / _num_seen(silhouettes), parts)
 
 
@@ -105,21 +109,6 @@ def _num_seen(silhouettes: Silhouettes) -> Float[Array, ""]:
     return jnp.maximum(jnp.sum(seen), 1).astype(silhouettes.sigmas.dtype)
 
 
-def _seen(camera: Camera, blob: SpaceBlob) -> SeenBlob:
-    """Eq. 4."""
-    pixels, depth = project_points(camera, blob[None, :3])
-    return jnp.append(pixels[0], blob[3] * camera.focal_length / depth[0])
-
-
-def _times_cap(seen: SeenBlob, mean: Float[Array, "2"], sigma: Float[Array, ""]) -> Float[Array, ""]:
-    """E_ij / E_ii of Eq. 6: how often one blob alone fills the cap of a cell."""
-    one = lambda mean, sigma: Sog.from_arrays(mean[None], sigma[None], jnp.zeros_like(mean[None]))
-    cell = one(mean, sigma)
-    same_color = jnp.ones((1, 1), sigma.dtype)
-    pair = overlaps(cell, one(seen[:2], seen[2]), same_color, jnp.asarray(EXACT_EXPONENT, sigma.dtype))
-    return pair[0, 0] / self_overlaps(cell)[0]
-
-
 def _covered(times_cap: Float[Array, ""]) -> Float[Array, ""]:
     power = jnp.maximum(times_cap, SMALLEST) ** SHARPNESS
     return power / (1.0 + power)
@@ -131,20 +120,33 @@ def _cell_weights(coverage: Float[Array, "cell"], mask: Bool[Array, "cell"]) -> 
 
 
 def _camera_equations(blobs, jacobian, camera, means, sigmas, coverage, mask) -> NormalEquations:
-    """One camera's part: first by what is seen of the blobs, then by the parameters."""
-    seen = jax.vmap(_seen, in_axes=(None, 0))(camera, blobs)
-    pair = jax.value_and_grad(_times_cap)
-    over_cells = jax.vmap(pair, in_axes=(None, 0, 0))
-    parts, slopes = jax.vmap(over_cells, in_axes=(0, None, None))(seen, means, sigmas)
-    covered, steepness = jax.vmap(jax.value_and_grad(_covered))(jnp.sum(parts, axis=0))
+    """One camera's part: first by what is seen of the blobs (mean and sigma, pixels), then by the parameters.
+
+    What a blob fills depends on no other blob, so three derivatives, each along the same direction of all blobs, are
+    those of all pairs.
+    """
+
+    def seen_rows(blobs: Float[Array, "blob 4"]) -> Float[Array, "blob 3"]:
+        seen = project(camera, _blobs(blobs))
+        return jnp.column_stack([seen.means, seen.sigmas])
+
+    seen = project(camera, _blobs(blobs))
+    fills = lambda *rows: _fills(
+        eqx.tree_at(lambda s: (s.means, s.sigmas), seen, (jnp.stack(rows[:2], axis=1), rows[2])), means, sigmas
+    )
+    rows = (*seen.means.T, seen.sigmas)
+    along = [tuple(jnp.full_like(row, j == k) for j, row in enumerate(rows)) for k in range(len(rows))]
+    slopes = jnp.stack([jax.jvp(fills, rows, direction)[1] for direction in along], axis=1)
+    covered, steepness = jax.vmap(jax.value_and_grad(_covered))(jnp.sum(fills(*rows), axis=0))
     weights = _cell_weights(coverage, mask)
-    by_seen = jnp.moveaxis(slopes * steepness[None, :, None], 2, 1).reshape(-1, means.shape[0])
-    projection = jax.vmap(jax.jacfwd(_seen, argnums=1), in_axes=(None, 0))(camera, blobs)
+    by_seen = (slopes * steepness[None, None]).reshape(-1, means.shape[0])
+    of_one = lambda blob: seen_rows(blob[None])[0]
+    projection = jax.vmap(jax.jacfwd(of_one))(blobs)
     chain = jnp.einsum("bij,bjp->bip", projection, jacobian, precision="highest").reshape(-1, jacobian.shape[-1])
     difference = covered - coverage
     product = lambda a, b: jnp.matmul(a, b, precision="highest")
-    gradient = product(chain.T, product(by_seen, weights * difference))
-    matrix = product(chain.T, product(product(by_seen * weights[None, :], by_seen.T), chain))
+    by_param = product(chain.T, by_seen)
+    gradient, matrix = product(by_param, weights * difference), product(by_param * weights[None, :], by_param.T)
     return NormalEquations(jnp.sum(weights * difference**2), gradient, matrix)
 
 
