@@ -1,19 +1,23 @@
 """What the bodies of others leave of the masks of all people."""
 
+from dataclasses import replace
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from body_cases import shipped
 from drawn_scene import moved, standing
-from rig_cases import ring_rig
+from rig_cases import recording_of, ring_rig
 
+from sogjax.actor import together
 from sogjax.actor.coverage import body_silhouette
-from sogjax.actor.make import MadeActor
+from sogjax.actor.make import MadeActor, Making
 from sogjax.actor.silhouette_fit import Estimate
 from sogjax.actor.silhouettes import PosedPictures
-from sogjax.actor.together import People, made_together
+from sogjax.actor.together import People, believed, made_together
 from sogjax.io.example_poses import ExamplePose
 from sogjax.model.shape import ShapeModel
+from sogjax.search.placed_body import turned
 
 RIG = ring_rig(4, (160, 120), distance=3.5)
 DOG = shipped("dog")
@@ -31,6 +35,11 @@ def made(pose):
     zeros = jnp.zeros(MODEL.num_shape_params)
     estimate = Estimate(jnp.asarray(pose)[None], zeros, jnp.zeros((1, len(pose))), zeros)
     return MadeActor(DOG, DOG, DOG, {"a": jnp.asarray(pose)}, {"a": 0}, (), RIG.cameras, MODEL, estimate)
+
+
+def making_of(examples):
+    recording = replace(recording_of(RIG, 20), example_poses=tuple(examples))
+    return Making.of(recording, DOG, None, "lab", True, best=None, report=print)
 
 
 @pytest.fixture(scope="module")
@@ -61,6 +70,31 @@ def test_masks_say_nothing_where_somebody_else_is(poses):
 def test_masks_of_somebody_who_is_seen_only_behind_another_stay_his_own(poses):
     same = [poses[0], poses[0]]
     assert People(tuple(map(made, same)), {"a": all_people(same)}).left_by_others(0, NONE, same) is NONE
+
+
+@pytest.mark.parametrize(("alone", "again"), [(0.0, 0.2), (0.2, 0.0)])
+def test_of_the_fit_alone_and_that_beside_others_the_better_one_is_kept(poses, monkeypatch, alone, again):
+    """Metres by which each is off."""
+    off = lambda by: made(moved(DOG, poses[0], {"root_x": by}))
+    found = off(again)
+    monkeypatch.setattr(together, "fit_edges", lambda *_: found.estimate)
+    monkeypatch.setattr(Making, "finished", lambda *_: found)
+    actors = [replace(off(alone), pictures=(all_people(poses),)), made(poses[1])]
+    kept = People(tuple(actors), {"a": all_people(poses)}).fitted_again(
+        0, making_of(()), [{"a": pose} for pose in poses]
+    )
+    assert kept is (found if again < alone else actors[0])
+
+
+def test_an_example_pose_is_believed_that_goes_with_the_others(poses):
+    """Of three moments the second one fits a little better back to front."""
+    frames = {name: ExamplePose(name, None, {}, {}, None, frame) for name, frame in (("a", 0), ("b", 5), ("c", 10))}
+    making = making_of(frames.values())
+    front, back = (np.asarray(turned(DOG, jnp.asarray(poses[0]), heading, "z")) for heading in (0.0, np.pi))
+    ways = {name: [(front, 0.1), (back, 0.095 if name == "b" else 0.12)] for name in frames}
+    found = believed(making, DOG, ways)
+    assert all(np.array_equal(found[name], front) for name in frames)
+    assert np.array_equal(believed(making, DOG, {"b": ways["b"]})["b"], back)
 
 
 def test_actors_without_a_common_pose_stay_as_they_were_made(poses):

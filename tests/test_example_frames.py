@@ -8,7 +8,7 @@ import pytest
 from rig_cases import recording_of, ring_rig
 from run_cases import pose_request
 
-from sogjax.actor.example_pose import consistent_ways, disagreement
+from sogjax.actor.facing import Way, consistent_ways, disagreement, haste
 from sogjax.actor.frame_choice import SHAPE_VOXELS, SeenShape, spread_choice, unlikeness
 from sogjax.actor.make import MadeActor
 from sogjax.errors import InputError
@@ -17,6 +17,8 @@ from sogjax.run.actors import Actors, known_frames
 from sogjax.run.clip import Clip
 from sogjax.run.example_frames import check_actors, most_helpful, several_people, unsuitable
 from sogjax.run.initial_pose import from_example_frames
+
+AHEAD = np.array([1.0, 0.0, 0.0])
 
 
 def shape(frame, part, **values):
@@ -119,9 +121,24 @@ def test_colours_decide_where_the_fit_does_not():
     front, back = (
         np.array([[color, other]], float) for color, other in [((0, 0, 1), (1, 0, 0)), ((1, 0, 0), (0, 0, 1))]
     )
-    ways = consistent_ways([(1.0, 0.9), (0.99, 1.0), (1.0, 0.9)], [(front, back), (front, back), (front, back)])
-    assert ways == (0, 0, 0)
-    assert consistent_ways([(1.0, 0.9), (0.99, 1.0)], [(front, front), (front, front)]) == (0, 1)
+    fits = [(1.0, 0.9), (0.99, 1.0), (1.0, 0.9)]
+    both = lambda of_moment, *colors: [Way(fit, AHEAD, seen) for fit, seen in zip(of_moment, colors, strict=True)]
+    untimed = [None] * 3
+    assert consistent_ways([both(of_moment, front, back) for of_moment in fits], untimed) == (0, 0, 0)
+    assert consistent_ways([both(of_moment, front, front) for of_moment in fits[:2]], untimed[:2]) == (0, 1)
     assert disagreement([front, front]) == 0.0
     unseen = np.full_like(front, np.nan)
     assert disagreement([front, unseen]) == 0.0
+
+
+def test_nobody_turns_round_in_an_instant():
+    """In the second moment the wrong way fits a little better."""
+    moments = [[Way(fit, AHEAD), Way(other, -AHEAD)] for fit, other in [(1.0, 0.98), (0.99, 1.0), (1.0, 0.98)]]
+    assert consistent_ways(moments, [0.0, 0.3, 0.6]) == (0, 0, 0)
+    assert consistent_ways([moments[k] for k in (0, 2, 1)], [0.0, 0.6, 0.3]) == (0, 0, 0)  # in any order
+    assert consistent_ways(moments, [0.0, 2.0, 4.0]) == (0, 1, 0)
+    assert consistent_ways(moments, [0.0, None, 0.6]) == (0, 1, 0)
+    clear = [moments[0], [Way(0.9, AHEAD), Way(1.0, -AHEAD)], moments[2]]
+    assert consistent_ways(clear, [0.0, 0.3, 0.6]) == (0, 1, 0)
+    np.testing.assert_allclose(haste([AHEAD, -AHEAD], [0.0, 0.0]), 1.0)
+    assert haste([AHEAD, -AHEAD], [0.0, 1.0]) == 0.0

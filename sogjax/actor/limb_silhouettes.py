@@ -42,6 +42,9 @@ REST = 0.003
 """What being at the end of a joint's range costs beside the mismatch, which is 0.1 to 0.2: of two ways that cover the
 masks alike, the one that twists less is more likely."""
 
+PoseAndMiss = tuple[Float[np.ndarray, "dof"], float]
+"""A pose, and its mismatch."""
+
 
 @dataclass(frozen=True)
 class Everybody:
@@ -100,19 +103,15 @@ def with_limbs_found(
     return pose
 
 
-def way_round(
+def both_ways_round(
     everybody: Everybody, number: int, poses: Sequence[Float[np.ndarray, "dof"]], silhouettes: Silhouettes, turn: int
-) -> Float[np.ndarray, "dof"]:
-    """As `with_limbs_found`, from the pose or from that of the body turned round, as covers the masks better.
-
-    Cut masks of a few cameras hardly tell front from back.
-    """
+) -> list[PoseAndMiss]:
+    """As `with_limbs_found`, from the pose, then from that of the body turned round, each with its mismatch."""
     body, pose = everybody.bodies[number], poses[number]
     starts = [pose, *look_alikes(body, pose)[:1]]
     given = lambda start: [start if k == number else other for k, other in enumerate(poses)]
     found = [with_limbs_found(everybody, number, given(start), silhouettes, turn) for start in starts]
-    costs = [float(_whole_cost(body, jnp.asarray(pose), silhouettes)) for pose in found]
-    return found[-1] if costs[-1] < (1.0 - LEAST_GAIN) * costs[0] else found[0]
+    return [(each, float(_whole_cost(body, jnp.asarray(each), silhouettes))) for each in found]
 
 
 def _limbs_of(unit: Unit) -> list[Unit]:

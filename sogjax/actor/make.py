@@ -144,24 +144,27 @@ class Making:
             InputError: no example poses of the subject, or pictures without masks.
         """
         recording, model, rig, best = self.recording, self.shape_model, self.rig, self.best
-        examples = examples_of(recording, self.subject)
+        examples = self.examples
         shown = progress(examples, len(examples), "masks")
         pictures = [load_pictures(recording, example, self.report, learnt, shared) for example in shown]
         if any(posed.undecided for posed in pictures):
             share = float(np.mean([posed.mask_share() for posed in pictures]))
             terms = (*terms, RestPrior(UNDECIDED_REST * share))
-        found = _found_poses(
-            model.body, model, examples, pictures, rig, recording.up, terms, best, self.report, progress
-        )
+        found = _found_poses(model.body, model, examples, pictures, rig, recording, terms, best, self.report, progress)
         self.report("shape")
         estimate = _best_estimate(model, found, rig, terms, ways=1 if best is None else 2)
         _check_fit(recording, _shaped(model, estimate.shape_params), estimate, found.pictures, rig)
         return self.finished(found.pictures, estimate, found.rough, self.unsuitable(found.pictures, estimate))
 
     @property
+    def examples(self) -> list[ExamplePose]:
+        """The example poses of the subject."""
+        return examples_of(self.recording, self.subject)
+
+    @property
     def described(self) -> set[str]:
-        """The example poses of which somebody, or keypoints, say roughly how the subject stands."""
-        return {e.name for e in examples_of(self.recording, self.subject) if e.initial_pose is not None}
+        """Those of which somebody, or keypoints, say roughly how the subject stands."""
+        return {example.name for example in self.examples if example.initial_pose is not None}
 
     def unsuitable(self, pictures: Sequence[PosedPictures], estimate: Estimate) -> str | None:
         """Why frames that were chosen do not suit, with the remedy; None: they do, or somebody chose them."""
@@ -186,7 +189,7 @@ class Making:
         explained = explained_examples(actor, list(estimate.poses), pictures, rig)
         actor = replace(actor, explained=jnp.asarray(explained, jnp.float32))
         names, turn = [posed.name for posed in pictures], world_from_upright(self.recording.up)
-        frames = {example.name: example.frame for example in examples_of(self.recording, self.subject)}
+        frames = {example.name: example.frame for example in self.examples}
         return MadeActor(
             body=actor.rotated(jnp.asarray(turn.T, self.start.blob_sigmas.dtype)),
             start=self.start,
@@ -251,7 +254,7 @@ def _found_poses(
     examples: list[ExamplePose],
     pictures: list[PosedPictures],
     rig: Camera,
-    up: str,
+    recording: Recording,
     terms: Terms,
     best: int | None,
     report: Report,
@@ -265,7 +268,7 @@ def _found_poses(
     with ThreadPoolExecutor(1) as beside:
         if not chooses:
             beside.submit(compile_estimate, model, stack_views(views), silhouettes_of(pictures, rig), terms)
-        ways = rough_poses(upright, shown, rig, up, terms, report, progress)
+        ways = rough_poses(upright, shown, rig, recording, terms, report, progress)
     rough = {posed.name: poses[0] for posed, poses in zip(pictures, ways, strict=True)}
     found = _FoundPoses(pictures, views, ways, rough)
     if best is None or not chooses:

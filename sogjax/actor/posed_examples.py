@@ -10,12 +10,14 @@ from jaxtyping import Array, Bool, Float, UInt8
 
 from sogjax.actor.colors import ColoredView
 from sogjax.actor.coverage import silhouette_iou
-from sogjax.actor.example_pose import consistent_ways, poses_from_silhouettes, side_colors, starts_at
+from sogjax.actor.example_pose import poses_from_silhouettes, starts_at
+from sogjax.actor.facing import Way, consistent_ways, forward, side_colors
 from sogjax.actor.silhouettes import PosedPictures, subject_centre
 from sogjax.energy.posed import Posed
 from sogjax.energy.term import Terms
 from sogjax.energy.views import Views
 from sogjax.io.example_poses import ExamplePose
+from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, camera_of
 from sogjax.model.compiled import compiled_hastily
@@ -37,26 +39,30 @@ def rough_poses(
     body: Body,
     shown: Sequence[tuple[ExamplePose, PosedPictures, Views, Views]],
     rig: Camera,
-    up: str,
+    recording: Recording,
     terms: Terms,
     report: Report,
     progress: Progress,
 ) -> list[list[Float[Array, "dof"]]]:
     """The rough poses of an upright body in the example pictures; front and back are told apart by all together.
 
-    Of each example are `shown` its pictures and its silhouettes, coarse and fine. Of each, the pose that is believed,
-    and after it that of the body turned round, if it was looked for.
+    Of each example are `shown` its pictures (`rig` has all cameras) and its silhouettes, coarse and fine. Of each, the
+    pose that is believed, and after it that of the body turned round, if it was looked for.
     """
-    ways, colors = [], []
+    found, up = [], recording.up
     for example, posed, coarse, fine in progress(shown, len(shown), "example poses"):
         report(f"pose of {example.name}")
         starts = _starts(body, example, posed, rig, up)
-        ways.append(poses_from_silhouettes(body, coarse, fine, starts, terms, up))
-        colors.append([side_colors(body, colored_views(posed, rig, way.pose), up) for way in ways[-1]])
-    chosen = consistent_ways([[way.energy for way in of_example] for of_example in ways], colors)
+        found.append(poses_from_silhouettes(body, coarse, fine, starts, terms, up))
+    colors = lambda pose, posed: side_colors(body, colored_views(posed, rig, pose), up)
+    ways = [
+        [Way(way.energy, forward(body, way.pose, up), colors(way.pose, posed)) for way in of_example]
+        for of_example, (_, posed, _, _) in zip(found, shown, strict=True)
+    ]
+    chosen = consistent_ways(ways, recording.times_of([example.frame for example, *_ in shown]))
     return [
         [of_example[k].pose, *(way.pose for way in of_example if way is not of_example[k])]
-        for of_example, k in zip(ways, chosen, strict=True)
+        for of_example, k in zip(found, chosen, strict=True)
     ]
 
 

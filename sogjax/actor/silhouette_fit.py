@@ -1,11 +1,8 @@
-"""Masks cut into cells of equal size around the subject.
+"""An actor from example poses (Section 5.2): all poses and one set of shape parameters, climbed together.
 
-All example poses and one shape, fitted to the edges of the masks by Gauss-Newton steps.
-
-An actor from example poses (Section 5.2): all poses and one set of shape parameters, climbed together.
-
-First Eq. 9 on the binary colours of the silhouettes, which forgives a start that is far off; then the edges of the
-silhouettes themselves, which say exactly where limbs end.
+First Eq. 9 on the binary colours of the silhouettes, which forgives a start that is far off; then, by Gauss-Newton
+steps, the edges of the silhouettes themselves, in cells of equal size around the subject: they say exactly where limbs
+end.
 """
 
 from collections.abc import Sequence

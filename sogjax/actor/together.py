@@ -14,10 +14,13 @@ import numpy as np
 from jaxtyping import Float
 
 from sogjax.actor.coverage import body_silhouette
-from sogjax.actor.limb_silhouettes import Everybody, way_round, with_limbs_found
+from sogjax.actor.facing import Way, consistent_ways, forward
+from sogjax.actor.limb_silhouettes import Everybody, PoseAndMiss, both_ways_round, with_limbs_found
 from sogjax.actor.make import MadeActor, Making
+from sogjax.actor.posed_examples import overlap_of
 from sogjax.actor.silhouette_fit import COARSE_CELLS, fit_edges, silhouettes_of
 from sogjax.actor.silhouettes import PosedPictures
+from sogjax.model.body import Body
 from sogjax.model.camera import camera_of
 from sogjax.scene.background_difference import reduced_mask, widened
 from sogjax.scene.coarse_views import enlarged
@@ -51,14 +54,23 @@ def made_together(
     everybody = Everybody.of([actor.upright_body for actor in made])
     for turn in range(ROUNDS):
         for k, (making, actor) in enumerate(zip(makings, made, strict=True)):
-            described = making.described
+            ways: dict[str, list[PoseAndMiss]] = {}
             for posed in [posed for posed in actor.pictures if posed.name in shared]:
                 now = [of_actor[posed.name] for of_actor in poses]
                 cells = silhouettes_of([people.left_by_others(k, posed, now)], actor.rig, COARSE_CELLS)
-                of_pose = jax.tree.map(lambda leaf: leaf[0], cells)
-                find = way_round if turn == 0 and posed.name not in described else with_limbs_found
-                poses[k][posed.name] = find(everybody, k, now, of_pose, turn)
+                search = (everybody, k, now, jax.tree.map(lambda leaf: leaf[0], cells), turn)
+                both = turn == 0 and posed.name not in making.described
+                ways[posed.name] = both_ways_round(*search) if both else [(with_limbs_found(*search), 0.0)]
+            poses[k] |= believed(making, actor.upright_body, ways)
     return [people.fitted_again(k, making, poses) for k, making in enumerate(makings)]
+
+
+def believed(making: Making, body: Body, ways: Mapping[str, Sequence[PoseAndMiss]]) -> Poses:
+    """Of each example pose of an actor the way to see it, given with its mismatch, that goes with all others."""
+    up, frames = making.recording.up, {example.name: example.frame for example in making.examples}
+    moments = [[Way(1.0 - miss, forward(body, jnp.asarray(pose), up)) for pose, miss in both] for both in ways.values()]
+    chosen = consistent_ways(moments, making.recording.times_of([frames[name] for name in ways]))
+    return {name: both[k][0] for (name, both), k in zip(ways.items(), chosen, strict=True)}
 
 
 @dataclass(frozen=True)
@@ -69,7 +81,7 @@ class People:
     shown: Mapping[str, PosedPictures]
 
     def fitted_again(self, k: int, making: Making, poses: Sequence[Poses]) -> MadeActor:
-        """One of the actors, its shape and poses fitted to what the others leave."""
+        """One of the actors, its shape and poses fitted to what the others leave, where that agrees better with it."""
         actor = self.made[k]
         pictures = [
             self.left_by_others(k, posed, [of_actor[posed.name] for of_actor in poses])
@@ -80,7 +92,9 @@ class People:
         found = jnp.stack([jnp.asarray(poses[k][posed.name]) for posed in pictures])
         near = eqx.tree_at(lambda estimate: estimate.poses, actor.estimate, found)
         estimate = fit_edges(actor.shape_model, near, silhouettes_of(pictures, actor.rig))
-        return making.finished(pictures, estimate, actor.rough_poses, actor.unsuitable)
+        again = making.finished(pictures, estimate, actor.rough_poses, actor.unsuitable)
+        agrees = lambda made: overlap_of(made.upright_body, made.estimate.poses, pictures, made.rig)
+        return again if agrees(again) > agrees(actor) else actor
 
     def left_by_others(self, k: int, own: PosedPictures, poses: Sequence[Float[np.ndarray, "dof"]]) -> PosedPictures:
         """The masks of all people, which say nothing where the bodies of others than one of them are.

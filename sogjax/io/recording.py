@@ -82,6 +82,10 @@ class Recording:
         """The numbers of its frames."""
         return range(self.first_frame, self.first_frame + self.num_frames)
 
+    def times_of(self, frames: Iterable[int | None]) -> list[float | None]:
+        """Seconds from the first frame to each of some frames; None: not of the clip."""
+        return [None if frame is None else (frame - self.first_frame) / self.fps for frame in frames]
+
     @property
     def masked(self) -> bool:
         """Whether masks of example poses tell what its people look like."""
