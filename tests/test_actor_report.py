@@ -15,6 +15,7 @@ from tiny_body import make_body
 
 from sogjax.actor.coverage import body_silhouette, overlap_ratio, silhouette_iou
 from sogjax.actor.doubts import doubt_of, unlike_sides, unseen_limbs
+from sogjax.actor.limb_colors import limb_pairs_alike
 from sogjax.actor.make import MadeActor
 from sogjax.actor.report import actor_report
 from sogjax.actor.silhouette_fit import Estimate
@@ -24,7 +25,6 @@ from sogjax.model.bones import bone_lengths
 from sogjax.model.limbs import limb_blobs, limb_names
 from sogjax.model.shape import ShapeModel
 from sogjax.run.actor_report import report_folder, report_page, write_actor_report
-from sogjax.search.body_parts import limb_groups
 from sogjax.view.sheets import (
     BACKGROUND,
     BOTH,
@@ -99,15 +99,13 @@ def test_limbs_that_no_mask_shows_are_said():
 
 def test_limbs_whose_sides_have_other_colours_are_said():
     made = made_dog()
-    members = limb_blobs(made.body)
-    one, other = next(pair for pair in limb_groups(made.body) if len(pair) == 2)
-    colors = np.full((made.body.num_blobs, 3), 0.5)
-    assert unlike_sides(made.body, colors, made.pictures) is None
-    colors[members[other]] = 0.3
-    said = unlike_sides(made.body, colors, made.pictures)
-    names = limb_names(made.body)
+    pair, colors = limb_pairs_alike(made.body)[0], np.full((made.body.num_blobs, 3), 0.5)
+    assert unlike_sides(made.body, colors, [], made.pictures) is None
+    colors[pair.blobs[1]] = 0.3
+    said = unlike_sides(made.body, colors, [pair], made.pictures)
+    one, other = (limb_names(made.body)[k] for k in pair.limbs)
     assert said is not None
-    assert said.startswith(f"the {names[one]} or {names[other]} (0.35 apart) of the actor was not found")
+    assert said.startswith(f"the {one} or {other} (0.35 apart) of the actor was not found")
     assert "example_poses" in said
 
 

@@ -13,6 +13,7 @@ from sogjax.actor.limb_silhouettes import Everybody, both_ways_round, with_limbs
 from sogjax.actor.silhouette_fit import COARSE_CELLS, silhouettes_of
 from sogjax.actor.silhouettes import PosedPictures
 from sogjax.model.body import concatenate
+from sogjax.model.limbs import limb_blobs
 from sogjax.model.solid import Solid
 
 pytestmark = pytest.mark.slow
@@ -76,11 +77,14 @@ def test_a_limb_in_somebody_elses_trunk_is_impossible_but_in_his_arm_not():
     beside = moved(HUMAN, start, {"root_y": 0.18})
     apart = moved(HUMAN, start, {"root_y": 3.0})
     everybody, nothing = Everybody.of([HUMAN, HUMAN]), np.zeros(0, int)
-    inside, free = (everybody.impossibility(0, start[None], [start, other], nothing) for other in (beside, apart))
+    own = np.arange(HUMAN.num_blobs)
+    inside, free = (everybody.impossibility(0, start[None], [start, other], own, nothing) for other in (beside, apart))
     assert inside > 0.5
     assert free == 0.0
-    own = np.arange(HUMAN.num_blobs)
-    assert everybody.impossibility(0, start[None], [start, beside], own) == 0.0  # wherever its own blobs are
+    assert everybody.impossibility(0, start[None], [start, beside], own, own) == 0.0  # wherever its own blobs are
+    assert everybody.impossibility(0, start[None], [start, beside], nothing, nothing) == 0.0  # none that is moved
+    arm = limb_blobs(HUMAN)[0]
+    assert 0.0 < everybody.impossibility(0, start[None], [start, beside], np.flatnonzero(arm), nothing) <= inside
     whole = concatenate([HUMAN, HUMAN])
     np.testing.assert_array_equal(everybody.blobs(1), own + HUMAN.num_blobs)
     means = whole.posed_blobs(jnp.asarray(np.concatenate([start, beside]))).means

@@ -54,3 +54,16 @@ def apart(both, metres):
     pose = np.array(both.poses["rest"])
     pose[list(both.skeleton.dof_names).index("ben/root_y")] += metres
     return jnp.asarray(pose)
+
+
+def test_of_a_solid_about_some_blobs_only_their_pairs_are_left():
+    both = concatenate([replace(HUMAN, name="anna"), replace(HUMAN, name="ben")])
+    whole, hand = Solid.of(both), np.array([HUMAN.num_blobs - 1])
+    about = whole.about(hand)
+    real = np.isfinite(np.asarray(about.allowed))
+    of_hand = np.isin(np.asarray(whole.ends)[np.asarray(whole.pairs)].reshape(-1, 4), hand).any(axis=1)
+    assert 0 < real.sum() == of_hand.sum() < len(of_hand)
+    means = both.posed_blobs(apart(both, 0.1)).means
+    np.testing.assert_array_equal(about.excess(means)[real], whole.excess(means)[of_hand])
+    assert not np.asarray(about.excess(means))[~real].any()
+    assert whole.about(np.zeros(0, int)).impossibility(means) == 0.0

@@ -53,22 +53,36 @@ class BlobColors(NamedTuple):
     shown: Bool[np.ndarray, "blob"]
 
 
+Samples = list[Float[np.ndarray, "_n 3"]]
+"""Colours (RGB, 0..1) that pictures show of every blob."""
+
+
 def back_projected_colors(body: Body, views: Sequence[ColoredView], color_space: str) -> BlobColors:
     """The colours of every blob, averaged in a colour space."""
-    samples: list[list[np.ndarray]] = [[] for _ in range(body.num_blobs)]
-    for view in views:
-        for blob, colors in enumerate(blob_samples(body, view)):
-            samples[blob].append(colors)
-    stacked = [np.concatenate(parts) for parts in samples]
+    return colors_of(body, all_samples(body, views), color_space)
+
+
+def all_samples(body: Body, views: Sequence[ColoredView]) -> Samples:
+    """What some pictures together show of every blob."""
+    return joined_samples([blob_samples(body, view) for view in views])
+
+
+def joined_samples(parts: Sequence[Samples]) -> Samples:
+    """All samples of every blob."""
+    return [np.concatenate(of_blob) for of_blob in zip(*parts, strict=True)]
+
+
+def colors_of(body: Body, samples: Samples, color_space: str) -> BlobColors:
+    """The colours of every blob, the mean of its samples in a colour space."""
     space = averaging_space(color_space)
-    converted = np.asarray(_from_rgb(jnp.asarray(np.concatenate(stacked), jnp.float32), space))
-    parts = np.split(converted, np.cumsum([len(part) for part in stacked])[:-1])
+    converted = np.asarray(_from_rgb(jnp.asarray(np.concatenate(samples), jnp.float32), space))
+    parts = np.split(converted, np.cumsum([len(part) for part in samples])[:-1])
     shown = np.array([len(part) >= MIN_SAMPLES for part in parts])
     means = np.stack([_robust_mean(part) if enough else np.zeros(3) for part, enough in zip(parts, shown, strict=True)])
     return BlobColors(_filled(body, np.asarray(_to_rgb(jnp.asarray(means, jnp.float32), space), float), shown), shown)
 
 
-def blob_samples(body: Body, view: ColoredView) -> list[Float[np.ndarray, "n 3"]]:
+def blob_samples(body: Body, view: ColoredView) -> Samples:
     """Colours (RGB, 0..1) that one picture shows of every blob; none where the blob is hidden."""
     pixels, visible = _sample_pixels(body, view)
     height, width = view.image.shape[:2]
@@ -172,8 +186,7 @@ def _with_unknown(gains: Float[np.ndarray, "camera 3"]) -> Float[np.ndarray, "ca
 
 def _log_light(body: Body, views: Sequence[ColoredView]) -> Float[np.ndarray, "blob 3"]:
     """Logarithm of the middle light that a camera shows of every blob, over all poses."""
-    parts = [blob_samples(body, view) for view in views]
-    samples = [np.concatenate(of_blob) for of_blob in zip(*parts, strict=True)]
+    samples = all_samples(body, views)
     middle = np.stack([np.median(rgb, axis=0) if len(rgb) >= FEWEST_SAMPLES else np.full(3, np.nan) for rgb in samples])
     light = np.asarray(linear_light(jnp.asarray(middle, jnp.float32)), float)
     return np.log(np.where((light >= DARKEST) & (light <= BRIGHTEST), light, np.nan))

@@ -5,21 +5,18 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from sogjax.actor.limb_colors import UNLIKE, Pair
 from sogjax.actor.posed_examples import overlap_of
 from sogjax.actor.silhouettes import PosedPictures
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.limbs import limb_blobs, limb_names
-from sogjax.search.body_parts import limb_groups
 
 LEAST_SHOWN = 0.7
 """Share of a limb's blobs that the masks must show."""
 FRAMES_SUIT = 0.75
 """Mean IoU of frames that nobody chose below which the actor is doubtful: its limbs may be of the wrong sizes. Good
 frames have 0.86 to 0.89, and 0.81 to 0.83 where masks say nothing of the legs; at 0.70 and 0.68 all was wrong."""
-UNLIKE = 0.1
-"""Mean distance of the colours (sRGB, 0 to 1) of left and right blobs from which on a limb was not found. Of 98 actors
-of `experiments/whole_runs.py` 82 have at most 0.093; of the 16 others eleven had an arm that was not found."""
 
 
 def doubt_of(body: Body, poses: Float[Array, "pose dof"], pictures: Sequence[PosedPictures], rig: Camera) -> str | None:
@@ -53,18 +50,12 @@ def unseen_limbs(body: Body, shown: Bool[np.ndarray, "blob"], pictures: Sequence
     )
 
 
-def unlike_sides(body: Body, colors: Float[np.ndarray, "blob 3"], pictures: Sequence[PosedPictures]) -> str | None:
-    """Of which pairs of limbs one was not found, as its colours (sRGB) are not the other one's; None: of none."""
-    blobs, names = limb_blobs(body), limb_names(body)
-    unlike = [
-        (
-            f"{names[one]} or {names[other]}",
-            float(np.linalg.norm(colors[blobs[one]] - colors[blobs[other]], axis=1).mean()),
-        )
-        for one, other in (members for members in limb_groups(body) if len(members) == 2)
-        if blobs[one].sum() == blobs[other].sum()
-    ]
-    said = [f"{pair} ({off:.2f} apart)" for pair, off in unlike if off > UNLIKE]
+def unlike_sides(
+    body: Body, colors: Float[np.ndarray, "blob 3"], unlike: Sequence[Pair], pictures: Sequence[PosedPictures]
+) -> str | None:
+    """Of which pairs of limbs of unlike `colors` (sRGB) one was not found; None: of none."""
+    names = limb_names(body)
+    said = [f"{' or '.join(names[k] for k in pair.limbs)} ({pair.apart(colors):.2f} apart)" for pair in unlike]
     if not said:
         return None
     frames = ", ".join(posed.name for posed in pictures)

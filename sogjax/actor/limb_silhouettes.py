@@ -70,16 +70,17 @@ class Everybody:
         number: int,
         ways: Float[np.ndarray, "way dof"],
         poses: Sequence[Float[np.ndarray, "dof"]],
+        moved: Int[np.ndarray, "_blob"],
         unsure: Int[np.ndarray, "_blob"],
     ) -> Float[np.ndarray, "way"]:
-        """How impossible ways to hold one of the bodies are, 0 to 1, given the poses of all.
+        """How impossible ways to hold some blobs of one of the bodies are, 0 to 1, given the poses of all.
 
         The limbs of the others, and some blobs of its own, may be anywhere.
         """
         own = self.blobs(number)
         others = np.setdiff1d(np.flatnonzero(limb_blobs(self.whole).any(axis=0)), own)
         held = [ways if k == number else np.tile(pose, (len(ways), 1)) for k, pose in enumerate(poses)]
-        solid = self.solid.regardless_of(np.append(others, own[unsure]))
+        solid = self.solid.about(own[moved]).regardless_of(np.append(others, own[unsure]))
         return np.asarray(impossibilities(solid, self.whole, jnp.asarray(np.concatenate(held, axis=1))))
 
 
@@ -150,7 +151,7 @@ class _SeenUnit:
         for of_limb, row, (limb, _) in zip(ways, rows, limbs, strict=True):
             held[:, limb.all_dofs] = of_limb[row][:, limb.all_dofs]
         together = sum(fills[row] for fills, row in zip(covered, rows, strict=True))
-        cost = self._cost(held, rest, jnp.asarray(together), np.zeros(0, int))
+        cost = self._cost(held, rest, jnp.asarray(together), self.unit.all_blobs)
         best = int(np.argmin(cost))
         return held[best] if cost[best] < (1.0 - LEAST_GAIN) * cost[0] else self.pose
 
@@ -163,9 +164,8 @@ class _SeenUnit:
         """
         drawn = drawn_ways(self.body, limb, self.pose, self.turn, NUM_DRAWN)
         drawn[0] = self.pose
-        unsure = np.setdiff1d(self.unit.all_blobs, limb.all_blobs)
         fills = _part_covered(self.body, jnp.asarray(drawn), part, self.silhouettes)
-        kept = _different(drawn[:, limb.all_dofs], self._cost(drawn, rest, fills, unsure))
+        kept = _different(drawn[:, limb.all_dofs], self._cost(drawn, rest, fills, limb.all_blobs))
         scales = pose_scales(self.body.skeleton)
         climbed = _climbed(self.body, jnp.asarray(drawn[kept]), part, rest, self.silhouettes, scales)
         ways = np.asarray(climbed).copy()
@@ -177,12 +177,16 @@ class _SeenUnit:
         ways: Float[np.ndarray, "way dof"],
         rest: Float[Array, "camera cell"],
         fills: Float[Array, "way camera cell"],
-        unsure: Int[np.ndarray, "_blob"],
+        moved: Int[np.ndarray, "_blob"],
     ) -> Float[np.ndarray, "way"]:
-        """The mismatch of the body held in some ways, with `REST`, up to twice as much where that is impossible."""
+        """The mismatch of the body held in some ways, with `REST`, up to twice as much where that is impossible.
+
+        Blobs of the unit that are not `moved` may be anywhere.
+        """
+        unsure = np.setdiff1d(self.unit.all_blobs, moved)
         twisted = np.asarray(_from_rest(self.body, jnp.asarray(ways)))
         mismatches = np.asarray(_mismatches(rest, fills, self.silhouettes)) + REST * twisted
-        return mismatches * (1.0 + self.everybody.impossibility(self.number, ways, self.poses, unsure))
+        return mismatches * (1.0 + self.everybody.impossibility(self.number, ways, self.poses, moved, unsure))
 
 
 def _different(angles: Float[np.ndarray, "way param"], cost: Float[np.ndarray, "way"]) -> list[int]:

@@ -10,8 +10,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from sogjax.actor.colors import BlobColors, back_projected_colors, colored
+from sogjax.actor.colors import all_samples, colored, colors_of, joined_samples
 from sogjax.actor.doubts import doubt_of, unlike_sides, unseen_limbs
+from sogjax.actor.limb_colors import agreed_samples
 from sogjax.actor.posed_examples import (
     Progress,
     Report,
@@ -74,15 +75,21 @@ class MadeActor:
     estimate: Estimate
     rough_poses: dict[str, Float[Array, "dof"]] = field(default_factory=dict)
     """As the masks alone tell them, also of examples that it is not made of."""
+    explained: dict[str, float] = field(default_factory=dict)
+    """Part of the visible area that shows the actor's own colours, of each example pose."""
     unsuitable: str | None = None
     """Why the frames that were chosen for it may not suit it, with the remedy."""
     doubt: str | None = None
     """Why its sizes may be wrong, with the remedy."""
 
     def agreement(self, name: str) -> float:
-        """How well the masks of an example pose and the body's silhouettes agree (IoU, mean over the cameras)."""
+        """How well the body suits an example pose, 0 to 1.
+
+        Masks and silhouettes (IoU, mean over the cameras), times the part of the body that shows the actor's colours.
+        """
         posed = next(posed for posed in self.pictures if posed.name == name)
-        return agreement(self.upright_body, self.example_poses[name], posed, self.rig)
+        silhouettes = agreement(self.upright_body, self.example_poses[name], posed, self.rig)
+        return silhouettes * self.explained.get(name, 1.0)
 
     @property
     def shape_names(self) -> tuple[str, ...]:
@@ -182,12 +189,18 @@ class Making:
         self.report("colours")
         shaped, rig = _shaped(self.shape_model, estimate.shape_params), self.rig
         pairs = zip(pictures, estimate.poses, strict=True)
-        shown = [view for posed, pose in pairs for view in colored_views(posed, rig, pose)]
-        found = back_projected_colors(shaped, shown, self.color_space)
-        doubts = (unsuitable, *self._doubts(shaped, found, pictures))
+        samples = [all_samples(shaped, colored_views(posed, rig, pose)) for posed, pose in pairs]
+        found = colors_of(shaped, joined_samples(samples), self.color_space)
+        doubts = [unsuitable]
+        if any(posed.undecided for posed in pictures):
+            doubts.append(unseen_limbs(shaped, found.shown, pictures))
+        if self.best is not None:
+            agreed = agreed_samples(shaped, samples, found.colors)
+            doubts.append(unlike_sides(shaped, found.colors, agreed.unlike, pictures))
+            found = colors_of(shaped, agreed.samples, self.color_space)
         actor = replace(colored(shaped, found.colors), name=self.subject or self.start.name)
         explained = explained_examples(actor, list(estimate.poses), pictures, rig)
-        actor = replace(actor, explained=jnp.asarray(explained, jnp.float32))
+        actor = replace(actor, explained=jnp.asarray(np.mean(explained), jnp.float32))
         names, turn = [posed.name for posed in pictures], world_from_upright(self.recording.up)
         frames = {example.name: example.frame for example in self.examples}
         return MadeActor(
@@ -201,18 +214,9 @@ class Making:
             shape_model=self.shape_model,
             estimate=estimate,
             rough_poses={**rough},
+            explained=dict(zip(names, explained, strict=True)),
             unsuitable=unsuitable,
             doubt="; ".join(said for said in doubts if said is not None) or None,
-        )
-
-    def _doubts(
-        self, shaped: Body, found: BlobColors, pictures: Sequence[PosedPictures]
-    ) -> tuple[str | None, str | None]:
-        """Which limbs the pictures do not show, and which were not found."""
-        undecided = any(posed.undecided for posed in pictures)
-        return (
-            unseen_limbs(shaped, found.shown, pictures) if undecided else None,
-            unlike_sides(shaped, np.asarray(found.colors), pictures) if self.best is not None else None,
         )
 
 

@@ -114,15 +114,14 @@ ROWS = 160
 
 def explained_examples(
     body: Body, poses: Sequence[Float[Array, "dof"]], pictures: Sequence[PosedPictures], rig: Camera
-) -> float:
-    """Part of the visible area that shows the actor's own colours, the mean over its example poses.
+) -> list[float]:
+    """Part of the visible area that shows the actor's own colours, of each of its example poses.
 
     The actor stands upright in the recording's world; `rig` has all cameras.
     """
-    found = [
+    return [
         _explained(body, jnp.asarray(pose), *_cells(posed, rig)) for pose, posed in zip(poses, pictures, strict=True)
     ]
-    return float(np.mean(found))
 
 
 def _cells(

@@ -6,6 +6,7 @@ So masks are not cut, and cameras in which one hides the other tell of both.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import equinox as eqx
 import jax
@@ -22,6 +23,7 @@ from sogjax.actor.silhouette_fit import COARSE_CELLS, fit_edges, silhouettes_of
 from sogjax.actor.silhouettes import PosedPictures
 from sogjax.model.body import Body
 from sogjax.model.camera import camera_of
+from sogjax.model.cores import in_threads
 from sogjax.scene.background_difference import reduced_mask, widened
 from sogjax.scene.coarse_views import enlarged
 
@@ -51,18 +53,22 @@ def made_together(
     if not shared:
         return list(made)
     people = People(tuple(made), {name: shown[name] for name in shared})
-    everybody = Everybody.of([actor.upright_body for actor in made])
     for turn in range(ROUNDS):
-        for k, (making, actor) in enumerate(zip(makings, made, strict=True)):
-            ways: dict[str, list[PoseAndMiss]] = {}
-            for posed in [posed for posed in actor.pictures if posed.name in shared]:
-                now = [of_actor[posed.name] for of_actor in poses]
-                cells = silhouettes_of([people.left_by_others(k, posed, now)], actor.rig, COARSE_CELLS)
-                search = (everybody, k, now, jax.tree.map(lambda leaf: leaf[0], cells), turn)
-                both = turn == 0 and posed.name not in making.described
-                ways[posed.name] = both_ways_round(*search) if both else [(with_limbs_found(*search), 0.0)]
-            poses[k] |= believed(making, actor.upright_body, ways)
-    return [people.fitted_again(k, making, poses) for k, making in enumerate(makings)]
+        for k, making in enumerate(makings):
+            poses[k] |= _searched(people, k, making, poses, turn)
+    return in_threads(lambda k: people.fitted_again(k, makings[k], poses), range(len(made)))
+
+
+def _searched(people: "People", k: int, making: Making, poses: Sequence[Poses], turn: int) -> Poses:
+    """The poses of one of the actors in all shared examples, its limbs found, given those of the others.
+
+    Also in those that it is not made of: the others are.
+    """
+    described, of_actor = making.described, {posed.name: posed for posed in people.made[k].pictures}
+    own = [of_actor.get(name, everybodys) for name, everybodys in people.shown.items()]
+    found = lambda posed: people.ways(k, posed, poses, turn, both=turn == 0 and posed.name not in described)
+    ways = [*map(found, own[:1]), *in_threads(found, own[1:])]  # the first one compiles
+    return believed(making, people.made[k].upright_body, dict(zip(people.shown, ways, strict=True)))
 
 
 def believed(making: Making, body: Body, ways: Mapping[str, Sequence[PoseAndMiss]]) -> Poses:
@@ -79,6 +85,21 @@ class People:
 
     made: tuple[MadeActor, ...]
     shown: Mapping[str, PosedPictures]
+
+    @cached_property
+    def everybody(self) -> Everybody:
+        """Their bodies as one."""
+        return Everybody.of([actor.upright_body for actor in self.made])
+
+    def ways(self, k: int, posed: PosedPictures, poses: Sequence[Poses], turn: int, both: bool) -> list[PoseAndMiss]:
+        """The pose of one of them in an example, its limbs found, given those of the others; or that both ways round.
+
+        `posed` are its own pictures, if it is made of them; each `turn` draws other ways to hold limbs.
+        """
+        now = [of_actor[posed.name] for of_actor in poses]
+        cells = silhouettes_of([self.left_by_others(k, posed, now)], self.made[k].rig, COARSE_CELLS)
+        search = (self.everybody, k, now, jax.tree.map(lambda leaf: leaf[0], cells), turn)
+        return both_ways_round(*search) if both else [(with_limbs_found(*search), 0.0)]
 
     def fitted_again(self, k: int, making: Making, poses: Sequence[Poses]) -> MadeActor:
         """One of the actors, its shape and poses fitted to what the others leave, where that agrees better with it."""

@@ -25,6 +25,8 @@ DEEP = 0.04
 UNLIKELY, IMPOSSIBLE = 0.07, 0.11
 """Metres from which on a pose is the less likely the deeper it is, and from which on it is impossible: two who dance or
 talk are up to 0.07 in each other, and legs of who runs for an instant; legs that were exchanged are 0.1."""
+PAIRS_AT_ONCE = 256
+"""Pairs are padded to a multiple of this, where only some matter."""
 
 
 class Solid(eqx.Module):
@@ -74,6 +76,15 @@ class Solid(eqx.Module):
         of_pairs = np.asarray(self.ends)[np.asarray(self.pairs)].reshape(-1, 4)
         allowed = jnp.where(np.isin(of_pairs, blobs).any(axis=1), jnp.inf, self.allowed)
         return eqx.tree_at(lambda solid: solid.allowed, self, allowed)
+
+    def about(self, blobs: Int[np.ndarray, "_blob"]) -> "Solid":
+        """The same, but that only the pairs that some blobs belong to matter, so that others are not computed."""
+        pairs = np.asarray(self.pairs)
+        kept = np.flatnonzero(np.isin(np.asarray(self.ends)[pairs].reshape(-1, 4), blobs).any(axis=1))
+        spare = -len(kept) % PAIRS_AT_ONCE  # few sizes, so few programs
+        allowed = jnp.append(self.allowed[kept], jnp.full(spare, jnp.inf, self.allowed.dtype))
+        padded = jnp.asarray(np.concatenate([pairs[kept], np.zeros((spare, 2), pairs.dtype)]))
+        return eqx.tree_at(lambda solid: (solid.pairs, solid.allowed), self, (padded, allowed))
 
     def deeper(
         self, body: Body, known: Float[np.ndarray, "dof"], poses: Float[np.ndarray, "start dof"]

@@ -49,7 +49,7 @@ class KnownFrame:
     pose: Float[np.ndarray, "dof"]
     """The pose of all actors, upright in the recording's world."""
     agreement: float
-    """How well masks and silhouettes agree (IoU) for the actor for whom they do least."""
+    """`MadeActor.agreement` of the actor for whom it is least."""
 
 
 @dataclass(frozen=True)
