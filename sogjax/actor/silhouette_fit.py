@@ -27,7 +27,7 @@ from sogjax.model.program import compiled
 from sogjax.model.shape import ShapeModel
 from sogjax.solve.ascent import ConditionedAscent
 from sogjax.solve.gauss_newton import GaussNewton
-from sogjax.solve.solution import QuadraticModel, Scales, Solution
+from sogjax.solve.solution import QuadraticModel, Scales
 from sogjax.tracking.solving import pose_scales
 
 MAX_CELLS, COARSE_CELLS = 2048, 512
@@ -186,19 +186,14 @@ class SilhouetteFit(eqx.Module):
     def _shape_penalty(self, shape: Float[Array, "shape"]) -> Float[Array, ""]:
         return NOISE * jnp.sum((shape / self.model.spread) ** 2)
 
-    def deviations(self, params: Float[Array, "param"]) -> Float[Array, "param"]:
-        """Standard deviation of every parameter given all pictures and the priors, from the curvature.
-
-        What no picture determines keeps the deviation of its prior.
-        """
-        curvature = self.quadratic(params).curvature
-        return jnp.sqrt(2.0 * NOISE * jnp.maximum(jnp.diag(jnp.linalg.pinv(curvature, hermitian=True)), 0.0))
-
 
 def fitted(
     fit: SilhouetteFit, start: Float[Array, "param"], pose_scales: Scales, max_iterations: int = MAX_ITERATIONS
-) -> Solution:
-    """The best poses and shape near a start."""
+) -> tuple[Float[Array, "param"], Float[Array, "param"]]:
+    """The best poses and shape near a start, and the standard deviation of every parameter.
+
+    What no picture determines keeps the deviation of its prior.
+    """
     num_shape = fit.model.num_shape_params
     scales = scales_with_shape(pose_scales, fit.num_poses, num_shape)
     return _fitted(fit, start, scales, jnp.asarray(max_iterations))
@@ -207,11 +202,13 @@ def fitted(
 @compiled
 def _fitted(
     fit: SilhouetteFit, start: Float[Array, "param"], scales: Scales, max_iterations: Int[Array, ""]
-) -> Solution:
+) -> tuple[Float[Array, "param"], Float[Array, "param"]]:
     solver = GaussNewton(
         epsilon=EPSILON, max_iterations=max_iterations, first_damping=0.1, smallest_damping=DAMPING, common_damping=0.0
     )
-    return solver.maximize(fit, start, scales)
+    end = solver.climbed(fit, start, scales)
+    variances = jnp.diag(jnp.linalg.pinv(end.model.curvature, hermitian=True))
+    return end.params, jnp.sqrt(2.0 * NOISE * jnp.maximum(variances, 0.0))
 
 
 def scales_with_shape(pose: Scales, num_poses: int, num_shape_params: int) -> Scales:
@@ -274,19 +271,14 @@ def fit_edges(
 
 def _edges(model: ShapeModel, start: Float[Array, "param"], silhouettes: Silhouettes, max_iterations: int) -> Estimate:
     fit = SilhouetteFit(model, silhouettes)
-    solution = fitted(fit, start, pose_scales(model.body.skeleton), max_iterations)
-    poses_deviation, shape_deviation = fit.split(_deviations(fit, solution.params))
-    best_poses, shape = fit.split(solution.params)
-    return Estimate(best_poses, shape, poses_deviation, shape_deviation)
+    params, deviations = fitted(fit, start, pose_scales(model.body.skeleton), max_iterations)
+    return Estimate(*fit.split(params), *fit.split(deviations))
 
 
 def compile_estimate(model: ShapeModel, views: Views, silhouettes: Silhouettes, terms: Terms) -> None:
     """Compile beforehand what `estimate_shape` needs, while other work goes on."""
     num_poses = silhouettes.mask.shape[0]
     estimate_shape(model, jnp.tile(model.body.poses["rest"], (num_poses, 1)), views, silhouettes, terms, (0, 0))
-
-
-_deviations = compiled(SilhouetteFit.deviations)
 
 
 @compiled

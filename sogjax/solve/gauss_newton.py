@@ -69,6 +69,16 @@ class GaussNewton(eqx.Module):
         Raises:
             TypeError: the objective gives no quadratic model of itself.
         """
+        end = self.climbed(objective, start, scales)
+        converged = end.converged & end.finite
+        return Solution(end.params, end.model.value, end.iteration, end.iteration + 1, converged)
+
+    def climbed(self, objective: Objective, start: Params, scales: Scales) -> GaussNewtonState:
+        """As `maximize`, but the state in which the climb ends: the model there tells how certain parameters are.
+
+        Raises:
+            TypeError: the objective gives no quadratic model of itself.
+        """
         if not isinstance(objective, CurvedObjective):
             raise TypeError("Gauss-Newton needs an objective with a method `quadratic` (CurvedObjective)")
         state = GaussNewtonState(
@@ -101,9 +111,7 @@ class GaussNewton(eqx.Module):
                 finite=jnp.all(jnp.isfinite(step)) & (~at_start | tried.finite()),
             )
 
-        end = jax.lax.while_loop(unfinished, climb, state)
-        converged = end.converged & end.finite
-        return Solution(end.params, end.model.value, end.iteration, end.iteration + 1, converged)
+        return jax.lax.while_loop(unfinished, climb, state)
 
     def _next_damping(self, damping: Float[Array, ""], gain: Float[Array, ""]) -> Float[Array, ""]:
         """Less where the objective rose by about as much as the model expected, more where by much less or not."""
