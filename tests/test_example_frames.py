@@ -89,7 +89,7 @@ class Made(MadeActor):
         object.__setattr__(self, "frames", {f"frame_{frame}": frame for frame in fits})
         object.__setattr__(self, "example_poses", {f"frame_{k}": jnp.asarray(pose) for k, pose in poses.items()})
 
-    def agreement(self, name):
+    def suitability(self, name):
         return self.fits[self.frames[name]]
 
 

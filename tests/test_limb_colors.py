@@ -66,6 +66,35 @@ def test_what_too_few_pictures_show_is_not_compared():
     np.testing.assert_allclose(found, np.tile(SKIN, (HUMAN.num_blobs, 1)), atol=0.02)
 
 
+def without(samples, blobs):
+    """Of one pose, some blobs of which are hidden."""
+    return [each[:2] if blob in blobs else each for blob, each in enumerate(samples)]
+
+
+@pytest.mark.parametrize("hidden", [[ARMS.blobs[1]], ARMS.blobs])
+def test_sleeves_of_different_colours_stay_where_a_pose_hides_one(hidden):
+    poses = [samples_of(SKIN, RED)] * 3 + [without(samples_of(SKIN, RED), blobs) for blobs in hidden]
+    found, joined, unlike = agreed(poses)
+    assert unlike
+    np.testing.assert_allclose(found, joined, atol=0.01)
+
+
+def test_of_an_arm_that_most_poses_show_alike_the_others_do_not_count():
+    """The left arm lies on the same wall in all poses: who is wrong is not known."""
+    poses = [samples_of(ELSEWHERE[0], right) for right in (SKIN, SKIN, ELSEWHERE[1])]
+    found, _, unlike = agreed(poses)
+    assert unlike
+    for blobs, color in zip(ARMS.blobs, (ELSEWHERE[0], SKIN), strict=True):
+        np.testing.assert_allclose(found[blobs], np.tile(color, (len(blobs), 1)), atol=0.02)
+
+
+def test_arms_that_no_pose_shows_keep_what_there_is():
+    hidden = [without(samples_of(SKIN, RED), np.concatenate(ARMS.blobs))] * 2
+    found, joined, unlike = agreed(hidden)
+    assert unlike
+    np.testing.assert_array_equal(found, joined)
+
+
 def test_a_single_pose_has_nothing_to_agree_with():
     found, joined, unlike = agreed([samples_of(SKIN, RED)])
     assert unlike

@@ -57,8 +57,11 @@ def moved(params, fit):
 
 
 @pytest.mark.slow
-def test_the_quadratic_model_has_the_value_and_the_gradient_of_the_objective(case):
+@pytest.mark.parametrize("seen", [[True] * 4, [True, False, True, True]], ids=["all cameras", "one without a mask"])
+def test_the_quadratic_model_has_the_value_and_the_gradient_of_the_objective(case, seen):
     fit, truth = case
+    mask = fit.silhouettes.mask & jnp.asarray(seen)[None, :, None]
+    fit = eqx.tree_at(lambda f: f.silhouettes.mask, fit, mask)
     params = moved(truth, fit)
     value, gradient = eqx.filter_jit(jax.value_and_grad(lambda p: fit(p)))(params)
     model = eqx.filter_jit(SilhouetteFit.quadratic)(fit, params)

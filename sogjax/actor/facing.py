@@ -103,7 +103,7 @@ def consistent_ways(moments: Sequence[Sequence[Way]], times: Sequence[float | No
 
 
 def haste(forward: Sequence[Float[np.ndarray, "3"]], times: Sequence[float | None]) -> float:
-    """By how many half turns somebody turns more than is usual, from each moment of the clip to the next."""
+    """By how many half turns somebody turns more than at `TURNING`, from each moment of the clip to the next."""
     known = sorted((time, k) for k, time in enumerate(times) if time is not None)
     beyond = [
         np.arccos(np.clip(np.dot(forward[one], forward[two]), -1.0, 1.0)) - TURNING * (later - time)

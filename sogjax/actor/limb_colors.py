@@ -1,4 +1,4 @@
-"""The colours of limbs that were not found in every example pose: those that most of the poses, left and right, show.
+"""The colours of limbs that were not found in every example pose: those of the poses, left and right, that are alike.
 
 Where people reach for each other, masks do not tell every arm. One that is not where the body is believed to hold it
 shows whatever is there, another thing in each pose; where it was found, it shows the same.
@@ -20,6 +20,8 @@ UNLIKE = 0.1
 of `experiments/whole_runs.py` 82 have at most 0.093; of the 16 others eleven had an arm that was not found."""
 LEAST_SEEN = 0.5
 """Part of a limb's blobs that two poses must both show for their colours to be compared."""
+FEWEST_ROWS = 3
+"""Limbs in poses, of which half may be most alike."""
 
 
 class Pair(NamedTuple):
@@ -47,7 +49,7 @@ def limb_pairs_alike(body: Body) -> list[Pair]:
 
 
 class Agreed(NamedTuple):
-    """What to take colours from, and of which pairs of limbs too few poses agree."""
+    """What to take colours from, and which pairs of limbs stay unlike, or are found in too few poses."""
 
     samples: Samples
     unlike: list[Pair]
@@ -56,32 +58,48 @@ class Agreed(NamedTuple):
 def agreed_samples(body: Body, by_pose: Sequence[Samples], colors: Float[np.ndarray, "blob 3"]) -> Agreed:
     """What to take the colours of every blob from, of the samples that each example pose shows of it.
 
-    All of them, but of a pair of limbs of unlike `colors`: a limb that poses show alike keeps its own; another one
-    takes those of the poses, its own and the other limb's, that are most alike.
+    All of them, but of a pair of limbs of unlike `colors`. A limb that most of its poses show alike takes the colours
+    of these; another one those of its counterpart, if that is such a limb. Where neither is, both take those of the
+    poses of either that are most alike.
     """
     agreed = Agreed(joined_samples(by_pose), [])
     for pair in limb_pairs_alike(body):
-        if pair.apart(colors) > UNLIKE and not (len(by_pose) > 1 and _agree(agreed.samples, pair, by_pose)):
+        if pair.apart(colors) > UNLIKE and not _agree(agreed.samples, pair, by_pose):
             agreed.unlike.append(pair)
     return agreed
 
 
 def _agree(joined: Samples, pair: Pair, by_pose: Sequence[Samples]) -> bool:
-    """Give the limbs of a pair the samples that tell their colours; whether these are alike."""
-    seen = [(blobs, samples) for blobs in pair.blobs for samples in by_pose]
-    apart = _distances(np.stack([_middle(samples, blobs) for blobs, samples in seen]))
-    sides = np.repeat([0, 1], len(by_pose))
-    alike = np.array([_spread(apart[np.ix_(sides == side, sides == side)]) <= UNLIKE for side in (0, 1)])
-    if alike.all():
-        return False  # clothes differ, or a limb is elsewhere in all poses
-    told = np.flatnonzero(np.isin(sides, np.flatnonzero(alike)) if alike.any() else sides >= 0)
-    near = np.sort(apart[np.ix_(told, told)], axis=1)[:, : len(told) // 2 + 1]
-    centre = told[int(np.argmin(near.mean(axis=1)))]
-    members = [k for k in told if apart[centre, k] <= np.median(apart[centre, told])]
-    for side in np.flatnonzero(~alike):
+    """Give the limbs of a pair the samples that tell their colours; whether both are of one colour, surely."""
+    seen = [(side, samples) for side in (0, 1) for samples in by_pose]
+    middles = np.stack([_middle(samples, pair.blobs[side]) for side, samples in seen])
+    told = np.isfinite(middles[..., 0]).mean(axis=1) >= LEAST_SEEN
+    apart, sides = _distances(middles), np.array([side for side, _ in seen])
+    found = [_majority(apart, np.flatnonzero(told & (sides == side))) for side in (0, 1)]
+    if not any(found):
+        found = [_most_alike(apart, np.flatnonzero(told))] * 2
+    for side, members in enumerate(found):
         for number, blob in enumerate(pair.blobs[side]):
-            joined[blob] = np.concatenate([seen[k][1][seen[k][0][number]] for k in members])
-    return _spread(apart[np.ix_(members, members)]) <= UNLIKE
+            shown = [seen[k][1][pair.blobs[seen[k][0]][number]] for k in members or found[1 - side]]
+            joined[blob] = np.concatenate(shown) if shown else joined[blob]
+    alike = apart[np.ix_(*[sorted({*found[0], *found[1]})] * 2)]
+    return len(alike) > 1 and float(alike[~np.eye(len(alike), dtype=bool)].mean()) <= UNLIKE
+
+
+def _majority(apart: Float[np.ndarray, "limb limb"], rows: np.ndarray) -> list[int]:
+    """Those of some rows that are alike, if they are more than half, and more than one; else none."""
+    near = apart[np.ix_(rows, rows)] <= UNLIKE
+    members = rows[near[int(np.argmax(near.sum(axis=1)))]] if len(rows) else rows
+    return members.tolist() if len(members) > max(len(rows) / 2, 1) else []
+
+
+def _most_alike(apart: Float[np.ndarray, "limb limb"], rows: np.ndarray) -> list[int]:
+    """The half of some rows that is most alike; none of too few."""
+    if len(rows) < FEWEST_ROWS:
+        return []
+    among = apart[np.ix_(rows, rows)]
+    centre = int(np.argmin(np.sort(among, axis=1)[:, : len(rows) // 2 + 1].mean(axis=1)))
+    return rows[among[centre] <= np.median(among[centre])].tolist()
 
 
 def _middle(samples: Samples, blobs: np.ndarray) -> Float[np.ndarray, "blob 3"]:
@@ -96,9 +114,3 @@ def _distances(colors: Float[np.ndarray, "limb blob 3"]) -> Float[np.ndarray, "l
     both = np.isfinite(off)
     mean = np.where(both, off, 0.0).sum(axis=-1) / np.maximum(both.sum(axis=-1), 1)
     return np.where(both.mean(axis=-1) >= LEAST_SEEN, mean, np.inf)
-
-
-def _spread(apart: Float[np.ndarray, "pose pose"]) -> float:
-    """Mean distance of different poses; infinite for a single one."""
-    others = apart[~np.eye(len(apart), dtype=bool)]
-    return float(others.mean()) if len(others) else np.inf

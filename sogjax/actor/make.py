@@ -82,7 +82,7 @@ class MadeActor:
     doubt: str | None = None
     """Why its sizes may be wrong, with the remedy."""
 
-    def agreement(self, name: str) -> float:
+    def suitability(self, name: str) -> float:
         """How well the body suits an example pose, 0 to 1.
 
         Masks and silhouettes (IoU, mean over the cameras), times the part of the body that shows the actor's colours.
@@ -172,6 +172,10 @@ class Making:
     def described(self) -> set[str]:
         """Those of which somebody, or keypoints, say roughly how the subject stands."""
         return {example.name for example in self.examples if example.initial_pose is not None}
+
+    def overlap(self, pictures: Sequence[PosedPictures], estimate: Estimate) -> float:
+        """How well the silhouettes of an estimate and all masks agree (mean IoU)."""
+        return overlap_of(_shaped(self.shape_model, estimate.shape_params), estimate.poses, pictures, self.rig)
 
     def unsuitable(self, pictures: Sequence[PosedPictures], estimate: Estimate) -> str | None:
         """Why frames that were chosen do not suit, with the remedy; None: they do, or somebody chose them."""

@@ -16,9 +16,8 @@ from jaxtyping import Float
 
 from sogjax.actor.coverage import body_silhouette
 from sogjax.actor.facing import Way, consistent_ways, forward
-from sogjax.actor.limb_silhouettes import Everybody, PoseAndMiss, both_ways_round, with_limbs_found
+from sogjax.actor.limb_silhouettes import LEAST_GAIN, Everybody, PoseAndMiss, both_ways_round, with_limbs_found
 from sogjax.actor.make import MadeActor, Making
-from sogjax.actor.posed_examples import overlap_of
 from sogjax.actor.silhouette_fit import COARSE_CELLS, fit_edges, silhouettes_of
 from sogjax.actor.silhouettes import PosedPictures
 from sogjax.model.body import Body
@@ -33,6 +32,8 @@ AROUND = 2
 """Pixels of a mask at the working size around a body that are its own, too: sizes are only roughly known."""
 LEAST_LEFT = 0.2
 """Share of somebody's silhouettes, the median of the cameras, that others must leave in one for it to tell."""
+LEAST_FIT = 1e-3
+"""Of a way to see somebody, where he covers less than nothing of what is left of masks."""
 FEWEST_CAMERAS = 2
 """Cameras that must tell of somebody in a pose."""
 
@@ -49,7 +50,7 @@ def made_together(
     poses: list[Poses] = [
         {name: np.asarray(pose) for name, pose in (actor.rough_poses | actor.example_poses).items()} for actor in made
     ]
-    shared = {name for name in shown if all(name in of_actor for of_actor in poses)}
+    shared = [name for name in shown if all(name in of_actor for of_actor in poses)]
     if not shared:
         return list(made)
     people = People(tuple(made), {name: shown[name] for name in shared})
@@ -72,9 +73,14 @@ def _searched(people: "People", k: int, making: Making, poses: Sequence[Poses], 
 
 
 def believed(making: Making, body: Body, ways: Mapping[str, Sequence[PoseAndMiss]]) -> Poses:
-    """Of each example pose of an actor the way to see it, given with its mismatch, that goes with all others."""
+    """Of each shared example pose of an actor the way to see it, given with its mismatch, that goes with the others.
+
+    A pose that is not the one until now, the first, must be better by `LEAST_GAIN` beside that.
+    """
+    fit = lambda number, miss: max(1.0 - miss / (1.0 - LEAST_GAIN * (number > 0)), LEAST_FIT)
     up, frames = making.recording.up, {example.name: example.frame for example in making.examples}
-    moments = [[Way(1.0 - miss, forward(body, jnp.asarray(pose), up)) for pose, miss in both] for both in ways.values()]
+    way = lambda number, pose, miss: Way(fit(number, miss), forward(body, jnp.asarray(pose), up))
+    moments = [[way(number, *each) for number, each in enumerate(both)] for both in ways.values()]
     chosen = consistent_ways(moments, making.recording.times_of([frames[name] for name in ways]))
     return {name: both[k][0] for (name, both), k in zip(ways.items(), chosen, strict=True)}
 
@@ -94,15 +100,22 @@ class People:
     def ways(self, k: int, posed: PosedPictures, poses: Sequence[Poses], turn: int, both: bool) -> list[PoseAndMiss]:
         """The pose of one of them in an example, its limbs found, given those of the others; or that both ways round.
 
-        `posed` are its own pictures, if it is made of them; each `turn` draws other ways to hold limbs.
+        `posed` are its own pictures, if it is made of them, or those of everybody; each `turn` draws other ways to hold
+        limbs. The mismatch of a single pose is not computed, but 0.
         """
         now = [of_actor[posed.name] for of_actor in poses]
-        cells = silhouettes_of([self.left_by_others(k, posed, now)], self.made[k].rig, COARSE_CELLS)
+        left = self.left_by_others(k, posed, now)
+        if left is self.shown[posed.name]:  # those of everybody, which others leave nothing of
+            return [(now[k], 0.0)]
+        cells = silhouettes_of([left], self.made[k].rig, COARSE_CELLS)
         search = (self.everybody, k, now, jax.tree.map(lambda leaf: leaf[0], cells), turn)
         return both_ways_round(*search) if both else [(with_limbs_found(*search), 0.0)]
 
     def fitted_again(self, k: int, making: Making, poses: Sequence[Poses]) -> MadeActor:
-        """One of the actors, its shape and poses fitted to what the others leave, where that agrees better with it."""
+        """One of the actors, its shape and poses fitted to what the others leave, where that agrees better with it.
+
+        The others are where their limbs were found, whether their own fit is taken or not.
+        """
         actor = self.made[k]
         pictures = [
             self.left_by_others(k, posed, [of_actor[posed.name] for of_actor in poses])
@@ -113,9 +126,9 @@ class People:
         found = jnp.stack([jnp.asarray(poses[k][posed.name]) for posed in pictures])
         near = eqx.tree_at(lambda estimate: estimate.poses, actor.estimate, found)
         estimate = fit_edges(actor.shape_model, near, silhouettes_of(pictures, actor.rig))
-        again = making.finished(pictures, estimate, actor.rough_poses, actor.unsuitable)
-        agrees = lambda made: overlap_of(made.upright_body, made.estimate.poses, pictures, made.rig)
-        return again if agrees(again) > agrees(actor) else actor
+        if making.overlap(pictures, estimate) <= making.overlap(pictures, actor.estimate):
+            return actor
+        return making.finished(pictures, estimate, actor.rough_poses, actor.unsuitable)
 
     def left_by_others(self, k: int, own: PosedPictures, poses: Sequence[Float[np.ndarray, "dof"]]) -> PosedPictures:
         """The masks of all people, which say nothing where the bodies of others than one of them are.

@@ -40,8 +40,9 @@ def stage_barrier(
     cameras take 2.2 ms in stages instead of 12.
 
     Args:
-        true_at_run_time: a condition that always holds when the program runs, but that the compiler cannot know, such
-            as a variance being positive; a constant would be optimised away together with the branch.
+        true_at_run_time: a condition that the compiler cannot know: one that always holds when the program runs, such
+            as a variance being positive, or whether there is anything to do. A constant would be optimised away
+            together with the branch.
         function: the stage.
         arguments: its arrays.
         keywords: what it needs beside them.

@@ -49,7 +49,7 @@ class KnownFrame:
     pose: Float[np.ndarray, "dof"]
     """The pose of all actors, upright in the recording's world."""
     agreement: float
-    """`MadeActor.agreement` of the actor for whom it is least."""
+    """`MadeActor.suitability` of the actor for whom it is least."""
 
 
 @dataclass(frozen=True)
@@ -260,7 +260,7 @@ def known_frames(made: Sequence[MadeActor]) -> tuple[KnownFrame, ...]:
         KnownFrame(
             frame=made[0].frames[name],
             pose=np.concatenate([np.asarray(actor.example_poses[name]) for actor in made]),
-            agreement=min(actor.agreement(name) for actor in made),
+            agreement=min(actor.suitability(name) for actor in made),
         )
         for name in shared
     )
