@@ -2,6 +2,8 @@
 
 import time
 from dataclasses import dataclass, field
+from threading import Event
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -98,6 +100,33 @@ def test_who_leaves_is_nobody_and_is_found_again(walking_dog, step):
     beside.close()
     assert solved is not None
     assert back > last
+
+
+@pytest.mark.parametrize("came", [0, 1, 5, 40])
+def test_what_was_found_catches_up_however_many_frames_come_meanwhile(walking_dog, step, came):
+    tracker, cells, offline = walking_dog
+    cells, exposures = np.asarray(cells[0]), iter(PERIOD * np.arange(100_000))
+    hold = lambda: beside.hold(HeldFrame(cells, ALL, next(exposures)))
+    tracked = []
+
+    def slow_step(moment, _cells, _present, exposed):
+        tracked.append(exposed)
+        for _ in range(came):
+            hold()
+        return moment, SimpleNamespace(result=SimpleNamespace(energy=1.0)), None
+
+    slow_step.start = step.start
+    beside = SearchBeside(StandInSearch((tracker.body,), [np.array(offline.poses[0])], seconds=0.0), step)
+    beside.step = slow_step
+    for _ in range(100):
+        hold()
+    beside._run(Event())
+    found = beside.taken()
+    assert found.exposed == tracked[-1]
+    assert len(beside._held) == 0
+    last = next(exposures) / PERIOD - 1
+    assert last - found.exposed / PERIOD <= max(3, 2 * came)
+    assert len(tracked) < 60
 
 
 @pytest.mark.parametrize(("tracked", "seconds"), [(False, 4.0), (True, 30.0)])

@@ -23,7 +23,8 @@ from sogjax.tracking.frame import FrameInput
 MOST_HELD = 256_000_000
 """Bytes of cells that are held while a search goes on; beyond, every other frame is let go."""
 NEARLY, HURRY = 3, 6
-"""Frames behind the present with which a search has caught up; one of so many that it is behind is left out."""
+"""Frames behind the present with which a search has caught up, or as many as come while one is tracked; one of so many
+that it is behind is left out, and as many as came meanwhile."""
 LONGEST_END = 30.0
 """Seconds that a search may take to notice that it was stopped: a thread that computes must not outlive the program."""
 LIKELIEST_AFTER = 3
@@ -203,14 +204,17 @@ class SearchBeside:
             if not self._held:  # forgotten
                 return None
             done = self._held[0].exposed + (guess.frame - 0.5) * SECONDS
+            behind = len(self._held)
         while not stopped.is_set():
             with self._lock:
+                came = max(len(self._held) - behind, 0)
                 while self._held and self._held[0].exposed <= done:
                     self._held.popleft()
                 behind = len(self._held)
-                if (behind <= NEARLY and energy > float("-inf")) or not behind:
+                if (behind <= max(NEARLY, came) and energy > float("-inf")) or not behind:
                     return Found(moment, sentence, done, energy)
-                frame = self._held[behind // HURRY]  # the more it is behind, the more frames are left out
+                left_out = min(behind // HURRY + came, behind - 1)  # on a slow machine, too, it comes nearer
+                frame = self._held[left_out]
             moment, tracked, _ = self.step(moment, frame.cells, frame.present, frame.exposed)
             done, energy = frame.exposed, float(tracked.result.energy)
         return None
