@@ -157,7 +157,7 @@ def test_what_is_compiled_beforehand_is_what_the_search_for_limbs_takes(walking_
     compile_search(tracker, *told[0])
     assert traces
     traces.clear()
-    LimbSearch.of(tracker).better_pose(cells[1], replace(right, capacities=capacities[0]), 1)
+    LimbSearch.of(tracker, capacities[0]).better_pose(cells[1], replace(right, capacities=capacities[0]), 1)
     assert not traces
 
 
@@ -174,13 +174,13 @@ def test_a_pose_is_the_less_likely_the_deeper_a_leg_is_in_the_other():
 @pytest.mark.slow
 def test_no_pass_begins_where_one_went_in_vain(walking_dog, monkeypatch):
     tracker, cells, right = walking_dog
-    search = LimbSearch.of(tracker)
+    search = LimbSearch.of(tracker, right.capacities)
     other = right.poses[1].copy()
     other[search.units[0].all_dofs] += 0.5
     monkeypatch.setattr(LimbSearch, "held_otherwise", lambda *_: None)
     monkeypatch.setattr(LimbSearch, "_starts", lambda *_: (other[None], other[:0].reshape(0, len(other))))
     monkeypatch.setattr(LimbSearch, "possible", lambda _, known, poses: np.ones(len(poses), bool))
-    monkeypatch.setattr(limb_search, "climbed_in", lambda _, views, start, share: (start, jnp.ceil(share)))
+    monkeypatch.setattr(limb_search, "climbed_in", lambda _, views, start, share, room: (start, jnp.ceil(share)))
     better = lambda row: search.better_pose(cells[row], right, row)
     assert np.array_equal(better(1), other)
     search.note_in_vain([1], [other], [0.1])
@@ -199,14 +199,14 @@ def test_no_pass_begins_where_one_went_in_vain(walking_dog, monkeypatch):
 def test_a_climb_makes_its_share_of_the_solvers_iterations(walking_dog):
     tracker, cells, right = walking_dog
     pose = right.poses[1]
-    search, start = LimbSearch.of(tracker), pose + np.float32(0.1)
-    views = search.views(on_device(cells[1]), pose, right.capacities)
-    climb = lambda share: climbed_in(tracker, views, jnp.asarray(start), jnp.asarray(share, pose.dtype))
+    search, start = LimbSearch.of(tracker, right.capacities), pose + np.float32(0.1)
+    views = search.views(on_device(cells[1]), pose)
+    climb = lambda share: climbed_in(tracker, views, start, share, right.capacities)
     (unmoved, first), (_, few), (_, last) = map(climb, (0.0, 0.04, 1.0))
     np.testing.assert_array_equal(unmoved, start)
     assert first < few < last
     ends, gains = search.climbed(views, pose, np.stack([start, pose]), np.array([1.0, 0.0]))
-    known = climbed_in(tracker, views, jnp.asarray(pose), jnp.asarray(0.0, pose.dtype))[1]
+    known = climbed_in(tracker, views, pose, 0.0, right.capacities)[1]
     np.testing.assert_array_equal(ends[1], pose)
     np.testing.assert_allclose(gains, [last - known, 0.0], atol=1e-3)
 

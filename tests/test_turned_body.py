@@ -96,7 +96,7 @@ def test_an_actor_that_is_followed_back_to_front_is_turned(back_to_front):
 def test_an_actor_that_is_followed_rightly_is_not_turned(back_to_front):
     tracker, cells, poses, _ = back_to_front
     right = pass_of([*track(tracker, jnp.asarray(poses[0], jnp.float32), cells)])
-    search = LimbSearch.of(tracker)
+    search = LimbSearch.of(tracker, right.capacities)
     wholes = [part for part in body_parts(tracker.body) if part.whole is None]
     assert all(turned_pose(search, wholes, cells[row], right, row) is None for row in turning_rows(FRAMES, 30.0))
 
@@ -104,8 +104,8 @@ def test_an_actor_that_is_followed_rightly_is_not_turned(back_to_front):
 @pytest.mark.slow
 def test_more_poses_than_one_program_takes_are_climbed_as_few_are(back_to_front):
     tracker, cells, _, passed = back_to_front
-    search, known = LimbSearch.of(tracker), passed.poses[0]
-    views = search.views(on_device(cells[0]), known, passed.capacities)
+    search, known = LimbSearch.of(tracker, passed.capacities), passed.poses[0]
+    views = search.views(on_device(cells[0]), known)
     starts = known + np.linspace(-0.1, 0.1, 6, dtype=np.float32)[:, None]
     ends, gains = search.climbed(views, known, starts, np.full(6, 0.16))
     assert ends.shape == starts.shape

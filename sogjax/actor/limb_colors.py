@@ -16,8 +16,9 @@ from sogjax.model.limbs import limb_blobs
 from sogjax.search.body_parts import limb_groups
 
 UNLIKE = 0.1
-"""Mean distance of the colours (sRGB, 0 to 1) of left and right blobs from which on a limb was not found. Of 98 actors
-of `experiments/whole_runs.py` 82 have at most 0.093; of the 16 others eleven had an arm that was not found."""
+"""Mean distance of the blobs' colours (sRGB, 0 to 1) from which on a limb and its counterpart, or either in two poses,
+do not show the same. Left and right of 82 of 98 actors of `experiments/whole_runs.py` are at most 0.093 apart; of the
+16 others eleven had an arm that was not found."""
 LEAST_SEEN = 0.5
 """Part of a limb's blobs that two poses must both show for their colours to be compared."""
 FEWEST_ROWS = 3

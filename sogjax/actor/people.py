@@ -74,17 +74,17 @@ def people_apart(
     most = HIDDEN
     if len(bodies) < count:
         bodies, most = cut_apart(bodies, count, cube.spacing, up), TOUCHED
+    places = [cube.middle(body) for body in bodies]
     regions = {
-        k: _regions([pixels[k].silhouette_of(body) for body in bodies], _depths(bodies, cube, cameras[k]), pixels[k])
+        k: _regions([pixels[k].silhouette_of(body) for body in bodies], _depths(places, cameras[k]), pixels[k])
         for k in masks
     }
     people = []
-    for number, body in enumerate(bodies):
+    for number, place in enumerate(places):
         own = {k: of_camera[number].around for k, of_camera in regions.items() if of_camera[number].hidden <= most}
         apart = {k: [one for j, one in enumerate(regions[k]) if j != number and one.hidden <= most] for k in own}
         others = {k: np.any([np.zeros_like(own[k]), *(one.around for one in apart[k])], axis=0) for k in own}
         limited = {k: masks[k] & region for k, region in own.items()}
-        place = cube.points[body].mean(axis=0)
         people.append(PersonSeen(frame, place, own, others, limited, color_histogram(pictures, limited)))
     return people
 
@@ -151,10 +151,10 @@ def _pieces_joined(parts: list[Bool[np.ndarray, "x y z"]], spacing: float) -> li
     return list(bodies.values())
 
 
-def _depths(bodies: Sequence[Bool[np.ndarray, "voxel"]], cube: Cube, camera: Camera) -> list[float]:
-    """The depth of each body's middle in a camera's picture, metres."""
+def _depths(places: Sequence[Float[np.ndarray, "3"]], camera: Camera) -> list[float]:
+    """The depth of places in a camera's picture, metres."""
     pose = np.asarray(camera.camera_from_world, float)
-    return [float(pose[2, :3] @ cube.points[body].mean(axis=0) + pose[2, 3]) for body in bodies]
+    return [float(pose[2, :3] @ place + pose[2, 3]) for place in places]
 
 
 class _Region(NamedTuple):

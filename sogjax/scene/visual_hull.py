@@ -47,6 +47,11 @@ class Cube:
         steps = (np.arange(VOXELS) - (VOXELS - 1) / 2) * self.spacing
         return (np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1) + self.centre).reshape(-1, 3)
 
+    def middle(self, voxels: Bool[np.ndarray, "voxel"]) -> Float[np.ndarray, "3"]:
+        """The mean of the centres of some voxels; there must be one."""
+        places = np.argwhere(voxels.reshape(3 * (VOXELS,))).mean(axis=0)
+        return self.centre + (places - (VOXELS - 1) / 2) * self.spacing
+
 
 @dataclass(frozen=True)
 class VoxelPixels:

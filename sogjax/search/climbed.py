@@ -1,14 +1,16 @@
 """Poses of a frame climbed with the tracker's energy, without history."""
 
-import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+import numpy as np
+from jaxtyping import Array, Float, Int
 
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History
 from sogjax.energy.views import Views
 from sogjax.model.program import compiled
 from sogjax.search.worth import worth
+from sogjax.tracking.capacity import Needed, with_room
+from sogjax.tracking.culling import Capacities
 from sogjax.tracking.tracker import Tracker
 
 FEW, MORE = 0.16, 0.64
@@ -16,13 +18,36 @@ FEW, MORE = 0.16, 0.64
 climbed already, and from others."""
 
 
-@compiled
+Climbed = tuple[Float[Array, "dof"], Float[Array, ""]]
+"""A pose, and what it is worth."""
+
+
 def climbed_in(
-    tracker: Tracker, views: Views, start: Float[Array, "dof"], share: Float[Array, ""]
-) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
-    """A pose climbed with the tracker's energy and a share of its solver's most iterations, and what it is worth."""
+    tracker: Tracker,
+    views: Views,
+    start: Float[np.ndarray | Array, "dof"],
+    share: float,
+    capacities: Capacities,
+) -> Climbed:
+    """A pose climbed with the tracker's energy and a share of its solver's most iterations, and what it is worth.
+
+    There is room for the near pairs of `capacities`, and for more where that needs them.
+    """
+    start = jnp.asarray(start)
+    part = jnp.asarray(share, start.dtype)
+
+    def climb(room: Capacities) -> tuple[Climbed, Needed]:
+        pose, value, blocks = _climbed_in(tracker, views, start, part, Capacities(0, 0, room.blocks))
+        return (pose, value), (0, 0, blocks)
+
+    return with_room(climb, capacities)
+
+
+@compiled
+def _climbed_in(
+    tracker: Tracker, views: Views, start: Float[Array, "dof"], share: Float[Array, ""], room: Capacities
+) -> tuple[Float[Array, "dof"], Float[Array, ""], Int[Array, ""]]:
     energy = FrameEnergy(tracker.body, views, History.unknown(start), tracker.terms)
     most = jnp.ceil(share * tracker.solver.max_iterations).astype(jnp.int32)
-    solver = eqx.tree_at(lambda solver: solver.max_iterations, tracker.solver, most)
-    found = solver.maximize(energy, start, tracker.scales)
-    return found.params, worth(energy, tracker.solid, found.params, found.value)
+    found, blocks = tracker.solved(energy, start, room, most)
+    return found.params, worth(energy, tracker.solid, found.params, found.value), blocks

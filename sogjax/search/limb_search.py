@@ -53,17 +53,18 @@ MOST_ROUNDS = 3
 class LimbSearch:
     """Looks for better ways to hold limbs, in one key frame after the other."""
 
-    def __init__(self, tracker: Tracker, units: Sequence[Unit]) -> None:
+    def __init__(self, tracker: Tracker, units: Sequence[Unit], capacities: Capacities) -> None:
         self.tracker, self.units, self.arrays = tracker, units, UnitArrays.of(tracker.body, units)
+        self.capacities = capacities
         self._turn = 0
         self._carried: HeldOtherwise | None = None
         self._in_vain: dict[int, list[tuple[np.ndarray, int]]] = {}
 
     @classmethod
-    def of(cls, tracker: Tracker) -> "LimbSearch | None":
-        """The search for the limbs of a tracker's body; None: it has none."""
+    def of(cls, tracker: Tracker, capacities: Capacities) -> "LimbSearch | None":
+        """The search for the limbs of a tracker's body, in frames that need about so much room; None: it has none."""
         units = units_of(tracker.body)
-        return cls(tracker, units) if units else None
+        return cls(tracker, units, capacities) if units else None
 
     def note_in_vain(
         self, rows: Sequence[int], poses: Sequence[Float[np.ndarray, "dof"]], gained: Sequence[float]
@@ -86,7 +87,7 @@ class LimbSearch:
         From a better pose the limbs are searched again: one may have been in the place of another.
         """
         first = passed.poses[row]
-        views = self.views(on_device(frame), first, passed.capacities)
+        views = self.views(on_device(frame), first)
         pose = self.with_better_limbs(views, first, first, passed.energy, self._in_vain.get(row, []))
         return None if pose is first else pose
 
@@ -117,9 +118,9 @@ class LimbSearch:
         moved = np.linalg.norm(means_of(self.tracker.body, poses) - means_of(self.tracker.body, pose[None]), axis=-1)
         return np.max([moved[:, blobs].mean(axis=1) for unit in self.units for blobs in unit.blobs], axis=0)
 
-    def views(self, frame: FrameInput, pose: Float[np.ndarray, "dof"], capacities: Capacities) -> Views:
+    def views(self, frame: FrameInput, pose: Float[np.ndarray, "dof"]) -> Views:
         """What the cameras see where limbs may be held."""
-        return views_near(self.tracker, frame, jnp.asarray(pose), capacities, REACH)
+        return views_near(self.tracker, frame, jnp.asarray(pose), self.capacities, REACH)
 
     def held_otherwise(self, views: Views, pose: Float[np.ndarray, "dof"]) -> "HeldOtherwise":
         """Ways to hold limbs around a pose; some of the next frame's are those found here."""
@@ -160,8 +161,7 @@ class LimbSearch:
     ) -> tuple[Float[np.ndarray, "start dof"], Float[np.ndarray, "start"]]:
         """Poses climbed, each by a share of the solver's most iterations, and what they gain over a known pose."""
         tried = [*zip(starts, shares, strict=True), (known, 0.0)]
-        number = lambda value: jnp.asarray(value, known.dtype)
-        climb = lambda each: jax.device_get(climbed_in(self.tracker, views, *map(number, each)))
+        climb = lambda each: jax.device_get(climbed_in(self.tracker, views, each[0], float(each[1]), self.capacities))
         found = in_threads(climb, tried)
         values = np.array([value for _, value in found])
         return np.stack([end for end, _ in found])[:-1], values[:-1] - values[-1]
@@ -219,10 +219,12 @@ class LimbSearch:
 
 def compile_search(tracker: Tracker, state: TrackState, frame: FrameInput, capacities: Capacities) -> None:
     """Compile beforehand what a search for limbs needs, in a frame, while other work goes on."""
-    search = LimbSearch.of(tracker)
+    search = LimbSearch.of(tracker, capacities)
     if search is not None and tracker.limbs is not None:
         pose = np.asarray(state.previous)
-        search.held_otherwise(search.views(frame, pose, capacities), pose)
+        views = search.views(frame, pose)
+        search.held_otherwise(views, pose)
+        search.climbed(views, pose, pose[None], np.zeros(1))
 
 
 MOST_WHOLE = 3

@@ -104,7 +104,7 @@ def merge_passes(
     of `passed`; the tracker must judge limbs.
     """
     own = {name: getattr(passed, name).copy() for name in ("poses", "doubts", "energies")}
-    revising = _Revising(tracker, replace(passed, **own), frames)
+    revising = _Revising(tracker, replace(passed, **own, climbed={}), frames)
     if misplaced is not None:
         revising.place_actors(misplaced)
     revising.turn_actors(turning_rows)
@@ -141,10 +141,11 @@ class _Revising:
 
         Frames that changed meanwhile are searched again: a limb may have been in the place of another.
         """
-        search = LimbSearch.of(self.tracker)
+        search = LimbSearch.of(self.tracker, self.passed.capacities)
         if search is None:
             return
         self._search_limbs(search, rows, report)
+        report(0.0)  # how long the rest takes depends on what was found
         for _ in range(MOST_SWEEPS - 1):
             changed = [row for row in rows if row in self._changed]
             self._changed.clear()
@@ -158,7 +159,7 @@ class _Revising:
 
     def place_actors(self, misplaced: Misplaced) -> None:
         """See where it leads if an actor of whom little is explained is where he is found again."""
-        search = LimbSearch.of(self.tracker)
+        search = LimbSearch.of(self.tracker, self.passed.capacities)
         for row, actor in misplaced.places():
             if search is None or self._tired():
                 break
@@ -173,7 +174,8 @@ class _Revising:
 
     def turn_actors(self, rows: Sequence[int]) -> None:
         """See where it leads if an actor is back to front in some frames."""
-        search, wholes = LimbSearch.of(self.tracker), [part for part in self.parts if part.whole is None]
+        search = LimbSearch.of(self.tracker, self.passed.capacities)
+        wholes = [part for part in self.parts if part.whole is None]
         for row in rows:
             if search is None or self._tired():
                 break
@@ -188,7 +190,7 @@ class _Revising:
 
         First one limb by itself, then all that jump there.
         """
-        search, body = LimbSearch.of(self.tracker), self.tracker.body
+        search, body = LimbSearch.of(self.tracker, self.passed.capacities), self.tracker.body
         for at_once in (1, 2):
             tried: set[int] = set()
             while search is not None and not self._tired():
@@ -271,7 +273,7 @@ class _Revising:
         changed = [(int(k), int(rows[k])) for k in np.flatnonzero(taken.any(axis=1))]
         poses = in_threads(lambda at: self._merged(self.passed.poses[at[1]], found, at[0], taken[at[0]]), changed)
         merged = {row: pose for (_, row), pose in zip(changed, poses, strict=True)}
-        gained = in_threads(lambda at: self._gained(found, at[0], self.passed.poses[at[1]], merged[at[1]]), changed)
+        gained = in_threads(lambda at: self._gained(found, at[0], merged[at[1]]), changed)
         if not sum(gained) > 0.0:
             self._looked_at += len(rows)
             return set()
@@ -297,6 +299,7 @@ class _Revising:
             taken = elsewhere & by_itself & np.isin(rows, [*merged])[:, None]
         for row, pose in merged.items():
             self.passed.poses[row] = pose
+            self.passed.climbed.pop(row, None)
         in_threads(lambda k: self._revise(found.rows[k], found.cells[k]), np.flatnonzero(np.isin(rows, [*merged])))
         self._changed |= set(merged)
         self._tracklets.forget(merged)
@@ -310,13 +313,13 @@ class _Revising:
         limbs = [[k for k, name in enumerate(names) if name in part.names] for part in self.parts]
         return np.stack([self.passed.doubts[rows][:, of_part].max(axis=1, initial=0.0) for of_part in limbs], axis=1)
 
-    def _gained(
-        self, found: Compared, k: int, pose: Float[np.ndarray, "dof"], merged: Float[np.ndarray, "dof"]
-    ) -> float:
+    def _gained(self, found: Compared, k: int, merged: Float[np.ndarray, "dof"]) -> float:
         """What a frame gains with a merged pose, which may be that of the other pass, once both are climbed."""
         if np.array_equal(merged, found.poses[k]):
             return found.gained[k]
-        return BothSeen.of(self.tracker, found.cells[k], self.passed.capacities, pose, merged).climbed_gain
+        row, passed = found.rows[k], self.passed
+        seen = BothSeen.of(self.tracker, found.cells[k], passed.capacities, passed.poses[row], merged)
+        return seen.climbed_gain(passed.climbed, row)
 
     def _merged(
         self, pose: Float[np.ndarray, "dof"], found: Compared, k: int, taken: Bool[np.ndarray, "part"]
@@ -328,8 +331,9 @@ class _Revising:
         if alike:
             return found.poses[k].copy()
         mixed = jnp.asarray(merged_pose(self.tracker.body, self.parts, pose, found.poses[k], taken))
-        views = views_near(self.tracker, on_device(found.cells[k]), mixed, self.passed.capacities)
-        return np.asarray(climbed_in(self.tracker, views, mixed, jnp.asarray(MORE, mixed.dtype))[0])
+        room = self.passed.capacities
+        views = views_near(self.tracker, on_device(found.cells[k]), mixed, room)
+        return np.asarray(climbed_in(self.tracker, views, mixed, MORE, room)[0])
 
     def _revise(self, row: int, frame: AnyFrame) -> None:
         """Note what the pose of a frame, which changed, is worth."""

@@ -67,14 +67,14 @@ class Misplaced:
         for optimum in search(self._searchers[actor], self._seen(frame, known, actor)):
             pose = known.copy()
             pose[whole.dofs] = optimum.pose
-            views = limbs.views(on_device(frame), pose, passed.capacities)
+            views = limbs.views(on_device(frame), pose)
             pose = limbs.climbed(views, pose, pose[None], np.array([WHOLE]))[0][0]
             gain = BothSeen.of(self.tracker, frame, passed.capacities, known, pose).gain
             if gain > best and limbs.possible(known, pose[None])[0]:
                 found, best = pose, gain
         if found is None:
             return None
-        views = limbs.views(on_device(frame), found, passed.capacities)
+        views = limbs.views(on_device(frame), found)
         return limbs.with_better_limbs(views, found, found, passed.energy)
 
     def _seen(self, frame: AnyFrame, pose: Float[np.ndarray, "dof"], actor: int) -> SeenFrame:

@@ -63,6 +63,8 @@ class Pass:
     energies: Float[np.ndarray, "frame"]
     capacities: Capacities
     """The capacities of the last frame."""
+    climbed: dict[int, Float[np.ndarray | Array, "dof"]] = field(default_factory=dict)
+    """What came of those poses that were climbed without history, by their rows; whoever changes a pose drops it."""
 
     @property
     def energy(self) -> float:
@@ -170,7 +172,7 @@ def compared(
         found.add(row, np.asarray(both[1]), apart)
         if patience is not None or differ(k).any():
             seen = BothSeen.of(tracker, found.cells[k], tracked.capacities, *both)
-            found.gained[k] = seen.climbed_gain
+            found.gained[k] = seen.climbed_gain(passed.climbed, row)
             waiting.extend([(k, seen)] if spared is None else [])
         promising = promising or sum(found.gained) >= LEAST_GAIN * passed.energy
         while waiting and (promising or len(waiting) > MOST_WAITING):
@@ -198,6 +200,8 @@ class BothSeen:
     views: tuple[Views, ...]
     """What is seen around both. Where something stands in front, or there are keypoints, twice: with what is hidden of
     the one, and whose keypoints they are beside it, and with that of the other."""
+    capacities: Capacities
+    """Room for what is seen around one of them."""
 
     @classmethod
     def of(
@@ -213,7 +217,7 @@ class BothSeen:
         alike = tracker.reader.occluders is None and keypoint_term_among(tracker.terms) is None
         orders = (poses,) if alike else (poses, poses[::-1])
         views = tuple(views_near(tracker, seen, one, capacities, REACH, two) for one, two in orders)
-        return cls(tracker, poses, views)
+        return cls(tracker, poses, views, capacities)
 
     @cached_property
     def values(self) -> Float[np.ndarray, "view 2"]:
@@ -225,16 +229,19 @@ class BothSeen:
         """The rise of the energy with the other pose: the mean over the views."""
         return float(np.mean(self.values[:, 1] - self.values[:, 0]))
 
-    @cached_property
-    def climbed_gain(self) -> float:
+    def climbed_gain(self, climbed: dict[int, Float[np.ndarray | Array, "dof"]], row: int) -> float:
         """The rise of the energy with the other pose once both are climbed from where they are.
 
         Tracking leaves each pose short of its optimum, by 0.2 to 0.5 % of the energy and by more where it was tracked
-        less long: that is more than two ways to hold an arm differ by.
+        less long: that is more than two ways to hold an arm differ by. The known pose is climbed once: what comes of
+        it is kept, by its row, among those that are `climbed`.
         """
-        few = jnp.asarray(FEW, self.poses.dtype)
-        value = lambda near, pose: float(climbed_in(self.tracker, near, pose, few)[1])
-        return float(np.mean([value(near, self.poses[1]) - value(near, self.poses[0]) for near in self.views]))
+        climb = lambda near, pose, share: climbed_in(self.tracker, near, pose, share, self.capacities)
+        others = [climb(near, self.poses[1], FEW)[1] for near in self.views]
+        known = climbed.get(row)
+        ends = [climb(near, self.poses[0], FEW) if known is None else climb(near, known, 0.0) for near in self.views]
+        climbed.setdefault(row, ends[0][0])
+        return float(np.mean([float(other) - float(end[1]) for other, end in zip(others, ends, strict=True)]))
 
 
 def _differ(parts: Sequence[Part], apart: Bool[np.ndarray, "part"]) -> Bool[np.ndarray, "part"]:

@@ -44,7 +44,7 @@ def turned_pose(
 ) -> Float[np.ndarray, "dof"] | None:
     """The pose of a frame with an actor back to front and its limbs held as fits then, if that is worth more."""
     known, best = passed.poses[row], WORTH * passed.energy
-    views, found = search.views(on_device(frame), known, passed.capacities), None
+    views, found = search.views(on_device(frame), known), None
     others = look_alikes(search.tracker.body, known)
     for whole in wholes:
         ways = turned(search.tracker.body, whole, known, others)

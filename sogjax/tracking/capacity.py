@@ -22,8 +22,8 @@ BLOCK_HEADROOM = 1.25
 
 Found = TypeVar("Found")
 
-Needed = tuple[Int[Array, ""], Int[Array, ""]]
-"""Image blobs of one camera, near and matching, at most: what capacities must hold."""
+Needed = tuple[Int[Array, ""] | int, Int[Array, ""] | int, Int[Array, ""] | int]
+"""Image blobs of one camera, near and matching, at most, and blocks of near pairs: what capacities must hold."""
 
 
 def with_room(compute: Callable[[Capacities], tuple[Found, Needed]], capacities: Capacities) -> Found:
@@ -34,10 +34,10 @@ def with_room(compute: Callable[[Capacities], tuple[Found, Needed]], capacities:
     """
     while True:
         found, needed = compute(capacities)
-        near, matching = (int(count) for count in jax.device_get(needed))
-        if capacities.hold(near, matching):
+        near, matching, blocks = (int(count) for count in jax.device_get(needed))
+        if capacities.hold(near, matching, blocks):
             return found
-        capacities = larger_capacities(capacities, near, matching, 0)
+        capacities = larger_capacities(capacities, near, matching, blocks)
 
 
 def views_near(
@@ -67,7 +67,7 @@ def _views_near(
     more = beyond * jnp.max(boxes[..., 1, :] - boxes[..., 0, :], axis=-1, keepdims=True)
     wide = jnp.stack([boxes[..., 0, :] - more, boxes[..., 1, :] + more], axis=-2)
     views, near, matching = tracker.views(frame, states[0], capacities, wide)
-    return views, (jnp.max(near), jnp.max(matching))
+    return views, (jnp.max(near), jnp.max(matching), 0)
 
 
 def larger_capacities(capacities: Capacities, near: int, matching: int, blocks: int) -> Capacities:

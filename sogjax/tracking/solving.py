@@ -29,20 +29,27 @@ class RoundsState(eqx.Module):
 
 
 def solve_near(
-    solver: Solver, objective: FrameEnergy, start: Float[Array, "dof"], scales: Scales, capacity: int
+    solver: Solver,
+    objective: FrameEnergy,
+    start: Float[Array, "dof"],
+    scales: Scales,
+    capacity: int,
+    most: Int[Array, ""] | None = None,
 ) -> tuple[Solution, Int[Array, ""]]:
     """The solution with only the pairs that matter, and how many blocks of them there were at most.
 
     A round makes the lists at the pose that it starts from. Where it ends too far from there, the next round starts at
     its end; a solution is converged only if it lies where its own lists hold. A count above `capacity` means that
-    blocks were cut off.
+    blocks were cut off. All rounds together make at most so many iterations; None: each as many as the solver may.
     """
     posed = objective.body.posed_blobs
+    left = lambda made: solver if most is None else eqx.tree_at(lambda each: each.max_iterations, solver, most - made)
+    more = lambda made: True if most is None else made < most
 
     def one_round(state: RoundsState) -> RoundsState:
         start = state.solution.params
         near, num_blocks = objective.near(start, capacity)
-        solution = solver.maximize(near, start, scales)
+        solution = left(state.solution.iterations).maximize(near, start, scales)
         moved = displacement(objective.views.cameras, posed(start), posed(solution.params))
         return RoundsState(
             solution=Solution(
@@ -60,7 +67,12 @@ def solve_near(
     none = jnp.asarray(0)
     nothing = Solution(start, jnp.zeros((), start.dtype), none, none, jnp.asarray(False))
     state = RoundsState(nothing, none, none, jnp.asarray(False))
-    end = jax.lax.while_loop(lambda state: ~state.settled & (state.round < MAX_ROUNDS), one_round, state)
+
+    def unsettled(state: RoundsState) -> Bool[Array, ""]:
+        again = ~state.settled & (state.round < MAX_ROUNDS) & more(state.solution.iterations)
+        return again | (state.round == 0)
+
+    end = jax.lax.while_loop(unsettled, one_round, state)
     solution = eqx.tree_at(lambda s: s.converged, end.solution, end.solution.converged & end.settled)
     return solution, end.num_blocks
 

@@ -217,7 +217,7 @@ class Tracker(eqx.Module):
         views, num_near, num_matching = seen
         history = History(state.previous, state.before_previous, state.num_known == 2)
         objective = FrameEnergy(self.body, views, history, self.terms)
-        solution, num_blocks = self._solved(objective, self.predicted(state), capacities)
+        solution, num_blocks = self.solved(objective, self.predicted(state), capacities)
         result = FrameResult(
             pose=solution.params,
             energy=solution.value,
@@ -267,9 +267,18 @@ class Tracker(eqx.Module):
         found = limb_confidence(self.limbs, evidence, baseline, windows is not None)
         return replace(found, explained=fit.explained, overlap=fit.overlap)
 
-    def _solved(
-        self, objective: FrameEnergy, start: Float[Array, "dof"], capacities: Capacities
+    def solved(
+        self,
+        objective: FrameEnergy,
+        start: Float[Array, "dof"],
+        capacities: Capacities,
+        most: Int[Array, ""] | None = None,
     ) -> tuple[Solution, Int[Array, ""]]:
+        """What the solver finds from a pose, and how many blocks of near pairs that needs room for.
+
+        In at most so many iterations; None: as many as the solver may make.
+        """
         if self.pairs == "sparse":
-            return solve_near(self.solver, objective, start, self.scales, capacities.blocks)
-        return self.solver.maximize(objective, start, self.scales), jnp.asarray(0)
+            return solve_near(self.solver, objective, start, self.scales, capacities.blocks, most)
+        solver = self.solver if most is None else eqx.tree_at(lambda each: each.max_iterations, self.solver, most)
+        return solver.maximize(objective, start, self.scales), jnp.asarray(0)
