@@ -148,3 +148,7 @@ def test_lists_are_made_anew_until_the_pose_lies_where_they_hold():
     assert 0 < count <= 64
     np.testing.assert_allclose(sparse.value, objective(sparse.params), rtol=AGREEMENT)
     assert sparse.value > 0.99 * dense.value
+    bounded, _ = solve(solver, objective, start, scales, 64, jnp.asarray(4))
+    assert float(moved(rig.cameras, body, start, bounded.params)) > 1.0
+    assert 0 < bounded.iterations <= 4
+    np.testing.assert_allclose(bounded.value, objective(bounded.params), rtol=AGREEMENT)

@@ -228,6 +228,11 @@ def test_voxels_lie_where_the_camera_sees_them():
     np.testing.assert_allclose(found.rows[::997], pixels[:, 1], atol=0.51)
 
 
+def test_the_middle_of_voxels_is_the_mean_of_their_centres():
+    cube, some = Cube(CENTRE, 0.5), np.random.default_rng(0).random(64**3) < 0.1
+    np.testing.assert_allclose(cube.middle(some), cube.points[some].mean(axis=0), atol=1e-9)
+
+
 def test_a_camera_of_smaller_pictures_sees_the_same_points():
     _, cameras = sphere_masks()
     camera, half = cameras[0], resized(cameras[0], (160, 120))

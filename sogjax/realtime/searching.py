@@ -24,7 +24,7 @@ MOST_HELD = 256_000_000
 """Bytes of cells that are held while a search goes on; beyond, every other frame is let go."""
 NEARLY, HURRY = 3, 6
 """Frames behind the present with which a search has caught up, or as many as come while one is tracked; one of so many
-that it is behind is left out, and as many as came meanwhile."""
+that it is behind is left out, and as many as came meanwhile (the lesser of the last two times: one may be slow)."""
 LONGEST_END = 30.0
 """Seconds that a search may take to notice that it was stopped: a thread that computes must not outlive the program."""
 LIKELIEST_AFTER = 3
@@ -204,10 +204,11 @@ class SearchBeside:
             if not self._held:  # forgotten
                 return None
             done = self._held[0].exposed + (guess.frame - 0.5) * SECONDS
-            behind = len(self._held)
+            behind, latest = len(self._held), 0
         while not stopped.is_set():
             with self._lock:
-                came = max(len(self._held) - behind, 0)
+                before, latest = latest, max(len(self._held) - behind, 0)
+                came = min(before, latest)
                 while self._held and self._held[0].exposed <= done:
                     self._held.popleft()
                 behind = len(self._held)

@@ -37,7 +37,8 @@ def climbed_in(
     part = jnp.asarray(share, start.dtype)
 
     def climb(room: Capacities) -> tuple[Climbed, Needed]:
-        pose, value, blocks = _climbed_in(tracker, views, start, part, Capacities(0, 0, room.blocks))
+        only_blocks = Capacities(0, 0, room.blocks)  # one program, whatever room the views have for image blobs
+        pose, value, blocks = _climbed_in(tracker, views, start, part, only_blocks)
         return (pose, value), (0, 0, blocks)
 
     return with_room(climb, capacities)

@@ -104,7 +104,7 @@ def merge_passes(
     of `passed`; the tracker must judge limbs.
     """
     own = {name: getattr(passed, name).copy() for name in ("poses", "doubts", "energies")}
-    revising = _Revising(tracker, replace(passed, **own, climbed={}), frames)
+    revising = _Revising(tracker, replace(passed, **own), frames)
     if misplaced is not None:
         revising.place_actors(misplaced)
     revising.turn_actors(turning_rows)

@@ -63,7 +63,7 @@ class Pass:
     energies: Float[np.ndarray, "frame"]
     capacities: Capacities
     """The capacities of the last frame."""
-    climbed: dict[int, Float[np.ndarray | Array, "dof"]] = field(default_factory=dict)
+    climbed: dict[int, Float[np.ndarray | Array, "dof"]] = field(default_factory=dict, init=False, compare=False)
     """What came of those poses that were climbed without history, by their rows; whoever changes a pose drops it."""
 
     @property
@@ -233,15 +233,19 @@ class BothSeen:
         """The rise of the energy with the other pose once both are climbed from where they are.
 
         Tracking leaves each pose short of its optimum, by 0.2 to 0.5 % of the energy and by more where it was tracked
-        less long: that is more than two ways to hold an arm differ by. The known pose is climbed once: what comes of
-        it is kept, by its row, among those that are `climbed`.
+        less long: that is more than two ways to hold an arm differ by. Where what is seen does not depend on the other
+        pose but for its extent, the known one is climbed once: what comes of it is added to those `climbed`, by row.
         """
         climb = lambda near, pose, share: climbed_in(self.tracker, near, pose, share, self.capacities)
-        others = [climb(near, self.poses[1], FEW)[1] for near in self.views]
-        known = climbed.get(row)
-        ends = [climb(near, self.poses[0], FEW) if known is None else climb(near, known, 0.0) for near in self.views]
-        climbed.setdefault(row, ends[0][0])
-        return float(np.mean([float(other) - float(end[1]) for other, end in zip(others, ends, strict=True)]))
+        others, first = [climb(near, self.poses[1], FEW)[1] for near in self.views], self.views[0]
+        if len(self.views) > 1:
+            known = [climb(near, self.poses[0], FEW)[1] for near in self.views]
+        elif row in climbed:
+            known = [climb(first, climbed[row], 0.0)[1]]
+        else:
+            climbed[row], value = climb(first, self.poses[0], FEW)
+            known = [value]
+        return float(np.mean([float(other) - float(value) for other, value in zip(others, known, strict=True)]))
 
 
 def _differ(parts: Sequence[Part], apart: Bool[np.ndarray, "part"]) -> Bool[np.ndarray, "part"]:

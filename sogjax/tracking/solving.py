@@ -40,11 +40,11 @@ def solve_near(
 
     A round makes the lists at the pose that it starts from. Where it ends too far from there, the next round starts at
     its end; a solution is converged only if it lies where its own lists hold. A count above `capacity` means that
-    blocks were cut off. All rounds together make at most so many iterations; None: each as many as the solver may.
+    blocks were cut off. All rounds together make at most `most` iterations, of which a last one may make none: it
+    values the end by lists that hold there. None: each round makes as many as the solver may.
     """
     posed = objective.body.posed_blobs
     left = lambda made: solver if most is None else eqx.tree_at(lambda each: each.max_iterations, solver, most - made)
-    more = lambda made: True if most is None else made < most
 
     def one_round(state: RoundsState) -> RoundsState:
         start = state.solution.params
@@ -67,12 +67,7 @@ def solve_near(
     none = jnp.asarray(0)
     nothing = Solution(start, jnp.zeros((), start.dtype), none, none, jnp.asarray(False))
     state = RoundsState(nothing, none, none, jnp.asarray(False))
-
-    def unsettled(state: RoundsState) -> Bool[Array, ""]:
-        again = ~state.settled & (state.round < MAX_ROUNDS) & more(state.solution.iterations)
-        return again | (state.round == 0)
-
-    end = jax.lax.while_loop(unsettled, one_round, state)
+    end = jax.lax.while_loop(lambda state: ~state.settled & (state.round < MAX_ROUNDS), one_round, state)
     solution = eqx.tree_at(lambda s: s.converged, end.solution, end.solution.converged & end.settled)
     return solution, end.num_blocks
 

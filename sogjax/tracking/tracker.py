@@ -276,7 +276,7 @@ class Tracker(eqx.Module):
     ) -> tuple[Solution, Int[Array, ""]]:
         """What the solver finds from a pose, and how many blocks of near pairs that needs room for.
 
-        In at most so many iterations; None: as many as the solver may make.
+        `most` bounds the iterations of all rounds together; None: each makes as many as the solver may.
         """
         if self.pairs == "sparse":
             return solve_near(self.solver, objective, start, self.scales, capacities.blocks, most)
