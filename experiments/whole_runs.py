@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 from beside_truth import OFTEN, beside_truth
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.optimize import linear_sum_assignment
 
 from sogjax.errors import InputError
@@ -26,6 +27,7 @@ from sogjax.io.files import write_file, write_json
 from sogjax.io.ground_truth import GroundTruth, load_ground_truth
 from sogjax.io.motion import Motion, load_motion
 from sogjax.io.recording_files import BACKGROUND, CALIBRATION, EXAMPLE_POSES, GROUND_TRUTH, SETTINGS, VIDEOS
+from sogjax.quality.limb_warnings import AT_LEAST
 from sogjax.quality.verdict import Verdict
 from sogjax.run.run_files import METRICS, MOTION
 from sogjax.study.experiment import synth_settings
@@ -169,6 +171,33 @@ ROWS = (
     "fight 2 12 videos 195",
     "sit 1 12 videos 196",
     "arms 1 4 videos 197",
+    "fight 2 4 plates 203",
+    "couple 2 4 plates 204",
+    "talk 2 4 plates 205",
+    "hug 2 6 videos 206",
+    "dance 1 4 plates 208",
+    "sit 1 12 videos 209",
+    "sit 1 4 plates 210",
+    "run 1 4 videos 211",
+    "walk 1 4 videos 212",
+    "cartwheel 1 4 poses 213",
+    "throw 1 4 plates 214",
+    "arms 1 4 videos 215",
+    "stoop 1 6 videos 216",
+    "squat_kick 1 4 videos 217",
+    "walk 1 12 plates 218 props=counter",
+    "sit 1 6 poses 219",
+    "run 1 12 videos 220",
+    "dance 1 6 videos 221",
+    "throw 1 6 videos 222",
+    "arms 1 12 videos 223",
+    "cartwheel 1 12 videos 224",
+    "hug 2 4 plates 225",
+    "embrace 2 6 plates 226",
+    "talk 2 6 plates 227",
+    "stoop 1 4 poses 228",
+    "talk 2 12 plates 229",
+    "walk 1 4 plates 230",
 )
 GIVEN = {
     "plates": (SETTINGS, BACKGROUND, EXAMPLE_POSES),
@@ -176,6 +205,8 @@ GIVEN = {
     "videos": (),
 }
 COLUMNS = ("recording", "joints, mm", "a joint > 15 cm off, % of frames", "verdict")
+BOUNDS = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
+"""Of how likely a limb is lost, from which it could be named."""
 SHOWN = ((1e3, "mean"), (100, "astray"))
 LEAN = ("outputs.rerun=false", "outputs.overlay=false", "overwrite=true")
 
@@ -215,7 +246,7 @@ def _line(row: str, run: dict) -> str:
 def _kept(folder: Path) -> dict | None:
     path = folder / "found.json"
     found = _read(path) if path.is_file() else {}
-    return found if "actors" in found else None
+    return found if all("doubt" in actor for actor in found.get("actors", [{}])) else None
 
 
 def _read(path: Path) -> dict:
@@ -273,7 +304,14 @@ def _actor(motion: Motion, person: GroundTruth, verdict: Verdict) -> dict:
     assert beside is not None
     named = sorted({limb.name for limb in verdict.doubtful})
     said = {"sentence": verdict.sentence, "looks_right": verdict.looks_right, "subject_wrong": verdict.wrong}
-    return asdict(beside) | said | {"named": named}
+    return asdict(beside) | said | {"named": named, "doubt": _lasting_doubt(motion)}
+
+
+def _lasting_doubt(motion: Motion) -> float:
+    """How likely some limb is lost that is so in several frames in a row: up to there a bound names it."""
+    if motion.limb_doubt is None or len(motion.limb_doubt) < AT_LEAST:
+        return 0.0
+    return float(sliding_window_view(motion.limb_doubt, AT_LEAST, axis=0).min(axis=-1).max(initial=0.0))
 
 
 def _of_verdicts(runs: list[dict]) -> list[str]:
@@ -288,7 +326,10 @@ def _of_verdicts(runs: list[dict]) -> list[str]:
         "a limb is lost, and one of these is named": [bool(limbs(one) & {*one["named"]}) for one in lost],
         "refused": [not run["actors"] for run in runs],
     }
-    return [f"- {name}: {sum(true)} of {len(true)}" for name, true in groups.items()]
+    found = [f"- {name}: {sum(true)} of {len(true)}" for name, true in groups.items()]
+    named = lambda some, bound: f"{sum(one['doubt'] > bound for one in some)} of {len(some)}"
+    rows = [f"| {bound:g} | {named(wrong, bound)} | {named(right, bound)} |" for bound in BOUNDS]
+    return [*found, "", "| a limb named from | a joint is astray | none is |", "|---|---|---|", *rows]
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ from sogjax.energy.views import Windows
 from sogjax.model.body import concatenate
 from sogjax.model.limbs import limb_names
 from sogjax.model.solid import Solid, impossibilities
-from sogjax.search import limb_search
+from sogjax.search import climbed, limb_search
 from sogjax.search.climbed import climbed_in
 from sogjax.search.limb_search import LimbSearch, compile_search
 from sogjax.search.limb_ways import UnitArrays, drawn_ways, look_alikes, units_of
@@ -148,16 +148,23 @@ def test_what_is_compiled_beforehand_is_what_the_search_for_limbs_takes(walking_
     """Tracking tells of its first frame once, before it compiles its step."""
     tracker, cells, right = walking_dog
     told, traces = [], []
-    monkeypatch.setattr(limb_search, "look_alikes", lambda *given: traces.append(1) or look_alikes(*given))
-    as_written = limb_search.held_otherwise.__wrapped__  # a function of its own: what others traced does not count
-    monkeypatch.setattr(limb_search, "held_otherwise", eqx.filter_jit(lambda *given: as_written(*given)))
+
+    def watch(module, name):
+        as_written = getattr(module, name).__wrapped__  # a function of its own: what others traced does not count
+        watched = eqx.filter_jit(lambda *given: traces.append(name) or as_written(*given))
+        monkeypatch.setattr(module, name, watched)
+
+    watch(limb_search, "held_otherwise")
+    watch(climbed, "_climbed_in")
     tracked = track(tracker, jnp.asarray(right.poses[0]), cells[:2], told=lambda *given: told.append(given))
     capacities = [frame.capacities for frame in tracked]
     assert [given[2] for given in told] == capacities[:1]
     compile_search(tracker, *told[0])
-    assert traces
+    assert {*traces} == {"held_otherwise", "_climbed_in"}
     traces.clear()
-    LimbSearch.of(tracker, capacities[0]).better_pose(cells[1], replace(right, capacities=capacities[0]), 1)
+    search, pose = LimbSearch.of(tracker, capacities[0]), right.poses[1]
+    search.better_pose(cells[1], replace(right, capacities=capacities[0]), 1)
+    search.climbed(search.views(on_device(cells[1]), pose), pose, pose[None], np.array([0.2]))
     assert not traces
 
 

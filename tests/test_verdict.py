@@ -126,9 +126,11 @@ def test_another_subject_is_told_at_the_first_frame(capsys):
     assert capsys.readouterr().err == ""
 
 
-def test_limbs_in_doubt_are_named(walk):
-    doubt = np.zeros((walk.num_frames, 2))
-    doubt[3:9, 1] = 0.9
+@pytest.mark.parametrize("likely", [0.9, 0.35])
+def test_limbs_in_doubt_are_named(walk, likely):
+    doubt = np.full((walk.num_frames, 2), 0.25)
+    doubt[3:9, 1] = likely
+    doubt[15:17, 0] = likely  # for too few frames
     motion = replace(judged(walk), limb_names=np.array(["head", "left arm"]), limb_doubt=doubt)
     assert of_one(motion).sentence == f"look at frames {walk.frame[3]}-{walk.frame[8]}, left arm"
 

@@ -18,7 +18,7 @@ from sogjax.model.camera import Camera, cells_at, point_depths, project
 from sogjax.model.color import SHADING, SPREAD
 from sogjax.model.limbs import limb_blobs
 from sogjax.model.sog import Sog
-from sogjax.scene.foreground import SubjectColors, own_color, own_density, subject_density
+from sogjax.scene.foreground import LARGEST_UNKNOWN, SubjectColors, own_color, own_density, subject_density
 
 WORST = 1.0 / 3.0
 """Part of a limb's blobs that is looked at: those that fit worst, as a limb is lost from some joint on."""
@@ -78,7 +78,7 @@ class BlobEvidence(NamedTuple):
     seen: Float[Array, "blob"]
     """Part of its area in all pictures that is seen."""
     explained: Float[Array, "blob"]
-    """How far the samples show the blob's own colours (0 to 1), and no background; their mean."""
+    """How far the samples show the blob's own colours (0 to 1), and no background where that is known; their mean."""
     hidden: Float[Array, "blob"] | None = None
     """Part of what no other limb hides that is hidden by things in front; None: nothing is in front."""
 
@@ -110,7 +110,8 @@ def blob_evidence(
         inside &= present[:, None, None]
     own_colors = posed.body.blob_colors[None, :, None]
     alike = own_color(colors, own_colors)
-    against = jnp.zeros(inside.shape, bool) if windows is None else _odds_at(limbs, windows, places) < BACKGROUND
+    odds = jnp.zeros(inside.shape) if windows is None else _odds_at(limbs, windows, places)
+    against = odds < BACKGROUND
     areas = jnp.where(seen.mask, seen.sigmas, 0.0) ** 2
     weights = jnp.where(inside, (areas * _visible(limbs, posed.blobs, seen, cameras))[:, :, None], 0.0)
     hidden = None
@@ -128,7 +129,7 @@ def blob_evidence(
         own=mean(own_density(lit, own_colors) - subject_density(lit, subject)),
         contradicted=mean(jnp.where(against, 1.0 - alike, 0.0)),
         seen=whole / (len(SAMPLES) * jnp.sum(areas, axis=0) + 1e-6),
-        explained=mean(jnp.where(against, 0.0, alike)),
+        explained=mean(jnp.where(odds < -LARGEST_UNKNOWN, 0.0, alike)),
         hidden=hidden,
     )
 

@@ -14,14 +14,11 @@ from jaxtyping import Bool
 from sogjax.io.motion import Motion
 from sogjax.model.body import Body
 from sogjax.model.reach import told_dofs
+from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.metrics import stretches
 
-LIKELY_LOST = 0.5
-"""A limb is in doubt where it is more likely lost than not."""
 AT_LEAST = 3
 """Frames: shorter stretches are not reported, and shorter gaps between them do not count."""
-
-
 HIDDEN = 0.7
 """Part of a limb, mean over a stretch, whose being hidden is the cause of the doubt."""
 
@@ -49,7 +46,7 @@ def in_doubt(motion: Motion) -> Bool[np.ndarray, "frame limb"]:
     """Which limbs are in doubt in which frames; none where they were not judged."""
     if motion.limb_doubt is None:
         return np.zeros((motion.num_frames, 0), bool)
-    return motion.limb_doubt > LIKELY_LOST
+    return motion.limb_doubt > fitted_numbers().verdict.limb_lost
 
 
 def doubtful_limbs(motion: Motion) -> tuple[DoubtfulLimb, ...]:
@@ -57,6 +54,7 @@ def doubtful_limbs(motion: Motion) -> tuple[DoubtfulLimb, ...]:
     if motion.limb_doubt is None or motion.limb_names is None:
         return ()
     hidden = np.zeros_like(motion.limb_doubt) if motion.limb_hidden is None else motion.limb_hidden
+    columns = motion.limb_names, motion.limb_doubt.T, in_doubt(motion).T, hidden.T
     found = [
         DoubtfulLimb(
             str(name),
@@ -65,8 +63,8 @@ def doubtful_limbs(motion: Motion) -> tuple[DoubtfulLimb, ...]:
             float(doubt[first:stop].mean()),
             bool(unseen[first:stop].mean() > HIDDEN),
         )
-        for name, doubt, unseen in zip(motion.limb_names, motion.limb_doubt.T, hidden.T, strict=True)
-        for first, stop in stretches(doubt > LIKELY_LOST, AT_LEAST, gap=AT_LEAST)
+        for name, doubt, doubted, unseen in zip(*columns, strict=True)
+        for first, stop in stretches(doubted, AT_LEAST, gap=AT_LEAST)
     ]
     return tuple(sorted(found, key=lambda limb: (limb.first_frame, limb.name)))
 

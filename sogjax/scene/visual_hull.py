@@ -44,13 +44,16 @@ class Cube:
     @property
     def points(self) -> Float[np.ndarray, "voxel 3"]:
         """The voxels' centres; the last axis varies fastest."""
-        steps = (np.arange(VOXELS) - (VOXELS - 1) / 2) * self.spacing
+        steps = self._from_centre(np.arange(VOXELS))
         return (np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1) + self.centre).reshape(-1, 3)
 
     def middle(self, voxels: Bool[np.ndarray, "voxel"]) -> Float[np.ndarray, "3"]:
         """The mean of the centres of some voxels; there must be one."""
-        places = np.argwhere(voxels.reshape(3 * (VOXELS,))).mean(axis=0)
-        return self.centre + (places - (VOXELS - 1) / 2) * self.spacing
+        return self.centre + self._from_centre(np.argwhere(voxels.reshape(3 * (VOXELS,))).mean(axis=0))
+
+    def _from_centre(self, places: np.ndarray) -> np.ndarray:
+        """How far voxels are from the cube's centre along an axis, by their places there."""
+        return (places - (VOXELS - 1) / 2) * self.spacing
 
 
 @dataclass(frozen=True)

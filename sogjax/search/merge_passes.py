@@ -23,7 +23,6 @@ from sogjax.model.limbs import limb_names
 from sogjax.model.program import compiled
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.limb_confidence import LimbConfidence
-from sogjax.quality.limb_warnings import LIKELY_LOST
 from sogjax.quality.metrics import stretches
 from sogjax.search.body_parts import PartArrays, body_parts, merged_pose, select_parts
 from sogjax.search.climbed import MORE, climbed_in
@@ -49,6 +48,8 @@ from sogjax.tracking.capacity import views_near
 from sogjax.tracking.frame import AnyFrame, FrameInput, on_device
 from sogjax.tracking.tracker import Tracker
 
+LIKELY_LOST = 0.5
+"""A limb is likely lost where it is more likely lost than not."""
 MOST_SWEEPS = 3
 """Times that key frames are searched, where they changed meanwhile."""
 MORE_SWEEPS = 6

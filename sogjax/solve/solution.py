@@ -119,3 +119,8 @@ class Solver(Protocol):
     def maximize(self, objective: Objective, start: Params, scales: Scales) -> Solution:
         """Climb from `start`."""
         ...
+
+
+def bounded(solver: Solver, most: Int[Array, ""] | None) -> Solver:
+    """A solver that makes so many iterations at most; None: as many as it may."""
+    return solver if most is None else eqx.tree_at(lambda each: each.max_iterations, solver, most)

@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Float, Int
 from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.neighbours import displacement
 from sogjax.model.skeleton import Skeleton
-from sogjax.solve.solution import Scales, Solution, Solver
+from sogjax.solve.solution import Scales, Solution, Solver, bounded
 
 MAX_ROUNDS = 6
 
@@ -44,7 +44,7 @@ def solve_near(
     values the end by lists that hold there. None: each round makes as many as the solver may.
     """
     posed = objective.body.posed_blobs
-    left = lambda made: solver if most is None else eqx.tree_at(lambda each: each.max_iterations, solver, most - made)
+    left = lambda made: bounded(solver, None if most is None else most - made)
 
     def one_round(state: RoundsState) -> RoundsState:
         start = state.solution.params

@@ -26,7 +26,7 @@ from sogjax.model.sog import Sog
 from sogjax.model.solid import Solid
 from sogjax.quality.limb_confidence import LimbConfidence, frame_fit, limb_confidence
 from sogjax.quality.limb_evidence import LimbBlobs, blob_evidence
-from sogjax.solve.solution import Scales, Solution, Solver
+from sogjax.solve.solution import Scales, Solution, Solver, bounded
 from sogjax.tracking.culling import Capacities, ImageReader, body_boxes, union_boxes
 from sogjax.tracking.frame import AnyFrame, FrameInput, FrameResult, TrackState, on_device
 from sogjax.tracking.keypoint_prefit import KeypointPrefit
@@ -280,5 +280,4 @@ class Tracker(eqx.Module):
         """
         if self.pairs == "sparse":
             return solve_near(self.solver, objective, start, self.scales, capacities.blocks, most)
-        solver = self.solver if most is None else eqx.tree_at(lambda each: each.max_iterations, self.solver, most)
-        return solver.maximize(objective, start, self.scales), jnp.asarray(0)
+        return bounded(self.solver, most).maximize(objective, start, self.scales), jnp.asarray(0)

@@ -14,6 +14,7 @@ from sogjax.io.motion import Motion, motion_from_poses
 from sogjax.model.body import Body
 from sogjax.model.cores import in_threads
 from sogjax.model.rotation import world_from_upright
+from sogjax.quality.limb_warnings import in_doubt
 from sogjax.quality.remedies import remedies
 from sogjax.quality.verdict import Verdict
 from sogjax.view.page.document import (
@@ -190,7 +191,7 @@ def _facts(actor: ActorOnPage) -> str:
     if verdict.overlap:
         facts.append(("silhouettes overlap", f"{np.median(list(verdict.overlap.values())):.0%}"))
     if motion.limb_doubt is not None and motion.limb_doubt.size:
-        facts.append(("limbs sure", f"{np.mean(motion.limb_doubt < 0.5):.1%}"))
+        facts.append(("limbs sure", f"{1.0 - np.mean(in_doubt(motion)):.1%}"))
     if actor.revised is not None:
         facts.append(("frames revised", f"{np.mean(actor.revised.any(axis=1)):.1%}"))
     cells = "".join(f"<div><dt>{text(name)}</dt><dd>{text(value)}</dd></div>" for name, value in facts)
