@@ -17,7 +17,6 @@ from pathlib import Path
 
 import numpy as np
 from beside_truth import OFTEN, beside_truth
-from numpy.lib.stride_tricks import sliding_window_view
 from scipy.optimize import linear_sum_assignment
 
 from sogjax.errors import InputError
@@ -27,7 +26,7 @@ from sogjax.io.files import write_file, write_json
 from sogjax.io.ground_truth import GroundTruth, load_ground_truth
 from sogjax.io.motion import Motion, load_motion
 from sogjax.io.recording_files import BACKGROUND, CALIBRATION, EXAMPLE_POSES, GROUND_TRUTH, SETTINGS, VIDEOS
-from sogjax.quality.limb_warnings import AT_LEAST
+from sogjax.quality.limb_warnings import doubtful_limbs
 from sogjax.quality.verdict import Verdict
 from sogjax.run.run_files import METRICS, MOTION
 from sogjax.study.experiment import synth_settings
@@ -246,7 +245,7 @@ def _line(row: str, run: dict) -> str:
 def _kept(folder: Path) -> dict | None:
     path = folder / "found.json"
     found = _read(path) if path.is_file() else {}
-    return found if all("doubt" in actor for actor in found.get("actors", [{}])) else None
+    return found if all("doubted" in actor for actor in found.get("actors", [{}])) else None
 
 
 def _read(path: Path) -> dict:
@@ -304,14 +303,8 @@ def _actor(motion: Motion, person: GroundTruth, verdict: Verdict) -> dict:
     assert beside is not None
     named = sorted({limb.name for limb in verdict.doubtful})
     said = {"sentence": verdict.sentence, "looks_right": verdict.looks_right, "subject_wrong": verdict.wrong}
-    return asdict(beside) | said | {"named": named, "doubt": _lasting_doubt(motion)}
-
-
-def _lasting_doubt(motion: Motion) -> float:
-    """How likely some limb is lost that is so in several frames in a row: up to there a bound names it."""
-    if motion.limb_doubt is None or len(motion.limb_doubt) < AT_LEAST:
-        return 0.0
-    return float(sliding_window_view(motion.limb_doubt, AT_LEAST, axis=0).min(axis=-1).max(initial=0.0))
+    doubted = {f"{bound:g}": len(doubtful_limbs(motion, bound)) for bound in BOUNDS}
+    return asdict(beside) | said | {"named": named, "doubted": doubted}
 
 
 def _of_verdicts(runs: list[dict]) -> list[str]:
@@ -327,9 +320,12 @@ def _of_verdicts(runs: list[dict]) -> list[str]:
         "refused": [not run["actors"] for run in runs],
     }
     found = [f"- {name}: {sum(true)} of {len(true)}" for name, true in groups.items()]
-    named = lambda some, bound: f"{sum(one['doubt'] > bound for one in some)} of {len(some)}"
-    rows = [f"| {bound:g} | {named(wrong, bound)} | {named(right, bound)} |" for bound in BOUNDS]
-    return [*found, "", "| a limb named from | a joint is astray | none is |", "|---|---|---|", *rows]
+    count = lambda some, bound, named: (
+        f"{sum((one['doubted'][f'{bound:g}'] > 0) == named for one in some)} of {len(some)}"
+    )
+    rows = [f"| {bound:g} | {count(wrong, bound, False)} | {count(right, bound, True)} |" for bound in BOUNDS]
+    head = "| a limb is named from | a joint is astray, and none is named | none is, and one is named |"
+    return [*found, "", head, "|---|---|---|", *rows]
 
 
 if __name__ == "__main__":

@@ -12,14 +12,15 @@ from motion_cases import walking_motion
 from rig_cases import ring_rig
 
 from sogjax.energy.posed import Posed
+from sogjax.energy.views import windows_around
 from sogjax.model.body import concatenate
 from sogjax.model.limbs import joint_limbs, limb_blobs, limb_names, limb_slices
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.limb_confidence import LimbMeasures, error_probability, limb_confidence
-from sogjax.quality.limb_evidence import BlobEvidence, LimbBlobs, blob_evidence
+from sogjax.quality.limb_evidence import CLEARLY, BlobEvidence, LimbBlobs, blob_evidence
 from sogjax.quality.limb_warnings import doubtful_limbs
 from sogjax.scene.background import BackgroundCells
-from sogjax.scene.foreground import BackgroundModel, own_density, subject_colors, subject_density
+from sogjax.scene.foreground import LARGEST, BackgroundModel, own_density, subject_colors, subject_density
 from sogjax.tracking.frame import FrameInput
 from sogjax.tracking.frame_by_frame import track
 
@@ -67,6 +68,25 @@ def evidence_of(tracker, pose, cells, present=None):
 def judged(tracker, pose, cells, baseline):
     evidence = evidence_of(tracker, jnp.asarray(pose), jnp.asarray(cells))
     return limb_confidence(tracker.limbs, evidence, baseline, tracker.reader.background is not None)
+
+
+@pytest.mark.slow
+def test_what_may_be_background_speaks_against_nobody_s_colours(dog):
+    tracker, pose, cells = dog
+    posed, reader = Posed.from_pose(tracker.body, jnp.asarray(pose)), tracker.reader
+    boxes = tracker.boxes(tracker.start(jnp.asarray(pose)))
+
+    def evidence(odds):
+        windows = None if odds is None else windows_around(odds, reader.cell_sizes, tracker.cameras, boxes)
+        given = windows, jnp.asarray(cells), reader.cell_sizes, reader.subject
+        return blob_evidence(tracker.limbs, posed, tracker.cameras, *given)
+
+    everywhere = lambda odds: evidence(jnp.full(cells.shape[:3], odds))
+    unknown, perhaps, clearly = evidence(None), everywhere(-CLEARLY), everywhere(-LARGEST)
+    assert float(unknown.explained.mean()) > 0.3
+    np.testing.assert_array_equal(perhaps.explained, unknown.explained)
+    assert (np.asarray(clearly.explained) == 0.0).all()
+    assert float(unknown.contradicted.max()) == 0.0 < float(perhaps.contradicted.max())
 
 
 @pytest.mark.slow

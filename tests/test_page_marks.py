@@ -1,5 +1,7 @@
 """What the timeline of a page marks: limbs that too few cameras see, and those that another pass found."""
 
+from dataclasses import replace
+
 import numpy as np
 from body_cases import shipped
 from rig_cases import ring_rig
@@ -8,7 +10,10 @@ from run_cases import DOG, stand_in_tracked, tiny_run
 from sogjax.io.frame_table import FramesRecord
 from sogjax.io.motion import motion_from_poses
 from sogjax.model.limbs import joint_limbs, limb_names, limbs
+from sogjax.quality.limb_warnings import in_doubt
+from sogjax.quality.verdict import verdicts
 from sogjax.run.page import revised_limbs
+from sogjax.view.page.run_page import ActorOnPage, _of_actor, _why
 from sogjax.view.page.sight import hidden_limbs
 from sogjax.view.page.timeline import Marks, confidence_colors, timeline
 
@@ -80,3 +85,15 @@ def test_colours_tell_lost_limbs_from_sure_ones():
     assert lost[0] > lost[1] + 0.5
     assert half[0] > half[2] + 0.5
     assert sure[1] > sure[0] + 0.2
+
+
+def test_the_page_names_the_limbs_that_the_verdict_names():
+    doubt = np.full((6, len(NAMES)), 0.05)
+    doubt[:, 1], doubt[:, 2] = 0.35, 0.28
+    motion = replace(standing(frames=6), limb_doubt=doubt)
+    verdict = verdicts({"anna": motion}, {})["anna"]
+    actor = ActorOnPage(motion, HUMAN, verdict, None)
+    assert [limb.name for limb in verdict.doubtful] == [NAMES[1]]
+    assert _why(actor, 3, several=False) == f"{NAMES[1]} 65% sure"
+    assert np.array_equal(np.array(_of_actor(actor)["doubted"], bool), in_doubt(motion).T)
+    assert in_doubt(motion).any(axis=0).tolist() == [k == 1 for k in range(len(NAMES))]

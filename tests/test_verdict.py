@@ -148,6 +148,9 @@ def test_a_limb_that_things_hide_is_named_with_the_cause_and_nobody_is_called_an
     assert Verdict.from_dict(json.loads(json.dumps(found.as_dict()))) == found
     half = with_hidden(np.full_like(hidden, 0.2), hidden * 0.6)
     assert (half == 0.2).all()  # enough is seen
+    part = lambda share: replace(motion, limb_doubt=with_hidden(np.zeros_like(hidden), np.full_like(hidden, share)))
+    assert of_one(part(0.84)).looks_right
+    assert not of_one(part(0.86)).looks_right
     unseen = replace(motion, explained=np.full(walk.num_frames, 0.01), limb_hidden=np.ones_like(hidden))
     assert not of_one(unseen).wrong
     assert of_one(replace(unseen, limb_hidden=None)).wrong

@@ -28,7 +28,7 @@ PARTIAL = "run.partial"
 
 
 MOSTLY_HIDDEN = 0.7
-"""Part of a limb that must be hidden from the cameras for it to be in doubt; from half-way to all on it is wholly."""
+"""Part of a limb that must be hidden from the cameras for its place to be doubted, the more the less is seen."""
 UNSEEN_DOUBT = 0.6
 """Doubt of a limb that no camera sees: it is kept by prediction and limits, which is more likely wrong than right."""
 
@@ -59,7 +59,7 @@ def with_hidden(
     if hidden is None:
         return doubt
     unseen = np.clip((hidden - MOSTLY_HIDDEN) / (1.0 - MOSTLY_HIDDEN), 0.0, 1.0)
-    return np.maximum(doubt, UNSEEN_DOUBT * np.minimum(2.0 * unseen, 1.0))
+    return np.maximum(doubt, UNSEEN_DOUBT * unseen)
 
 
 def motions_of(table: FrameTable, bodies: Sequence[Body], clip: ClipFacts) -> dict[str, Motion]:

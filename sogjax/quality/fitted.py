@@ -64,8 +64,8 @@ class VerdictBounds:
     """Frames, and cameras, below this part of the median must be looked at."""
     inside: float
     """Metres between the middles of two actors, below which they are inside each other."""
-    limb_lost: float
-    """How likely a limb must be lost, for some frames, to be in doubt."""
+    limb_doubtful: float
+    """How likely lost a limb must be in a frame to be in doubt there."""
 
 
 @dataclass(frozen=True)

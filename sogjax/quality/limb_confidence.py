@@ -16,8 +16,7 @@ from sogjax.energy.posed import Posed
 from sogjax.energy.views import Windows
 from sogjax.model.camera import Camera, project
 from sogjax.quality.fitted import Weights, fitted_numbers
-from sogjax.quality.limb_evidence import DENSITY, BlobEvidence, LimbBlobs
-from sogjax.scene.foreground import LARGEST_UNKNOWN
+from sogjax.quality.limb_evidence import CLEARLY, DENSITY, BlobEvidence, LimbBlobs
 
 FAR = 0.1
 """Metres, mean over the limb's joints: farther off is lost."""
@@ -92,9 +91,6 @@ def _certainty(evidence: BlobEvidence) -> Float[Array, "blob"]:
     return evidence.seen / (evidence.seen + fitted_numbers().limb_baseline.unseen)
 
 
-CLEARLY = LARGEST_UNKNOWN
-"""Log odds from which a cell is foreground, and below minus which it is background; others do not count, and none whose
-background is unknown."""
 LEAST_TOLD = 0.5
 """Part of an actor's silhouette that must be either for a camera to be compared."""
 

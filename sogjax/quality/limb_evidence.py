@@ -61,7 +61,10 @@ DEPTH_SCALE = 0.16
 DENSITY = 2.0
 """Density of a blob's middle along a ray, as in the foreground term."""
 BACKGROUND = -0.3
-"""Log odds below which a sample speaks for the background."""
+"""Log odds below which a sample contradicts a blob, as far as its colour is another."""
+CLEARLY = LARGEST_UNKNOWN
+"""Log odds from which a cell is foreground, and below minus which it is background; others do not count, and none whose
+background is unknown."""
 DARKEST = 0.05
 """A limb's light, at least: nothing is told of colours that are nearly black."""
 
@@ -78,7 +81,7 @@ class BlobEvidence(NamedTuple):
     seen: Float[Array, "blob"]
     """Part of its area in all pictures that is seen."""
     explained: Float[Array, "blob"]
-    """How far the samples show the blob's own colours (0 to 1), and no background where that is known; their mean."""
+    """How far the samples show the blob's own colours (0 to 1), and no clear background; their mean."""
     hidden: Float[Array, "blob"] | None = None
     """Part of what no other limb hides that is hidden by things in front; None: nothing is in front."""
 
@@ -129,7 +132,7 @@ def blob_evidence(
         own=mean(own_density(lit, own_colors) - subject_density(lit, subject)),
         contradicted=mean(jnp.where(against, 1.0 - alike, 0.0)),
         seen=whole / (len(SAMPLES) * jnp.sum(areas, axis=0) + 1e-6),
-        explained=mean(jnp.where(odds < -LARGEST_UNKNOWN, 0.0, alike)),
+        explained=mean(jnp.where(odds < -CLEARLY, 0.0, alike)),
         hidden=hidden,
     )
 

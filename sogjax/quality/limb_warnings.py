@@ -42,19 +42,22 @@ class DoubtfulLimb:
         return f"{self.name} doubtful in {frames} ({100.0 * self.doubt:.0f} % likely more than 10 cm off)"
 
 
-def in_doubt(motion: Motion) -> Bool[np.ndarray, "frame limb"]:
-    """Which limbs are in doubt in which frames; none where they were not judged."""
+def in_doubt(motion: Motion, bound: float | None = None) -> Bool[np.ndarray, "frame limb"]:
+    """Which limbs are in doubt in which frames; none where they were not judged.
+
+    `bound` is how likely lost they must be; None: `limb_doubtful` of the fitted numbers.
+    """
     if motion.limb_doubt is None:
         return np.zeros((motion.num_frames, 0), bool)
-    return motion.limb_doubt > fitted_numbers().verdict.limb_lost
+    return motion.limb_doubt > (fitted_numbers().verdict.limb_doubtful if bound is None else bound)
 
 
-def doubtful_limbs(motion: Motion) -> tuple[DoubtfulLimb, ...]:
-    """All stretches, by their first frames."""
+def doubtful_limbs(motion: Motion, bound: float | None = None) -> tuple[DoubtfulLimb, ...]:
+    """All stretches, by their first frames; `bound` as in `in_doubt`."""
     if motion.limb_doubt is None or motion.limb_names is None:
         return ()
     hidden = np.zeros_like(motion.limb_doubt) if motion.limb_hidden is None else motion.limb_hidden
-    columns = motion.limb_names, motion.limb_doubt.T, in_doubt(motion).T, hidden.T
+    columns = motion.limb_names, motion.limb_doubt.T, in_doubt(motion, bound).T, hidden.T
     found = [
         DoubtfulLimb(
             str(name),

@@ -49,7 +49,7 @@ from sogjax.tracking.frame import AnyFrame, FrameInput, on_device
 from sogjax.tracking.tracker import Tracker
 
 LIKELY_LOST = 0.5
-"""A limb is likely lost where it is more likely lost than not."""
+"""How likely lost a limb must be to be searched for longer."""
 MOST_SWEEPS = 3
 """Times that key frames are searched, where they changed meanwhile."""
 MORE_SWEEPS = 6

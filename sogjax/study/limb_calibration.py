@@ -67,7 +67,7 @@ def limb_curve(limbs: Sequence[JudgedLimb], weights: WeightsOf = committed) -> L
 def area_table(
     limbs: Sequence[JudgedLimb], groups: dict[str, Callable[[JudgedLimb], bool]], weights: WeightsOf = committed
 ) -> str:
-    """Areas under the curve and what a threshold of one half would notice, by group (Markdown)."""
+    """Areas under the curve and what limbs named from one half would be, by group (Markdown)."""
     lines = [["", "limbs x frames", "lost", "area under the ROC", "noticed", "false alarms"]]
     for name, belongs in groups.items():
         group = [limb for limb in limbs if belongs(limb)]
@@ -118,8 +118,8 @@ def limbs_section(study: Study) -> Section:
         [
             "Is a limb that is in doubt lost, and one that is not in its place? (`python experiments/limb_doubt.py`) "
             "The recordings are tracked as they are, with two of three frames left out, and with each limb displaced "
-            "by 20 to 30 cm on purpose. A limb is lost if its joints are more than 10 cm off on average; it is in "
-            "doubt where it is more likely lost than not.",
+            "by 20 to 30 cm on purpose. A limb is lost if its joints are more than 10 cm off on average; it is "
+            "noticed where it is more likely lost than not.",
             area_table(found, groups),
             calibration_table(found),
             *without,

@@ -27,7 +27,8 @@
     known.actors.forEach((actor) => {
       const parts = [];
       if (actor.explained) parts.push(`${actor.explained[row]} % explained`);
-      const low = actor.limbs.map((name, limb) => [name, actor.sure[limb][row]]).filter(([, sure]) => sure < 60);
+      const limbs = actor.limbs.map((name, limb) => [name, actor.sure[limb][row], actor.doubted[limb][row]]);
+      const low = limbs.filter(([, , doubted]) => doubted);
       low.sort((a, b) => a[1] - b[1]).slice(0, 3).forEach(([name, sure]) => parts.push(`${name} ${sure} % sure`));
       if (!low.length && actor.limbs.length) parts.push("all limbs sure");
       const whose = known.actors.length > 1 ? `${actor.name}: ` : "";

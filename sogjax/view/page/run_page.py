@@ -256,8 +256,8 @@ def _why(actor: ActorOnPage, frame: int, several: bool) -> str:
     rows = np.flatnonzero(motion.frame == frame)
     if not len(rows) or motion.limb_doubt is None or motion.limb_names is None:
         return ""
-    sure = dict(zip(motion.limb_names.tolist(), (1.0 - motion.limb_doubt[rows[0]]).tolist(), strict=True))
-    low = [f"{name.rpartition('/')[2]} {value:.0%} sure" for name, value in sure.items() if value < 0.6]
+    limbs = zip(motion.limb_names.tolist(), motion.limb_doubt[rows[0]], in_doubt(motion)[rows[0]], strict=True)
+    low = [f"{name.rpartition('/')[2]} {1.0 - doubt:.0%} sure" for name, doubt, doubted in limbs if doubted]
     parts = low or ["all limbs sure"]
     if motion.explained is not None:
         parts.append(f"{motion.explained[rows[0]]:.0%} explained")
@@ -318,6 +318,7 @@ def _of_actor(actor: ActorOnPage) -> dict[str, Any]:
         "explained": None if motion.explained is None else percent(motion.explained),
         "limbs": [name.rpartition("/")[2] for name in motion.limb_names.tolist()] if judged else [],  # pyright: ignore[reportOptionalMemberAccess]
         "sure": percent(1.0 - motion.limb_doubt.T) if judged else [],  # pyright: ignore[reportOptionalMemberAccess]
+        "doubted": in_doubt(motion).T.astype(int).tolist() if judged else [],
     }
 
 
