@@ -89,11 +89,11 @@ def test_colours_tell_lost_limbs_from_sure_ones():
 
 def test_the_page_names_the_limbs_that_the_verdict_names():
     doubt = np.full((6, len(NAMES)), 0.05)
-    doubt[:, 1], doubt[:, 2] = 0.35, 0.28
+    doubt[:, 1], doubt[:, 2] = 0.45, 0.35
     motion = replace(standing(frames=6), limb_doubt=doubt)
     verdict = verdicts({"anna": motion}, {})["anna"]
     actor = ActorOnPage(motion, HUMAN, verdict, None)
     assert [limb.name for limb in verdict.doubtful] == [NAMES[1]]
-    assert _why(actor, 3, several=False) == f"{NAMES[1]} 65% sure"
+    assert _why(actor, 3, several=False) == f"{NAMES[1]} 55% sure"
     assert np.array_equal(np.array(_of_actor(actor)["doubted"], bool), in_doubt(motion).T)
     assert in_doubt(motion).any(axis=0).tolist() == [k == 1 for k in range(len(NAMES))]

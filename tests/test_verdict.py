@@ -126,9 +126,9 @@ def test_another_subject_is_told_at_the_first_frame(capsys):
     assert capsys.readouterr().err == ""
 
 
-@pytest.mark.parametrize("likely", [0.9, 0.35])
+@pytest.mark.parametrize("likely", [0.9, 0.45])
 def test_limbs_in_doubt_are_named(walk, likely):
-    doubt = np.full((walk.num_frames, 2), 0.25)
+    doubt = np.full((walk.num_frames, 2), 0.35)
     doubt[3:9, 1] = likely
     doubt[15:17, 0] = likely  # for too few frames
     motion = replace(judged(walk), limb_names=np.array(["head", "left arm"]), limb_doubt=doubt)
@@ -149,8 +149,8 @@ def test_a_limb_that_things_hide_is_named_with_the_cause_and_nobody_is_called_an
     half = with_hidden(np.full_like(hidden, 0.2), hidden * 0.6)
     assert (half == 0.2).all()  # enough is seen
     part = lambda share: replace(motion, limb_doubt=with_hidden(np.zeros_like(hidden), np.full_like(hidden, share)))
-    assert of_one(part(0.84)).looks_right
-    assert not of_one(part(0.86)).looks_right
+    assert of_one(part(0.89)).looks_right
+    assert not of_one(part(0.91)).looks_right
     unseen = replace(motion, explained=np.full(walk.num_frames, 0.01), limb_hidden=np.ones_like(hidden))
     assert not of_one(unseen).wrong
     assert of_one(replace(unseen, limb_hidden=None)).wrong
