@@ -114,6 +114,7 @@ def test_one_compilation_serves_a_recording_and_every_swept_number(dog):
 
     class Staying(eqx.Module):
         number: Array
+        max_iterations: int = 0
 
         def maximize(self, objective, start, scales):
             traces.append(1)
