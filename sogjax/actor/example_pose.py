@@ -72,7 +72,8 @@ def poses_from_silhouettes(
     named = jnp.arange(num_named)
     tried = jnp.concatenate([starts[heading, named], starts[opposite, named]])
     likely = sorted(climbed(tried, coarse, COARSE_ITERATIONS), key=lambda found: -found.energy)
-    like = [np.dot(forward(body, found.pose, up), forward(body, likely[0].pose, up)) > 0.0 for found in likely]
+    facing = forward(body, [found.pose for found in likely], up)
+    like = (facing @ facing[0] > 0.0).tolist()
     ways = [[found for found, same in zip(likely, like, strict=True) if same == way] for way in (True, False)]
     best = [
         max(climbed((found.pose for found in way[:NUM_FINE]), fine, FINE_ITERATIONS), key=lambda found: found.energy)

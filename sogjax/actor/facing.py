@@ -14,7 +14,7 @@ from sogjax.actor.colors import ColoredView, blob_samples
 from sogjax.model.body import Body
 from sogjax.model.program import compiled
 from sogjax.model.rotation import world_from_upright
-from sogjax.search.placed_body import root_rotation
+from sogjax.search.placed_body import root_rotations
 
 SIDES = 4
 """Sides of the body that are told apart: front, left, back and right."""
@@ -68,10 +68,10 @@ def _frames_and_means(
     return frames, body.blobs.points_world(frames)
 
 
-def forward(body: Body, pose: Float[Array, "dof"], up: str) -> Float[np.ndarray, "3"]:
-    """Where the body's trunk faces (world); `body` stands upright in a world of vertical `up`."""
-    turn = root_rotation(body, pose) @ root_rotation(body, body.poses["rest"]).T
-    return turn @ world_from_upright(up)[:, 0]
+def forward(body: Body, poses: Sequence[Float[Array | np.ndarray, "dof"]], up: str) -> Float[np.ndarray, "pose 3"]:
+    """Where the body's trunk faces in each pose (world); `body` stands upright in a world of vertical `up`."""
+    *turns, rest = root_rotations(body, np.stack([*poses, body.poses["rest"]]))
+    return np.stack(turns) @ rest.T @ world_from_upright(up)[:, 0]
 
 
 class Way(NamedTuple):

@@ -40,6 +40,7 @@ from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.compiled import compiled_hastily
+from sogjax.model.cores import in_threads
 from sogjax.model.rotation import world_from_upright
 from sogjax.model.shape import ShapeModel
 from sogjax.scene.background import BackgroundImage
@@ -151,7 +152,8 @@ class Making:
             InputError: no example poses of the subject, or pictures without masks.
         """
         recording, model, rig, best = self.recording, self.shape_model, self.rig, self.best
-        examples = self.examples
+        examples, shared = self.examples, shared or SharedFrames()
+        shared.read(recording, examples)
         shown = progress(examples, len(examples), "masks")
         pictures = [load_pictures(recording, example, self.report, learnt, shared) for example in shown]
         if any(posed.undecided for posed in pictures):
@@ -293,10 +295,8 @@ def _best_estimate(model: ShapeModel, found: _FoundPoses, rig: Camera, terms: Te
     Rough silhouettes hardly tell front from back; the fitted body does.
     """
     silhouettes, views = silhouettes_of(found.pictures, rig), stack_views(found.views)
-    estimates = [
-        estimate_shape(model, jnp.stack([poses[way] for poses in found.ways]), views, silhouettes, terms)
-        for way in range(min(ways, *map(len, found.ways)))
-    ]
+    starts = [jnp.stack([poses[way] for poses in found.ways]) for way in range(min(ways, *map(len, found.ways)))]
+    estimates = in_threads(lambda start: estimate_shape(model, start, views, silhouettes, terms), starts)
     agrees = lambda estimate: overlap_of(_shaped(model, estimate.shape_params), estimate.poses, found.pictures, rig)
     return max(estimates, key=agrees) if len(estimates) > 1 else estimates[0]
 

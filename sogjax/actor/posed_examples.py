@@ -55,8 +55,9 @@ def rough_poses(
         starts = _starts(body, example, posed, rig, up)
         found.append(poses_from_silhouettes(body, coarse, fine, starts, terms, up))
     colors = lambda pose, posed: side_colors(body, colored_views(posed, rig, pose), up)
+    facing = iter(forward(body, [way.pose for of_example in found for way in of_example], up))
     ways = [
-        [Way(way.energy, forward(body, way.pose, up), colors(way.pose, posed)) for way in of_example]
+        [Way(way.energy, next(facing), colors(way.pose, posed)) for way in of_example]
         for of_example, (_, posed, _, _) in zip(found, shown, strict=True)
     ]
     chosen = consistent_ways(ways, recording.times_of([example.frame for example, *_ in shown]))

@@ -1,6 +1,6 @@
 """Example poses as silhouettes: what Eq. 9 compares a body of unknown shape and pose with."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from sogjax.energy.views import Views, whole_image_overlap
 from sogjax.errors import InputError
 from sogjax.io.example_poses import ExamplePose
 from sogjax.io.recording import Recording
-from sogjax.io.video import read_frames, read_still
+from sogjax.io.video import read_chosen, read_still
 from sogjax.model.camera import Camera, camera_of
 from sogjax.model.compiled import compiled_hastily
 from sogjax.model.cores import in_threads
@@ -64,14 +64,18 @@ class SharedFrames:
     masks: dict[int, dict[bool, FoundMasks]] = field(default_factory=dict)
     """What `example_masks` keeps of each frame."""
 
+    def read(self, recording: Recording, examples: Sequence[ExamplePose]) -> None:
+        """Read the frames of example poses that are not known yet, each video from its beginning to its end."""
+        frames = {example.frame for example in examples if example.frame is not None}
+        self.images |= _images_of_frames(recording, frames - {*self.images})
+
     def of(
         self, recording: Recording, example: ExamplePose
     ) -> tuple[dict[int, UInt8[np.ndarray, "_h _w 3"]], dict[bool, FoundMasks]]:
         """The pictures of an example pose, and what is kept of its masks: nothing where they are files."""
         if example.frame is None:
             return load_images(recording, example), {}
-        if example.frame not in self.images:
-            self.images[example.frame] = load_images(recording, example)
+        self.read(recording, [example])
         return self.images[example.frame], self.masks.setdefault(example.frame, {})
 
 
@@ -103,13 +107,20 @@ def load_images(recording: Recording, example: ExamplePose) -> dict[int, UInt8[n
         InputError: a picture of another size than the calibration's, or a video that cannot be read.
     """
     if example.frame is not None:
-        shown = next(iter(read_frames(recording, example.frame, example.frame + 1)))
-        return {k: image for k, image in enumerate(shown) if image is not None}
+        return _images_of_frames(recording, [example.frame])[example.frame]
     cameras = [(k, name) for k, name in enumerate(recording.rig.names) if name in example.images]
     images = in_threads(lambda camera: read_still(recording, camera[1], example.images[camera[1]]), cameras)
     for (_, name), image in zip(cameras, images, strict=True):
         _check_picture(example.images[name], image, recording.rig.image_size(name))
     return {k: image for (k, _), image in zip(cameras, images, strict=True)}
+
+
+def _images_of_frames(
+    recording: Recording, frames: Iterable[int]
+) -> dict[int, dict[int, UInt8[np.ndarray, "_h _w 3"]]]:
+    """The pictures (BGR) of frames, by camera."""
+    shown = read_chosen(recording, frames)
+    return {frame: {k: image for k, image in enumerate(images) if image is not None} for frame, images in shown}
 
 
 def _check_picture(path: Path, image: UInt8[np.ndarray, "_h _w 3"], size: tuple[int, int]) -> None:

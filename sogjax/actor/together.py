@@ -79,8 +79,10 @@ def believed(making: Making, body: Body, ways: Mapping[str, Sequence[PoseAndMiss
     """
     fit = lambda number, miss: max(1.0 - miss / (1.0 - LEAST_GAIN * (number > 0)), LEAST_FIT)
     up, frames = making.recording.up, {example.name: example.frame for example in making.examples}
-    way = lambda number, pose, miss: Way(fit(number, miss), forward(body, jnp.asarray(pose), up))
-    moments = [[way(number, *each) for number, each in enumerate(both)] for both in ways.values()]
+    facing = iter(forward(body, [pose for both in ways.values() for pose, _ in both], up))
+    moments = [
+        [Way(fit(number, miss), next(facing)) for number, (_, miss) in enumerate(both)] for both in ways.values()
+    ]
     chosen = consistent_ways(moments, making.recording.times_of([frames[name] for name in ways]))
     return {name: both[k][0] for (name, both), k in zip(ways.items(), chosen, strict=True)}
 

@@ -149,7 +149,7 @@ class PlaneVideo:
         stream, numbers, back = self._container.streams.video[0], {time: k for k, time in enumerate(times)}, start
         while True:
             self._container.seek(times[back], stream=stream, backward=True)
-            self._images = self._decoded()
+            self._images = self._decoded(times[start])
             image, number = self._reached(numbers, start)
             if image is not None and number == start:
                 self._first = image
@@ -170,11 +170,16 @@ class PlaneVideo:
         image, self._first = self._first, None
         return next(self._images, None) if image is None else image
 
-    def _decoded(self) -> Iterator[VideoFrame]:
-        """All images from here on, up to damage: as with OpenCV, no later image is taken for that of another frame."""
-        failures = _failures()
+    def _decoded(self, wanted: int | None = None) -> Iterator[VideoFrame]:
+        """All images from here on, up to damage: as with OpenCV, no later image is taken for that of another frame.
+
+        Before the time that is `wanted` come only those that others are made of.
+        """
+        failures, codec = _failures(), self._container.streams.video[0].codec_context
         try:
             for packet in self._container.demux(video=0):
+                early = wanted is not None and packet.pts is not None and packet.pts < wanted
+                codec.skip_frame = "NONREF" if early else "DEFAULT"
                 yield from packet.decode()  # pyright: ignore[reportReturnType]
         except failures:
             return

@@ -47,8 +47,12 @@ def read_chosen(recording: Recording, frames: Iterable[int]) -> Iterator[tuple[i
     starts = [k for k, frame in enumerate(chosen) if k == 0 or frame - chosen[k - 1] > WORTH_A_JUMP]
     for first, stop in pairwise([*starts, len(chosen)]):
         part = chosen[first:stop]
-        images = _decoded_ahead(recording, lambda camera, frame, image: image, part, planes=False)
+        images = _decoded_ahead(recording, _whole, part, planes=True)
         yield from zip(part, images, strict=True)
+
+
+def _whole(camera: int, frame: int, image: np.ndarray | YuvPicture | None) -> UInt8[np.ndarray, "_h _w 3"] | None:
+    return image.bgr() if isinstance(image, YuvPicture) else image
 
 
 def read_prepared(
@@ -94,7 +98,7 @@ def _decoded_ahead(
             for camera in cameras
         ]
         stack.callback(_close_all, opened)
-        sources = [future.result() for future in opened]
+        sources, sizes = [future.result() for future in opened], [recording.rig.image_size(name) for name in cameras]
 
         ended: set[int] = set()
         passed_over = {frame: range(last + 1, frame) for last, frame in pairwise([frames[0] - 1, *frames])}
@@ -106,7 +110,7 @@ def _decoded_ahead(
             for passed in passed_over[frame]:
                 if recording.has_image(name, passed):
                     sources[camera].skip()
-            image = _checked(recording, name, sources[camera].read(), frame)
+            image = _checked(recording, name, sources[camera].read(), frame, sizes[camera])
             if image is None:
                 ended.add(camera)  # what might still come would be images of other frames
             return prepare(camera, frame, None if recording.is_missing(name, frame) else image)
@@ -128,7 +132,7 @@ def _close_all(opened: list[Future[ImageStream[Any]]]) -> None:
 
 
 def _checked(
-    recording: Recording, camera: str, image: np.ndarray | YuvPicture | None, frame: int
+    recording: Recording, camera: str, image: np.ndarray | YuvPicture | None, frame: int, expected: tuple[int, int]
 ) -> np.ndarray | YuvPicture | None:
     source = recording.sources[camera]
     if image is None and recording.fewest_cameras is not None:
@@ -139,7 +143,7 @@ def _checked(
             f"set `last_frame: {frame - 1}` in recording.yaml, or convert the video again"
         )
     size = (image.shape[1], image.shape[0])
-    if size != recording.rig.image_size(camera):
+    if size != expected:
         raise InputError(f"{source}: its frame {frame} is {size[0]}x{size[1]}, unlike the first; convert it again")
     return image if isinstance(image, YuvPicture) else evened(image, recording.color_gains.get(camera))
 

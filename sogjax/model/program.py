@@ -69,8 +69,8 @@ def compiled(function: Callable[Arguments, Results], **options: Any) -> Callable
         program = _keepers[0].program(function, options, (arguments, keywords))
         if program is None:
             return plain(*arguments, **keywords)
-        leaves = jax.tree.leaves((arguments, keywords))
-        return program([jnp.asarray(leaf) for leaf in leaves if eqx.is_array(leaf)])
+        arrays = [leaf for leaf in jax.tree.leaves((arguments, keywords)) if eqx.is_array(leaf)]
+        return program([leaf if isinstance(leaf, jax.Array) else jnp.asarray(leaf) for leaf in arrays])
 
     return call
 

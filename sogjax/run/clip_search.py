@@ -11,7 +11,7 @@ from sogjax.energy.term import Term
 from sogjax.errors import InputError
 from sogjax.io.image_file import write_image
 from sogjax.io.motion import motion_from_poses
-from sogjax.io.video import read_frames
+from sogjax.io.video import read_chosen
 from sogjax.model.body import Body
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.run import build
@@ -272,7 +272,7 @@ def _write_picture(search: ClipSearch, guess: Guess, path: Path) -> Path:
     for body, found in zip(search.bodies, guess.poses, strict=True):
         motion = motion_from_poses(body, np.asarray(found.pose)[None], recording.fps)
         motions.append(replace(motion, frame=np.array([guess.frame])))
-    images = next(iter(read_frames(recording, guess.frame, guess.frame + 1)))
+    _, images = next(read_chosen(recording, [guess.frame]))
     write_image(path, overlay_frame(images, recording.rig, motions, guess.frame, width=1600))
     return path
 

@@ -183,9 +183,9 @@ def root_position(body: Body, pose: Float[Array, "dof"]) -> Float[np.ndarray, "3
     return _joint_frames(body, pose)[last, :3, 3]
 
 
-def root_rotation(body: Body, pose: Float[Array, "dof"]) -> Float[np.ndarray, "3 3"]:
-    """The turn of the trunk in a pose: the rotation of the joint where the tree first branches."""
-    return _joint_frames(body, pose)[_root_joints(body)[-1], :3, :3]
+def root_rotations(body: Body, poses: Float[np.ndarray, "pose dof"]) -> Float[np.ndarray, "pose 3 3"]:
+    """The turn of the trunk in each pose: the rotation of the joint where the tree first branches."""
+    return _padded(_posed_joints, body, poses)[:, _root_joints(body)[-1], :3, :3].astype(float)
 
 
 def _joint_frames(body: Body, pose: Float[Array, "dof"]) -> Float[np.ndarray, "joint 4 4"]:
