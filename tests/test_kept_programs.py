@@ -177,6 +177,27 @@ def test_a_keeper_is_asked_for_functions_of_modules_alone(traced):
     assert float(found[0]) == float(found[1]) == float(found[2]) == 0.0
 
 
+def test_programs_take_arrays_of_jax_as_they_are_and_others_converted():
+    given = []
+
+    class Keeper:
+        def program(self, function, options, given_to):
+            return given.extend
+
+        def forget(self):
+            """Hold nothing."""
+
+    pose, limits = jnp.zeros(5), np.ones(5, np.float32)
+    keep_programs(Keeper())
+    try:
+        compiled(unwrap(limit_penalty))(pose, limits, limits)
+    finally:
+        keep_programs(None)
+    assert given[0] is pose
+    assert len(given) == 3
+    assert all(isinstance(each, jax.Array) for each in given)
+
+
 SCRIPT = """
 import sys
 from pathlib import Path

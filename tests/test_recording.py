@@ -15,7 +15,7 @@ from small_recording import (
     write_video,
 )
 
-from sogjax.actor.silhouettes import load_images
+from sogjax.actor.silhouettes import SharedFrames, load_images
 from sogjax.errors import InputError
 from sogjax.io.recording import open_recording
 
@@ -153,7 +153,13 @@ def test_frames_of_the_videos_are_example_poses(folder):
         ("frame_1", 1, None),
         ("frame_3", 3, "Ann"),
     ]
-    assert load_images(recording, recording.example_poses[1]).keys() == {0, 1}
+    one, other = recording.example_poses
+    assert load_images(recording, other).keys() == {0, 1}
+    shared = SharedFrames()
+    shared.read(recording, [one, other, one])
+    for example in (one, other):
+        for camera, image in load_images(recording, example).items():
+            np.testing.assert_array_equal(shared.images[example.frame][camera], image)
 
 
 @pytest.mark.parametrize(

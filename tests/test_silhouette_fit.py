@@ -9,7 +9,8 @@ from body_cases import shipped
 from rig_cases import ring_rig
 
 from sogjax.actor.coverage import Silhouettes, _blobs, _covered, _fills, mismatch
-from sogjax.actor.silhouette_fit import MAX_CELLS, SilhouetteFit, cells_of, fitted
+from sogjax.actor.silhouette_fit import COARSE_CELLS, MAX_CELLS, SilhouetteFit, cells_of, fitted, silhouettes_of
+from sogjax.actor.silhouettes import PosedPictures
 from sogjax.model.camera import project
 from sogjax.model.shape import LENGTH_SPREAD, ShapeModel
 from sogjax.tracking.solving import pose_scales
@@ -141,6 +142,16 @@ def test_cells_cover_what_the_mask_does():
     inside = covered > 0.99
     assert centres[inside].min(axis=0)[0] >= 59.0
     assert centres[inside].max(axis=0)[1] <= 220.0
+
+
+@pytest.mark.parametrize(("seeing", "cells"), [(2, MAX_CELLS), (4, MAX_CELLS), (12, 640), (16, COARSE_CELLS)])
+def test_cells_are_shared_out_among_the_cameras_that_have_masks(seeing, cells):
+    rig, mask = ring_rig(16, (200, 300), distance=3.0), np.zeros((300, 200), bool)
+    mask[20:280, 30:170] = True
+    pictures = PosedPictures("squat", {}, {2 * k % 16 + k // 8: mask for k in range(seeing)})
+    silhouettes = silhouettes_of([pictures], jax.tree.map(jnp.asarray, rig.cameras))
+    assert silhouettes.mask.shape == (1, 16, cells)
+    assert np.asarray(silhouettes.mask[0]).any(axis=1).sum() == seeing
 
 
 def test_cells_tell_nothing_where_a_mask_does_not():

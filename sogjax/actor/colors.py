@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, UInt8
 
 from sogjax.io.recording import Recording
-from sogjax.io.video import read_frames
+from sogjax.io.video import read_chosen
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, camera_of, distort, project, project_points
 from sogjax.model.color import averaging_space, from_rgb, linear_light, to_rgb
@@ -218,8 +218,7 @@ def measured_colors(
     of_frame = dict(zip(frames, poses, strict=True))
     views = [
         ColoredView(camera_of(rig, k), image, None, jnp.asarray(of_frame[frame], jnp.float32))
-        for frame, images in enumerate(read_frames(recording, frames[0], frames[-1] + 1), frames[0])
-        if frame in of_frame
+        for frame, images in read_chosen(recording, frames)
         for k, image in enumerate(images)
         if image is not None
     ]

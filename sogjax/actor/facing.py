@@ -70,8 +70,8 @@ def _frames_and_means(
 
 def forward(body: Body, poses: Sequence[Float[Array | np.ndarray, "dof"]], up: str) -> Float[np.ndarray, "pose 3"]:
     """Where the body's trunk faces in each pose (world); `body` stands upright in a world of vertical `up`."""
-    *turns, rest = root_rotations(body, np.stack([*poses, body.poses["rest"]]))
-    return np.stack(turns) @ rest.T @ world_from_upright(up)[:, 0]
+    turns = root_rotations(body, np.stack([*poses, body.poses["rest"]]))
+    return turns[:-1] @ turns[-1].T @ world_from_upright(up)[:, 0]
 
 
 class Way(NamedTuple):

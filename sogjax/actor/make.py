@@ -40,7 +40,6 @@ from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.compiled import compiled_hastily
-from sogjax.model.cores import in_threads
 from sogjax.model.rotation import world_from_upright
 from sogjax.model.shape import ShapeModel
 from sogjax.scene.background import BackgroundImage
@@ -152,10 +151,7 @@ class Making:
             InputError: no example poses of the subject, or pictures without masks.
         """
         recording, model, rig, best = self.recording, self.shape_model, self.rig, self.best
-        examples, shared = self.examples, shared or SharedFrames()
-        shared.read(recording, examples)
-        shown = progress(examples, len(examples), "masks")
-        pictures = [load_pictures(recording, example, self.report, learnt, shared) for example in shown]
+        examples, pictures = self.examples, self._pictures(progress, learnt, shared or SharedFrames())
         if any(posed.undecided for posed in pictures):
             share = float(np.mean([posed.mask_share() for posed in pictures]))
             terms = (*terms, RestPrior(UNDECIDED_REST * share))
@@ -164,6 +160,14 @@ class Making:
         estimate = _best_estimate(model, found, rig, terms, ways=1 if best is None else 2)
         _check_fit(recording, _shaped(model, estimate.shape_params), estimate, found.pictures, rig)
         return self.finished(found.pictures, estimate, found.rough, self.unsuitable(found.pictures, estimate))
+
+    def _pictures(
+        self, progress: Progress, learnt: Sequence[BackgroundImage] | None, shared: SharedFrames
+    ) -> list[PosedPictures]:
+        examples = self.examples
+        shared.read(self.recording, examples)
+        shown = progress(examples, len(examples), "masks")
+        return [load_pictures(self.recording, example, self.report, learnt, shared) for example in shown]
 
     @property
     def examples(self) -> list[ExamplePose]:
@@ -295,8 +299,10 @@ def _best_estimate(model: ShapeModel, found: _FoundPoses, rig: Camera, terms: Te
     Rough silhouettes hardly tell front from back; the fitted body does.
     """
     silhouettes, views = silhouettes_of(found.pictures, rig), stack_views(found.views)
-    starts = [jnp.stack([poses[way] for poses in found.ways]) for way in range(min(ways, *map(len, found.ways)))]
-    estimates = in_threads(lambda start: estimate_shape(model, start, views, silhouettes, terms), starts)
+    estimates = [
+        estimate_shape(model, jnp.stack([poses[way] for poses in found.ways]), views, silhouettes, terms)
+        for way in range(min(ways, *map(len, found.ways)))
+    ]
     agrees = lambda estimate: overlap_of(_shaped(model, estimate.shape_params), estimate.poses, found.pictures, rig)
     return max(estimates, key=agrees) if len(estimates) > 1 else estimates[0]
 

@@ -31,13 +31,23 @@ from sogjax.solve.solution import QuadraticModel, Scales
 from sogjax.tracking.solving import pose_scales
 
 MAX_CELLS, COARSE_CELLS = 2048, 512
-"""Cells of each camera, at most, and where limbs are only looked for: a hand is about two wide."""
+"""Cells of each camera, at most and at least; a hand is about two wide, or one."""
+ALL_CELLS = 8192
+"""Cells of all cameras together, within these bounds: the more cameras there are, the less depends on one of them."""
+CELL_STEP = 128
+"""Each camera has a multiple of so many, so that a program serves most actors of a rig."""
 BORDER = 0.12
 """Border around the subject's box, as a part of its longer side."""
 
 
-def silhouettes_of(pictures: Sequence[PosedPictures], rig: Camera, most: int = MAX_CELLS) -> Silhouettes:
-    """The masks of all poses, with a leading axis for the poses; each camera's has at most so many cells."""
+def silhouettes_of(pictures: Sequence[PosedPictures], rig: Camera, most: int | None = None) -> Silhouettes:
+    """The masks of all poses, with a leading axis for the poses; each camera's has at most so many cells.
+
+    None: its share of `ALL_CELLS`, among the cameras that have masks.
+    """
+    if most is None:
+        share = ALL_CELLS // max(len(posed.masks) for posed in pictures)
+        most = min(max(share // CELL_STEP * CELL_STEP, COARSE_CELLS), MAX_CELLS)
     poses = [_pose_cells(posed, int(rig.image_size.shape[0]), most) for posed in pictures]
     means, sigmas, coverage, mask = (np.stack(part) for part in zip(*poses, strict=True))
     dtype = rig.intrinsics.dtype

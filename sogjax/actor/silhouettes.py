@@ -65,7 +65,7 @@ class SharedFrames:
     """What `example_masks` keeps of each frame."""
 
     def read(self, recording: Recording, examples: Sequence[ExamplePose]) -> None:
-        """Read the frames of example poses that are not known yet, each video from its beginning to its end."""
+        """Read the frames of example poses that are not known yet, each video in one pass."""
         frames = {example.frame for example in examples if example.frame is not None}
         self.images |= _images_of_frames(recording, frames - {*self.images})
 

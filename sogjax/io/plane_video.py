@@ -111,8 +111,9 @@ class PlaneVideo:
         stream = container.streams.video[0]
         codec = stream.codec_context
         # Images that no other one is made of need no smoothing of block edges: the mean of a cell does not see them.
-        # Pictures made beside the cells, as for the overlay, show them.
+        # Pictures made beside the cells, as for the overlay, and single ones show them.
         codec.options = {"skip_loop_filter": "noref"}
+        codec.skip_frame = "DEFAULT"  # a PyAV that cannot is too old
         codec.thread_count = threads
         codec.thread_type = "AUTO" if threads > 1 else "NONE"
         if 0 < codec.width * codec.height <= MAX_PIXELS:

@@ -40,7 +40,13 @@ def read_frames(recording: Recording, start: int | None = None, stop: int | None
 
 
 def read_chosen(recording: Recording, frames: Iterable[int]) -> Iterator[tuple[int, list[Any]]]:
-    """Some of the recording's frames with their images, in the order of time; as `read_frames`."""
+    """Some of the recording's frames with their images, in the order of time, as `read_frames` gives them.
+
+    Where PyAV is installed it decodes them, which shows some edges of compressed blocks.
+
+    Raises:
+        InputError: a video ends early or changes its size.
+    """
     chosen = sorted({*frames})
     if not {*chosen} <= {*recording.frames}:
         raise ValueError(f"of the frames {chosen}, some are not in a recording of the frames {recording.frames}")
@@ -52,6 +58,7 @@ def read_chosen(recording: Recording, frames: Iterable[int]) -> Iterator[tuple[i
 
 
 def _whole(camera: int, frame: int, image: np.ndarray | YuvPicture | None) -> UInt8[np.ndarray, "_h _w 3"] | None:
+    """The picture in red, green and blue."""
     return image.bgr() if isinstance(image, YuvPicture) else image
 
 
@@ -132,7 +139,7 @@ def _close_all(opened: list[Future[ImageStream[Any]]]) -> None:
 
 
 def _checked(
-    recording: Recording, camera: str, image: np.ndarray | YuvPicture | None, frame: int, expected: tuple[int, int]
+    recording: Recording, camera: str, image: np.ndarray | YuvPicture | None, frame: int, calibrated: tuple[int, int]
 ) -> np.ndarray | YuvPicture | None:
     source = recording.sources[camera]
     if image is None and recording.fewest_cameras is not None:
@@ -143,7 +150,7 @@ def _checked(
             f"set `last_frame: {frame - 1}` in recording.yaml, or convert the video again"
         )
     size = (image.shape[1], image.shape[0])
-    if size != expected:
+    if size != calibrated:
         raise InputError(f"{source}: its frame {frame} is {size[0]}x{size[1]}, unlike the first; convert it again")
     return image if isinstance(image, YuvPicture) else evened(image, recording.color_gains.get(camera))
 
