@@ -232,9 +232,9 @@ def test_a_pyav_too_old_is_not_used(tmp_path, monkeypatch, start):
         raise AttributeError("rotation")
 
     class Watched(PlaneVideo):
-        def __init__(self, container, threads):
+        def __init__(self, container, threads, smooth):
             opened.append(container)
-            super().__init__(container, threads)
+            super().__init__(container, threads, smooth)
 
     monkeypatch.setattr(module, "_known", without_rotation)
     monkeypatch.setattr(module, "PlaneVideo", Watched)
@@ -254,7 +254,7 @@ def test_an_error_of_ffmpeg_alone_ends_a_video(tmp_path):
             raise av.error.ExternalError(1, "nothing of Python's")
 
     with av.open(str(painted_video(tmp_path / "video.mp4", size=(64, 48)))) as container:
-        assert 0 < len(images_of(PlaneVideo(Damaged(container), 1))) <= 3
+        assert 0 < len(images_of(PlaneVideo(Damaged(container), 1, False))) <= 3
 
 
 def test_without_pyav_opencv_reads(tmp_path, monkeypatch):

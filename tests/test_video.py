@@ -180,7 +180,7 @@ def test_an_image_of_another_size_among_others_is_named(tmp_path):
         list(read_frames(open_recording(folder)))
 
 
-@pytest.mark.parametrize("name", ["rendered_walk", "real_tpose"])
+@pytest.mark.parametrize("name", ["rendered_walk", "real_tpose", "real_turning"])
 def test_seeking_is_exact_in_real_videos(name):
     folder = shared_recording(name)
     if folder is None:
@@ -188,13 +188,14 @@ def test_seeking_is_exact_in_real_videos(name):
     recording = open_recording(folder)
     recording = dataclasses.replace(recording, rig=recording.rig.select(recording.rig.names[:2]))
     start = recording.num_frames - 3
-    images = next(iter(read_frames(recording, start)))
-    for camera, image in zip(recording.rig.names, images, strict=True):
+    images, (_, picked) = next(iter(read_frames(recording, start))), next(read_chosen(recording, [start]))
+    for camera, image, same in zip(recording.rig.names, images, picked, strict=True):
         capture = cv2.VideoCapture(str(recording.sources[camera]))
         for _ in range(start + 1):
             _, expected = capture.read()
         capture.release()
         np.testing.assert_array_equal(image, expected)
+        np.testing.assert_array_equal(same, expected)
 
 
 def test_a_written_video_is_read_again(tmp_path):

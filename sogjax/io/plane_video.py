@@ -39,21 +39,22 @@ def _pyav() -> Any:
         return None
 
 
-def plane_video(path: Path, start: int, threads: int) -> PlaneVideo | None:
+def plane_video(path: Path, start: int, threads: int, smooth: bool = False) -> PlaneVideo | None:
     """The images of a video from its frame `start` on; None where only OpenCV can read them as they should be.
 
     That is where PyAV is not installed, or is too old, or where the video is of a rare kind: turned sideways, of odd
     size, with more than eight bits or other differences of colour. It does not depend on `start`, so the same frame
-    gives the same cells wherever reading began. `threads` decode it.
+    gives the same cells wherever reading began. `threads` decode it; with `smooth`, no image shows the edges of its
+    blocks.
     """
     if _pyav() is None:
         return None
     try:
-        video = _opened(path, threads)
+        video = _opened(path, threads, smooth)
         if video is None or start == 0 or _jumped(video, path, start):
             return video
         video.close()
-        if (video := _opened(path, threads)) is not None:
+        if (video := _opened(path, threads, smooth)) is not None:
             for _ in range(start):
                 video.skip()
         return video
@@ -66,11 +67,11 @@ def _failures() -> tuple[type[Exception], ...]:
     return OSError, ValueError, _pyav().FFmpegError
 
 
-def _opened(path: Path, threads: int) -> PlaneVideo | None:
+def _opened(path: Path, threads: int, smooth: bool) -> PlaneVideo | None:
     with ExitStack() as stack:
         container = _pyav().open(str(path), options={})
         stack.callback(container.close)
-        video = PlaneVideo(container, threads)
+        video = PlaneVideo(container, threads, smooth)
         if not video.readable:
             return None
         stack.pop_all()
@@ -102,7 +103,7 @@ def _times_of(path: str, size: int, changed: int) -> tuple[int, ...]:
 class PlaneVideo:
     """The images of an open file, one after the other."""
 
-    def __init__(self, container: InputContainer, threads: int):
+    def __init__(self, container: InputContainer, threads: int, smooth: bool):
         self._container = container
         self._images: Iterator[VideoFrame] = iter(())
         self._first: VideoFrame | None = None
@@ -111,8 +112,8 @@ class PlaneVideo:
         stream = container.streams.video[0]
         codec = stream.codec_context
         # Images that no other one is made of need no smoothing of block edges: the mean of a cell does not see them.
-        # Pictures made beside the cells, as for the overlay, and single ones show them.
-        codec.options = {"skip_loop_filter": "noref"}
+        # Pictures made beside the cells, as for the overlay, show them.
+        codec.options = {} if smooth else {"skip_loop_filter": "noref"}
         codec.skip_frame = "DEFAULT"  # a PyAV that cannot is too old
         codec.thread_count = threads
         codec.thread_type = "AUTO" if threads > 1 else "NONE"

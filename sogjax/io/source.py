@@ -83,10 +83,13 @@ def open_source(path: Path, start: int = 0, threads: int = 1, picked: Sequence[i
 
 
 def open_with_least_work(
-    path: Path, start: int = 0, threads: int = 1, picked: Sequence[int] | None = None
+    path: Path, start: int = 0, threads: int = 1, picked: Sequence[int] | None = None, smooth: bool = False
 ) -> ImageStream[Bgr | YuvPicture]:
-    """What `open_source` gives, but the images of a video stay in its own colours where they can be read so."""
-    video = None if path.is_dir() else plane_video(path, 0 if picked is not None else start, threads)
+    """What `open_source` gives, but the images of a video stay in its own colours where they can be read so.
+
+    Unless they are to be `smooth`, some show the edges of the codec's blocks, which cells do not see.
+    """
+    video = None if path.is_dir() else plane_video(path, 0 if picked is not None else start, threads, smooth)
     if video is None:
         return open_source(path, start, threads, picked)
     return video if picked is None else _PickedImages(video, picked[start:])

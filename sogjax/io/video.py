@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from types import TracebackType
@@ -42,8 +43,6 @@ def read_frames(recording: Recording, start: int | None = None, stop: int | None
 def read_chosen(recording: Recording, frames: Iterable[int]) -> Iterator[tuple[int, list[Any]]]:
     """Some of the recording's frames with their images, in the order of time, as `read_frames` gives them.
 
-    Where PyAV is installed it decodes them, which shows some edges of compressed blocks.
-
     Raises:
         InputError: a video ends early or changes its size.
     """
@@ -53,7 +52,7 @@ def read_chosen(recording: Recording, frames: Iterable[int]) -> Iterator[tuple[i
     starts = [k for k, frame in enumerate(chosen) if k == 0 or frame - chosen[k - 1] > WORTH_A_JUMP]
     for first, stop in pairwise([*starts, len(chosen)]):
         part = chosen[first:stop]
-        images = _decoded_ahead(recording, _whole, part, planes=True)
+        images = _decoded_ahead(recording, _whole, part, planes=True, smooth=True)
         yield from zip(part, images, strict=True)
 
 
@@ -86,17 +85,22 @@ def read_prepared(
 
 
 def _decoded_ahead(
-    recording: Recording, prepare: Callable[[int, int, Any], Item], frames: Sequence[int], planes: bool
+    recording: Recording,
+    prepare: Callable[[int, int, Any], Item],
+    frames: Sequence[int],
+    planes: bool,
+    smooth: bool = False,
 ) -> Iterator[list[Item]]:
     if not frames:
         return
+    in_planes = partial(open_with_least_work, smooth=smooth)
     cameras, workers = recording.rig.names, usable_cores()
     threads = max(1, workers // len(cameras))
     with ExitStack() as stack:
         pool = stack.enter_context(ThreadPoolExecutor(min(len(cameras), workers)))
         opened = [
             pool.submit(
-                open_with_least_work if planes and camera not in recording.color_gains else open_source,
+                in_planes if planes and camera not in recording.color_gains else open_source,
                 recording.sources[camera],
                 max(frames[0] + recording.frame_offset[camera], 0),
                 threads,
