@@ -231,7 +231,7 @@ def test_a_video_that_breaks_off_and_is_there_again(capsys, tmp_path, monkeypatc
     done(capsys, *words, "out=whole")
     whole = video.open_with_least_work
     with monkeypatch.context() as context:
-        context.setattr(video, "open_with_least_work", lambda *arguments: BreaksOff(whole(*arguments)))
+        context.setattr(video, "open_with_least_work", lambda *given, **more: BreaksOff(whole(*given, **more)))
         assert main([*words, "out=run"]) == 2
     assert "ends before frame 14" in capsys.readouterr().err
     done(capsys, *words, "out=run", "resume=true")
