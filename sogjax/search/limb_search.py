@@ -14,6 +14,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.energy.part_energy import PartEnergy
 from sogjax.energy.views import Views
+from sogjax.model.compiled import of_each
 from sogjax.model.cores import in_threads
 from sogjax.model.program import compiled
 from sogjax.model.solid import DEEP, impossibilities
@@ -30,7 +31,6 @@ from sogjax.tracking.tracker import Tracker
 
 NUM_CLIMBED = 4
 """Different ways that are climbed, the tracked one among them."""
-AT_ONCE = 8
 ITERATIONS = 5
 APART = 0.08
 """Metres, mean over the blobs of the limb that differs more: ways to hold a unit that count as different."""
@@ -261,21 +261,14 @@ def held_otherwise(
     held = lambda params: index.put(pose, params)
     means = lambda params: tracker.body.posed_blobs(held(params)).means[index.blobs]
     params = jax.vmap(index.params)(jnp.concatenate([pose[None], look_alikes(tracker.body, pose, unit), tried]))
-    values = _in_parts(energy, params)
+    values = of_each(energy, params)
     chosen = _different(jax.vmap(means)(params), values, limbs)
     climb = lambda start: solver.maximize(energy, start, replace(scales, kinds=scales.kinds[index.dofs]))
-    found = jax.vmap(climb)(params[chosen])
+    found = of_each(climb, params[chosen])
     apart = jax.vmap(lambda each: _apart(each, means(params[0]), limbs))(jax.vmap(means)(found.params))
     ways = jax.vmap(held)(found.params), found.value - values[0], apart
     crossed = held(params[CROSSED]), values[CROSSED] - values[0]
     return HeldOtherwise(*ways, *crossed, _apart(means(params[CROSSED]), means(params[0]), limbs))
-
-
-def _in_parts(energy: PartEnergy, params: Float[Array, "seed param"]) -> Float[Array, "seed"]:
-    count = params.shape[0]
-    padded = jnp.concatenate([params, jnp.repeat(params[-1:], -count % AT_ONCE, axis=0)])
-    values = jax.lax.map(jax.vmap(energy), padded.reshape(-1, AT_ONCE, params.shape[1]))
-    return values.reshape(-1)[:count]
 
 
 def _different(

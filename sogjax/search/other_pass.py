@@ -19,6 +19,7 @@ from sogjax.energy.keypoints import keypoint_term_among
 from sogjax.energy.posed import History
 from sogjax.energy.views import Views
 from sogjax.model.body import Body
+from sogjax.model.compiled import of_each
 from sogjax.model.cores import go_on, in_threads
 from sogjax.model.program import compiled
 from sogjax.quality.fitted import fitted_numbers
@@ -317,8 +318,6 @@ def _energies(tracker: Tracker, views: Views, poses: Float[Array, "pose dof"]) -
 def _padded_energies(
     tracker: Tracker, views: Views, poses: Float[Array, "pose dof"], count: Int[Array, ""]
 ) -> Float[Array, "pose"]:
-    """What the first `count` poses are worth, 0 for the others."""
+    """What the first `count` poses are worth; the others' values are arbitrary."""
     energy = FrameEnergy(tracker.body, views, History.unknown(poses[0]), tracker.terms)
-    values = jnp.zeros(len(poses), poses.dtype)
-    known = lambda k, found: found.at[k].set(worth(energy, tracker.solid, poses[k]))
-    return jax.lax.fori_loop(0, count, known, values)
+    return of_each(lambda pose: worth(energy, tracker.solid, pose), poses, count=count)

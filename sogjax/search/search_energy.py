@@ -20,6 +20,7 @@ from sogjax.energy.term import Penalty, Term, Terms
 from sogjax.energy.views import Views, whole_image_overlap
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
+from sogjax.model.compiled import of_each
 from sogjax.model.cores import in_threads
 from sogjax.model.program import compiled
 from sogjax.model.skeleton import Skeleton
@@ -40,8 +41,8 @@ LARGEST_ANGLE, LARGEST_TRANSLATION = 0.3, 0.15
 """Bounds on a step of the climb: radians, metres."""
 DISC = 1.35
 """Radius of the disc that a blob of sigma 1 stands for."""
-AT_ONCE, SCORED_AT_ONCE = 8, 64
-"""Poses that are climbed, and scored, in one call."""
+CLIMBED_IN_A_CALL, SCORED_IN_A_CALL = 8, 64
+"""Room for poses."""
 THREADS = 2
 """Calls at the same time: one alone leaves half of two cores idle; each takes memory."""
 
@@ -122,16 +123,15 @@ def scores(
     poses: Float[np.ndarray, "start dof"],
 ) -> Float[np.ndarray, "start"]:
     """The energies of poses, each in the windows of its place."""
-    return _in_parts(partial(_scores, energy, windows), SCORED_AT_ONCE, place, poses)[0]
+    return _in_parts(partial(_scores, energy, windows), SCORED_IN_A_CALL, place, poses)[0]
 
 
 @compiled
-def _scores(energy: SearchEnergy, windows: ColorWindows, place: Array, poses: Array) -> tuple[Float[Array, "start"]]:
-    def one(start: tuple[Array, Array]) -> Float[Array, ""]:
-        return energy.of_windows(jax.tree.map(lambda leaf: leaf[start[0]], windows))(start[1])
-
-    together = lambda leaf: leaf.reshape(-1, AT_ONCE, *leaf.shape[1:])
-    return (jax.lax.map(jax.vmap(one), (together(place), together(poses))).reshape(-1),)
+def _scores(
+    energy: SearchEnergy, windows: ColorWindows, count: Array, place: Array, poses: Array
+) -> tuple[Float[Array, "start"]]:
+    here = lambda index: energy.of_windows(jax.tree.map(lambda leaf: leaf[index], windows))
+    return (of_each(lambda index, pose: here(index)(pose), place, poses, count=count),)
 
 
 def climbed(
@@ -144,22 +144,32 @@ def climbed(
 ) -> tuple[Float[np.ndarray, "start dof"], Float[np.ndarray, "start"]]:
     """Every pose climbed and its energy."""
     climb = partial(_climbed, energy, windows, scales, jnp.asarray(iterations))
-    ends, values = _in_parts(climb, AT_ONCE, place, poses)
+    ends, values = _in_parts(climb, CLIMBED_IN_A_CALL, place, poses)
     return ends, values
 
 
 def _in_parts(function: Callable[..., tuple[Array, ...]], size: int, place: np.ndarray, poses: np.ndarray) -> list[Any]:
-    """The results for all starts, always the same number at once, so that one program serves all."""
-    count = len(poses)
-    padded = [np.concatenate([part, np.repeat(part[-1:], -count % size, axis=0)]) for part in (place, poses)]
-    part_at = lambda k: jax.device_get(function(*(part[k : k + size] for part in padded)))
-    parts = in_threads(part_at, range(0, count, size), THREADS)
-    return [np.concatenate(part)[:count] for part in zip(*parts, strict=True)]
+    """The results for all starts, shared out among threads; each call has the same room, so that one program serves."""
+    calls = THREADS * -(-len(poses) // (THREADS * size))
+    parts = np.array_split(np.arange(len(poses)), min(calls, len(poses)))
+
+    def of_part(some: np.ndarray) -> list[np.ndarray]:
+        filled = np.resize(some, size)
+        found = jax.device_get(function(jnp.asarray(len(some)), place[filled], poses[filled]))
+        return [result[: len(some)] for result in found]
+
+    return [np.concatenate(part) for part in zip(*in_threads(of_part, parts, THREADS), strict=True)]
 
 
 @compiled
 def _climbed(
-    energy: SearchEnergy, windows: ColorWindows, scales: Scales, iterations: Array, place: Array, poses: Array
+    energy: SearchEnergy,
+    windows: ColorWindows,
+    scales: Scales,
+    iterations: Array,
+    count: Array,
+    place: Array,
+    poses: Array,
 ) -> tuple[Float[Array, "start dof"], Float[Array, "start"]]:
     solver = GaussNewton(epsilon=0.01, max_iterations=iterations)
 
@@ -168,4 +178,4 @@ def _climbed(
         solution = solver.maximize(energy.of_windows(here), pose, scales)
         return solution.params, solution.value
 
-    return jax.vmap(climb)(place, poses)
+    return of_each(climb, place, poses, count=count)
