@@ -5,8 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from sogjax.model.compiled import ROWS, of_each
-from sogjax.search import search_energy
+from sogjax.model.batches import ROWS, THREADS, of_each, shared_out
 
 
 @pytest.mark.parametrize("backend", ["cpu", "gpu"])
@@ -45,8 +44,8 @@ def test_starts_are_shared_out_and_nothing_beyond_their_number_is_read(number):
         return (jnp.where(jnp.arange(4) < count, place + poses[:, 0], jnp.nan),)
 
     place = np.arange(number)
-    (found,) = search_energy._in_parts(function, 4, place, 10.0 * place[:, None].astype(np.float32))
+    (found,) = shared_out(function, 4, place, 10.0 * place[:, None].astype(np.float32))
     np.testing.assert_array_equal(found, 11.0 * place)
     assert sum(counts) == number
     assert max(counts) - min(counts) <= 1
-    assert len(counts) % search_energy.THREADS == 0 or number == 1
+    assert len(counts) % THREADS == 0 or number == 1

@@ -1,4 +1,4 @@
-"""What XLA on a CPU compiles badly, written as it compiles well: stages, batches, choices, products of small matrices.
+"""What XLA on a CPU compiles badly, written as it compiles well: stages, choices, products of many small matrices.
 
 And programs that run once, which are compiled in a hurry.
 """
@@ -50,27 +50,6 @@ def stage_barrier(
     shapes = jax.eval_shape(function, *arguments, **keywords)
     zeros = lambda *_: jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shapes)
     return jax.lax.cond(true_at_run_time, lambda *a: function(*a, **keywords), zeros, *arguments)
-
-
-ROWS = 8
-"""Of a batch that are computed at once, where that is quicker: more takes more memory."""
-
-
-def of_each(function: Callable[..., Results], *rows: Array, count: Int[Array, ""] | None = None) -> Results:
-    """What a function makes of each row; with `count`, of the first so many: what stands for the others is arbitrary.
-
-    On a CPU one after the other: a climb ends by itself, not with the last one of a batch, no row takes a copy of what
-    it looks up, and threads share the cores. Elsewhere several at once. `rows` are arrays of one length, not empty.
-    """
-    if jax.default_backend() != "cpu":
-        return jax.lax.map(lambda row: function(*row), rows, batch_size=min(ROWS, len(rows[0])))
-    if count is None:
-        return jax.lax.map(lambda row: function(*row), rows)
-    one = jax.jit(lambda k: function(*(row[k] for row in rows)))  # which is traced once
-    shapes = jax.eval_shape(one, count)
-    nothing = jax.tree.map(lambda leaf: jnp.zeros((len(rows[0]), *leaf.shape), leaf.dtype), shapes)
-    put = lambda k, found: jax.tree.map(lambda every, here: every.at[k].set(here), found, one(k))
-    return jax.lax.fori_loop(jnp.zeros_like(count), count, put, nothing)
 
 
 _RUN = 32

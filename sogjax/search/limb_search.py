@@ -14,7 +14,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.energy.part_energy import PartEnergy
 from sogjax.energy.views import Views
-from sogjax.model.compiled import of_each
+from sogjax.model.batches import of_each
 from sogjax.model.cores import in_threads
 from sogjax.model.program import compiled
 from sogjax.model.solid import DEEP, impossibilities

@@ -7,7 +7,7 @@ jumps.
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import jax
 import jax.numpy as jnp
@@ -18,8 +18,8 @@ from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.keypoints import keypoint_term_among
 from sogjax.energy.posed import History
 from sogjax.energy.views import Views
+from sogjax.model.batches import of_each, shared_out
 from sogjax.model.body import Body
-from sogjax.model.compiled import of_each
 from sogjax.model.cores import go_on, in_threads
 from sogjax.model.program import compiled
 from sogjax.quality.fitted import fitted_numbers
@@ -238,15 +238,15 @@ class BothSeen:
         pose but for its extent, the known one is climbed once: what comes of it is added to those `climbed`, by row.
         """
         climb = lambda near, pose, share: climbed_in(self.tracker, near, pose, share, self.capacities)
-        others, first = [climb(near, self.poses[1], FEW)[1] for near in self.views], self.views[0]
-        if len(self.views) > 1:
-            known = [climb(near, self.poses[0], FEW)[1] for near in self.views]
-        elif row in climbed:
-            known = [climb(first, climbed[row], 0.0)[1]]
-        else:
-            climbed[row], value = climb(first, self.poses[0], FEW)
-            known = [value]
-        return float(np.mean([float(other) - float(value) for other, value in zip(others, known, strict=True)]))
+        starts = [(near, pose, FEW) for pose in self.poses for near in self.views]
+        alone = len(self.views) == 1
+        if alone and row in climbed:
+            starts[0] = self.views[0], climbed[row], 0.0
+        ends = in_threads(lambda start: jax.device_get(climb(*start)), starts)
+        if alone:
+            climbed.setdefault(row, ends[0][0])
+        known, others = np.array([value for _, value in ends], float).reshape(2, -1)
+        return float(np.mean(others - known))
 
 
 def _differ(parts: Sequence[Part], apart: Bool[np.ndarray, "part"]) -> Bool[np.ndarray, "part"]:
@@ -266,7 +266,9 @@ def parts_apart(
 
 
 PARTS_AT_ONCE = 4
-"""Parts whose gains are computed in one call: seldom do more differ."""
+"""Parts that are mixed in one call: seldom do more differ."""
+ENERGIES_IN_A_CALL = 8
+"""Room for poses."""
 
 
 def part_gains(
@@ -309,15 +311,13 @@ def _mixed(
 
 
 def _energies(tracker: Tracker, views: Views, poses: Float[Array, "pose dof"]) -> Float[np.ndarray, "pose"]:
-    """The energies of at most `2 * PARTS_AT_ONCE` poses in the same views, without history."""
-    padded = jnp.concatenate([poses, jnp.repeat(poses[:1], 2 * PARTS_AT_ONCE - len(poses), axis=0)])
-    return np.asarray(_padded_energies(tracker, views, padded, jnp.asarray(len(poses))))[: len(poses)]
+    """The energies of poses in the same views, without history."""
+    return shared_out(partial(_energies_in_call, tracker, views), ENERGIES_IN_A_CALL, poses)[0]
 
 
 @compiled
-def _padded_energies(
-    tracker: Tracker, views: Views, poses: Float[Array, "pose dof"], count: Int[Array, ""]
-) -> Float[Array, "pose"]:
-    """What the first `count` poses are worth; the others' values are arbitrary."""
+def _energies_in_call(
+    tracker: Tracker, views: Views, count: Int[Array, ""], poses: Float[Array, "pose dof"]
+) -> tuple[Float[Array, "pose"]]:
     energy = FrameEnergy(tracker.body, views, History.unknown(poses[0]), tracker.terms)
-    return of_each(lambda pose: worth(energy, tracker.solid, pose), poses, count=count)
+    return (of_each(lambda pose: worth(energy, tracker.solid, pose), poses, count=count),)

@@ -1,8 +1,7 @@
 """The energy of a search: how well a pose explains the pictures, within the joints' limits, and climbing it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -18,10 +17,9 @@ from sogjax.energy.priors import AccelerationPenalty
 from sogjax.energy.similarity import Similarity
 from sogjax.energy.term import Penalty, Term, Terms
 from sogjax.energy.views import Views, whole_image_overlap
+from sogjax.model.batches import of_each, shared_out
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
-from sogjax.model.compiled import of_each
-from sogjax.model.cores import in_threads
 from sogjax.model.program import compiled
 from sogjax.model.skeleton import Skeleton
 from sogjax.model.sog import Sog
@@ -43,8 +41,6 @@ DISC = 1.35
 """Radius of the disc that a blob of sigma 1 stands for."""
 CLIMBED_IN_A_CALL, SCORED_IN_A_CALL = 8, 64
 """Room for poses."""
-THREADS = 2
-"""Calls at the same time: one alone leaves half of two cores idle; each takes memory."""
 
 
 class RestPrior(Penalty):
@@ -123,7 +119,7 @@ def scores(
     poses: Float[np.ndarray, "start dof"],
 ) -> Float[np.ndarray, "start"]:
     """The energies of poses, each in the windows of its place."""
-    return _in_parts(partial(_scores, energy, windows), SCORED_IN_A_CALL, place, poses)[0]
+    return shared_out(partial(_scores, energy, windows), SCORED_IN_A_CALL, place, poses)[0]
 
 
 @compiled
@@ -144,21 +140,8 @@ def climbed(
 ) -> tuple[Float[np.ndarray, "start dof"], Float[np.ndarray, "start"]]:
     """Every pose climbed and its energy."""
     climb = partial(_climbed, energy, windows, scales, jnp.asarray(iterations))
-    ends, values = _in_parts(climb, CLIMBED_IN_A_CALL, place, poses)
+    ends, values = shared_out(climb, CLIMBED_IN_A_CALL, place, poses)
     return ends, values
-
-
-def _in_parts(function: Callable[..., tuple[Array, ...]], size: int, place: np.ndarray, poses: np.ndarray) -> list[Any]:
-    """The results for all starts, shared out among threads; each call has the same room, so that one program serves."""
-    calls = THREADS * -(-len(poses) // (THREADS * size))
-    parts = np.array_split(np.arange(len(poses)), min(calls, len(poses)))
-
-    def of_part(some: np.ndarray) -> list[np.ndarray]:
-        filled = np.resize(some, size)
-        found = jax.device_get(function(jnp.asarray(len(some)), place[filled], poses[filled]))
-        return [result[: len(some)] for result in found]
-
-    return [np.concatenate(part) for part in zip(*in_threads(of_part, parts, THREADS), strict=True)]
 
 
 @compiled
