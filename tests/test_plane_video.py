@@ -7,14 +7,14 @@ from itertools import islice
 import cv2
 import numpy as np
 import pytest
-from small_recording import make_recording, shared_recording, write_video
+from small_recording import make_recording, shared_recording, toml_camera, write_calibration, write_video
 
 from sogjax.io import plane_video as module
 from sogjax.io import video_file
 from sogjax.io.plane_video import PlaneVideo, plane_video
 from sogjax.io.recording import open_recording
 from sogjax.io.source import open_with_least_work
-from sogjax.io.video import read_frames, read_prepared
+from sogjax.io.video import read_chosen, read_frames, read_prepared
 from sogjax.io.video_file import VideoFile
 from sogjax.model.yuv_picture import YuvPicture
 from sogjax.run.clip import Clip
@@ -286,6 +286,32 @@ def test_evened_colours_are_those_of_pictures(tmp_path):
     assert isinstance(left, np.ndarray)
     assert isinstance(right, YuvPicture)
     np.testing.assert_array_equal(left, next(iter(read_frames(recording)))[0])
+
+
+def test_chosen_frames_have_evened_colours(tmp_path):
+    settings = "up: z\ncolor_gains:\n  left: [1.2, 1.0, 0.9]\n"
+    recording = open_recording(make_recording(tmp_path / "r", settings=settings))
+    (_, (left, right)), *_ = read_chosen(recording, [2])
+    expected, _ = next(iter(read_frames(recording, 2, 3)))
+    np.testing.assert_array_equal(left, expected)
+    assert isinstance(right, np.ndarray)
+
+
+@pytest.mark.parametrize("gap", [4, 99])
+@pytest.mark.parametrize("name", ["mp4 with B-frames", "AVI of H.264 with B-frames"])
+def test_chosen_frames_are_found_by_jumps_and_without(tmp_path, monkeypatch, name, gap):
+    monkeypatch.setattr("sogjax.io.video.WORTH_A_JUMP", gap)
+    file, *how = VIDEOS[name]
+    folder = make_recording(tmp_path / "r", cameras=(), settings="up: z\n")
+    write_calibration(folder, *(toml_camera(camera, size=f"[{16 * BARS}, 32]") for camera in ("left", "right")))
+    for camera in ("left", "right"):
+        (folder / "videos").mkdir(exist_ok=True)
+        numbered_video(folder / "videos" / f"{camera}.{file.rsplit('.')[-1]}", *how)
+    chosen = [1, 3, 11, 12, 30, 55]
+    shown = read_chosen(open_recording(folder), chosen)
+    assert [(frame, [number_shown(image) for image in images]) for frame, images in shown] == [
+        (frame, [frame, frame]) for frame in chosen
+    ]
 
 
 def test_a_damaged_video_ends_where_it_does_with_opencv(tmp_path):

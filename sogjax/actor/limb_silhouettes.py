@@ -15,6 +15,7 @@ from jaxtyping import Array, Float, Int
 from sogjax.actor.coverage import Silhouettes, mismatch_of, times_cap
 from sogjax.energy.part_energy import PartIndex
 from sogjax.energy.priors import limit_penalty
+from sogjax.model.batches import THREADS, of_each, shared_out
 from sogjax.model.body import Body, concatenate
 from sogjax.model.limbs import limb_blobs
 from sogjax.model.program import compiled
@@ -167,10 +168,10 @@ class _SeenUnit:
         drawn[0] = self.pose
         fills = _part_covered(self.body, jnp.asarray(drawn), part, self.silhouettes)
         kept = _different(drawn[:, limb.all_dofs], self._cost(drawn, rest, fills, limb.all_blobs))
-        scales = pose_scales(self.body.skeleton)
-        climbed = _climbed(self.body, jnp.asarray(drawn[kept]), part, rest, self.silhouettes, scales)
-        ways = np.asarray(climbed).copy()
-        ways[0] = self.pose
+        given = (self.body, part, rest, self.silhouettes, pose_scales(self.body.skeleton))
+        climbed = shared_out(lambda count, poses: (_climbed(count, poses, *given),), NUM_KEPT // THREADS, drawn[kept])
+        ways = np.tile(self.pose, (NUM_KEPT, 1))
+        ways[1 : len(kept)] = climbed[0][1:]
         return ways, np.asarray(_part_covered(self.body, jnp.asarray(ways), part, self.silhouettes))
 
     def _cost(
@@ -191,14 +192,14 @@ class _SeenUnit:
 
 
 def _different(angles: Float[np.ndarray, "way param"], cost: Float[np.ndarray, "way"]) -> list[int]:
-    """The first way, and the best that differ from all better ones; always as many."""
+    """The first way, and the best that differ from all better ones."""
     kept = [0]
     for k in np.argsort(cost, kind="stable").tolist():
         if len(kept) == NUM_KEPT:
             break
         if np.abs(angles[kept] - angles[k]).max(axis=1).min() > APART:
             kept.append(k)
-    return kept + [0] * (NUM_KEPT - len(kept))
+    return kept
 
 
 @compiled
@@ -233,14 +234,15 @@ def _from_rest(body: Body, poses: Float[Array, "way dof"]) -> Float[Array, "way"
 
 @compiled
 def _climbed(
-    body: Body,
+    count: Int[Array, ""],
     poses: Float[Array, "way dof"],
+    body: Body,
     part: PartIndex,
     rest: Float[Array, "camera cell"],
     silhouettes: Silhouettes,
     scales: Scales,
 ) -> Float[Array, "way dof"]:
-    """Poses, in each of which a part is climbed to where it covers the masks better, within its limits."""
+    """The first `count` poses, in each of which a part is climbed to where it covers the masks better."""
     lower, upper = body.skeleton.joint_limits()
     solver = ConditionedAscent(max_iterations=jnp.asarray(ITERATIONS))
 
@@ -254,7 +256,7 @@ def _climbed(
         found = solver.maximize(objective, part.params(pose), replace(scales, kinds=scales.kinds[part.dofs]))
         return part.put(pose, found.params)
 
-    return jax.lax.map(climbed, poses)
+    return of_each(climbed, poses, count=count)
 
 
 @compiled

@@ -8,7 +8,7 @@ from jaxtyping import UInt8
 
 from sogjax.actor.example_masks import ExampleMasks, example_masks
 from sogjax.actor.make import examples_of
-from sogjax.actor.silhouettes import load_images
+from sogjax.actor.silhouettes import SharedFrames
 from sogjax.cli.schemas import SegmentConfig
 from sogjax.errors import InputError, counted
 from sogjax.io.example_poses import ExamplePose
@@ -16,7 +16,7 @@ from sogjax.io.image_file import write_image, write_mask
 from sogjax.io.painted import painted_masks
 from sogjax.io.recording import Recording
 from sogjax.io.recording_files import EXAMPLE_POSES
-from sogjax.io.video import read_prepared
+from sogjax.io.video import read_chosen
 from sogjax.run.background import learn_background
 from sogjax.run.clip import Clip
 from sogjax.run.example_frames import with_examples
@@ -58,8 +58,10 @@ def run(config: SegmentConfig) -> list[Path]:
     with results_folder(out), alive("segmenting"):
         clip = Clip(recording, recording.frames, ImagesConfig().depth)
         learnt = with_examples(clip, lambda: learn_background(clip, "auto"))[1] if examples else None
+        shared = SharedFrames()
+        shared.read(recording, examples)
         shown = progress(examples, len(examples), "example poses")
-        sheets = [_masks(recording, example, out, learnt) for example in shown]
+        sheets = [_masks(recording, example, out, learnt, shared) for example in shown]
         if recording.occluders:
             sheets.append(_occluders(clip, out / OCCLUDERS))
         if frames:
@@ -76,10 +78,16 @@ def _occluders(clip: Clip, path: Path) -> Path:
     return write_occluders(path, clip.recording, clip.grids, hidden, middle, "what was painted to stand in front")
 
 
-def _masks(recording: Recording, example: ExamplePose, out: Path, learnt: Sequence[BackgroundImage] | None) -> Path:
+def _masks(
+    recording: Recording,
+    example: ExamplePose,
+    out: Path,
+    learnt: Sequence[BackgroundImage] | None,
+    shared: SharedFrames,
+) -> Path:
     """Write the masks of one example pose and their sheet."""
-    images = load_images(recording, example)
-    found = example_masks(recording, example, images, learnt)
+    images, known = shared.of(recording, example)
+    found = example_masks(recording, example, images, learnt, known)
     for warning in found.warnings:
         say(f"warning: {warning}")
     for older in (out / example.name).glob("*.mask.png"):
@@ -107,8 +115,7 @@ def _background_sheets(clip: Clip, choice: str, frames: list[int], folder: Path)
     if learnt.cameras is None:
         raise InputError(f"{recording.path}: there is no background to show, since {learnt.reason}")
     folder.mkdir(parents=True, exist_ok=True)
-    as_is = lambda camera, frame, image: image
-    shown = {frame: next(read_prepared(recording, as_is, frame, frame + 1)) for frame in frames}
+    shown = dict(read_chosen(recording, frames))
     paths = []
     names = recording.rig.names
     for camera, name in enumerate(progress(names, len(names), "backgrounds")):

@@ -13,7 +13,7 @@ from sogjax.io.ground_truth import load_ground_truth
 from sogjax.io.image_file import write_image
 from sogjax.io.motion import Motion
 from sogjax.io.recording import Recording
-from sogjax.io.video import read_frames
+from sogjax.io.video import read_chosen, read_frames
 from sogjax.run.recordings import file_list, opened
 from sogjax.run.run_folder import free_path
 from sogjax.run.terminal import progress, say
@@ -64,7 +64,7 @@ def _write_picture(out: Path, recording: Recording, motions: list[Motion], confi
     shown = drawn_frames(motions, frame)
     if not shown:
         raise InputError(f"frame={frame}: the motion has the frames {first} to {stop - 1}, not this one")
-    pictures = list(read_frames(recording, frame, frame + 1)) if config.images else None
+    pictures = [images for _, images in read_chosen(recording, [frame])] if config.images else None
     with tempfile.TemporaryDirectory() as folder:
         write_rerun(Path(folder) / "motion.rrd", recording, shown, frames=pictures)
         drawn = rerun_screenshot(Path(folder) / "motion.rrd")

@@ -67,7 +67,7 @@ def limb_curve(limbs: Sequence[JudgedLimb], weights: WeightsOf = committed) -> L
 def area_table(
     limbs: Sequence[JudgedLimb], groups: dict[str, Callable[[JudgedLimb], bool]], weights: WeightsOf = committed
 ) -> str:
-    """Areas under the curve and what limbs named from one half would be, by group (Markdown)."""
+    """The area under the ROC by group, and how many limbs have a probability above one half (Markdown)."""
     lines = [["", "limbs x frames", "lost", "area under the ROC", "noticed", "false alarms"]]
     for name, belongs in groups.items():
         group = [limb for limb in limbs if belongs(limb)]

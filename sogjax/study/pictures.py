@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.io.motion import Motion
-from sogjax.io.video import read_frames
+from sogjax.io.video import read_chosen
 from sogjax.study.document import Picture, Section
 from sogjax.study.experiment import Experiment
 from sogjax.study.record import Done, RunRecord
@@ -78,7 +78,7 @@ def worst_frame(label: str, source: Source, record: RunRecord) -> Picture:
     frame = record.frame[row]
     recording = source.recording
     motions = list(motions_of(record, source.bodies, recording.fps).values())
-    images = next(iter(read_frames(recording, frame, frame + 1)))
+    _, images = next(read_chosen(recording, [frame]))
     points = np.concatenate([motion.blob_means[row] for motion in motions] + _true_points(source, frame))
     cameras = source.cameras(min(CAMERAS_SHOWN, len(recording.rig.names)))
     cut = [_cut_out(images, recording.rig, motions, frame, camera, points) for camera in cameras]

@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, UInt8
 
 from sogjax.io.image_file import write_image
 from sogjax.io.recording import Recording
-from sogjax.io.video import read_frames
+from sogjax.io.video import read_chosen
 from sogjax.scene.cells import CellGrid
 from sogjax.scene.occluders import HiddenFrom
 from sogjax.view.tiles import BLUE, RED, Tile, contact_sheet
@@ -143,7 +143,7 @@ def write_occluders(
     Raises:
         InputError: a picture cannot be read, or the file cannot be written.
     """
-    images = next(iter(read_frames(recording, frame, frame + 1)))
+    _, images = next(read_chosen(recording, [frame]))
     tiles = []
     for name, image, grid, of_camera in zip(recording.rig.names, images, grids, hidden, strict=True):
         inside = of_camera[: grid.rows, : grid.columns]
