@@ -43,6 +43,7 @@ def started(code, *words, **environment):
     return subprocess.Popen(line, stdin=pipe, stdout=pipe, text=True, env=os.environ | environment)
 
 
+@pytest.mark.slow
 def test_of_two_processes_one_compiles_and_the_other_reads(tmp_path):
     both = [started(PROGRAM, SOGJAX_COMPILATION_CACHE=str(tmp_path)) for _ in range(2)]
     for process in both:

@@ -85,6 +85,7 @@ def test_counts_are_true_ones_whatever_the_capacity(scene):
     assert int(matching.min()) > 8
 
 
+@pytest.mark.slow
 def test_blobs_of_the_background_are_left_out_and_others_weighted(scene):
     """The background is the picture itself, but for one quarter, and another in which it is unknown."""
     tracker, cells, _ = scene

@@ -14,6 +14,7 @@ from body_cases import posed, random_body, shipped
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rig_cases import ring_rig
+from slow_values import fast_and_slow
 from sog_cases import floats, in_float64, random_views
 
 from sogjax.energy.frame_energy import FrameEnergy, standard_terms
@@ -95,7 +96,7 @@ def test_random_poses_of_a_small_body(mode, capped, seed):
         assert_gradient_is_right(body, *case(body, seed), terms(mode, capped))
 
 
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", fast_and_slow(*MODES))
 @given(seed=seeds)
 @settings(deadline=None, max_examples=3)
 def test_random_poses_of_the_human(mode, seed):

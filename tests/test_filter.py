@@ -58,6 +58,7 @@ def test_a_straight_way_and_few_frames_stay():
         np.testing.assert_allclose(smooth(few, CUTOFF, FPS, np.array([True, False])), few, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_walk_keeps_its_range_of_motion():
     """Angles at knees, elbows and hips of the rendered walk, over its steady part."""
     names, times = list(LANDMARKS), np.arange(0.0, 5.0, 1.0 / FPS)
@@ -121,6 +122,7 @@ def test_the_command_refuses_it_before_any_work(capsys, tmp_path, command):
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.slow
 def test_files_show_the_filtered_motion_and_keep_what_it_was(capsys, tmp_path, monkeypatch, command):
     done(capsys, *command, f"out={tmp_path / 'plain'}")
     done(capsys, *command, f"out={tmp_path / 'run'}", "outputs.filter=4", "outputs.formats=[trc,csv]")

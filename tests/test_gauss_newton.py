@@ -46,6 +46,7 @@ def frame_energy(capped=True, sparse=False, known=True, added=()):
     return (near(energy, pose, 300)[0] if sparse else energy), pose
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("capped", "sparse", "known"), [(True, False, True), (False, False, False), (True, True, True)]
 )
@@ -98,6 +99,7 @@ def test_the_models_of_the_priors_are_exact(place, known):
         assert (np.abs(model.curvature).max() > 0.1) == (known or place == 1)
 
 
+@pytest.mark.slow
 def test_the_jacobian_of_the_projection_is_that_of_jacfwd():
     with jax.enable_x64(True):
         camera = in_float64(ring_rig(1).camera("cam0"))

@@ -39,6 +39,7 @@ def points_of(body, values):
     return np.asarray(body.posed_landmarks(values), float)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "pitch", "up"), [(0, 0.0, "z"), (1, 0.3, "z"), (2, 1.6, "z"), (3, 0.0, "-y")])
 def test_a_pose_is_found_again(seed, pitch, up):
     body = HUMAN.rotated(jnp.asarray(world_from_upright(up), jnp.float32))

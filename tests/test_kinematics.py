@@ -37,6 +37,7 @@ def test_the_derivatives_are_those_of_autodiff_in_both_directions(seed):
         np.testing.assert_allclose(jax.jit(jax.jacrev(frames))(pose), expected, atol=FLOAT64)
 
 
+@pytest.mark.slow
 def test_second_derivatives_and_those_by_the_skeleton_are_right_too():
     with jax.enable_x64(True):
         skeleton, pose = case(7)

@@ -50,6 +50,7 @@ def followed(dog, step, frames, present=lambda k: ALL, period=PERIOD):
     return np.stack([np.asarray(each.tracked.result.pose) for each in found])
 
 
+@pytest.mark.slow
 def test_the_poses_are_those_of_offline_tracking(dog, step):
     poses = followed(dog, step, range(FRAMES))
     np.testing.assert_allclose(poses, dog[2].poses, atol=2e-3)

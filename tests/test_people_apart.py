@@ -184,6 +184,7 @@ def passing(count):
     return [[(box(-0.7 * ACROSS + a * ALONG), RED), (box(0.7 * ACROSS - a * ALONG), BLUE)] for a in away]
 
 
+@pytest.mark.slow
 def test_each_person_has_example_poses_in_the_same_frames():
     recording = recording_of(RIG, 4, first_frame=10)
     examples = examples_of_masks(recording, sampled(passing(4), first=10), 2, 3)
@@ -200,6 +201,7 @@ def test_each_person_has_example_poses_in_the_same_frames():
             assert not (one.within[camera] & other.within[camera]).any()
 
 
+@pytest.mark.slow
 def test_who_stands_where_nothing_is_known_is_found_by_colour():
     seen = sampled(passing(2))
     noise = np.random.default_rng(0).integers(-9, 10, (*SIZE[::-1], 3))

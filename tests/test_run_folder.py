@@ -100,6 +100,7 @@ def test_two_runs_in_one_folder(capsys, tmp_path, command):
     done(capsys, *command)
 
 
+@pytest.mark.slow
 def test_the_lock_of_a_killed_process_blocks_nobody(capsys, tmp_path, command):
     """Another process holds it first, then is killed; the file stays."""
     hold = f"""

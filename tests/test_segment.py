@@ -70,6 +70,7 @@ def test_a_sheet_shows_every_picture_with_its_mask_tinted():
     assert not tiles[3].any()
 
 
+@pytest.mark.slow
 def test_a_sheet_shows_what_was_painted_to_stand_in_front(capsys, tmp_path):
     recording = make_recording(tmp_path / "recording")
     mask = np.zeros((48, 64), np.uint8)

@@ -54,6 +54,7 @@ def tracks_nothing(context):
     context.setattr(passes, "merge_backward", lambda *_: pytest.fail("tracked both ways again"))
 
 
+@pytest.mark.slow
 def test_a_run_stopped_while_its_revised_files_are_written(capsys, tmp_path, monkeypatch, command, farther):
     done(capsys, *command, "out=whole")
     with monkeypatch.context() as context:

@@ -70,6 +70,7 @@ def test_the_quadratic_model_has_the_value_and_the_gradient_of_the_objective(cas
     np.testing.assert_allclose(model.gradient, gradient, atol=GRADIENT * float(jnp.abs(gradient).max()))
 
 
+@pytest.mark.slow
 def test_the_curvature_is_positive_and_predicts_the_objective_where_all_fits(case):
     """With masks that the body throws exactly, the neglected part of the Hessian is small."""
     fit, truth = case

@@ -56,6 +56,7 @@ def apart(both, metres):
     return jnp.asarray(pose)
 
 
+@pytest.mark.slow
 def test_of_a_solid_about_some_blobs_only_their_pairs_are_left():
     both = concatenate([replace(HUMAN, name="anna"), replace(HUMAN, name="ben")])
     whole, hand = Solid.of(both), np.array([HUMAN.num_blobs - 1])

@@ -66,6 +66,7 @@ def test_what_kept_a_recording_from_any_result_is_told(capsys, pair):
     assert "n_jbos" in capsys.readouterr().err.splitlines()[-1]
 
 
+@pytest.mark.slow
 def test_any_error_before_tracking_is_a_row(capsys, tmp_path, pair, monkeypatch):
     whole = takes.Subjects.actor_of
 

@@ -114,6 +114,7 @@ def test_every_solver_climbs_an_energy_with_a_floor(name, pairs):
     assert np.linalg.norm(slope(found.params)) < 0.1 * np.linalg.norm(slope(start))
 
 
+@pytest.mark.slow
 def test_gauss_newton_uses_the_curvature_of_a_term():
     """A quadratic is climbed in a step or two; without its curvature the steps are as long as they may be."""
     energy, start = scene()
@@ -159,6 +160,7 @@ def test_the_model_from_autodiff_has_value_and_gradient_and_bends_one_way_only()
         assert values.min() < 0.0
 
 
+@pytest.mark.slow
 def test_a_penalty_is_subtracted_and_a_term_added():
     floor, steady = Floor(2.0, height=HEIGHT), Steady(0.5)
     energy, pose = scene((floor, steady))

@@ -108,6 +108,7 @@ def test_the_terms_of_a_result_are_those_of_its_pose(dog):
     np.testing.assert_allclose(results[2].terms["acceleration_penalty"], np.sum(bend**2), rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_one_compilation_serves_a_recording_and_every_swept_number(dog):
     """Counted with a solver that stays where it is, which compiles quickly."""
     traces = []

@@ -34,6 +34,7 @@ def test_actors_are_turned_in_the_middle_of_equal_parts_of_a_clip():
     assert len(long) == 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("actor", [0, 1])
 def test_one_of_two_actors_is_turned_in_all_ways_and_the_other_stays(actor):
     both = concatenate([replace(HUMAN, name="anna"), replace(HUMAN, name="ben")])

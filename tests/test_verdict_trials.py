@@ -53,6 +53,7 @@ def test_a_limb_is_lost_where_it_is_far_off_for_some_frames(off, frames, lost):
     assert run.looks_right
 
 
+@pytest.mark.slow
 def test_a_larger_actor_is_larger_in_every_pose():
     body = make_body()
     pose = jnp.zeros(body.skeleton.num_dofs)
