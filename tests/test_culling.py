@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from body_cases import random_body, shipped
 from drawn_scene import cells_of, draw, in_colors, make_tracker, standing
+from hypothesis import given
+from hypothesis import strategies as st
 from rig_cases import ring_rig
 
 from sogjax.energy.similarity import similarity_among
@@ -19,7 +21,16 @@ from sogjax.model.sog import Sog
 from sogjax.scene.background import BackgroundCells
 from sogjax.scene.foreground import BackgroundModel
 from sogjax.scene.quadtree import keep_blobs
-from sogjax.tracking.culling import BLOB_RADIUS, CAPACITIES, Capacities, body_boxes, capacity_for, union_boxes
+from sogjax.tracking.culling import (
+    BLOB_RADIUS,
+    BLOCK_STEP,
+    CAPACITIES,
+    Capacities,
+    block_capacity,
+    body_boxes,
+    capacity_for,
+    union_boxes,
+)
 from sogjax.tracking.frame import FrameInput, TrackState
 
 CULLED = 2e-3
@@ -160,6 +171,14 @@ def test_a_capacity_holds_its_count(count, headroom):
     assert capacity in CAPACITIES
     smaller = [c for c in CAPACITIES if c < capacity]
     assert all(c < headroom * count for c in smaller)
+
+
+@given(st.integers(0, 200_000))
+def test_room_for_blocks_is_one_of_few(count):
+    room = block_capacity(count)
+    assert count <= room <= max(1.25 * count + BLOCK_STEP, BLOCK_STEP)
+    assert block_capacity(room) == room
+    assert room // BLOCK_STEP in {few << k for few in range(1, 9) for k in range(9)}
 
 
 def test_more_blobs_than_the_largest_capacity_are_an_error():

@@ -20,7 +20,7 @@ from sogjax.search.combination import Optima, best_combination
 from sogjax.search.found_pose import TRUNK, FoundPose
 from sogjax.search.joint_search import search_poses
 from sogjax.search.mirrored import look_alikes, other_side, sides_apart
-from sogjax.search.placed_body import turns_with_vertical
+from sogjax.search.placed_body import centres_of, turns_with_vertical
 from sogjax.search.pose_confidence import SURE, Agreement, PoseEvidence, agreed_confidence, pose_confidence
 from sogjax.search.pose_search import Hypotheses, PlacedSearch, PoseSearch, with_better_limbs
 from sogjax.search.seen_frame import SeenFrame
@@ -69,8 +69,11 @@ def dog():
 def test_a_dog_is_found_without_a_hint(dog):
     truth = moved(dog, standing(dog, 1.1, (0.3, -0.2)), {"root_yaw": 2.1})
     search = searcher(dog)
-    found = search_poses([search], frames_of(draw(dog, truth, RIG)), 1)[0].found
+    told = []
+    found = search_poses([search], frames_of(draw(dog, truth, RIG)), 1, told=told.append)[0].found
     assert off(dog, found.pose, truth) < 0.05
+    (places,) = told
+    assert np.linalg.norm(places[0].centre - centres_of(dog, found.pose[None])[0]) < 0.1
     assert found.energy > 0.0
     assert 0.0 < found.margin <= 1.0
 

@@ -16,10 +16,10 @@ from sogjax.energy.frame_energy import standard_terms
 from sogjax.model.body import concatenate, dof_slices
 from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.solve.solution import Solution
-from sogjax.tracking import frame_by_frame
+from sogjax.tracking import capacity, frame_by_frame
 from sogjax.tracking.culling import CAPACITIES, Capacities
 from sogjax.tracking.frame import TrackState
-from sogjax.tracking.frame_by_frame import track
+from sogjax.tracking.frame_by_frame import compile_step, track
 
 DEPTH, FINE_DEPTH = 6, 7
 """Cells of 4 and 2 pixels: an arm at 3 m is 5 pixels wide."""
@@ -60,6 +60,20 @@ def test_the_motion_of_a_dog_is_found(dog):
     assert landmark_error(tracker.body, poses[-1], poses[0]) > 0.04
     assert all(r.result.converged for r in results)
     assert all((r.result.num_near <= r.capacities.near).all() for r in results)
+
+
+@pytest.mark.slow
+def test_a_step_compiled_beforehand_is_that_of_the_first_frame(walking_dog, monkeypatch):
+    tracker, cells, right = walking_dog
+    monkeypatch.setattr(capacity, "MOVED", 1.0)  # the dog at rest is where it is
+    traces, step = [], type(tracker).step
+    watched = eqx.filter_jit(lambda *given: traces.append(1) or step(*given))
+    monkeypatch.setattr(frame_by_frame, "_step", watched)
+    compile_step(tracker, cells[0], right.poses[0])
+    assert traces == [1]
+    first = next(track(tracker, jnp.asarray(right.poses[0]), cells))
+    assert traces == [1]
+    assert first.result.iterations > 0
 
 
 def test_a_step_is_lowered_for_a_gpu_with_the_shapes_that_it_has_here(dog):

@@ -6,6 +6,7 @@ from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
 
 from sogjax.energy.term import Term
 from sogjax.errors import InputError
@@ -21,8 +22,9 @@ from sogjax.run.terminal import alive, say
 from sogjax.search import found_pose
 from sogjax.search.found_pose import FoundPose, agreements
 from sogjax.search.joint_search import search_poses
-from sogjax.search.places import places
-from sogjax.search.pose_search import PoseSearch, Report, unreported
+from sogjax.search.placed_body import centred
+from sogjax.search.places import Place, places
+from sogjax.search.pose_search import PoseSearch, Report, unreported, untold
 from sogjax.search.seen_frame import SeenFrame
 from sogjax.settings.run import TrackConfig
 from sogjax.tracking.frame import FrameInput
@@ -75,6 +77,8 @@ class ClipSearch:
     bodies: Sequence[Body]
     config: TrackConfig
     terms: Sequence[Term] = ()
+    told: Callable[[FrameInput, Float[np.ndarray, "dof"]], object] = lambda *_: None
+    """Is told of the first frame that is searched, and of the bodies at rest where they are likely seen in it."""
 
     @cached_property
     def _cameras(self):
@@ -131,7 +135,14 @@ class ClipSearch:
     def paths_in(self, frames: Sequence[FrameInput], report: Report = unreported) -> list[found_pose.Path]:
         """The best poses of all actors in the first of some frames and in the others, by what is seen there."""
         make = lambda searcher, k: self._seen(searcher, frames[k])
-        return search_poses(self._searchers, make, len(frames), report)
+        told = untold if self._searched else lambda found: self.told(frames[0], self._at_rest(found))
+        return search_poses(self._searchers, make, len(frames), report, told)
+
+    def _at_rest(self, found: Sequence[Place]) -> Float[np.ndarray, "dof"]:
+        """The bodies at rest in some places; several in the last one where these are fewer."""
+        at = [found[min(k, len(found) - 1)].centre for k in range(len(self.bodies))]
+        rest = [np.asarray(body.poses["rest"])[None] for body in self.bodies]
+        return np.concatenate([centred(*each)[0] for each in zip(self.bodies, rest, at, strict=True)])
 
     def candidates(self) -> Iterator[int]:
         """The frames to search until one is clear: the first, then others in which the actors are seen best."""

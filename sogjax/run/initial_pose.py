@@ -23,6 +23,7 @@ from sogjax.run.terminal import say
 from sogjax.search.described_pose import check_described_pose, described_pose
 from sogjax.search.found_pose import FoundPose
 from sogjax.settings.run import TrackConfig
+from sogjax.tracking.frame import FrameInput
 
 NAMES = ("auto",)
 """Values of the setting `initial_pose` that name no file, but what is asked instead of files and keypoints."""
@@ -75,6 +76,8 @@ class PoseRequest:
     config: TrackConfig
     terms: Sequence[Term] = ()
     """Of the energy, beside those of the settings."""
+    told: Callable[[FrameInput, Float[np.ndarray, "dof"]], object] = lambda *_: None
+    """What a search tells beforehand (`ClipSearch.told`)."""
     picture: Path | None = None
     """Where the best guess is drawn if none is sure; None: into the working folder, where it is refused."""
 
@@ -151,7 +154,7 @@ def from_search(request: PoseRequest) -> InitialPose | None:
     Raises:
         InputError: the frames show nothing like an actor, or fewer people than actors.
     """
-    search = ClipSearch(request.clip, request.background, request.bodies, request.config, request.terms)
+    search = ClipSearch(request.clip, request.background, request.bodies, request.config, request.terms, request.told)
     guess = best_guess(search, request.picture)
     if guess.frame != request.clip.numbers[0]:
         say(f"tracking begins in frame {guess.frame}, and goes both ways")

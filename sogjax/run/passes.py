@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -38,6 +38,7 @@ from sogjax.run.setup import compile_beforehand
 from sogjax.run.terminal import say
 from sogjax.run.write import check_formats, check_pose2sim, write_results
 from sogjax.search.limb_search import compile_search
+from sogjax.tracking.frame_by_frame import compile_step
 
 
 @dataclass(frozen=True)
@@ -72,9 +73,11 @@ def _initial_pose(run: Run) -> InitialPose:
     check_pose2sim(run.config.outputs, run.clip.recording, run.clip.numbers, run.actors.bodies, run.config.overwrite)
     _ = run.adjusts
     with ThreadPoolExecutor(1) as beside:
-        compiling = beside.submit(lambda: compile_beforehand(run.setup))
-        found = find_initial_pose(run.pose_request, run.pose_sources)
-        compiling.result()
+        compiling = [beside.submit(lambda: compile_beforehand(run.setup))]
+        told = lambda *seen: compiling.append(beside.submit(lambda: compile_step(run.setup.tracker, *seen)))
+        found = find_initial_pose(replace(run.pose_request, told=told), run.pose_sources)
+        for each in compiling:
+            each.result()
     return found
 
 

@@ -102,7 +102,7 @@ class Run:
     def pose_request(self) -> PoseRequest:
         """The initial pose that is wanted."""
         picture = None if self.out is None else GUESS.of(self.out)
-        return PoseRequest(self.clip, self.background, self.actors, self.config, self.terms, picture)
+        return PoseRequest(self.clip, self.background, self.actors, self.config, self.terms, picture=picture)
 
     @cached_property
     def first_setup(self) -> Setup:

@@ -16,9 +16,11 @@ from sogjax.search.pose_search import (
     PlacedSearch,
     PoseSearch,
     Report,
+    Told,
     different,
     search,
     unreported,
+    untold,
     with_better_limbs,
     with_look_alikes,
 )
@@ -45,7 +47,11 @@ Poses = Float[np.ndarray, "hypothesis dof"]
 
 
 def search_poses(
-    searchers: Sequence[PoseSearch], make: FrameMaker, num_frames: int, report: Report = unreported
+    searchers: Sequence[PoseSearch],
+    make: FrameMaker,
+    num_frames: int,
+    report: Report = unreported,
+    told: Told = untold,
 ) -> list[Path]:
     """The poses of some actors in one frame, which explain the later ones too, in the order of the actors.
 
@@ -55,7 +61,8 @@ def search_poses(
     frames = [[make(searcher, number) for number in range(num_frames)] for searcher in searchers]
     optima, of_each = [], SEARCHING / len(searchers)
     for k, searcher in enumerate(searchers):
-        optima.append(_searched(searcher, frames[k][0], lambda share, k=k: report(of_each * (k + share))))
+        of_search = lambda share, k=k: report(of_each * (k + share))
+        optima.append(_searched(searcher, frames[k][0], of_search, untold if k else told))
     paths = [Path.of_nothing(searcher.body, num_frames) for searcher in searchers]
     seen = [k for k in range(len(searchers)) if len(optima[k])]
     if seen:
@@ -92,8 +99,8 @@ class Sought:
         return replace(tried, values=tried.values - UPSIDE_DOWN * downwards)
 
 
-def _searched(searcher: PoseSearch, frame: SeenFrame, report: Report = unreported) -> Poses:
-    found = search(searcher, frame, report=report)
+def _searched(searcher: PoseSearch, frame: SeenFrame, report: Report = unreported, told: Told = untold) -> Poses:
+    found = search(searcher, frame, report=report, told=told)
     return np.stack([optimum.pose for optimum in found]) if found else np.zeros((0, searcher.body.skeleton.num_dofs))
 
 

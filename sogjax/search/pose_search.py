@@ -54,6 +54,8 @@ DIFFERENT = 0.1
 
 Report = Callable[[float], None]
 """Called with the share of some work that is done, 0 to 1."""
+Told = Callable[[Sequence[Place]], object]
+"""Is told of the places that look like a body, before poses are searched for there."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,13 @@ def unreported(share: float) -> None:
     """Nobody asks how far a search is."""
 
 
-def search(searcher: PoseSearch, frame: SeenFrame, count: int = NUM_LAST, report: Report = unreported) -> list[Optimum]:
+def untold(found: Sequence[Place]) -> None:
+    """Nobody asks where something looks like a body."""
+
+
+def search(
+    searcher: PoseSearch, frame: SeenFrame, count: int = NUM_LAST, report: Report = unreported, told: Told = untold
+) -> list[Optimum]:
     """The best different poses of a body in one frame, best first; none, if nothing looks like it.
 
     What looks like the best is among them; of several actors that is asked once it is known where the others are.
@@ -103,6 +111,7 @@ def search(searcher: PoseSearch, frame: SeenFrame, count: int = NUM_LAST, report
     found = places(frame, searcher.up, NUM_PLACES, searcher.among)
     if not found:
         return []
+    told(found)
     placed = PlacedSearch.of_places(searcher, frame, np.stack([place.centre for place in found]))
     tried = _starts(searcher, found)
     with ThreadPoolExecutor(2) as beside:

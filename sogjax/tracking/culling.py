@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.energy.overlap import pair_color_similarities
+from sogjax.energy.pairs import CHUNK
 from sogjax.energy.views import Windows, windows_around
 from sogjax.errors import InputError
 from sogjax.model.camera import Camera, project
@@ -37,8 +38,8 @@ NEGLIGIBLE_WEIGHT = 0.05
 
 BoxAround = Literal["last", "predicted"]
 
-BLOCK_STEP = 128
-"""Room for blocks of pairs comes in multiples of this."""
+BLOCK_STEP = CHUNK
+"""Room for blocks of pairs comes in multiples of this; what is not used is passed over, so large steps cost little."""
 
 
 class Capacities(eqx.Module):
@@ -78,8 +79,13 @@ def capacity_for(count: int, headroom: float = 1.0) -> int:
 
 
 def block_capacity(count: int, headroom: float = 1.0) -> int:
-    """Room for `headroom` times `count` blocks of pairs, at least for one step of them."""
-    return BLOCK_STEP * max(math.ceil(headroom * count / BLOCK_STEP), 1)
+    """Room for `headroom` times `count` blocks of pairs, at least for one step of them; up to a quarter more.
+
+    So few capacities are asked for, and few programs compiled.
+    """
+    steps = max(math.ceil(headroom * count / BLOCK_STEP), 1)
+    coarser = 1 << max(steps.bit_length() - 3, 0)
+    return BLOCK_STEP * coarser * math.ceil(steps / coarser)
 
 
 class BlobWeights(NamedTuple):

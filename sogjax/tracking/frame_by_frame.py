@@ -58,6 +58,13 @@ def track(
         yield TrackedFrame(index, on_host(result), capacities, tracker.reader.color_space, seconds)
 
 
+def compile_step(tracker: Tracker, frame: AnyFrame, at_rest: Float[np.ndarray, "dof"]) -> None:
+    """Compile beforehand what `track` begins with, while other work goes on, given the pose of bodies at rest there."""
+    state, known = tracker.start(at_rest), on_device(frame)
+    unmoved = eqx.tree_at(lambda t: t.solver.max_iterations, tracker, jnp.zeros_like(tracker.solver.max_iterations))
+    _step(unmoved, state, known, first_capacities(tracker, state, known, at_rest=True))
+
+
 @compiled
 def image_blobs(tracker: Tracker, state: TrackState, frame: FrameInput, capacities: Capacities) -> Sog:
     """The image blobs of a frame that was tracked already."""
