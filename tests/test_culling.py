@@ -176,7 +176,7 @@ def test_a_capacity_holds_its_count(count, headroom):
 @given(st.integers(0, 200_000))
 def test_room_for_blocks_is_one_of_few(count):
     room = block_capacity(count)
-    assert count <= room <= max(1.25 * count + BLOCK_STEP, BLOCK_STEP)
+    assert count <= room <= 1.25 * count + BLOCK_STEP
     assert block_capacity(room) == room
     assert room // BLOCK_STEP in {few << k for few in range(1, 9) for k in range(9)}
 

@@ -1,6 +1,7 @@
 """Videos in their own colours (PyAV): the same cells and the same frames as OpenCV's pictures."""
 
 import sys
+from dataclasses import replace
 from fractions import Fraction
 from itertools import islice
 
@@ -294,6 +295,8 @@ def test_chosen_frames_have_evened_colours(tmp_path):
     (_, (left, right)), *_ = read_chosen(recording, [2])
     expected, _ = next(iter(read_frames(recording, 2, 3)))
     np.testing.assert_array_equal(left, expected)
+    (_, (as_filmed, _)), *_ = read_chosen(replace(recording, color_gains={}), [2])
+    assert (left != as_filmed).any()
     assert isinstance(right, np.ndarray)
 
 

@@ -52,6 +52,14 @@ def test_beside_a_table_legs_may_be_those_of_a_chair(leg):
     assert not legs_of(still, 0.0, spacing).any()
 
 
+def test_a_rail_is_no_table():
+    spacing, still = 0.04, np.zeros((64, 64, 30), bool)
+    still[10:20, 10:18, :22] = True
+    alone = still.copy()
+    still[30:60, 30:32, 17:19] = True
+    np.testing.assert_array_equal(legs_of(still, 0.0, spacing), alone)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("turn", OTHER_UPS)
 def test_whichever_axis_points_upwards_the_same_is_found(waving, turn):

@@ -16,7 +16,7 @@ from sogjax.energy.frame_energy import standard_terms
 from sogjax.model.body import concatenate, dof_slices
 from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.solve.solution import Solution
-from sogjax.tracking import capacity, frame_by_frame
+from sogjax.tracking import frame_by_frame
 from sogjax.tracking.culling import CAPACITIES, Capacities
 from sogjax.tracking.frame import TrackState
 from sogjax.tracking.frame_by_frame import compile_step, track
@@ -65,7 +65,7 @@ def test_the_motion_of_a_dog_is_found(dog):
 @pytest.mark.slow
 def test_a_step_compiled_beforehand_is_that_of_the_first_frame(walking_dog, monkeypatch):
     tracker, cells, right = walking_dog
-    monkeypatch.setattr(capacity, "MOVED", 1.0)  # the dog at rest is where it is
+    monkeypatch.setattr(frame_by_frame, "MOVED", 1.0)  # the dog at rest is where it is
     traces, step = [], type(tracker).step
     watched = eqx.filter_jit(lambda *given: traces.append(1) or step(*given))
     monkeypatch.setattr(frame_by_frame, "_step", watched)

@@ -170,8 +170,8 @@ class _SeenUnit:
         kept = _different(drawn[:, limb.all_dofs], self._cost(drawn, rest, fills, limb.all_blobs))
         given = (self.body, part, rest, self.silhouettes, pose_scales(self.body.skeleton))
         climbed = shared_out(lambda count, poses: (_climbed(count, poses, *given),), NUM_KEPT // THREADS, drawn[kept])
-        ways = np.tile(self.pose, (NUM_KEPT, 1))
-        ways[1 : len(kept)] = climbed[0][1:]
+        ways = np.resize(climbed[0], (NUM_KEPT, len(self.pose)))
+        ways[0] = self.pose
         return ways, np.asarray(_part_covered(self.body, jnp.asarray(ways), part, self.silhouettes))
 
     def _cost(

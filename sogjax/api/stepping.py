@@ -58,7 +58,7 @@ def make_tracker(
     """
     config, actors = track_settings(**settings), actor_list(actor)
     clip = opened_clip(with_cameras(recording, config.cameras), config)
-    run = Run(clip, config, terms=terms, records={"actors": Actors(tuple(actors))})
+    run = Run(clip, config, terms=terms, takes_steps=False, records={"actors": Actors(tuple(actors))})
     run_passes(run, BEFORE_TRACKING)
     tracker = replace(run.setup.tracker, initial_pose=jnp.asarray(run.initial_pose.pose))
     frame = on_device(next(clip.frames(run.initial_pose.frame, run.initial_pose.frame + 1)))

@@ -141,7 +141,7 @@ def session_of(
 def _replayed(recording: Recording, actors: Sequence[Body], config: LiveConfig, terms: Sequence[Term]) -> Session:
     settings = track_settings_of(config)
     clip = Clip(recording, recording.frames, config.images.depth)
-    run = Run(clip, settings, terms=terms, records={"actors": Actors(tuple(actors))})
+    run = Run(clip, settings, terms=terms, takes_steps=False, records={"actors": Actors(tuple(actors))})
     run_passes(run, [each for each in UP_TO_TRACKING if not config.search or each.name not in FROM_THE_POSE])
     pose = None if config.search else np.asarray(run.initial_pose.pose)
     first = recording.first_frame if config.search else run.initial_pose.frame

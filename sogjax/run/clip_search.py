@@ -24,7 +24,7 @@ from sogjax.search.found_pose import FoundPose, agreements
 from sogjax.search.joint_search import search_poses
 from sogjax.search.placed_body import centred
 from sogjax.search.places import Place, places
-from sogjax.search.pose_search import PoseSearch, Report, unreported, untold
+from sogjax.search.pose_search import PoseSearch, Report, Told, unreported, untold
 from sogjax.search.seen_frame import SeenFrame
 from sogjax.settings.run import TrackConfig
 from sogjax.tracking.frame import FrameInput
@@ -42,6 +42,10 @@ ROOM = 1.0
 NOTHING_LEFT = 0.1
 """An actor is not there if this part is left of what it explains, once the others are taken away. Of somebody who is
 hidden by others half is left, of a woman half of whom had become background a fourth; of nobody 0.02 at most."""
+
+
+SeenAtRest = Callable[[FrameInput, Float[np.ndarray, "dof"]], object]
+"""Is told of the first frame that is searched, and of all bodies at rest, where something looks like them."""
 
 
 @dataclass(frozen=True)
@@ -77,8 +81,8 @@ class ClipSearch:
     bodies: Sequence[Body]
     config: TrackConfig
     terms: Sequence[Term] = ()
-    told: Callable[[FrameInput, Float[np.ndarray, "dof"]], object] = lambda *_: None
-    """Is told of the first frame that is searched, and of the bodies at rest where they are likely seen in it."""
+    told: SeenAtRest | None = None
+    """Is told once, before poses are searched for."""
 
     @cached_property
     def _cameras(self):
@@ -135,8 +139,12 @@ class ClipSearch:
     def paths_in(self, frames: Sequence[FrameInput], report: Report = unreported) -> list[found_pose.Path]:
         """The best poses of all actors in the first of some frames and in the others, by what is seen there."""
         make = lambda searcher, k: self._seen(searcher, frames[k])
-        told = untold if self._searched else lambda found: self.told(frames[0], self._at_rest(found))
-        return search_poses(self._searchers, make, len(frames), report, told)
+        return search_poses(self._searchers, make, len(frames), report, self._with_places(frames[0]))
+
+    def _with_places(self, frame: FrameInput) -> Told:
+        """What a search does with the places that it finds in a frame."""
+        told = self.told
+        return untold if told is None or self._searched else lambda found: told(frame, self._at_rest(found))
 
     def _at_rest(self, found: Sequence[Place]) -> Float[np.ndarray, "dof"]:
         """The bodies at rest in some places; several in the last one where these are fewer."""

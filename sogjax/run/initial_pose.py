@@ -16,14 +16,13 @@ from sogjax.model.body import Body
 from sogjax.run.actors import Actors
 from sogjax.run.background import Background
 from sogjax.run.clip import Clip
-from sogjax.run.clip_search import ClipSearch, best_guess
+from sogjax.run.clip_search import ClipSearch, SeenAtRest, best_guess
 from sogjax.run.keypoint_initial_pose import keypoint_poses
 from sogjax.run.recordings import upright
 from sogjax.run.terminal import say
 from sogjax.search.described_pose import check_described_pose, described_pose
 from sogjax.search.found_pose import FoundPose
 from sogjax.settings.run import TrackConfig
-from sogjax.tracking.frame import FrameInput
 
 NAMES = ("auto",)
 """Values of the setting `initial_pose` that name no file, but what is asked instead of files and keypoints."""
@@ -76,8 +75,8 @@ class PoseRequest:
     config: TrackConfig
     terms: Sequence[Term] = ()
     """Of the energy, beside those of the settings."""
-    told: Callable[[FrameInput, Float[np.ndarray, "dof"]], object] = lambda *_: None
-    """What a search tells beforehand (`ClipSearch.told`)."""
+    told: SeenAtRest | None = None
+    """Is told by a search, before poses are searched for."""
     picture: Path | None = None
     """Where the best guess is drawn if none is sure; None: into the working folder, where it is refused."""
 

@@ -74,10 +74,15 @@ def _initial_pose(run: Run) -> InitialPose:
     _ = run.adjusts
     with ThreadPoolExecutor(1) as beside:
         compiling = [beside.submit(lambda: compile_beforehand(run.setup))]
-        told = lambda *seen: compiling.append(beside.submit(lambda: compile_step(run.setup.tracker, *seen)))
-        found = find_initial_pose(replace(run.pose_request, told=told), run.pose_sources)
-        for each in compiling:
-            each.result()
+        with_step = lambda *seen: compiling.append(beside.submit(lambda: compile_step(run.setup.tracker, *seen)))
+        request = replace(run.pose_request, told=with_step if run.takes_steps else None)
+        try:
+            found = find_initial_pose(request, run.pose_sources)
+            for each in compiling:
+                each.result()
+        except BaseException:
+            beside.shutdown(wait=False, cancel_futures=True)
+            raise
     return found
 
 

@@ -47,6 +47,8 @@ class Run:
     adjust: AdjustRequest = field(default_factory=AdjustRequest)
     frames_given: bool = False
     """Whether the frames were tracked before, and their table is given."""
+    takes_steps: bool = True
+    """Whether it tracks frames by the tracker's step, which is compiled beforehand; others only take its tracker."""
     report_actors: Callable[[Sequence[MadeActor]], object] = lambda _: None
     """Takes how the actors were made."""
     before_results: Callable[[], object] = lambda: None

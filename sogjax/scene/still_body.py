@@ -30,9 +30,10 @@ LEAST_HEIGHT, SHOES = 0.35, 0.35
 """Metres: what is less high is no leg; and a leg begins so far above the floor, whose colour shoes may have."""
 NARROWEST, WIDEST = 0.1, 0.9
 """Metres on the floor that legs take, with the ground between them; a table's leg takes less, a table more."""
-SEATS, BOARD, THIN = (0.2, 0.8), 0.6, 0.35
-"""Metres over the floor between which seats and tops of tables begin, what they are wide, at least, and high, at most,
-as they are seen."""
+TOPS, THIN = (0.2, 0.8), 0.35
+"""Metres over the floor between which the top of a table begins, as it is seen, and how high that is, at most."""
+LONG, BROAD = 0.6, 0.3
+"""Metres on the floor that it takes, at least."""
 RIM = 0.08
 """Metres around what is seen in one colour that may be somebody, too: at its edge, some cameras look past it."""
 INPAINTED = 5
@@ -141,12 +142,12 @@ def _floor_by_color(
 def legs_of(still: Bool[np.ndarray, "x y z"], ground: float, spacing: float) -> Bool[np.ndarray, "x y z"]:
     """The connected parts that stand on the ground (a level) as legs do: high, and not wide.
 
-    None beside a seat or a table: a chair is as high and wide as legs.
+    None beside a table: a chair is as high and wide as legs. Where the floor is not known, tables are not told.
     """
     connected: Any = label(still)
     labels: Int[np.ndarray, "x y z"] = connected[0]
     places = [spacing * np.argwhere(labels == part) for part in range(1, connected[1] + 1)]
-    if any(_is_board(of_part, ground * spacing, spacing) for of_part in places):
+    if any(_is_top(of_part, ground * spacing, spacing) for of_part in places):
         return np.zeros_like(still)
     kept = [_stands(of_part, ground * spacing, spacing) for of_part in places]
     return still & np.isin(labels, np.flatnonzero(kept) + 1)
@@ -159,12 +160,13 @@ def _stands(places: Float[np.ndarray, "place 3"], floor: float, spacing: float) 
     return bool(low and high >= LEAST_HEIGHT and NARROWEST <= max(wide) <= WIDEST)
 
 
-def _is_board(places: Float[np.ndarray, "place 3"], floor: float, spacing: float) -> bool:
-    """Whether most of a part lies over the floor as a seat or the top of a table does; metres."""
+def _is_top(places: Float[np.ndarray, "place 3"], floor: float, spacing: float) -> bool:
+    """Whether most of a part lies over the floor as the top of a table does; metres."""
     low, high = np.percentile(places[:, 2], [10, 90])
-    lowest, highest = SEATS
-    wide = np.ptp(places[:, :2], axis=0).max() + spacing
-    return bool(lowest <= low - floor <= highest and high - low <= THIN and wide >= BOARD)
+    lowest, highest = TOPS
+    broad, long = sorted(np.ptp(places[:, :2], axis=0) + spacing)
+    thin = lowest <= low - floor <= highest and high - low <= THIN
+    return bool(thin and broad >= BROAD and long >= LONG)
 
 
 def with_room_behind(

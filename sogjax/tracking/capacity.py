@@ -19,8 +19,6 @@ HEADROOM = 1.4
 """Slots for image blobs, as a multiple of what the first frame needs."""
 BLOCK_HEADROOM = 1.25
 """The same for blocks of pairs, whose number for all cameras together changes less."""
-MOVED = 1.1
-"""Image blobs near a body that moves, as a multiple of those near it at rest."""
 
 Found = TypeVar("Found")
 
@@ -85,10 +83,10 @@ def larger_capacities(capacities: Capacities, near: int, matching: int, blocks: 
     )
 
 
-def first_capacities(tracker: Tracker, state: TrackState, frame: FrameInput, at_rest: bool = False) -> Capacities:
-    """Capacities with headroom for what the first frame needs; as they likely are, if the state is that `at_rest`."""
+def first_capacities(tracker: Tracker, state: TrackState, frame: FrameInput, moved: float = 1.0) -> Capacities:
+    """Capacities with headroom for what the first frame needs, or `moved` times as many image blobs."""
     near, matching, blocks = (int(count.max()) for count in _counts(tracker, state, jnp.asarray(frame.cells)))
-    near, matching = (round(MOVED * count) for count in (near, matching)) if at_rest else (near, matching)
+    near, matching = (max(count, min(round(moved * count), CAPACITIES[-1])) for count in (near, matching))
     room = capacity_for(near, HEADROOM)
     if tracker.pairs == "dense":
         return Capacities(room, capacity_for(matching, HEADROOM))

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 
 import equinox as eqx
 import jax
@@ -9,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int, UInt8
 
+from sogjax.errors import InputError
 from sogjax.model.program import compiled
 from sogjax.model.sog import Sog
 from sogjax.quality.limb_confidence import LimbConfidence
@@ -16,6 +18,9 @@ from sogjax.tracking.capacity import first_capacities, larger_capacities
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import AnyFrame, FrameInput, TrackedFrame, TrackState, on_device, on_host
 from sogjax.tracking.tracker import Tracker
+
+MOVED = 1.1
+"""Image blobs near a body that moves, as a multiple of those near it at rest."""
 
 _step = compiled(Tracker.step)
 Told = Callable[[TrackState, FrameInput, Capacities], object]
@@ -59,10 +64,14 @@ def track(
 
 
 def compile_step(tracker: Tracker, frame: AnyFrame, at_rest: Float[np.ndarray, "dof"]) -> None:
-    """Compile beforehand what `track` begins with, while other work goes on, given the pose of bodies at rest there."""
+    """Compile beforehand the step of a frame, while other work goes on, from the pose of bodies at rest near theirs.
+
+    Nothing, where there are more image blobs near that pose than the largest capacity: near the true one may be fewer.
+    """
     state, known = tracker.start(at_rest), on_device(frame)
     unmoved = eqx.tree_at(lambda t: t.solver.max_iterations, tracker, jnp.zeros_like(tracker.solver.max_iterations))
-    _step(unmoved, state, known, first_capacities(tracker, state, known, at_rest=True))
+    with suppress(InputError):
+        _step(unmoved, state, known, first_capacities(tracker, state, known, MOVED))
 
 
 @compiled
