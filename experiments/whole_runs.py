@@ -197,6 +197,14 @@ ROWS = (
     "stoop 1 4 poses 228",
     "talk 2 12 plates 229",
     "walk 1 4 plates 230",
+    "talk 2 12 plates 231",
+    "talk 2 4 plates 232",
+    "embrace 2 12 videos 233",
+    "sit 1 12 plates 234",
+    "sit 1 12 videos 235",
+    "run 1 12 plates 236",
+    "cartwheel 1 4 plates 237",
+    "walk 1 3 plates 241",
 )
 GIVEN = {
     "plates": (SETTINGS, BACKGROUND, EXAMPLE_POSES),
