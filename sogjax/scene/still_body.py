@@ -30,10 +30,9 @@ LEAST_HEIGHT, SHOES = 0.35, 0.35
 """Metres: what is less high is no leg; and a leg begins so far above the floor, whose colour shoes may have."""
 NARROWEST, WIDEST = 0.1, 0.9
 """Metres on the floor that legs take, with the ground between them; a table's leg takes less, a table more."""
-TOPS, THIN = (0.2, 0.8), 0.35
-"""Metres over the floor between which the top of a table begins, as it is seen, and how high that is, at most."""
-LONG, BROAD = 0.6, 0.3
-"""Metres on the floor that it takes, at least."""
+TOPS, LARGE = (0.4, 1.0), 0.3
+"""Metres over the floor between which the top of a table is, and square metres that it has at one level: tops that were
+seen have 0.45 to 0.75, legs 0.1, other parts of a room in one colour 0.15."""
 RIM = 0.08
 """Metres around what is seen in one colour that may be somebody, too: at its edge, some cameras look past it."""
 INPAINTED = 5
@@ -161,12 +160,11 @@ def _stands(places: Float[np.ndarray, "place 3"], floor: float, spacing: float) 
 
 
 def _is_top(places: Float[np.ndarray, "place 3"], floor: float, spacing: float) -> bool:
-    """Whether most of a part lies over the floor as the top of a table does; metres."""
-    low, high = np.percentile(places[:, 2], [10, 90])
+    """Whether a part holds what may be the top of a table: it is large at some height, and not beneath; metres."""
+    levels, counts = np.unique(places[:, 2], return_counts=True)
+    large = levels[spacing**2 * counts >= LARGE] - floor
     lowest, highest = TOPS
-    broad, long = sorted(np.ptp(places[:, :2], axis=0) + spacing)
-    thin = lowest <= low - floor <= highest and high - low <= THIN
-    return bool(thin and broad >= BROAD and long >= LONG)
+    return bool(large.size and lowest <= large.min() and large.max() <= highest)
 
 
 def with_room_behind(
