@@ -32,7 +32,7 @@ NARROWEST, WIDEST = 0.1, 0.9
 """Metres on the floor that legs take, with the ground between them; a table's leg takes less, a table more."""
 TOPS, LARGE = (0.4, 1.0), 0.3
 """Metres over the floor between which the top of a table is, and square metres that it has at one level: tops that were
-seen have 0.45 to 0.75, legs 0.1, other parts of a room in one colour 0.15."""
+seen have 0.45 to 0.75, what else is at such heights at most 0.18."""
 RIM = 0.08
 """Metres around what is seen in one colour that may be somebody, too: at its edge, some cameras look past it."""
 INPAINTED = 5
