@@ -171,6 +171,7 @@ def made_dog():
     )
 
 
+@pytest.mark.slow
 def test_a_good_actor_has_nothing_to_warn_of():
     made = made_dog()
     report = actor_report(made, RIG)

@@ -36,6 +36,7 @@ def request_and_count(tmp_path, monkeypatch):
     return ActorRequest(Clip(recording, recording.frames, 4), lambda: Background(None)), count
 
 
+@pytest.mark.slow
 def test_the_next_run_takes_them_until_one_comes_to_its_end(request_and_count, tmp_path, capsys):
     request, count = request_and_count
     images = ImagesConfig(cache=str(tmp_path / "cache"))

@@ -153,6 +153,7 @@ def test_no_parameters_leave_the_body_as_it_is(shape):
     np.testing.assert_allclose(same.blobs.offsets, HUMAN.blobs.offsets, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_a_joint_that_moves_leaves_the_flesh_and_the_other_joints(shape):
     body, rest = moved_by(shape, "shoulder.y", 0.02), HUMAN.poses["rest"]
     np.testing.assert_allclose(body.posed_blobs(rest).means, HUMAN.posed_blobs(rest).means, atol=1e-6)

@@ -11,6 +11,7 @@ import pytest
 from command_line import done, refused
 from damaged import FUZZ, damaged
 from hypothesis import given
+from slow_values import fast_and_slow
 from small_recording import make_recording
 
 from sogjax.errors import InputError
@@ -253,7 +254,7 @@ def only_input_errors(path, text):
     assert "\n" not in message
 
 
-@pytest.mark.parametrize("kind", cases.TEXTS)
+@pytest.mark.parametrize("kind", fast_and_slow(*cases.TEXTS))
 def test_a_damaged_file_is_read_or_refused(tmp_path, kind):
     @FUZZ
     @given(damaged(cases.TEXTS[kind]()))

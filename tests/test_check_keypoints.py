@@ -62,6 +62,7 @@ def test_nobody_is_suspected_where_nobody_can_tell():
     assert suspects(("a", "b", "c"), np.array([0.2, 0.5, 0.1])) == []
 
 
+@pytest.mark.slow
 def test_a_pose2sim_project_is_checked_as_it_is(capsys, tmp_path):
     folder, _ = pose2sim(tmp_path / "trial")
     out, _ = done(capsys, "check", f"recording={folder}", f"out={tmp_path / 'out'}")

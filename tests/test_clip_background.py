@@ -124,6 +124,7 @@ def test_light_that_drifts_or_jumps_is_taken_out_and_counted_as_spread():
     assert np.median(found.spread) > 2 * np.median(learnt(steady).spread)
 
 
+@pytest.mark.slow
 def test_foreground_is_told_from_the_background_and_unknown_is_open():
     found = learnt(film())
     known = found.known.copy()
@@ -207,6 +208,7 @@ def test_one_moving_camera_is_said_and_only_its_background_stays_unknown(tmp_pat
     assert float(said[1]) == pytest.approx(4.0, abs=1.0)  # blocks of 24 pixels see a little less of a shift of 4
 
 
+@pytest.mark.slow
 def test_a_background_is_kept_in_the_cache_and_made_anew_for_other_frames(tmp_path, capsys):
     recording = filmed(tmp_path / "clip", num_frames=30)
     cache = str(tmp_path / "cache")
@@ -220,6 +222,7 @@ def test_a_background_is_kept_in_the_cache_and_made_anew_for_other_frames(tmp_pa
     assert "made again" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_who_stands_still_is_looked_for_only_where_no_masks_tell_who_it_is(tmp_path, monkeypatch):
     """Kept backgrounds of both kinds are told apart."""
     asked = []

@@ -36,6 +36,7 @@ def hits(environment):
     return int(done.stdout)
 
 
+@pytest.mark.slow
 def test_a_second_process_finds_the_programs_of_the_first(tmp_path):
     assert hits({VARIABLE: str(tmp_path / "kept")}) == 0
     (folder,) = (path for path in (tmp_path / "kept").iterdir() if path.is_dir())
@@ -44,6 +45,7 @@ def test_a_second_process_finds_the_programs_of_the_first(tmp_path):
     assert hits({VARIABLE: str(tmp_path / "kept")}) >= 1
 
 
+@pytest.mark.slow
 def test_they_lie_in_the_cache_folder_by_default(tmp_path):
     surroundings = {VARIABLE: "", "SOGJAX_CACHE": str(tmp_path)}
     hits(surroundings)
@@ -56,6 +58,7 @@ def test_nothing_is_kept_when_switched_off(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_work_goes_on_where_kept_programs_are_not_taken(tmp_path):
     kept = tmp_path / "kept"
     hits({VARIABLE: str(kept)})

@@ -86,7 +86,7 @@ def assert_gradient_is_right(body, pose, views, history, terms, differences=True
     return float(value), np.asarray(gradient)
 
 
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", fast_and_slow(*MODES))
 @pytest.mark.parametrize("capped", [True, False])
 @given(seed=seeds)
 @settings(deadline=None, max_examples=6)

@@ -86,6 +86,7 @@ def test_a_hand_over_a_floor_of_its_colour_is_undecided():
     assert float(odds[0, 5, 5]) > float(certain[0, 5, 5]) + 0.5
 
 
+@pytest.mark.slow
 def test_nothing_is_held_against_a_shoe_on_a_floor_of_its_colour():
     floor, shoe = wall(color=(0.1, 0.1, 0.11)), (0.13, 0.13, 0.13)
     tables, empty = jnp.stack([subject(shoe), subject(SKIN)]), BackgroundModel.from_background(floor)

@@ -4,6 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from body_cases import posed, reference_frames, reference_points, shipped
+from slow_values import fast_and_slow
 
 from sogjax.errors import InputError
 from sogjax.io.pose_description import PoseDescription
@@ -57,14 +58,14 @@ def test_the_position_is_that_of_the_root_and_values_of_single_dofs_are_taken():
 
 @pytest.mark.parametrize(
     ("up", "heading", "pose"),
-    [
+    fast_and_slow(
         ("z", 0.0, "walk_left"),
         ("z", 100.0, "tpose"),
         ("y", 100.0, "walk_left"),
         ("y", -150.0, "tpose"),
         ("-x", -150.0, "walk_left"),
         ("-x", 0.0, "tpose"),
-    ],
+    ),
 )
 def test_landmarks_give_the_pose_back_from_any_heading(up, heading, pose):
     body = upright(HUMAN, up)

@@ -7,6 +7,7 @@ import pytest
 from damaged import FUZZ, damaged
 from hypothesis import given
 from keypoint_cases import people, person, write_keypoints
+from slow_values import fast_and_slow
 from small_recording import make_recording, write_images
 
 from sogjax.errors import InputError
@@ -338,7 +339,7 @@ def test_too_many_people_are_said(folder):
     assert "up to 20 people" in found.warnings[0]
 
 
-@pytest.mark.parametrize("program", JSON_PROGRAMS)
+@pytest.mark.parametrize("program", fast_and_slow(*JSON_PROGRAMS))
 def test_damaged_files_are_read_or_refused(tmp_path, program):
     write_keypoints(tmp_path / "good", program, cameras=("a",), scheme="COCO_17", frames=1)
     good = next((tmp_path / "good").rglob("*.json")).read_text()

@@ -10,6 +10,7 @@ from body_cases import shipped
 from drawn_scene import BACKGROUND, cells_of, draw, in_colors, make_tracker, moved, standing
 from motion_cases import walking_motion
 from rig_cases import ring_rig
+from slow_values import fast_and_slow
 
 from sogjax.energy.posed import Posed
 from sogjax.energy.views import windows_around
@@ -101,7 +102,7 @@ def test_only_a_limb_that_is_elsewhere_is_in_doubt(dog):
     assert others.max() < 0.3
 
 
-@pytest.mark.parametrize("light", [0.55, 1.15])
+@pytest.mark.parametrize("light", fast_and_slow(0.55, 1.15))
 def test_a_limb_in_another_light_is_in_doubt_only_elsewhere(dog, light):
     """As a lamp or the shade beside it makes a limb brighter or darker as a whole, the rest as it was."""
     tracker, pose, cells = dog

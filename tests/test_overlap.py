@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from slow_values import fast_and_slow
 from sog_cases import floats, in_float64, random_sog, similarities
 
 from sogjax.energy.overlap import (
@@ -139,7 +140,7 @@ def test_the_gradient_is_zero_where_the_sum_reaches_the_cap(mode, sigma, live):
     assert (by_body.means == 0.0).all()
 
 
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", fast_and_slow(*MODES))
 def test_padding_is_inert_in_value_and_gradient(mode):
     """Whatever stands in the padding, sigmas of 0 included, which divide 0 by 0 where nobody masks them."""
     image, body = random_sog(5, 7), random_sog(6, 5)
@@ -181,7 +182,7 @@ def test_the_forward_gradient_is_that_of_autodiff(capped, seed):
 
 
 @pytest.mark.parametrize("capped", [True, False])
-@pytest.mark.parametrize("coinciding", [False, True])
+@pytest.mark.parametrize("coinciding", fast_and_slow(False, True))
 def test_the_forward_gradient_is_that_of_autodiff_in_float64(capped, coinciding):
     with jax.enable_x64(True):
         image, body = random_sog(11, 7), random_sog(12, 5, sigmas=(5.0, 20.0))

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from body_cases import shipped
 from rig_cases import ring_rig
 from run_cases import DOG, stand_in_tracked, tiny_run
@@ -65,6 +66,7 @@ def test_limbs_that_another_pass_moved_are_revised():
     assert np.argwhere(found).tolist() == [[3, 0]]
 
 
+@pytest.mark.slow
 def test_marked_stretches_are_drawn():
     motion = standing(frames=20)
     marked = np.zeros((20, len(NAMES)), bool)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from command_line import actor_file, trackable
 from hydra import compose, initialize_config_dir
+from slow_values import fast_and_slow
 from small_recording import frame_image, write_image
 
 from sogjax.cli.sweep.run import register_schema
@@ -101,7 +102,7 @@ def test_the_default_preset_is_the_defaults():
     assert track_config(["recording=x", "preset=default"]) == TrackConfig(recording="x")
 
 
-@pytest.mark.parametrize("preset", choices_of("preset"))
+@pytest.mark.parametrize("preset", fast_and_slow(*choices_of("preset")))
 @pytest.mark.parametrize("group", GROUPS)
 def test_settings_are_the_same_with_hydra_and_without(preset, group):
     for choice in choices_of(group):

@@ -98,6 +98,7 @@ def in_rig_centre(body, side):
     return jnp.zeros(body.skeleton.num_dofs).at[0].set(side).at[2].set(1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("distance", "competing"), [(0.05, True), (1.2, False)])
 def test_two_actors_compete_under_one_cap(distance, competing):
     """What both cover counts once; far from each other their similarities add up."""

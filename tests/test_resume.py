@@ -169,7 +169,9 @@ def other_version(recording, tmp_path):
     return [], "jax was 9"
 
 
-@pytest.mark.parametrize("change", [other_setting, other_actor, other_pictures, other_first_pose, other_version])
+@pytest.mark.parametrize(
+    "change", fast_and_slow(other_setting, other_actor, other_pictures, other_first_pose, other_version)
+)
 def test_a_run_that_was_begun_with_something_else_is_not_gone_on_with(
     capsys, tmp_path, monkeypatch, command, recording, change
 ):

@@ -103,6 +103,7 @@ def test_the_passes_of_a_command_are_those_that_it_wants(tmp_path):
     assert {each.name for each in PASSES} == named | conditional
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [(), ("adjust=true",), ("outputs.filter=6",)])
 def test_files_grow_while_tracking_only_where_no_later_pass_changes_the_frames(tmp_path, monkeypatch, words):
     """Whichever pass that is: one is added behind the others."""

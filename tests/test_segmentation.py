@@ -154,6 +154,7 @@ def who_hardly_moves(num_cameras):
     return rig, pictures, truth, arms, pillars
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("num_cameras", [4, 8])
 def test_who_stands_still_in_a_pillar_of_the_room_is_told_by_colour(num_cameras):
     rig, pictures, truth, arms, pillars = who_hardly_moves(num_cameras)

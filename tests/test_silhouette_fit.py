@@ -145,6 +145,7 @@ def test_cells_cover_what_the_mask_does():
     assert centres[inside].max(axis=0)[1] <= 220.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seeing", "cells"), [(2, MAX_CELLS), (4, MAX_CELLS), (12, 640), (16, COARSE_CELLS)])
 def test_cells_are_shared_out_among_the_cameras_that_have_masks(seeing, cells):
     rig, mask = ring_rig(16, (200, 300), distance=3.0), np.zeros((300, 200), bool)

@@ -13,6 +13,7 @@ from damaged import FUZZ, damaged
 from hypothesis import given
 from scipy.spatial.transform import Rotation
 from skeleton_cases import BVH, DOF_TEXT, DOFS, JOINTS, MARKERS, MOTION, skeleton_text
+from slow_values import fast_and_slow
 
 from sogjax.errors import InputError
 from sogjax.io.actor_file import load_body, save_body
@@ -332,7 +333,7 @@ def only_input_errors(read, *arguments, **keywords):
     assert "\n" not in message
 
 
-@pytest.mark.parametrize("kind", ["skeleton", "dof", "bvh"])
+@pytest.mark.parametrize("kind", fast_and_slow("skeleton", "dof", "bvh"))
 def test_a_damaged_file_is_read_or_refused(skeleton, tmp_path, kind):
     text = {"skeleton": skeleton_text(), "dof": DOF_TEXT, "bvh": BVH}[kind]
     path = tmp_path / f"damaged.{kind}"

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import actor_file
+from slow_values import fast_and_slow
 
 from sogjax.cli.words import composed
 from sogjax.errors import InputError
@@ -31,7 +32,7 @@ STUDY = Path(__file__).resolve().parents[1] / "experiments" / "study.py"
 SMALL = ("images.depth=5", "solver.max_iterations=12")
 
 
-@pytest.mark.parametrize("name", experiment_names())
+@pytest.mark.parametrize("name", fast_and_slow(*experiment_names()))
 def test_every_experiment_can_be_composed(name):
     experiment = Experiment.named(name)
     for method in experiment.methods:
@@ -208,6 +209,7 @@ def test_a_study_that_cannot_be(tmp_path, settings, words):
         Study(tmp_path, **{"recordings": ["walk:0"], "frames": 4} | settings)
 
 
+@pytest.mark.slow
 def test_other_files_of_a_recording_are_another_recording(source_folder, tmp_path):
     folder = shutil.copytree(source_folder / "person", tmp_path / "person")
     before = source_named(str(folder), 4, tmp_path).identity

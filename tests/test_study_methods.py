@@ -113,6 +113,7 @@ def test_the_overview_has_both_rules_and_the_rate_of_the_step(study):
     assert line["tracking step, frames/s"] == "20.0"
 
 
+@pytest.mark.slow
 def test_the_methods_are_told_by_their_settings():
     lines = {cells(settings_table(), line)[0]: cells(settings_table(), line)[1:] for line in range(2, 12)}
     theirs, ours = lines["solver"]

@@ -1,6 +1,7 @@
 """Who stands where the background is not known, by colours that the cameras share."""
 
 import numpy as np
+import pytest
 from test_segmentation import UP, iou, who_hardly_moves
 
 from sogjax.scene.background import BackgroundImage
@@ -44,6 +45,7 @@ def test_what_one_camera_alone_shows_is_not_taken_for_the_subject():
         assert iou(colors.decided(k, scene)[0], truth[k]) > 0.85, k
 
 
+@pytest.mark.slow
 def test_what_never_moves_is_not_taken_for_the_subject():
     """A table before everybody's legs, of a colour that no room has, in all cameras."""
     rig, pictures, truth, _, pillars = who_hardly_moves(CAMERAS)

@@ -45,6 +45,7 @@ def test_surface_nets_of_a_sphere():
     assert volume(vertices, faces) == pytest.approx(4 / 3 * np.pi * 0.4**3, rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 def test_the_surface_is_closed_and_encloses_a_person(seed):
     person = figure(seed)

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
+from slow_values import fast_and_slow
 from synth_people import motions, people, person
 
 from sogjax.synth.anatomy import INDEX
@@ -24,7 +25,7 @@ def landmarks(kind):
     return np.stack([landmark_points(person(0).anatomy, motions(kind)[0](float(t))) for t in times])
 
 
-@pytest.mark.parametrize("kind", SINGLE)
+@pytest.mark.parametrize("kind", fast_and_slow(*SINGLE))
 def test_nobody_jumps(kind):
     speed = np.linalg.norm(np.diff(landmarks(kind), axis=0), axis=-1) * FPS
     assert speed.max() < 13.0  # the hands and feet of a cartwheel; metres a second
@@ -33,7 +34,7 @@ def test_nobody_jumps(kind):
     assert speed.max() < 0.65 * twice.max()
 
 
-@pytest.mark.parametrize("kind", SINGLE)
+@pytest.mark.parametrize("kind", fast_and_slow(*SINGLE))
 def test_bodies_stay_on_the_floor(kind):
     body, motion = person(0), motions(kind)[0]
     lowest = [body.posed(motion(float(t))).vertices[:, 2].min() for t in np.arange(0.0, SECONDS, 0.2)]
@@ -41,7 +42,7 @@ def test_bodies_stay_on_the_floor(kind):
     assert max(lowest) < (0.15 if kind == "run" else 0.015)
 
 
-@pytest.mark.parametrize("kind", SINGLE)
+@pytest.mark.parametrize("kind", fast_and_slow(*SINGLE))
 def test_everything_begins_upright_with_the_arms_down(kind):
     first = dict(zip(NAMES, landmarks(kind)[0], strict=True))
     assert first["head_top"][2] > 1.6 * first["pelvis"][2]
@@ -50,7 +51,7 @@ def test_everything_begins_upright_with_the_arms_down(kind):
         assert first[f"{side}_ankle"][2] < 0.15
 
 
-@pytest.mark.parametrize("kind", SINGLE)
+@pytest.mark.parametrize("kind", fast_and_slow(*SINGLE))
 def test_people_stay_near_the_centre(kind):
     farthest = np.linalg.norm(landmarks(kind)[:, NAMES.index("pelvis"), :2], axis=1).max()
     assert farthest < 1.7
@@ -105,7 +106,7 @@ def test_a_cartwheel_turns_upside_down_on_the_hands():
     assert np.linalg.norm(way) > 2.0
 
 
-@pytest.mark.parametrize(("kind", "count"), [("pass", 2), ("walk", 3), ("cartwheel", 2), ("arms", 2)])
+@pytest.mark.parametrize(("kind", "count"), fast_and_slow(("pass", 2), ("walk", 3), ("cartwheel", 2), ("arms", 2)))
 def test_people_never_go_through_one_another(kind, count):
     bodies, closest = people(count), np.inf
     for time in np.arange(0.0, 3.0, 0.25):

@@ -42,6 +42,7 @@ def folder(tmp_path_factory):
     return render_recording(SMALL, tmp_path_factory.mktemp("synth") / "walk", workers=1)
 
 
+@pytest.mark.slow
 def test_a_rendered_recording_is_of_the_registered_files(folder):
     rendered = {part.name for part in RECORDING_FILES if part.rendered}
     assert {path.name for path in folder.iterdir()} == rendered - {"keypoints", "pose"}
@@ -98,6 +99,7 @@ def test_the_recording_opens_without_a_warning(folder):
     assert set(recording.background) == set(recording.rig.names)
 
 
+@pytest.mark.slow
 def test_the_video_shows_the_person_in_front_of_the_plate_where_the_markers_are(folder):
     recording = open_recording(folder)
     truth = load_ground_truth(folder / "ground_truth.npz")
@@ -111,6 +113,7 @@ def test_the_video_shows_the_person_in_front_of_the_plate_where_the_markers_are(
         assert near[rows, columns].mean() > 0.9
 
 
+@pytest.mark.slow
 def test_masks_have_the_outline_of_the_figure(folder, stage):
     recording = open_recording(folder)
     for pose in recording.example_poses:

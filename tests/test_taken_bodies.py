@@ -35,6 +35,7 @@ def seen():
     return [np.asarray(part) for part in _seen(tracker, on_device(FrameInput(shown)), jnp.asarray(pose))]
 
 
+@pytest.mark.slow
 def test_a_camera_that_took_the_body_is_told_from_one_before_which_something_stands(seen):
     overlap, colors = seen
     others = [k for k in range(5) if k not in (TOOK, HIDDEN)]

@@ -140,6 +140,7 @@ def test_the_model_from_autodiff_is_the_closed_one_where_that_is_exact(place):
             np.testing.assert_allclose(mine, other, rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_model_from_autodiff_has_value_and_gradient_and_bends_one_way_only():
     with jax.enable_x64(True):
         energy, pose = scene(precise=True)
@@ -174,6 +175,7 @@ def test_a_penalty_is_subtracted_and_a_term_added():
     np.testing.assert_allclose(given["similarity"], values["similarity"], rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_numbers_of_a_term_can_be_swept_and_differentiated_by():
     energy, pose = scene((Floor(2.0, height=HEIGHT),))
     by_floor = eqx.filter_jit(eqx.filter_grad(lambda e: e(pose)))(energy).terms[3]

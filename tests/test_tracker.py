@@ -76,6 +76,7 @@ def test_a_step_compiled_beforehand_is_that_of_the_first_frame(walking_dog, monk
     assert first.result.iterations > 0
 
 
+@pytest.mark.slow
 def test_a_step_is_lowered_for_a_gpu_with_the_shapes_that_it_has_here(dog):
     tracker, poses, frames = dog
     capacities = Capacities(1024, 1024, 1024)

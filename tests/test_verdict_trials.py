@@ -115,6 +115,7 @@ def trials(tmp_path):
     return VerdictTrials(tmp_path / "out", {"walk": SynthSettings()}, 60)
 
 
+@pytest.mark.slow
 def test_joints_at_their_limits_are_named_of_kept_trials_as_well(tracking, trials):
     trial = replace(TRIAL, cameras=2)
     at_limit = ("look at left_elbow, at its limit in 100% of the frames",)
