@@ -11,9 +11,11 @@ import pytest
 from sogjax.errors import InputError
 from sogjax.io.recording import open_recording
 from sogjax.io.video import read_still
+from sogjax.run import background
 from sogjax.run.background import learn_background
 from sogjax.run.clip import Clip
 from sogjax.run.plates import median_picture, with_example_plates
+from sogjax.scene.background import BackgroundImage
 from sogjax.scene.plates import fitted_plate
 from sogjax.synth.render import render_recording
 from sogjax.synth.settings import SynthSettings
@@ -123,6 +125,7 @@ def background_of(recording, choice="auto"):
     return learn_background(clip_of(recording), choice)
 
 
+@pytest.mark.slow
 def test_a_run_takes_plates_that_agree_as_they_are(walk, capsys):
     recording = open_recording(walk)
     found = background_of(recording)
@@ -155,6 +158,30 @@ def test_a_plate_of_another_place_is_not_used(walk, tmp_path, capsys):
     assert not np.array_equal(found.required()[2].picture, other)
     with pytest.raises(InputError, match=r"cam02\.png does not show"):
         background_of(wrong, "pictures")
+
+
+def test_where_somebody_stands_in_a_plate_and_without_one_the_clip_tells(walk, tmp_path, monkeypatch, capsys):
+    recording = open_recording(walk)
+    plates = {name: read_still(recording, name, path) for name, path in recording.background.items()}
+    crowded = plates["cam01"].copy()
+    crowded[60:180, 10:50] = (20, 160, 60)
+    wrong = faulty(walk, tmp_path, "cam01", crowded)
+    wrong = replace(wrong, background={name: path for name, path in wrong.background.items() if name != "cam02"})
+    learnt = [replace(BackgroundImage.from_photograph(plate[::2, ::2]), origin="clip") for plate in plates.values()]
+    monkeypatch.setattr(background, "_of_clip", lambda *_: background.Background(tuple(learnt)))
+    found = background_of(wrong).required()
+    said = capsys.readouterr().err
+    assert "cam01.png shows somebody or something" in said
+    assert "background/ has no picture of cam02" in said
+    assert "the background of cam02 is learnt from the clip" in said
+    np.testing.assert_array_equal(found[0].picture, plates["cam00"])
+    assert found[1].known[70:170, 15:45].all()
+    assert np.abs(found[1].picture[70:170, 15:45].astype(int) - plates["cam01"][70:170, 15:45]).mean() < 8.0
+    assert found[2].origin == "clip"
+    asked = background_of(
+        replace(wrong, background={**wrong.background, "cam02": recording.background["cam02"]}), "pictures"
+    )
+    assert not asked.required()[1].known[70:170, 15:45].any()
 
 
 @pytest.mark.parametrize("count", [1, 2, 8, 9])

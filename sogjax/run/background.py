@@ -10,6 +10,7 @@ import numpy as np
 from sogjax.errors import InputError
 from sogjax.io.background_cache import Arrays, background_origin, kept_background
 from sogjax.io.npz_file import bool_array, float_array, int_array, read_npz, save_npz, text_array
+from sogjax.io.recording import Recording
 from sogjax.io.source import fingerprint
 from sogjax.model.compiled import compiled_hastily
 from sogjax.run.clip import Clip, SampleKind
@@ -98,7 +99,7 @@ def _kept_camera(path: Path, arrays: Arrays, prefix: str) -> BackgroundImage:
 def learn_background(clip: Clip, choice: str, cache: str | None = None, more: Sequence[SampleKind] = ()) -> Background:
     """The background of every camera, as `images.background` asks for.
 
-    With `auto`, photographs count if every camera has one, else the clip, if it is suitable; where it leaves much open,
+    With `auto`, photographs count where there are any, else the clip, if it is suitable; where that leaves much open,
     photographs of example poses fill it outside of their masks.
 
     Args:
@@ -122,8 +123,10 @@ def learn_background(clip: Clip, choice: str, cache: str | None = None, more: Se
         )
     if choice == "none":
         return Background(None, "images.background=none")
-    if choice == "pictures" or (choice == "auto" and not missing):
+    if choice == "pictures":
         return _of_plates(clip, choice, cache, more)
+    if choice == "auto" and recording.background:
+        return _with_examples(clip, _of_plates(clip, choice, cache, more))
     learnt = _of_clip(clip, cache, more)
     if choice == "auto":
         return _with_examples(clip, learnt)
@@ -135,7 +138,7 @@ def learn_background(clip: Clip, choice: str, cache: str | None = None, more: Se
 
 
 def _of_plates(clip: Clip, choice: str, cache: str | None, more: Sequence[SampleKind]) -> Background:
-    """The background from photographs; of cameras whose photographs do not fit, from the clip, or nothing is known."""
+    """The background from photographs; from the clip, if it tells, where these do not fit, or there are none."""
     recording = clip.recording
     files = [(name, str(path), fingerprint(path)) for name, path in recording.background.items()]
     key = [
@@ -150,15 +153,31 @@ def _of_plates(clip: Clip, choice: str, cache: str | None, more: Sequence[Sample
         plates = fitted_plates(clip, more)
         unfit = say_plates(clip, plates, choice)
         known = {name: BackgroundImage.from_plate(plate) for name, plate in plates.items() if name not in unfit}
-        learnt = _of_clip(clip, cache, ()).cameras if unfit else None
+        others = [name for name in recording.rig.names if name not in known]
+        partly = [name for name in known if plates[name].other and choice == "auto"]
+        learnt = _of_clip(clip, cache, ()).cameras if others or partly else None
+        _say_learnt(recording, others, partly, learnt is not None)
         for k, name in enumerate(recording.rig.names):
-            if name in unfit:
-                say(f"the background of {name} {'stays unknown' if learnt is None else 'is learnt from the clip'}")
-                nothing = BackgroundImage.nothing(*working_size(*recording.rig.image_size(name)))
-                known[name] = nothing if learnt is None else learnt[k]
+            if learnt is not None and name in others:
+                known[name] = learnt[k]
+            elif learnt is not None and name in partly:
+                known[name] = known[name].filled(learnt[k])
+            elif name in others:
+                known[name] = BackgroundImage.nothing(*working_size(*recording.rig.image_size(name)))
         return Background(tuple(known[name] for name in recording.rig.names))
 
     return SHARED.get(json.dumps(key), of_plates)
+
+
+def _say_learnt(recording: Recording, others: Sequence[str], partly: Sequence[str], learnt: bool) -> None:
+    """Say where photographs are not what is known of the empty scene."""
+    done = "is learnt from the clip" if learnt else "stays unknown"
+    if missing := [name for name in others if name not in recording.background]:
+        say(f"warning: {recording.path}: background/ has no picture of {', '.join(missing)}; add it, as CAMERA.jpg")
+    if others:
+        say(f"the background of {', '.join(others)} {done}")
+    if partly:
+        say(f"what stands in the pictures of the empty scene of {', '.join(partly)}: the background there {done}")
 
 
 def _with_examples(clip: Clip, learnt: Background) -> Background:

@@ -24,14 +24,20 @@ from sogjax.scene.plates import FittedPlate, fitted_plate, median_picture
 
 LOOKED_AT = 9
 """Frames whose median is what a camera shows; somebody who moves is not in it."""
+SCENE_SECONDS = 10.0
+"""Seconds of the recording that they are spread over, at least: who hardly moved in a shorter clip is in the median."""
 BORDER = 0.02
 """Width left out around masks, and around what differs from the clip, as a part of a picture's longer side: masks are
 rough, shadows begin there."""
 
 
 def scene_samples(clip: Clip) -> SampleKind:
-    """The pictures that photographs of the empty scene are held against."""
-    return SampleKind.at_working_size("scene", clip.recording, spread_frames(clip.numbers, LOOKED_AT))
+    """The pictures that photographs of the empty scene are held against: of the clip, or around a short one."""
+    first, last = clip.numbers[0], clip.numbers[-1]
+    around = max(round(0.5 * (SCENE_SECONDS * clip.recording.fps - abs(last - first))), 0)
+    every = clip.recording.frames
+    frames = range(max(min(first, last) - around, every[0]), min(max(first, last) + around, every[-1]) + 1)
+    return SampleKind.at_working_size("scene", clip.recording, spread_frames(frames, LOOKED_AT))
 
 
 def fitted_plates(clip: Clip, more: Sequence[SampleKind] = ()) -> dict[str, FittedPlate]:
@@ -153,6 +159,4 @@ def _filled(own: BackgroundImage, plates: Sequence[FittedPlate]) -> BackgroundIm
         [np.repeat(~plate.known[there][:, None], 3, axis=1) for plate in plates],
     )
     shown[there] = np.ma.median(values, axis=0)
-    added = BackgroundImage.from_photograph(np.rint(shown).astype(np.uint8))
-    picture = np.where(there[..., None], added.picture, own.picture)
-    return replace(own, picture=picture, spread=np.where(there, added.spread, own.spread), known=own.known | there)
+    return own.filled(replace(BackgroundImage.from_photograph(np.rint(shown).astype(np.uint8)), known=there))

@@ -63,6 +63,15 @@ class BackgroundImage:
         """The background from a photograph that was held against the videos."""
         return replace(cls.from_photograph(plate.picture), known=plate.known)
 
+    def filled(self, other: "BackgroundImage") -> "BackgroundImage":
+        """With what another one knows where this one does not."""
+        size = (self.known.shape[1], self.known.shape[0])
+        resized = lambda values: cv2.resize(values, size, interpolation=cv2.INTER_LINEAR)
+        there = ~self.known & (resized(other.known.astype(np.float32)) > 0.99)
+        picture = np.where(there[..., None], resized(other.picture), self.picture)
+        spread = np.where(there, resized(other.spread.astype(np.float32)), self.spread)
+        return replace(self, picture=picture, spread=spread, known=self.known | there)
+
     @property
     def calm(self) -> Bool[np.ndarray, "_h _w"]:
         """Beside furniture, where the background is not known, and its most frequent colour hardly varies.

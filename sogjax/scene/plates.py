@@ -108,7 +108,7 @@ class FittedPlate:
         if not self.fits:
             return (
                 f"{name} does not show what the videos of this camera show ({self.alike:.0%} of it agrees): the camera "
-                f"was moved, or it is another camera's; {take}"
+                f"was moved, or picture or video are another camera's (`sogjax check` tells); {take}"
             )
         done = []
         if self.pixels:
