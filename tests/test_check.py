@@ -20,7 +20,7 @@ from sogjax.check.cameras import camera_findings, rig_geometry
 from sogjax.check.examination import examined
 from sogjax.check.motion import CameraMotion, barcodes, correlation, lag_curve
 from sogjax.check.pictures import Moment
-from sogjax.check.synchronisation import synchrony
+from sogjax.check.synchronisation import synchrony, synchrony_findings
 from sogjax.errors import InputError
 from sogjax.io.recording import open_recording
 from sogjax.io.recording_settings import read_recording_settings, write_frame_offsets
@@ -342,6 +342,22 @@ def test_points_that_move_in_space_give_both_cameras_the_same_barcode():
     found = synchrony(("a", "b", "c"), {(0, 1): (first, late), (0, 2): (first, second), (1, 2): (late, second)}, 30, 8)
     assert found.offsets.tolist() == [0, -4, 0]
     assert found.sure.all()
+
+
+@pytest.mark.parametrize(("seconds", "sure"), [(1.0, True), (60.0, False)])
+def test_an_offset_of_one_frame_is_told_by_what_moves_fast(seconds, sure):
+    """Of three cameras, one a frame early, that see the same patterns come and go in a time."""
+    times, phases = np.arange(60)[:, None], np.random.default_rng(0).uniform(0.0, 6.0, 40)
+    code = np.sin(2.0 * np.pi * times / seconds / 8.0 + phases).astype(np.float32)
+    early = np.roll(code, -1, axis=0)
+    early[-1] = code[-1]
+    found = synchrony(("a", "b", "c"), {(0, 1): (code, early), (0, 2): (code, code), (1, 2): (early, code)}, 60, 3)
+    assert found.offsets.tolist() == [0, -1, 0]
+    found = replace(found, sure=np.array([True, found.sure[1], True]))
+    assert found.sure[1] == sure
+    said = synchrony_findings(found, {"a": 0, "b": 0, "c": 0}, moving=True)[0].what
+    assert ("b shows everything 1 frame earlier" in said) == sure
+    assert ("the motion in b fits that of the others as well a frame later or earlier" in said) != sure
 
 
 def test_the_smallest_shift_brings_a_mask_into_a_larger_region():
