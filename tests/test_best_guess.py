@@ -85,7 +85,7 @@ def test_what_shows_no_actor_or_too_few_people_is_refused(drawn):
     alone = Searched(
         {0: [found(0.9), found(0.0, 0.02, 0.01)], 9: [found(0.9), found(0.1, 0.05, 0.04)]}, ("anna", "ben")
     )
-    with pytest.raises(InputError, match="ben is not seen beside anna in frames 0, 9"):
+    with pytest.raises(InputError, match="nobody is left for ben beside anna in frames 0, 9"):
         best_guess(alone)
     assert len(drawn) == 2
 

@@ -215,7 +215,7 @@ def check_size(path: Path, size: tuple[int, int], rig: CameraRig, camera: str) -
     width, height = calibrated = rig.image_size(camera)
     if size == calibrated:
         return
-    remedy = "calibrate the size that was recorded, or convert the images to the calibrated size"
+    remedy = "convert the images to that size, or calibrate theirs, if all of this camera have it"
     if size == (height, width):
         remedy = "turn the images by 90 degrees, or calibrate them as they stand"
     raise InputError(

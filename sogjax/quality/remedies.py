@@ -4,9 +4,11 @@ from sogjax.quality.verdict import Verdict
 
 WRONG = {
     "not the subject": "Use the actor of the person who is seen, in the clothes that are worn (actor=, or leave it "
-    "out, and it is made of the videos); look whether red and blue are exchanged in the pictures.",
+    "out, and it is made of the videos); look whether red and blue are exchanged in the pictures, and with `sogjax "
+    "check` whether videos are under the names of other cameras.",
     "not where somebody": "Look at the first frame: if the skeleton does not stand on the person there, write a rough "
-    "pose into initial_pose.yaml or begin elsewhere (start=); then run `sogjax check` for the calibration.",
+    "pose into initial_pose.yaml or begin elsewhere (start=); then run `sogjax check` for the calibration. If it does, "
+    "and somebody is beside it who has no actor, give that one, too (actors=, actor=).",
     "inside each other": "Two actors were found on one person: give the actors of those who are there, or begin where "
     "they stand apart (start=).",
 }
@@ -23,6 +25,8 @@ LOOK = {
     "keypoints tell them apart; start= begins in a frame in which they are clear of each other.",
     "at its limit": "A joint at its limit is drawn to something dark or alike behind it: light from behind, another "
     "background, a cap or shoes of another colour.",
+    "hidden by": "What is hidden is guessed. If nothing stands there, look at occluders.png: what is painted white in "
+    "occluders/CAMERA.png hides all that is behind it.",
     "initial pose": "The initial pose was not sure: if its frame is wrong, write a rough one into initial_pose.yaml.",
 }
 """What to do, by words of a finding: where nothing of a motion can be relied on, and where some can."""

@@ -244,8 +244,8 @@ def best_guess(search: ClipSearch, picture: Path | None = None) -> Guess:
     if (problem := nobody_there(guesses, names)) is not None:
         path = _write_picture(search, best, picture or Path(f"{recording.name}_first_pose.png"))
         raise InputError(
-            f"{recording.path}: {problem} in frames {frames}: leave out who is not there (actor=), begin with another "
-            f"frame (start=), or write {_remedy(search.clip)}; the best guess is drawn in {path}"
+            f"{recording.path}: {problem} in frames {frames}; look at the best guess, drawn in {path}, and "
+            f"leave out who is not there (actor=), begin with another frame (start=), or write {_remedy(search.clip)}"
         )
     look = "" if picture is None else f"; look at {_write_picture(search, best, picture)}"
     say(
@@ -271,7 +271,8 @@ def nobody_there(guesses: Sequence[Guess], names: Sequence[str]) -> str | None:
     if not missing:
         return None
     others = [name for name in names if name not in missing]
-    return f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} not seen beside {' and '.join(others)}"
+    nobody = f"nobody is left for {' and '.join(missing)} beside {' and '.join(others)}"
+    return nobody if len(others) == 1 else f"{nobody} (one of whom may be taken for another)"
 
 
 def say_guess(names: Sequence[str], guess: Guess) -> None:

@@ -118,10 +118,12 @@ def check_actors(recording: Recording, actors: int | None, num_files: int | None
     subjects = subjects_of(recording) if recording.example_poses else ()
     if subjects and len(subjects) != actors:
         named = ", ".join(str(name) for name in subjects if name is not None)
+        more = "add example poses of the others, each with its `actor`, to recording.yaml"
+        fewer = "make those who are wanted (`sogjax actor subject=NAME`) and give their files (actor=)"
         raise InputError(
             f"actors={actors}: the example poses of {recording.path} show {counted(len(subjects), 'actor')}"
-            f"{f' ({named})' if named else ''}, and they count; leave actors out, or add example poses of the others, "
-            "each with its `actor`, to recording.yaml"
+            f"{f' ({named})' if named else ''}, and they count; leave actors out, or "
+            f"{more if len(subjects) < actors else fewer}"
         )
 
 
