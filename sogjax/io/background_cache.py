@@ -16,7 +16,7 @@ from sogjax.io.npz_file import read_npz, save_npz
 from sogjax.io.recording import Recording
 from sogjax.io.source import fingerprint
 
-BACKGROUND_VERSION = 9
+BACKGROUND_VERSION = 10
 """Raise it with every change that alters what is learnt."""
 NOTE = "made_from"
 VARIABLE = "SOGJAX_BACKGROUND_CACHE"

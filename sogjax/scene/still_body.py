@@ -33,6 +33,10 @@ NARROWEST, WIDEST = 0.1, 0.9
 TOPS, LARGE = (0.4, 1.0), 0.3
 """Metres over the floor between which the top of a table is, and square metres that it has at one level: tops that were
 seen have 0.45 to 0.75, what else is at such heights at most 0.18."""
+HEAD, OVER_SHOULDERS, HEAD_AGREEING = 0.17, 0.13, 0.55
+"""Metres: how far around its middle a head may be, and how far that is over the highest place that moves over legs; and
+the share of the cameras that must see a place there in one colour: some see the face, others hair. Of six heads 58 to
+94 % of the places are seen so, of those around them 3 to 25 %."""
 RIM = 0.08
 """Metres around what is seen in one colour that may be somebody, too: at its edge, some cameras look past it."""
 INPAINTED = 5
@@ -77,7 +81,9 @@ def still_bodies(views: CoarseViews, floors: Mapping[int, Floor]) -> dict[int, S
         over = over_floor(views, floors)
         empty, ground = over.empty | (empty & ~over.told), over.level
     body = alike & plan[:, :, None] & _heights(moving, spacing)
-    still = from_upright(legs_of(body & ~empty, float(ground), spacing), views.up)
+    legs = legs_of(body & ~empty, float(ground), spacing)
+    heads = heads_over(legs, moving, spacing) & upright(views.inside & (share >= HEAD_AGREEING), views.up)
+    still = from_upright(legs | heads, views.up)
     shown = {k: at.silhouette_of(still) for k, at in views.pixels.items()}
     rim = {k: round(RIM / spacing * at.footprint) for k, at in views.pixels.items()}
     large = lambda k, mask: views.enlarged(k, mask) & ~views.movements[k]
@@ -150,6 +156,22 @@ def legs_of(still: Bool[np.ndarray, "x y z"], ground: float, spacing: float) -> 
         return np.zeros_like(still)
     kept = [_stands(of_part, ground * spacing, spacing) for of_part in places]
     return still & np.isin(labels, np.flatnonzero(kept) + 1)
+
+
+def heads_over(
+    legs: Bool[np.ndarray, "x y z"], moving: Bool[np.ndarray, "x y z"], spacing: float
+) -> Bool[np.ndarray, "x y z"]:
+    """Where heads may be: balls over the highest places that move over legs, or over one leg."""
+    connected: Any = label(legs.any(axis=2))
+    heads, at = np.zeros_like(legs), np.indices(legs.shape)
+    for part in range(1, connected[1] + 1):
+        middle = np.argwhere(connected[0] == part).mean(axis=0)
+        near = np.hypot(*(at[:2, :, :, 0] - middle[:, None, None])) * spacing <= NEAR
+        levels = np.flatnonzero((moving & near[:, :, None]).any(axis=(0, 1)))
+        if levels.size:
+            centre = np.append(middle, levels[-1] + OVER_SHOULDERS / spacing)
+            heads |= np.linalg.norm(at - centre[:, None, None, None], axis=0) * spacing <= HEAD
+    return heads
 
 
 def _stands(places: Float[np.ndarray, "place 3"], floor: float, spacing: float) -> bool:
