@@ -205,6 +205,11 @@ ROWS = (
     "run 1 12 plates 236",
     "cartwheel 1 4 plates 237",
     "walk 1 3 plates 241",
+    "hug 2 12 videos 251",
+    "fight 2 6 videos 252",
+    "talk 2 6 videos 253",
+    "sit 1 6 videos 254",
+    "pass 2 4 videos 256",
 )
 GIVEN = {
     "plates": (SETTINGS, BACKGROUND, EXAMPLE_POSES),

@@ -344,7 +344,7 @@ def test_points_that_move_in_space_give_both_cameras_the_same_barcode():
     assert found.sure.all()
 
 
-@pytest.mark.parametrize(("seconds", "sure"), [(1.0, True), (60.0, False)])
+@pytest.mark.parametrize(("seconds", "sure"), [(1.0, True), (6.0, False)])
 def test_an_offset_of_one_frame_is_told_by_what_moves_fast(seconds, sure):
     """Of three cameras, one a frame early, that see the same patterns come and go in a time."""
     times, phases = np.arange(60)[:, None], np.random.default_rng(0).uniform(0.0, 6.0, 40)

@@ -8,7 +8,6 @@ from sogjax.cli import doctor as self_test
 from sogjax.run.compilation_cache import REFUSED, VARIABLE, programs_folder
 
 
-@pytest.mark.slow
 def test_a_sound_installation(capsys, tmp_path):
     out, err = done(capsys, "doctor", f"folder={tmp_path}")
     for word in ("python", "jax", "opencv-python-headless", "devices", "extra [test]", str(tmp_path), "MB/s"):

@@ -57,7 +57,7 @@ def test_the_position_is_that_of_the_root_and_values_of_single_dofs_are_taken():
 
 
 @pytest.mark.parametrize(
-    ("up", "heading", "pose"),
+    "case",
     fast_and_slow(
         ("z", 0.0, "walk_left"),
         ("z", 100.0, "tpose"),
@@ -67,7 +67,8 @@ def test_the_position_is_that_of_the_root_and_values_of_single_dofs_are_taken():
         ("-x", 0.0, "tpose"),
     ),
 )
-def test_landmarks_give_the_pose_back_from_any_heading(up, heading, pose):
+def test_landmarks_give_the_pose_back_from_any_heading(case):
+    up, heading, pose = case
     body = upright(HUMAN, up)
     points = points_of(HUMAN, pose, up, (0.5, -0.4, 1.0), heading)
     landmarks = {name: tuple(point) for name, point in zip(body.landmarks.names, points, strict=True)}

@@ -11,12 +11,12 @@ import pytest
 from sogjax.errors import InputError
 from sogjax.io.recording import open_recording
 from sogjax.io.video import read_still
-from sogjax.run import background
+from sogjax.run import background, plates
 from sogjax.run.background import learn_background
 from sogjax.run.clip import Clip
-from sogjax.run.plates import median_picture, with_example_plates
+from sogjax.run.plates import median_picture, scene_samples, with_example_plates
 from sogjax.scene.background import BackgroundImage
-from sogjax.scene.plates import fitted_plate
+from sogjax.scene.plates import FittedPlate, fitted_plate
 from sogjax.synth.render import render_recording
 from sogjax.synth.settings import SynthSettings
 
@@ -162,26 +162,52 @@ def test_a_plate_of_another_place_is_not_used(walk, tmp_path, capsys):
 
 def test_where_somebody_stands_in_a_plate_and_without_one_the_clip_tells(walk, tmp_path, monkeypatch, capsys):
     recording = open_recording(walk)
-    plates = {name: read_still(recording, name, path) for name, path in recording.background.items()}
-    crowded = plates["cam01"].copy()
+    empty = {name: read_still(recording, name, path) for name, path in recording.background.items()}
+    crowded = empty["cam01"].copy()
     crowded[60:180, 10:50] = (20, 160, 60)
     wrong = faulty(walk, tmp_path, "cam01", crowded)
     wrong = replace(wrong, background={name: path for name, path in wrong.background.items() if name != "cam02"})
-    learnt = [replace(BackgroundImage.from_photograph(plate[::2, ::2]), origin="clip") for plate in plates.values()]
+    learnt = [replace(BackgroundImage.from_photograph(plate[::2, ::2]), origin="clip") for plate in empty.values()]
     monkeypatch.setattr(background, "_of_clip", lambda *_: background.Background(tuple(learnt)))
     found = background_of(wrong).required()
     said = capsys.readouterr().err
     assert "cam01.png shows somebody or something" in said
     assert "background/ has no picture of cam02" in said
     assert "the background of cam02 is learnt from the clip" in said
-    np.testing.assert_array_equal(found[0].picture, plates["cam00"])
-    assert found[1].known[70:170, 15:45].all()
-    assert np.abs(found[1].picture[70:170, 15:45].astype(int) - plates["cam01"][70:170, 15:45]).mean() < 8.0
+    np.testing.assert_array_equal(found[0].picture, empty["cam00"])
+    assert found[1].known.all()
+    np.testing.assert_array_equal(found[1].picture, empty["cam01"][::2, ::2])
     assert found[2].origin == "clip"
-    asked = background_of(
-        replace(wrong, background={**wrong.background, "cam02": recording.background["cam02"]}), "pictures"
-    )
-    assert not asked.required()[1].known[70:170, 15:45].any()
+    monkeypatch.setattr(background, "_of_clip", lambda *_: background.Background(None, "nobody moves"))
+    few = {**wrong.background, "cam00": tmp_path / "cam01.png"}  # of another camera
+    unknown = background_of(replace(wrong, background=few))
+    assert not unknown.is_learnt
+    assert not unknown.required()[2].known.any()
+    assert "the background of cam00, cam02 stays unknown, since nobody moves" in capsys.readouterr().err
+    asked = replace(wrong, background={**wrong.background, "cam02": recording.background["cam02"]})
+    assert not background_of(asked, "pictures").required()[1].known[70:170, 15:45].any()
+
+
+def test_what_a_smaller_picture_knows_fills_a_larger_one():
+    large = replace(BackgroundImage.from_photograph(np.full((60, 80, 3), 90, np.uint8)), known=np.zeros((60, 80), bool))
+    plate = FittedPlate.unseen(np.full((30, 40, 3), 150, np.uint8))
+    plate.known[:, :20] = False
+    found = plates._filled(large, [plate])
+    assert found.picture.shape == large.picture.shape
+    assert not found.known[:, :39].any()
+    assert found.known[:, 42:].all()
+    assert (found.picture[:, 42:] == 150).all()
+
+
+@pytest.mark.parametrize(
+    ("tracked", "first", "last"), [((0, 3), 0, 6), ((9, 12), 5, 11), ((5, 7), 2, 8), ((11, 4, -1), 5, 11)]
+)
+def test_plates_are_held_against_more_than_a_short_clip(walk, monkeypatch, tracked, first, last):
+    monkeypatch.setattr(plates, "SCENE_SECONDS", 0.2)
+    recording = open_recording(walk)
+    frames = scene_samples(Clip(recording, range(*tracked), 8)).frames
+    assert recording.fps == 30.0
+    assert (frames[0], frames[-1]) == (first, last)
 
 
 @pytest.mark.parametrize("count", [1, 2, 8, 9])

@@ -7,6 +7,7 @@ import pytest
 from body_cases import posed, shipped
 from drawn_scene import draw, in_colors, standing
 from rig_cases import opencv_pixels, ring_rig
+from slow_values import fast_and_slow
 
 from sogjax.model.camera import distort, project_points
 from sogjax.scene.background_difference import background_difference
@@ -154,8 +155,7 @@ def who_hardly_moves(num_cameras):
     return rig, pictures, truth, arms, pillars
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("num_cameras", [4, 8])
+@pytest.mark.parametrize("num_cameras", fast_and_slow(4, 8))
 def test_who_stands_still_in_a_pillar_of_the_room_is_told_by_colour(num_cameras):
     rig, pictures, truth, arms, pillars = who_hardly_moves(num_cameras)
     cameras = {k: rig.camera(name) for k, name in enumerate(rig.names)}

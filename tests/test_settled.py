@@ -96,7 +96,6 @@ def test_a_run_stopped_while_its_adjusted_files_are_written(
     assert not any(name.endswith(".partial") for name in names("run"))
 
 
-@pytest.mark.slow
 def test_a_run_stopped_while_it_is_adjusted(capsys, tmp_path, monkeypatch, command, higher):
     words = [*command, "adjust=true", "outputs.overlay=false"]
 

@@ -27,6 +27,7 @@ def test_legs_that_never_move_are_found_in_nearly_all_cameras(waving, by_floor):
     masks, movements = found_in(waving, range(8), floors=seen_floors(waving.seen(range(8))) if by_floor else None)
     surely, perhaps = ({k: mask[part] for k, mask in masks.items()} for part in (0, 1))
     assert waving.shown_at(surely, waving.knees).mean() > 0.8
+    assert waving.shown_at(surely, waving.heads).mean() > 0.8
     assert np.mean([mask.mean() for mask in perhaps.values()]) < 0.055  # legs, trunk, head, and a rim
     assert all((surely[k] <= perhaps[k]).all() for k in masks)
     assert not any((perhaps[k] & movements[k]).any() for k in masks)
@@ -61,10 +62,10 @@ def test_a_rail_is_no_table():
 
 
 def test_a_head_is_over_what_moves_over_legs():
-    """Somebody who stands still and moves the arms, beside a table that nobody stands at, and somebody who walks."""
+    """Somebody who stands still on two legs and moves the arms, and somebody who walks beside."""
     spacing = 0.05
     legs, moving = np.zeros((40, 40, 50), bool), np.zeros((40, 40, 50), bool)
-    legs[8:12, 8:14, 2:18] = True
+    legs[8:12, 8:10, 2:18] = legs[8:12, 12:14, 2:18] = True
     moving[6:14, 6:16, 20:30] = True
     moving[28:34, 28:34, 2:36] = True
     heads = heads_over(legs, moving, spacing)

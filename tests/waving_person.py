@@ -28,6 +28,7 @@ class WavingPerson:
     recording: Recording
     sampled: dict[int, SampledCamera]
     knees: np.ndarray
+    heads: np.ndarray
 
     @classmethod
     def rendered(cls, folder):
@@ -41,7 +42,10 @@ class WavingPerson:
             for camera in range(len(recording.rig.names))
         }
         knees = [truth.joints[FRAMES // 2, truth.joint_names.index(f"{side}_knee")] for side in ("left", "right")]
-        return cls(recording, sampled, np.array(knees, np.float32))
+        ends = [truth.joints[FRAMES // 2, truth.joint_names.index(name)] for name in ("neck", "head_top")]
+        return cls(
+            recording, sampled, np.array(knees, np.float32), np.array([0.4 * ends[0] + 0.6 * ends[1]], np.float32)
+        )
 
     def seen(self, cameras, turn=None):
         """What some cameras see together, in a world that is turned."""

@@ -4,7 +4,7 @@ Where a camera lost or repeated frames, its offset at the end of a clip differs 
 """
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,9 +16,9 @@ from sogjax.errors import counted
 
 FEWEST_STEPS = 8
 """Steps from a frame to the next without which offsets are not looked for."""
-LEAST_ALIKE, LEAST_SHARP = 0.35, 0.01
-"""Correlation of motions that are the same; and how far it falls from an offset of one frame to none. Of a walk before
-four cameras in step it fell by 0.008 for one of them."""
+LEAST_ALIKE, LEAST_MARGIN, LEAST_SHARP = 0.35, 0.03, 0.01
+"""Correlation of motions that are the same; how far it falls at other offsets; and, if the offset is one frame, at the
+neighbouring ones. Of a walk before four cameras in step it fell there by 0.008 for one of them."""
 REFITS = 10
 """Rounds of either fit at most; a few suffice."""
 
@@ -37,6 +37,11 @@ class Synchrony:
     """How far that falls at any other offset but the neighbouring ones."""
     sharpness: Float[np.ndarray, "camera"]
     """How far that falls at the neighbouring ones."""
+
+    @property
+    def followed(self) -> Bool[np.ndarray, "camera"]:
+        """Whether a camera's motion is that of the others at its offset, and at no other but the neighbouring ones."""
+        return (self.alike > LEAST_ALIKE) & (self.margins > LEAST_MARGIN)
 
     def of(self, camera: int) -> int:
         """The offset of a camera, 0 where it is uncertain."""
@@ -63,8 +68,8 @@ def synchrony(names: tuple[str, ...], codes: PairCodes, steps: int, largest: int
     offsets = _refined(_least_squares(curves, count, most), curves, most)
     offsets = offsets - int(np.bincount(offsets - offsets.min()).argmax()) - offsets.min()
     alike, margins, sharpness = _support(offsets, curves, most)
-    sure = (alike > LEAST_ALIKE) & (margins > 0.03) & ((np.abs(offsets) != 1) | (sharpness > LEAST_SHARP))
-    return Synchrony(names, offsets, sure, alike, margins, sharpness)
+    found = Synchrony(names, offsets, np.zeros(count, bool), alike, margins, sharpness)
+    return replace(found, sure=found.followed & ((np.abs(offsets) != 1) | (sharpness > LEAST_SHARP)))
 
 
 def _least_squares(curves: Mapping[tuple[int, int], np.ndarray], count: int, most: int) -> Int[np.ndarray, "camera"]:
@@ -181,7 +186,7 @@ def synchrony_findings(
         remedy = f"write `frame_offset: {{{name}: {known[name] + offset}}}` into recording.yaml, or add write=true"
         cause = "cameras that were not started or triggered together"
         findings.append(Finding("warning", "synchronisation", what, cause, remedy, (name,)))
-    fits = (np.abs(found.offsets) == 1) & (found.alike > LEAST_ALIKE)
+    fits = (np.abs(found.offsets) == 1) & found.followed
     either = tuple(name for k, name in enumerate(found.names) if not found.sure[k] and fits[k] and k not in away)
     if either:
         what = f"the motion in {listed(either)} fits that of the others as well a frame later or earlier"
@@ -219,6 +224,6 @@ def find_jumps(codes: PairCodes, steps: int, whole: Synchrony) -> dict[int, Jump
         for part in (slice(0, half), slice(half, steps))
     )
     sharp = np.sort([early.sharpness, late.sharpness], axis=0)
-    sure = whole.sure & early.sure & late.sure & (sharp[0] > 0.01) & (sharp[1] > 0.06)
+    sure = whole.followed & early.sure & late.sure & (sharp[0] > 0.01) & (sharp[1] > 0.06)
     sure &= early.offsets != late.offsets
     return {int(k): Jump(int(early.offsets[k] - late.offsets[k])) for k in sure.nonzero()[0]}

@@ -41,7 +41,9 @@ class SegmentConfig:
     frames: list[int] | None = option(
         None, "frames whose probability of foreground is shown; null: none, or three if there are no example poses"
     )
-    background: str = option("auto", "pictures: of the empty scene | clip: learnt from the clip | auto")
+    background: str = option(
+        "auto", "pictures: of the empty scene | clip: learnt from the clip | auto: those there are, else the clip"
+    )
     subject: str | None = option(None, "which subject, if the recording has several")
     cameras: list[str] | None = option(None, "cameras to use; null: all")
     overwrite: bool = option(False, OVERWRITE)

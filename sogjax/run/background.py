@@ -15,11 +15,10 @@ from sogjax.io.source import fingerprint
 from sogjax.model.compiled import compiled_hastily
 from sogjax.run.clip import Clip, SampleKind
 from sogjax.run.clip_learning import UnsuitableError, learnt_from
-from sogjax.run.plates import fitted_plates, say_plates, with_example_plates
+from sogjax.run.plates import fitted_plates, say_plates, unseen_background, with_example_plates
 from sogjax.run.shared import SHARED
 from sogjax.run.terminal import say
 from sogjax.scene.background import BackgroundImage, Origin, stack_background
-from sogjax.scene.background_difference import working_size
 from sogjax.scene.cells import CellGrid
 from sogjax.scene.foreground import BackgroundModel
 
@@ -138,7 +137,10 @@ def learn_background(clip: Clip, choice: str, cache: str | None = None, more: Se
 
 
 def _of_plates(clip: Clip, choice: str, cache: str | None, more: Sequence[SampleKind]) -> Background:
-    """The background from photographs; from the clip, if it tells, where these do not fit, or there are none."""
+    """The background from photographs; from the clip, if it tells, where these do not fit, or there are none.
+
+    Also where something stands in one that the videos do not show: somebody in it is seldom told as a whole.
+    """
     recording = clip.recording
     files = [(name, str(path), fingerprint(path)) for name, path in recording.background.items()]
     key = [
@@ -155,29 +157,27 @@ def _of_plates(clip: Clip, choice: str, cache: str | None, more: Sequence[Sample
         known = {name: BackgroundImage.from_plate(plate) for name, plate in plates.items() if name not in unfit}
         others = [name for name in recording.rig.names if name not in known]
         partly = [name for name in known if plates[name].other and choice == "auto"]
-        learnt = _of_clip(clip, cache, ()).cameras if others or partly else None
-        _say_learnt(recording, others, partly, learnt is not None)
-        for k, name in enumerate(recording.rig.names):
-            if learnt is not None and name in others:
-                known[name] = learnt[k]
-            elif learnt is not None and name in partly:
-                known[name] = known[name].filled(learnt[k])
-            elif name in others:
-                known[name] = BackgroundImage.nothing(*working_size(*recording.rig.image_size(name)))
+        if others or partly:
+            found = _of_clip(clip, cache, ())
+            _say_learnt(recording, others, partly, found)
+            learnt = found.cameras or tuple(unseen_background(recording, name) for name in recording.rig.names)
+            for name, own in zip(recording.rig.names, learnt, strict=True):
+                plate = known.get(name, own)
+                known[name] = own.filled(plate) if name in partly else plate.filled(own)
         return Background(tuple(known[name] for name in recording.rig.names))
 
     return SHARED.get(json.dumps(key), of_plates)
 
 
-def _say_learnt(recording: Recording, others: Sequence[str], partly: Sequence[str], learnt: bool) -> None:
+def _say_learnt(recording: Recording, others: Sequence[str], partly: Sequence[str], learnt: Background) -> None:
     """Say where photographs are not what is known of the empty scene."""
-    done = "is learnt from the clip" if learnt else "stays unknown"
+    done = f"stays unknown, since {learnt.reason}" if learnt.cameras is None else "is learnt from the clip"
     if missing := [name for name in others if name not in recording.background]:
         say(f"warning: {recording.path}: background/ has no picture of {', '.join(missing)}; add it, as CAMERA.jpg")
     if others:
         say(f"the background of {', '.join(others)} {done}")
     if partly:
-        say(f"what stands in the pictures of the empty scene of {', '.join(partly)}: the background there {done}")
+        say(f"somebody may stand in the pictures of {', '.join(partly)}: the background there {done}")
 
 
 def _with_examples(clip: Clip, learnt: Background) -> Background:

@@ -33,11 +33,11 @@ rough, shadows begin there."""
 
 def scene_samples(clip: Clip) -> SampleKind:
     """The pictures that photographs of the empty scene are held against: of the clip, or around a short one."""
-    first, last = clip.numbers[0], clip.numbers[-1]
-    around = max(round(0.5 * (SCENE_SECONDS * clip.recording.fps - abs(last - first))), 0)
-    every = clip.recording.frames
-    frames = range(max(min(first, last) - around, every[0]), min(max(first, last) + around, every[-1]) + 1)
-    return SampleKind.at_working_size("scene", clip.recording, spread_frames(frames, LOOKED_AT))
+    first, last = sorted((clip.numbers[0], clip.numbers[-1]))
+    wanted, every = round(SCENE_SECONDS * clip.recording.fps), clip.recording.frames
+    first = max(min(first, (first + last - wanted) // 2, every[-1] - wanted), every[0])
+    frames = range(first, min(max(last, first + wanted), every[-1]) + 1)
+    return SampleKind.at_working_size(f"scene_{first}_{frames[-1]}", clip.recording, spread_frames(frames, LOOKED_AT))
 
 
 def fitted_plates(clip: Clip, more: Sequence[SampleKind] = ()) -> dict[str, FittedPlate]:
@@ -100,7 +100,7 @@ def with_example_plates(
 
     def filled(camera: int) -> BackgroundImage:
         name, frames = recording.rig.names[camera], list(map(np.asarray, shown[camera].values()))
-        own = given[camera] if given else _nothing(recording, name)
+        own = given[camera] if given else unseen_background(recording, name)
         return _filled(own, _example_plates(recording, name, frames)) if frames and name in names else own
 
     with ThreadPoolExecutor() as pool:
@@ -111,7 +111,7 @@ def with_example_plates(
     return (found, added) if added and enough else (given, 0.0)
 
 
-def _nothing(recording: Recording, camera: str) -> BackgroundImage:
+def unseen_background(recording: Recording, camera: str) -> BackgroundImage:
     """A background that photographs will fill: not one to learn again from a clip that is unsuitable."""
     return replace(BackgroundImage.nothing(*working_size(*recording.rig.image_size(camera))), origin="picture")
 
@@ -152,7 +152,7 @@ def _filled(own: BackgroundImage, plates: Sequence[FittedPlate]) -> BackgroundIm
     """A background with the median of some pictures where it is not known and they are."""
     if not plates:
         return own
-    there = np.any([plate.known for plate in plates], axis=0) & ~own.known
+    there = np.any([plate.known for plate in plates], axis=0)
     shown: Float[np.ndarray, "rows columns 3"] = np.zeros((*there.shape, 3))
     values = np.ma.masked_array(
         [plate.picture[there] for plate in plates],

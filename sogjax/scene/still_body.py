@@ -161,11 +161,12 @@ def legs_of(still: Bool[np.ndarray, "x y z"], ground: float, spacing: float) -> 
 def heads_over(
     legs: Bool[np.ndarray, "x y z"], moving: Bool[np.ndarray, "x y z"], spacing: float
 ) -> Bool[np.ndarray, "x y z"]:
-    """Where heads may be: balls over the highest places that move over legs, or over one leg."""
-    connected: Any = label(legs.any(axis=2))
+    """Where heads may be: balls over the highest places that move over the legs of somebody."""
+    plan: Bool[np.ndarray, "x y"] = legs.any(axis=2)
+    connected: Any = label(widened(plan, round(0.5 * NEAR / spacing)))
     heads, at = np.zeros_like(legs), np.indices(legs.shape)
     for part in range(1, connected[1] + 1):
-        middle = np.argwhere(connected[0] == part).mean(axis=0)
+        middle = np.argwhere(plan & (connected[0] == part)).mean(axis=0)
         near = np.hypot(*(at[:2, :, :, 0] - middle[:, None, None])) * spacing <= NEAR
         levels = np.flatnonzero((moving & near[:, :, None]).any(axis=(0, 1)))
         if levels.size:

@@ -24,7 +24,8 @@ class ImagesConfig:
         "predicted", "predicted: an actor's box holds the last pose and the predicted one | last: the last"
     )
     background: str = option(
-        "auto", "pictures: of the empty scene | clip: learnt from the clip | auto: pictures, else the clip | none"
+        "auto",
+        "pictures: of the empty scene | clip: learnt from the clip | auto: those there are, else the clip | none",
     )
     cache: str | None = option(
         None, "folder for averaged pictures, so that later runs decode no video; null: none", inert=True
