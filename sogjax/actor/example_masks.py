@@ -77,7 +77,9 @@ def example_masks(
     }
     photographed = {camera: plate.picture for camera, plate in plates.items()}
     from_clip = {
-        camera: learnt[camera] for camera in images if learnt and camera not in files and camera not in photographed
+        camera: learnt[camera]
+        for camera in images
+        if learnt and camera not in files and camera not in photographed and learnt[camera].known.any()
     }
     backgrounds = photographed | {camera: background.picture for camera, background in from_clip.items()}
     unknown = {camera: ~plate.known for camera, plate in (plates | from_clip).items() if not plate.known.all()}

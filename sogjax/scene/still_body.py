@@ -162,7 +162,7 @@ def heads_over(
     legs: Bool[np.ndarray, "x y z"], moving: Bool[np.ndarray, "x y z"], spacing: float
 ) -> Bool[np.ndarray, "x y z"]:
     """Where heads may be: balls over the highest places that move over the legs of somebody."""
-    plan: Bool[np.ndarray, "x y"] = legs.any(axis=2)
+    plan = legs.sum(axis=2) > 0
     connected: Any = label(widened(plan, round(0.5 * NEAR / spacing)))
     heads, at = np.zeros_like(legs), np.indices(legs.shape)
     for part in range(1, connected[1] + 1):
