@@ -21,7 +21,6 @@ from sogjax.model.limbs import limb_blobs
 from sogjax.model.program import compiled
 from sogjax.model.solid import Solid, impossibilities
 from sogjax.search.limb_ways import Unit, UnitArrays, drawn_ways, units_of
-from sogjax.search.mirrored import look_alikes
 from sogjax.search.search_energy import from_rest
 from sogjax.solve.ascent import ConditionedAscent
 from sogjax.solve.solution import Scales
@@ -104,17 +103,6 @@ def with_limbs_found(
         seen = _SeenUnit(everybody, number, now, silhouettes, turn, unit)
         pose = seen.found(pair.index, [(limb, next(arrays).index) for limb in of_limbs])
     return pose
-
-
-def both_ways_round(
-    everybody: Everybody, number: int, poses: Sequence[Float[np.ndarray, "dof"]], silhouettes: Silhouettes, turn: int
-) -> list[PoseAndMiss]:
-    """As `with_limbs_found`, from the pose, then from that of the body turned round, each with its mismatch."""
-    body, pose = everybody.bodies[number], poses[number]
-    starts = [pose, *look_alikes(body, pose)[:1]]
-    given = lambda start: [start if k == number else other for k, other in enumerate(poses)]
-    found = [with_limbs_found(everybody, number, given(start), silhouettes, turn) for start in starts]
-    return [(each, float(_whole_cost(body, jnp.asarray(each), silhouettes))) for each in found]
 
 
 def _limbs_of(unit: Unit) -> list[Unit]:
@@ -200,14 +188,6 @@ def _different(angles: Float[np.ndarray, "way param"], cost: Float[np.ndarray, "
         if np.abs(angles[kept] - angles[k]).max(axis=1).min() > APART:
             kept.append(k)
     return kept
-
-
-@compiled
-def _whole_cost(body: Body, pose: Float[Array, "dof"], silhouettes: Silhouettes) -> Float[Array, ""]:
-    """The mismatch of the body, with `REST`."""
-    return mismatch_of(times_cap(body.posed_blobs(pose), silhouettes), silhouettes) + REST * from_rest(
-        body.skeleton, pose
-    )
 
 
 @compiled

@@ -14,9 +14,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from sogjax.actor.body_silhouettes import WaysRound
 from sogjax.actor.coverage import body_silhouette
 from sogjax.actor.facing import Way, consistent_ways, forward
-from sogjax.actor.limb_silhouettes import LEAST_GAIN, Everybody, PoseAndMiss, both_ways_round, with_limbs_found
+from sogjax.actor.limb_silhouettes import Everybody, PoseAndMiss, with_limbs_found
 from sogjax.actor.make import MadeActor, Making
 from sogjax.actor.silhouette_fit import COARSE_CELLS, fit_edges, silhouettes_of
 from sogjax.actor.silhouettes import PosedPictures
@@ -32,6 +33,8 @@ AROUND = 2
 """Pixels of a mask at the working size around a body that are its own, too: sizes are only roughly known."""
 LEAST_LEFT = 0.2
 """Share of somebody's silhouettes, the median of the cameras, that others must leave in one for it to tell."""
+LEAST_GAIN = 0.15
+"""Part of its mismatch by which another way to see somebody must be better: where trunks were found, limbs stay."""
 LEAST_FIT = 1e-3
 """Of a way to see somebody, where he covers less than nothing of what is left of masks."""
 FEWEST_CAMERAS = 2
@@ -67,7 +70,8 @@ def _searched(people: "People", k: int, making: Making, poses: Sequence[Poses], 
     """
     described, of_actor = making.described, {posed.name: posed for posed in people.made[k].pictures}
     own = [of_actor.get(name, everybodys) for name, everybodys in people.shown.items()]
-    found = lambda posed: people.ways(k, posed, poses, turn, both=turn == 0 and posed.name not in described)
+    around = None if turn else making.recording.up
+    found = lambda posed: people.ways(k, posed, poses, turn, None if posed.name in described else around)
     ways = [*map(found, own[:1]), *in_threads(found, own[1:])]  # the first one compiles
     return believed(making, people.made[k].upright_body, dict(zip(people.shown, ways, strict=True)))
 
@@ -99,9 +103,12 @@ class People:
         """Their bodies as one."""
         return Everybody.of([actor.upright_body for actor in self.made])
 
-    def ways(self, k: int, posed: PosedPictures, poses: Sequence[Poses], turn: int, both: bool) -> list[PoseAndMiss]:
-        """The pose of one of them in an example, its limbs found, given those of the others; or that both ways round.
+    def ways(
+        self, k: int, posed: PosedPictures, poses: Sequence[Poses], turn: int, around: str | None = None
+    ) -> list[PoseAndMiss]:
+        """The pose of one of them in an example, its limbs found, given those of the others; or ways to see it.
 
+        These are looked for all `around` the vertical of that name, if there is one.
         `posed` are its own pictures, if it is made of them, or those of everybody; each `turn` draws other ways to hold
         limbs. The mismatch of a single pose is not computed, but 0.
         """
@@ -110,8 +117,10 @@ class People:
         if left is self.shown[posed.name]:  # those of everybody, which others leave nothing of
             return [(now[k], 0.0)]
         cells = silhouettes_of([left], self.made[k].rig, COARSE_CELLS)
-        search = (self.everybody, k, now, jax.tree.map(lambda leaf: leaf[0], cells), turn)
-        return both_ways_round(*search) if both else [(with_limbs_found(*search), 0.0)]
+        search = (now, jax.tree.map(lambda leaf: leaf[0], cells), turn)
+        if around is not None:
+            return WaysRound(self.everybody, k, around).found(*search)
+        return [(with_limbs_found(self.everybody, k, *search), 0.0)]
 
     def fitted_again(self, k: int, making: Making, poses: Sequence[Poses]) -> MadeActor:
         """One of the actors, its shape and poses fitted to what the others leave, where that agrees better with it.

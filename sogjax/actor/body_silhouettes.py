@@ -1,0 +1,103 @@
+"""The whole body in an example pose, searched by its masks: climbed from all around, then its limbs searched.
+
+Masks that are cut between people turn trunks round and tilt them, which no search of limbs mends.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from sogjax.actor.coverage import Silhouettes, mismatch_of, times_cap
+from sogjax.actor.facing import forward
+from sogjax.actor.limb_silhouettes import ITERATIONS, REST, Everybody, PoseAndMiss, with_limbs_found
+from sogjax.energy.priors import limit_penalty
+from sogjax.model.batches import THREADS, of_each, shared_out
+from sogjax.model.body import Body
+from sogjax.model.program import compiled
+from sogjax.search.mirrored import look_alikes
+from sogjax.search.placed_body import centred, centres_of, headings, turned_to
+from sogjax.search.search_energy import from_rest
+from sogjax.solve.ascent import ConditionedAscent
+from sogjax.solve.solution import Scales
+from sogjax.tracking.solving import pose_scales
+
+NUM_HEADINGS = 8
+"""Ways round in which a body at rest is put where it is, to be climbed."""
+
+
+@dataclass(frozen=True)
+class WaysRound:
+    """Ways to see one of some bodies by what the others leave of the masks of an example pose."""
+
+    everybody: Everybody
+    number: int
+    """Which of the bodies."""
+    up: str
+
+    @property
+    def body(self) -> Body:
+        """The one that is searched."""
+        return self.everybody.bodies[self.number]
+
+    def found(
+        self, poses: Sequence[Float[np.ndarray, "dof"]], silhouettes: Silhouettes, turn: int
+    ) -> list[PoseAndMiss]:
+        """The body's pose, then the one that fits best after a climb, and the best of those that face the other way.
+
+        Each with its limbs found as by `with_limbs_found`, and with its mismatch.
+        """
+        now = np.asarray(poses[self.number])
+        climbed, misses = self._climbed(now, silhouettes)
+        facing = forward(self.body, list(climbed), self.up)
+        best = int(np.argmin(misses))
+        behind = np.flatnonzero(facing @ facing[best] <= 0.0)
+        starts = [now, climbed[best], *climbed[behind[np.argsort(misses[behind])][:1]]]
+        given = lambda start: [start if k == self.number else other for k, other in enumerate(poses)]
+        held = [with_limbs_found(self.everybody, self.number, given(start), silhouettes, turn) for start in starts]
+        return [(each, float(_whole_miss(self.body, jnp.asarray(each), silhouettes))) for each in held]
+
+    def _climbed(
+        self, pose: Float[np.ndarray, "dof"], silhouettes: Silhouettes
+    ) -> tuple[Float[np.ndarray, "way dof"], Float[np.ndarray, "way"]]:
+        """Where the pose, what looks like it from behind, and a body at rest all round end, with mismatches."""
+        upright = turned_to(self.body, [np.asarray(self.body.poses["rest"])], headings(NUM_HEADINGS), self.up)
+        there = centred(self.body, upright, centres_of(self.body, pose[None])[0])
+        starts = np.concatenate([pose[None], look_alikes(self.body, pose)[:1], there]).astype(pose.dtype)
+        given = (self.body, silhouettes, pose_scales(self.body.skeleton))
+        room = -(-(2 + NUM_HEADINGS) // THREADS)
+        climbed, misses = shared_out(lambda count, rows: _climbed(count, rows, *given), room, starts)
+        return climbed, misses
+
+
+@compiled
+def _whole_miss(body: Body, pose: Float[Array, "dof"], silhouettes: Silhouettes) -> Float[Array, ""]:
+    """The mismatch of the body, with `REST`."""
+    return mismatch_of(times_cap(body.posed_blobs(pose), silhouettes), silhouettes) + REST * from_rest(
+        body.skeleton, pose
+    )
+
+
+@compiled
+def _climbed(
+    count: Int[Array, ""],
+    poses: Float[Array, "way dof"],
+    body: Body,
+    silhouettes: Silhouettes,
+    scales: Scales,
+) -> tuple[Float[Array, "way dof"], Float[Array, "way"]]:
+    """The first `count` poses climbed to where the body covers the masks better, and their mismatches with `REST`."""
+    lower, upper = body.skeleton.joint_limits()
+    solver = ConditionedAscent(max_iterations=jnp.asarray(ITERATIONS))
+
+    def climbed(pose: Float[Array, "dof"]) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
+        def objective(held: Float[Array, "dof"]) -> Float[Array, ""]:
+            beyond = limit_penalty(body.skeleton.joint_params(held), lower, upper)
+            return -_whole_miss(body, held, silhouettes) - beyond
+
+        found = solver.maximize(objective, pose, scales)
+        return found.params, -found.value
+
+    return of_each(climbed, poses, count=count)
