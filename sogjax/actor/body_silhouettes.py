@@ -30,7 +30,7 @@ NUM_HEADINGS = 8
 
 @dataclass(frozen=True)
 class WaysRound:
-    """Ways to see one of some bodies by what the others leave of the masks of an example pose."""
+    """Ways to see somebody in an example pose, by what the others leave of its masks."""
 
     everybody: Everybody
     number: int
@@ -88,7 +88,7 @@ def _climbed(
     silhouettes: Silhouettes,
     scales: Scales,
 ) -> tuple[Float[Array, "way dof"], Float[Array, "way"]]:
-    """The first `count` poses climbed to where the body covers the masks better, and their mismatches with `REST`."""
+    """The first `count` poses climbed to where the body covers the masks better, and their mismatches with `REST` and limits."""
     lower, upper = body.skeleton.joint_limits()
     solver = ConditionedAscent(max_iterations=jnp.asarray(ITERATIONS))
 

@@ -37,8 +37,7 @@ AT_ONCE = 16
 """Ways that are compared in one step."""
 
 LEAST_GAIN = 0.05
-"""Part of its cost by which another way to hold a unit, or the body turned round, must be better: masks are not that
-exact."""
+"""Part of its cost by which another way to hold a unit must be better: masks are not that exact."""
 REST = 0.003
 """What being at the end of a joint's range costs beside the mismatch, which is 0.1 to 0.2: of two ways that cover the
 masks alike, the one that twists less is more likely."""

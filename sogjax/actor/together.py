@@ -64,7 +64,7 @@ def made_together(
 
 
 def _searched(people: "People", k: int, making: Making, poses: Sequence[Poses], turn: int) -> Poses:
-    """The poses of one of the actors in all shared examples, its limbs found, given those of the others.
+    """The poses of one of the actors in all shared examples, searched given those of the others.
 
     Also in those that it is not made of: the others are.
     """
