@@ -88,7 +88,7 @@ def _climbed(
     silhouettes: Silhouettes,
     scales: Scales,
 ) -> tuple[Float[Array, "way dof"], Float[Array, "way"]]:
-    """The first `count` poses climbed to where the body covers the masks better, and their mismatches with `REST` and limits."""
+    """The first `count` poses, climbed to where they cover the masks better, and mismatches with `REST` and limits."""
     lower, upper = body.skeleton.joint_limits()
     solver = ConditionedAscent(max_iterations=jnp.asarray(ITERATIONS))
 
