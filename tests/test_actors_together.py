@@ -92,17 +92,18 @@ def test_an_example_pose_is_believed_that_goes_with_the_others(poses):
     making = making_of(frames.values())
     front, back = (np.asarray(turned(DOG, jnp.asarray(poses[0]), heading, "z")) for heading in (0.0, np.pi))
     ways = {name: [(front, 0.1), (back, 0.08 if name == "b" else 0.12)] for name in frames}
-    found = believed(making, DOG, ways)
+    found = believed(making, DOG, ways, 0)
     assert all(np.array_equal(found[name], front) for name in frames)
-    assert np.array_equal(believed(making, DOG, {"b": ways["b"]})["b"], back)
-    assert np.array_equal(believed(making, DOG, {"b": [(front, 0.1), (back, 0.09)]})["b"], front)  # hardly better
-    assert np.array_equal(believed(making, DOG, {"b": [(front, 1.4), (back, 1.8)]})["b"], front)
+    assert np.array_equal(believed(making, DOG, {"b": ways["b"]}, 0)["b"], back)
+    assert np.array_equal(believed(making, DOG, {"b": [(front, 0.1), (back, 0.09)]}, 0)["b"], front)  # hardly better
+    assert np.array_equal(believed(making, DOG, {"b": [(front, 0.1), (back, 0.09)]}, 1)["b"], back)
+    assert np.array_equal(believed(making, DOG, {"b": [(front, 1.4), (back, 1.8)]}, 0)["b"], front)
 
 
 def test_an_actor_is_not_searched_in_the_masks_of_everybody(poses):
     same = [{"a": poses[0]}, {"a": poses[0]}]
     people = People(tuple(map(made, (poses[0], poses[0]))), {"a": all_people([poses[0], poses[0]])})
-    (found, _), *others = people.ways(0, people.shown["a"], same, 0, around="z")
+    (found, _), *others = people.ways(0, people.shown["a"], same, 0, up="z")
     assert found is poses[0]
     assert not others
 

@@ -8,7 +8,7 @@ from body_cases import shipped
 from drawn_scene import moved, standing
 from rig_cases import ring_rig
 
-from sogjax.actor.body_silhouettes import WaysRound
+from sogjax.actor.body_silhouettes import WaysRound, upright_all_round
 from sogjax.actor.coverage import body_silhouette
 from sogjax.actor.limb_silhouettes import Everybody, with_limbs_found
 from sogjax.actor.silhouette_fit import COARSE_CELLS, silhouettes_of
@@ -63,6 +63,11 @@ def bent():
     )
 
 
+def ways_of(truth, pose, starts):
+    """Ways to see the masks of the truth, from a pose and other starts."""
+    return WaysRound(Everybody.of([HUMAN]), 0, "z").found([pose], cells_of_masks(masks_of(truth)), 0, starts)
+
+
 def nose_off(pose, truth):
     nose = HUMAN.landmarks.names.index("nose")
     places = [np.asarray(HUMAN.posed_landmarks(jnp.asarray(each)))[nose] for each in (pose, truth)]
@@ -71,7 +76,7 @@ def nose_off(pose, truth):
 
 def test_a_pose_that_covers_the_masks_fits_better_than_turned_round():
     truth = bent()
-    (found, miss), *others = WaysRound(Everybody.of([HUMAN]), 0, "z").found([truth], cells_of_masks(masks_of(truth)), 0)
+    (found, miss), *others = ways_of(truth, truth, upright_all_round(HUMAN, "z"))
     turned, turned_miss = others[-1]
     assert nose_off(found, truth) < 0.05 < nose_off(turned, truth)
     assert miss < 0.9 * turned_miss
@@ -83,9 +88,19 @@ def test_a_trunk_that_faces_sideways_is_found_where_the_masks_show_it():
     aside = np.array(truth)
     aside[heading] += 0.5 * np.pi / per_radian
     assert nose_off(aside, truth) > 0.1
-    ways = WaysRound(Everybody.of([HUMAN]), 0, "z").found([aside], cells_of_masks(masks_of(truth)), 0)
+    ways = ways_of(truth, aside, upright_all_round(HUMAN, "z"))
     best, _ = min(ways, key=lambda way: way[1])
     assert nose_off(best, truth) < 0.05
+
+
+def test_a_pose_is_found_that_is_known_from_another_moment():
+    truth = moved(HUMAN, bent(), {"root_pitch": 1.2})
+    start = standing(HUMAN, 1.0)
+    ways = ways_of(truth, start, [moved(HUMAN, truth, {"root_x": 0.6, "root_y": -0.4, "left_knee": 0.2})])
+    best, _ = min(ways, key=lambda way: way[1])
+    assert nose_off(start, truth) > 0.3
+    assert nose_off(best, truth) < 0.05
+    assert hands_off(best, truth).max() < 0.1
 
 
 def test_limbs_that_cover_the_masks_stay():

@@ -1,4 +1,4 @@
-"""The whole body in an example pose, searched by its masks: climbed from all around, then its limbs searched.
+"""The whole body in an example pose, searched by its masks: climbed from several starts, then its limbs searched.
 
 Masks that are cut between people turn trunks round and tilt them, which no search of limbs mends.
 """
@@ -28,6 +28,11 @@ NUM_HEADINGS = 8
 """Ways round in which a body at rest is put where it is, to be climbed."""
 
 
+def upright_all_round(body: Body, up: str) -> list[Float[np.ndarray, "dof"]]:
+    """A body at rest, turned to `NUM_HEADINGS`."""
+    return [*turned_to(body, [np.asarray(body.poses["rest"])], headings(NUM_HEADINGS), up)]
+
+
 @dataclass(frozen=True)
 class WaysRound:
     """Ways to see somebody in an example pose, by what the others leave of its masks."""
@@ -43,32 +48,39 @@ class WaysRound:
         return self.everybody.bodies[self.number]
 
     def found(
-        self, poses: Sequence[Float[np.ndarray, "dof"]], silhouettes: Silhouettes, turn: int
+        self,
+        poses: Sequence[Float[np.ndarray, "dof"]],
+        silhouettes: Silhouettes,
+        turn: int,
+        starts: Sequence[Float[np.ndarray, "dof"]],
     ) -> list[PoseAndMiss]:
         """The body's pose, then the one that fits best after a climb, and the best of those that face the other way.
 
-        Each with its limbs found as by `with_limbs_found`, and with its mismatch.
+        Each with its limbs found as by `with_limbs_found`, and with its mismatch. Climbed are, beside the pose, what
+        looks like it from behind, and the `starts`, moved to where it is.
         """
         now = np.asarray(poses[self.number])
-        climbed, misses = self._climbed(now, silhouettes)
+        climbed, misses = self._climbed(now, silhouettes, starts)
         facing = forward(self.body, list(climbed), self.up)
         best = int(np.argmin(misses))
         behind = np.flatnonzero(facing @ facing[best] <= 0.0)
-        starts = [now, climbed[best], *climbed[behind[np.argsort(misses[behind])][:1]]]
+        ways = [now, climbed[best], *climbed[behind[np.argsort(misses[behind])][:1]]]
         given = lambda start: [start if k == self.number else other for k, other in enumerate(poses)]
-        held = [with_limbs_found(self.everybody, self.number, given(start), silhouettes, turn) for start in starts]
+        held = [with_limbs_found(self.everybody, self.number, given(start), silhouettes, turn) for start in ways]
         return [(each, float(_whole_miss(self.body, jnp.asarray(each), silhouettes))) for each in held]
 
     def _climbed(
-        self, pose: Float[np.ndarray, "dof"], silhouettes: Silhouettes
+        self,
+        pose: Float[np.ndarray, "dof"],
+        silhouettes: Silhouettes,
+        starts: Sequence[Float[np.ndarray, "dof"]],
     ) -> tuple[Float[np.ndarray, "way dof"], Float[np.ndarray, "way"]]:
-        """Where the pose, what looks like it from behind, and a body at rest all round end, with mismatches."""
-        upright = turned_to(self.body, [np.asarray(self.body.poses["rest"])], headings(NUM_HEADINGS), self.up)
-        there = centred(self.body, upright, centres_of(self.body, pose[None])[0])
-        starts = np.concatenate([pose[None], look_alikes(self.body, pose)[:1], there]).astype(pose.dtype)
+        """Where the pose, what looks like it from behind, and the starts end, with mismatches."""
+        there = centred(self.body, np.stack(starts), centres_of(self.body, pose[None])[0]) if len(starts) else []
+        begun = np.stack([pose, *look_alikes(self.body, pose)[:1], *there]).astype(pose.dtype)
         given = (self.body, silhouettes, pose_scales(self.body.skeleton))
         room = -(-(2 + NUM_HEADINGS) // THREADS)
-        climbed, misses = shared_out(lambda count, rows: _climbed(count, rows, *given), room, starts)
+        climbed, misses = shared_out(lambda count, rows: _climbed(count, rows, *given), room, begun)
         return climbed, misses
 
 

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from sogjax.actor.body_silhouettes import WaysRound
+from sogjax.actor.body_silhouettes import WaysRound, upright_all_round
 from sogjax.actor.coverage import body_silhouette
 from sogjax.actor.facing import Way, consistent_ways, forward
 from sogjax.actor.limb_silhouettes import Everybody, PoseAndMiss, with_limbs_found
@@ -27,14 +27,13 @@ from sogjax.model.cores import in_threads
 from sogjax.scene.background_difference import reduced_mask, widened
 from sogjax.scene.coarse_views import enlarged
 
-ROUNDS = 2
-"""Times that each is searched for limbs, given the others."""
 AROUND = 2
 """Pixels of a mask at the working size around a body that are its own, too: sizes are only roughly known."""
 LEAST_LEFT = 0.2
 """Share of somebody's silhouettes, the median of the cameras, that others must leave in one for it to tell."""
-LEAST_GAIN = 0.15
-"""Part of its mismatch by which another way to see somebody must be better: where trunks were found, limbs stay."""
+LEAST_GAINS = 0.15, 0.05
+"""Part of its mismatch by which another way to see somebody must be better in each round: trunks that were found first
+keep their limbs, until others are there to compare."""
 LEAST_FIT = 1e-3
 """Of a way to see somebody, where he covers less than nothing of what is left of masks."""
 FEWEST_CAMERAS = 2
@@ -57,7 +56,7 @@ def made_together(
     if not shared:
         return list(made)
     people = People(tuple(made), {name: shown[name] for name in shared})
-    for turn in range(ROUNDS):
+    for turn in range(len(LEAST_GAINS)):
         for k, making in enumerate(makings):
             poses[k] |= _searched(people, k, making, poses, turn)
     return in_threads(lambda k: people.fitted_again(k, makings[k], poses), range(len(made)))
@@ -70,18 +69,18 @@ def _searched(people: "People", k: int, making: Making, poses: Sequence[Poses], 
     """
     described, of_actor = making.described, {posed.name: posed for posed in people.made[k].pictures}
     own = [of_actor.get(name, everybodys) for name, everybodys in people.shown.items()]
-    around = None if turn else making.recording.up
-    found = lambda posed: people.ways(k, posed, poses, turn, None if posed.name in described else around)
+    up = making.recording.up
+    found = lambda posed: people.ways(k, posed, poses, turn, None if posed.name in described else up)
     ways = [*map(found, own[:1]), *in_threads(found, own[1:])]  # the first one compiles
-    return believed(making, people.made[k].upright_body, dict(zip(people.shown, ways, strict=True)))
+    return believed(making, people.made[k].upright_body, dict(zip(people.shown, ways, strict=True)), turn)
 
 
-def believed(making: Making, body: Body, ways: Mapping[str, Sequence[PoseAndMiss]]) -> Poses:
+def believed(making: Making, body: Body, ways: Mapping[str, Sequence[PoseAndMiss]], turn: int) -> Poses:
     """Of each shared example pose of an actor the way to see it, given with its mismatch, that goes with the others.
 
-    A pose that is not the one until now, the first, must be better by `LEAST_GAIN` beside that.
+    A pose that is not the one until now, the first, must be better by the turn's `LEAST_GAINS` beside that.
     """
-    fit = lambda number, miss: max(1.0 - miss / (1.0 - LEAST_GAIN * (number > 0)), LEAST_FIT)
+    fit = lambda number, miss: max(1.0 - miss / (1.0 - LEAST_GAINS[turn] * (number > 0)), LEAST_FIT)
     up, frames = making.recording.up, {example.name: example.frame for example in making.examples}
     facing = iter(forward(body, [pose for both in ways.values() for pose, _ in both], up))
     moments = [
@@ -104,13 +103,13 @@ class People:
         return Everybody.of([actor.upright_body for actor in self.made])
 
     def ways(
-        self, k: int, posed: PosedPictures, poses: Sequence[Poses], turn: int, around: str | None = None
+        self, k: int, posed: PosedPictures, poses: Sequence[Poses], turn: int, up: str | None = None
     ) -> list[PoseAndMiss]:
         """The pose of one of them in an example, its limbs found, given those of the others; or ways to see it.
 
-        These are looked for all `around` the vertical of that name, if there is one.
-        `posed` are its own pictures, if it is made of them, or those of everybody; each `turn` draws other ways to hold
-        limbs. The mismatch of a single pose is not computed, but 0.
+        These are looked for where the vertical is given as `up`: in the first turn all around it, then from its poses
+        in the other examples. `posed` are its own pictures, if it is made of them, or those of everybody; each `turn`
+        draws other ways to hold limbs. The mismatch of a single pose is not computed, but 0.
         """
         now = [of_actor[posed.name] for of_actor in poses]
         left = self.left_by_others(k, posed, now)
@@ -118,9 +117,15 @@ class People:
             return [(now[k], 0.0)]
         cells = silhouettes_of([left], self.made[k].rig, COARSE_CELLS)
         search = (now, jax.tree.map(lambda leaf: leaf[0], cells), turn)
-        if around is not None:
-            return WaysRound(self.everybody, k, around).found(*search)
+        if up is not None:
+            return WaysRound(self.everybody, k, up).found(*search, self._starts(k, posed.name, poses[k], turn, up))
         return [(with_limbs_found(self.everybody, k, *search), 0.0)]
+
+    def _starts(self, k: int, example: str, poses: Poses, turn: int, up: str) -> list[Float[np.ndarray, "dof"]]:
+        """From where somebody is climbed in an example pose."""
+        if turn == 0:
+            return upright_all_round(self.made[k].upright_body, up)
+        return [poses[name] for name in self.shown if name != example]
 
     def fitted_again(self, k: int, making: Making, poses: Sequence[Poses]) -> MadeActor:
         """One of the actors, its shape and poses fitted to what the others leave, where that agrees better with it.
