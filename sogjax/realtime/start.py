@@ -50,7 +50,7 @@ USUAL_RATE = 30.0
 """Pictures per second of cameras of which nothing is known."""
 UP_TO_TRACKING = PASSES[: [each.name for each in PASSES].index("tracked")]
 """The passes of a replay before it begins: its place is then as well known as to a run over the recording."""
-FROM_THE_POSE = ("initial_pose", "relearnt", "keypoint_bias")
+FROM_THE_POSE = ("initial_pose", "relearnt", "remade", "keypoint_bias")
 """Those of them that need a first pose."""
 
 

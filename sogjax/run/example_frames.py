@@ -59,7 +59,7 @@ def with_examples(
     recording = clip.recording
     check_actors(recording, actors)
     if recording.example_poses:
-        learnt = background().cameras if _need_background(recording) else None
+        learnt = background().cameras if need_background(recording) else None
         return _told_apart(clip, learnt), learnt, None
     known = background()
     if known.cameras is None:
@@ -127,7 +127,7 @@ def check_actors(recording: Recording, actors: int | None, num_files: int | None
         )
 
 
-def _need_background(recording: Recording) -> bool:
+def need_background(recording: Recording) -> bool:
     """Whether some picture of an example pose has neither a mask nor a picture of the empty scene."""
     without = lambda example: [
         name for name in example.images if name not in example.masks and name not in recording.background

@@ -29,6 +29,8 @@ AGREEING = 0.45
 """Least agreement of everybody's hull and silhouettes in a frame."""
 FEWEST_APART = 2
 """Frames in which all stand apart; fewer make no actors."""
+MOST = 0.7
+"""Part of the frames that must show another number of people for it to be recommended: two who pass are seen as one."""
 OTHERWISE = (
     "list frames in which each stands alone as example_poses in recording.yaml, such as [{frame: 12, actor: anna}, "
     "{frame: 300, actor: ben}], or give actor files with actor=[...]"
@@ -166,11 +168,11 @@ def too_few_apart(actors: int, counts: Sequence[int], plates: bool = False) -> s
     if not most:
         return f"nobody is seen apart from the background; {_plates_or(plates)}{OTHERWISE}"
     shown = "one person" if most == 1 else f"{most} people"
+    usual = most != actors and sum(n == most for n in counts) > MOST * len(counts)
     return (
         f"actors={actors}, but {actors} people stand apart in {sum(n == actors for n in counts)} of "
         f"{counted(len(counts), 'frame')}, and {shown} in {sum(n == most for n in counts)}; "
-        f"{f'give actors={most}, or ' if most != actors and 2 * sum(n == most for n in counts) > len(counts) else ''}"
-        f"{OTHERWISE}"
+        f"{f'give actors={most}, or ' if usual else ''}{OTHERWISE}"
     )
 
 

@@ -42,7 +42,7 @@ def judged_result(run: Run) -> RunResult:
 
 def _doubtful_begin(run: Run) -> dict[str, str]:
     """What is said of each actor whose initial pose was not sure."""
-    start = run.records.get("initial_pose")
+    start = run.initial_pose if run.tracks else None
     if start is None or start.confidence is None:
         return {}
     names = [body.name for body in run.actors.bodies]

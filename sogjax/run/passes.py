@@ -32,6 +32,7 @@ from sogjax.run.keypoint_bias import KeypointBias, estimate_keypoint_bias
 from sogjax.run.learn_occluders import LearntOccluders, Retracked, learn_occluders, track_again
 from sogjax.run.merge import Merged, merge_backward
 from sogjax.run.relearn_background import RelearntBackground, relearn_background
+from sogjax.run.remake_actors import RemadeActors, remake_actors
 from sogjax.run.result_streams import ResultStreams
 from sogjax.run.run import Run
 from sogjax.run.setup import compile_beforehand
@@ -86,6 +87,14 @@ def _initial_pose(run: Run) -> InitialPose:
     return found
 
 
+def _remade(run: Run) -> RemadeActors:
+    """The actors of the background that is known by now."""
+    background = run.records["relearnt"].whole
+    return remake_actors(
+        run.actor_request, run.actors, background, run.pose_request, run.pose_sources, run.report_actors
+    )
+
+
 def _tracked(run: Run) -> Tracked:
     """The frames, tracked; rows and the files that show them are written as they come."""
     log = rows = streams = None
@@ -123,6 +132,7 @@ PASSES: tuple[Pass, ...] = (
         RelearntBackground,
         wanted=lambda run: run.tracks and run.background.is_learnt,
     ),
+    Pass("remade", ACTORS, _remade, RemadeActors, wanted=lambda run: run.tracks and run.remakes_actors),
     Pass(
         "keypoint_bias",
         PREPARING,
@@ -174,6 +184,8 @@ PASSES: tuple[Pass, ...] = (
 """The passes of `sogjax track`, of `sogjax.track`, of every member of a sweep and of every run of a study; and of
 `sogjax adjust`, which is given frames that were tracked."""
 BEFORE_TRACKING = tuple(
-    each for each in PASSES[: [each.name for each in PASSES].index("tracked")] if each.name != "relearnt"
+    each
+    for each in PASSES[: [each.name for each in PASSES].index("tracked")]
+    if each.name not in ("relearnt", "remade")
 )
-"""Those that say how the first frame is tracked, without the one for which the whole clip is."""
+"""Those that say how the first frame is tracked, without the one for which the whole clip is, and what needs it."""

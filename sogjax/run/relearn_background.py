@@ -50,6 +50,14 @@ class RelearntBackground:
     first: Background | None = None
     """The first background without what turned out to be the body; it holds where nothing was learnt."""
 
+    @property
+    def whole(self) -> Background | None:
+        """What is known of the empty scene by now; None: no more than before."""
+        if self.background is None or self.first is None:
+            return None
+        pairs = zip(self.background.required(), self.first.required(), strict=True)
+        return Background(tuple(again.filled(before) for again, before in pairs))
+
     def in_setup(self, setup: Setup) -> Setup:
         """The setup with this background where something is known of it, and with its own elsewhere."""
         if self.background is None:

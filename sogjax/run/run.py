@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import takewhile
 from pathlib import Path
-from threading import Lock
+from threading import RLock
 from typing import Any
 
 from sogjax.actor.make import MadeActor
@@ -23,6 +23,8 @@ from sogjax.run.clock import StageTimes
 from sogjax.run.filter import filter_name
 from sogjax.run.initial_pose import SOURCES, InitialPose, PoseRequest, PoseSource
 from sogjax.run.learn_occluders import LearntOccluders
+from sogjax.run.relearn_background import RelearntBackground
+from sogjax.run.remake_actors import RemadeActors, may_gain
 from sogjax.run.result import RunResult
 from sogjax.run.run_files import GUESS
 from sogjax.run.sampled_masks import mask_samples
@@ -61,8 +63,9 @@ class Run:
     """What each pass left, by the name of the pass."""
 
     def __post_init__(self) -> None:
-        self._lock = Lock()
-        self._setup: tuple[list[Any], Setup | None] = ([None] * 3, None)
+        self._lock = RLock()
+        self._first_setup: tuple[Actors | None, Setup | None] = (None, None)
+        self._setup: tuple[list[Any], Setup | None] = ([None] * 4, None)
 
     @property
     def makes_actors(self) -> bool:
@@ -83,12 +86,23 @@ class Run:
     @property
     def actors(self) -> Actors:
         """The actors, in their own upright frames."""
-        return self.records["actors"]
+        return self._remade.actors or self.records["actors"]
 
     @property
     def initial_pose(self) -> InitialPose:
         """Where tracking begins."""
-        return self.records["initial_pose"]
+        return self._remade.initial_pose or self.records["initial_pose"]
+
+    @property
+    def _remade(self) -> RemadeActors:
+        return self.records.get("remade") or RemadeActors()
+
+    @property
+    def remakes_actors(self) -> bool:
+        """Whether the actors are doubtful, and more of the background, of which they were made, is known now."""
+        relearnt: RelearntBackground | None = self.records.get("relearnt")
+        known = relearnt is not None and relearnt.background is not None
+        return known and may_gain(self.actor_request, self.records["actors"])
 
     @property
     def adjusted(self) -> Adjusted | None:
@@ -106,22 +120,28 @@ class Run:
         picture = None if self.out is None else GUESS.of(self.out)
         return PoseRequest(self.clip, self.background, self.actors, self.config, self.terms, picture=picture)
 
-    @cached_property
+    @property
     def first_setup(self) -> Setup:
         """What is tracked with before anything was learnt by tracking."""
-        return tracking_setup(self.clip, self.background, self.actors.bodies, self.config, self.terms)
+        with self._lock:
+            of_actors, made = self._first_setup
+            if made is None or of_actors is not self.actors:
+                made = tracking_setup(self.clip, self.background, self.actors.bodies, self.config, self.terms)
+                self._first_setup = self.actors, made
+            return made
 
     @property
     def setup(self) -> Setup:
         """What is tracked with, knowing what was learnt so far."""
         with self._lock:  # a thread makes it while the initial pose is searched for
+            first = self.first_setup
             learnt = [self.records.get(name) for name in ("relearnt", "occluders", "keypoint_bias")]
             known, made = self._setup
-            if made is None or any(now is not before for now, before in zip(learnt, known, strict=True)):
-                made = self.first_setup
+            if made is None or any(now is not before for now, before in zip([first, *learnt], known, strict=True)):
+                made = first
                 for record in learnt:
                     made = made if record is None else record.in_setup(made)
-                self._setup = learnt, made
+                self._setup = [first, *learnt], made
             return made
 
     @property

@@ -1,0 +1,85 @@
+"""Actors that are made again where the first ones are doubtful, once tracking told more of the background.
+
+Who hardly leaves his place hides what is behind him, and masks say nothing where the background is unknown: arms are
+found in the wrong places, and take the colours of what is there. Once the body was tracked, most of it is known.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from sogjax.actor.make import MadeActor
+from sogjax.errors import InputError
+from sogjax.run.actors import ActorRequest, Actors, new_actors
+from sogjax.run.background import Background
+from sogjax.run.example_frames import need_background
+from sogjax.run.initial_pose import InitialPose, PoseRequest, PoseSource, find_initial_pose
+from sogjax.run.terminal import say
+
+FOLDER = "remade"
+
+
+@dataclass(frozen=True)
+class RemadeActors:
+    """What was made again; None: the first ones hold."""
+
+    actors: Actors | None = None
+    initial_pose: InitialPose | None = None
+    """Where tracking begins with these actors."""
+
+    def save(self, folder: Path) -> None:
+        """Keep it in a run's folder."""
+        (folder / FOLDER).mkdir(exist_ok=True)
+        for record in (self.actors, self.initial_pose):
+            if record is not None:
+                record.save(folder / FOLDER)
+
+    @classmethod
+    def load(cls, folder: Path) -> "RemadeActors | None":
+        """What was kept, if it was."""
+        place = folder / FOLDER
+        return cls(Actors.load(place), InitialPose.load(place)) if place.is_dir() else None
+
+
+def may_gain(request: ActorRequest, first: Actors) -> bool:
+    """Whether the actors are doubtful, and of masks that a background tells which was learnt."""
+    recording = request.recording
+    of_masks = not recording.example_poses or need_background(recording)
+    return request.files is None and any(first.doubts) and of_masks
+
+
+def remake_actors(
+    request: ActorRequest,
+    first: Actors,
+    background: Background,
+    begin: PoseRequest,
+    sources: Sequence[PoseSource],
+    report: Callable[[Sequence[MadeActor]], object],
+) -> RemadeActors:
+    """The actors made again with a better background, and where tracking begins with them.
+
+    Args:
+        request: the actors that are wanted.
+        first: as they were made.
+        background: that is known by now.
+        begin: the initial pose that is wanted.
+        sources: of initial poses.
+        report: takes how the actors were made, where they are better.
+    """
+    doubtful = ", ".join(body.name for body, doubt in zip(first.bodies, first.doubts, strict=True) if doubt)
+    say(f"{doubtful}: made again, since more of the background is known now")
+    made: list[MadeActor] = []
+    try:
+        actors = new_actors(replace(request, background=lambda: background), made.extend)
+        if _num_doubtful(actors) > _num_doubtful(first):
+            return RemadeActors()
+        begun = find_initial_pose(replace(begin, actors=actors, background=background), sources)
+    except InputError as error:
+        say(f"warning: the first actors hold: {error}")
+        return RemadeActors()
+    report(made)
+    return RemadeActors(actors, begun)
+
+
+def _num_doubtful(actors: Actors) -> int:
+    return sum(map(bool, actors.doubts))

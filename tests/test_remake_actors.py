@@ -1,0 +1,116 @@
+"""When actors are made again, and which hold then."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from run_cases import DOG, pose_request, tiny_clip, tiny_run
+
+from sogjax.errors import InputError
+from sogjax.io.example_poses import ExamplePose
+from sogjax.run import passes, remake_actors, run
+from sogjax.run.actors import ActorRequest, Actors
+from sogjax.run.background import Background
+from sogjax.run.initial_pose import InitialPose
+from sogjax.run.relearn_background import RelearntBackground
+from sogjax.run.remake_actors import RemadeActors, may_gain
+from sogjax.run.setup import Setup
+from sogjax.scene.background import BackgroundImage
+
+SURE, DOUBTFUL = Actors((DOG,), doubts=("",)), Actors((DOG,), doubts=("a paw was not found",))
+BEGUN = InitialPose(3, np.zeros(DOG.skeleton.num_dofs, np.float32), "example frames")
+NOTHING = Background((BackgroundImage.nothing(4, 4),))
+FRAME = ExamplePose("frame_3", None, {}, {}, None, 3)
+PICTURE = ExamplePose("sit", None, {"cam0": Path("a.jpg")}, {"cam0": Path("a.mask.png")}, None)
+
+
+def request_of(*examples, files=None):
+    clip = tiny_clip()
+    shown = replace(clip, recording=replace(clip.recording, example_poses=examples))
+    return ActorRequest(shown, lambda: Background(None), files)
+
+
+@pytest.mark.parametrize(
+    ("request_", "first", "expected"),
+    [
+        (request_of(), DOUBTFUL, True),
+        (request_of(), SURE, False),
+        (request_of(FRAME), DOUBTFUL, True),
+        (request_of(PICTURE), DOUBTFUL, False),  # its mask is given
+        (request_of(files=[Path("dog.yaml")]), DOUBTFUL, False),
+    ],
+)
+def test_doubtful_actors_gain_where_a_background_tells_their_masks(request_, first, expected):
+    assert may_gain(request_, first) == expected
+
+
+def remade(monkeypatch, made, first=DOUBTFUL):
+    """What comes of actors that are made as `made`, or that error; what is reported, and whose pose is asked for."""
+    reported, asked, begun = [], [], []
+
+    def new(request, report):
+        asked.append(request.background())
+        if isinstance(made, InputError):
+            raise made
+        report([made])
+        return made
+
+    monkeypatch.setattr(remake_actors, "new_actors", new)
+    monkeypatch.setattr(remake_actors, "find_initial_pose", lambda request, _: begun.append(request.actors) or BEGUN)
+    found = remake_actors.remake_actors(request_of(), first, NOTHING, pose_request(), (), reported.extend)
+    assert asked[0] is NOTHING
+    return found, reported, begun
+
+
+@pytest.mark.parametrize("made", [SURE, DOUBTFUL])
+def test_tracking_begins_anew_with_actors_that_are_no_more_doubtful(monkeypatch, made):
+    found, reported, begun = remade(monkeypatch, made)
+    assert found.actors is begun[0] is reported[0] is made
+    assert found.initial_pose is BEGUN
+
+
+@pytest.mark.parametrize("made", [Actors((DOG, DOG), doubts=("one", "two")), InputError("nobody is seen")])
+def test_the_first_actors_hold_where_others_are_worse_or_none(monkeypatch, made):
+    found, reported, _ = remade(monkeypatch, made)
+    assert found.actors is found.initial_pose is None
+    assert not reported
+
+
+@pytest.mark.parametrize("record", [RemadeActors(), RemadeActors(SURE, BEGUN)])
+def test_what_was_made_again_is_kept(tmp_path, record):
+    assert RemadeActors.load(tmp_path) is None
+    record.save(tmp_path)
+    kept = RemadeActors.load(tmp_path)
+    assert (kept.actors is None) == (record.actors is None)
+    if record.actors is not None:
+        assert kept.actors.doubts == SURE.doubts
+        assert (kept.initial_pose.frame, kept.initial_pose.source) == (BEGUN.frame, BEGUN.source)
+
+
+def test_a_run_goes_on_with_what_was_made_again(monkeypatch):
+    made = []
+    new_setup = lambda clip, background, bodies, *_: made.append((Setup.__new__(Setup), bodies)) or made[-1][0]
+    monkeypatch.setattr(run, "tracking_setup", new_setup)
+    other = replace(SURE, bodies=(replace(DOG, name="other"),))
+    begun = replace(BEGUN, frame=0)
+    going = tiny_run(actors=DOUBTFUL, initial_pose=begun)
+    assert going.setup is going.first_setup
+    going.records["remade"] = RemadeActors()
+    assert going.actors is DOUBTFUL
+    assert going.initial_pose is begun
+    going.records["remade"] = RemadeActors(other, BEGUN)
+    assert going.actors is other
+    assert going.initial_pose is BEGUN
+    assert going.setup is going.first_setup is made[-1][0]
+    assert [bodies for _, bodies in made] == [DOUBTFUL.bodies, other.bodies]
+
+
+def test_actors_are_made_again_once_more_of_the_background_is_known():
+    wanted = next(each for each in passes.PASSES if each.name == "remade").wanted
+    going = tiny_run("actor=null", actors=DOUBTFUL)
+    assert not wanted(going)
+    going.records["relearnt"] = RelearntBackground(None)
+    assert not wanted(going)
+    going.records["relearnt"] = RelearntBackground(NOTHING, NOTHING)
+    assert wanted(going)
