@@ -1,6 +1,12 @@
 """A recording of which no actor can be made: what was tried by itself is said, and every other way, easiest first."""
 
+from dataclasses import replace
+from pathlib import Path
+
 from command_line import refused, trackable
+from rig_cases import recording_of, ring_rig
+
+from sogjax.run.example_frames import _ways
 
 
 def test_every_way_to_an_actor_is_named(capsys, tmp_path):
@@ -10,3 +16,15 @@ def test_every_way_to_an_actor_is_named(capsys, tmp_path):
     places = [sentence.rindex(way) for way in ways]
     assert places == sorted(places)
     assert not (tmp_path / "actor.yaml").exists()
+
+
+def test_only_cameras_without_a_picture_of_the_empty_scene_learn_theirs():
+    recording = recording_of(ring_rig(3), 4)
+    one, *others = recording.rig.names
+    said = _ways(replace(recording, background={one: Path("a.jpg")}))
+    assert f"the background of {', '.join(others)} is learnt" in said
+    assert f"pictures of the empty scene of {', '.join(others)} (background/" in said
+    assert "background is learnt" in _ways(recording)
+    assert "background" not in _ways(
+        replace(recording, background={name: Path("a.jpg") for name in recording.rig.names})
+    )

@@ -8,8 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from sogjax.check.agreement import Misfit, MomentHull, camera_misfits, hulls_of, mean_coverage
-from sogjax.check.findings import Finding, listed
+from sogjax.check.findings import Finding
 from sogjax.check.pictures import Moment
+from sogjax.errors import listed
 from sogjax.io.calibration.rig import CameraRig
 
 FEWEST_TO_TELL = 4

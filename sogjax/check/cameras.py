@@ -6,8 +6,8 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Float
 
-from sogjax.check.findings import Finding, listed
-from sogjax.errors import counted
+from sogjax.check.findings import Finding
+from sogjax.errors import counted, listed
 from sogjax.io.calibration.rig import CameraRig
 from sogjax.model.rotation import UP_AXES, axis_vector
 from sogjax.scene.visual_hull import nearest_point

@@ -41,9 +41,3 @@ class Finding:
 def worst_first(findings: Iterable[Finding]) -> list[Finding]:
     """The findings by severity, those of equal severity in their order."""
     return sorted(findings, key=lambda finding: -SEVERITIES.index(finding.severity))
-
-
-def listed(names: Iterable[str], most: int = 6) -> str:
-    """Names for a sentence, shortened if there are many."""
-    names = list(names)
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

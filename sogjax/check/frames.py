@@ -8,10 +8,10 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Float
 
-from sogjax.check.findings import Finding, listed
+from sogjax.check.findings import Finding
 from sogjax.check.pictures import Clip
 from sogjax.check.synchronisation import Jump
-from sogjax.errors import counted
+from sogjax.errors import counted, listed
 from sogjax.io.recording import Recording
 from sogjax.io.source import SourceInfo, look_at_source
 

@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from sogjax.check.findings import Finding, listed
+from sogjax.check.findings import Finding
 from sogjax.check.pictures import Clip, Picture
-from sogjax.errors import InputError, counted
+from sogjax.errors import InputError, counted, listed
 from sogjax.io.keypoints.load import Keypoints, load_keypoints
 from sogjax.io.recording import Recording
 from sogjax.scene.background_difference import same_exposure

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from sogjax.check.findings import Finding, listed
+from sogjax.check.findings import Finding
 from sogjax.check.motion import PairCodes, lag_curve
-from sogjax.errors import counted
+from sogjax.errors import counted, listed
 
 FEWEST_STEPS = 8
 """Steps from a frame to the next without which offsets are not looked for."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from sogjax.actor.frame_choice import SeenShape, seen_shape, spread_choice, subject_cubes
 from sogjax.actor.make import subjects_of
-from sogjax.errors import InputError, counted
+from sogjax.errors import InputError, counted, listed
 from sogjax.io.example_poses import ExamplePose, frame_name
 from sogjax.io.recording import Recording
 from sogjax.model.rotation import axis_vector
@@ -30,7 +30,6 @@ from sogjax.scene.background import BackgroundImage
 NUM_TRIED, NUM_EXAMPLES = 8, 5
 """Frames in which the pose is looked for, and those of them that the actor is made of."""
 FEWEST_EXAMPLES = 2
-PLATES_FIRST = "pictures of the empty scene (background/CAMERA.jpg); "
 OTHER_WAYS = (
     "frames of your choice (`example_poses: [0, 150]` in recording.yaml); pictures of clear poses with masks "
     "(example_poses/POSE/CAMERA.jpg, CAMERA.mask.png); an actor file (actor=FILE)"
@@ -170,9 +169,12 @@ def _ways(recording: Recording) -> str:
     """What is done by itself where a recording has no example poses, and what else can be done."""
     if has_plates(recording):
         return f"Without example poses, frames of the videos are taken as such. Other ways: {OTHER_WAYS}"
+    without = listed([name for name in recording.rig.names if name not in recording.background])
+    whose = f" of {without}" if recording.background else ""
     return (
-        "Without example poses, the background is learnt from the videos, and frames of them are taken as example "
-        f"poses. Other ways, the easiest first: {PLATES_FIRST}{OTHER_WAYS}"
+        f"Without example poses, the background{whose} is learnt from the videos, and frames of them are taken as "
+        f"example poses. Other ways, the easiest first: pictures of the empty scene{whose} (background/CAMERA.jpg); "
+        f"{OTHER_WAYS}"
     )
 
 
