@@ -12,6 +12,12 @@ from sogjax.io.actor_file import load_body
 from sogjax.io.calibration.tables import write_toml
 from sogjax.io.ground_truth import GroundTruth, load_ground_truth, save_ground_truth
 from sogjax.io.motion import load_motion
+from sogjax.io.recording import open_recording
+from sogjax.run.background import Background
+from sogjax.run.clip_search import ClipSearch
+from sogjax.run.initial_pose import ELSEWHERE
+from sogjax.run.track import opened_clip
+from sogjax.settings.compose import track_config
 
 FRAMES = 12
 HEIGHT = 1.1
@@ -64,3 +70,13 @@ def test_a_dog_is_tracked_by_the_commands_from_files_alone(recording, tmp_path, 
     assert np.linalg.norm(found - truth.markers, axis=-1).mean() < 0.04
     text, _ = done(capsys, "evaluate", f"motion={out}/motion.npz", f"truth={recording}/ground_truth.npz")
     assert "all markers" in text
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("off", "warned"), [(0.1, False), (1.6, True)])
+def test_a_rough_pose_beside_the_dog_is_doubted_at_once(recording, off, warned):
+    dog = in_colors(shipped("dog"))
+    clip = opened_clip(open_recording(recording), track_config((), recording="r"))
+    search = ClipSearch(clip, Background(None), [dog], track_config((), recording="r"))
+    (away,) = search.away(0, [np.asarray(moved(dog, trotting(dog, 0), {"root_x": off}))])
+    assert (away > ELSEWHERE) == warned

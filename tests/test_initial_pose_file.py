@@ -1,9 +1,13 @@
 """Rough poses are read in both their forms, for one actor and for several."""
 
+import numpy as np
 import pytest
+from run_cases import pose_request
 
 from sogjax.errors import InputError
 from sogjax.io.pose_description import PoseDescription, load_initial_poses
+from sogjax.run.clip_search import ClipSearch
+from sogjax.run.initial_pose import from_file
 
 
 @pytest.fixture
@@ -66,3 +70,19 @@ def test_poses_of_others_are_left_out(tmp_path):
     poses = load_initial_poses(path, ["Ann"])
     assert set(poses) == {"Ann"}
     assert poses["Ann"].heading == 3.0
+
+
+@pytest.mark.parametrize(
+    ("away", "words"), [(0.3, None), (2.5, "the nearest place is 2.5 m away"), (np.inf, "nothing in the pictures does")]
+)
+def test_a_pose_where_nothing_looks_like_its_actor_is_doubted(tmp_path, monkeypatch, capsys, away, words):
+    asked = []
+    monkeypatch.setattr(ClipSearch, "away", lambda search, frame, poses: asked.append((frame, len(poses))) or [away])
+    path = tmp_path / "pose.yaml"
+    path.write_text("pose: rest\nposition: [0, 0, 0.5]\n")
+    found = from_file(pose_request(f"initial_pose={path}"))
+    assert found.frame == 0
+    assert asked == [(0, 1)]
+    said = capsys.readouterr()
+    assert ("warning" in said.out + said.err) == (words is not None)
+    assert words is None or f"{path} puts the body ({words})" in said.out + said.err

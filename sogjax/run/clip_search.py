@@ -22,7 +22,7 @@ from sogjax.run.terminal import alive, say
 from sogjax.search import found_pose
 from sogjax.search.found_pose import FoundPose, agreements
 from sogjax.search.joint_search import search_poses
-from sogjax.search.placed_body import centred
+from sogjax.search.placed_body import centred, centres_of
 from sogjax.search.places import Place, places
 from sogjax.search.pose_search import PoseSearch, Report, Told, unreported, untold
 from sogjax.search.seen_frame import SeenFrame
@@ -169,6 +169,20 @@ class ClipSearch:
         centres = np.stack([found[0].centre for found in best])
         between = np.linalg.norm(centres[:, None] - centres[None], axis=-1) + np.diag(np.full(len(best), np.inf))
         return min(found[0].score for found in best) * min(float(between.min()) / ROOM, 1.0)
+
+    def away(self, frame: int, poses: Sequence[Float[np.ndarray, "_dof"]]) -> list[float]:
+        """How far (metres) each body, in a pose, is from the nearest place where something looks like it.
+
+        Infinite where nothing does.
+        """
+        seen = next(iter(self.clip.frames(frame, frame + 1)))
+        found = [places(self._seen(searcher, seen), searcher.up, NUM_GLANCED) for searcher in self._searchers]
+        middles = [centres_of(body, pose[None])[0] for body, pose in zip(self.bodies, poses, strict=True)]
+        off = lambda middle, place: float(np.linalg.norm(place.centre - middle))
+        return [
+            min((off(middle, p) for p in of_body), default=np.inf)
+            for middle, of_body in zip(middles, found, strict=True)
+        ]
 
     def found_in(self, frame: int) -> list[FoundPose]:
         """The best poses in a frame, sure or not.

@@ -27,6 +27,8 @@ from sogjax.settings.run import TrackConfig
 NAMES = ("auto",)
 """Values of the setting `initial_pose` that name no file, but what is asked instead of files and keypoints."""
 FILE = "initial_pose.npz"
+ELSEWHERE = 1.0
+"""Metres between a rough pose and what looks like the actor from which on it is doubted."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +120,22 @@ def from_file(request: PoseRequest) -> InitialPose | None:
     if frame > 0:
         say(f"warning: the rough pose of {pose_file(recording, request.config)} is used for frame {frame}")
     pairs = zip(request.bodies, descriptions, strict=True)
-    return InitialPose.of_actors(frame, [described_pose(body, each, recording.up) for body, each in pairs], "file")
+    poses = [described_pose(body, each, recording.up) for body, each in pairs]
+    _say_who_is_elsewhere(request, frame, poses)
+    return InitialPose.of_actors(frame, poses, "file")
+
+
+def _say_who_is_elsewhere(request: PoseRequest, frame: int, poses: Sequence[Float[Array, "_dof"]]) -> None:
+    """Warn of actors whose pose is where nothing looks like them."""
+    search = ClipSearch(request.clip, request.background, request.bodies, request.config, request.terms)
+    for body, away in zip(request.bodies, search.away(frame, [np.asarray(pose) for pose in poses]), strict=True):
+        if away > ELSEWHERE:
+            nearest = "nothing in the pictures does" if np.isinf(away) else f"the nearest place is {away:.1f} m away"
+            say(
+                f"warning: nothing that looks like {body.name} is seen in frame {frame} where "
+                f"{pose_file(request.clip.recording, request.config)} puts the body ({nearest}); if the pose is "
+                "another recording's or another actor's, correct it, or leave it out with initial_pose=auto"
+            )
 
 
 def from_example_frames(request: PoseRequest) -> InitialPose | None:
