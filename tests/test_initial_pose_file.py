@@ -7,7 +7,7 @@ from run_cases import pose_request
 from sogjax.errors import InputError
 from sogjax.io.pose_description import PoseDescription, load_initial_poses
 from sogjax.run.clip_search import ClipSearch
-from sogjax.run.initial_pose import from_file
+from sogjax.run.initial_pose import from_file, say_who_is_elsewhere
 
 
 @pytest.fixture
@@ -73,16 +73,23 @@ def test_poses_of_others_are_left_out(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("away", "words"), [(0.3, None), (2.5, "the nearest place is 2.5 m away"), (np.inf, "nothing in the pictures does")]
+    ("away", "words"),
+    [
+        (0.3, None),
+        (2.5, "the nearest place that does is 2.5 m away"),
+        (np.inf, "nothing in the pictures looks like it"),
+    ],
 )
 def test_a_pose_where_nothing_looks_like_its_actor_is_doubted(tmp_path, monkeypatch, capsys, away, words):
     asked = []
     monkeypatch.setattr(ClipSearch, "away", lambda search, frame, poses: asked.append((frame, len(poses))) or [away])
     path = tmp_path / "pose.yaml"
     path.write_text("pose: rest\nposition: [0, 0, 0.5]\n")
-    found = from_file(pose_request(f"initial_pose={path}"))
-    assert found.frame == 0
+    request = pose_request(f"initial_pose={path}")
+    found = from_file(request)
+    assert not asked
+    say_who_is_elsewhere(request, found)
     assert asked == [(0, 1)]
     said = capsys.readouterr()
     assert ("warning" in said.out + said.err) == (words is not None)
-    assert words is None or f"{path} puts the body ({words})" in said.out + said.err
+    assert words is None or f"{path} puts dog where nothing looks like it in frame 0 ({words})" in said.out + said.err

@@ -106,6 +106,7 @@ def test_advice_is_neither_followed_already_nor_refused_in_turn():
     assert "empty scene" in too_few_apart(2, [0, 0])
     assert "empty scene" not in too_few_apart(2, [0, 0], plates=True)
     assert "give actors=3" in too_few_apart(2, [3, 3, 3, 2])
+    assert "give actors" not in too_few_apart(2, [1, 1, 1, 2, 2])  # who pass are seen as one
     assert "give actors" not in too_few_apart(2, [3, 3, 1, 1, 2])
 
 

@@ -45,20 +45,27 @@ def test_doubtful_actors_gain_where_a_background_tells_their_masks(request_, fir
     assert may_gain(request_, first) == expected
 
 
-def remade(monkeypatch, made, first=DOUBTFUL):
+def raised(value):
+    """The value, unless it is an error."""
+    if isinstance(value, InputError):
+        raise value
+    return value
+
+
+def remade(monkeypatch, made, begin=BEGUN):
     """What comes of actors that are made as `made`, or that error; what is reported, and whose pose is asked for."""
     reported, asked, begun = [], [], []
 
     def new(request, report):
         asked.append(request.background())
-        if isinstance(made, InputError):
-            raise made
-        report([made])
+        report([raised(made)])
         return made
 
     monkeypatch.setattr(remake_actors, "new_actors", new)
-    monkeypatch.setattr(remake_actors, "find_initial_pose", lambda request, _: begun.append(request.actors) or BEGUN)
-    found = remake_actors.remake_actors(request_of(), first, NOTHING, pose_request(), (), reported.extend)
+    monkeypatch.setattr(
+        remake_actors, "find_initial_pose", lambda request, _: begun.append(request.actors) or raised(begin)
+    )
+    found = remake_actors.remake_actors(request_of(), DOUBTFUL, NOTHING, pose_request(), (), reported.extend)
     assert asked[0] is NOTHING
     return found, reported, begun
 
@@ -70,9 +77,16 @@ def test_tracking_begins_anew_with_actors_that_are_no_more_doubtful(monkeypatch,
     assert found.initial_pose is BEGUN
 
 
-@pytest.mark.parametrize("made", [Actors((DOG, DOG), doubts=("one", "two")), InputError("nobody is seen")])
-def test_the_first_actors_hold_where_others_are_worse_or_none(monkeypatch, made):
-    found, reported, _ = remade(monkeypatch, made)
+@pytest.mark.parametrize(
+    ("made", "begin"),
+    [
+        (Actors((DOG, DOG), doubts=("one", "two")), BEGUN),
+        (InputError("nobody is seen"), BEGUN),
+        (SURE, InputError("nothing like dog is seen")),
+    ],
+)
+def test_the_first_actors_hold_where_others_are_worse_or_none(monkeypatch, made, begin):
+    found, reported, _ = remade(monkeypatch, made, begin)
     assert found.actors is found.initial_pose is None
     assert not reported
 
@@ -82,6 +96,8 @@ def test_what_was_made_again_is_kept(tmp_path, record):
     assert RemadeActors.load(tmp_path) is None
     record.save(tmp_path)
     kept = RemadeActors.load(tmp_path)
+    (tmp_path / remake_actors.FOLDER / remake_actors.LAST).unlink()
+    assert RemadeActors.load(tmp_path) is None  # it was stopped before all was kept
     assert (kept.actors is None) == (record.actors is None)
     if record.actors is not None:
         assert kept.actors.doubts == SURE.doubts
@@ -114,3 +130,17 @@ def test_actors_are_made_again_once_more_of_the_background_is_known():
     assert not wanted(going)
     going.records["relearnt"] = RelearntBackground(NOTHING, NOTHING)
     assert wanted(going)
+    going.pose_sources = (lambda request: BEGUN,)
+    assert not wanted(going)
+
+
+def test_what_is_known_is_learnt_again_or_was_known_before():
+    camera = BackgroundImage.nothing(4, 2)
+    left, right = np.zeros((2, 2, 4), bool)
+    left[:, :2], right[:, 1:] = True, True
+    before = replace(camera, known=left, picture=np.full_like(camera.picture, 10))
+    again = replace(camera, known=right, picture=np.full_like(camera.picture, 20))
+    (whole,) = RelearntBackground(Background((again,)), Background((before,))).whole.required()
+    assert whole.known.all()
+    assert whole.picture[0, :, 0].tolist() == [10, 20, 20, 20]
+    assert RelearntBackground(None).whole is None

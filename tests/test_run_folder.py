@@ -4,7 +4,9 @@ import json
 import subprocess
 import sys
 
+import numpy as np
 import pytest
+from body_cases import shipped
 from command_line import actor_file, done, refused, trackable
 from motion_cases import walking_motion
 from small_recording import snapshot
@@ -12,6 +14,11 @@ from small_recording import snapshot
 from sogjax.errors import InputError
 from sogjax.io.motion import load_motion
 from sogjax.io.motion_data import save_motion
+from sogjax.run.actors import Actors
+from sogjax.run.background import Background
+from sogjax.run.initial_pose import InitialPose
+from sogjax.run.relearn_background import RelearntBackground
+from sogjax.run.remake_actors import RemadeActors
 from sogjax.run.run_files import NOTE
 from sogjax.run.run_folder import LOCK, run_folder
 
@@ -192,6 +199,26 @@ def test_a_note_that_names_what_is_no_result_removes_nothing(tmp_path, name):
         folder.begin("track", {})
     assert (tmp_path / "work" / "precious.txt").read_text() == "keep"
     assert (out / "clips" / "left.mp4").is_file()
+
+
+@pytest.mark.parametrize(
+    "record",
+    [
+        Actors((shipped("dog"),)),
+        InitialPose(0, np.zeros(3, np.float32), "given"),
+        Background(None),
+        RelearntBackground(None),
+        RemadeActors(),
+    ],
+)
+def test_a_run_that_begins_anew_finds_no_record_of_an_earlier_one(tmp_path, record):
+    with run_folder(tmp_path / "run") as folder:
+        folder.begin("track", {"of": "one"})
+        record.save(folder.kept)
+        assert type(record).load(folder.kept) is not None
+    with run_folder(tmp_path / "run", overwrite=True) as folder:
+        folder.begin("track", {"of": "another"})
+        assert type(record).load(folder.kept) is None
 
 
 def test_folders_of_the_user_inside_of_an_unfinished_run_stay(tmp_path):

@@ -32,8 +32,8 @@ AROUND = 2
 LEAST_LEFT = 0.2
 """Share of somebody's silhouettes, the median of the cameras, that others must leave in one for it to tell."""
 LEAST_GAINS = 0.15, 0.05
-"""Part of its mismatch by which another way to see somebody must be better in each round: trunks that were found first
-keep their limbs, until others are there to compare."""
+"""Part of its mismatch by which another way to see somebody must be better in each round: much at first, as limbs that
+are found anew are not always better; less once poses of the other examples are the starts."""
 LEAST_FIT = 1e-3
 """Of a way to see somebody, where he covers less than nothing of what is left of masks."""
 FEWEST_CAMERAS = 2
@@ -107,9 +107,9 @@ class People:
     ) -> list[PoseAndMiss]:
         """The pose of one of them in an example, its limbs found, given those of the others; or ways to see it.
 
-        These are looked for where the vertical is given as `up`: in the first turn all around it, then from its poses
-        in the other examples. `posed` are its own pictures, if it is made of them, or those of everybody; each `turn`
-        draws other ways to hold limbs. The mismatch of a single pose is not computed, but 0.
+        Where `up` names the vertical, other ways are looked for, too: in the first turn all around it, then from its
+        poses in the other examples. `posed` are its own pictures, if it is made of them, or those of everybody; each
+        `turn` draws other ways to hold limbs. The mismatch of a single pose is not computed, but 0.
         """
         now = [of_actor[posed.name] for of_actor in poses]
         left = self.left_by_others(k, posed, now)
@@ -122,7 +122,7 @@ class People:
         return [(with_limbs_found(self.everybody, k, *search), 0.0)]
 
     def _starts(self, k: int, example: str, poses: Poses, turn: int, up: str) -> list[Float[np.ndarray, "dof"]]:
-        """From where somebody is climbed in an example pose."""
+        """The poses that a climb begins with, beside the present one."""
         if turn == 0:
             return upright_all_round(self.made[k].upright_body, up)
         return [poses[name] for name in self.shown if name != example]

@@ -23,7 +23,7 @@ from sogjax.search import found_pose
 from sogjax.search.found_pose import FoundPose, agreements
 from sogjax.search.joint_search import search_poses
 from sogjax.search.placed_body import centred, centres_of
-from sogjax.search.places import Place, places
+from sogjax.search.places import Place, is_looked_at, places
 from sogjax.search.pose_search import PoseSearch, Report, Told, unreported, untold
 from sogjax.search.seen_frame import SeenFrame
 from sogjax.settings.run import TrackConfig
@@ -37,6 +37,8 @@ MOST_TRIED = 2
 """Frames that are searched, each with the one that is to agree with it, before the likeliest is taken."""
 NUM_GLANCED = 6
 """Frames spread over the clip, of which that is searched next in which the actors are seen best."""
+NUM_PLACES = 12
+"""Places that look most like an actor, of which one is to be near where a file says that he is."""
 ROOM = 1.0
 """Metres between two actors from which on neither is in the other's way."""
 NOTHING_LEFT = 0.1
@@ -173,16 +175,20 @@ class ClipSearch:
     def away(self, frame: int, poses: Sequence[Float[np.ndarray, "_dof"]]) -> list[float]:
         """How far (metres) each body, in a pose, is from the nearest place where something looks like it.
 
-        Infinite where nothing does.
+        Infinite where nothing does; 0 where no places are looked for.
         """
-        seen = next(iter(self.clip.frames(frame, frame + 1)))
-        found = [places(self._seen(searcher, seen), searcher.up, NUM_GLANCED) for searcher in self._searchers]
-        middles = [centres_of(body, pose[None])[0] for body, pose in zip(self.bodies, poses, strict=True)]
-        off = lambda middle, place: float(np.linalg.norm(place.centre - middle))
+        frames = next(iter(self.clip.frames(frame, frame + 1)))
         return [
-            min((off(middle, p) for p in of_body), default=np.inf)
-            for middle, of_body in zip(middles, found, strict=True)
+            self._away(searcher, frames, centres_of(body, pose[None])[0])
+            for searcher, body, pose in zip(self._searchers, self.bodies, poses, strict=True)
         ]
+
+    def _away(self, searcher: PoseSearch, frame: FrameInput, middle: Float[np.ndarray, "3"]) -> float:
+        seen = self._seen(searcher, frame)
+        if not is_looked_at(seen.cameras, searcher.up, middle):
+            return 0.0
+        off = (float(np.linalg.norm(place.centre - middle)) for place in places(seen, searcher.up, NUM_PLACES))
+        return min(off, default=np.inf)
 
     def found_in(self, frame: int) -> list[FoundPose]:
         """The best poses in a frame, sure or not.

@@ -12,7 +12,7 @@ from sogjax.errors import InputError
 from sogjax.io.npz_file import finite_array, read_npz, save_npz, text_array
 from sogjax.io.pose_description import PoseDescription, load_initial_poses
 from sogjax.io.recording import Recording
-from sogjax.model.body import Body
+from sogjax.model.body import Body, dof_slices
 from sogjax.run.actors import Actors
 from sogjax.run.background import Background
 from sogjax.run.clip import Clip
@@ -26,7 +26,7 @@ from sogjax.settings.run import TrackConfig
 
 NAMES = ("auto",)
 """Values of the setting `initial_pose` that name no file, but what is asked instead of files and keypoints."""
-FILE = "initial_pose.npz"
+FILE, FROM_FILE = "initial_pose.npz", "file"
 ELSEWHERE = 1.0
 """Metres between a rough pose and what looks like the actor from which on it is doubted."""
 
@@ -120,22 +120,7 @@ def from_file(request: PoseRequest) -> InitialPose | None:
     if frame > 0:
         say(f"warning: the rough pose of {pose_file(recording, request.config)} is used for frame {frame}")
     pairs = zip(request.bodies, descriptions, strict=True)
-    poses = [described_pose(body, each, recording.up) for body, each in pairs]
-    _say_who_is_elsewhere(request, frame, poses)
-    return InitialPose.of_actors(frame, poses, "file")
-
-
-def _say_who_is_elsewhere(request: PoseRequest, frame: int, poses: Sequence[Float[Array, "_dof"]]) -> None:
-    """Warn of actors whose pose is where nothing looks like them."""
-    search = ClipSearch(request.clip, request.background, request.bodies, request.config, request.terms)
-    for body, away in zip(request.bodies, search.away(frame, [np.asarray(pose) for pose in poses]), strict=True):
-        if away > ELSEWHERE:
-            nearest = "nothing in the pictures does" if np.isinf(away) else f"the nearest place is {away:.1f} m away"
-            say(
-                f"warning: nothing that looks like {body.name} is seen in frame {frame} where "
-                f"{pose_file(request.clip.recording, request.config)} puts the body ({nearest}); if the pose is "
-                "another recording's or another actor's, correct it, or leave it out with initial_pose=auto"
-            )
+    return InitialPose.of_actors(frame, [described_pose(body, each, recording.up) for body, each in pairs], FROM_FILE)
 
 
 def from_example_frames(request: PoseRequest) -> InitialPose | None:
@@ -226,3 +211,21 @@ def searched_poses(request: PoseRequest) -> list[FoundPose]:
     """
     search = ClipSearch(request.clip, request.background, request.bodies, request.config, request.terms)
     return search.found_in(request.clip.numbers[0])
+
+
+def say_who_is_elsewhere(request: PoseRequest, found: InitialPose) -> None:
+    """Warn of actors whose pose, from a file, is where nothing looks like them."""
+    search = ClipSearch(request.clip, request.background, request.bodies, request.config, request.terms)
+    poses = [found.pose[part] for part in dof_slices(request.bodies)]
+    for body, away in zip(request.bodies, search.away(found.frame, poses), strict=True):
+        if away > ELSEWHERE:
+            nearest = (
+                "nothing in the pictures looks like it"
+                if np.isinf(away)
+                else f"the nearest place that does is {away:.1f} m away"
+            )
+            say(
+                f"warning: {pose_file(request.clip.recording, request.config)} puts {body.name} where nothing looks "
+                f"like it in frame {found.frame} ({nearest}); if the pose is another recording's or another actor's, "
+                "correct it, or leave it out with initial_pose=auto"
+            )

@@ -25,7 +25,7 @@ from sogjax.run.clock import (
 )
 from sogjax.run.filter import Filtered, filter_frames
 from sogjax.run.forward import Tracked, kept_rows, track_forward
-from sogjax.run.initial_pose import InitialPose, find_initial_pose
+from sogjax.run.initial_pose import FROM_FILE, InitialPose, find_initial_pose, say_who_is_elsewhere
 from sogjax.run.judge import judged_result
 from sogjax.run.kept_actors import kept_or_made
 from sogjax.run.keypoint_bias import KeypointBias, estimate_keypoint_bias
@@ -35,6 +35,7 @@ from sogjax.run.relearn_background import RelearntBackground, relearn_background
 from sogjax.run.remake_actors import RemadeActors, remake_actors
 from sogjax.run.result_streams import ResultStreams
 from sogjax.run.run import Run
+from sogjax.run.run_files import GUESS
 from sogjax.run.setup import compile_beforehand
 from sogjax.run.terminal import say
 from sogjax.run.write import check_formats, check_pose2sim, write_results
@@ -79,6 +80,8 @@ def _initial_pose(run: Run) -> InitialPose:
         request = replace(run.pose_request, told=with_step if run.takes_steps else None)
         try:
             found = find_initial_pose(request, run.pose_sources)
+            if found.source == FROM_FILE:
+                say_who_is_elsewhere(request, found)
             for each in compiling:
                 each.result()
         except BaseException:
@@ -88,11 +91,13 @@ def _initial_pose(run: Run) -> InitialPose:
 
 
 def _remade(run: Run) -> RemadeActors:
-    """The actors of the background that is known by now."""
-    background = run.records["relearnt"].whole
-    return remake_actors(
-        run.actor_request, run.actors, background, run.pose_request, run.pose_sources, run.report_actors
-    )
+    """The actors of the background that is known by now; what was drawn of a pose of the first ones goes."""
+    background, request = run.records["relearnt"].whole, run.pose_request
+    request = replace(request, picture=None if run.kept is None else GUESS.of(run.kept))
+    found = remake_actors(run.actor_request, run.actors, background, request, run.pose_sources, run.report_actors)
+    if found.actors is not None and run.out is not None:
+        GUESS.of(run.out).unlink(missing_ok=True)
+    return found
 
 
 def _tracked(run: Run) -> Tracked:

@@ -10,13 +10,14 @@ from pathlib import Path
 
 from sogjax.actor.make import MadeActor
 from sogjax.errors import InputError
+from sogjax.io.files import write_json
 from sogjax.run.actors import ActorRequest, Actors, new_actors
 from sogjax.run.background import Background
 from sogjax.run.example_frames import need_background
 from sogjax.run.initial_pose import InitialPose, PoseRequest, PoseSource, find_initial_pose
 from sogjax.run.terminal import say
 
-FOLDER = "remade"
+FOLDER, LAST = "remade", "made.json"
 
 
 @dataclass(frozen=True)
@@ -28,17 +29,18 @@ class RemadeActors:
     """Where tracking begins with these actors."""
 
     def save(self, folder: Path) -> None:
-        """Keep it in a run's folder."""
+        """Keep it in a run's folder; a note comes last."""
         (folder / FOLDER).mkdir(exist_ok=True)
         for record in (self.actors, self.initial_pose):
             if record is not None:
                 record.save(folder / FOLDER)
+        write_json(folder / FOLDER / LAST, {"made": self.actors is not None})
 
     @classmethod
     def load(cls, folder: Path) -> "RemadeActors | None":
-        """What was kept, if it was."""
+        """What was kept, if all of it was."""
         place = folder / FOLDER
-        return cls(Actors.load(place), InitialPose.load(place)) if place.is_dir() else None
+        return cls(Actors.load(place), InitialPose.load(place)) if (place / LAST).is_file() else None
 
 
 def may_gain(request: ActorRequest, first: Actors) -> bool:
@@ -64,7 +66,7 @@ def remake_actors(
         background: that is known by now.
         begin: the initial pose that is wanted.
         sources: of initial poses.
-        report: takes how the actors were made, where they are better.
+        report: takes how the actors were made, where they are taken, that is, no more doubtful.
     """
     doubtful = ", ".join(body.name for body, doubt in zip(first.bodies, first.doubts, strict=True) if doubt)
     say(f"{doubtful}: made again, since more of the background is known now")
@@ -72,10 +74,11 @@ def remake_actors(
     try:
         actors = new_actors(replace(request, background=lambda: background), made.extend)
         if _num_doubtful(actors) > _num_doubtful(first):
+            say("the first actors are kept, since the new ones are more doubtful")
             return RemadeActors()
         begun = find_initial_pose(replace(begin, actors=actors, background=background), sources)
     except InputError as error:
-        say(f"warning: the first actors hold: {error}")
+        say(f"the first actors are kept, since no new ones can be made ({error})")
         return RemadeActors()
     report(made)
     return RemadeActors(actors, begun)

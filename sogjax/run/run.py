@@ -99,10 +99,13 @@ class Run:
 
     @property
     def remakes_actors(self) -> bool:
-        """Whether the actors are doubtful, and more of the background, of which they were made, is known now."""
+        """Whether the actors are doubtful, and more of the background, of which they were made, is known now.
+
+        Not where the initial pose comes from elsewhere, as for members of a sweep: these are to share their actors.
+        """
         relearnt: RelearntBackground | None = self.records.get("relearnt")
         known = relearnt is not None and relearnt.background is not None
-        return known and may_gain(self.actor_request, self.records["actors"])
+        return known and self.pose_sources is SOURCES and may_gain(self.actor_request, self.records["actors"])
 
     @property
     def adjusted(self) -> Adjusted | None:

@@ -72,6 +72,12 @@ def places(frame: SeenFrame, up: str, count: int, among: int = 1) -> list[Place]
     return places_among(grid, spacing, scores, up, count, among)
 
 
+def is_looked_at(cameras: Camera, up: str, point: Float[np.ndarray, "3"]) -> bool:
+    """Whether a point (metres, world) is where places are looked for."""
+    corners = _voxels(cameras, up)[0].reshape(-1, 3)
+    return bool(((corners.min(axis=0) <= point) & (point <= corners.max(axis=0))).all())
+
+
 def places_among(
     grid: Float[np.ndarray, "a b c 3"],
     spacing: float,
