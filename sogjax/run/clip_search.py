@@ -23,7 +23,7 @@ from sogjax.search import found_pose
 from sogjax.search.found_pose import FoundPose, agreements
 from sogjax.search.joint_search import search_poses
 from sogjax.search.placed_body import centred, centres_of
-from sogjax.search.places import Place, is_looked_at, places
+from sogjax.search.places import Place, likeness, places
 from sogjax.search.pose_search import PoseSearch, Report, Told, unreported, untold
 from sogjax.search.seen_frame import SeenFrame
 from sogjax.settings.run import TrackConfig
@@ -173,10 +173,7 @@ class ClipSearch:
         return min(found[0].score for found in best) * min(float(between.min()) / ROOM, 1.0)
 
     def away(self, frame: int, poses: Sequence[Float[np.ndarray, "_dof"]]) -> list[float]:
-        """How far (metres) each body, in a pose, is from the nearest place where something looks like it.
-
-        Infinite where nothing does; 0 where no places are looked for.
-        """
+        """How far (metres) each body, in a pose, is from where something looks like it; infinite where nothing does."""
         frames = next(iter(self.clip.frames(frame, frame + 1)))
         return [
             self._away(searcher, frames, centres_of(body, pose[None])[0])
@@ -185,7 +182,7 @@ class ClipSearch:
 
     def _away(self, searcher: PoseSearch, frame: FrameInput, middle: Float[np.ndarray, "3"]) -> float:
         seen = self._seen(searcher, frame)
-        if not is_looked_at(seen.cameras, searcher.up, middle):
+        if likeness(seen, middle) > 0.0:
             return 0.0
         off = (float(np.linalg.norm(place.centre - middle)) for place in places(seen, searcher.up, NUM_PLACES))
         return min(off, default=np.inf)

@@ -72,10 +72,9 @@ def places(frame: SeenFrame, up: str, count: int, among: int = 1) -> list[Place]
     return places_among(grid, spacing, scores, up, count, among)
 
 
-def is_looked_at(cameras: Camera, up: str, point: Float[np.ndarray, "3"]) -> bool:
-    """Whether a point (metres, world) is where places are looked for."""
-    corners = _voxels(cameras, up)[0].reshape(-1, 3)
-    return bool(((corners.min(axis=0) <= point) & (point <= corners.max(axis=0))).all())
+def likeness(frame: SeenFrame, point: Float[np.ndarray, "3"]) -> float:
+    """How much what is seen at a point (metres, world) looks like the body: mean log odds; -2 where few cameras see."""
+    return float(_voxel_scores(frame, jnp.asarray(point[None], frame.odds.dtype))[0])
 
 
 def places_among(
