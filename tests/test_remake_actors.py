@@ -36,12 +36,14 @@ def request_of(*examples, files=None):
     [
         (request_of(), DOUBTFUL, True),
         (request_of(), SURE, False),
+        (request_of(), Actors((DOG, DOG), doubts=("", "")), True),
+        (request_of(), Actors((DOG, DOG)), False),  # they are given
         (request_of(FRAME), DOUBTFUL, True),
         (request_of(PICTURE), DOUBTFUL, False),  # its mask is given
         (request_of(files=[Path("dog.yaml")]), DOUBTFUL, False),
     ],
 )
-def test_doubtful_actors_gain_where_a_background_tells_their_masks(request_, first, expected):
+def test_doubtful_or_several_actors_gain_where_a_background_tells_their_masks(request_, first, expected):
     assert may_gain(request_, first) == expected
 
 

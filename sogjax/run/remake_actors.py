@@ -1,4 +1,4 @@
-"""Actors that are made again where the first ones are doubtful, once tracking told more of the background.
+"""Actors that are made again once tracking told more of the background: several, or one that is doubtful.
 
 Who hardly leaves his place hides what is behind him, and masks say nothing where the background is unknown: arms are
 found in the wrong places, and take the colours of what is there. Once the body was tracked, most of it is known.
@@ -44,10 +44,13 @@ class RemadeActors:
 
 
 def may_gain(request: ActorRequest, first: Actors) -> bool:
-    """Whether the actors are doubtful, and of masks that a background tells which was learnt."""
+    """Whether the actors are several or doubtful, and made of masks that a background tells which was learnt.
+
+    Of several people more is unknown, and what was wrong is not always noticed. Those that are given have no doubts.
+    """
     recording = request.recording
     of_masks = not recording.example_poses or need_background(recording)
-    return request.files is None and any(first.doubts) and of_masks
+    return request.files is None and (len(first.doubts) > 1 or any(first.doubts)) and of_masks
 
 
 def remake_actors(
@@ -68,8 +71,8 @@ def remake_actors(
         sources: of initial poses.
         report: takes how the actors were made, where they are taken, that is, no more doubtful.
     """
-    doubtful = ", ".join(body.name for body, doubt in zip(first.bodies, first.doubts, strict=True) if doubt)
-    say(f"{doubtful}: made again, since more of the background is known now")
+    names = ", ".join(body.name for body in first.bodies)
+    say(f"{names}: made again, since more of the background is known now")
     made: list[MadeActor] = []
     try:
         actors = new_actors(replace(request, background=lambda: background), made.extend)

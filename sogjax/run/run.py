@@ -99,7 +99,7 @@ class Run:
 
     @property
     def remakes_actors(self) -> bool:
-        """Whether the actors are doubtful, and more of the background, of which they were made, is known now.
+        """Whether more of the background is known now than when the actors were made of it, and they may gain by that.
 
         Not where the initial pose comes from elsewhere, as for members of a sweep: these are to share their actors.
         """
