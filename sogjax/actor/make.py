@@ -81,6 +81,8 @@ class MadeActor:
     """Why the frames that were chosen for it may not suit it, with the remedy."""
     doubt: str | None = None
     """Why its sizes may be wrong, with the remedy."""
+    unlike: str | None = None
+    """Which limbs were not found in the example poses, since left and right show other colours, with the remedy."""
 
     def suitability(self, name: str) -> float:
         """How well the body suits an example pose, 0 to 1.
@@ -201,12 +203,12 @@ class Making:
         pairs = zip(pictures, estimate.poses, strict=True)
         samples = [all_samples(shaped, colored_views(posed, rig, pose)) for posed, pose in pairs]
         found = colors_of(shaped, joined_samples(samples), self.color_space)
-        doubts = [unsuitable]
+        doubts, unlike = [unsuitable], None
         if any(posed.undecided for posed in pictures):
             doubts.append(unseen_limbs(shaped, found.shown, pictures))
         if self.best is not None:
             agreed = agreed_samples(shaped, samples, found.colors)
-            doubts.append(unlike_sides(shaped, found.colors, agreed.unlike, pictures))
+            unlike = unlike_sides(shaped, found.colors, agreed.unlike, pictures)
             found = colors_of(shaped, agreed.samples, self.color_space)
         actor = replace(colored(shaped, found.colors), name=self.subject or self.start.name)
         explained = explained_examples(actor, list(estimate.poses), pictures, rig)
@@ -227,6 +229,7 @@ class Making:
             explained=dict(zip(names, explained, strict=True)),
             unsuitable=unsuitable,
             doubt="; ".join(said for said in doubts if said is not None) or None,
+            unlike=unlike,
         )
 
 

@@ -60,6 +60,8 @@ class Actors:
     known_frames: tuple[KnownFrame, ...] = ()
     doubts: tuple[str, ...] = ()
     """Why each may be of the wrong sizes; "" where nothing says so. None at all: nothing does."""
+    unlike: tuple[str, ...] = ()
+    """Which limbs of each were not found in the example poses; "" and none at all as for `doubts`."""
 
     def save(self, folder: Path) -> None:
         """Keep them exactly in a run's folder; actor files hold rounded colours."""
@@ -69,7 +71,8 @@ class Actors:
             arrays |= {f"{k}_{n}": np.asarray(leaf) for n, leaf in enumerate(jax.tree.leaves(body))}
         for k, known in enumerate(self.known_frames):
             arrays |= {f"known_{k}": known.pose, f"where_{k}": np.array([known.frame, known.agreement])}
-        arrays |= {f"doubt_{k}": np.array(doubt) for k, doubt in enumerate(self.doubts)}
+        for kind, sentences in (("doubt", self.doubts), ("unlike", self.unlike)):
+            arrays |= {f"{kind}_{k}": np.array(sentence) for k, sentence in enumerate(sentences)}
         save_npz(folder / FILE, arrays)
 
     @classmethod
@@ -87,11 +90,13 @@ class Actors:
             leaves, structure = jax.tree.flatten(load_body(path))
             kept = [_leaf(file, exact.get(f"{len(bodies)}_{n}"), leaf) for n, leaf in enumerate(leaves)]
             bodies.append(jax.tree.unflatten(structure, kept))
-        doubts = [str(text_array(file, exact, name, ())) for k in range(len(bodies)) if (name := f"doubt_{k}") in exact]
+        said = lambda kind: tuple(
+            str(text_array(file, exact, name, ())) for k in range(len(bodies)) if (name := f"{kind}_{k}") in exact
+        )
         known = []
         for k in count():
             if f"known_{k}" not in exact:
-                return cls(tuple(bodies), tuple(known), tuple(doubts))
+                return cls(tuple(bodies), tuple(known), said("doubt"), said("unlike"))
             frame, agreement = exact[f"where_{k}"].tolist()
             known.append(KnownFrame(int(frame), exact[f"known_{k}"], agreement))
         raise AssertionError
@@ -182,11 +187,16 @@ def new_actors(request: ActorRequest, report: Report = lambda _: None) -> Actors
         if (actor := _of_keypoints(request, str(error))) is None:
             raise
         return Actors((actor,))
-    doubts = tuple(actor.doubt or "" for actor in made)
-    if any(doubts) and (actor := _of_keypoints(request, "; ".join(doubts))) is not None:
+    doubts, unlike = (tuple(said or "" for said in sentences) for sentences in zip(*map(_doubts, made), strict=True))
+    reasons = "; ".join(filter(None, (*doubts, *unlike)))
+    if reasons and (actor := _of_keypoints(request, reasons)) is not None:
         return Actors((actor,))
     report(made)
-    return Actors(tuple(actor.body for actor in made), known_frames(made), doubts)
+    return Actors(tuple(actor.body for actor in made), known_frames(made), doubts, unlike)
+
+
+def _doubts(actor: MadeActor) -> tuple[str | None, str | None]:
+    return actor.doubt, actor.unlike
 
 
 def _of_files(request: ActorRequest, files: Sequence[Path]) -> Actors:
@@ -226,8 +236,8 @@ def actors_of_pictures(request: ActorRequest) -> list[MadeActor]:
     if shared is not None:
         made = made_together(makings, made, _of_everybody(recording, made, learnt, shared))
     for making, actor in zip(makings, made, strict=True):
-        if actor.doubt is not None:
-            making.report(f"warning: {actor.doubt}")
+        for said in filter(None, _doubts(actor)):
+            making.report(f"warning: {said}")
     return made
 
 

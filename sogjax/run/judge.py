@@ -18,6 +18,8 @@ from sogjax.quality.limb_warnings import limits_of
 from sogjax.quality.passages import passages
 from sogjax.quality.proportions import odd_sentence
 from sogjax.quality.verdict import NUM_WORST, Verdict, expected_of, verdicts
+from sogjax.run.clip_sides import colors_apart, unlike_sides
+from sogjax.run.recordings import upright
 from sogjax.run.result import RunResult
 from sogjax.run.run import Run
 from sogjax.run.run_files import PAGE, WORST
@@ -30,7 +32,9 @@ def judged_result(run: Run) -> RunResult:
     result = run.result_so_far
     limits = {body.name: limits_of(body) for body in result.bodies}
     doubts = dict(zip((body.name for body in run.actors.bodies), run.actors.doubts, strict=False))
-    odd = {body.name: [said for said in (doubts.get(body.name), odd_sentence(body)) if said] for body in result.bodies}
+    sides = _sides(run, result)
+    told = lambda body: (doubts.get(body.name), odd_sentence(body), sides.get(body.name))
+    odd = {body.name: [said for said in told(body) if said] for body in result.bodies}
     moved = {body.name: (body, result.motions[body.name]) for body in result.bodies}
     limbs = {name: [*jumps(*of_body), *passages(*of_body)] for name, of_body in moved.items()}
     return replace(
@@ -38,6 +42,23 @@ def judged_result(run: Run) -> RunResult:
         evaluation=compared(result.recording, result.motions),
         verdicts=verdicts(result.motions, expected_of(result.bodies), limits, _doubtful_begin(run), odd, limbs),
     )
+
+
+def _sides(run: Run, result: RunResult) -> dict[str, str | None]:
+    """Which limbs of actors whose limbs were found in frames that nobody chose are of other colours in the motion.
+
+    Nothing where the videos cannot be read once more, which is said.
+    """
+    if not run.actors.unlike or run.clip.recording.example_poses:
+        return {}
+    recording = result.recording
+    actors = {body.name: (upright(body, recording), result.motions[body.name]) for body in result.bodies}
+    try:
+        apart = colors_apart(recording, actors, run.actor_request.color_space)
+    except InputError as error:
+        say(f"warning: the colours of left and right are not compared: {error}")
+        return {}
+    return {name: unlike_sides(of_actor) for name, of_actor in apart.items()}
 
 
 def _doubtful_begin(run: Run) -> dict[str, str]:

@@ -50,7 +50,7 @@ def may_gain(request: ActorRequest, first: Actors) -> bool:
     """
     recording = request.recording
     of_masks = not recording.example_poses or need_background(recording)
-    return request.files is None and (len(first.doubts) > 1 or any(first.doubts)) and of_masks
+    return request.files is None and (len(first.doubts) > 1 or _num_doubtful(first) > 0) and of_masks
 
 
 def remake_actors(
@@ -88,4 +88,4 @@ def remake_actors(
 
 
 def _num_doubtful(actors: Actors) -> int:
-    return sum(map(bool, actors.doubts))
+    return sum(map(bool, (*actors.doubts, *actors.unlike)))

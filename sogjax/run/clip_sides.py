@@ -1,0 +1,65 @@
+"""Whether limbs show the colours of their counterparts where they were tracked: what is lost lies on something else.
+
+A limb that was not found in the frames that an actor is made of may be found while tracking, or the other way round.
+"""
+
+from collections.abc import Mapping
+
+import jax.numpy as jnp
+import numpy as np
+
+from sogjax.actor.colors import ColoredView, all_samples, colors_of
+from sogjax.actor.limb_colors import limb_pairs_alike
+from sogjax.io.motion import Motion
+from sogjax.io.recording import Recording
+from sogjax.io.video import read_chosen
+from sogjax.model.body import Body
+from sogjax.model.camera import camera_of
+from sogjax.model.limbs import limb_names
+
+NUM_LOOKED_AT = 10
+"""Frames, spread over the motion."""
+UNLIKE = 0.11
+"""Mean distance of the blobs' colours (sRGB, 0 to 1) from which on one of a pair is lost. `experiments/clip_sides.py`:
+13 of 21 pairs of arms of which one was lost are beyond, and 2 of 44 others."""
+
+
+def colors_apart(
+    recording: Recording, actors: Mapping[str, tuple[Body, Motion]], color_space: str
+) -> dict[str, dict[str, float]]:
+    """How far the colours of each pair of limbs are apart in a motion, by their names, of each actor.
+
+    Args:
+        recording: that is read.
+        actors: bodies, upright in the recording's world, and their motions.
+        color_space: in which colours are averaged.
+
+    Raises:
+        InputError: a video cannot be read.
+    """
+    frames = next(iter(actors.values()))[1].frame
+    rows = np.unique(np.linspace(0, len(frames) - 1, NUM_LOOKED_AT).astype(int)).tolist()
+    shown = dict(read_chosen(recording, [int(frames[row]) for row in rows]))
+    found: dict[str, dict[str, float]] = {}
+    for name, (body, motion) in actors.items():
+        views = [
+            ColoredView(camera_of(recording.rig.cameras, k), image, None, jnp.asarray(motion.pose[row], jnp.float32))
+            for row in rows
+            for k, image in enumerate(shown[int(frames[row])])
+            if image is not None
+        ]
+        colors, names = colors_of(body, all_samples(body, views), color_space).colors, limb_names(body)
+        found[name] = {" or ".join(names[k] for k in pair.limbs): pair.apart(colors) for pair in limb_pairs_alike(body)}
+    return found
+
+
+def unlike_sides(apart: Mapping[str, float]) -> str | None:
+    """Of which pairs of limbs, by how far their colours are apart, one is lost; None: of none."""
+    said = [f"{names} ({distance:.2f} apart)" for names, distance in apart.items() if distance > UNLIKE]
+    if not said:
+        return None
+    return (
+        f"look at the {', and the '.join(said)}: where they were tracked, left and right show other colours "
+        f"({UNLIKE:g} and less is usual), so one is lost, unless clothes differ; name frames with clear limbs in "
+        "recording.yaml, such as `example_poses: [0, 150]`"
+    )
