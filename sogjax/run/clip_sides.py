@@ -21,7 +21,7 @@ NUM_LOOKED_AT = 10
 """Frames, spread over the motion."""
 UNLIKE = 0.11
 """Mean distance of the blobs' colours (sRGB, 0 to 1) from which on one of a pair is lost. `experiments/clip_sides.py`:
-13 of 21 pairs of arms of which one was lost are beyond, and 2 of 44 others."""
+14 of 23 pairs of arms of which one was lost are beyond, and 3 of 46 others."""
 
 
 def colors_apart(
