@@ -50,7 +50,7 @@ def may_gain(request: ActorRequest, first: Actors) -> bool:
     """
     recording = request.recording
     of_masks = not recording.example_poses or need_background(recording)
-    return request.files is None and (len(first.doubts) > 1 or _num_doubtful(first) > 0) and of_masks
+    return request.files is None and (len(first.doubts) > 1 or any((*first.doubts, *first.unlike))) and of_masks
 
 
 def remake_actors(
@@ -69,15 +69,16 @@ def remake_actors(
         background: that is known by now.
         begin: the initial pose that is wanted.
         sources: of initial poses.
-        report: takes how the actors were made, where they are taken, that is, no more doubtful.
+        report: takes how the actors were made, where they are taken: unless more of them are doubtful. Limbs that were
+            not found do not count: colours tell some, and of the better background more.
     """
     names = ", ".join(body.name for body in first.bodies)
     say(f"{names}: made again, since more of the background is known now")
     made: list[MadeActor] = []
     try:
         actors = new_actors(replace(request, background=lambda: background), made.extend)
-        if _num_doubtful(actors) > _num_doubtful(first):
-            say("the first actors are kept, since the new ones are more doubtful")
+        if sum(map(bool, actors.doubts)) > sum(map(bool, first.doubts)):
+            say("the first actors are kept, since the sizes of the new ones are more doubtful")
             return RemadeActors()
         begun = find_initial_pose(replace(begin, actors=actors, background=background), sources)
     except InputError as error:
@@ -85,7 +86,3 @@ def remake_actors(
         return RemadeActors()
     report(made)
     return RemadeActors(actors, begun)
-
-
-def _num_doubtful(actors: Actors) -> int:
-    return sum(map(bool, (*actors.doubts, *actors.unlike)))
