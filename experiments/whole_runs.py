@@ -210,6 +210,8 @@ ROWS = (
     "talk 2 6 videos 253",
     "sit 1 6 videos 254",
     "pass 2 4 videos 256",
+    "couple 2 6 videos 262",
+    "talk 2 6 videos 264",
 )
 GIVEN = {
     "plates": (SETTINGS, BACKGROUND, EXAMPLE_POSES),

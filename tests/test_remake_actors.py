@@ -18,7 +18,8 @@ from sogjax.run.remake_actors import RemadeActors, may_gain
 from sogjax.run.setup import Setup
 from sogjax.scene.background import BackgroundImage
 
-SURE, DOUBTFUL = Actors((DOG,), doubts=("",)), Actors((DOG,), doubts=("a paw was not found",))
+SURE, DOUBTFUL = Actors((DOG,), doubts=("",)), Actors((DOG,), doubts=("too little is seen",))
+UNLIKE = Actors((DOG,), doubts=("",), unlike=("a paw was not found",))
 BEGUN = InitialPose(3, np.zeros(DOG.skeleton.num_dofs, np.float32), "example frames")
 NOTHING = Background((BackgroundImage.nothing(4, 4),))
 FRAME = ExamplePose("frame_3", None, {}, {}, None, 3)
@@ -35,6 +36,7 @@ def request_of(*examples, files=None):
     ("request_", "first", "expected"),
     [
         (request_of(), DOUBTFUL, True),
+        (request_of(), UNLIKE, True),
         (request_of(), SURE, False),
         (request_of(), Actors((DOG, DOG), doubts=("", "")), True),
         (request_of(), Actors((DOG, DOG)), False),  # they are given
@@ -72,7 +74,7 @@ def remade(monkeypatch, made, begin=BEGUN):
     return found, reported, begun
 
 
-@pytest.mark.parametrize("made", [SURE, DOUBTFUL])
+@pytest.mark.parametrize("made", [SURE, UNLIKE, DOUBTFUL])
 def test_tracking_begins_anew_with_actors_that_are_no_more_doubtful(monkeypatch, made):
     found, reported, begun = remade(monkeypatch, made)
     assert found.actors is begun[0] is reported[0] is made
@@ -93,7 +95,7 @@ def test_the_first_actors_hold_where_others_are_worse_or_none(monkeypatch, made,
     assert not reported
 
 
-@pytest.mark.parametrize("record", [RemadeActors(), RemadeActors(SURE, BEGUN)])
+@pytest.mark.parametrize("record", [RemadeActors(), RemadeActors(UNLIKE, BEGUN)])
 def test_what_was_made_again_is_kept(tmp_path, record):
     assert RemadeActors.load(tmp_path) is None
     record.save(tmp_path)
@@ -102,7 +104,7 @@ def test_what_was_made_again_is_kept(tmp_path, record):
     assert RemadeActors.load(tmp_path) is None  # it was stopped before all was kept
     assert (kept.actors is None) == (record.actors is None)
     if record.actors is not None:
-        assert kept.actors.doubts == SURE.doubts
+            assert (kept.actors.doubts, kept.actors.unlike) == (UNLIKE.doubts, UNLIKE.unlike)
         assert (kept.initial_pose.frame, kept.initial_pose.source) == (BEGUN.frame, BEGUN.source)
 
 
