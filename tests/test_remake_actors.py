@@ -104,7 +104,7 @@ def test_what_was_made_again_is_kept(tmp_path, record):
     assert RemadeActors.load(tmp_path) is None  # it was stopped before all was kept
     assert (kept.actors is None) == (record.actors is None)
     if record.actors is not None:
-            assert (kept.actors.doubts, kept.actors.unlike) == (UNLIKE.doubts, UNLIKE.unlike)
+        assert (kept.actors.doubts, kept.actors.unlike) == (UNLIKE.doubts, UNLIKE.unlike)
         assert (kept.initial_pose.frame, kept.initial_pose.source) == (BEGUN.frame, BEGUN.source)
 
 
