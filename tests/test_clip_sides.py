@@ -53,7 +53,7 @@ def test_an_arm_that_is_not_where_it_is_tracked_shows_something_else(monkeypatch
     assert all(distance < UNLIKE for name, distance in apart.items() if name != arms)
     said = unlike_sides(apart)
     assert (said is not None) == lost
-    assert said is None or f"{arms} ({apart[arms]:.2f} apart)" in said
+    assert said is None or f"{arms} ({apart[arms]:.3f} apart)" in said
 
 
 def judged(monkeypatch, compared, **recording):

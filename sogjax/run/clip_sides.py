@@ -55,7 +55,7 @@ def colors_apart(
 
 def unlike_sides(apart: Mapping[str, float]) -> str | None:
     """Of which pairs of limbs, by how far their colours are apart, one is lost; None: of none."""
-    said = [f"{names} ({distance:.2f} apart)" for names, distance in apart.items() if distance > UNLIKE]
+    said = [f"{names} ({distance:.3f} apart)" for names, distance in apart.items() if distance > UNLIKE]
     if not said:
         return None
     return (
