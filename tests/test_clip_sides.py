@@ -45,6 +45,12 @@ def distances(monkeypatch, tracked):
     return colors_apart(recording_of(RIG, FRAMES), {"a": (body, motion)}, "lab")["a"]
 
 
+@pytest.mark.parametrize(("one", "other", "alike"), [(0.9, 0.5, True), (0.5, 0.5, True), (0.9, [0.5, 0.4, 0.5], False)])
+def test_an_arm_in_the_shade_is_no_other_arm(one, other, alike):
+    skin = np.array([[0.8, 0.6, 0.4]])
+    assert (clip_sides._apart(one * skin, np.array(other) * skin) < UNLIKE) == alike
+
+
 @pytest.mark.parametrize(("tracked", "lost"), [({}, False), ({"left_shoulder_raise": 0.1}, True)])
 def test_an_arm_that_is_not_where_it_is_tracked_shows_something_else(monkeypatch, tracked, lost):
     apart = distances(monkeypatch, tracked)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from sogjax.actor.colors import ColoredView, all_samples, colors_of
 from sogjax.actor.limb_colors import limb_pairs_alike
@@ -19,15 +20,17 @@ from sogjax.model.limbs import limb_names
 
 NUM_LOOKED_AT = 10
 """Frames, spread over the motion."""
-UNLIKE = 0.11
-"""Mean distance of the blobs' colours (sRGB, 0 to 1) from which on one of a pair is lost. `experiments/clip_sides.py`:
-14 of 23 pairs of arms of which one was lost are beyond, and 3 of 46 others."""
+UNLIKE = 0.045
+"""Mean distance of the blobs' colours (sRGB, 0 to 1), equally bright, from which on one of a pair is lost.
+`experiments/clip_sides.py`: 14 of 23 pairs of arms of which one was lost are beyond, and none of 48 others."""
 
 
 def colors_apart(
     recording: Recording, actors: Mapping[str, tuple[Body, Motion]], color_space: str
 ) -> dict[str, dict[str, float]]:
-    """How far the colours of each pair of limbs are apart in a motion, by their names, of each actor.
+    """How far the colours of each pair of limbs are apart in a motion, equally bright, by their names, of each actor.
+
+    A light from one side makes one arm of a real man twice as bright as the other.
 
     Args:
         recording: that is read.
@@ -49,8 +52,18 @@ def colors_apart(
             if image is not None
         ]
         colors, names = colors_of(body, all_samples(body, views), color_space).colors, limb_names(body)
-        found[name] = {" or ".join(names[k] for k in pair.limbs): pair.apart(colors) for pair in limb_pairs_alike(body)}
+        found[name] = {
+            " or ".join(names[k] for k in pair.limbs): _apart(*(colors[blobs] for blobs in pair.blobs))
+            for pair in limb_pairs_alike(body)
+        }
     return found
+
+
+def _apart(one: Float[np.ndarray, "blob 3"], other: Float[np.ndarray, "blob 3"]) -> float:
+    """The mean distance of colours, each pair as bright as its mean."""
+    brightness = [np.maximum(colors.sum(axis=1, keepdims=True), 1e-3) for colors in (one, other)]
+    mean = 0.5 * (brightness[0] + brightness[1])
+    return float(np.linalg.norm(mean * (one / brightness[0] - other / brightness[1]), axis=1).mean())
 
 
 def unlike_sides(apart: Mapping[str, float]) -> str | None:
