@@ -22,7 +22,7 @@ NUM_LOOKED_AT = 10
 """Frames, spread over the motion."""
 UNLIKE = 0.045
 """Mean distance of the blobs' colours (sRGB, 0 to 1), equally bright, from which on one of a pair is lost.
-`experiments/clip_sides.py`: 14 of 23 pairs of arms of which one was lost are beyond, and none of 48 others."""
+`experiments/clip_sides.py`: 14 of 22 pairs of arms of which one was lost are beyond, and none of 45 others."""
 
 
 def colors_apart(
@@ -30,7 +30,7 @@ def colors_apart(
 ) -> dict[str, dict[str, float]]:
     """How far the colours of each pair of limbs are apart in a motion, equally bright, by their names, of each actor.
 
-    A light from one side makes one arm of a real man twice as bright as the other.
+    A light from one side made one arm of a real man half as bright again as the other.
 
     Args:
         recording: that is read.
