@@ -16,7 +16,7 @@ from sogjax.io.example_poses import ExamplePose
 from sogjax.io.motion import motion_from_poses
 from sogjax.run import clip_sides, judge
 from sogjax.run.actors import Actors
-from sogjax.run.clip_sides import UNLIKE, colors_apart, unlike_sides
+from sogjax.run.clip_sides import UNLIKE, colors_apart, unlike_where_tracked
 from sogjax.run.initial_pose import InitialPose
 from sogjax.run.runner import run_passes
 
@@ -57,7 +57,7 @@ def test_an_arm_that_is_not_where_it_is_tracked_shows_something_else(monkeypatch
     arms = next(name for name in apart if "arm" in name)
     assert (apart[arms] > UNLIKE) == lost
     assert all(distance < UNLIKE for name, distance in apart.items() if name != arms)
-    said = unlike_sides(apart)
+    said = unlike_where_tracked(apart)
     assert (said is not None) == lost
     assert said is None or f"{arms} ({apart[arms]:.3f} apart)" in said
 
@@ -75,9 +75,11 @@ def judged(monkeypatch, compared, **recording):
 def test_it_is_a_finding_of_the_verdict(monkeypatch):
     apart = {"left front leg or right front leg": 0.2}
     compared = lambda recording, actors, space: dict.fromkeys(actors, apart)
-    assert unlike_sides(apart) in judged(monkeypatch, compared)
+    assert unlike_where_tracked(apart) in judged(monkeypatch, compared)
     example = ExamplePose("stand", None, {}, {}, None, 0)
-    assert unlike_sides(apart) not in judged(monkeypatch, compared, example_poses=(example,))  # somebody chose it
+    assert unlike_where_tracked(apart) not in judged(
+        monkeypatch, compared, example_poses=(example,)
+    )  # somebody chose it
 
 
 def test_videos_that_cannot_be_read_once_more_end_no_run(monkeypatch, capsys):

@@ -66,7 +66,7 @@ def _apart(one: Float[np.ndarray, "blob 3"], other: Float[np.ndarray, "blob 3"])
     return float(np.linalg.norm(mean * (one / brightness[0] - other / brightness[1]), axis=1).mean())
 
 
-def unlike_sides(apart: Mapping[str, float]) -> str | None:
+def unlike_where_tracked(apart: Mapping[str, float]) -> str | None:
     """Of which pairs of limbs, by how far their colours are apart, one is lost; None: of none."""
     said = [f"{names} ({distance:.3f} apart)" for names, distance in apart.items() if distance > UNLIKE]
     if not said:

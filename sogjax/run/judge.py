@@ -18,7 +18,7 @@ from sogjax.quality.limb_warnings import limits_of
 from sogjax.quality.passages import passages
 from sogjax.quality.proportions import odd_sentence
 from sogjax.quality.verdict import NUM_WORST, Verdict, expected_of, verdicts
-from sogjax.run.clip_sides import colors_apart, unlike_sides
+from sogjax.run.clip_sides import colors_apart, unlike_where_tracked
 from sogjax.run.recordings import upright
 from sogjax.run.result import RunResult
 from sogjax.run.run import Run
@@ -58,7 +58,7 @@ def _sides(run: Run, result: RunResult) -> dict[str, str | None]:
     except InputError as error:
         say(f"warning: the colours of left and right are not compared: {error}")
         return {}
-    return {name: unlike_sides(of_actor) for name, of_actor in apart.items()}
+    return {name: unlike_where_tracked(of_actor) for name, of_actor in apart.items()}
 
 
 def _doubtful_begin(run: Run) -> dict[str, str]:
