@@ -6,7 +6,8 @@ Each calculation takes turns with the reference workload, in one thread, and the
 else the machine does changes both alike, if at all. Where a ratio of the two is more than 20 % above that in
 `small.json`, it is measured again; where it stays, that is said, and the exit status is 1. `renew` writes the file
 anew, as is due after a change that is meant. On another kind of processor than the file's the ratios are printed, and
-nothing fails.
+nothing fails. Machines with processors of one kind differ as well, by 20 % where memory decides: an earlier commit on
+the same machine tells whether the code became slower.
 """
 
 import json
