@@ -213,3 +213,14 @@ def test_a_painted_picture_must_be_one_of_a_camera_and_of_its_size(tmp_path):
     (broken / "occluders" / "left.png").write_bytes(b"no image")
     with pytest.raises(InputError, match=r"left\.png: cannot be read as an image"):
         open_recording(broken)
+
+
+def test_a_painted_picture_that_hides_all_is_said_to_do_so(tmp_path):
+    recording = make_recording(tmp_path / "recording")
+    image = np.full((48, 64), 255, np.uint8)
+    write_image(recording / "occluders" / "left.png", image)
+    with pytest.raises(InputError, match=r"occluders/left\.png: 100% of it is white, so its camera sees nobody; paint"):
+        painted_masks(open_recording(recording))
+    image[20:] = 0
+    write_image(recording / "occluders" / "left.png", image)
+    assert painted_masks(open_recording(recording))[0].any()

@@ -53,7 +53,8 @@ def _size_sentence(body: Body) -> str | None:
     size = odd_size(body)
     if size is None:
         return None
-    masks = "its masks show only a part of somebody" if size < 1.0 else "its masks show more than one person"
+    several = "its masks show more than one person (with actors=2, each gets an actor)"
+    masks = "its masks show only a part of somebody" if size < 1.0 else several
     return (
         f"its bones are {size:.0%} as long as an adult's: if that is not so, {masks}, or the calibration's unit is "
         "wrong; look at the masks in the actor's report, and correct them or give pictures of the empty scene"
