@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from sogjax.actor.colors import ColoredView, all_samples, colors_of
+from sogjax.actor.colors import ColoredView, Samples, all_samples, colors_of, joined_samples
 from sogjax.actor.limb_colors import limb_pairs_alike
 from sogjax.io.motion import Motion
 from sogjax.io.recording import Recording
@@ -23,6 +23,32 @@ NUM_LOOKED_AT = 10
 UNLIKE = 0.045
 """Mean distance of the blobs' colours (sRGB, 0 to 1), equally bright, from which on one of a pair is lost.
 `experiments/clip_sides.py`: 14 of 22 pairs of arms of which one was lost are beyond, and none of 45 others."""
+
+
+def colors_by_frame(recording: Recording, actors: Mapping[str, tuple[Body, Motion]]) -> dict[str, dict[int, Samples]]:
+    """What some frames, by their numbers, show of every blob of each actor, by the actors' names.
+
+    Args:
+        recording: that is read.
+        actors: bodies, upright in the recording's world, and their motions.
+
+    Raises:
+        InputError: a video cannot be read.
+    """
+    frames = next(iter(actors.values()))[1].frame
+    rows = np.unique(np.linspace(0, len(frames) - 1, NUM_LOOKED_AT).astype(int)).tolist()
+    numbers = {row: int(frames[row]) for row in rows}
+    shown = dict(read_chosen(recording, [*numbers.values()]))
+
+    def views(motion: Motion, row: int) -> list[ColoredView]:
+        pose = jnp.asarray(motion.pose[row], jnp.float32)
+        images = enumerate(shown[numbers[row]])
+        return [ColoredView(camera_of(recording.rig.cameras, k), i, None, pose) for k, i in images if i is not None]
+
+    return {
+        name: {number: all_samples(body, views(motion, row)) for row, number in numbers.items()}
+        for name, (body, motion) in actors.items()
+    }
 
 
 def colors_apart(
@@ -40,18 +66,11 @@ def colors_apart(
     Raises:
         InputError: a video cannot be read.
     """
-    frames = next(iter(actors.values()))[1].frame
-    rows = np.unique(np.linspace(0, len(frames) - 1, NUM_LOOKED_AT).astype(int)).tolist()
-    shown = dict(read_chosen(recording, [int(frames[row]) for row in rows]))
     found: dict[str, dict[str, float]] = {}
-    for name, (body, motion) in actors.items():
-        views = [
-            ColoredView(camera_of(recording.rig.cameras, k), image, None, jnp.asarray(motion.pose[row], jnp.float32))
-            for row in rows
-            for k, image in enumerate(shown[int(frames[row])])
-            if image is not None
-        ]
-        colors, names = colors_of(body, all_samples(body, views), color_space).colors, limb_names(body)
+    for name, by_frame in colors_by_frame(recording, actors).items():
+        body = actors[name][0]
+        samples, names = joined_samples([*by_frame.values()]), limb_names(body)
+        colors = colors_of(body, samples, color_space).colors
         found[name] = {
             " or ".join(names[k] for k in pair.limbs): _apart(*(colors[blobs] for blobs in pair.blobs))
             for pair in limb_pairs_alike(body)

@@ -31,6 +31,7 @@ from sogjax.run.kept_actors import kept_or_made
 from sogjax.run.keypoint_bias import KeypointBias, estimate_keypoint_bias
 from sogjax.run.learn_occluders import LearntOccluders, Retracked, learn_occluders, track_again
 from sogjax.run.merge import Merged, merge_backward
+from sogjax.run.recolor_actors import RecoloredActors, recolor_actors
 from sogjax.run.relearn_background import RelearntBackground, relearn_background
 from sogjax.run.remake_actors import RemadeActors, remake_actors
 from sogjax.run.result_streams import ResultStreams
@@ -100,6 +101,11 @@ def _remade(run: Run) -> RemadeActors:
     return found
 
 
+def _recolored(run: Run) -> RecoloredActors:
+    space, both_ways = run.actor_request.color_space, run.config.tracking.both_ways
+    return recolor_actors(run.setup, run.actors, run.initial_pose, run.frames, space, both_ways)
+
+
 def _tracked(run: Run) -> Tracked:
     """The frames, tracked; rows and the files that show them are written as they come."""
     log = rows = streams = None
@@ -166,6 +172,13 @@ PASSES: tuple[Pass, ...] = (
         lambda run: merge_backward(run.setup, run.frames),
         Merged,
         wanted=lambda run: run.tracks and run.config.tracking.both_ways,
+    ),  # which seldom changes frames
+    Pass(
+        "recolored",
+        TRACKING,
+        _recolored,
+        RecoloredActors,
+        wanted=lambda run: run.tracks and run.recolors_actors,
     ),  # which seldom changes frames
     Pass(
         "adjusted",

@@ -23,6 +23,7 @@ from sogjax.run.clock import StageTimes
 from sogjax.run.filter import filter_name
 from sogjax.run.initial_pose import SOURCES, InitialPose, PoseRequest, PoseSource
 from sogjax.run.learn_occluders import LearntOccluders
+from sogjax.run.recolor_actors import RecoloredActors
 from sogjax.run.relearn_background import RelearntBackground
 from sogjax.run.remake_actors import RemadeActors, may_gain
 from sogjax.run.result import RunResult
@@ -86,7 +87,9 @@ class Run:
     @property
     def actors(self) -> Actors:
         """The actors, in their own upright frames."""
-        return self._remade.actors or self.records["actors"]
+        recolored: RecoloredActors | None = self.records.get("recolored")
+        new = None if recolored is None else recolored.actors
+        return new or self._remade.actors or self.records["actors"]
 
     @property
     def initial_pose(self) -> InitialPose:
@@ -106,6 +109,15 @@ class Run:
         relearnt: RelearntBackground | None = self.records.get("relearnt")
         known = relearnt is not None and relearnt.background is not None
         return known and self.pose_sources is SOURCES and may_gain(self.actor_request, self.records["actors"])
+
+    @property
+    def recolors_actors(self) -> bool:
+        """Whether limbs of the actors were not found in the frames that these are made of, which nobody chose.
+
+        Not where the initial pose comes from elsewhere, as for `remakes_actors`.
+        """
+        by_itself = self.pose_sources is SOURCES and not self.clip.recording.example_poses
+        return by_itself and any(self.actors.unlike)
 
     @property
     def adjusted(self) -> Adjusted | None:

@@ -181,7 +181,7 @@ def _check_no_recording(path: Path) -> None:
 
 def _remove_kept(path: Path) -> None:
     """Remove what a run kept; a folder stays if it holds subfolders that are somebody else's."""
-    for known in (FRAMES, "cells", "pictures", "relearnt", "first", "remade", "adjusted"):
+    for known in (FRAMES, "cells", "pictures", "relearnt", "first", "remade", "recolored", "adjusted"):
         if (path / known).is_dir() and not (path / known).is_symlink():
             shutil.rmtree(path / known, ignore_errors=True)
     for file in path.iterdir():

@@ -1,0 +1,135 @@
+"""When the limbs of actors take the colours that they show where they were tracked."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from body_cases import shipped
+from frame_table_cases import frame_table
+from run_cases import DOG, tiny_run
+
+from sogjax.actor.colors import colored
+from sogjax.actor.limb_colors import limb_pairs_alike
+from sogjax.io.example_poses import ExamplePose
+from sogjax.model.limbs import limb_names
+from sogjax.run import passes, recolor_actors
+from sogjax.run.actors import Actors
+from sogjax.run.initial_pose import InitialPose
+from sogjax.run.recolor_actors import RecoloredActors, recolored
+
+HUMAN = shipped("human")
+SKIN, RED, BLUE = np.array([0.8, 0.6, 0.5]), np.array([0.8, 0.1, 0.1]), np.array([0.1, 0.2, 0.7])
+ARMS = next(pair for pair in limb_pairs_alike(HUMAN) if "arm" in limb_names(HUMAN)[pair.limbs[0]])
+FRAMES, POSE = 4, np.zeros((4, DOG.skeleton.num_dofs), np.float32)
+UNLIKE = Actors((DOG,), doubts=("",), unlike=("a paw was not found",))
+BEGUN = InitialPose(1, POSE[1], "example frames")
+
+
+def person(left, right):
+    """Blue, with arms of two colours."""
+    colors = np.tile(BLUE, (HUMAN.num_blobs, 1))
+    for blobs, color in zip(ARMS.blobs, (left, right), strict=True):
+        colors[blobs] = color
+    return colored(HUMAN, colors)
+
+
+def shown(*arms):
+    """What frames show of somebody whose left and right arms have these colours in them."""
+    bodies = [person(*of_frame).blob_colors for of_frame in arms]
+    return {frame: [np.tile(color, (20, 1)) for color in np.asarray(colors)] for frame, colors in enumerate(bodies)}
+
+
+@pytest.mark.parametrize(
+    ("frames", "expected"),
+    [
+        ([(SKIN, SKIN)] * FRAMES, SKIN),  # both were tracked rightly
+        ([(SKIN, SKIN), (SKIN, SKIN), (SKIN, RED), (SKIN, BLUE)], SKIN),  # one was not in every frame
+        ([(SKIN, BLUE)] * FRAMES, None),  # it may be lost everywhere, or its sleeve may be blue
+    ],
+)
+def test_an_arm_that_was_not_found_takes_the_colours_that_it_shows_over_the_clip(frames, expected):
+    body, told = recolored(person(SKIN, RED), shown(*frames), "lab")
+    if expected is None:
+        assert not told
+        np.testing.assert_array_equal(body.blob_colors, person(SKIN, RED).blob_colors)
+        return
+    assert told == "left arm and right arm"
+    np.testing.assert_allclose(body.blob_colors, person(expected, expected).blob_colors, atol=0.02)
+
+
+def test_who_looks_as_he_did_keeps_his_colours():
+    body, told = recolored(person(SKIN, SKIN), shown(*[(0.95 * SKIN, SKIN)] * FRAMES), "lab")
+    assert not told
+    np.testing.assert_array_equal(body.blob_colors, person(SKIN, SKIN).blob_colors)
+
+
+def tracked_again(monkeypatch, said, doubt):
+    """What comes of a clip whose dog is told to look otherwise, and of which limbs are so doubtful then."""
+    going = tiny_run("actor=null", frames=FRAMES, actors=UNLIKE, initial_pose=BEGUN)
+    doubtful = lambda value: replace(frame_table(POSE), limb_doubt=np.full((FRAMES, 1), value))
+    begun = []
+
+    def track(setup, begin, times):
+        begun.append((np.asarray(setup.tracker.body.blob_colors), begin))
+        return doubtful(doubt)
+
+    other = colored(DOG, np.full((DOG.num_blobs, 3), 0.25))
+    monkeypatch.setattr(recolor_actors, "colors_by_frame", lambda recording, actors: dict.fromkeys(actors, {}))
+    monkeypatch.setattr(recolor_actors, "recolored", lambda body, *_: (other, said) if said else (body, ""))
+    monkeypatch.setattr(recolor_actors, "track_forward", track)
+    first = doubtful(0.2)
+    found = recolor_actors.recolor_actors(going.setup, UNLIKE, BEGUN, first, "lab", both_ways=False)
+    return found, first, begun
+
+
+def test_the_clip_is_tracked_again_in_the_new_colours(monkeypatch):
+    found, first, begun = tracked_again(monkeypatch, "left leg and right leg", 0.1)
+    assert found.table is not first
+    assert found.actors.unlike == UNLIKE.unlike
+    np.testing.assert_allclose(found.actors.bodies[0].blob_colors, 0.25)
+    np.testing.assert_allclose(begun[0][0], 0.25)
+    assert begun[0][1].frame == BEGUN.frame
+
+
+@pytest.mark.parametrize(("said", "doubt"), [("", 0.1), ("left leg and right leg", 0.5)])
+def test_it_stays_where_nothing_looks_otherwise_or_limbs_are_more_doubtful_then(monkeypatch, said, doubt):
+    found, first, begun = tracked_again(monkeypatch, said, doubt)
+    assert found.table is first
+    assert found.actors is None
+    assert bool(begun) == bool(said)
+
+
+@pytest.mark.parametrize("actors", [None, UNLIKE])
+def test_what_was_tracked_again_is_kept(tmp_path, actors):
+    assert RecoloredActors.load(tmp_path) is None
+    RecoloredActors(frame_table(POSE), actors).save(tmp_path)
+    kept = RecoloredActors.load(tmp_path)
+    np.testing.assert_array_equal(kept.table.pose, POSE)
+    assert (kept.actors is None) == (actors is None)
+    (tmp_path / recolor_actors.FOLDER / recolor_actors.LAST).unlink()
+    assert RecoloredActors.load(tmp_path) is None  # it was stopped before all was kept
+
+
+def test_a_run_goes_on_with_the_new_colours():
+    going = tiny_run(actors=UNLIKE, initial_pose=BEGUN)
+    going.records["recolored"] = RecoloredActors(frame_table(POSE))
+    assert going.actors is UNLIKE
+    other = replace(UNLIKE, bodies=(colored(DOG, np.full((DOG.num_blobs, 3), 0.25)),))
+    going.records["recolored"] = RecoloredActors(frame_table(POSE), other)
+    assert going.actors is other
+    np.testing.assert_array_equal(going.frames.pose, POSE)
+
+
+def test_only_limbs_that_were_not_found_in_frames_that_nobody_chose_are_looked_at():
+    wanted = next(each for each in passes.PASSES if each.name == "recolored").wanted
+    going = tiny_run("actor=null", actors=UNLIKE)
+    assert wanted(going)
+    going.records["actors"] = replace(UNLIKE, unlike=("",))
+    assert not wanted(going)
+    going.records["actors"] = UNLIKE
+    going.pose_sources = (lambda request: BEGUN,)
+    assert not wanted(going)
+    chosen = tiny_run("actor=null", actors=UNLIKE)
+    example = ExamplePose("sit", None, {}, {}, None, 0)
+    chosen.clip = replace(chosen.clip, recording=replace(chosen.clip.recording, example_poses=(example,)))
+    assert not wanted(chosen)
