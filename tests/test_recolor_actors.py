@@ -74,7 +74,7 @@ def tracked_again(monkeypatch, said, doubt):
         return doubtful(doubt)
 
     other = colored(DOG, np.full((DOG.num_blobs, 3), 0.25))
-    monkeypatch.setattr(recolor_actors, "colors_by_frame", lambda recording, actors: dict.fromkeys(actors, {}))
+    monkeypatch.setattr(recolor_actors, "colors_by_frame", lambda _, actors: {name: {} for name in actors})
     monkeypatch.setattr(recolor_actors, "recolored", lambda body, *_: (other, said) if said else (body, ""))
     monkeypatch.setattr(recolor_actors, "track_forward", track)
     first = doubtful(0.2)
