@@ -10,7 +10,6 @@ from run_cases import DOG, tiny_run
 
 from sogjax.actor.colors import colored
 from sogjax.actor.limb_colors import limb_pairs_alike
-from sogjax.io.example_poses import ExamplePose
 from sogjax.model.limbs import limb_names
 from sogjax.run import passes, recolor_actors
 from sogjax.run.actors import Actors
@@ -22,6 +21,7 @@ SKIN, RED, BLUE = np.array([0.8, 0.6, 0.5]), np.array([0.8, 0.1, 0.1]), np.array
 ARMS = next(pair for pair in limb_pairs_alike(HUMAN) if "arm" in limb_names(HUMAN)[pair.limbs[0]])
 FRAMES, POSE = 4, np.zeros((4, DOG.skeleton.num_dofs), np.float32)
 UNLIKE = Actors((DOG,), doubts=("",), unlike=("a paw was not found",))
+SHOWN = {"dog": np.full((DOG.num_blobs, 3), 0.5)}
 BEGUN = InitialPose(1, POSE[1], "example frames")
 
 
@@ -66,19 +66,20 @@ def test_who_looks_as_he_did_keeps_his_colours():
 def tracked_again(monkeypatch, said, doubt):
     """What comes of a clip whose dog is told to look otherwise, and of which limbs are so doubtful then."""
     going = tiny_run("actor=null", frames=FRAMES, actors=UNLIKE, initial_pose=BEGUN)
-    doubtful = lambda value: replace(frame_table(POSE), limb_doubt=np.full((FRAMES, 1), value))
+    doubtful = lambda *values: replace(frame_table(POSE), limb_doubt=np.array([[value] for value in values]))
     begun = []
 
     def track(setup, begin, times):
         begun.append((np.asarray(setup.tracker.body.blob_colors), begin))
-        return doubtful(doubt)
+        return doubtful(*[doubt] * FRAMES)
 
     other = colored(DOG, np.full((DOG.num_blobs, 3), 0.25))
     monkeypatch.setattr(recolor_actors, "colors_by_frame", lambda _, actors: {name: {} for name in actors})
+    monkeypatch.setattr(recolor_actors, "mean_colors", lambda body, *_: SHOWN[body.name])
     monkeypatch.setattr(recolor_actors, "recolored", lambda body, *_: (other, said) if said else (body, ""))
     monkeypatch.setattr(recolor_actors, "track_forward", track)
-    first = doubtful(0.2)
-    found = recolor_actors.recolor_actors(going.setup, UNLIKE, BEGUN, first, "lab", both_ways=False)
+    first = doubtful(0.3, 0.2, 0.1, 0.2)
+    found = recolor_actors.recolor_actors(going.setup, UNLIKE, first, "lab", both_ways=False)
     return found, first, begun
 
 
@@ -88,7 +89,7 @@ def test_the_clip_is_tracked_again_in_the_new_colours(monkeypatch):
     assert found.actors.unlike == UNLIKE.unlike
     np.testing.assert_allclose(found.actors.bodies[0].blob_colors, 0.25)
     np.testing.assert_allclose(begun[0][0], 0.25)
-    assert begun[0][1].frame == BEGUN.frame
+    assert begun[0][1].frame == 2  # the surest one
 
 
 @pytest.mark.parametrize(("said", "doubt"), [("", 0.1), ("left leg and right leg", 0.5)])
@@ -102,7 +103,7 @@ def test_it_stays_where_nothing_looks_otherwise_or_limbs_are_more_doubtful_then(
 @pytest.mark.parametrize("actors", [None, UNLIKE])
 def test_what_was_tracked_again_is_kept(tmp_path, actors):
     assert RecoloredActors.load(tmp_path) is None
-    RecoloredActors(frame_table(POSE), actors).save(tmp_path)
+    RecoloredActors(frame_table(POSE), SHOWN, actors).save(tmp_path)
     kept = RecoloredActors.load(tmp_path)
     np.testing.assert_array_equal(kept.table.pose, POSE)
     assert (kept.actors is None) == (actors is None)
@@ -112,24 +113,27 @@ def test_what_was_tracked_again_is_kept(tmp_path, actors):
 
 def test_a_run_goes_on_with_the_new_colours():
     going = tiny_run(actors=UNLIKE, initial_pose=BEGUN)
-    going.records["recolored"] = RecoloredActors(frame_table(POSE))
+    going.records["recolored"] = RecoloredActors(frame_table(POSE), SHOWN)
     assert going.actors is UNLIKE
     other = replace(UNLIKE, bodies=(colored(DOG, np.full((DOG.num_blobs, 3), 0.25)),))
-    going.records["recolored"] = RecoloredActors(frame_table(POSE), other)
+    going.records["recolored"] = RecoloredActors(frame_table(POSE), SHOWN, other)
     assert going.actors is other
     np.testing.assert_array_equal(going.frames.pose, POSE)
 
 
-def test_only_limbs_that_were_not_found_in_frames_that_nobody_chose_are_looked_at():
+def test_colours_of_frames_that_held_are_not_looked_at_again():
+    going = tiny_run(actors=UNLIKE, initial_pose=BEGUN)
+    assert going.shown_colors is None
+    going.records["recolored"] = RecoloredActors(frame_table(POSE), SHOWN)
+    assert going.shown_colors is SHOWN
+    going.records["recolored"] = RecoloredActors(frame_table(POSE), SHOWN, UNLIKE)
+    assert going.shown_colors is None  # the frames are others now
+
+
+def test_actors_that_are_given_or_shared_keep_their_colours():
     wanted = next(each for each in passes.PASSES if each.name == "recolored").wanted
     going = tiny_run("actor=null", actors=UNLIKE)
     assert wanted(going)
-    going.records["actors"] = replace(UNLIKE, unlike=("",))
-    assert not wanted(going)
-    going.records["actors"] = UNLIKE
+    assert not wanted(tiny_run("actor=dog.yaml"))
     going.pose_sources = (lambda request: BEGUN,)
     assert not wanted(going)
-    chosen = tiny_run("actor=null", actors=UNLIKE)
-    example = ExamplePose("sit", None, {}, {}, None, 0)
-    chosen.clip = replace(chosen.clip, recording=replace(chosen.clip.recording, example_poses=(example,)))
-    assert not wanted(chosen)

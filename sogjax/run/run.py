@@ -8,6 +8,9 @@ from pathlib import Path
 from threading import RLock
 from typing import Any
 
+import numpy as np
+from jaxtyping import Float
+
 from sogjax.actor.make import MadeActor
 from sogjax.energy.term import Term
 from sogjax.errors import InputError
@@ -112,12 +115,17 @@ class Run:
 
     @property
     def recolors_actors(self) -> bool:
-        """Whether limbs of the actors were not found in the frames that these are made of, which nobody chose.
+        """Whether the actors were made of this recording, by this run.
 
         Not where the initial pose comes from elsewhere, as for `remakes_actors`.
         """
-        by_itself = self.pose_sources is SOURCES and not self.clip.recording.example_poses
-        return by_itself and any(self.actors.unlike)
+        return self.makes_actors and self.pose_sources is SOURCES
+
+    @property
+    def shown_colors(self) -> dict[str, Float[np.ndarray, "blob 3"]] | None:
+        """What the clip shows of the blobs of each actor, by name, where the frames were looked at and held."""
+        recolored: RecoloredActors | None = self.records.get("recolored")
+        return None if recolored is None or recolored.actors is not None else recolored.shown
 
     @property
     def adjusted(self) -> Adjusted | None:
