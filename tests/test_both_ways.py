@@ -67,6 +67,21 @@ def test_a_lost_limb_comes_back_from_the_other_side(walking_dog):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("known_is_right", [True, False])
+def test_a_limb_is_taken_from_a_pass_that_is_known_where_that_explains_it_better(walking_dog, known_is_right):
+    tracker, cells, right = walking_dog
+    lost, limb = with_lost_limb(walking_dog, doubt=0.0)  # nobody doubts it, so no other pass is looked for
+    passed, known = (lost, right.poses) if known_is_right else (right, lost.poses)
+    found = merge_passes(tracker, passed, reader(cells), known=known)
+    expected = {*range(LOST.start, LOST.stop)} if known_is_right else set()
+    assert expected <= {*found.frames} <= {row + k for row in expected for k in (-1, 0, 1)}
+    assert found.parts.keys() == ({limb_names(tracker.body)[limb]} if known_is_right else set())
+    for row, revised in found.frames.items():
+        off = means_of(tracker.body, revised.pose[None]) - means_of(tracker.body, right.poses[[row]])
+        assert np.linalg.norm(off, axis=-1).max() < 0.015
+
+
+@pytest.mark.slow
 def test_what_holds_then_is_said_with_it(walking_dog):
     tracker, cells, right = walking_dog
     passed, limb = with_lost_limb(walking_dog)

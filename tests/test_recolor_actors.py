@@ -10,18 +10,20 @@ from run_cases import DOG, tiny_run
 
 from sogjax.actor.colors import colored
 from sogjax.actor.limb_colors import limb_pairs_alike
+from sogjax.io.motion import motion_from_poses
 from sogjax.model.limbs import limb_names
 from sogjax.run import passes, recolor_actors
 from sogjax.run.actors import Actors
 from sogjax.run.initial_pose import InitialPose
-from sogjax.run.recolor_actors import RecoloredActors, recolored
+from sogjax.run.recolor_actors import RecoloredActors, named_limbs, recolored
 
 HUMAN = shipped("human")
 SKIN, RED, BLUE = np.array([0.8, 0.6, 0.5]), np.array([0.8, 0.1, 0.1]), np.array([0.1, 0.2, 0.7])
 ARMS = next(pair for pair in limb_pairs_alike(HUMAN) if "arm" in limb_names(HUMAN)[pair.limbs[0]])
 FRAMES, POSE = 4, np.zeros((4, DOG.skeleton.num_dofs), np.float32)
-UNLIKE = Actors((DOG,), doubts=("",), unlike=("a paw was not found",))
-SHOWN = {"dog": np.full((DOG.num_blobs, 3), 0.5)}
+LEG, LIMBS = limb_names(DOG)[0], len(limb_names(DOG))
+LEGS = "left leg and right leg"
+UNLIKE = Actors((DOG,), doubts=("",), unlike=(f"{LEG} was not found",))
 BEGUN = InitialPose(1, POSE[1], "example frames")
 
 
@@ -48,25 +50,26 @@ def shown(*arms):
     ],
 )
 def test_an_arm_that_was_not_found_takes_the_colours_that_it_shows_over_the_clip(frames, expected):
-    body, told = recolored(person(SKIN, RED), shown(*frames), "lab")
+    body, told = recolored(person(SKIN, RED), {"right arm"}, shown(*frames), "lab")
     if expected is None:
         assert not told
         np.testing.assert_array_equal(body.blob_colors, person(SKIN, RED).blob_colors)
         return
-    assert told == "left arm and right arm"
+    assert told == ["left arm and right arm"]
     np.testing.assert_allclose(body.blob_colors, person(expected, expected).blob_colors, atol=0.02)
 
 
-def test_who_looks_as_he_did_keeps_his_colours():
-    body, told = recolored(person(SKIN, SKIN), shown(*[(0.95 * SKIN, SKIN)] * FRAMES), "lab")
+@pytest.mark.parametrize(("named", "arms"), [("left arm", (0.95 * SKIN, SKIN)), ("left leg", (RED, RED))])
+def test_who_looks_as_he_did_keeps_his_colours_and_so_do_limbs_that_nothing_is_said_of(named, arms):
+    body, told = recolored(person(SKIN, SKIN), {named}, shown(*[arms] * FRAMES), "lab")
     assert not told
     np.testing.assert_array_equal(body.blob_colors, person(SKIN, SKIN).blob_colors)
 
 
-def tracked_again(monkeypatch, said, doubt):
+def tracked_again(monkeypatch, said, doubt, actors=UNLIKE):
     """What comes of a clip whose dog is told to look otherwise, and of which limbs are so doubtful then."""
-    going = tiny_run("actor=null", frames=FRAMES, actors=UNLIKE, initial_pose=BEGUN)
-    doubtful = lambda *values: replace(frame_table(POSE), limb_doubt=np.array([[value] for value in values]))
+    going = tiny_run("actor=null", frames=FRAMES, actors=actors, initial_pose=BEGUN)
+    doubtful = lambda *values: replace(frame_table(POSE), limb_doubt=np.tile(np.array(values)[:, None], LIMBS))
     begun = []
 
     def track(setup, begin, times):
@@ -75,16 +78,15 @@ def tracked_again(monkeypatch, said, doubt):
 
     other = colored(DOG, np.full((DOG.num_blobs, 3), 0.25))
     monkeypatch.setattr(recolor_actors, "colors_by_frame", lambda _, actors: {name: {} for name in actors})
-    monkeypatch.setattr(recolor_actors, "mean_colors", lambda body, *_: SHOWN[body.name])
-    monkeypatch.setattr(recolor_actors, "recolored", lambda body, *_: (other, said) if said else (body, ""))
+    monkeypatch.setattr(recolor_actors, "recolored", lambda body, *_: (other, [said]) if said else (body, []))
     monkeypatch.setattr(recolor_actors, "track_forward", track)
-    first = doubtful(0.3, 0.2, 0.1, 0.2)
-    found = recolor_actors.recolor_actors(going.setup, UNLIKE, first, "lab", both_ways=False)
+    first = doubtful(0.03, 0.02, 0.01, 0.02)
+    found = recolor_actors.recolor_actors(going.setup, actors, first, "lab", both_ways=False)
     return found, first, begun
 
 
 def test_the_clip_is_tracked_again_in_the_new_colours(monkeypatch):
-    found, first, begun = tracked_again(monkeypatch, "left leg and right leg", 0.1)
+    found, first, begun = tracked_again(monkeypatch, LEGS, 0.01)
     assert found.table is not first
     assert found.actors.unlike == UNLIKE.unlike
     np.testing.assert_allclose(found.actors.bodies[0].blob_colors, 0.25)
@@ -92,7 +94,7 @@ def test_the_clip_is_tracked_again_in_the_new_colours(monkeypatch):
     assert begun[0][1].frame == 2  # the surest one
 
 
-@pytest.mark.parametrize(("said", "doubt"), [("", 0.1), ("left leg and right leg", 0.5)])
+@pytest.mark.parametrize(("said", "doubt"), [("", 0.01), (LEGS, 0.5)])
 def test_it_stays_where_nothing_looks_otherwise_or_limbs_are_more_doubtful_then(monkeypatch, said, doubt):
     found, first, begun = tracked_again(monkeypatch, said, doubt)
     assert found.table is first
@@ -100,10 +102,25 @@ def test_it_stays_where_nothing_looks_otherwise_or_limbs_are_more_doubtful_then(
     assert bool(begun) == bool(said)
 
 
+def test_nothing_is_read_where_nothing_is_said_of_a_limb(monkeypatch):
+    found, first, begun = tracked_again(monkeypatch, LEGS, 0.01, replace(UNLIKE, unlike=("",)))
+    assert found.table is first
+    assert not begun
+
+
+def test_limbs_are_named_that_the_verdict_would_name():
+    motion = motion_from_poses(DOG, POSE, 25.0, limb_names=limb_names(DOG))
+    doubts = np.zeros((FRAMES, LIMBS))
+    assert named_limbs(DOG, replace(motion, limb_doubt=doubts), "") == set()
+    assert named_limbs(DOG, replace(motion, limb_doubt=doubts), UNLIKE.unlike[0]) == {LEG}
+    doubts[:, limb_names(DOG).index(LEG)] = 0.9
+    assert named_limbs(DOG, replace(motion, limb_doubt=doubts), "") == {LEG}
+
+
 @pytest.mark.parametrize("actors", [None, UNLIKE])
 def test_what_was_tracked_again_is_kept(tmp_path, actors):
     assert RecoloredActors.load(tmp_path) is None
-    RecoloredActors(frame_table(POSE), SHOWN, actors).save(tmp_path)
+    RecoloredActors(frame_table(POSE), actors).save(tmp_path)
     kept = RecoloredActors.load(tmp_path)
     np.testing.assert_array_equal(kept.table.pose, POSE)
     assert (kept.actors is None) == (actors is None)
@@ -113,21 +130,12 @@ def test_what_was_tracked_again_is_kept(tmp_path, actors):
 
 def test_a_run_goes_on_with_the_new_colours():
     going = tiny_run(actors=UNLIKE, initial_pose=BEGUN)
-    going.records["recolored"] = RecoloredActors(frame_table(POSE), SHOWN)
+    going.records["recolored"] = RecoloredActors(frame_table(POSE))
     assert going.actors is UNLIKE
     other = replace(UNLIKE, bodies=(colored(DOG, np.full((DOG.num_blobs, 3), 0.25)),))
-    going.records["recolored"] = RecoloredActors(frame_table(POSE), SHOWN, other)
+    going.records["recolored"] = RecoloredActors(frame_table(POSE), other)
     assert going.actors is other
     np.testing.assert_array_equal(going.frames.pose, POSE)
-
-
-def test_colours_of_frames_that_held_are_not_looked_at_again():
-    going = tiny_run(actors=UNLIKE, initial_pose=BEGUN)
-    assert going.shown_colors is None
-    going.records["recolored"] = RecoloredActors(frame_table(POSE), SHOWN)
-    assert going.shown_colors is SHOWN
-    going.records["recolored"] = RecoloredActors(frame_table(POSE), SHOWN, UNLIKE)
-    assert going.shown_colors is None  # the frames are others now
 
 
 def test_actors_that_are_given_or_shared_keep_their_colours():

@@ -54,7 +54,9 @@ def colors_by_frame(recording: Recording, actors: Mapping[str, tuple[Body, Motio
 def colors_apart(
     recording: Recording, actors: Mapping[str, tuple[Body, Motion]], color_space: str
 ) -> dict[str, dict[str, float]]:
-    """How far left and right are apart in a motion (`sides_apart`), of each actor by name.
+    """How far the colours of each pair of limbs are apart in a motion, equally bright, by their names, of each actor.
+
+    A light from one side made one arm of a real man half as bright again as the other.
 
     Args:
         recording: that is read.
@@ -64,26 +66,16 @@ def colors_apart(
     Raises:
         InputError: a video cannot be read.
     """
-    shown = colors_by_frame(recording, actors)
-    mean = lambda name: mean_colors(actors[name][0], shown[name], color_space)
-    return {name: sides_apart(body, mean(name)) for name, (body, _) in actors.items()}
-
-
-def mean_colors(body: Body, by_frame: Mapping[int, Samples], color_space: str) -> Float[np.ndarray, "blob 3"]:
-    """The colours (sRGB, 0 to 1) that some frames together show of every blob."""
-    return colors_of(body, joined_samples([*by_frame.values()]), color_space).colors
-
-
-def sides_apart(body: Body, colors: Float[np.ndarray, "blob 3"]) -> dict[str, float]:
-    """How far the colours of each pair of limbs are apart, equally bright, by their names.
-
-    A light from one side made one arm of a real man half as bright again as the other.
-    """
-    names = limb_names(body)
-    return {
-        " or ".join(names[k] for k in pair.limbs): _apart(*(colors[blobs] for blobs in pair.blobs))
-        for pair in limb_pairs_alike(body)
-    }
+    found: dict[str, dict[str, float]] = {}
+    for name, by_frame in colors_by_frame(recording, actors).items():
+        body = actors[name][0]
+        samples, names = joined_samples([*by_frame.values()]), limb_names(body)
+        colors = colors_of(body, samples, color_space).colors
+        found[name] = {
+            " or ".join(names[k] for k in pair.limbs): _apart(*(colors[blobs] for blobs in pair.blobs))
+            for pair in limb_pairs_alike(body)
+        }
+    return found
 
 
 def _apart(one: Float[np.ndarray, "blob 3"], other: Float[np.ndarray, "blob 3"]) -> float:

@@ -18,7 +18,7 @@ from sogjax.quality.limb_warnings import limits_of
 from sogjax.quality.passages import passages
 from sogjax.quality.proportions import odd_sentence
 from sogjax.quality.verdict import NUM_WORST, Verdict, expected_of, verdicts
-from sogjax.run.clip_sides import colors_apart, sides_apart, unlike_where_tracked
+from sogjax.run.clip_sides import colors_apart, unlike_where_tracked
 from sogjax.run.recordings import upright
 from sogjax.run.result import RunResult
 from sogjax.run.run import Run
@@ -54,10 +54,7 @@ def _sides(run: Run, result: RunResult) -> dict[str, str | None]:
     recording = result.recording
     actors = {body.name: (upright(body, recording), result.motions[body.name]) for body in result.bodies}
     try:
-        if (shown := run.shown_colors) is not None:
-            apart = {name: sides_apart(body, shown[name]) for name, (body, _) in actors.items()}
-        else:
-            apart = colors_apart(recording, actors, run.actor_request.color_space)
+        apart = colors_apart(recording, actors, run.actor_request.color_space)
     except InputError as error:
         say(f"warning: the colours of left and right are not compared: {error}")
         return {}

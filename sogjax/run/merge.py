@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from functools import partial
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Float
 
 from sogjax.errors import InputError, counted
 from sogjax.io.frame_table import TERM, FramesRecord, FrameTable
@@ -27,10 +27,10 @@ class Merged(FramesRecord):
     file = "merged.npz"
 
 
-def merge_backward(setup: Setup, tracked: FrameTable) -> Merged:
+def merge_backward(setup: Setup, tracked: FrameTable, known: Float[np.ndarray, "frame dof"] | None = None) -> Merged:
     """The frames with what other passes explain better; as they are where nothing is, or a pass failed.
 
-    That a pass failed is said.
+    That a pass failed is said. `known` are the poses of a pass that is there already, if one is.
     """
     if tracked.limb_doubt is None or tracked.baseline is None:
         return Merged(tracked)
@@ -49,7 +49,7 @@ def merge_backward(setup: Setup, tracked: FrameTable) -> Merged:
             turning = turning_rows(len(numbers), setup.clip.fps)
             report = partial(setattr, work, "share")
             elsewhere, jump = misplaced(setup, tracked), NEAR * largest_step(setup.clip.fps)
-            found = merge_passes(setup.tracker, passed, of_rows, keys, turning, elsewhere, report, jump)
+            found = merge_passes(setup.tracker, passed, of_rows, keys, turning, elsewhere, report, jump, known)
     except InputError as error:
         say(f"warning: limbs were not searched over the clip, which stays as it was tracked: {error}")
         return Merged(tracked)

@@ -9,19 +9,22 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
 
-from sogjax.actor.colors import Samples, colored, colors_of
+from sogjax.actor.colors import Samples, colored, colors_of, joined_samples
 from sogjax.actor.limb_colors import agreed_samples, limb_pairs_alike
 from sogjax.io.files import write_json
 from sogjax.io.frame_motions import ClipFacts, motions_of
 from sogjax.io.frame_table import FramesRecord, FrameTable
+from sogjax.io.motion import Motion
 from sogjax.io.npz_file import read_npz, save_npz
 from sogjax.model.body import Body
 from sogjax.model.limbs import limb_names
+from sogjax.quality.jumps import jumps
+from sogjax.quality.limb_warnings import doubtful_limbs
+from sogjax.quality.passages import passages
 from sogjax.run.actors import Actors
 from sogjax.run.adjust_colors import more_doubtful
-from sogjax.run.clip_sides import colors_by_frame, mean_colors
+from sogjax.run.clip_sides import colors_by_frame
 from sogjax.run.clock import StageTimes
 from sogjax.run.forward import track_forward
 from sogjax.run.initial_pose import InitialPose
@@ -29,7 +32,7 @@ from sogjax.run.merge import merge_backward
 from sogjax.run.setup import Setup, with_bodies
 from sogjax.run.terminal import say
 
-FOLDER, SHOWN, LAST = "recolored", "shown.npz", "made.json"
+FOLDER, LAST = "recolored", "made.json"
 TRACKED = "the clip as it was tracked"
 """Source of the pose with which tracking begins again."""
 OTHER = 0.08
@@ -40,8 +43,6 @@ OTHER = 0.08
 class RecoloredActors(FramesRecord):
     """The frames, tracked again with the actors' new colours, if these doubt less."""
 
-    shown: dict[str, Float[np.ndarray, "blob 3"]]
-    """What the frames showed of the blobs of each actor (sRGB, 0 to 1), by name."""
     actors: Actors | None = None
     """In new colours; None: the old ones hold, and the frames are as they were."""
 
@@ -51,7 +52,6 @@ class RecoloredActors(FramesRecord):
         if self.actors is not None:
             self.actors.save(folder / FOLDER)
         save_npz(folder / FOLDER / self.file, self.table.arrays())
-        save_npz(folder / FOLDER / SHOWN, self.shown)
         write_json(folder / FOLDER / LAST, {"made": self.actors is not None})
 
     @classmethod
@@ -60,8 +60,7 @@ class RecoloredActors(FramesRecord):
         place = folder / FOLDER
         if not (place / LAST).is_file():
             return None
-        table = FrameTable.from_arrays(read_npz(place / cls.file))
-        return cls(table, read_npz(place / SHOWN), Actors.load(place))
+        return cls(FrameTable.from_arrays(read_npz(place / cls.file)), Actors.load(place))
 
 
 def recolor_actors(
@@ -81,24 +80,33 @@ def recolor_actors(
     """
     motions = motions_of(tracked, setup.bodies, ClipFacts.of(setup.clip.recording))
     of_actors = {body.name: (body, motions[body.name]) for body in setup.bodies}
-    by_frame = colors_by_frame(setup.clip.recording, of_actors)
-    shown = {body.name: mean_colors(body, by_frame[body.name], color_space) for body in setup.bodies}
-    found = {body.name: recolored(body, by_frame[body.name], color_space) for body in setup.bodies}
-    told = [f"{name}: {listed}" for name, (_, listed) in found.items() if listed]
+    said = dict(zip(of_actors, actors.unlike, strict=False))
+    named = {name: named_limbs(*of_actor, said.get(name, "")) for name, of_actor in of_actors.items()}
+    if not any(named.values()):
+        return RecoloredActors(tracked)
+    shown = colors_by_frame(setup.clip.recording, of_actors)
+    found = [recolored(body, named[body.name], shown[body.name], color_space) for body in setup.bodies]
+    told = [f"{body.name}: {', '.join(taken)}" for body, taken in found if taken]
     if not told:
-        return RecoloredActors(tracked, shown)
+        return RecoloredActors(tracked)
     say(f"tracked again with the colours that limbs show where they were tracked ({'; '.join(told)})")
-    bodies = tuple(found[body.name][0] for body in setup.bodies)
+    bodies = tuple(body for body, _ in found)
     again, row = with_bodies(setup, bodies), surest_row(tracked)
     begin = InitialPose(setup.clip.numbers[row], np.asarray(tracked.pose[row]), TRACKED)
     table = track_forward(again, begin, StageTimes())
-    table = merge_backward(again, table).table if both_ways else table
+    table = merge_backward(again, table, tracked.pose).table if both_ways else table
     if more_doubtful(table, tracked):
         say("the clip stays as it was, since limbs are more doubtful in the new colours")
-        return RecoloredActors(tracked, shown)
+        return RecoloredActors(tracked)
     pairs = zip(actors.bodies, bodies, strict=True)
-    named = tuple(colored(actor, np.asarray(body.blob_colors, float)) for actor, body in pairs)
-    return RecoloredActors(table, shown, replace(actors, bodies=named))
+    new = tuple(colored(actor, np.asarray(body.blob_colors, float)) for actor, body in pairs)
+    return RecoloredActors(table, replace(actors, bodies=new))
+
+
+def named_limbs(body: Body, motion: Motion, unlike: str) -> set[str]:
+    """The limbs that a verdict would name: in doubt, jumping, through others, or not found in the actor's frames."""
+    said = [*map(str, doubtful_limbs(motion)), *jumps(body, motion), *passages(body, motion), unlike]
+    return {name for name in limb_names(body) if any(name in sentence for sentence in said)}
 
 
 def surest_row(table: FrameTable) -> int:
@@ -106,25 +114,25 @@ def surest_row(table: FrameTable) -> int:
     return 0 if table.limb_doubt is None else int(np.argmin(np.max(table.limb_doubt, axis=1, initial=0.0)))
 
 
-def recolored(body: Body, by_frame: Mapping[int, Samples], color_space: str) -> tuple[Body, str]:
-    """A body whose limbs have the colours that frames show of them, if these are others; and which limbs these are.
+def recolored(body: Body, named: set[str], by_frame: Mapping[int, Samples], color_space: str) -> tuple[Body, list[str]]:
+    """A body whose named limbs have the colours that frames show of them, if these are others; and which these are.
 
-    Pairs of limbs that are unlike in most frames keep theirs.
+    A limb goes with its counterpart. Pairs that are unlike in most frames keep theirs.
     """
     samples = [*by_frame.values()]
-    shown = mean_colors(body, by_frame, color_space)
+    shown = colors_of(body, joined_samples(samples), color_space).colors
     agreed = agreed_samples(body, samples, shown)
-    shown, own, names = colors_of(body, agreed.samples, color_space).colors, _colors(body), limb_names(body)
-    unlike, taken = [pair.limbs for pair in agreed.unlike], list[str]()
-    new = own.copy()
+    shown, own, names = (
+        colors_of(body, agreed.samples, color_space).colors,
+        np.asarray(body.blob_colors),
+        limb_names(body),
+    )
+    new, taken = own.copy(), list[str]()
     for pair in limb_pairs_alike(body):
+        both = [names[k] for k in pair.limbs]
         off = max(np.linalg.norm(own[blobs] - shown[blobs], axis=1).mean() for blobs in pair.blobs)
-        if off > OTHER and pair.limbs not in unlike:
-            taken.append(" and ".join(names[k] for k in pair.limbs))
+        if off > OTHER and named.intersection(both) and pair.limbs not in [each.limbs for each in agreed.unlike]:
+            taken.append(" and ".join(both))
             for blobs in pair.blobs:
                 new[blobs] = shown[blobs]
-    return (colored(body, new), ", ".join(taken)) if taken else (body, "")
-
-
-def _colors(body: Body) -> Float[np.ndarray, "blob 3"]:
-    return np.asarray(body.blob_colors, float)
+    return (colored(body, np.asarray(new, float)) if taken else body), taken

@@ -8,9 +8,6 @@ from pathlib import Path
 from threading import RLock
 from typing import Any
 
-import numpy as np
-from jaxtyping import Float
-
 from sogjax.actor.make import MadeActor
 from sogjax.energy.term import Term
 from sogjax.errors import InputError
@@ -120,12 +117,6 @@ class Run:
         Not where the initial pose comes from elsewhere, as for `remakes_actors`.
         """
         return self.makes_actors and self.pose_sources is SOURCES
-
-    @property
-    def shown_colors(self) -> dict[str, Float[np.ndarray, "blob 3"]] | None:
-        """What the clip shows of the blobs of each actor, by name, where the frames were looked at and held."""
-        recolored: RecoloredActors | None = self.records.get("recolored")
-        return None if recolored is None or recolored.actors is not None else recolored.shown
 
     @property
     def adjusted(self) -> Adjusted | None:

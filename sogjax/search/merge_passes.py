@@ -39,6 +39,7 @@ from sogjax.search.other_pass import (
     Pass,
     compared_backwards,
     compared_both_ways,
+    compared_known,
     parts_apart,
 )
 from sogjax.search.pose_search import Report, unreported
@@ -97,15 +98,18 @@ def merge_passes(
     misplaced: Misplaced | None = None,
     report: Report = unreported,
     jump: float = np.inf,
+    known: Float[np.ndarray, "frame dof"] | None = None,
 ) -> Revision:
     """Where another pass explains parts of the body better.
 
     Limbs are searched in `key_rows` and held as before where they `jump` (metres, of a blob from a frame to the next),
-    actors turned back to front in `turning_rows`, and those `misplaced` looked for. `frames` reads what is seen in rows
-    of `passed`; the tracker must judge limbs.
+    actors turned back to front in `turning_rows`, and those `misplaced` looked for; first parts are taken from the
+    `known` poses of another pass. `frames` reads what is seen in rows of `passed`; the tracker must judge limbs.
     """
     own = {name: getattr(passed, name).copy() for name in ("poses", "doubts", "energies")}
     revising = _Revising(tracker, replace(passed, **own), frames)
+    if known is not None:
+        revising.take_known(known)
     if misplaced is not None:
         revising.place_actors(misplaced)
     revising.turn_actors(turning_rows)
@@ -157,6 +161,14 @@ class _Revising:
             self._looked_at += len(lost)  # a look costs about as much as a frame of a pass
             self._search_limbs(search, lost, unreported)
         self._looked_at = 0  # what comes backwards from behind doubts may look at as much
+
+    def take_known(self, poses: Float[np.ndarray, "frame dof"]) -> None:
+        """Take what the poses of another pass of the clip explain better."""
+        for first in range(0, len(poses), MOST_FRAMES):
+            rows = range(first, min(first + MOST_FRAMES, len(poses)))
+            self.take(compared_known(self.tracker, self.passed, self.frames, self.parts, rows, poses))
+        self._changed.clear()
+        self._looked_at = 0
 
     def place_actors(self, misplaced: Misplaced) -> None:
         """See where it leads if an actor of whom little is explained is where he is found again."""

@@ -189,6 +189,28 @@ def compared(
     return found
 
 
+def compared_known(
+    tracker: Tracker,
+    passed: Pass,
+    frames: FramesOfRows,
+    parts: Sequence[Part],
+    rows: range,
+    poses: Float[np.ndarray, "frame dof"],
+) -> Compared:
+    """Some rows beside the poses of a pass, of all rows, that is known already."""
+    found, choices, least = Compared(), PartArrays.of(tracker.body, parts), fitted_numbers().merge_passes.compared
+    for row, frame in zip(rows, frames(rows), strict=True):
+        both = jnp.asarray(passed.poses[row]), jnp.asarray(poses[row])
+        apart = np.asarray(parts_apart(tracker.body, choices.blobs, *both))
+        found.cells.append(frame)
+        found.add(row, poses[row], apart)
+        if (differ := _differ(parts, apart > least)).any():
+            seen = BothSeen.of(tracker, frame, passed.capacities, *both)
+            found.gained[-1] = seen.climbed_gain(passed.climbed, row)
+            found.gains[-1] = part_gains(tracker, seen, choices, differ)
+    return found
+
+
 @dataclass(frozen=True)
 class BothSeen:
     """A known pose of a frame and another one, and what is seen around both, wider by `REACH`.
