@@ -10,6 +10,9 @@ from run_cases import DOG, tiny_run
 
 from sogjax.actor.colors import colored
 from sogjax.actor.limb_colors import limb_pairs_alike
+from sogjax.errors import InputError
+from sogjax.io.example_poses import ExamplePose
+from sogjax.io.frame_table import FramesRecord
 from sogjax.io.motion import motion_from_poses
 from sogjax.model.limbs import limb_names
 from sogjax.run import passes, recolor_actors
@@ -21,9 +24,13 @@ HUMAN = shipped("human")
 SKIN, RED, BLUE = np.array([0.8, 0.6, 0.5]), np.array([0.8, 0.1, 0.1]), np.array([0.1, 0.2, 0.7])
 ARMS = next(pair for pair in limb_pairs_alike(HUMAN) if "arm" in limb_names(HUMAN)[pair.limbs[0]])
 FRAMES, POSE = 4, np.zeros((4, DOG.skeleton.num_dofs), np.float32)
-LEG, LIMBS = limb_names(DOG)[0], len(limb_names(DOG))
+LEG, LIMBS = limb_names(DOG)[limb_pairs_alike(DOG)[0].limbs[0]], len(limb_names(DOG))
 LEGS = "left leg and right leg"
 UNLIKE = Actors((DOG,), doubts=("",), unlike=(f"{LEG} was not found",))
+POSES = np.tile(POSE, 2)
+BOTH = Actors(
+    (replace(DOG, name="rex"), replace(DOG, name="bello")), doubts=("", ""), unlike=(f"{LEG} was not found", "")
+)
 BEGUN = InitialPose(1, POSE[1], "example frames")
 
 
@@ -66,32 +73,61 @@ def test_who_looks_as_he_did_keeps_his_colours_and_so_do_limbs_that_nothing_is_s
     np.testing.assert_array_equal(body.blob_colors, person(SKIN, SKIN).blob_colors)
 
 
-def tracked_again(monkeypatch, said, doubt, actors=UNLIKE):
-    """What comes of a clip whose dog is told to look otherwise, and of which limbs are so doubtful then."""
-    going = tiny_run("actor=null", frames=FRAMES, actors=actors, initial_pose=BEGUN)
-    doubtful = lambda *values: replace(frame_table(POSE), limb_doubt=np.tile(np.array(values)[:, None], LIMBS))
+@pytest.mark.parametrize("seen", [0, 20])
+def test_limbs_that_are_hardly_seen_keep_their_colours(seen):
+    frames = shown(*[(SKIN, SKIN)] * FRAMES)
+    for samples in frames.values():
+        for blobs in ARMS.blobs:
+            for blob in blobs:
+                samples[blob] = samples[blob][:seen]
+    assert bool(recolored(person(SKIN, RED), {"right arm"}, frames, "lab")[1]) == bool(seen)
+
+
+def doubtful(*values):
+    """The frames of dogs, of which each limb is so doubtful."""
+    return replace(frame_table(POSES), limb_doubt=np.tile(np.array(values)[:, None], 2 * LIMBS))
+
+
+def tracked_again(monkeypatch, said, doubt, actors=BOTH, both_ways=False):
+    """What comes of two dogs, one of which is told to look otherwise, whose limbs are so doubtful then."""
+    going = tiny_run("actor=null", "every=2", frames=2 * FRAMES, actors=actors, initial_pose=BEGUN)
+    going.clip = replace(going.clip, numbers=range(0, 2 * FRAMES, 2))
     begun = []
 
-    def track(setup, begin, times):
+    def track(setup, begin, times, again):
+        assert again
         begun.append((np.asarray(setup.tracker.body.blob_colors), begin))
         return doubtful(*[doubt] * FRAMES)
 
-    other = colored(DOG, np.full((DOG.num_blobs, 3), 0.25))
-    monkeypatch.setattr(recolor_actors, "colors_by_frame", lambda _, actors: {name: {} for name in actors})
-    monkeypatch.setattr(recolor_actors, "recolored", lambda body, *_: (other, [said]) if said else (body, []))
+    def recolor(body, named, *_):
+        assert bool(named) == (body.name == "rex")
+        other = colored(body, np.full((DOG.num_blobs, 3), 0.25))
+        return (other, [said]) if said and named else (body, [])
+
+    def merge(setup, table, known):
+        begun.append(known)
+        return FramesRecord(table)
+
+    monkeypatch.setattr(recolor_actors, "colors_by_frame", lambda _, actors, free: {name: {} for name in actors})
+    monkeypatch.setattr(recolor_actors, "recolored", recolor)
     monkeypatch.setattr(recolor_actors, "track_forward", track)
-    first = doubtful(0.03, 0.02, 0.01, 0.02)
-    found = recolor_actors.recolor_actors(going.setup, actors, first, "lab", both_ways=False)
+    monkeypatch.setattr(recolor_actors, "merge_backward", merge)
+    first = replace(doubtful(0.03, 0.02, 0.01, 0.02), frame=np.arange(0, 2 * FRAMES, 2))
+    found = recolor_actors.recolor_actors(going.setup, actors, first, "lab", going.setup_with, both_ways)
     return found, first, begun
 
 
-def test_the_clip_is_tracked_again_in_the_new_colours(monkeypatch):
-    found, first, begun = tracked_again(monkeypatch, LEGS, 0.01)
+@pytest.mark.parametrize("both_ways", [False, True])
+def test_the_clip_is_tracked_again_in_the_new_colours(monkeypatch, both_ways):
+    found, first, begun = tracked_again(monkeypatch, LEGS, 0.01, both_ways=both_ways)
     assert found.table is not first
-    assert found.actors.unlike == UNLIKE.unlike
-    np.testing.assert_allclose(found.actors.bodies[0].blob_colors, 0.25)
-    np.testing.assert_allclose(begun[0][0], 0.25)
-    assert begun[0][1].frame == 2  # the surest one
+    assert found.actors.unlike == BOTH.unlike
+    new, kept = (np.asarray(body.blob_colors) for body in found.actors.bodies)
+    np.testing.assert_allclose(new, 0.25)
+    np.testing.assert_array_equal(kept, DOG.blob_colors)
+    np.testing.assert_array_equal(begun[0][0], np.concatenate([new, kept]))
+    assert begun[0][1].frame == 4  # the surest one
+    assert [known is first.pose for known in begun[1:]] == [True] * both_ways
 
 
 @pytest.mark.parametrize(("said", "doubt"), [("", 0.01), (LEGS, 0.5)])
@@ -103,18 +139,40 @@ def test_it_stays_where_nothing_looks_otherwise_or_limbs_are_more_doubtful_then(
 
 
 def test_nothing_is_read_where_nothing_is_said_of_a_limb(monkeypatch):
-    found, first, begun = tracked_again(monkeypatch, LEGS, 0.01, replace(UNLIKE, unlike=("",)))
-    assert found.table is first
-    assert not begun
+    going = tiny_run("actor=null", frames=FRAMES)
+    monkeypatch.setattr(recolor_actors, "colors_by_frame", None)
+    table = frame_table(POSES[:, : DOG.skeleton.num_dofs])
+    found = recolor_actors.recolor_actors(going.setup, going.actors, table, "lab", going.setup_with, both_ways=True)
+    assert found.table is table
 
 
-def test_limbs_are_named_that_the_verdict_would_name():
+def test_videos_that_cannot_be_read_once_more_end_no_run(monkeypatch, capsys):
+    def unreadable(*_):
+        raise InputError("cam0.mp4: is gone")
+
+    monkeypatch.setattr(recolor_actors, "named_limbs", lambda *_: {LEG})
+    going = tiny_run("actor=null", frames=FRAMES)
+    monkeypatch.setattr(recolor_actors, "colors_by_frame", unreadable)
+    table = frame_table(POSES[:, : DOG.skeleton.num_dofs])
+    found = recolor_actors.recolor_actors(going.setup, going.actors, table, "lab", going.setup_with, both_ways=True)
+    assert found.table is table
+    assert "keep the actors' colours: cam0.mp4: is gone" in "".join(capsys.readouterr())
+
+
+def test_limbs_are_named_that_the_verdict_would_name_unless_something_hides_them(monkeypatch):
     motion = motion_from_poses(DOG, POSE, 25.0, limb_names=limb_names(DOG))
-    doubts = np.zeros((FRAMES, LIMBS))
+    doubts, nothing = np.zeros((FRAMES, LIMBS)), np.zeros((FRAMES, LIMBS))
     assert named_limbs(DOG, replace(motion, limb_doubt=doubts), "") == set()
-    assert named_limbs(DOG, replace(motion, limb_doubt=doubts), UNLIKE.unlike[0]) == {LEG}
-    doubts[:, limb_names(DOG).index(LEG)] = 0.9
+    assert named_limbs(DOG, replace(motion, limb_doubt=doubts), f"{LEG} was not found") == {LEG}
+    monkeypatch.setattr(recolor_actors, "jumps", lambda *_: [f"look at frames 1-2, {LEG} jumps"])
     assert named_limbs(DOG, replace(motion, limb_doubt=doubts), "") == {LEG}
+    monkeypatch.setattr(recolor_actors, "jumps", lambda *_: [])
+    monkeypatch.setattr(recolor_actors, "passages", lambda *_: [f"look at frames 1-2, {LEG} through the trunk"])
+    assert named_limbs(DOG, replace(motion, limb_doubt=doubts), "") == {LEG}
+    monkeypatch.setattr(recolor_actors, "passages", lambda *_: [])
+    doubts[:, limb_names(DOG).index(LEG)] = 0.9
+    assert named_limbs(DOG, replace(motion, limb_doubt=doubts, limb_hidden=nothing), "") == {LEG}
+    assert named_limbs(DOG, replace(motion, limb_doubt=doubts, limb_hidden=nothing + 1.0), "") == set()
 
 
 @pytest.mark.parametrize("actors", [None, UNLIKE])
@@ -122,6 +180,8 @@ def test_what_was_tracked_again_is_kept(tmp_path, actors):
     assert RecoloredActors.load(tmp_path) is None
     RecoloredActors(frame_table(POSE), actors).save(tmp_path)
     kept = RecoloredActors.load(tmp_path)
+    if actors is not None:
+        np.testing.assert_array_equal(kept.actors.bodies[0].blob_colors, actors.bodies[0].blob_colors)
     np.testing.assert_array_equal(kept.table.pose, POSE)
     assert (kept.actors is None) == (actors is None)
     (tmp_path / recolor_actors.FOLDER / recolor_actors.LAST).unlink()
@@ -138,10 +198,22 @@ def test_a_run_goes_on_with_the_new_colours():
     np.testing.assert_array_equal(going.frames.pose, POSE)
 
 
-def test_actors_that_are_given_or_shared_keep_their_colours():
+def test_actors_that_are_given_or_shared_or_made_of_chosen_frames_keep_their_colours():
     wanted = next(each for each in passes.PASSES if each.name == "recolored").wanted
-    going = tiny_run("actor=null", actors=UNLIKE)
+    assert not wanted(tiny_run("actor=null", actors=UNLIKE))  # given from Python
+    assert not wanted(made_itself("actor=dog.yaml"))
+    going = made_itself("actor=null")
     assert wanted(going)
-    assert not wanted(tiny_run("actor=dog.yaml"))
     going.pose_sources = (lambda request: BEGUN,)
     assert not wanted(going)
+    chosen = made_itself("actor=null")
+    example = ExamplePose("sit", None, {}, {}, None, 0)
+    chosen.clip = replace(chosen.clip, recording=replace(chosen.clip.recording, example_poses=(example,)))
+    assert not wanted(chosen)
+
+
+def made_itself(*words):
+    """A run that found actors itself."""
+    going = tiny_run(*words, actors=UNLIKE)
+    going.actors_given = False
+    return going

@@ -90,7 +90,7 @@ def wanted(run):
 
 def test_the_passes_of_a_command_are_those_that_it_wants(tmp_path):
     """Of every pass it is said here which commands have it."""
-    tracking = ["initial_pose", "tracked", "occluders", "merged", "recolored"]
+    tracking = ["initial_pose", "tracked", "occluders", "merged"]
     assert wanted(tiny_run(out=tmp_path)) == [*tracking, "result", "files"]
     assert wanted(tiny_run()) == tracking
     given = tiny_run("adjust=true", out=tmp_path, frames_given=True, tracked=None)
@@ -98,8 +98,8 @@ def test_the_passes_of_a_command_are_those_that_it_wants(tmp_path):
     assert wanted(tiny_run("adjust=true")) == [*tracking, "adjusted"]
     assert wanted(tiny_run("adjust=true", "outputs.filter=6")) == [*tracking, "adjusted", "filtered"]
     assert [each.name for each in BEFORE_TRACKING] == ["background", "actors", "initial_pose", "keypoint_bias"]
-    # a learnt background, actors that are doubtful by it, keypoints, things in front
-    conditional = {"relearnt", "remade", "keypoint_bias", "retracked"}
+    # a learnt background, actors that are doubtful by it, keypoints, things in front, actors that are not given
+    conditional = {"relearnt", "remade", "keypoint_bias", "retracked", "recolored"}
     named = {"background", "actors", *tracking, "adjusted", "filtered", "result", "files"}
     assert {each.name for each in PASSES} == named | conditional
 

@@ -3,21 +3,24 @@
 A limb that was not found in the frames that an actor is made of may be found while tracking, or the other way round.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import islice
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from sogjax.actor.colors import ColoredView, Samples, all_samples, colors_of, joined_samples
 from sogjax.actor.limb_colors import limb_pairs_alike
 from sogjax.io.motion import Motion
 from sogjax.io.recording import Recording
 from sogjax.io.video import read_chosen
-from sogjax.model.body import Body
+from sogjax.model.body import Body, concatenate
 from sogjax.model.camera import camera_of
 from sogjax.model.limbs import limb_names
 
+Masks = Sequence[Bool[np.ndarray, "_height _width"]]
+"""A mask of each camera's pictures."""
 NUM_LOOKED_AT = 10
 """Frames, spread over the motion."""
 UNLIKE = 0.045
@@ -25,30 +28,35 @@ UNLIKE = 0.045
 `experiments/clip_sides.py`: 14 of 22 pairs of arms of which one was lost are beyond, and none of 45 others."""
 
 
-def colors_by_frame(recording: Recording, actors: Mapping[str, tuple[Body, Motion]]) -> dict[str, dict[int, Samples]]:
+def colors_by_frame(
+    recording: Recording, actors: Mapping[str, tuple[Body, Motion]], free: Masks | None = None
+) -> dict[str, dict[int, Samples]]:
     """What some frames, by their numbers, show of every blob of each actor, by the actors' names.
 
     Args:
         recording: that is read.
-        actors: bodies, upright in the recording's world, and their motions.
+        actors: bodies, upright in the recording's world, and their motions; they hide each other.
+        free: where nothing stands in front, in the pictures of each camera; None: everywhere.
 
     Raises:
         InputError: a video cannot be read.
     """
-    frames = next(iter(actors.values()))[1].frame
+    bodies, motions = zip(*actors.values(), strict=True)
+    frames, together = motions[0].frame, concatenate([*bodies])
     rows = np.unique(np.linspace(0, len(frames) - 1, NUM_LOOKED_AT).astype(int)).tolist()
-    numbers = {row: int(frames[row]) for row in rows}
-    shown = dict(read_chosen(recording, [*numbers.values()]))
-
-    def views(motion: Motion, row: int) -> list[ColoredView]:
-        pose = jnp.asarray(motion.pose[row], jnp.float32)
-        images = enumerate(shown[numbers[row]])
-        return [ColoredView(camera_of(recording.rig.cameras, k), i, None, pose) for k, i in images if i is not None]
-
-    return {
-        name: {number: all_samples(body, views(motion, row)) for row, number in numbers.items()}
-        for name, (body, motion) in actors.items()
-    }
+    shown = dict(read_chosen(recording, [int(frames[row]) for row in rows]))
+    found: dict[str, dict[int, Samples]] = {name: {} for name in actors}
+    for row in rows:
+        pose = jnp.asarray(np.concatenate([motion.pose[row] for motion in motions]), jnp.float32)
+        views = [
+            ColoredView(camera_of(recording.rig.cameras, k), image, None if free is None else free[k], pose)
+            for k, image in enumerate(shown[int(frames[row])])
+            if image is not None
+        ]
+        samples = iter(all_samples(together, views))
+        for name, (body, _) in actors.items():
+            found[name][int(frames[row])] = [*islice(samples, body.num_blobs)]
+    return found
 
 
 def colors_apart(

@@ -150,6 +150,7 @@ def track_forward(
     kept: FrameTable | None = None,
     streams: ResultStreams | None = None,
     beforehand: Told = lambda *_: None,
+    again: bool = False,
 ) -> FrameTable:
     """All frames of the clip, tracked from the initial pose.
 
@@ -161,6 +162,7 @@ def track_forward(
         kept: rows of an earlier process, in the log already; after them the run is resumed.
         streams: files that show the frames, written as they come.
         beforehand: what is done beside tracking from the first frame on, for later passes.
+        again: whether the clip was tracked before, so that somebody else would have been noticed.
 
     Raises:
         InputError: a video ends early, a picture has too many image blobs, or a file cannot be written.
@@ -183,7 +185,7 @@ def track_forward(
                 turn(TRACKING)
                 return_freed_memory()
                 limbs = done.tracked.result.limbs
-                if limbs is not None and limbs.explained is not None and kept is None:
+                if limbs is not None and limbs.explained is not None and kept is None and not again:
                     say_if_other_subject(setup.bodies, np.asarray(limbs.explained))
         turn(WRITING)
     return_freed_memory()

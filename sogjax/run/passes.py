@@ -103,7 +103,7 @@ def _remade(run: Run) -> RemadeActors:
 
 def _recolored(run: Run) -> RecoloredActors:
     space, both_ways = run.actor_request.color_space, run.config.tracking.both_ways
-    return recolor_actors(run.setup, run.actors, run.frames, space, both_ways)
+    return recolor_actors(run.setup, run.actors, run.frames, space, run.setup_with, both_ways)
 
 
 def _tracked(run: Run) -> Tracked:
@@ -175,7 +175,7 @@ PASSES: tuple[Pass, ...] = (
     ),  # which seldom changes frames
     Pass(
         "recolored",
-        TRACKING,
+        BOTH_WAYS,
         _recolored,
         RecoloredActors,
         wanted=lambda run: run.tracks and run.recolors_actors,

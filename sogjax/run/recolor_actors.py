@@ -1,17 +1,18 @@
-"""Actors whose limbs take the colours that they show where they were tracked, with which the clip is tracked again.
+"""Actors whose doubtful limbs are recoloured from the clip, which is tracked again with them.
 
-An arm that was not found in the frames that an actor is made of took the colours of what is there. Over the clip it was
-mostly found, and of left and right, frame by frame, what is alike tells the colours of both.
+An arm that was not found in the frames that its actor is made of has the colours of what was seen in its place. Over
+the clip it was mostly found; its colours come from the frames in which left and right agree.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from sogjax.actor.colors import Samples, colored, colors_of, joined_samples
-from sogjax.actor.limb_colors import agreed_samples, limb_pairs_alike
+from sogjax.actor.limb_colors import LEAST_SEEN, agreed_samples, limb_pairs_alike
+from sogjax.errors import InputError
 from sogjax.io.files import write_json
 from sogjax.io.frame_motions import ClipFacts, motions_of
 from sogjax.io.frame_table import FramesRecord, FrameTable
@@ -24,12 +25,12 @@ from sogjax.quality.limb_warnings import doubtful_limbs
 from sogjax.quality.passages import passages
 from sogjax.run.actors import Actors
 from sogjax.run.adjust_colors import more_doubtful
-from sogjax.run.clip_sides import colors_by_frame
+from sogjax.run.clip_sides import Masks, colors_by_frame
 from sogjax.run.clock import StageTimes
 from sogjax.run.forward import track_forward
 from sogjax.run.initial_pose import InitialPose
 from sogjax.run.merge import merge_backward
-from sogjax.run.setup import Setup, with_bodies
+from sogjax.run.setup import Setup
 from sogjax.run.terminal import say
 
 FOLDER, LAST = "recolored", "made.json"
@@ -41,7 +42,7 @@ OTHER = 0.08
 
 @dataclass(frozen=True)
 class RecoloredActors(FramesRecord):
-    """The frames, tracked again with the actors' new colours, if these doubt less."""
+    """The frames, tracked again with the actors' new colours, unless limbs are more doubtful then."""
 
     actors: Actors | None = None
     """In new colours; None: the old ones hold, and the frames are as they were."""
@@ -64,49 +65,68 @@ class RecoloredActors(FramesRecord):
 
 
 def recolor_actors(
-    setup: Setup, actors: Actors, tracked: FrameTable, color_space: str, both_ways: bool
+    setup: Setup,
+    actors: Actors,
+    tracked: FrameTable,
+    color_space: str,
+    setup_with: Callable[[Actors], Setup],
+    both_ways: bool,
 ) -> RecoloredActors:
     """The clip tracked again with limbs in the colours that they show in it, where these are others than the actors'.
+
+    Where a pass fails, the frames are as they were, which is said.
 
     Args:
         setup: what was tracked with.
         actors: of it, each in its own upright frame.
         tracked: the frames.
         color_space: in which colours are averaged.
+        setup_with: makes the setup of other actors.
         both_ways: whether limbs are searched over the clip then, as before.
-
-    Raises:
-        InputError: a video cannot be read, or a picture has too many image blobs.
     """
     motions = motions_of(tracked, setup.bodies, ClipFacts.of(setup.clip.recording))
+    said = dict(zip(motions, actors.unlike, strict=False))
     of_actors = {body.name: (body, motions[body.name]) for body in setup.bodies}
-    said = dict(zip(of_actors, actors.unlike, strict=False))
     named = {name: named_limbs(*of_actor, said.get(name, "")) for name, of_actor in of_actors.items()}
     if not any(named.values()):
         return RecoloredActors(tracked)
-    shown = colors_by_frame(setup.clip.recording, of_actors)
-    found = [recolored(body, named[body.name], shown[body.name], color_space) for body in setup.bodies]
-    told = [f"{body.name}: {', '.join(taken)}" for body, taken in found if taken]
-    if not told:
+    try:
+        shown = colors_by_frame(setup.clip.recording, of_actors, free_of_things(setup))
+        new, told = _in_new_colors(setup.bodies, actors, named, shown, color_space)
+        if not told:
+            return RecoloredActors(tracked)
+        say(f"tracking again, since limbs have other colours in the clip than the actors have ({'; '.join(told)})")
+        again, row = setup_with(new), surest_row(tracked)
+        begin = InitialPose(setup.clip.numbers[row], np.asarray(tracked.pose[row]), TRACKED)
+        table = track_forward(again, begin, StageTimes(), again=True)
+        table = merge_backward(again, table, tracked.pose).table if both_ways else table
+    except InputError as error:
+        say(f"warning: limbs keep the actors' colours: {error}")
         return RecoloredActors(tracked)
-    say(f"tracked again with the colours that limbs show where they were tracked ({'; '.join(told)})")
-    bodies = tuple(body for body, _ in found)
-    again, row = with_bodies(setup, bodies), surest_row(tracked)
-    begin = InitialPose(setup.clip.numbers[row], np.asarray(tracked.pose[row]), TRACKED)
-    table = track_forward(again, begin, StageTimes())
-    table = merge_backward(again, table, tracked.pose).table if both_ways else table
     if more_doubtful(table, tracked):
         say("the clip stays as it was, since limbs are more doubtful in the new colours")
         return RecoloredActors(tracked)
-    pairs = zip(actors.bodies, bodies, strict=True)
-    new = tuple(colored(actor, np.asarray(body.blob_colors, float)) for actor, body in pairs)
-    return RecoloredActors(table, replace(actors, bodies=new))
+    return RecoloredActors(table, new)
 
 
 def named_limbs(body: Body, motion: Motion, unlike: str) -> set[str]:
-    """The limbs that a verdict would name: in doubt, jumping, through others, or not found in the actor's frames."""
-    said = [*map(str, doubtful_limbs(motion)), *jumps(body, motion), *passages(body, motion), unlike]
-    return {name for name in limb_names(body) if any(name in sentence for sentence in said)}
+    """The limbs with a counterpart that a verdict would name, but for those that something hides.
+
+    They are in doubt, jump, are through others, or were not found in the frames of the actor.
+    """
+    doubts = [str(limb) for limb in doubtful_limbs(motion) if not limb.hidden]
+    said, names = [*doubts, *jumps(body, motion), *passages(body, motion), unlike], limb_names(body)
+    paired = {names[k] for pair in limb_pairs_alike(body) for k in pair.limbs}
+    return {name for name in paired if any(name in sentence for sentence in said)}
+
+
+def free_of_things(setup: Setup) -> Masks | None:
+    """Where nothing stands in front, in the pictures of each camera; None: nothing does anywhere."""
+    occluders = setup.tracker.reader.occluders
+    if occluders is None:
+        return None
+    free = np.isinf(np.asarray(occluders.cells))
+    return [grid.enlarged(free[k, : grid.rows, : grid.columns]) for k, grid in enumerate(setup.clip.grids)]
 
 
 def surest_row(table: FrameTable) -> int:
@@ -114,25 +134,38 @@ def surest_row(table: FrameTable) -> int:
     return 0 if table.limb_doubt is None else int(np.argmin(np.max(table.limb_doubt, axis=1, initial=0.0)))
 
 
+def _in_new_colors(
+    bodies: Sequence[Body],
+    actors: Actors,
+    named: Mapping[str, set[str]],
+    shown: Mapping[str, Mapping[int, Samples]],
+    color_space: str,
+) -> tuple[Actors, list[str]]:
+    """The actors in the colours that their named limbs show, and what to say of them."""
+    new, told = list[Body](), list[str]()
+    for body, actor in zip(bodies, actors.bodies, strict=True):
+        other, taken = recolored(body, named[body.name], shown[body.name], color_space)
+        new.append(colored(actor, np.asarray(other.blob_colors, float)) if taken else actor)
+        told += [f"{body.name}: {', '.join(taken)}"] if taken else []
+    return replace(actors, bodies=tuple(new)), told
+
+
 def recolored(body: Body, named: set[str], by_frame: Mapping[int, Samples], color_space: str) -> tuple[Body, list[str]]:
     """A body whose named limbs have the colours that frames show of them, if these are others; and which these are.
 
-    A limb goes with its counterpart. Pairs that are unlike in most frames keep theirs.
+    A limb goes with its counterpart. Pairs that are unlike in most frames keep theirs, and those that are hardly seen.
     """
     samples = [*by_frame.values()]
-    shown = colors_of(body, joined_samples(samples), color_space).colors
-    agreed = agreed_samples(body, samples, shown)
-    shown, own, names = (
-        colors_of(body, agreed.samples, color_space).colors,
-        np.asarray(body.blob_colors),
-        limb_names(body),
-    )
-    new, taken = own.copy(), list[str]()
+    agreed = agreed_samples(body, samples, colors_of(body, joined_samples(samples), color_space).colors)
+    shown, own = colors_of(body, agreed.samples, color_space), np.asarray(body.blob_colors, float)
+    new, names, taken = own.copy(), limb_names(body), list[str]()
     for pair in limb_pairs_alike(body):
         both = [names[k] for k in pair.limbs]
-        off = max(np.linalg.norm(own[blobs] - shown[blobs], axis=1).mean() for blobs in pair.blobs)
-        if off > OTHER and named.intersection(both) and pair.limbs not in [each.limbs for each in agreed.unlike]:
+        off = max(np.linalg.norm(own[blobs] - shown.colors[blobs], axis=1).mean() for blobs in pair.blobs)
+        seen = min(shown.shown[blobs].mean() for blobs in pair.blobs) >= LEAST_SEEN
+        alike = pair.limbs not in [each.limbs for each in agreed.unlike]
+        if off > OTHER and seen and alike and named.intersection(both):
             taken.append(" and ".join(both))
             for blobs in pair.blobs:
-                new[blobs] = shown[blobs]
-    return (colored(body, np.asarray(new, float)) if taken else body), taken
+                new[blobs] = shown.colors[blobs]
+    return (colored(body, new) if taken else body), taken

@@ -65,6 +65,7 @@ class Run:
 
     def __post_init__(self) -> None:
         self._lock = RLock()
+        self.actors_given = "actors" in self.records
         self._first_setup: tuple[Actors | None, Setup | None] = (None, None)
         self._setup: tuple[list[Any], Setup | None] = ([None] * 4, None)
 
@@ -112,11 +113,19 @@ class Run:
 
     @property
     def recolors_actors(self) -> bool:
-        """Whether the actors were made of this recording, by this run.
+        """Whether this run made the actors, of frames that nobody chose.
 
         Not where the initial pose comes from elsewhere, as for `remakes_actors`.
         """
-        return self.makes_actors and self.pose_sources is SOURCES
+        made = self.makes_actors and not self.actors_given and not self.clip.recording.example_poses
+        return made and self.pose_sources is SOURCES
+
+    def setup_with(self, actors: Actors) -> Setup:
+        """What is tracked with, knowing what was learnt so far, with other actors."""
+        made = tracking_setup(self.clip, self.background, actors.bodies, self.config, self.terms)
+        for record in self._learnt:
+            made = made if record is None else record.in_setup(made)
+        return made
 
     @property
     def adjusted(self) -> Adjusted | None:
@@ -148,8 +157,7 @@ class Run:
     def setup(self) -> Setup:
         """What is tracked with, knowing what was learnt so far."""
         with self._lock:  # a thread makes it while the initial pose is searched for
-            first = self.first_setup
-            learnt = [self.records.get(name) for name in ("relearnt", "occluders", "keypoint_bias")]
+            first, learnt = self.first_setup, self._learnt
             known, made = self._setup
             if made is None or any(now is not before for now, before in zip([first, *learnt], known, strict=True)):
                 made = first
@@ -157,6 +165,11 @@ class Run:
                     made = made if record is None else record.in_setup(made)
                 self._setup = [first, *learnt], made
             return made
+
+    @property
+    def _learnt(self) -> list[Any]:
+        """What passes learnt that the tracker is to know; None: nothing, or not yet."""
+        return [self.records.get(name) for name in ("relearnt", "occluders", "keypoint_bias")]
 
     @property
     def hides_something(self) -> bool:

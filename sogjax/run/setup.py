@@ -1,7 +1,7 @@
 """What frames are tracked with: the clip, the actors as they stand in its world, and the tracker made for them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from sogjax.energy.term import Term
 from sogjax.model.body import Body, concatenate
@@ -34,11 +34,6 @@ def tracking_setup(
     body = concatenate(list(bodies))
     terms = (*terms, *keypoint_terms(clip.keypoints, body, config))
     return Setup(clip, bodies, build.tracker(clip, background, body, config, terms))
-
-
-def with_bodies(setup: Setup, bodies: tuple[Body, ...]) -> Setup:
-    """The setup for the same actors in other colours, or of other sizes."""
-    return replace(setup, bodies=bodies, tracker=replace(setup.tracker, body=concatenate(list(bodies))))
 
 
 def compile_beforehand(setup: Setup) -> None:

@@ -109,7 +109,7 @@ def merge_passes(
     own = {name: getattr(passed, name).copy() for name in ("poses", "doubts", "energies")}
     revising = _Revising(tracker, replace(passed, **own), frames)
     if known is not None:
-        revising.take_known(known)
+        revising.take_known(known, misplaced)
     if misplaced is not None:
         revising.place_actors(misplaced)
     revising.turn_actors(turning_rows)
@@ -162,13 +162,24 @@ class _Revising:
             self._search_limbs(search, lost, unreported)
         self._looked_at = 0  # what comes backwards from behind doubts may look at as much
 
-    def take_known(self, poses: Float[np.ndarray, "frame dof"]) -> None:
-        """Take what the poses of another pass of the clip explain better."""
-        for first in range(0, len(poses), MOST_FRAMES):
-            rows = range(first, min(first + MOST_FRAMES, len(poses)))
-            self.take(compared_known(self.tracker, self.passed, self.frames, self.parts, rows, poses))
+    def take_known(self, poses: Float[np.ndarray, "frame dof"], misplaced: Misplaced | None) -> None:
+        """Take what the poses of another pass of the clip explain better, by stretches in which the passes differ."""
+        blobs, least = PartArrays.of(self.tracker.body, self.parts).blobs, fitted_numbers().merge_passes.compared
+        both = zip(map(jnp.asarray, self.passed.poses), map(jnp.asarray, poses), strict=True)
+        differ = np.array([np.max(parts_apart(self.tracker.body, blobs, *pair), initial=0.0) > least for pair in both])
+        for first, stop in stretches(differ, gap=SURE_FRAMES):
+            for begin in range(max(first - 1, 0), stop, MOST_FRAMES):
+                rows = range(begin, min(begin + MOST_FRAMES, stop + 1, len(poses)))
+                self.take(compared_known(self.tracker, self.passed, self.frames, self.parts, rows, poses))
+        self._note_explained(misplaced)
         self._changed.clear()
         self._looked_at = 0
+
+    def _note_explained(self, misplaced: Misplaced | None) -> None:
+        """Tell the search for misplaced actors what is explained of them in frames that changed."""
+        if misplaced is not None:
+            for changed in self._changed:
+                misplaced.explained[changed] = self.revision.frames[changed].judged.explained
 
     def place_actors(self, misplaced: Misplaced) -> None:
         """See where it leads if an actor of whom little is explained is where he is found again."""
@@ -180,8 +191,7 @@ class _Revising:
             pose = misplaced.pose(search, self._frame(row), self.passed, row, actor)
             if pose is not None:
                 self._pass_from(search, row, pose, TURNED_PATIENCE)
-                for changed in self._changed:
-                    misplaced.explained[changed] = self.revision.frames[changed].judged.explained
+                self._note_explained(misplaced)
         self._changed.clear()
         self._looked_at = 0
 
