@@ -66,6 +66,12 @@ def test_an_arm_that_was_not_found_takes_the_colours_that_it_shows_over_the_clip
     np.testing.assert_allclose(body.blob_colors, person(expected, expected).blob_colors, atol=0.02)
 
 
+@pytest.mark.parametrize(("left", "taken"), [(0.7 * SKIN, True), (RED, False)])
+def test_sleeves_that_differ_are_taken_where_those_of_the_actor_differ_far_more(left, taken):
+    frames = shown(*[(left, SKIN)] * FRAMES)
+    assert bool(recolored(person(BLUE, SKIN), {"left arm"}, frames, "lab")[1]) == taken
+
+
 @pytest.mark.parametrize(("named", "arms"), [("left arm", (0.95 * SKIN, SKIN)), ("left leg", (RED, RED))])
 def test_who_looks_as_he_did_keeps_his_colours_and_so_do_limbs_that_nothing_is_said_of(named, arms):
     body, told = recolored(person(SKIN, SKIN), {named}, shown(*[arms] * FRAMES), "lab")

@@ -34,6 +34,8 @@ from sogjax.run.setup import Setup
 from sogjax.run.terminal import say
 
 FOLDER, LAST = "recolored", "made.json"
+MORE_ALIKE = 0.5
+"""Part of how far the actor's left and right are apart from which on those of the clip are far more alike."""
 TRACKED = "the clip as it was tracked"
 """Source of the pose with which tracking begins again."""
 OTHER = 0.08
@@ -153,7 +155,8 @@ def _in_new_colors(
 def recolored(body: Body, named: set[str], by_frame: Mapping[int, Samples], color_space: str) -> tuple[Body, list[str]]:
     """A body whose named limbs have the colours that frames show of them, if these are others; and which these are.
 
-    A limb goes with its counterpart. Pairs that are unlike in most frames keep theirs, and those that are hardly seen.
+    A limb goes with its counterpart. Pairs that are unlike in most frames keep theirs, unless they are far less so than
+    in the actor, and so do those that are hardly seen.
     """
     samples = [*by_frame.values()]
     agreed = agreed_samples(body, samples, colors_of(body, joined_samples(samples), color_space).colors)
@@ -164,6 +167,7 @@ def recolored(body: Body, named: set[str], by_frame: Mapping[int, Samples], colo
         off = max(np.linalg.norm(own[blobs] - shown.colors[blobs], axis=1).mean() for blobs in pair.blobs)
         seen = min(shown.shown[blobs].mean() for blobs in pair.blobs) >= LEAST_SEEN
         alike = pair.limbs not in [each.limbs for each in agreed.unlike]
+        alike |= pair.apart(shown.colors) < MORE_ALIKE * pair.apart(own)
         if off > OTHER and seen and alike and named.intersection(both):
             taken.append(" and ".join(both))
             for blobs in pair.blobs:
