@@ -165,20 +165,23 @@ def test_videos_that_cannot_be_read_once_more_end_no_run(monkeypatch, capsys):
     assert "keep the actors' colours: cam0.mp4: is gone" in "".join(capsys.readouterr())
 
 
-def test_limbs_are_named_that_the_verdict_would_name_unless_something_hides_them(monkeypatch):
-    motion = motion_from_poses(DOG, POSE, 25.0, limb_names=limb_names(DOG))
-    doubts, nothing = np.zeros((FRAMES, LIMBS)), np.zeros((FRAMES, LIMBS))
-    assert named_limbs(DOG, replace(motion, limb_doubt=doubts), "") == set()
-    assert named_limbs(DOG, replace(motion, limb_doubt=doubts), f"{LEG} was not found") == {LEG}
-    monkeypatch.setattr(recolor_actors, "jumps", lambda *_: [f"look at frames 1-2, {LEG} jumps"])
-    assert named_limbs(DOG, replace(motion, limb_doubt=doubts), "") == {LEG}
-    monkeypatch.setattr(recolor_actors, "jumps", lambda *_: [])
-    monkeypatch.setattr(recolor_actors, "passages", lambda *_: [f"look at frames 1-2, {LEG} through the trunk"])
-    assert named_limbs(DOG, replace(motion, limb_doubt=doubts), "") == {LEG}
-    monkeypatch.setattr(recolor_actors, "passages", lambda *_: [])
-    doubts[:, limb_names(DOG).index(LEG)] = 0.9
-    assert named_limbs(DOG, replace(motion, limb_doubt=doubts, limb_hidden=nothing), "") == {LEG}
-    assert named_limbs(DOG, replace(motion, limb_doubt=doubts, limb_hidden=nothing + 1.0), "") == set()
+@pytest.mark.parametrize(
+    ("frames", "hidden", "unlike", "named"),
+    [
+        (0, 0.0, "", False),
+        (0, 0.0, f"{LEG} was not found", True),
+        (1, 0.0, "", False),  # of thirty
+        (2, 0.0, "", True),
+        (2, 1.0, "", False),
+    ],
+)
+def test_limbs_are_named_that_are_often_in_doubt_unless_something_hides_them(frames, hidden, unlike, named):
+    motion = motion_from_poses(DOG, np.zeros((30, DOG.skeleton.num_dofs)), 25.0, limb_names=limb_names(DOG))
+    doubts = np.zeros((30, LIMBS))
+    doubts[:frames, limb_names(DOG).index(LEG)] = 0.9
+    motion = replace(motion, limb_doubt=doubts, limb_hidden=np.full((30, LIMBS), hidden))
+    assert named_limbs(DOG, motion, unlike) == ({LEG} if named else set())
+    assert named_limbs(DOG, replace(motion, limb_doubt=None, limb_hidden=None), "") == set()
 
 
 @pytest.mark.parametrize("actors", [None, UNLIKE])

@@ -20,9 +20,7 @@ from sogjax.io.motion import Motion
 from sogjax.io.npz_file import read_npz, save_npz
 from sogjax.model.body import Body
 from sogjax.model.limbs import limb_names
-from sogjax.quality.jumps import jumps
-from sogjax.quality.limb_warnings import doubtful_limbs
-from sogjax.quality.passages import passages
+from sogjax.quality.limb_warnings import HIDDEN, in_doubt
 from sogjax.run.actors import Actors
 from sogjax.run.adjust_colors import more_doubtful
 from sogjax.run.clip_sides import Masks, colors_by_frame
@@ -34,6 +32,8 @@ from sogjax.run.setup import Setup
 from sogjax.run.terminal import say
 
 FOLDER, LAST = "recolored", "made.json"
+OFTEN = 0.05
+"""Part of the frames in which a limb must be in doubt: less is not worth tracking a clip again."""
 MORE_ALIKE = 0.5
 """Part of how far the actor's left and right are apart from which on those of the clip are far more alike."""
 TRACKED = "the clip as it was tracked"
@@ -112,14 +112,14 @@ def recolor_actors(
 
 
 def named_limbs(body: Body, motion: Motion, unlike: str) -> set[str]:
-    """The limbs with a counterpart that a verdict would name, but for those that something hides.
-
-    They are in doubt, jump, are through others, or were not found in the frames of the actor.
-    """
-    doubts = [str(limb) for limb in doubtful_limbs(motion) if not limb.hidden]
-    said, names = [*doubts, *jumps(body, motion), *passages(body, motion), unlike], limb_names(body)
-    paired = {names[k] for pair in limb_pairs_alike(body) for k in pair.limbs}
-    return {name for name in paired if any(name in sentence for sentence in said)}
+    """The limbs with a counterpart that are often in doubt, where nothing hides them, or are said to be `unlike`."""
+    names = limb_names(body)
+    doubted = in_doubt(motion) if motion.limb_doubt is not None else np.zeros((1, len(names)), bool)
+    if motion.limb_hidden is not None:
+        doubted &= motion.limb_hidden <= HIDDEN
+    often = np.mean(doubted, axis=0) >= OFTEN
+    paired = [k for pair in limb_pairs_alike(body) for k in pair.limbs]
+    return {names[k] for k in paired if often[k] or names[k] in unlike}
 
 
 def free_of_things(setup: Setup) -> Masks | None:
