@@ -122,10 +122,7 @@ class Run:
 
     def setup_with(self, actors: Actors) -> Setup:
         """What is tracked with, knowing what was learnt so far, with other actors."""
-        made = tracking_setup(self.clip, self.background, actors.bodies, self.config, self.terms)
-        for record in self._learnt:
-            made = made if record is None else record.in_setup(made)
-        return made
+        return self._knowing(tracking_setup(self.clip, self.background, actors.bodies, self.config, self.terms))
 
     @property
     def adjusted(self) -> Adjusted | None:
@@ -160,9 +157,7 @@ class Run:
             first, learnt = self.first_setup, self._learnt
             known, made = self._setup
             if made is None or any(now is not before for now, before in zip([first, *learnt], known, strict=True)):
-                made = first
-                for record in learnt:
-                    made = made if record is None else record.in_setup(made)
+                made = self._knowing(first)
                 self._setup = [first, *learnt], made
             return made
 
@@ -170,6 +165,12 @@ class Run:
     def _learnt(self) -> list[Any]:
         """What passes learnt that the tracker is to know; None: nothing, or not yet."""
         return [self.records.get(name) for name in ("relearnt", "occluders", "keypoint_bias")]
+
+    def _knowing(self, setup: Setup) -> Setup:
+        """A setup that knows what was learnt so far."""
+        for record in self._learnt:
+            setup = setup if record is None else record.in_setup(setup)
+        return setup
 
     @property
     def hides_something(self) -> bool:
