@@ -29,9 +29,9 @@ from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import AnyFrame, FrameInput, TrackState, on_device
 from sogjax.tracking.tracker import Tracker
 
-NUM_CLIMBED = 4
+NUM_CLIMBED = 8
 """Different ways that are climbed, the tracked one among them."""
-ITERATIONS = 5
+ITERATIONS = 12
 APART = 0.08
 """Metres, mean over the blobs of the limb that differs more: ways to hold a unit that count as different."""
 LARGEST_ANGLE = 0.3

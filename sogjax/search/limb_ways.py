@@ -18,7 +18,7 @@ from sogjax.model.limbs import limb_blobs, limb_names, limbs
 from sogjax.search.body_parts import limb_groups
 from sogjax.search.mirrored import fitted_to_blobs, other_side
 
-NUM_DRAWN = 23
+NUM_DRAWN = 100
 """Ways to hold a unit that are drawn in a frame; another frame draws others."""
 FIT_ITERATIONS = 5
 SMALL_RANGE = 0.9
