@@ -159,6 +159,18 @@ def test_signs_of_the_humans_degrees_of_freedom(dof):
     assert sign * moved[axis] > 0.01
 
 
+def test_the_shoulder_rises_with_the_arm():
+    """By about 5 cm with the arm overhead; pulled to rest, an arm overhead bent at the elbow instead."""
+    human = shipped("human")
+    rest, overhead = (
+        landmarks(human, values) for values in ({}, {"left_shoulder_raise": 2.89, "left_shoulder_swing": -0.24})
+    )
+    upper_arm = overhead["left_elbow"] - overhead["left_shoulder"]
+    np.testing.assert_allclose(upper_arm / np.linalg.norm(upper_arm), [0, 0, 1], atol=5e-3)
+    assert overhead["left_shoulder"][UP] - rest["left_shoulder"][UP] == pytest.approx(0.05, abs=0.01)
+    np.testing.assert_allclose(overhead["right_shoulder"], rest["right_shoulder"], atol=1e-6)
+
+
 @pytest.mark.parametrize(
     "arm",
     [{}, {"raise": 1.57, "swing": -0.785}, {"raise": 1.57, "swing": 0.785}, {"raise": 3.14}, {"raise": 2.4}],
