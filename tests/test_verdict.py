@@ -126,11 +126,11 @@ def test_another_subject_is_told_at_the_first_frame(capsys):
     assert capsys.readouterr().err == ""
 
 
-@pytest.mark.parametrize("likely", [0.9, 0.45])
+@pytest.mark.parametrize("likely", [0.9, 0.4])
 def test_limbs_in_doubt_are_named(walk, likely):
-    doubt = np.full((walk.num_frames, 2), 0.35)
+    doubt = np.full((walk.num_frames, 2), 0.3)
     doubt[3:9, 1] = likely
-    doubt[15:17, 0] = likely  # for too few frames
+    doubt[15:18, 0] = likely  # for too few frames
     motion = replace(judged(walk), limb_names=np.array(["head", "left arm"]), limb_doubt=doubt)
     assert of_one(motion).sentence == f"look at frames {walk.frame[3]}-{walk.frame[8]}, left arm"
 

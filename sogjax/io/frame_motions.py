@@ -27,7 +27,7 @@ PARTIAL = "run.partial"
 """The folder itself, in that of the results."""
 
 
-MOSTLY_HIDDEN = 0.7
+MOSTLY_HIDDEN = 0.76
 """Part of a limb that must be hidden from the cameras for its place to be doubted, the more the less is seen."""
 UNSEEN_DOUBT = 0.6
 """Doubt of a limb that no camera sees: it is kept by prediction and limits, which is more likely wrong than right."""

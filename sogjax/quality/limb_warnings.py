@@ -17,7 +17,7 @@ from sogjax.model.reach import told_dofs
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.metrics import stretches
 
-AT_LEAST = 3
+AT_LEAST = 4
 """Frames: shorter stretches are not reported, and shorter gaps between them do not count."""
 HIDDEN = 0.7
 """Part of a limb, mean over a stretch, whose being hidden is the cause of the doubt."""
