@@ -173,7 +173,7 @@ def test_the_shoulder_rises_with_the_arm():
 
 @pytest.mark.parametrize(
     "arm",
-    [{}, {"raise": 1.57, "swing": -0.785}, {"raise": 1.57, "swing": 0.785}, {"raise": 3.14}, {"raise": 2.4}],
+    [{}, {"raise": 1.345, "swing": -0.772}, {"raise": 1.57, "swing": 0.785}, {"raise": 2.89}, {"raise": 2.4}],
     ids=["hanging", "sideways", "forward", "overhead", "raised"],
 )
 def test_the_shoulder_is_far_from_singular_where_arms_are(arm):

@@ -91,7 +91,7 @@ def test_colours_tell_lost_limbs_from_sure_ones():
 
 def test_the_page_names_the_limbs_that_the_verdict_names():
     doubt = np.full((6, len(NAMES)), 0.05)
-    doubt[:, 1], doubt[:, 2] = 0.45, 0.35
+    doubt[:, 1], doubt[:, 2] = 0.45, 0.3
     motion = replace(standing(frames=6), limb_doubt=doubt)
     verdict = verdicts({"anna": motion}, {})["anna"]
     actor = ActorOnPage(motion, HUMAN, verdict, None)

@@ -13,6 +13,7 @@ from rig_cases import black, opencv_pixels, recording_of, ring_rig
 
 from sogjax.errors import InputError
 from sogjax.io.ground_truth import GroundTruth
+from sogjax.quality.limb_warnings import in_doubt
 from sogjax.view.bones import bones_from_motion
 from sogjax.view.rerun.comparison import write_comparison, write_iterations
 from sogjax.view.rerun.curves import plots_with
@@ -167,7 +168,7 @@ def test_limbs_in_doubt_have_balls_around_their_joints(tmp_path, motion):
     found = read_back(tmp_path / "judged.rrd")
     radii = [row for row in found["/world/actors/ann/doubtful"]["Points3D:radii"] if row]
     drawn = bones_from_motion(motion).joints
-    assert len(radii) == int((doubt > 0.5).sum())
+    assert len(radii) == int(in_doubt(judged).sum())
     assert {len(row) for row in radii} == {int((left[drawn] == 0).sum())}
     assert radii[-1] == pytest.approx([0.06] * len(radii[-1]))
     assert np.allclose(np.ravel(found["/curves/doubts/doubt_left_arm"]["Scalars:scalars"]), doubt.ravel())

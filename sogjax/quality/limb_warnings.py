@@ -17,8 +17,8 @@ from sogjax.model.reach import told_dofs
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.metrics import stretches
 
-AT_LEAST = 4
-"""Frames: shorter stretches are not reported, and shorter gaps between them do not count."""
+AT_LEAST, GAP = 4, 3
+"""Frames: shorter stretches are not reported, and shorter gaps between doubts do not count."""
 HIDDEN = 0.7
 """Part of a limb, mean over a stretch, whose being hidden is the cause of the doubt."""
 
@@ -52,8 +52,8 @@ def in_doubt(motion: Motion, bound: float | None = None) -> Bool[np.ndarray, "fr
     return motion.limb_doubt > (fitted_numbers().verdict.limb_doubtful if bound is None else bound)
 
 
-def doubtful_limbs(motion: Motion, bound: float | None = None) -> tuple[DoubtfulLimb, ...]:
-    """All stretches, by their first frames; `bound` as in `in_doubt`."""
+def doubtful_limbs(motion: Motion, bound: float | None = None, at_least: int = AT_LEAST) -> tuple[DoubtfulLimb, ...]:
+    """All stretches of `at_least` so many frames, by their first frames; `bound` as in `in_doubt`."""
     if motion.limb_doubt is None or motion.limb_names is None:
         return ()
     hidden = np.zeros_like(motion.limb_doubt) if motion.limb_hidden is None else motion.limb_hidden
@@ -67,7 +67,7 @@ def doubtful_limbs(motion: Motion, bound: float | None = None) -> tuple[Doubtful
             bool(unseen[first:stop].mean() > HIDDEN),
         )
         for name, doubt, doubted, unseen in zip(*columns, strict=True)
-        for first, stop in stretches(doubted, AT_LEAST, gap=AT_LEAST)
+        for first, stop in stretches(doubted, at_least, gap=GAP)
     ]
     return tuple(sorted(found, key=lambda limb: (limb.first_frame, limb.name)))
 
