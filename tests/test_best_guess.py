@@ -70,6 +70,13 @@ def test_where_none_is_sure_the_likeliest_is_taken_and_said(drawn, capsys, tmp_p
     assert "no pose is sure in frames 0, 9: tracking begins with the likeliest (frame 0, 64 %)" in said
 
 
+def test_a_pose_that_lies_on_the_floor_must_be_the_likelier():
+    lying = lambda trunk: replace(found(trunk), upright=-0.26)
+    search = Searched({0: [found(0.99), found(0.54)], 59: [lying(0.86), found(0.99)]}, ("anna", "ben"))
+    assert best_guess(search).frame == 0
+    assert best_guess(Searched({0: [found(0.3)], 59: [lying(0.86)]})).frame == 59
+
+
 def test_several_actors_who_keep_what_they_explain_beside_the_others_are_searched_in_one_frame():
     search = Searched({0: [found(0.01), found(0.02)], 9: [found(1.0), found(1.0)]}, ("anna", "ben"))
     assert best_guess(search).frame == 0

@@ -41,6 +41,10 @@ NUM_PLACES = 12
 """Places that look most like an actor, of which one is to be near where a file says that he is."""
 ROOM = 1.0
 """Metres between two actors from which on neither is in the other's way."""
+LYING, SELDOM = 0.5, 0.5
+"""A body is lying, or upside down, below this cosine of the angle between its vertical and the world's; and by this
+factor a guess in which one is must be the likelier. Of two who danced before four cameras one was found in a shadow on
+the floor, 86 % likely, and both where they stood in another frame, 54 %."""
 NOTHING_LEFT = 0.1
 """An actor is not there if this part is left of what it explains, once the others are taken away. Of somebody who is
 hidden by others half is left, of a woman half of whom had become background a fourth; of nobody 0.02 at most."""
@@ -72,6 +76,11 @@ class Guess:
     def confidence(self) -> float:
         """That of the least sure trunk."""
         return min(pose.trunk for pose in self.poses)
+
+    @property
+    def likelihood(self) -> float:
+        """The confidence, less of those who are lying."""
+        return min(pose.trunk * (1.0 if pose.upright > LYING else SELDOM) for pose in self.poses)
 
 
 @dataclass(frozen=True)
@@ -251,7 +260,7 @@ def best_guess(search: ClipSearch, picture: Path | None = None) -> Guess:
     for _, frame in zip(range(MOST_TRIED), search.candidates(), strict=False):
         with alive(f"searching for the initial pose in frame {frame}") as work:
             guesses += search.guesses(frame, partial(setattr, work, "share"))
-        say_guess(names, max(guesses, key=lambda guess: guess.confidence))
+        say_guess(names, max(guesses, key=lambda guess: guess.likelihood))
         if any(guess.sure or guess.side_by_side for guess in guesses):
             break
     best = likeliest(guesses)
@@ -273,9 +282,9 @@ def best_guess(search: ClipSearch, picture: Path | None = None) -> Guess:
 
 
 def likeliest(guesses: Sequence[Guess]) -> Guess:
-    """That whose least sure trunk is surest, of those in which everybody is seen, if any."""
+    """That whose least sure trunk is surest, of those in which everybody is seen, if any; few people are lying."""
     seen = [guess for guess in guesses if all(pose.energy > 0.0 for pose in guess.poses)]
-    return max(seen or guesses, key=lambda guess: guess.confidence)
+    return max(seen or guesses, key=lambda guess: guess.likelihood)
 
 
 def nobody_there(guesses: Sequence[Guess], names: Sequence[str]) -> str | None:

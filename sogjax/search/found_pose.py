@@ -14,7 +14,7 @@ from sogjax.model.limbs import limb_blobs, limb_names
 from sogjax.search.cell_evidence import CellEvidence
 from sogjax.search.combination import trunk_blobs
 from sogjax.search.mirrored import sides_apart
-from sogjax.search.placed_body import means_of
+from sogjax.search.placed_body import means_of, uprightness
 from sogjax.search.pose_confidence import (
     SURE,
     Agreement,
@@ -52,6 +52,8 @@ class FoundPose:
     """How likely the trunk and each limb are right, 0 to 1, by name."""
     share: float = 1.0
     """What is left of the energy beside the other actors, as a part of the most that is found where they are not."""
+    upright: float = 1.0
+    """The cosine of the angle between the world's vertical and the body's: -1 upside down."""
 
     @property
     def trunk(self) -> float:
@@ -100,10 +102,11 @@ class Followed:
     energies: Float[np.ndarray, "frame hypothesis"]
 
 
-def judged(body: Body, paths: Followed, best: int, seen: CellEvidence, exchange: float, share: float) -> Path:
+def judged(body: Body, paths: Followed, best: int, seen: CellEvidence, exchange: float, share: float, up: str) -> Path:
     """One of the hypotheses that were followed, with how likely it and its parts are right.
 
-    `exchange` is how far it is behind that this is another actor, and `share` what others leave of the energy.
+    `exchange` is how far it is behind that this is another actor, `share` what others leave of the energy, and `up` the
+    world's vertical.
     """
     means = means_of(body, paths.poses[0])
     apart = np.linalg.norm(means - means[best], axis=-1)
@@ -121,8 +124,10 @@ def judged(body: Body, paths: Followed, best: int, seen: CellEvidence, exchange:
     parts |= {name: limb_confidence(evidence(blobs), float(explained)) for name, blobs, explained in limbs}
     parts = {name: max(part, likely) for name, part in parts.items()}
     energy = float(paths.energies[0, best])
+    pose = paths.poses[0, best]
+    upright = float(uprightness(body, pose[None], up)[0])
     found = FoundPose(
-        paths.poses[0, best], energy, whole.margin, likely >= SURE, likely, whole, parts=parts, share=share
+        pose, energy, whole.margin, likely >= SURE, likely, whole, parts=parts, share=share, upright=upright
     )
     return Path(found, paths.poses[:, best])
 

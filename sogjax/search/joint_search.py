@@ -121,7 +121,8 @@ def _paths_together(actors: list[Sought]) -> list[Path]:
         actor, pose = actors[k], first[k]
         frame = actor.given(0, [(actors[j], first[j]) for j in range(len(actors)) if j != k])
         seen = cell_evidence(actor.searcher, frame, pose)
-        return judged(actor.searcher.body, followed[k], best[k], seen, combined.exchange[k], combined.shares[k])
+        searcher, behind, left = actor.searcher, combined.exchange[k], combined.shares[k]
+        return judged(searcher.body, followed[k], best[k], seen, behind, left, searcher.up)
 
     return [judge(k) for k in range(len(actors))]
 
