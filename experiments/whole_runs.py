@@ -219,6 +219,7 @@ ROWS = (
     "cartwheel 1 4 plates 305",
     "walk 1 6 videos 306",
     "walk 3 12 videos 308",
+    "hug 2 8 videos 319 outfit=striped",
     "stoop 1 12 videos 321",
     "couple 2 12 videos 322",
     "run 1 12 plates 323",
