@@ -42,9 +42,9 @@ NUM_PLACES = 12
 ROOM = 1.0
 """Metres between two actors from which on neither is in the other's way."""
 LYING, SELDOM = 0.5, 0.5
-"""A body is lying, or upside down, below this cosine of the angle between its vertical and the world's; and by this
-factor a guess in which one is must be the likelier. Of two who danced before four cameras one was found in a shadow on
-the floor, 86 % likely, and both where they stood in another frame, 54 %."""
+"""Cosine of the angle between the vertical of the world and that of a body, below which it lies or is upside down; and
+what its likelihood is multiplied by then. Of two who danced before four cameras one was found in a shadow on the floor,
+86 % likely, and both where they stood in another frame, 54 %."""
 NOTHING_LEFT = 0.1
 """An actor is not there if this part is left of what it explains, once the others are taken away. Of somebody who is
 hidden by others half is left, of a woman half of whom had become background a fourth; of nobody 0.02 at most."""
@@ -79,7 +79,7 @@ class Guess:
 
     @property
     def likelihood(self) -> float:
-        """The confidence, less of those who are lying."""
+        """That of the least likely trunk: as the confidence, but less of who lies or is upside down."""
         return min(pose.trunk * (1.0 if pose.upright > LYING else SELDOM) for pose in self.poses)
 
 
