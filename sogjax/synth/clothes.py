@@ -98,10 +98,10 @@ class Wardrobe:
         """SRGB colours of surface points, given their part (index into PARTS) and bind position (metres)."""
         result = np.zeros((len(part), 3), np.float32)
         for k, name in enumerate(PARTS):
-            chosen = part == k
-            if chosen.any():
+            chosen = np.flatnonzero(part == k)
+            if len(chosen):
                 side, _, kind = name.rpartition("_")
-                result[chosen] = getattr(self, f"_{kind}")(rest[chosen], side)
+                result[chosen] = getattr(self, f"_{kind}")(np.take(rest, chosen, axis=0), side)
         return result
 
     def _local(self, joint: str, rest: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:

@@ -2,9 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
+import cv2
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from sogjax.synth.figure import Mesh
 from sogjax.synth.raster import Window, rasterize
@@ -99,16 +101,40 @@ class ShadowMap:
     def lit(self, points: Float[np.ndarray, "n 3"], taps: int = 8) -> Float[np.ndarray, "n"]:
         """Share of the lamp that reaches each point (world), 0..1."""
         local = ((points @ self.axes) - self.origin).astype(np.float32)
-        height, width = self.depths.shape
         limit = local[:, 2] - np.float32(self.bias)
-        count = np.zeros(len(points), np.float32)
+        places = local[:, :2].T * np.float32(1.0 / self.spacing)
+        at = self._cells(*(places + np.float32(0.5)).astype(np.int32))
+        first, last = (np.take(depths, at, mode="clip") for depths in self._around)
+        share = (first >= limit).astype(np.float32)  # where no tap can be in the dark
+        edge = np.flatnonzero((first < limit) & (last >= limit))
+        share[edge] = self._tapped(places[:, edge], limit[edge], taps)
+        return share
+
+    def _tapped(
+        self, places: Float[np.ndarray, "2 n"], limit: Float[np.ndarray, "n"], taps: int
+    ) -> Float[np.ndarray, "n"]:
+        """Share of the taps around places (in cells) where nothing stops the light before a limit."""
+        count = np.zeros(len(limit), np.float32)
         angles = 2.39996 * np.arange(taps)
         radii = self.spread * np.sqrt((np.arange(taps) + 0.5) / taps)
-        bordered = np.pad(self.depths, 1, constant_values=_FAR).ravel()  # nothing is in the way outside
-        places = local[:, :2].T * np.float32(1.0 / self.spacing)
         for angle, radius in zip(angles, radii, strict=True):
             shift = (radius * np.array([np.cos(angle), np.sin(angle)]) / self.spacing + 0.5).astype(np.float32)
-            x, y = (places + shift[:, None]).astype(np.int32)
-            at = (np.clip(y, -1, height) + 1) * (width + 2) + np.clip(x, -1, width) + 1
-            count += np.take(bordered, at, mode="clip") >= limit
+            at = self._cells(*(places + shift[:, None]).astype(np.int32))
+            count += np.take(self._bordered, at, mode="clip") >= limit
         return count / np.float32(taps)
+
+    def _cells(self, x: Int[np.ndarray, "n"], y: Int[np.ndarray, "n"]) -> Int[np.ndarray, "n"]:
+        """Where columns and rows are in the bordered map; nothing is in the way outside."""
+        height, width = self.depths.shape
+        return (np.clip(y, -1, height) + 1) * (width + 2) + np.clip(x, -1, width) + 1
+
+    @cached_property
+    def _bordered(self) -> Float[np.ndarray, "row column"]:
+        return np.pad(self.depths, 1, constant_values=_FAR)
+
+    @cached_property
+    def _around(self) -> tuple[Float[np.ndarray, "row column"], Float[np.ndarray, "row column"]]:
+        """The least and the greatest depth that a tap can meet around each cell."""
+        reach = 2 * (int(self.spread / self.spacing) + 1) + 1
+        kernel = np.ones((reach, reach), np.uint8)
+        return tuple(of(self._bordered, kernel, borderType=cv2.BORDER_REPLICATE) for of in (cv2.erode, cv2.dilate))

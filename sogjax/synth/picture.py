@@ -160,7 +160,7 @@ def _people_samples(
     for figure, mesh, (pixels, depths) in zip(people, meshes, projected, strict=True):
         hits = rasterize(pixels, depths, mesh.faces, window)
         front = hits.depths < nearest[hits.rows, hits.columns]
-        hits = hits.where(front)
+        hits = hits if front.all() else hits.where(front)
         nearest[hits.rows, hits.columns] = hits.depths
         colors[hits.rows, hits.columns] = _shaded(figure, mesh, hits, shadows)
         covered[hits.rows, hits.columns] = 1.0

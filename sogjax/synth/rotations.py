@@ -54,7 +54,8 @@ def frame(z: Iterable[float], towards_x: Iterable[float]) -> Matrix:
 
 def unit(vector: Float[np.ndarray, "*batch 3"]) -> Float[np.ndarray, "*batch 3"]:
     """The vectors at length one; a zero vector stays zero."""
-    return vector / np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), 1e-12)
+    x, y, z = (vector[..., k : k + 1] for k in range(3))
+    return vector / np.maximum(np.sqrt(x * x + y * y + z * z), 1e-12)
 
 
 def partial_twist(rotation: Matrix, share: float) -> Matrix:
