@@ -1,5 +1,6 @@
 """The commands end to end on a tiny recording, their help, and their exit statuses."""
 
+import gc
 import json
 import re
 import subprocess
@@ -13,7 +14,7 @@ from command_line import actor_file, done, refused, trackable
 from rendered_person import rendered_person
 from small_recording import write_video
 
-from sogjax.cli.main import main
+from sogjax.cli.main import RARELY, main, process
 from sogjax.cli.schemas import SCHEMAS
 from sogjax.cli.words import composed
 from sogjax.io.motion import load_motion
@@ -153,3 +154,16 @@ def test_exit_status_of_the_program(tmp_path):
     assert (wrong.returncode, wrong.stdout) == (2, "")
     assert wrong.stderr == "sogjax: nowhere: there is no such folder; give the folder of a recording\n"
     assert run("--version").returncode == 0
+
+
+def test_a_process_looks_at_all_its_garbage_rarely_and_not_when_it_ends(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["sogjax", "trak"])
+    before = gc.get_threshold()
+    try:
+        assert process() == 2
+        assert gc.get_threshold() == (*before[:2], RARELY)
+        assert gc.get_freeze_count() > 0
+    finally:
+        gc.unfreeze()
+        gc.set_threshold(*before)
+    assert "trak" in capsys.readouterr().err

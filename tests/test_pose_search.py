@@ -22,7 +22,15 @@ from sogjax.search.joint_search import search_poses
 from sogjax.search.mirrored import look_alikes, other_side, sides_apart
 from sogjax.search.placed_body import centres_of, turns_with_vertical
 from sogjax.search.pose_confidence import SURE, Agreement, PoseEvidence, agreed_confidence, pose_confidence
-from sogjax.search.pose_search import Hypotheses, PlacedSearch, PoseSearch, with_better_limbs
+from sogjax.search.pose_search import (
+    Hypotheses,
+    PlacedSearch,
+    PoseSearch,
+    compile_pose_search,
+    search,
+    with_better_limbs,
+)
+from sogjax.search.search_energy import SearchEnergy
 from sogjax.search.seen_frame import SeenFrame
 from sogjax.tracking.culling import ImageReader
 
@@ -58,6 +66,21 @@ def off(body, found, truth):
     """Mean distance of the landmarks (metres)."""
     at = lambda pose: np.asarray(posed(body, jnp.asarray(pose, jnp.float32))[1], float)
     return np.linalg.norm(at(found) - at(truth), axis=1).mean()
+
+
+@pytest.mark.slow
+def test_what_is_compiled_beforehand_is_what_a_search_of_an_actor_in_its_colors_needs(dog, monkeypatch):
+    traced, of_windows = [], SearchEnergy.of_windows
+    monkeypatch.setattr(
+        SearchEnergy, "of_windows", lambda energy, windows: traced.append(1) or of_windows(energy, windows)
+    )
+    seen = frames_of(draw(dog, standing(dog, 1.1, (0.3, -0.2)), RIG))
+    template = searcher(shipped("dog"))
+    jax.clear_caches()
+    compile_pose_search(template, seen(template, 0))
+    beforehand = len(traced)
+    assert search(searcher(dog), seen(searcher(dog), 0))
+    assert 0 < beforehand == len(traced)
 
 
 @pytest.fixture(scope="module")

@@ -1,22 +1,27 @@
-"""The step that is compiled while the first pose is searched for: for whom, with which frame, and from which pose."""
+"""What is compiled beforehand: the step while the first pose is searched for, the search while actors are made."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from run_cases import DOG, pose_request, tiny_run
 
 from sogjax.errors import InputError
+from sogjax.io.example_poses import ExamplePose
 from sogjax.run import clip_search, passes
+from sogjax.run.actors import Actors
 from sogjax.run.clip_search import ClipSearch
-from sogjax.run.initial_pose import InitialPose
+from sogjax.run.initial_pose import InitialPose, compile_sources
 from sogjax.search.placed_body import centres_of
 from sogjax.search.places import Place
 from sogjax.tracking.frame import FrameInput
 
 FRAMES = {frame: FrameInput(np.zeros((2, 4, 4, 3), np.uint8)) for frame in (0, 5)}
 REST = np.asarray(DOG.poses["rest"])
-INITIAL_POSE = next(each for each in passes.PASSES if each.name == "initial_pose")
+ACTORS, INITIAL_POSE = (
+    next(each for each in passes.PASSES if each.name == name) for name in ("actors", "initial_pose")
+)
 
 
 def place(x, y, z):
@@ -78,3 +83,35 @@ def test_a_search_that_refuses_waits_for_no_step(compiled):
     with pytest.raises(InputError, match="nobody is there"):
         INITIAL_POSE.make(replace(tiny_run(), pose_sources=[refusing]))
     assert not compiled
+
+
+@pytest.mark.parametrize(
+    ("words", "frames", "initial_poses", "searches"),
+    [
+        ((), [None, None], None, 1),
+        ((), [], None, 0),
+        ((), [None, 3], None, 0),
+        ((), [None], "initial_pose.yaml", 0),
+        (("initial_pose=auto",), [None], "initial_pose.yaml", 1),
+    ],
+)
+def test_a_search_is_compiled_if_actors_are_made_of_pictures_that_tell_no_pose(
+    monkeypatch, words, frames, initial_poses, searches
+):
+    done, request = [], pose_request(*words)
+    examples = tuple(ExamplePose(str(k), None, {}, {}, None, frame) for k, frame in enumerate(frames))
+    path = None if initial_poses is None else Path(initial_poses)
+    recording = replace(request.clip.recording, example_poses=examples, initial_poses=path)
+    monkeypatch.setattr(ClipSearch, "compile_beforehand", lambda search: done.append(search.bodies))
+    compile_sources(replace(request.clip, recording=recording), request.background, request.config)
+    assert [body.name for bodies in done for body in bodies] == ["human"] * searches
+
+
+@pytest.mark.parametrize(("words", "searches"), [((), 1), (("actor=anna.yaml",), 0)])
+def test_a_search_is_compiled_while_actors_are_made(monkeypatch, words, searches):
+    done = []
+    monkeypatch.setattr(passes, "compile_sources", lambda *given: done.append(given))
+    monkeypatch.setattr(passes, "kept_or_made", lambda *given: Actors((DOG,)))
+    run = tiny_run(*words)
+    assert ACTORS.make(run).bodies == (DOG,)
+    assert done == [(run.clip, run.background, run.config)] * searches

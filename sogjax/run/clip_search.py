@@ -24,7 +24,7 @@ from sogjax.search.found_pose import FoundPose, agreements
 from sogjax.search.joint_search import search_poses
 from sogjax.search.placed_body import centred, centres_of
 from sogjax.search.places import Place, likeness, places
-from sogjax.search.pose_search import PoseSearch, Report, Told, unreported, untold
+from sogjax.search.pose_search import PoseSearch, Report, Told, compile_pose_search, unreported, untold
 from sogjax.search.seen_frame import SeenFrame
 from sogjax.settings.run import TrackConfig
 from sogjax.tracking.frame import FrameInput
@@ -162,6 +162,12 @@ class ClipSearch:
         at = [found[min(k, len(found) - 1)].centre for k in range(len(self.bodies))]
         rest = [np.asarray(body.poses["rest"])[None] for body in self.bodies]
         return np.concatenate([centred(*each)[0] for each in zip(self.bodies, rest, at, strict=True)])
+
+    def compile_beforehand(self) -> None:
+        """Compile what a search needs, while other work goes on; of the bodies only structure and shapes count."""
+        first = self.clip.numbers[0]
+        seen = next(iter(self.clip.frames(first, first + 1)))
+        compile_pose_search(self._searchers[0], self._seen(self._searchers[0], seen))
 
     def candidates(self) -> Iterator[int]:
         """The frames to search until one is clear: the first, then others in which the actors are seen best."""

@@ -18,7 +18,7 @@ from sogjax.run.background import Background
 from sogjax.run.clip import Clip
 from sogjax.run.clip_search import ClipSearch, SeenAtRest, best_guess
 from sogjax.run.keypoint_initial_pose import keypoint_poses
-from sogjax.run.recordings import upright
+from sogjax.run.recordings import body_named, upright
 from sogjax.run.terminal import say
 from sogjax.search.described_pose import check_described_pose, described_pose
 from sogjax.search.found_pose import FoundPose
@@ -165,6 +165,16 @@ def from_search(request: PoseRequest) -> InitialPose | None:
 
 SOURCES: tuple[PoseSource, ...] = (from_file, from_example_frames, from_keypoints, from_search)
 """In the order in which they are asked."""
+
+
+def compile_sources(clip: Clip, background: Background, config: TrackConfig) -> None:
+    """Compile a search beforehand, while actors are made; nothing where something else will tell where they begin."""
+    examples = clip.recording.example_poses
+    of_frames = not examples or any(each.frame is not None for each in examples)
+    if of_frames or clip.keypoints is not None or pose_file(clip.recording, config) is not None:
+        return
+    body = upright(body_named(config.body), clip.recording)
+    ClipSearch(clip, background, [body], config).compile_beforehand()
 
 
 def pose_file(recording: Recording, config: TrackConfig) -> Path | None:

@@ -25,7 +25,14 @@ from sogjax.run.clock import (
 )
 from sogjax.run.filter import Filtered, filter_frames
 from sogjax.run.forward import Tracked, kept_rows, track_forward
-from sogjax.run.initial_pose import FROM_FILE, InitialPose, find_initial_pose, say_who_is_elsewhere
+from sogjax.run.initial_pose import (
+    FROM_FILE,
+    SOURCES,
+    InitialPose,
+    compile_sources,
+    find_initial_pose,
+    say_who_is_elsewhere,
+)
 from sogjax.run.judge import judged_result
 from sogjax.run.kept_actors import kept_or_made
 from sogjax.run.keypoint_bias import KeypointBias, estimate_keypoint_bias
@@ -65,6 +72,14 @@ def _background(run: Run) -> Background:
     images = run.config.images
     found = learn_background(run.clip, images.background, images.cache, run.samples_to_come)
     return said_if_none(run.clip, images.background, found)
+
+
+def _actors(run: Run) -> Actors:
+    """The actors; if they are made, the search for where they begin is compiled meanwhile."""
+    with ThreadPoolExecutor(1) as beside:
+        if run.makes_actors and run.pose_sources is SOURCES:
+            beside.submit(lambda: compile_sources(run.clip, run.background, run.config))
+        return kept_or_made(run.actor_request, run.config.images, run.report_actors)
 
 
 def _initial_pose(run: Run) -> InitialPose:
@@ -127,12 +142,7 @@ def _tracked(run: Run) -> Tracked:
 
 PASSES: tuple[Pass, ...] = (
     Pass("background", PREPARING, _background, Background),
-    Pass(
-        "actors",
-        ACTORS,
-        lambda run: kept_or_made(run.actor_request, run.config.images, run.report_actors),
-        Actors,
-    ),
+    Pass("actors", ACTORS, _actors, Actors),
     Pass("initial_pose", INITIAL_POSE, _initial_pose, InitialPose, wanted=lambda run: run.tracks),
     Pass(
         "relearnt",

@@ -115,7 +115,7 @@ def search(
     placed = PlacedSearch.of_places(searcher, frame, np.stack([place.centre for place in found]))
     tried = _starts(searcher, found)
     with ThreadPoolExecutor(2) as beside:
-        for level in [placed.glance, placed][placed.glance is placed :]:
+        for level in placed.levels:
             beside.submit(level.climbed, tried[np.arange(1)], 0)  # what climbs is compiled meanwhile
         scored = placed.glance.scored(tried)
         tried = placed.glance.climbed(_spread_best(searcher, scored), FIRST_ITERATIONS)
@@ -128,6 +128,15 @@ def search(
     report(1.0)
     best = _best(searcher, tried, count)
     return [Optimum(pose, float(value)) for pose, value in zip(best.poses, best.values, strict=True)]
+
+
+def compile_pose_search(searcher: PoseSearch, frame: SeenFrame) -> None:
+    """Compile beforehand what a search needs, while other work goes on; only shapes count of body and frame."""
+    placed = PlacedSearch.of_places(searcher, frame, np.zeros((1, 3)))
+    rest = Hypotheses(np.asarray(searcher.body.poses["rest"])[None], np.zeros(1, int), np.zeros(1))
+    placed.glance.scored(rest)
+    for level in placed.levels:
+        level.climbed(rest, 0)
 
 
 @dataclass(frozen=True)
@@ -179,6 +188,11 @@ class PlacedSearch:
         chosen = seeing[farthest(centres[seeing], FEW_CAMERAS)]
         seen, windows = _of_cameras(self.energy.cameras, self.windows, jnp.asarray(chosen))
         return replace(self, energy=eqx.tree_at(lambda energy: energy.cameras, self.energy, seen), windows=windows)
+
+    @property
+    def levels(self) -> list["PlacedSearch"]:
+        """The glance, and all cameras if these are more."""
+        return [self] if self.glance is self else [self.glance, self]
 
     def scored(self, tried: Hypotheses) -> Hypotheses:
         """The hypotheses with their energies."""
