@@ -137,5 +137,5 @@ class ShadowMap:
         """The least and the greatest depth that a tap can meet around each cell."""
         reach = 2 * (int(self.spread / self.spacing) + 1) + 1
         kernel = np.ones((reach, reach), np.uint8)
-        least, greatest = (of(self._bordered, kernel, borderType=cv2.BORDER_REPLICATE) for of in (cv2.erode, cv2.dilate))
-        return least, greatest
+        least = cv2.erode(self._bordered, kernel, borderType=cv2.BORDER_REPLICATE)
+        return least, cv2.dilate(self._bordered, kernel, borderType=cv2.BORDER_REPLICATE)
