@@ -1,13 +1,17 @@
 """What comes out of whole runs, as a user makes them, on recordings of people and rooms that nothing was chosen on?
 
-    python experiments/whole_runs.py [rows=['talk 2 4 plates 22']] [out=outputs/whole_runs]
+    python experiments/whole_runs.py [rows=['talk 2 4 plates 22']] [out=outputs/whole_runs] [update=true]
 
 A row is: motion, people, cameras, what is given beside the videos (`plates`: pictures of the empty scene and example
 poses; `poses`: example poses; `videos`: nothing), the seed of people, clothes and room, and settings of `sogjax synth`.
 Each recording is rendered, `sogjax track` is run on it without a pose, and its motions are held against the truth. Runs
-are kept in `out` and not made again. The table is printed, with how often verdicts hold, and written as table.md.
+are kept in `out` and not made again. The table is printed, with how often verdicts hold, and written as table.md. With
+`update`, `whole_runs.csv`, which has every recording as it was last run, is brought up to date, and what it says in all
+is printed.
 """
 
+import csv
+import datetime
 import json
 import os
 import subprocess
@@ -22,7 +26,7 @@ from scipy.optimize import linear_sum_assignment
 from sogjax.errors import InputError
 from sogjax.io.background_cache import VARIABLE
 from sogjax.io.cache_folder import OFF
-from sogjax.io.files import write_file, write_json
+from sogjax.io.files import csv_text, write_file, write_json
 from sogjax.io.ground_truth import GroundTruth, load_ground_truth
 from sogjax.io.motion import Motion, load_motion
 from sogjax.io.recording_files import BACKGROUND, CALIBRATION, EXAMPLE_POSES, GROUND_TRUTH, SETTINGS, VIDEOS
@@ -33,256 +37,23 @@ from sogjax.study.experiment import synth_settings
 from sogjax.study.script import machine_line, run_script, settings_from
 from sogjax.synth.cache import cached_recording
 
-ROWS = (
-    "talk 2 12 plates 21",
-    "talk 2 4 plates 22",
-    "fight 2 12 plates 23",
-    "fight 2 4 plates 24",
-    "embrace 2 12 poses 25",
-    "embrace 2 12 videos 26",
-    "hug 2 4 plates 28",
-    "couple 2 12 plates 29",
-    "dance 1 4 plates 30",
-    "sit 1 4 plates 31",
-    "sit 1 12 poses 32",
-    "sit 1 12 videos 33",
-    "run 1 12 poses 34",
-    "talk 2 12 videos 35",
-    "arms 1 12 poses 36",
-    "stoop 1 12 videos 37",
-    "cartwheel 1 4 plates 38",
-    "arms 1 12 videos 39",
-    "throw 1 12 videos 40",
-    "walk 1 4 videos 41",
-    "pass 2 4 plates 42",
-    "walk 1 12 plates 43 props=board",
-    "talk 2 12 plates 44 props=counter",
-    "squat_kick 1 4 poses 45",
-    "run 1 4 plates 46",
-    "sit 1 4 plates 61",
-    "cartwheel 1 4 plates 54",
-    "pass 2 4 plates 52",
-    "talk 2 4 plates 66",
-    "stoop 1 12 videos 55",
-    "embrace 2 12 videos 56",
-    "sit 1 12 plates 57",
-    "pass 2 12 plates 51",
-    "run 1 12 plates 59",
-    "walk 1 4 plates 60",
-    "sit 1 12 videos 58",
-    "cartwheel 1 4 poses 70",
-    "hug 2 12 videos 65",
-    "arms 1 4 plates 64",
-    "dance 1 4 plates 63",
-    "fight 2 4 plates 67",
-    "couple 2 4 plates 69",
-    "cartwheel 1 12 plates 62",
-    "talk 2 12 videos 53",
-    "embrace 2 12 poses 71",
-    "sit 1 12 poses 72",
-    "talk 2 12 plates 73",
-    "run 1 12 plates 74",
-    "walk 1 6 videos 75",
-    "fight 2 6 plates 76",
-    "throw 1 4 plates 77",
-    "squat_kick 1 12 videos 78",
-    "dance 1 12 poses 79",
-    "pass 2 12 videos 80",
-    "stoop 1 4 poses 81",
-    "hug 2 12 plates 82 props=counter",
-    "couple 2 6 poses 83",
-    "arms 1 6 videos 84",
-    "cartwheel 1 6 plates 85",
-    "sit 1 6 plates 86",
-    "squat_kick 1 4 videos 91",
-    "stoop 1 4 videos 92",
-    "arms 1 4 videos 93",
-    "sit 1 12 videos 101",
-    "talk 2 12 plates 102",
-    "embrace 2 12 poses 103",
-    "cartwheel 1 4 plates 104",
-    "stoop 1 12 videos 105",
-    "run 1 12 plates 106",
-    "sit 1 12 plates 107",
-    "sit 1 12 poses 108",
-    "hug 2 4 plates 109",
-    "walk 1 4 videos 110",
-    "squat_kick 1 12 videos 111",
-    "arms 1 4 plates 112",
-    "dance 1 6 poses 113",
-    "fight 2 12 poses 114",
-    "couple 2 12 plates 115",
-    "pass 2 6 videos 116",
-    "throw 1 12 videos 117",
-    "run 1 4 plates 118",
-    "cartwheel 1 12 videos 119",
-    "talk 2 6 plates 120",
-    "talk 2 4 plates 131",
-    "embrace 2 12 poses 132",
-    "sit 1 12 plates 133",
-    "run 1 12 poses 134",
-    "cartwheel 1 4 plates 135",
-    "stoop 1 12 videos 136",
-    "talk 2 12 plates 137",
-    "fight 2 4 plates 138",
-    "sit 1 12 videos 139",
-    "arms 1 6 videos 140",
-    "couple 2 6 plates 141",
-    "throw 1 4 poses 142",
-    "dance 1 6 poses 143",
-    "pass 2 12 videos 144",
-    "walk 1 12 plates 145 props=counter",
-    "hug 2 12 poses 146",
-    "squat_kick 1 4 plates 147",
-    "run 1 6 plates 148",
-    "sit 1 6 plates 149",
-    "embrace 2 4 plates 150",
-    "arms 1 4 plates 151",
-    "cartwheel 1 12 poses 152",
-    "talk 2 4 plates 161",
-    "dance 1 4 plates 162",
-    "throw 1 4 videos 163",
-    "couple 2 4 plates 164",
-    "talk 2 4 plates 171",
-    "talk 2 6 plates 172",
-    "couple 2 4 plates 173",
-    "dance 1 4 plates 174",
-    "embrace 2 6 plates 175",
-    "hug 2 4 plates 176",
-    "run 1 4 plates 177",
-    "fight 2 6 plates 178",
-    "cartwheel 1 4 plates 179",
-    "sit 1 12 videos 180",
-    "talk 2 4 plates 181",
-    "couple 2 4 plates 182",
-    "embrace 2 4 plates 183",
-    "fight 2 4 plates 184",
-    "hug 2 6 videos 185",
-    "pass 2 4 plates 186",
-    "talk 2 12 videos 187",
-    "throw 1 4 plates 188",
-    "arms 1 6 videos 189",
-    "couple 2 12 plates 190",
-    "squat_kick 1 6 plates 191",
-    "talk 2 12 videos 192",
-    "hug 2 12 videos 193",
-    "couple 2 12 videos 194",
-    "fight 2 12 videos 195",
-    "sit 1 12 videos 196",
-    "arms 1 4 videos 197",
-    "fight 2 4 plates 203",
-    "couple 2 4 plates 204",
-    "talk 2 4 plates 205",
-    "hug 2 6 videos 206",
-    "dance 1 4 plates 208",
-    "sit 1 12 videos 209",
-    "sit 1 4 plates 210",
-    "run 1 4 videos 211",
-    "walk 1 4 videos 212",
-    "cartwheel 1 4 poses 213",
-    "throw 1 4 plates 214",
-    "arms 1 4 videos 215",
-    "stoop 1 6 videos 216",
-    "squat_kick 1 4 videos 217",
-    "walk 1 12 plates 218 props=counter",
-    "sit 1 6 poses 219",
-    "run 1 12 videos 220",
-    "dance 1 6 videos 221",
-    "throw 1 6 videos 222",
-    "arms 1 12 videos 223",
-    "cartwheel 1 12 videos 224",
-    "hug 2 4 plates 225",
-    "embrace 2 6 plates 226",
-    "talk 2 6 plates 227",
-    "stoop 1 4 poses 228",
-    "talk 2 12 plates 229",
-    "walk 1 4 plates 230",
-    "talk 2 12 plates 231",
-    "talk 2 4 plates 232",
-    "embrace 2 12 videos 233",
-    "sit 1 12 plates 234",
-    "sit 1 12 videos 235",
-    "run 1 12 plates 236",
-    "cartwheel 1 4 plates 237",
-    "walk 1 3 plates 241",
-    "hug 2 12 videos 251",
-    "fight 2 6 videos 252",
-    "talk 2 6 videos 253",
-    "sit 1 6 videos 254",
-    "pass 2 4 videos 256",
-    "couple 2 6 videos 262",
-    "talk 2 6 videos 264",
-    "talk 2 12 plates 301",
-    "sit 1 12 videos 302",
-    "run 1 12 videos 303",
-    "embrace 2 12 plates 304",
-    "cartwheel 1 4 plates 305",
-    "walk 1 6 videos 306",
-    "walk 3 12 videos 308",
-    "hug 2 8 videos 319 outfit=striped",
-    "stoop 1 12 videos 321",
-    "couple 2 12 videos 322",
-    "run 1 12 plates 323",
-    "cartwheel 1 12 videos 324",
-    "hug 2 6 plates 325",
-    "sit 1 6 plates 326",
-    "arms 1 12 videos 327",
-    "embrace 2 12 plates 330 outfit=black_suit",
-    "sit 1 12 plates 332 room=camouflage",
-    "talk 2 12 plates 333 props=table",
-    "walk 2 12 videos 334",
-    "walk 1 5 videos 335 distortion=-0.2",
-    "couple 2 12 videos 336 outfit=long_sleeves",
-    "arms 1 3 plates 337",
-    "throw 1 12 videos 338 outfit=black_suit",
-    "dance 1 12 plates 339 props=screen",
-    "walk 1 4 plates 341",
-    "hug 2 12 plates 342",
-    "sit 1 12 plates 343",
-    "run 1 6 plates 344",
-    "talk 2 12 videos 345",
-    "stoop 1 6 plates 346",
-    "cartwheel 1 12 plates 347",
-    "fight 2 12 plates 348",
-    "squat_kick 1 12 videos 349",
-    "couple 2 12 plates 350 outfit=black_suit",
-    "throw 1 6 plates 351",
-    "dance 1 12 videos 352",
-    "pass 2 12 videos 353",
-    "walk 1 12 plates 354 props=screen",
-    "embrace 2 12 videos 355",
-    "run 1 4 plates 356",
-    "arms 1 6 videos 357",
-    "talk 2 12 plates 358 props=counter",
-    "squat_kick 1 6 plates 359",
-    "walk 2 6 plates 360",
-    "sit 1 12 plates 361",
-    "walk 1 12 poses 362",
-    "cartwheel 1 6 plates 363",
-    "arms 1 12 plates 364 props=screen",
-    "run 1 12 videos 365 outfit=black_suit",
-    "dance 1 6 plates 366",
-    "throw 1 4 plates 367",
-    "stoop 1 12 poses 368",
-    "squat_kick 1 4 plates 369",
-    "walk 1 12 videos 370 room=camouflage",
-    "talk 2 6 plates 371",
-    "hug 2 12 videos 372",
-    "couple 2 4 plates 373",
-    "pass 2 12 plates 374",
-    "fight 2 12 videos 375",
-    "embrace 2 6 plates 376",
-    "walk 3 12 plates 377",
-)
+TABLE = Path(__file__).with_suffix(".csv")
+"""What each recording came to when it was last run, and when that was."""
 GIVEN = {
     "plates": (SETTINGS, BACKGROUND, EXAMPLE_POSES),
     "poses": (SETTINGS, EXAMPLE_POSES),
     "videos": (),
 }
 COLUMNS = ("recording", "joints, mm", "a joint > 15 cm off, % of frames", "verdict")
+FIELDS = ("recording", "joints_mm", "astray_percent", "silent", "doubted", "verdict", "date")
+"""Of the table. Silent: actors with a joint astray that the verdict calls right; doubted: those with none that it doubts;
+both are empty where they were not kept."""
+GROUPS = ((10, "10 to 12"), (5, "5 to 8"), (0, "3 or 4"))
+"""Cameras from which on a group of recordings begins, and its name."""
 BOUNDS, LEAST = (0.2, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7), (3, 4, 5)
 """Of how likely a limb is lost, from which it could be named, and the frames for which it must be so."""
 SHOWN = ((1e3, "mean"), (100, "astray"))
+FOUND = "found.json"
 LEAN = ("outputs.rerun=false", "outputs.overlay=false", "overwrite=true")
 
 
@@ -290,36 +61,87 @@ LEAN = ("outputs.rerun=false", "outputs.overlay=false", "overwrite=true")
 class Settings:
     """What is run, as `key=value` on the command line."""
 
-    rows: list[str] = field(default_factory=lambda: [*ROWS])
+    rows: list[str] = field(default_factory=list)
+    """None: all of the table."""
     frames: int = 60
     out: str = "outputs/whole_runs"
+    update: bool = False
 
 
 def main() -> None:
     """Run what is not there yet, and write the table."""
-    settings = settings_from(Settings)
+    settings, table = settings_from(Settings), _table()
     head = [machine_line(), "", f"| {' | '.join(COLUMNS)} |", "|---" * len(COLUMNS) + "|"]
     runs, lines = [], []
-    for row in settings.rows:
+    for row in settings.rows or [*table]:
         name = f"{row} {settings.frames}".replace(" ", "_").replace("=", "-")
         folder = Path(settings.out) / name
         runs.append(_kept(folder) or _run(row, settings.frames, folder))
+        table[row] = _entry(row, runs[-1], folder)
         lines.append(_line(row, runs[-1]))
         print(lines[-1], flush=True)
     text = "\n".join([*head, *lines, "", *_of_verdicts(runs)]) + "\n"
     write_file(Path(settings.out) / "table.md", text)
     print(f"\n{text}")
+    if settings.update:
+        write_file(TABLE, csv_text([FIELDS, *([entry[field] for field in FIELDS] for entry in table.values())]))
+        print("\n".join(_in_all(table)))
+
+
+def _table() -> dict[str, dict[str, str]]:
+    """What each recording came to, in the order of the table."""
+    with TABLE.open(encoding="utf-8", newline="") as file:
+        return {entry["recording"]: entry for entry in csv.DictReader(file)}
+
+
+def _entry(row: str, run: dict, folder: Path) -> dict[str, str]:
+    """A line of the table."""
+    ran = datetime.date.fromtimestamp((folder / FOUND).stat().st_mtime).isoformat()
+    _, means, astray, said = _cells(row, run)
+    wrong = [one["astray"] > OFTEN for one in run["actors"]]
+    right = [one["looks_right"] for one in run["actors"]]
+    silent = sum(off and fine for off, fine in zip(wrong, right, strict=True))
+    doubted = sum(not off and not fine for off, fine in zip(wrong, right, strict=True))
+    counts = map(str, (silent, doubted) if run["actors"] else ("", ""))
+    return dict(zip(FIELDS, (row, means, astray, *counts, said, ran), strict=True))
+
+
+def _in_all(table: dict[str, dict[str, str]]) -> list[str]:
+    """The table by what is given and the number of cameras, as Markdown."""
+    heads = ("given, cameras", "recordings", "joints: median", "nine of ten", "actors", "astray", "silent", "doubted")
+    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    for given in GIVEN:
+        for k, (least, name) in enumerate(GROUPS):
+            most = GROUPS[k - 1][0] if k else np.inf
+            some = [e for row, e in table.items() if row.split()[3] == given and least <= int(row.split()[2]) < most]
+            lines.append(f"| {given}, {name} | {_of_group(some)} |")
+    return [*lines, f"| all | {_of_group([*table.values()])} |"]
+
+
+def _of_group(entries: list[dict[str, str]]) -> str:
+    """Of all recordings how far joints are off (mm); of those whose verdict was kept the actors, and what it says."""
+    numbers = lambda text: [float(part) for part in text.split("/")] if text.strip() else []
+    joints = [value for entry in entries for value in numbers(entry["joints_mm"])] or [np.nan]
+    kept = [entry for entry in entries if entry["silent"]]
+    shares = [value for entry in kept for value in numbers(entry["astray_percent"])]
+    silent, doubted = (sum(int(entry[key]) for entry in kept) for key in ("silent", "doubted"))
+    wrong = sum(share > 100 * OFTEN for share in shares)
+    middle, high = np.percentile(joints, [50, 90])
+    return f"{len(entries)} | {middle:.0f} | {high:.0f} | {len(shares)} | {wrong} | {silent} | {doubted}"
+
+
+def _cells(row: str, run: dict) -> tuple[str, str, str, str]:
+    actors = run["actors"]
+    means, astray = (" / ".join(f"{scale * one[key]:.0f}" for one in actors) for scale, key in SHOWN)
+    return row, means, astray, "; ".join(one["sentence"] for one in actors) or f"refused: {run['refused']}"
 
 
 def _line(row: str, run: dict) -> str:
-    actors = run["actors"]
-    means, astray = (" / ".join(f"{scale * one[key]:.0f}" for one in actors) for scale, key in SHOWN)
-    said = "; ".join(dict.fromkeys(one["sentence"] for one in actors)) or f"refused: {run['refused']}"
-    return f"| {row} | {means} | {astray} | {said} |"
+    return f"| {' | '.join(_cells(row, run))} |"
 
 
 def _kept(folder: Path) -> dict | None:
-    path = folder / "found.json"
+    path = folder / FOUND
     found = _read(path) if path.is_file() else {}
     return found if all("longest" in actor for actor in found.get("actors", [{}])) else None
 
@@ -354,7 +176,7 @@ def _run(row: str, frames: int, folder: Path) -> dict:
         found = {"actors": [], "refused": said.removeprefix("sogjax: ")}
     else:
         found = {"actors": _actors(results, GROUND_TRUTH.of(rendered)), "refused": ""}
-    write_json(folder / "found.json", found)
+    write_json(folder / FOUND, found)
     return found
 
 
