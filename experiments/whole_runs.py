@@ -46,8 +46,8 @@ GIVEN = {
 }
 COLUMNS = ("recording", "joints, mm", "a joint > 15 cm off, % of frames", "verdict")
 FIELDS = ("recording", "joints_mm", "astray_percent", "silent", "doubted", "verdict", "date")
-"""Of the table. Silent: actors with a joint astray that the verdict calls right; doubted: those with none that it doubts;
-both are empty where they were not kept."""
+"""Of the table. Silent: actors with a joint astray whom the verdict calls right; doubted: those with none whom it
+doubts; both are empty where they were not kept."""
 GROUPS = ((10, "10 to 12"), (5, "5 to 8"), (0, "3 or 4"))
 """Cameras from which on a group of recordings begins, and its name."""
 BOUNDS, LEAST = (0.2, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7), (3, 4, 5)
