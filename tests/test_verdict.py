@@ -75,9 +75,14 @@ def test_a_body_beside_the_foreground_is_told_by_silhouettes(walk):
 
 
 def test_silhouettes_that_overlap_less_than_usual_must_be_looked_at(walk):
-    found = of_one(judged(walk, overlap=0.5))
+    found, bare = of_one(judged(walk, overlap=0.5, explained=0.55)), "silhouettes overlap to 50% (65 % is usual)"
     assert not found.wrong
-    assert found.sentence == "look at all of it: silhouettes overlap to 50% (65 % is usual)"
+    assert found.sentence == f"look at all of it: {bare}"
+    beside = of_one(judged(walk, overlap=0.5)).sentence
+    assert (
+        beside
+        == f"look at all of it: {bare}, in its own colours: somebody beside it has no actor, or its sizes are wrong"
+    )
     motion = judged(walk)
     motion.overlap[:, 1] = 0.3
     motion = replace(motion, overlap=np.repeat(motion.overlap, (2, 1), axis=1), camera_names=np.array(["a", "b", "c"]))

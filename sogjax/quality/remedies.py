@@ -16,8 +16,9 @@ LOOK = {
     "overlaps to": "A camera that overlaps less than the others was touched, shows much that is in front of the actor, "
     "or has another tint: `sogjax check` says which; cameras=[...] leaves it out, `sogjax adjust ... cameras=true` "
     "moves it back.",
-    "silhouettes overlap": "Silhouettes overlap too little everywhere: look at the actor's silhouettes below, and make "
-    "the actor again with more or better example poses if it is too thick, too thin, too long or too short.",
+    "silhouettes overlap": "Silhouettes overlap too little everywhere: if somebody is seen beside the actor who has "
+    "none, give that one, too (actors=, actor=); else look at the actor's silhouettes below, and make the actor again "
+    "with more or better example poses if it is too thick, too thin, too long or too short.",
     "fits badly": "Look at the stretches in which the body fits badly; start= and stop= leave them out.",
     " jumps": "A limb that jumps is wrong on one side of the jump: the pictures of both frames show which. It may be "
     "exchanged with another, or behind somebody; more cameras on other sides tell it.",

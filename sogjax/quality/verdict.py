@@ -17,6 +17,8 @@ AT_LEAST = 3
 """Frames: shorter stretches are not reported."""
 NEARLY_ALL = 0.9
 """Part of every limb whose being hidden by things leaves nothing to judge an actor by."""
+IN_ITS_COLORS = 0.85
+"""Part of what its example poses explain of an actor, from which on it is on its subject; elsewhere 0.94 to 1.02."""
 NUM_WORST = 5
 SHOWN = 4
 """Findings of each kind that the sentence names."""
@@ -122,7 +124,8 @@ def _verdict(
     wrong = [*_wrong(explained, expected, overlap), *others]
     doubtful = doubtful_limbs(motion)
     parts = [*_limbs(doubtful), *_shortened([*limbs]), *_bent(motion, limits)]
-    look = [] if wrong else [*_bad_overlaps(overlap), *_bad_stretches(motion), *parts]
+    of_itself = None if explained is None or expected is None else explained / expected
+    look = [] if wrong else [*_bad_overlaps(overlap, of_itself), *_bad_stretches(motion), *parts]
     look = [*odd, *look]
     if begun is not None and (wrong or look):
         look.append(begun)
@@ -176,13 +179,18 @@ def _wrong(explained: float | None, expected: float | None, overlap: Mapping[str
     return found
 
 
-def _bad_overlaps(overlap: Mapping[str, float]) -> list[str]:
-    """Silhouettes that overlap little in all cameras, or in some."""
+def _bad_overlaps(overlap: Mapping[str, float], of_itself: float | None) -> list[str]:
+    """Silhouettes that overlap little in all cameras, or in some.
+
+    `of_itself` is how much of an actor is explained, as a part of what its example poses explain; None: not known.
+    """
     if not overlap:
         return []
     usual = float(np.median(list(overlap.values())))
     if usual < fitted_numbers().verdict.good_overlap:
-        return [f"look at all of it: silhouettes overlap to {usual:.0%} (65 % is usual)"]
+        own = of_itself is not None and of_itself > IN_ITS_COLORS
+        why = ", in its own colours: somebody beside it has no actor, or its sizes are wrong" if own else ""
+        return [f"look at all of it: silhouettes overlap to {usual:.0%} (65 % is usual){why}"]
     worse = worse_cameras(overlap)
     return _shortened([f"look at {name}: overlaps to {overlap[name]:.0%}, others to {usual:.0%}" for name in worse])
 
