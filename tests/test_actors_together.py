@@ -9,12 +9,13 @@ from body_cases import shipped
 from drawn_scene import moved, standing
 from rig_cases import recording_of, ring_rig
 
-from sogjax.actor import together
+from sogjax.actor import make, together
 from sogjax.actor.coverage import body_silhouette
 from sogjax.actor.make import MadeActor, Making
 from sogjax.actor.silhouette_fit import Estimate
 from sogjax.actor.silhouettes import PosedPictures
 from sogjax.actor.together import People, believed, made_together
+from sogjax.errors import InputError
 from sogjax.io.example_poses import ExamplePose
 from sogjax.model.shape import ShapeModel
 from sogjax.search.placed_body import turned
@@ -126,3 +127,13 @@ def test_everybody_is_the_subject_of_pictures_of_everybody():
     assert of_all.others is not None
     assert of_all.others.keys() == {"left", "right"}
     assert not any(mask.any() for mask in of_all.others.values())
+
+
+@pytest.mark.parametrize("others", [True, False])
+def test_a_pose_that_was_not_found_in_pictures_that_nobody_chose_may_be_of_several_people(monkeypatch, others):
+    monkeypatch.setattr(make, "agreement", lambda *_: 0.3)
+    poses = jnp.zeros((1, DOG.skeleton.num_dofs))
+    estimate = Estimate(poses, jnp.zeros(2), poses, jnp.zeros(2))
+    with pytest.raises(InputError, match=r"pose of the example 'a' was not found: .* only 0\.30") as refused:
+        make._check_fit(recording_of(RIG, 3), DOG, estimate, [NONE], RIG.cameras, others)
+    assert ("if several people are seen, say how many with actors=2" in str(refused.value)) == others

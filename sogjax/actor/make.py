@@ -160,7 +160,8 @@ class Making:
         found = _found_poses(model.body, model, examples, pictures, rig, recording, terms, best, self.report, progress)
         self.report("shape")
         estimate = _best_estimate(model, found, rig, terms, ways=1 if best is None else 2)
-        _check_fit(recording, _shaped(model, estimate.shape_params), estimate, found.pictures, rig)
+        body = _shaped(model, estimate.shape_params)
+        _check_fit(recording, body, estimate, found.pictures, rig, others=best is not None)
         return self.finished(found.pictures, estimate, found.rough, self.unsuitable(found.pictures, estimate))
 
     def _pictures(
@@ -311,9 +312,14 @@ def _best_estimate(model: ShapeModel, found: _FoundPoses, rig: Camera, terms: Te
 
 
 def _check_fit(
-    recording: Recording, body: Body, estimate: Estimate, pictures: Sequence[PosedPictures], rig: Camera
+    recording: Recording,
+    body: Body,
+    estimate: Estimate,
+    pictures: Sequence[PosedPictures],
+    rig: Camera,
+    others: bool,
 ) -> None:
-    """Refuse a fit in which a pose was not found.
+    """Refuse a fit in which a pose was not found; `others`: nobody chose the pictures, which may show more people.
 
     Raises:
         InputError: the silhouettes of the body and the masks of an example pose hardly overlap.
@@ -321,10 +327,11 @@ def _check_fit(
     for posed, pose in zip(pictures, estimate.poses, strict=True):
         overlap = agreement(body, pose, posed, rig)
         if overlap < POSE_FOUND:
+            several = "if several people are seen, say how many with actors=2 or more; else " if others else ""
             raise InputError(
                 f"{recording.path}: the pose of the example {posed.name!r} was not found: its masks and the body's "
-                f"silhouettes overlap by only {overlap:.2f} (IoU); look at the masks with `sogjax segment`, or give "
-                f"its rough pose in recording.yaml, as `example_poses: [{{name: {posed.name}, initial_pose: "
+                f"silhouettes overlap by only {overlap:.2f} (IoU); {several}look at the masks with `sogjax segment`, "
+                f"or give its rough pose in recording.yaml, as `example_poses: [{{name: {posed.name}, initial_pose: "
                 "{pose: ..., position: [x, y, z], heading: ...}}]`"
             )
 
