@@ -199,7 +199,8 @@ def unsuitable(shapes: Sequence[SeenShape], num_people: Callable[[], int], plate
         )
     if sum(shape.agreement > AGREEING for shape in shapes) < FEWEST_EXAMPLES:
         return (
-            "nobody is seen in them whole and apart from the background; give "
+            "nobody is seen in them whole and apart from the background; if somebody is, `sogjax check` may say "
+            "which videos are under the names of other cameras; else give "
             f"{'' if plates else 'pictures of the empty scene as background/CAMERA.jpg, or '}"
             "example_poses/POSE/CAMERA.jpg with CAMERA.mask.png"
         )
