@@ -8,6 +8,7 @@ from body_cases import shipped
 from rig_cases import recording_of, ring_rig
 
 from sogjax.actor.make import MadeActor
+from sogjax.io import background_cache
 from sogjax.run import kept_actors
 from sogjax.run.actors import ActorRequest, Actors
 from sogjax.run.background import Background
@@ -53,6 +54,20 @@ def test_the_next_run_takes_them_until_one_comes_to_its_end(request_and_count, t
     assert len(count) == 3, "of other pictures"
     forget_actors(request, images)
     assert kept_place(request, images) is None
+
+
+@pytest.mark.slow
+def test_another_decoder_makes_them_anew(request_and_count, tmp_path, monkeypatch):
+    """Its pixels differ: those of another PyAV, or of OpenCV, where that is not installed."""
+    request, count = request_and_count
+    images = ImagesConfig(cache=str(tmp_path / "cache"))
+    kept_or_made(request, images)
+    assert kept_place(request, images) is not None
+    for version in ("1.0.0", None):
+        monkeypatch.setattr(background_cache, "pyav_version", lambda version=version: version)
+        assert kept_place(request, images) is None
+    kept_or_made(request, images)
+    assert len(count) == 2
 
 
 def test_nothing_is_kept_where_that_is_off(request_and_count):

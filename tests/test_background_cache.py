@@ -6,7 +6,7 @@ from small_recording import make_recording
 
 from sogjax.errors import InputError
 from sogjax.io import background_cache
-from sogjax.io.background_cache import VARIABLE, kept_background
+from sogjax.io.background_cache import VARIABLE, background_origin, kept_background
 from sogjax.io.recording import open_recording
 
 
@@ -55,6 +55,15 @@ def test_other_files_are_learnt_anew(recording, tmp_path, monkeypatch):
     (said,) = ask(recording, learning)
     assert "other files" in said
     assert learning.count == 2
+
+
+def test_another_decoder_is_another_origin(tmp_path, monkeypatch):
+    recording = open_recording(make_recording(tmp_path / "clip"))
+    origins = []
+    for version in ("17.0.0", "18.0.0", None):
+        monkeypatch.setattr(background_cache, "pyav_version", lambda version=version: version)
+        origins.append(background_origin(recording))
+    assert [origin["PyAV"] for origin in origins] == ["17.0.0", "18.0.0", None]
 
 
 def test_nothing_is_kept_when_switched_off(recording, tmp_path, monkeypatch):

@@ -13,6 +13,7 @@ import numpy as np
 from sogjax.errors import InputError
 from sogjax.io.cache_folder import OFF, default_cache_dir, named_folder, sweep
 from sogjax.io.npz_file import read_npz, save_npz
+from sogjax.io.plane_video import pyav_version
 from sogjax.io.recording import Recording
 from sogjax.io.source import fingerprint
 
@@ -32,6 +33,7 @@ def background_origin(recording: Recording) -> dict[str, Any]:
     names, rig = recording.rig.names, recording.rig.cameras
     return {
         "version": BACKGROUND_VERSION,
+        "PyAV": pyav_version(),  # another one decodes other pixels
         "up": recording.up,
         "masked": recording.masked,
         "frames": [recording.first_frame, recording.num_frames],
