@@ -160,6 +160,52 @@ def test_a_video_that_ends_early_is_one_sentence(tmp_path):
         list(read_frames(recording))
 
 
+def damaged(video, kept):
+    """Overwrite the images of a video behind a part of them; the list of images stays as it is."""
+    content = bytearray(video.read_bytes())
+    start, stop = content.index(b"mdat") + 4, content.index(b"moov") - 4
+    middle = start + round(kept * (stop - start))
+    content[middle:stop] = bytes(stop - middle)
+    video.write_bytes(content)
+
+
+def last_readable(video):
+    """The number of the last image that OpenCV gives."""
+    capture, count = cv2.VideoCapture(str(video)), 0
+    while capture.read()[0]:
+        count += 1
+    capture.release()
+    return count - 1
+
+
+@pytest.mark.parametrize("gap", [3, 99])
+@pytest.mark.parametrize("planes", [True, False])
+def test_of_a_damaged_video_the_last_frame_that_can_be_read_is_named(tmp_path, monkeypatch, planes, gap):
+    """Also where the next frame that is wanted lies far behind it, by a jump or past others."""
+    monkeypatch.setattr("sogjax.io.video.WORTH_A_JUMP", gap)
+    if not planes:
+        monkeypatch.setattr(source, "plane_video", lambda *_: None)
+    yaml = "up: z\nframe_offset: {right: 2}\nfirst_frame: 1\n"
+    folder = make_recording(tmp_path / "r", frames=16, settings=yaml)
+    damaged(folder / "videos" / "right.mp4", 0.5)
+    last = last_readable(folder / "videos" / "right.mp4") - 2
+    assert 2 < last < 11
+    recording = open_recording(folder)
+    for wanted in ([1, 13], [1, 12, 13], [13]):
+        with pytest.raises(InputError, match=rf"right\.mp4: ends before frame {last + 1},.*`last_frame: {last}`"):
+            list(read_chosen(recording, wanted))
+    (folder / "recording.yaml").write_text(f"{yaml}last_frame: {last}\n")
+    assert frames_read(open_recording(folder)) == [[t, t + 2] for t in range(1, last + 1)]
+
+
+def test_of_a_video_without_any_frame_that_can_be_read_none_is_named(tmp_path):
+    folder = make_recording(tmp_path / "r", frames=16, settings="up: z\nfirst_frame: 12\n")
+    damaged(folder / "videos" / "right.mp4", 0.5)
+    with pytest.raises(InputError, match=r"right\.mp4: ends before frame 12, .*; convert the video again") as error:
+        list(read_chosen(open_recording(folder), [14]))
+    assert "last_frame" not in str(error.value)
+
+
 def test_a_video_that_vanishes_or_changes_size_is_one_sentence(tmp_path):
     folder = make_recording(tmp_path / "r")
     recording = open_recording(folder)

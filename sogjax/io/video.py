@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -98,16 +98,13 @@ def _decoded_ahead(
     threads = max(1, workers // len(cameras))
     with ExitStack() as stack:
         pool = stack.enter_context(ThreadPoolExecutor(min(len(cameras), workers)))
-        opened = [
-            pool.submit(
-                in_planes if planes and camera not in recording.color_gains else open_source,
-                recording.sources[camera],
-                max(frames[0] + recording.frame_offset[camera], 0),
-                threads,
-                recording.picked.get(camera),
-            )
-            for camera in cameras
-        ]
+
+        def opened_at(frame: int, camera: str) -> ImageStream[Any]:
+            opening = in_planes if planes and camera not in recording.color_gains else open_source
+            start = max(frame + recording.frame_offset[camera], 0)
+            return opening(recording.sources[camera], start, threads, recording.picked.get(camera))
+
+        opened = [pool.submit(opened_at, frames[0], camera) for camera in cameras]
         stack.callback(_close_all, opened)
         sources, sizes = [future.result() for future in opened], [recording.rig.image_size(name) for name in cameras]
 
@@ -121,9 +118,14 @@ def _decoded_ahead(
             for passed in passed_over[frame]:
                 if recording.has_image(name, passed):
                     sources[camera].skip()
-            image = _checked(recording, name, sources[camera].read(), frame, sizes[camera])
+            image = sources[camera].read()
+            if image is None and recording.fewest_cameras is None:
+                unread = range(recording.frames.start, frame) if frame == frames[0] else passed_over[frame]
+                raise _ends_early(recording, name, unread, opened_at)
             if image is None:
                 ended.add(camera)  # what might still come would be images of other frames
+            else:
+                image = _checked(recording, name, image, frame, sizes[camera])
             return prepare(camera, frame, None if recording.is_missing(name, frame) else image)
 
         decode = lambda frame: [pool.submit(decoded, camera, frame) for camera in range(len(cameras))]
@@ -142,17 +144,30 @@ def _close_all(opened: list[Future[ImageStream[Any]]]) -> None:
             future.result().close()
 
 
+def _ends_early(
+    recording: Recording, camera: str, unread: range, opened_at: Callable[[int, str], ImageStream[Any]]
+) -> InputError:
+    """What is said of a video whose frame `unread.stop` cannot be read.
+
+    The frames before it that are `unread` were jumped or passed over; reading them tells which is the last that can be.
+    """
+    end = unread.stop
+    if unread:
+        held = [frame for frame in unread if recording.has_image(camera, frame)]
+        with closing(opened_at(unread.start, camera)) as images:
+            end = next((frame for frame in held if images.read() is None), end)
+    remedy = "convert the video again"
+    if end > recording.frames.start:
+        remedy = f"set `last_frame: {end - 1}` in recording.yaml, or {remedy}"
+    return InputError(
+        f"{recording.sources[camera]}: ends before frame {end}, though its header promises more; {remedy}"
+    )
+
+
 def _checked(
-    recording: Recording, camera: str, image: np.ndarray | YuvPicture | None, frame: int, calibrated: tuple[int, int]
-) -> np.ndarray | YuvPicture | None:
+    recording: Recording, camera: str, image: np.ndarray | YuvPicture, frame: int, calibrated: tuple[int, int]
+) -> np.ndarray | YuvPicture:
     source = recording.sources[camera]
-    if image is None and recording.fewest_cameras is not None:
-        return None
-    if image is None:
-        raise InputError(
-            f"{source}: ends before frame {frame}, though its header promises more; "
-            f"set `last_frame: {frame - 1}` in recording.yaml, or convert the video again"
-        )
     size = (image.shape[1], image.shape[0])
     if size != calibrated:
         raise InputError(f"{source}: its frame {frame} is {size[0]}x{size[1]}, unlike the first; convert it again")
