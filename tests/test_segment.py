@@ -1,12 +1,16 @@
 """`sogjax segment`: what it writes, and that nothing that was given is touched."""
 
+import weakref
+
 import cv2
 import numpy as np
 import pytest
 from command_line import done, refused
 from rig_cases import ring_rig
-from small_recording import make_recording, write_image
+from small_recording import frame_of, make_recording, write_image
 
+from sogjax.actor.example_masks import FROM_CLIP, ExampleMasks
+from sogjax.cli import segment
 from sogjax.io.image_file import read_mask
 from sogjax.synth.render import render_recording
 from sogjax.synth.settings import SynthSettings
@@ -54,6 +58,24 @@ def test_masks_and_sheets_of_a_rendered_person(capsys, tmp_path):
 
 def out_order(out):
     return [line.rsplit("/", 1)[-1].removesuffix(".png") for line in out.split()]
+
+
+def test_pictures_of_one_example_pose_at_a_time_are_in_memory(capsys, tmp_path, monkeypatch):
+    recording = make_recording(tmp_path / "recording", settings="up: z\nexample_poses: [3, 0, 1]\n")
+    before, frames = [], []
+
+    def found(recording, example, images, *_):
+        assert not any(picture() is not None for picture in before)
+        before.extend(map(weakref.ref, images.values()))
+        frames.append([frame_of(image) for image in images.values()])
+        masks = {camera: image[..., 0] > 0 for camera, image in images.items()}
+        return ExampleMasks(masks, dict.fromkeys(masks, FROM_CLIP), {}, {}, False, ())
+
+    monkeypatch.setattr(segment, "with_examples", lambda *_: (None, None, None))
+    monkeypatch.setattr(segment, "example_masks", found)
+    out, _ = done(capsys, "segment", f"recording={recording}", f"out={tmp_path / 'masks'}")
+    assert out_order(out) == ["frame_3", "frame_0", "frame_1"]
+    assert frames == [[3, 3], [0, 0], [1, 1]]
 
 
 def test_a_sheet_shows_every_picture_with_its_mask_tinted():

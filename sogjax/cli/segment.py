@@ -8,7 +8,7 @@ from jaxtyping import UInt8
 
 from sogjax.actor.example_masks import ExampleMasks, example_masks
 from sogjax.actor.make import examples_of
-from sogjax.actor.silhouettes import SharedFrames
+from sogjax.actor.silhouettes import load_images
 from sogjax.cli.schemas import SegmentConfig
 from sogjax.errors import InputError, counted
 from sogjax.io.example_poses import ExamplePose
@@ -58,10 +58,8 @@ def run(config: SegmentConfig) -> list[Path]:
     with results_folder(out), alive("segmenting"):
         clip = Clip(recording, recording.frames, ImagesConfig().depth)
         learnt = with_examples(clip, lambda: learn_background(clip, "auto"))[1] if examples else None
-        shared = SharedFrames()
-        shared.read(recording, examples)
         shown = progress(examples, len(examples), "example poses")
-        sheets = [_masks(recording, example, out, learnt, shared) for example in shown]
+        sheets = [_masks(recording, example, out, learnt) for example in shown]
         if recording.occluders:
             sheets.append(_occluders(clip, out / OCCLUDERS))
         if frames:
@@ -78,16 +76,10 @@ def _occluders(clip: Clip, path: Path) -> Path:
     return write_occluders(path, clip.recording, clip.grids, hidden, middle, "what was painted to stand in front")
 
 
-def _masks(
-    recording: Recording,
-    example: ExamplePose,
-    out: Path,
-    learnt: Sequence[BackgroundImage] | None,
-    shared: SharedFrames,
-) -> Path:
+def _masks(recording: Recording, example: ExamplePose, out: Path, learnt: Sequence[BackgroundImage] | None) -> Path:
     """Write the masks of one example pose and their sheet."""
-    images, known = shared.of(recording, example)
-    found = example_masks(recording, example, images, learnt, known)
+    images = load_images(recording, example)
+    found = example_masks(recording, example, images, learnt)
     for warning in found.warnings:
         say(f"warning: {warning}")
     for older in (out / example.name).glob("*.mask.png"):
