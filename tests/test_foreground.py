@@ -17,8 +17,10 @@ from sogjax.energy.views import COLUMNS, ROWS, Windows, windows_around
 from sogjax.scene.background import BackgroundCells
 from sogjax.scene.color_clusters import cluster_odds, odds_where_told
 from sogjax.scene.foreground import (
+    DEEP_SHADOW,
     LARGEST,
     SHADOW,
+    SHADOWED,
     BackgroundModel,
     background_surprise,
     foreground_weights,
@@ -109,16 +111,32 @@ def test_slow_light_is_no_foreground():
 
 
 @pytest.mark.parametrize("gain", [0.9, 1.0, 1.1])
-def test_surprise_is_that_of_a_gaussian_about_the_background_in_the_frames_light(gain):
+@pytest.mark.parametrize("shown", [(0.11, 0.09, 0.09), (0.75, 0.57, 0.41), (0.3, 0.24, 0.17)])
+def test_surprise_is_that_of_two_gaussians_about_the_background_in_the_frames_light(gain, shown):
     """In a brighter light dark trousers passed for a shadow once."""
-    color, trousers, spread = np.array([140.0, 107.0, 77.0]) / 255.0, np.array([0.11, 0.09, 0.09]), 0.028
+    color, spread = np.array([140.0, 107.0, 77.0]) / 255.0, 0.028
     floor = replace(wall(color=color), spread=jnp.full((1, 12, 15), spread))
-    found = background_surprise(seen(floor, trousers, gain), BackgroundModel.from_background(floor))[0, 5, 5]
+    found = background_surprise(seen(floor, shown, gain), BackgroundModel.from_background(floor))[0, 5, 5]
     expected = gain * color
-    inverse = np.linalg.inv(spread**2 * np.eye(3) + SHADOW**2 * np.outer(expected, expected))
-    off = gain * trousers - expected
-    volume = 1.5 * np.log(2.0 * np.pi) + 0.5 * np.log(spread**4 * (spread**2 + SHADOW**2 * color @ color))
-    assert float(found) == pytest.approx(0.5 * off @ inverse @ off + volume, rel=1e-3)
+    off = gain * np.array(shown) - expected
+
+    def density(shadow):
+        inverse = np.linalg.inv(spread**2 * np.eye(3) + shadow**2 * np.outer(expected, expected))
+        volume = (2.0 * np.pi) ** 1.5 * np.sqrt(spread**4 * (spread**2 + shadow**2 * color @ color))
+        return np.exp(-0.5 * off @ inverse @ off) / volume
+
+    deep = 2.0 * SHADOWED * density(DEEP_SHADOW) if off @ expected < 0.0 else 0.0
+    assert float(found) == pytest.approx(-np.log((1.0 - SHADOWED) * density(SHADOW) + deep), rel=1e-3)
+
+
+def test_a_deep_shadow_is_background_and_what_is_as_dark_but_of_another_hue_is_not():
+    background = wall()
+    of = lambda color, *whose: float(odds_of(seen(background, color), background, subject(*whose))[0, 5, 5])
+    shade, other = 0.55 * np.array(WALL), 0.55 * np.array(WALL[::-1])
+    assert of(shade, SHIRT, SKIN) < -0.5
+    assert of(other, SHIRT, SKIN) == LARGEST
+    assert of(shade, shade) > 0.2  # a sleeve of its colour is seen all the same
+    assert of(1.45 * np.array(WALL), SHIRT) == LARGEST  # light is no shadow
 
 
 def test_windows_look_where_the_lens_put_things():

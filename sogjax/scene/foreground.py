@@ -1,5 +1,6 @@
 """Foreground against background: what the colour of a cell says about whether somebody is seen there."""
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -19,9 +20,10 @@ LARGEST = 2.0
 SMALLEST_SPREAD = 0.015
 """Standard deviation of a channel at one place in one light, at least (compression, a lens that breathes)."""
 SHADOW = 0.06
-"""Standard deviation of the light that a shadow or a reflection takes or adds, as a part of the background's. Deeper
-shadows count as foreground: with room for them dark sleeves and trousers pass for shadows, and limbs are lost. Where
-people are looked for, shadows are told by lying on the floor."""
+"""Standard deviation of the light that a shadow or a reflection takes or adds, as a part of the background's."""
+DEEP_SHADOW, SHADOWED = 0.3, 0.05
+"""The same of a deep shadow, and the share of cells that lie in one. Room for deep shadows everywhere let dark sleeves
+and trousers pass for them, and limbs were lost; none drew hands to their own shadows on the floor."""
 SUBJECT_UNKNOWN = 0.3
 """Share of a subject whose colours are none of its blobs': any colour."""
 COLOR_BINS = 32
@@ -100,6 +102,8 @@ class BackgroundModel(eqx.Module):
     """1 / variance of a channel."""
     volume: Cells
     """Logarithm of the Gaussian's volume in colours, in the background's own light: a frame's changes it little."""
+    deep_volume: Cells
+    """The same in a deep shadow."""
     known: Bool[Array, "camera rows columns"]
     unknown: Bool[Array, "camera rows columns"]
     """The other cells that are in the picture."""
@@ -112,13 +116,13 @@ class BackgroundModel(eqx.Module):
         known, unknown = self.known | other.known, self.unknown & other.unknown
         parts = {
             name: jax.tree.map(filled, getattr(self, name), getattr(other, name))
-            for name in ("planes", "precision", "volume")
+            for name in ("planes", "precision", "volume", "deep_volume")
         }
         return replace(self, **parts, known=known, unknown=unknown)
 
     @classmethod
     def from_background(cls, background: BackgroundCells) -> "BackgroundModel":
-        """The background may be darker or brighter by a factor (a shadow), at a cost: a longer Gaussian that way."""
+        """The background may be darker or brighter by a factor (a shadow), at a cost: longer Gaussians that way."""
         dtype = jnp.result_type(float)
         variance = jnp.maximum(jnp.asarray(background.spread, dtype), SMALLEST_SPREAD) ** 2
         colors, known = jnp.asarray(background.colors, dtype) / 255.0, jnp.asarray(background.known)
@@ -126,13 +130,13 @@ class BackgroundModel(eqx.Module):
         unknown = (jnp.asarray(background.spread) > 0.0) & ~known
         elsewhere = color_surprise(colors, known.astype(dtype))
         nothing = jnp.zeros_like(variance)
-        empty = cls((red, green, blue), nothing, nothing, known, unknown, elsewhere)
+        empty = cls((red, green, blue), nothing, nothing, nothing, known, unknown, elsewhere)
         return empty._with_variance(variance)
 
     def _with_variance(self, variance: Cells) -> "BackgroundModel":
         length = sum(plane * plane for plane in self.planes)
-        volume = jnp.log(_NORMAL * variance * jnp.sqrt(variance + SHADOW**2 * length))
-        return replace(self, precision=1.0 / variance, volume=volume)
+        volume, deep = (jnp.log(_NORMAL * variance * jnp.sqrt(variance + s**2 * length)) for s in (SHADOW, DEEP_SHADOW))
+        return replace(self, precision=1.0 / variance, volume=volume, deep_volume=deep)
 
     def blurred(self, spread: float) -> "BackgroundModel":
         """This background, each channel of which is known no better than to a standard deviation."""
@@ -200,9 +204,16 @@ def _surprise(seen: list[Cells], empty: BackgroundModel) -> Cells:
     squared = sum(o * o for o in off)
     along = sum(o * e for o, e in zip(off, expected, strict=True))
     # Along the expected colour: by the background's length, a brighter light would explain more than all.
-    shadow = SHADOW**2 * empty.precision
-    explained = shadow * along * along / (1.0 + shadow * sum(e * e for e in expected))
-    return 0.5 * (squared - explained) * empty.precision + empty.volume
+    length = sum(e * e for e in expected)
+
+    def surprise(shadow: float, volume: Cells) -> Cells:
+        longer = shadow**2 * empty.precision
+        explained = longer * along * along / (1.0 + longer * length)
+        return 0.5 * (squared - explained) * empty.precision + volume
+
+    usual, deep = surprise(SHADOW, empty.volume), surprise(DEEP_SHADOW, empty.deep_volume)
+    darker = jnp.where(along < 0.0, math.log(2.0 * SHADOWED) - deep, -jnp.inf)
+    return -jnp.logaddexp(math.log(1.0 - SHADOWED) - usual, darker)
 
 
 def color_bins(cells: Float[Array, "*cell 3"]) -> tuple[Array, Array, Array]:
