@@ -211,9 +211,8 @@ def _surprise(seen: list[Cells], empty: BackgroundModel) -> Cells:
         explained = longer * along * along / (1.0 + longer * length)
         return 0.5 * (squared - explained) * empty.precision + volume
 
-    usual, deep = surprise(SHADOW, empty.volume), surprise(DEEP_SHADOW, empty.deep_volume)
-    darker = jnp.where(along < 0.0, math.log(2.0 * SHADOWED) - deep, -jnp.inf)
-    return -jnp.logaddexp(math.log(1.0 - SHADOWED) - usual, darker)
+    deep = surprise(DEEP_SHADOW, empty.deep_volume) - math.log(2.0 * SHADOWED)
+    return jnp.minimum(surprise(SHADOW, empty.volume), jnp.where(along < 0.0, deep, jnp.inf))
 
 
 def color_bins(cells: Float[Array, "*cell 3"]) -> tuple[Array, Array, Array]:
