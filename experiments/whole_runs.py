@@ -46,8 +46,8 @@ GIVEN = {
 }
 COLUMNS = ("recording", "joints, mm", "a joint > 15 cm off, % of frames", "verdict")
 FIELDS = ("recording", "joints_mm", "astray_percent", "silent", "doubted", "verdict", "date")
-"""Of the table. Silent: actors with a joint astray whom the verdict calls right; doubted: those with none whom it
-doubts; both are empty where they were not kept."""
+"""Columns of the table. Silent: actors with a joint astray whom the verdict calls right; doubted: those with none whom
+it doubts; both are empty where they were not kept."""
 GROUPS = ((10, "10 to 12"), (5, "5 to 8"), (0, "3 or 4"))
 """Cameras from which on a group of recordings begins, and its name."""
 BOUNDS, LEAST = (0.2, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7), (3, 4, 5)
@@ -71,6 +71,8 @@ class Settings:
 def main() -> None:
     """Run what is not there yet, and write the table."""
     settings, table = settings_from(Settings), _table()
+    if settings.update and settings.frames != Settings.frames:
+        raise InputError(f"update=true: the table is of {Settings.frames} frames; leave frames={settings.frames} out")
     head = [machine_line(), "", f"| {' | '.join(COLUMNS)} |", "|---" * len(COLUMNS) + "|"]
     runs, lines = [], []
     for row in settings.rows or [*table]:
@@ -84,7 +86,7 @@ def main() -> None:
     write_file(Path(settings.out) / "table.md", text)
     print(f"\n{text}")
     if settings.update:
-        write_file(TABLE, csv_text([FIELDS, *([entry[field] for field in FIELDS] for entry in table.values())]))
+        write_file(TABLE, csv_text([FIELDS, *([entry[name] for name in FIELDS] for entry in table.values())]))
         print("\n".join(_in_all(table)))
 
 

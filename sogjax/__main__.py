@@ -2,7 +2,7 @@
 
 import sys
 
-from sogjax.cli.main import process
+from sogjax.cli.main import run_process
 
 if __name__ == "__main__":
-    sys.exit(process())
+    sys.exit(run_process())

@@ -129,11 +129,11 @@ def test_everybody_is_the_subject_of_pictures_of_everybody():
     assert not any(mask.any() for mask in of_all.others.values())
 
 
-@pytest.mark.parametrize("others", [True, False])
-def test_a_pose_that_was_not_found_in_pictures_that_nobody_chose_may_be_of_several_people(monkeypatch, others):
+@pytest.mark.parametrize("unchosen", [True, False])
+def test_a_pose_that_was_not_found_in_pictures_that_nobody_chose_may_be_of_several_people(monkeypatch, unchosen):
     monkeypatch.setattr(make, "agreement", lambda *_: 0.3)
     poses = jnp.zeros((1, DOG.skeleton.num_dofs))
     estimate = Estimate(poses, jnp.zeros(2), poses, jnp.zeros(2))
     with pytest.raises(InputError, match=r"pose of the example 'a' was not found: .* only 0\.30") as refused:
-        make._check_fit(recording_of(RIG, 3), DOG, estimate, [NONE], RIG.cameras, others)
-    assert ("if several people are seen, say how many with actors=2" in str(refused.value)) == others
+        make._check_fit(recording_of(RIG, 3), DOG, estimate, [NONE], RIG.cameras, unchosen)
+    assert ("if several people are seen, say how many with actors=2" in str(refused.value)) == unchosen

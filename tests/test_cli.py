@@ -14,7 +14,7 @@ from command_line import actor_file, done, refused, trackable
 from rendered_person import rendered_person
 from small_recording import write_video
 
-from sogjax.cli.main import RARELY, main, process
+from sogjax.cli.main import RARELY, main, run_process
 from sogjax.cli.schemas import SCHEMAS
 from sogjax.cli.words import composed
 from sogjax.io.motion import load_motion
@@ -160,8 +160,9 @@ def test_a_process_looks_at_all_its_garbage_rarely_and_not_when_it_ends(monkeypa
     monkeypatch.setattr(sys, "argv", ["sogjax", "trak"])
     before = gc.get_threshold()
     try:
-        assert process() == 2
-        assert gc.get_threshold() == (*before[:2], RARELY)
+        assert run_process() == 2
+        if sys.version_info < (3, 14):  # later ones have no oldest generation of their own
+            assert gc.get_threshold() == (*before[:2], RARELY)
         assert gc.get_freeze_count() > 0
     finally:
         gc.unfreeze()

@@ -74,12 +74,13 @@ def test_what_is_compiled_beforehand_is_what_a_search_of_an_actor_in_its_colors_
     monkeypatch.setattr(
         SearchEnergy, "of_windows", lambda energy, windows: traced.append(1) or of_windows(energy, windows)
     )
-    seen = frames_of(draw(dog, standing(dog, 1.1, (0.3, -0.2)), RIG))
-    template = searcher(shipped("dog"))
+    rig = ring_rig(8, (160, 120), distance=2.5)
+    seen = frames_of(draw(dog, standing(dog, 1.1, (0.3, -0.2)), rig), rig)
+    template, actor = searcher(shipped("dog")), searcher(replace(dog, name="rex"))
     jax.clear_caches()
     compile_pose_search(template, seen(template, 0))
     beforehand = len(traced)
-    assert search(searcher(dog), seen(searcher(dog), 0))
+    assert search(actor, seen(actor, 0))
     assert 0 < beforehand == len(traced)
 
 

@@ -115,3 +115,22 @@ def test_a_search_is_compiled_while_actors_are_made(monkeypatch, words, searches
     run = tiny_run(*words)
     assert ACTORS.make(run).bodies == (DOG,)
     assert done == [(run.clip, run.background, run.config)] * searches
+
+
+def raising(error):
+    def raises(*_):
+        raise error
+
+    return raises
+
+
+def test_wrong_input_is_told_by_whoever_needs_it_and_a_fault_of_the_thread_is_not_hidden(monkeypatch):
+    monkeypatch.setattr(passes, "kept_or_made", lambda *given: Actors((DOG,)))
+    monkeypatch.setattr(passes, "compile_sources", raising(InputError("no such pose file")))
+    assert ACTORS.make(tiny_run()).bodies == (DOG,)
+    monkeypatch.setattr(passes, "compile_sources", raising(TypeError("a fault")))
+    with pytest.raises(TypeError, match="a fault"):
+        ACTORS.make(tiny_run())
+    monkeypatch.setattr(passes, "kept_or_made", raising(InputError("no masks")))
+    with pytest.raises(InputError, match="no masks"):
+        ACTORS.make(tiny_run())

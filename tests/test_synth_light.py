@@ -33,5 +33,13 @@ def test_under_it_is_darkness_and_light_beside_it_far_away_and_on_it(shadow, poi
     assert shadow.lit(np.array([point])) == share
 
 
+def test_points_that_are_not_looked_at_closely_have_the_share_of_all_taps(shadow):
+    points = np.random.default_rng(1).uniform([-1.5, -1.5, -0.2], [1.5, 1.5, 1.1], (20_000, 3))
+    local = ((points @ shadow.axes) - shadow.origin).astype(np.float32)
+    places = local[:, :2].T * np.float32(1.0 / shadow.spacing)
+    every = shadow._tapped(places, local[:, 2] - np.float32(shadow.bias), 8)
+    np.testing.assert_array_equal(shadow.lit(points), every)
+
+
 def test_where_nothing_is_nothing_is_dark():
     np.testing.assert_array_equal(ShadowMap.of([]).lit(np.random.default_rng(0).normal(size=(50, 3))), 1.0)

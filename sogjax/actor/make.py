@@ -161,7 +161,7 @@ class Making:
         self.report("shape")
         estimate = _best_estimate(model, found, rig, terms, ways=1 if best is None else 2)
         body = _shaped(model, estimate.shape_params)
-        _check_fit(recording, body, estimate, found.pictures, rig, others=best is not None)
+        _check_fit(recording, body, estimate, found.pictures, rig, unchosen=best is not None and self.subject is None)
         return self.finished(found.pictures, estimate, found.rough, self.unsuitable(found.pictures, estimate))
 
     def _pictures(
@@ -317,9 +317,9 @@ def _check_fit(
     estimate: Estimate,
     pictures: Sequence[PosedPictures],
     rig: Camera,
-    others: bool,
+    unchosen: bool,
 ) -> None:
-    """Refuse a fit in which a pose was not found; `others`: nobody chose the pictures, which may show more people.
+    """Refuse a fit in which a pose was not found; `unchosen`: nobody chose the pictures of the only one.
 
     Raises:
         InputError: the silhouettes of the body and the masks of an example pose hardly overlap.
@@ -327,7 +327,7 @@ def _check_fit(
     for posed, pose in zip(pictures, estimate.poses, strict=True):
         overlap = agreement(body, pose, posed, rig)
         if overlap < POSE_FOUND:
-            several = "if several people are seen, say how many with actors=2 or more; else " if others else ""
+            several = "if several people are seen, say how many with actors=2 or more; else " if unchosen else ""
             raise InputError(
                 f"{recording.path}: the pose of the example {posed.name!r} was not found: its masks and the body's "
                 f"silhouettes overlap by only {overlap:.2f} (IoU); {several}look at the masks with `sogjax segment`, "

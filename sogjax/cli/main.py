@@ -29,7 +29,7 @@ RARELY = 100
 stay, and a look at them takes a quarter of a second in which no thread goes on."""
 
 
-def process() -> int:
+def run_process() -> int:
     """Run the command of this process, which ends soon after; what it returns is the exit status."""
     gc.set_threshold(*gc.get_threshold()[:2], RARELY)
     try:

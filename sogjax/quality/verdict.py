@@ -18,7 +18,7 @@ AT_LEAST = 3
 NEARLY_ALL = 0.9
 """Part of every limb whose being hidden by things leaves nothing to judge an actor by."""
 IN_ITS_COLORS = 0.85
-"""Part of what its example poses explain of an actor, from which on it is on its subject; elsewhere 0.94 to 1.02."""
+"""Part of what its example poses explain of an actor, above which it is on its subject; usual are 0.94 to 1.02."""
 NUM_WORST = 5
 SHOWN = 4
 """Findings of each kind that the sentence names."""
@@ -189,7 +189,7 @@ def _bad_overlaps(overlap: Mapping[str, float], of_itself: float | None) -> list
     usual = float(np.median(list(overlap.values())))
     if usual < fitted_numbers().verdict.good_overlap:
         own = of_itself is not None and of_itself > IN_ITS_COLORS
-        why = ", in its own colours: somebody beside it has no actor, or its sizes are wrong" if own else ""
+        why = ", though its colours fit: somebody beside it has no actor, or its sizes are wrong" if own else ""
         return [f"look at all of it: silhouettes overlap to {usual:.0%} (65 % is usual){why}"]
     worse = worse_cameras(overlap)
     return _shortened([f"look at {name}: overlaps to {overlap[name]:.0%}, others to {usual:.0%}" for name in worse])

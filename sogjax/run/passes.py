@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from sogjax.errors import counted
+from sogjax.errors import InputError, counted
 from sogjax.io.frame_motions import FRAMES, ClipFacts
 from sogjax.io.frame_table import FrameLog
 from sogjax.run.actors import Actors
@@ -76,10 +76,17 @@ def _background(run: Run) -> Background:
 
 def _actors(run: Run) -> Actors:
     """The actors; if they are made, the search for where they begin is compiled meanwhile."""
-    with ThreadPoolExecutor(1) as beside:
+    beside, compiling = ThreadPoolExecutor(1), None
+    try:
         if run.makes_actors and run.pose_sources is SOURCES:
-            beside.submit(lambda: compile_sources(run.clip, run.background, run.config))
-        return kept_or_made(run.actor_request, run.config.images, run.report_actors)
+            compiling = beside.submit(lambda: compile_sources(run.clip, run.background, run.config))
+        found = kept_or_made(run.actor_request, run.config.images, run.report_actors)
+    finally:
+        beside.shutdown(wait=False, cancel_futures=True)  # who is refused is told at once
+    error = None if compiling is None else compiling.exception()
+    if error is not None and not isinstance(error, InputError):  # of wrong input the search itself will tell
+        raise error
+    return found
 
 
 def _initial_pose(run: Run) -> InitialPose:

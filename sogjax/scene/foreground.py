@@ -22,8 +22,9 @@ SMALLEST_SPREAD = 0.015
 SHADOW = 0.06
 """Standard deviation of the light that a shadow or a reflection takes or adds, as a part of the background's."""
 DEEP_SHADOW, SHADOWED = 0.3, 0.05
-"""The same of a deep shadow, and the share of cells that lie in one. Room for deep shadows everywhere let dark sleeves
-and trousers pass for them, and limbs were lost; none drew hands to their own shadows on the floor."""
+"""Standard deviation of the light that a deep shadow takes, and the share of cells that lie in one. With room for deep
+shadows in every cell dark sleeves and trousers passed for them, and limbs were lost; without any, hands were drawn to
+their own shadows on the floor."""
 SUBJECT_UNKNOWN = 0.3
 """Share of a subject whose colours are none of its blobs': any colour."""
 COLOR_BINS = 32
@@ -103,7 +104,7 @@ class BackgroundModel(eqx.Module):
     volume: Cells
     """Logarithm of the Gaussian's volume in colours, in the background's own light: a frame's changes it little."""
     deep_volume: Cells
-    """The same in a deep shadow."""
+    """Logarithm of the volume of the Gaussian of a deep shadow."""
     known: Bool[Array, "camera rows columns"]
     unknown: Bool[Array, "camera rows columns"]
     """The other cells that are in the picture."""
@@ -211,7 +212,7 @@ def _surprise(seen: list[Cells], empty: BackgroundModel) -> Cells:
         explained = longer * along * along / (1.0 + longer * length)
         return 0.5 * (squared - explained) * empty.precision + volume
 
-    deep = surprise(DEEP_SHADOW, empty.deep_volume) - math.log(2.0 * SHADOWED)
+    deep = surprise(DEEP_SHADOW, empty.deep_volume) - math.log(2.0 * SHADOWED)  # twice, as its other half is light
     return jnp.minimum(surprise(SHADOW, empty.volume), jnp.where(along < 0.0, deep, jnp.inf))
 
 

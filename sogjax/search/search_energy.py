@@ -1,6 +1,7 @@
 """The energy of a search: how well a pose explains the pictures, within the joints' limits, and climbing it."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import equinox as eqx
@@ -81,10 +82,14 @@ class SearchEnergy(eqx.Module):
 
     @classmethod
     def from_terms(cls, body: Body, cameras: Camera, terms: Sequence[Term], clusters: ColorClusters) -> "SearchEnergy":
-        """The energy with the terms of tracking that need no windows, lists or history."""
+        """The energy with the terms of tracking that need no windows, lists or history.
+
+        It does not know the body's name, so one program serves all actors.
+        """
         others = [term for term in terms if not isinstance(term, (Similarity, Foreground, AccelerationPenalty))]
         others = [eqx.tree_at(lambda term: term.weight, term, LIMITS * term.weight) for term in others]
-        return cls(body, cameras, (*others, RestPrior(REST_WEIGHT)), BlobClusters.from_members(clusters.members, SLOTS))
+        members = BlobClusters.from_members(clusters.members, SLOTS)
+        return cls(replace(body, name=""), cameras, (*others, RestPrior(REST_WEIGHT)), members)
 
     def appearance(self, windows: ColorWindows) -> Appearance:
         """The appearance, in units of the body's own area in the pictures: it does not matter how large it is seen."""

@@ -104,9 +104,9 @@ class ShadowMap:
         limit = local[:, 2] - np.float32(self.bias)
         places = local[:, :2].T * np.float32(1.0 / self.spacing)
         at = self._cells(*(places + np.float32(0.5)).astype(np.int32))
-        first, last = (np.take(depths, at, mode="clip") for depths in self._around)
-        share = (first >= limit).astype(np.float32)  # where no tap can be in the dark
-        edge = np.flatnonzero((first < limit) & (last >= limit))
+        least, greatest = (np.take(depths, at, mode="clip") for depths in self._around)
+        share = (least >= limit).astype(np.float32)  # where all taps are in the light, or all in the dark
+        edge = np.flatnonzero((least < limit) & (greatest >= limit))
         share[edge] = self._tapped(places[:, edge], limit[edge], taps)
         return share
 
