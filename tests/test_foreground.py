@@ -137,6 +137,7 @@ def test_a_deep_shadow_is_background_and_what_is_as_dark_but_of_another_hue_is_n
     assert of(other, SHIRT, SKIN) == LARGEST
     assert of(shade, shade) > 0.2  # a sleeve of its colour is seen all the same
     assert of(1.45 * np.array(WALL), SHIRT) == LARGEST  # light is no shadow
+    assert float(odds_of(seen(background, shade), background, None)[0, 5, 5]) == LARGEST  # it may be anybody's trousers
 
 
 def test_windows_look_where_the_lens_put_things():

@@ -24,7 +24,7 @@ SHADOW = 0.06
 DEEP_SHADOW, SHADOWED = 0.3, 0.05
 """Standard deviation of the light that a deep shadow takes, and the share of cells that lie in one. With room for deep
 shadows in every cell dark sleeves and trousers passed for them, and limbs were lost; without any, hands were drawn to
-their own shadows on the floor."""
+their own shadows on the floor. Of a subject of any colours there are none: nothing tells black trousers from them."""
 SUBJECT_UNKNOWN = 0.3
 """Share of a subject whose colours are none of its blobs': any colour."""
 COLOR_BINS = 32
@@ -155,9 +155,9 @@ def log_odds(
     the floor than a sleeve. It says nothing of a subject of any colours.
     """
     seen = [cells[..., k] for k in range(3)]
-    odds = _surprise(seen, empty)
     if subject is None:
-        return jnp.where(empty.known, jnp.clip(TEMPER * odds, -LARGEST, LARGEST), 0.0)
+        return jnp.where(empty.known, jnp.clip(TEMPER * _surprise(seen, empty, False), -LARGEST, LARGEST), 0.0)
+    odds = _surprise(seen, empty)
     density = subject_density(cells, subject)
     elsewhere = TEMPER * UNKNOWN_BACKGROUND * (surprise_of(cells, empty.elsewhere) + density)
     unknown = jnp.where(empty.unknown, jnp.clip(elsewhere, -LARGEST_UNKNOWN, LARGEST_UNKNOWN), 0.0)
@@ -198,7 +198,7 @@ def background_surprise(
     return _surprise([cells[..., k] for k in range(3)], empty)
 
 
-def _surprise(seen: list[Cells], empty: BackgroundModel) -> Cells:
+def _surprise(seen: list[Cells], empty: BackgroundModel, deep_shadows: bool = True) -> Cells:
     gains = _light(seen, empty)
     expected = [gain[:, None, None] * plane for gain, plane in zip(gains, empty.planes, strict=True)]
     off = [s - e for s, e in zip(seen, expected, strict=True)]
@@ -212,8 +212,11 @@ def _surprise(seen: list[Cells], empty: BackgroundModel) -> Cells:
         explained = longer * along * along / (1.0 + longer * length)
         return 0.5 * (squared - explained) * empty.precision + volume
 
+    usual = surprise(SHADOW, empty.volume)
+    if not deep_shadows:
+        return usual
     deep = surprise(DEEP_SHADOW, empty.deep_volume) - math.log(2.0 * SHADOWED)  # twice, as its other half is light
-    return jnp.minimum(surprise(SHADOW, empty.volume), jnp.where(along < 0.0, deep, jnp.inf))
+    return jnp.minimum(usual, jnp.where(along < 0.0, deep, jnp.inf))
 
 
 def color_bins(cells: Float[Array, "*cell 3"]) -> tuple[Array, Array, Array]:
