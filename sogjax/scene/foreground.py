@@ -156,7 +156,8 @@ def log_odds(
     """
     seen = [cells[..., k] for k in range(3)]
     if subject is None:
-        return jnp.where(empty.known, jnp.clip(TEMPER * _surprise(seen, empty, False), -LARGEST, LARGEST), 0.0)
+        odds = _surprise(seen, empty, deep_shadows=False)
+        return jnp.where(empty.known, jnp.clip(TEMPER * odds, -LARGEST, LARGEST), 0.0)
     odds = _surprise(seen, empty)
     density = subject_density(cells, subject)
     elsewhere = TEMPER * UNKNOWN_BACKGROUND * (surprise_of(cells, empty.elsewhere) + density)

@@ -135,7 +135,7 @@ class ShadowMap:
     @cached_property
     def _around(self) -> tuple[Float[np.ndarray, "row column"], Float[np.ndarray, "row column"]]:
         """The least and the greatest depth that a tap can meet around each cell."""
-        reach = 2 * (int(self.spread / self.spacing) + 1) + 1
-        kernel = np.ones((reach, reach), np.uint8)
+        width = 2 * (int(self.spread / self.spacing) + 1) + 1
+        kernel = np.ones((width, width), np.uint8)
         least = cv2.erode(self._bordered, kernel, borderType=cv2.BORDER_REPLICATE)
         return least, cv2.dilate(self._bordered, kernel, borderType=cv2.BORDER_REPLICATE)
