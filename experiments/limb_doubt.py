@@ -18,7 +18,7 @@ import numpy as np
 import yaml
 from jaxtyping import Float
 from scipy.optimize import minimize
-from scipy.special import expit
+from scipy.special import expit, logit
 
 from sogjax.errors import InputError
 from sogjax.io.files import atomic_path, write_file
@@ -42,6 +42,9 @@ from sogjax.study.table import ruled_table
 from sogjax.view.charts import limb_chart
 
 RIDGE = 1e-4
+ON_BACKGROUND = 0.7
+"""How likely a limb is lost at least that lies on nothing but background, where one is known: of a subject in one
+colour, colours tell nothing."""
 
 
 def fitted_weights(limbs: Sequence[JudgedLimb]) -> Weights:
@@ -57,7 +60,10 @@ def fitted_weights(limbs: Sequence[JudgedLimb]) -> Weights:
         ) * weights
 
     bounds = [(None, None), (0.0, None), (0.0, None)]
-    return Weights(*minimize(loss, np.zeros(3), jac=True, bounds=bounds).x.tolist())
+    contradicted = {"type": "ineq", "fun": lambda weights: weights[0] + weights[2] - logit(ON_BACKGROUND)}
+    constraints = [contradicted] if any(_known(limb) for limb in limbs) else []
+    found = minimize(loss, np.zeros(3), jac=True, bounds=bounds, constraints=constraints, method="SLSQP")
+    return Weights(*found.x.tolist())
 
 
 def write_weights(path: Path, found: Mapping[str, Sequence[JudgedLimb]], trials: str) -> None:
