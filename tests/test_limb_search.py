@@ -21,8 +21,9 @@ from sogjax.model.body import concatenate
 from sogjax.model.limbs import limb_names
 from sogjax.model.solid import Solid, impossibilities
 from sogjax.search import climbed, limb_search
+from sogjax.search import merge_passes as merging
 from sogjax.search.climbed import climbed_in
-from sogjax.search.limb_search import LimbSearch, compile_search
+from sogjax.search.limb_search import BetterPose, LimbSearch, compile_search
 from sogjax.search.limb_ways import UnitArrays, drawn_ways, look_alikes, units_of
 from sogjax.search.merge_passes import merge_passes
 from sogjax.search.placed_body import means_of
@@ -187,19 +188,50 @@ def test_no_pass_begins_where_one_went_in_vain(walking_dog, monkeypatch):
     monkeypatch.setattr(LimbSearch, "held_otherwise", lambda *_: None)
     monkeypatch.setattr(LimbSearch, "_starts", lambda *_: (other[None], other[:0].reshape(0, len(other))))
     monkeypatch.setattr(LimbSearch, "possible", lambda _, known, poses: np.ones(len(poses), bool))
-    monkeypatch.setattr(limb_search, "climbed_in", lambda _, views, start, share, room: (start, jnp.ceil(share)))
-    better = lambda row: search.better_pose(cells[row], right, row)
+    worth_more = lambda start: jnp.float32(np.array_equal(start, other))
+    monkeypatch.setattr(limb_search, "climbed_in", lambda _, views, start, share, room: (start, worth_more(start)))
+    better = lambda row: None if (found := search.better_pose(cells[row], right, row)) is None else found.pose
+    assert not search.is_in_vain(1, other)
     assert np.array_equal(better(1), other)
     search.note_in_vain([1], [other], [0.1])
     assert np.array_equal(better(1), other)  # it gained there: one more may begin
     search.note_in_vain([1], [other], [0.1])
     assert better(1) is None
+    assert search.is_in_vain(1, other)
     search.forget_in_vain([1])
     search.note_in_vain([1], [other], [-0.1])
     assert better(1) is None
     assert np.array_equal(better(2), other)
     search.forget_in_vain([1])
     assert np.array_equal(better(1), other)
+
+
+@pytest.mark.slow
+def test_passes_begin_where_most_is_gained_and_where_nothing_changed_meanwhile(walking_dog, monkeypatch):
+    tracker, cells, right = walking_dog
+    search, begun = LimbSearch.of(tracker, right.capacities), []
+    revising = merging._Revising(tracker, right, lambda rows: [cells[row] for row in rows])
+    away = lambda row, far: right.poses[row] + np.float32(far) * np.isin(np.arange(right.poses.shape[1]), dofs)
+    dofs, gains, asked = search.units[0].all_dofs, {0: 0.1, 1: 0.0, 2: 0.4, 3: 0.3, 4: 0.2, 5: 0.05}, []
+
+    def better_pose(_, frame, passed, row):
+        asked.append(row)
+        far = 1.0 if asked.count(row) > 1 else 0.5
+        return BetterPose(away(row, far), gains[row]) if gains[row] else None
+
+    def begin(search, row, pose, patience=0):
+        begun.append((row, np.array_equal(pose, away(row, 0.5))))
+        if row == 2:
+            revising._changed |= {2, 3}
+        if row == 4:  # its pass went in vain where the one of row 0 would begin
+            search.note_in_vain([0], [away(0, 0.5)], [-0.1])
+
+    monkeypatch.setattr(LimbSearch, "better_pose", better_pose)
+    monkeypatch.setattr(revising, "_pass_from", begin)
+    monkeypatch.setattr(revising, "_tired", lambda row=None: row == 5)
+    revising._changed |= {4}  # by what was done before
+    revising._search_limbs(search, [*gains], lambda share: None)
+    assert begun == [(2, True), (4, True), (0, False)]
 
 
 @pytest.mark.slow

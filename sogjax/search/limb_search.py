@@ -5,6 +5,7 @@ The rest of the body is held meanwhile (`energy/part_energy.py`).
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -50,6 +51,19 @@ MOST_ROUNDS = 3
 """Times that limbs are searched in a frame, each from the better pose that was found."""
 
 
+InVain = Sequence[tuple[Float[np.ndarray, "dof"], int]]
+"""Poses of passes in vain in a frame, and what each counts."""
+
+
+class BetterPose(NamedTuple):
+    """A pose of a frame that is worth more than the one that is known."""
+
+    pose: Float[np.ndarray, "dof"]
+    gain: float
+    """How much higher the frame's energy is. What tracking left to climb counts, too: were the known one climbed as
+    well, fewer passes would begin, and more limbs stay lost."""
+
+
 class LimbSearch:
     """Looks for better ways to hold limbs, in one key frame after the other."""
 
@@ -81,15 +95,19 @@ class LimbSearch:
         for row in rows:
             self._in_vain.pop(row, None)
 
-    def better_pose(self, frame: AnyFrame, passed: Pass, row: int) -> Float[np.ndarray, "dof"] | None:
+    def better_pose(self, frame: AnyFrame, passed: Pass, row: int) -> BetterPose | None:
         """The pose of a frame with limbs held otherwise, climbed with all degrees of freedom, if that is worth more.
 
         From a better pose the limbs are searched again: one may have been in the place of another.
         """
         first = passed.poses[row]
         views = self.views(on_device(frame), first)
-        pose = self.with_better_limbs(views, first, first, passed.energy, self._in_vain.get(row, []))
-        return None if pose is first else pose
+        found = self._better_in_rounds(views, first, first, passed.energy, self._in_vain.get(row, []))
+        return None if found.pose is first else found
+
+    def is_in_vain(self, row: int, pose: Float[np.ndarray, "dof"]) -> bool:
+        """Whether passes from such a pose of a frame led nowhere."""
+        return not self._worth_a_pass(pose[None], self._in_vain.get(row, []))[0]
 
     def with_better_limbs(
         self,
@@ -97,19 +115,30 @@ class LimbSearch:
         first: Float[np.ndarray, "dof"],
         pose: Float[np.ndarray, "dof"],
         energy: float,
-        in_vain: Sequence[tuple[Float[np.ndarray, "dof"], int]] = (),
     ) -> Float[np.ndarray, "dof"]:
         """A pose with limbs held otherwise as long as that is worth more; itself, where nothing is.
 
-        `first` is the tracked pose, `energy` that of a frame, for scale. Poses near those `in_vain` do not count.
+        `first` is the tracked pose, `energy` that of a frame, for scale.
         """
+        return self._better_in_rounds(views, first, pose, energy).pose
+
+    def _better_in_rounds(
+        self,
+        views: Views,
+        first: Float[np.ndarray, "dof"],
+        pose: Float[np.ndarray, "dof"],
+        energy: float,
+        in_vain: InVain = (),
+    ) -> BetterPose:
+        """As `with_better_limbs`; poses near those `in_vain` do not count."""
         self._turn += 1
+        best = BetterPose(pose, 0.0)
         for _ in range(MOST_ROUNDS):
-            better = self._better(views, first, pose, self.held_otherwise(views, pose), energy, in_vain)
+            better = self._better(views, first, best.pose, self.held_otherwise(views, best.pose), energy, in_vain)
             if better is None:
                 break
-            pose = better
-        return pose
+            best = BetterPose(better.pose, best.gain + better.gain)
+        return best
 
     def _apart(
         self, poses: Float[np.ndarray, "other dof"], pose: Float[np.ndarray, "dof"]
@@ -137,8 +166,8 @@ class LimbSearch:
         pose: Float[np.ndarray, "dof"],
         found: "HeldOtherwise",
         energy: float,
-        in_vain: Sequence[tuple[Float[np.ndarray, "dof"], int]],
-    ) -> Float[np.ndarray, "dof"] | None:
+        in_vain: InVain,
+    ) -> BetterPose | None:
         """The best that is reached from a pose with units held otherwise; None: nothing that is worth more."""
         held, crossed = self._starts(first, pose, found, energy)
         starts = np.concatenate([held, crossed])
@@ -146,11 +175,16 @@ class LimbSearch:
             return None
         ends, gains = self.climbed(views, pose, starts, np.where(np.arange(len(starts)) < len(held), FEW, MORE))
         good = (gains > WORTH * energy) & (self._apart(ends, pose) > APART) & self.possible(first, ends)
-        times = np.zeros(len(ends), int)
+        good &= self._worth_a_pass(ends, in_vain)
+        best = int(np.argmax(np.where(good, gains, -np.inf)))
+        return BetterPose(ends[best], float(gains[best])) if good.any() else None
+
+    def _worth_a_pass(self, poses: Float[np.ndarray, "pose dof"], in_vain: InVain) -> Bool[np.ndarray, "pose"]:
+        """Near which poses not too many passes were in vain."""
+        times = np.zeros(len(poses), int)
         for other, count in in_vain:
-            times += count * (self._apart(ends, other) <= APART)
-        good &= times < IN_VAIN
-        return ends[np.argmax(np.where(good, gains, -np.inf))] if good.any() else None
+            times += count * (self._apart(poses, other) <= APART)
+        return times < IN_VAIN
 
     def climbed(
         self,

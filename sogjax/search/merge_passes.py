@@ -27,7 +27,7 @@ from sogjax.quality.metrics import stretches
 from sogjax.search.body_parts import PartArrays, body_parts, merged_pose, select_parts
 from sogjax.search.climbed import MORE, climbed_in
 from sogjax.search.jump_passes import ChosenRows, Jump, chosen_rows, largest_jump, passes_without
-from sogjax.search.limb_search import LimbSearch
+from sogjax.search.limb_search import BetterPose, LimbSearch
 from sogjax.search.misplaced import Misplaced
 from sogjax.search.other_pass import (
     MOST_FRAMES,
@@ -51,7 +51,7 @@ from sogjax.tracking.tracker import Tracker
 
 LIKELY_LOST = 0.5
 """How likely lost a limb must be to be searched for longer."""
-MOST_SWEEPS = 3
+MOST_SWEEPS = 6
 """Times that key frames are searched, where they changed meanwhile."""
 MORE_SWEEPS = 6
 """Times that key frames in which a limb is likely lost still are searched, each time with other draws: with few cameras
@@ -150,11 +150,8 @@ class _Revising:
         if search is None:
             return
         self._search_limbs(search, rows, report)
-        report(0.0)  # how long the rest takes depends on what was found
         for _ in range(MOST_SWEEPS - 1):
-            changed = [row for row in rows if row in self._changed]
-            self._changed.clear()
-            self._search_limbs(search, changed, unreported)
+            self._search_limbs(search, [row for row in rows if row in self._changed], unreported)
         for _ in range(MORE_SWEEPS):
             likely = self._likely_lost
             lost = [row for row in rows if likely[row]]
@@ -237,14 +234,22 @@ class _Revising:
             self._revise_rows(best.found, best.poses)
 
     def _search_limbs(self, search: LimbSearch, rows: Sequence[int], report: Report) -> None:
+        """Search limbs in some rows, then see where what was found leads, what gains most in its row first."""
+        self._changed.clear()
+        found: dict[int, BetterPose] = {}
         for number, row in enumerate(rows):
             report(number / len(rows))
-            if self._tired(row):
+            better = None if self._tired(row) else search.better_pose(self._frame(row), self.passed, row)
+            if better is not None:
+                found[row] = better
+        report(0.0)  # how long the rest takes depends on what was found
+        for row, better in sorted(found.items(), key=lambda item: -item[1].gain):
+            if row in self._changed or self._tired(row):
                 continue
-            pose = search.better_pose(self._frame(row), self.passed, row)
-            if pose is not None:
-                self._pass_from(search, row, pose)
-
+            if search.is_in_vain(row, better.pose):
+                better = search.better_pose(self._frame(row), self.passed, row)
+            if better is not None:
+                self._pass_from(search, row, better.pose)
         path = self._tracklets.best_path(self.passed)
         self._take_path(path)
         search.forget_in_vain(path)
