@@ -17,7 +17,7 @@ from rig_cases import ring_rig
 from sogjax.cli.main import main
 from sogjax.energy.frame_energy import FrameEnergy, standard_terms
 from sogjax.energy.posed import History
-from sogjax.energy.priors import RestPenalty
+from sogjax.energy.priors import RestPenalty, pose_spread
 from sogjax.errors import InputError
 from sogjax.io.actor_file import load_body
 from sogjax.io.motion import load_motion, motion_from_poses
@@ -55,7 +55,7 @@ def test_a_frame_has_the_gradient_of_its_energy_by_pose_and_shape(scene):
     views, _, _ = tracker.views(FrameInput(jnp.asarray(cells)), TrackState.from_pose(near), Capacities(1024, 1024))
     shape = ClipShape.from_body(tracker.body, "z")
     params = jnp.asarray(0.01 * np.random.default_rng(0).normal(size=shape.num_params), jnp.float32)
-    terms = (*standard_terms(), RestPenalty(1e-3))
+    terms = (*standard_terms(), RestPenalty(1e-3, pose_spread(tracker.body)))
 
     def energy(both):
         body = shape.shaped(both[near.shape[0] :])

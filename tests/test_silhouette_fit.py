@@ -11,6 +11,7 @@ from rig_cases import ring_rig
 from sogjax.actor.coverage import Silhouettes, _blobs, _covered, _fills, mismatch
 from sogjax.actor.silhouette_fit import COARSE_CELLS, MAX_CELLS, SilhouetteFit, cells_of, fitted, silhouettes_of
 from sogjax.actor.silhouettes import PosedPictures
+from sogjax.energy.priors import pose_spread
 from sogjax.model.camera import project
 from sogjax.model.shape import LENGTH_SPREAD, ShapeModel
 from sogjax.tracking.solving import pose_scales
@@ -47,7 +48,7 @@ def case():
     pose = dog.poses["trot_left"].at[names.index("root_z")].set(1.0)
     rig = ring_rig(4, (160, 120), distance=1.5)
     model = ShapeModel.from_body(dog)
-    fit = SilhouetteFit(model, cells_covered_by(dog, pose, rig))
+    fit = SilhouetteFit(model, cells_covered_by(dog, pose, rig), pose_spread(dog))
     return fit, jnp.concatenate([pose, jnp.zeros(model.num_shape_params)])
 
 

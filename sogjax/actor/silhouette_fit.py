@@ -136,6 +136,8 @@ class SilhouetteFit(eqx.Module):
     model: ShapeModel
     silhouettes: Silhouettes
     """The silhouettes, with a leading axis for the poses."""
+    spread: Float[Array, "dof"]
+    """How far each degree of freedom is expected from rest."""
 
     @property
     def num_poses(self) -> int:
@@ -190,7 +192,7 @@ class SilhouetteFit(eqx.Module):
     def _pose_penalty(self, pose: Float[Array, "dof"]) -> Float[Array, ""]:
         skeleton = self.model.body.skeleton
         lower, upper = skeleton.joint_limits()
-        unusual = jnp.sum(((pose - self.model.body.poses["rest"]) / pose_spread(skeleton)) ** 2)
+        unusual = jnp.sum(((pose - self.model.body.poses["rest"]) / self.spread) ** 2)
         return limit_penalty(skeleton.joint_params(pose), lower, upper) + NOISE * unusual
 
     def _shape_penalty(self, shape: Float[Array, "shape"]) -> Float[Array, ""]:
@@ -280,7 +282,7 @@ def fit_edges(
 
 
 def _edges(model: ShapeModel, start: Float[Array, "param"], silhouettes: Silhouettes, max_iterations: int) -> Estimate:
-    fit = SilhouetteFit(model, silhouettes)
+    fit = SilhouetteFit(model, silhouettes, pose_spread(model.body))
     params, deviations = fitted(fit, start, pose_scales(model.body.skeleton), max_iterations)
     return Estimate(*fit.split(params), *fit.split(deviations))
 

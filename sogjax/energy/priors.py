@@ -1,12 +1,13 @@
 """Penalties of poses: joints beyond their limits (E_lim of Eq. 10), sudden motion (E_acc), joints far from rest."""
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from sogjax.energy.posed import Frame, Posed
 from sogjax.energy.term import Penalty
 from sogjax.model.body import Body
-from sogjax.model.skeleton import Skeleton
+from sogjax.model.reach import TOLD, reaches
 from sogjax.solve.solution import QuadraticModel
 
 
@@ -74,36 +75,42 @@ def acceleration_penalty(
 REST_SPREAD = 0.15
 """A joint of a range of one radian is expected to lie so far (radians) from its place in `rest`; it grows with the
 square of the range: a collar bone hardly moves, an elbow may be anywhere."""
+WELL_TOLD = 2.0 * TOLD
+"""Reach of a turn below which it is expected the nearer to rest the less pictures tell it: the turn of a head, hands or
+feet is hardly seen, but takes up what is wrong with their shape or their masks."""
+LEAST_PART = 0.2
+"""How far a turn that pictures do not tell at all is expected, as a part of one that they do."""
 LEAST_SPREAD = 0.01
 """Radians or metres: also of a joint that its limits hold in one place."""
 
 
 class RestPenalty(Penalty):
-    """Squared distance from the rest pose, in units of how far each joint is expected from it (`pose_spread`).
+    """Squared distance from the rest pose, in units of how far each joint is expected from it.
 
     Without it joints that no camera tells much of take up whatever is wrong with the body: raised shoulders, for a
     shoulder joint that lies too high, or a head bent to its limit, for dark hair before a dark wall.
     """
 
+    spread: Float[Array, "dof"]
+    """How far each degree of freedom is expected (`pose_spread`)."""
+
     def value(self, posed: Posed, frame: Frame) -> Float[Array, ""]:
         """The sum over the degrees of freedom that have limits."""
-        return jnp.sum(_inverse(posed.body) * _away(posed) ** 2)
+        return jnp.sum((_away(posed) / self.spread) ** 2)
 
     def quadratic(self, posed: Posed, frame: Frame) -> QuadraticModel:
         """The exact model: the penalty is quadratic."""
-        slope = 2.0 * self.weight * _inverse(posed.body)
+        slope = 2.0 * self.weight / self.spread**2
         return QuadraticModel(self.part(posed, frame), -slope * _away(posed), jnp.diag(slope))
 
 
-def pose_spread(skeleton: Skeleton) -> Float[Array, "dof"]:
+def pose_spread(body: Body) -> Float[Array, "dof"]:
     """How far each degree of freedom is expected to lie from `rest`; infinite without limits."""
-    return jnp.maximum(REST_SPREAD * (skeleton.dof_upper - skeleton.dof_lower) ** 2, LEAST_SPREAD)
+    skeleton = body.skeleton
+    told = np.where(skeleton.turning, np.clip(reaches(body) / WELL_TOLD, LEAST_PART, 1.0), 1.0)
+    ranges = np.asarray(skeleton.dof_upper, float) - np.asarray(skeleton.dof_lower, float)
+    return jnp.asarray(np.maximum(REST_SPREAD * told * ranges**2, LEAST_SPREAD), skeleton.offsets.dtype)
 
 
 def _away(posed: Posed) -> Float[Array, "dof"]:
     return posed.pose - posed.body.poses["rest"]
-
-
-def _inverse(body: Body) -> Float[Array, "dof"]:
-    """One over the squared expected distances; 0 where there are no limits."""
-    return 1.0 / pose_spread(body.skeleton) ** 2

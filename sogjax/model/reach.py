@@ -26,14 +26,18 @@ def told_dofs(body: Body) -> Bool[np.ndarray, "dof"]:
 
     One may turn more than a segment: `neck_bend` of the default body bends neck and head, and is told.
     """
+    return (reaches(body) >= TOLD) | ~body.skeleton.turning
+
+
+def reaches(body: Body) -> Float[np.ndarray, "dof"]:
+    """The reach of each degree of freedom where those with limits are in the middle between them."""
     skeleton = body.skeleton
     lower, upper = np.asarray(skeleton.dof_lower, float), np.asarray(skeleton.dof_upper, float)
     limited = np.isfinite(lower) & np.isfinite(upper)
     middle = 0.5 * (np.where(limited, lower, 0.0) + np.where(limited, upper, 0.0))
     pose = jnp.asarray(np.where(limited, middle, np.asarray(body.poses["rest"])), skeleton.offsets.dtype)
     moved = np.asarray(_blob_velocities(body, pose), float)
-    reaches = reach(np.moveaxis(moved, -1, 0), np.asarray(body.blob_sigmas, float))
-    return (reaches >= TOLD) | ~skeleton.turning
+    return reach(np.moveaxis(moved, -1, 0), np.asarray(body.blob_sigmas, float))
 
 
 @compiled_hastily

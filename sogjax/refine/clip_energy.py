@@ -4,12 +4,14 @@ What they share is the shape of the body and, where cameras may move, seven numb
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from sogjax.energy.priors import RestPenalty, pose_spread
 from sogjax.model.body import Body
 from sogjax.refine.arrow import ArrowSystem
 from sogjax.refine.camera_moves import LARGEST_STEP, MOVE, SPREAD, Sights
@@ -86,6 +88,11 @@ class ClipEnergy:
     def moves(self, params: Float[np.ndarray, "shared"]) -> Float[np.ndarray, "camera 7"]:
         """The parameters that are the cameras' moves."""
         return params[self.shape.num_params :].reshape(-1, MOVE)
+
+    @cached_property
+    def rest(self) -> RestPenalty:
+        """Being near rest, by the tracker's body: the shape hardly changes what pictures tell of a turn."""
+        return RestPenalty(self.weights.rest, pose_spread(self.tracker.body))
 
     @property
     def spread(self) -> Float[np.ndarray, "shared"]:
@@ -175,10 +182,10 @@ class ClipEnergy:
 
     def _seen(self, poses: Float[np.ndarray, "frame dof"], params: Float[np.ndarray, "shared"]) -> FrameModels:
         assert self.pairs is not None
-        appearance, rest = jnp.float32(self.weights.appearance), jnp.float32(self.weights.rest)
+        appearance = jnp.float32(self.weights.appearance)
         return frame_models(
             self.shape, _single(params[: self.shape.num_params]), self.tracker.terms, self.pictures, self.pairs.pairs,
-            _single(poses), appearance, rest, self._sights(params),
+            _single(poses), appearance, self.rest, self._sights(params),
         )  # fmt: skip
 
     def values(

@@ -58,7 +58,7 @@ def frame_models(
     pairs: SparsePairs,
     poses: Float[Array, "frame dof"],
     appearance: Float[Array, ""],
-    rest: Float[Array, ""],
+    rest: RestPenalty,
     sights: Sights | None,
 ) -> FrameModels:
     """Models of all frames; with `sights` also by the moves of the cameras."""
@@ -67,7 +67,7 @@ def frame_models(
     def one(frame: tuple[Views, ColorWindows, SparsePairs, Array, Array | None]) -> FrameModels:
         views, windows, near, pose, velocities = frame
         sight = None if sights is None or velocities is None else Sights(sights.moves, velocities)
-        added = (Appearance(appearance, windows, pictures.clusters), RestPenalty(rest))
+        added = (Appearance(appearance, windows, pictures.clusters), rest)
         # The foreground's part is in the appearance already, rest has a weight of its own.
         kept = [term for term in terms if not isinstance(term, Foreground | RestPenalty)]
         return frame_model(body, rates, pose, replace(views, pairs=near), (*kept, *added), sight)

@@ -10,7 +10,7 @@ import numpy as np
 from sogjax.energy.frame_energy import standard_terms
 from sogjax.energy.keypoints import KeypointTerm
 from sogjax.energy.overlap import EXACT_EXPONENT, PRINTED_EXPONENT
-from sogjax.energy.priors import RestPenalty
+from sogjax.energy.priors import RestPenalty, pose_spread
 from sogjax.energy.term import Term, Terms, added_terms
 from sogjax.energy.views import whole_image_overlap
 from sogjax.errors import InputError
@@ -189,7 +189,7 @@ def tracker(clip: Clip, background: Background, body: Body, config: TrackConfig,
         cameras=cameras,
         normalizers=whole_image_overlap(cameras.image_size),
         reader=image_reader(clip, background, config, [body]),
-        terms=_tracking_terms(config.energy, terms),
+        terms=_tracking_terms(config.energy, body, terms),
         solver=solver(config.solver),
         scales=pose_scales(body.skeleton),
         extrapolation=config.tracking.extrapolation,
@@ -201,6 +201,7 @@ def tracker(clip: Clip, background: Background, body: Body, config: TrackConfig,
 
 def varied(tracker: Tracker, config: TrackConfig) -> Tracker:
     """The same tracker with the numbers of other settings; pictures and colour space must be the same."""
+    keypoints = [term for term in tracker.terms if isinstance(term, KeypointTerm)]
     reader = replace(
         tracker.reader,
         color_radius=color_space_and_radius(config.color)[1],
@@ -210,7 +211,7 @@ def varied(tracker: Tracker, config: TrackConfig) -> Tracker:
     return replace(
         tracker,
         reader=reader,
-        terms=_tracking_terms(config.energy, [term for term in tracker.terms if isinstance(term, KeypointTerm)]),
+        terms=_tracking_terms(config.energy, tracker.body, keypoints),
         solver=solver(config.solver),
         scales=pose_scales(tracker.body.skeleton),
         extrapolation=config.tracking.extrapolation,
@@ -219,9 +220,9 @@ def varied(tracker: Tracker, config: TrackConfig) -> Tracker:
     )
 
 
-def _tracking_terms(config: EnergyConfig, further: Sequence[Term]) -> Terms:
+def _tracking_terms(config: EnergyConfig, body: Body, further: Sequence[Term]) -> Terms:
     """The energy's terms, and being near rest: initial poses, from which one is chosen, may be any."""
-    rest = [RestPenalty(config.rest_weight)] if config.rest_weight else []
+    rest = [RestPenalty(config.rest_weight, pose_spread(body))] if config.rest_weight else []
     return energy_terms(config, [*rest, *further])
 
 

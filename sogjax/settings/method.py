@@ -39,7 +39,9 @@ class EnergyConfig:
     limit_weight: float = option(1.0, "[w_l] weight of the joint limits, 1/rad^2")
     acceleration_weight: float = option(0.01, "[w_a] weight of smooth motion, 1/rad^2")
     foreground_weight: float = expert(0.2, "weight of covering what is not background, and nothing that is; 0: off")
-    rest_weight: float = expert(1e-5, "weight, while tracking, of joints of small range being near rest; 0: off")
+    rest_weight: float = expert(
+        1e-5, "weight, while tracking, of joints that move or show little being near rest; 0: off"
+    )
     keypoint_weight: float = expert(
         0.7, "weight of being near keypoints that other programs left beside the recording; 0: off"
     )
