@@ -19,7 +19,7 @@ from sogjax.scene.cells import CellGrid
 from sogjax.scene.clip_background import SampledCamera, even_samples, learnt_background
 from sogjax.scene.foreground import foreground_probability
 from sogjax.scene.moving_zone import filled
-from sogjax.scene.still_body import still_bodies
+from sogjax.scene.still_body import Standing, still_bodies
 
 SIZE = (128, 96)
 RNG = np.random.default_rng(0)
@@ -76,6 +76,19 @@ def test_what_was_uncovered_is_learnt_though_it_was_hidden_for_longer():
     assert (apart(found)[found.known] > 12).mean() < 0.002
     median = np.median(np.stack(list(images.values())), axis=0)
     assert (np.abs(median - EMPTY).max(axis=-1)[covered(90)] > 12).mean() > 0.9  # which a median does not see
+
+
+@pytest.mark.parametrize(
+    ("large", "of_body", "beside"), [(5, False, True), (3, False, True), (2, False, False), (5, True, False)]
+)
+def test_furniture_is_what_stays_still_beyond_bodies_in_most_cameras(large, of_body, beside):
+    where = lambda rows: np.isin(np.arange(20), rows)[:, None] & np.ones((20, 10), bool)
+    moving, still = where(range(0, 5)), where(range(5, 15))
+    perhaps = still if of_body else where(())
+    cameras = range(5)
+    still_of = {k: still if k < large else where(()) for k in cameras}
+    bodies = {k: Standing(where(()), perhaps) for k in cameras}
+    assert clip_learning._beside_furniture(still_of, dict.fromkeys(cameras, moving), bodies) == beside
 
 
 def test_beside_furniture_what_is_uncovered_for_a_short_time_beyond_an_edge_stays_unknown():
