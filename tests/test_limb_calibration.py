@@ -1,11 +1,11 @@
 """The figures about limbs in doubt: areas, shares and weights against cases that are known."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 import yaml
-from limb_doubt import fitted_weights, regained_table, write_weights
+from limb_doubt import ON_BACKGROUND, fitted_weights, regained_table, write_weights
 from scipy.special import expit
 
 from sogjax.quality.fitted import PATH, PoseEvidenceBounds, fitted_numbers, read_fitted
@@ -38,8 +38,13 @@ def test_the_area_is_the_share_of_pairs_in_order():
     assert np.isnan(area_under_roc(said, np.zeros(200, bool)))
 
 
+def without_background(limb):
+    """The limb, told without a background: no bound holds its weights."""
+    return replace(limb, trial=replace(limb.trial, background="none"))
+
+
 def test_weights_that_limbs_were_drawn_with_are_found():
-    weights = fitted_weights([drawn(40_000)])
+    weights = fitted_weights([without_background(drawn(40_000))])
     assert weights.constant == pytest.approx(-4.0, abs=0.2)
     assert weights.worse == pytest.approx(2.0, abs=0.1)
     assert weights.contradicted == pytest.approx(3.0, abs=0.2)
@@ -48,7 +53,17 @@ def test_weights_that_limbs_were_drawn_with_are_found():
 def test_a_measure_that_would_reassure_gets_no_weight():
     limb = drawn(4000)
     turned = JudgedLimb(TRIAL, PLAIN, "left arm", limb.worse, 1.0 - limb.contradicted, limb.error)
-    assert fitted_weights([turned]).contradicted == pytest.approx(0.0, abs=1e-9)
+    assert fitted_weights([without_background(turned)]).contradicted == pytest.approx(0.0, abs=1e-9)
+
+
+def test_what_lies_on_nothing_but_background_is_likely_lost_whatever_was_drawn():
+    limb = drawn(4000)
+    bound, free = fitted_weights([limb]), fitted_weights([without_background(limb)])
+    on_background = lambda weights: expit(weights.constant + weights.contradicted)
+    assert on_background(free) < 0.5
+    assert on_background(bound) == pytest.approx(ON_BACKGROUND, abs=1e-3)
+    kept = fitted_numbers().limb_weights.with_background
+    assert on_background(kept) > 0.5
 
 
 def test_other_weights_count_without_a_background():
