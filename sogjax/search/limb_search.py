@@ -102,7 +102,7 @@ class LimbSearch:
         """
         first = passed.poses[row]
         views = self.views(on_device(frame), first)
-        found = self._better_in_rounds(views, first, first, passed.energy, self._in_vain.get(row, []))
+        found = self.with_better_limbs(views, first, first, passed.energy, self._in_vain.get(row, []))
         return None if found.pose is first else found
 
     def is_in_vain(self, row: int, pose: Float[np.ndarray, "dof"]) -> bool:
@@ -115,22 +115,12 @@ class LimbSearch:
         first: Float[np.ndarray, "dof"],
         pose: Float[np.ndarray, "dof"],
         energy: float,
-    ) -> Float[np.ndarray, "dof"]:
-        """A pose with limbs held otherwise as long as that is worth more; itself, where nothing is.
-
-        `first` is the tracked pose, `energy` that of a frame, for scale.
-        """
-        return self._better_in_rounds(views, first, pose, energy).pose
-
-    def _better_in_rounds(
-        self,
-        views: Views,
-        first: Float[np.ndarray, "dof"],
-        pose: Float[np.ndarray, "dof"],
-        energy: float,
         in_vain: InVain = (),
     ) -> BetterPose:
-        """As `with_better_limbs`; poses near those `in_vain` do not count."""
+        """A pose with limbs held otherwise as long as that is worth more; itself, where nothing is.
+
+        `first` is the tracked pose, `energy` that of a frame, for scale. Poses near those `in_vain` do not count.
+        """
         self._turn += 1
         best = BetterPose(pose, 0.0)
         for _ in range(MOST_ROUNDS):

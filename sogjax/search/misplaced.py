@@ -75,7 +75,7 @@ class Misplaced:
         if found is None:
             return None
         views = limbs.views(on_device(frame), found)
-        return limbs.with_better_limbs(views, found, found, passed.energy)
+        return limbs.with_better_limbs(views, found, found, passed.energy).pose
 
     def _seen(self, frame: AnyFrame, pose: Float[np.ndarray, "dof"], actor: int) -> SeenFrame:
         """A frame as it is compared with one actor, where the others are in a pose."""

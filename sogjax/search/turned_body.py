@@ -55,7 +55,7 @@ def turned_pose(
         ends, gains = search.climbed(views, known, ends[likeliest : likeliest + 1], np.array([WHOLE]))
         if gains[0] < PROMISING * passed.energy:
             continue
-        pose = search.with_better_limbs(views, known, ends[0], passed.energy)
+        pose = search.with_better_limbs(views, known, ends[0], passed.energy).pose
         gain = float(search.climbed(views, known, pose[None], np.array([FEW]))[1][0])
         if gain > best and search.possible(known, pose[None])[0]:
             found, best = pose, gain
