@@ -74,14 +74,22 @@ def write_weights(path: Path, found: Mapping[str, Sequence[JudgedLimb]], trials:
         found: the limbs to fit to, by `with_background` and `without_background`; what is absent keeps its weights.
         trials: what was tracked, which the file will say.
     """
+    counts = [f"{name}: {len(lost(limbs))} limbs, {int(lost(limbs).sum())} lost" for name, limbs in found.items()]
+
+    def refit(part: dict) -> None:
+        for name, limbs in found.items():
+            part["values"][name] = {key: round(value, 1) + 0.0 for key, value in asdict(fitted_weights(limbs)).items()}
+        others = [said for said in part["recordings"].split("; ") if said.split(":")[0] in {*part["values"]} - {*found}]
+        part["recordings"] = "; ".join([trials, *counts, *others])
+
+    change_part(path, "limb_weights", refit)
+
+
+def change_part(path: Path, name: str, change: Callable[[dict], None]) -> None:
+    """Change a part of the file of fitted numbers."""
     text = path.read_text(encoding="utf-8")
     content = yaml.safe_load(text)
-    part = content["limb_weights"]
-    for name, limbs in found.items():
-        part["values"][name] = {key: round(value, 1) + 0.0 for key, value in asdict(fitted_weights(limbs)).items()}
-    counts = [f"{name}: {len(lost(limbs))} limbs, {int(lost(limbs).sum())} lost" for name, limbs in found.items()]
-    others = [said for said in part["recordings"].split("; ") if said.split(":")[0] in {*part["values"]} - {*found}]
-    part["recordings"] = "; ".join([trials, *counts, *others])
+    change(content[name])
     header = "".join(line for line in text.splitlines(keepends=True) if line.startswith("#"))
     with atomic_path(path) as temporary:
         written = yaml.safe_dump(content, sort_keys=False, width=120, allow_unicode=True, default_flow_style=None)

@@ -1,13 +1,14 @@
 """What comes out of whole runs, as a user makes them, on recordings of people and rooms that nothing was chosen on?
 
-    python experiments/whole_runs.py [rows=['talk 2 4 plates 22']] [out=outputs/whole_runs] [update=true]
+    python experiments/whole_runs.py [rows=['talk 2 4 plates 22']] [out=outputs/whole_runs] [update=true] [fit=true]
 
 A row is: motion, people, cameras, what is given beside the videos (`plates`: pictures of the empty scene and example
 poses; `poses`: example poses; `videos`: nothing), the seed of people, clothes and room, and settings of `sogjax synth`.
 Each recording is rendered, `sogjax track` is run on it without a pose, and its motions are held against the truth. Runs
 are kept in `out` and not made again. The table is printed, with how often verdicts hold, and written as table.md. With
 `update`, `whole_runs.csv`, which has every recording as it was last run, is brought up to date, and what it says in all
-is printed.
+is printed. With `fit` the weight by which rivals of limbs count is fitted to the limbs of these runs, and written
+into `sogjax/quality/fitted.yaml`; what is printed of it judges each run by the weight that comes from the others.
 """
 
 import csv
@@ -16,11 +17,13 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
-from beside_truth import OFTEN, beside_truth
+from beside_truth import FAR, OFTEN, beside_truth
+from limb_doubt import change_part
 from scipy.optimize import linear_sum_assignment
 
 from sogjax.errors import InputError
@@ -30,11 +33,17 @@ from sogjax.io.files import csv_text, write_file, write_json
 from sogjax.io.ground_truth import GroundTruth, load_ground_truth
 from sogjax.io.motion import Motion, load_motion
 from sogjax.io.recording_files import BACKGROUND, CALIBRATION, EXAMPLE_POSES, GROUND_TRUTH, SETTINGS, VIDEOS
+from sogjax.quality.fitted import PATH, fitted_numbers
+from sogjax.quality.limb_confidence import SURE, beside_rivals
 from sogjax.quality.limb_warnings import doubtful_limbs
+from sogjax.quality.markers import common_frames, joint_errors
+from sogjax.quality.metrics import mean_per_frame
 from sogjax.quality.verdict import Verdict
 from sogjax.run.run_files import METRICS, MOTION
 from sogjax.study.experiment import synth_settings
+from sogjax.study.limb_calibration import area_under_roc
 from sogjax.study.script import machine_line, run_script, settings_from
+from sogjax.study.true_poses import limb_of
 from sogjax.synth.cache import cached_recording
 
 TABLE = Path(__file__).with_suffix(".csv")
@@ -50,8 +59,10 @@ FIELDS = ("recording", "joints_mm", "astray_percent", "silent", "doubted", "verd
 it doubts; both are empty where they were not kept."""
 GROUPS = ((10, "10 to 12"), (5, "5 to 8"), (0, "3 or 4"))
 """Cameras from which on a group of recordings begins, and its name."""
-BOUNDS, LEAST = (0.2, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7), (3, 4, 5)
+BOUNDS, LEAST = (0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5), (3, 4, 5)
 """Of how likely a limb is lost, from which it could be named, and the frames for which it must be so."""
+WEIGHTS = [0.1 * k for k in range(200)]
+"""Of rivals, one of which is chosen."""
 SHOWN = ((1e3, "mean"), (100, "astray"))
 FOUND = "found.json"
 LEAN = ("outputs.rerun=false", "outputs.overlay=false", "overwrite=true")
@@ -66,6 +77,7 @@ class Settings:
     frames: int = 60
     out: str = "outputs/whole_runs"
     update: bool = False
+    fit: bool = False
 
 
 def main() -> None:
@@ -85,6 +97,8 @@ def main() -> None:
     text = "\n".join([*head, *lines, "", *_of_verdicts(runs)]) + "\n"
     write_file(Path(settings.out) / "table.md", text)
     print(f"\n{text}")
+    if settings.fit:
+        print("\n".join(fit_rivals(PATH, runs)), flush=True)
     if settings.update:
         write_file(TABLE, csv_text([FIELDS, *([entry[name] for name in FIELDS] for entry in table.values())]))
         print("\n".join(_in_all(table)))
@@ -145,7 +159,9 @@ def _line(row: str, run: dict) -> str:
 def _kept(folder: Path) -> dict | None:
     path = folder / FOUND
     found = _read(path) if path.is_file() else {}
-    return found if all("longest" in actor for actor in found.get("actors", [{}])) else None
+    bounds = {f"{bound:g}" for bound in BOUNDS}
+    known = lambda actor: "limbs" in actor and bounds <= {*actor.get("longest", {})}
+    return found if all(map(known, found.get("actors", [{}]))) else None
 
 
 def _read(path: Path) -> dict:
@@ -204,8 +220,64 @@ def _actor(motion: Motion, person: GroundTruth, verdict: Verdict) -> dict:
     named = sorted({limb.name for limb in verdict.doubtful})
     said = {"sentence": verdict.sentence, "looks_right": verdict.looks_right, "subject_wrong": verdict.wrong}
     frames = lambda limb: limb.last_frame - limb.first_frame + 1
+    limbs = limbs_beside(motion, person)
     longest = {f"{bound:g}": max(map(frames, doubtful_limbs(motion, bound, 1)), default=0) for bound in BOUNDS}
-    return asdict(beside) | said | {"named": named, "longest": longest}
+    return asdict(beside) | said | {"named": named, "longest": longest, "limbs": limbs}
+
+
+def limbs_beside(motion: Motion, person: GroundTruth) -> dict[str, list[list[float]]]:
+    """By limb, in each frame that the truth knows: how likely it is lost as it is seen, its rival's gain, its error."""
+    errors = joint_errors(motion, person)
+    if errors is None or motion.limb_unlike is None or motion.limb_rival is None or motion.limb_names is None:
+        return {}
+    rows, found = common_frames(motion, person)[0], {}
+    for name, *measures in zip(motion.limb_names.tolist(), motion.limb_unlike.T, motion.limb_rival.T, strict=True):
+        joints = [k for k, joint in enumerate(errors.names) if limb_of(joint) == name]
+        values = np.stack([*(of_limb[rows] for of_limb in measures), mean_per_frame(errors.errors[:, joints])])
+        found[name] = np.round(values[:, np.isfinite(values).all(axis=0)], 5).tolist()
+    return {name: values for name, values in found.items() if values[0]}
+
+
+def fit_rivals(path: Path, runs: Sequence[dict]) -> list[str]:
+    """Fit the weight of rivals to the limbs of runs and write it; how well each is judged by that of the others."""
+    limbs = [np.concatenate([np.zeros((3, 0)), *_measured(run)], axis=1) for run in runs]
+    limbs = [of_run for of_run in limbs if of_run.size]
+    unlike, _, error = np.concatenate(limbs or [np.zeros((3, 0))], axis=1)
+    if not (error > FAR).any():
+        raise InputError("fit=true: no limb of these runs is lost; give more rows")
+    others = lambda left: [of_run for k, of_run in enumerate(limbs) if k != left] or limbs
+    said = [beside_rivals(of_run[0], of_run[1], likeliest_weight(others(k))) for k, of_run in enumerate(limbs)]
+    count = f"{len(limbs)} runs; {len(error)} limbs, {int((error > FAR).sum())} lost"
+
+    def refit(part: dict) -> None:
+        part["values"], part["recordings"] = {"weight": round(likeliest_weight(limbs), 1)}, count
+
+    change_part(path, "rivals", refit)
+    by_both = {"as it is seen": unlike, "beside rivals": np.concatenate(said)}
+    return [count, *(_noticed(name, doubt, error > FAR) for name, doubt in by_both.items())]
+
+
+def likeliest_weight(limbs: Sequence[np.ndarray]) -> float:
+    """The weight of rivals with which what was lost of limbs is likeliest."""
+    unlike, rival, error = np.concatenate([*limbs], axis=1)
+
+    def surprise(weight: float) -> float:
+        doubt = np.clip(beside_rivals(unlike, rival, weight), SURE, 1.0 - SURE)
+        return -float(np.mean(np.log(np.where(error > FAR, doubt, 1.0 - doubt))))
+
+    return min(WEIGHTS, key=surprise)
+
+
+def _measured(run: dict) -> list[np.ndarray]:
+    return [np.array(values) for actor in run["actors"] for values in actor.get("limbs", {}).values()]
+
+
+def _noticed(name: str, said: np.ndarray, wrong: np.ndarray) -> str:
+    named = said > fitted_numbers().verdict.limb_doubtful
+    shares = (
+        f"{100 * named[wrong].mean():.0f} % of the lost are named, {100 * named[~wrong].mean():.2f} % of the others"
+    )
+    return f"- {name}: area under the ROC {area_under_roc(said, wrong):.3f}; {shares}"
 
 
 def _of_verdicts(runs: list[dict]) -> list[str]:

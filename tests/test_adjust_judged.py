@@ -53,6 +53,10 @@ def test_old_and_new_colours_are_judged_on_the_same_cells_read_once(setup, monke
     assert ahead == [1] * (2 * FRAMES)  # no cells are kept
     assert found.bodies[0] is found.tracker.body is (new if taken else old)
     np.testing.assert_allclose(after.limb_doubt, doubt if taken else 0.1)
+    rivals = np.zeros((FRAMES, len(limb_names(old))))
+    _, beside = adjust_colors.judged_with_colors(setup, new, coming(), replace(table, limb_rival=rivals))
+    np.testing.assert_array_equal(beside.limb_unlike, after.limb_doubt)
+    assert (beside.limb_doubt > after.limb_doubt).all()
 
 
 @pytest.mark.parametrize(("doubt", "more"), [(0.1, False), (0.11, False), (0.6, True)])

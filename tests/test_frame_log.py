@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from body_cases import shipped
 from command_line import actor_file, trackable
 from frame_table_cases import frame_table
 
@@ -16,6 +17,7 @@ from sogjax.io.frame_table import FrameLog, FrameTable, read_frames_log
 from sogjax.io.motion_data import save_motion
 from sogjax.io.npz_file import npy_header
 from sogjax.io.recording import open_recording
+from sogjax.model.limbs import limb_names
 from sogjax.run.actors import Actors
 
 POSES = np.random.default_rng(0).normal(size=(11, 5)).astype(np.float32)
@@ -110,6 +112,18 @@ def test_a_table_without_a_column_is_refused():
     del arrays["iterations"]
     with pytest.raises(InputError, match="'iterations'"):
         FrameTable.from_arrays(arrays)
+
+
+def test_each_actor_has_what_is_known_of_its_own_limbs():
+    bodies = [replace(shipped("human"), name=name) for name in ("anna", "ben")]
+    dofs, limbs = bodies[0].skeleton.num_dofs, len(limb_names(bodies[0]))
+    of_limbs = np.tile(np.arange(2.0 * limbs), (3, 1))
+    judged = {name: of_limbs + k for k, name in enumerate(("limb_doubt", "limb_unlike", "limb_rival"))}
+    table = frame_table(np.zeros((3, 2 * dofs)), explained=np.zeros((3, 2)), overlap=np.zeros((3, 2, 2)), **judged)
+    motions = motions_of(table, bodies, ClipFacts(25.0, "z", ("left", "right")))
+    for name, part in (("anna", slice(limbs)), ("ben", slice(limbs, None))):
+        for column, expected in judged.items():
+            np.testing.assert_array_equal(getattr(motions[name], column), expected[:, part])
 
 
 @pytest.fixture

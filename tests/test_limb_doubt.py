@@ -10,6 +10,7 @@ from body_cases import shipped
 from drawn_scene import BACKGROUND, cells_of, draw, in_colors, make_tracker, moved, standing
 from motion_cases import walking_motion
 from rig_cases import ring_rig
+from scipy.special import expit
 from slow_values import fast_and_slow
 
 from sogjax.energy.posed import Posed
@@ -17,7 +18,14 @@ from sogjax.energy.views import windows_around
 from sogjax.model.body import concatenate
 from sogjax.model.limbs import joint_limbs, limb_blobs, limb_names, limb_slices
 from sogjax.quality.fitted import fitted_numbers
-from sogjax.quality.limb_confidence import LimbMeasures, error_probability, limb_confidence
+from sogjax.quality.limb_confidence import (
+    LEAST_RIVAL,
+    MOST_RIVAL,
+    LimbMeasures,
+    beside_rivals,
+    error_probability,
+    limb_confidence,
+)
 from sogjax.quality.limb_evidence import CLEARLY, BlobEvidence, LimbBlobs, blob_evidence
 from sogjax.quality.limb_warnings import doubtful_limbs
 from sogjax.scene.background import BackgroundCells
@@ -243,3 +251,28 @@ def test_background_that_was_always_seen_in_a_limb_s_place_is_no_reason_for_doub
     always = limb_confidence(limbs, evidence, jnp.stack([fits, jnp.full(blobs, 0.6)]), True)
     suddenly = limb_confidence(limbs, evidence, jnp.stack([fits, jnp.zeros(blobs)]), True)
     assert float(always.error_probability.max()) < 0.05 < 0.2 < float(suddenly.error_probability.min())
+
+
+def test_a_limb_is_the_more_doubtful_the_more_its_rival_gains_and_none_reassures():
+    unlike, gains = np.full(5, 0.1), np.array([2.0 * LEAST_RIVAL, LEAST_RIVAL, 0.5 * LEAST_RIVAL, MOST_RIVAL, 0.5])
+    said = beside_rivals(unlike, gains)
+    assert unlike[0] == said[0] == said[1] < said[2] < said[3] == said[4]
+    assert said[3] > fitted_numbers().verdict.limb_doubtful
+    assert (np.diff(beside_rivals(np.linspace(0.0, 1.0, 9), np.full(9, -0.001))) >= 0.0).all()
+    assert beside_rivals(np.array([0.3, 0.0]), np.full(2, np.nan)).tolist() == [0.3, 0.0]
+    np.testing.assert_allclose(beside_rivals(np.array([0.5]), np.array([0.0]), 2.0), expit(1.0))
+
+
+def test_who_is_doubted_for_a_rival_alone_might_as_well_be_elsewhere():
+    walk = walking_motion(num_frames=20)
+    doubt, unlike = np.zeros((20, 2)), np.zeros((20, 2))
+    doubt[5:12], unlike[5:12, 1] = 0.8, 0.6
+    judged = replace(walk, limb_names=np.array(["head", "left leg"]), limb_doubt=doubt, limb_unlike=unlike)
+    judged = replace(judged, limb_rival=np.zeros_like(doubt))
+    both = doubtful_limbs(judged)
+    assert [limb.elsewhere for limb in both] == [True, False]
+    assert "might as well be elsewhere" in str(both[0])
+    for without in ({"limb_unlike": None}, {"limb_rival": np.full_like(doubt, np.nan)}):
+        assert not any(limb.elsewhere for limb in doubtful_limbs(replace(judged, **without)))
+    behind = doubtful_limbs(replace(judged, limb_hidden=np.full((20, 2), 0.9)))
+    assert [(limb.hidden, limb.elsewhere) for limb in behind] == [(True, False)] * 2

@@ -20,6 +20,7 @@ from sogjax.energy.views import Windows
 from sogjax.model.body import concatenate
 from sogjax.model.limbs import limb_names
 from sogjax.model.solid import Solid, impossibilities
+from sogjax.quality.limb_confidence import LEAST_RIVAL
 from sogjax.search import climbed, limb_search
 from sogjax.search import merge_passes as merging
 from sogjax.search.climbed import climbed_in
@@ -145,6 +146,57 @@ def test_a_lost_limb_that_nobody_doubts_is_found_in_a_key_frame(walking_dog):
 
 
 @pytest.mark.slow
+def test_a_lost_limb_has_a_rival_and_one_in_its_place_has_none(walking_dog, monkeypatch):
+    tracker, cells, right = walking_dog
+    passed, limb = with_lost_limb(walking_dog, doubt=0.0)
+    search, row = LimbSearch.of(tracker, right.capacities), LOST.start + 1
+    frame = lambda: cells[row]
+    assert search.rivals(frame, passed, row)[limb] > 0.0
+    rivals = search.rivals(frame, right, row)  # the pose changed: they are searched again
+    assert len(rivals) == len(limb_names(tracker.body))
+    assert rivals[limb] < -0.002
+    searched = sorted(limb for unit in search.units for limb in unit.limbs)
+    assert np.flatnonzero(np.isfinite(rivals)).tolist() == searched
+    np.testing.assert_array_equal(search.rivals(lambda: pytest.fail("read again"), right, row), rivals)
+    held = search.held_otherwise(search.views(on_device(cells[row]), right.poses[row]), right.poses[row])
+    here = means_of(tracker.body, right.poses[[row]])
+    for unit, poses in zip(search.units, held.poses, strict=True):  # each limb is elsewhere in some way
+        moved = np.linalg.norm(means_of(tracker.body, poses) - here, axis=-1)
+        assert all((moved[:, blobs[-1]] > 0.1).any() for blobs in unit.blobs)
+
+
+@pytest.mark.slow
+def test_rivals_are_those_of_the_poses_that_are_kept(walking_dog):
+    tracker, cells, right = walking_dog
+    passed, limb = with_lost_limb(walking_dog, doubt=0.0)
+    energies = right.energies.copy()
+    energies[LOST] *= 0.9
+    keys = range(0, len(cells), 5)
+    found = merge_passes(tracker, replace(passed, energies=energies), reader(cells), keys)
+    assert [*found.rivals] == [*keys]
+    assert 5 in found.frames  # its limb was found
+    assert found.rivals[5][limb] < -0.002
+
+
+@pytest.mark.slow
+def test_rivals_that_are_impossible_or_near_do_not_count(walking_dog, monkeypatch):
+    tracker, cells, right = walking_dog
+    search, row = LimbSearch.of(tracker, right.capacities), 3
+    pose, unit = right.poses[row], search.units[0]
+    found = search.held_otherwise(search.views(on_device(cells[row]), pose), pose)
+    limbs = [*unit.limbs]
+    with_gains = lambda gain: eqx.tree_at(lambda held: held.gains, found, np.full_like(found.gains, gain))
+    near = eqx.tree_at(lambda held: held.poses, with_gains(100.0), np.tile(pose, (*found.gains.shape, 1)))
+    assert (search._rivals_among(pose, near, right.energy)[limbs] == LEAST_RIVAL).all()
+    worth = with_gains(0.01 * right.energy)
+    monkeypatch.setattr(LimbSearch, "_less_impossible", lambda _, pose, poses: np.zeros(poses.shape[:-1]))
+    rivals = search._rivals_among(pose, worth, right.energy)[limbs]  # a climb may have led back
+    np.testing.assert_allclose(rivals.max(), 0.01, rtol=1e-5)
+    monkeypatch.setattr(LimbSearch, "possible", lambda _, known, poses: np.zeros(len(poses), bool))
+    assert (search._rivals_among(pose, worth, right.energy)[limbs] == LEAST_RIVAL).all()
+
+
+@pytest.mark.slow
 def test_what_is_compiled_beforehand_is_what_the_search_for_limbs_takes(walking_dog, monkeypatch):
     """Tracking tells of its first frame once, before it compiles its step."""
     tracker, cells, right = walking_dog
@@ -186,6 +238,7 @@ def test_no_pass_begins_where_one_went_in_vain(walking_dog, monkeypatch):
     other = right.poses[1].copy()
     other[search.units[0].all_dofs] += 0.5
     monkeypatch.setattr(LimbSearch, "held_otherwise", lambda *_: None)
+    monkeypatch.setattr(LimbSearch, "_rivals_among", lambda *_: None)
     monkeypatch.setattr(LimbSearch, "_starts", lambda *_: (other[None], other[:0].reshape(0, len(other))))
     monkeypatch.setattr(LimbSearch, "possible", lambda _, known, poses: np.ones(len(poses), bool))
     worth_more = lambda start: jnp.float32(np.array_equal(start, other))

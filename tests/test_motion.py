@@ -79,7 +79,7 @@ def test_poses_on_the_device_are_as_good_as_numpys():
     assert all(isinstance(value, np.ndarray | float | str) for value in known.values())
     assert vars(motion).keys() - known.keys() == {
         *("limb_names", "joint_limb", "limb_doubt", "limb_hidden", "explained", "overlap", "camera_names"),
-        "unfiltered_pose",
+        *("unfiltered_pose", "limb_unlike", "limb_rival"),
     }
 
 
@@ -93,6 +93,10 @@ def test_doubts_about_limbs_are_kept_and_files_without_them_are_read(tmp_path):
     found = load_motion(_saved(tmp_path / "judged.npz", judged))
     np.testing.assert_array_equal(found.limb_doubt, doubt)
     assert found.limb_names.tolist() == ["arm", "leg"]
+    rival = np.where(doubt > 0.5, np.nan, -0.01)  # none was searched
+    found = load_motion(_saved(tmp_path / "rivals.npz", replace(judged, limb_unlike=0.5 * doubt, limb_rival=rival)))
+    np.testing.assert_array_equal(found.limb_unlike, 0.5 * doubt)
+    np.testing.assert_array_equal(found.limb_rival, rival)
     arrays = dict(np.load(tmp_path / "judged.npz"))
     wrong = {"limb_doubt": (doubt[:, 1:], "'limb_doubt' has the shape"), "joint_limb": (of_joint + 1, "holds 2")}
     for name, (array, sentence) in wrong.items():

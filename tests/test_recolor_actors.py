@@ -181,6 +181,8 @@ def test_limbs_are_named_that_are_often_in_doubt_unless_something_hides_them(fra
     doubts[:frames, limb_names(DOG).index(LEG)] = 0.9
     motion = replace(motion, limb_doubt=doubts, limb_hidden=np.full((30, LIMBS), hidden))
     assert named_limbs(DOG, motion, unlike) == ({LEG} if named else set())
+    rivalled = replace(motion, limb_unlike=np.zeros_like(doubts))  # it looks like itself
+    assert named_limbs(DOG, rivalled, unlike) == ({LEG} if unlike else set())
     assert named_limbs(DOG, replace(motion, limb_doubt=None, limb_hidden=None), "") == set()
 
 

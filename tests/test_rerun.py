@@ -164,6 +164,7 @@ def test_limbs_in_doubt_have_balls_around_their_joints(tmp_path, motion):
     left = np.array([0 if "left" in name else -1 for name in motion.joint_names])
     doubt = np.linspace(0.0, 1.0, motion.num_frames)[:, None]
     judged = replace(motion, limb_names=np.array(["left arm"]), joint_limb=left, limb_doubt=doubt)
+    judged = replace(judged, limb_rival=0.01 * doubt)
     write_rerun(tmp_path / "judged.rrd", recording_of(ring_rig(), 10), [judged], names=["ann"])
     found = read_back(tmp_path / "judged.rrd")
     radii = [row for row in found["/world/actors/ann/doubtful"]["Points3D:radii"] if row]
@@ -172,6 +173,7 @@ def test_limbs_in_doubt_have_balls_around_their_joints(tmp_path, motion):
     assert {len(row) for row in radii} == {int((left[drawn] == 0).sum())}
     assert radii[-1] == pytest.approx([0.06] * len(radii[-1]))
     assert np.allclose(np.ravel(found["/curves/doubts/doubt_left_arm"]["Scalars:scalars"]), doubt.ravel())
+    assert np.allclose(np.ravel(found["/curves/rivals/rival_left_arm"]["Scalars:scalars"]), doubt.ravel())
 
 
 @pytest.mark.parametrize("size", [20, 3000, 20_000, 40_000])

@@ -4,6 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from command_line import actor_file, done, trackable
+from frame_table_cases import frame_table
 
 from sogjax.errors import InputError
 from sogjax.io.motion import load_motion
@@ -11,6 +12,7 @@ from sogjax.io.recording import open_recording
 from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.run import merge, passes
 from sogjax.run.clip import Clip
+from sogjax.run.frames import with_rivals
 from sogjax.run.initial_pose import InitialPose
 from sogjax.search.merge_passes import Revised, Revision
 
@@ -111,3 +113,18 @@ def test_a_pass_backwards_that_fails_is_said_and_the_motion_stays(capsys, tmp_pa
     _, err = done(capsys, *command, *shown, "out=run")
     assert "limbs were not searched over the clip, which stays as it was tracked: a frame has too many" in err
     assert load_motion(tmp_path / "run" / "motion.npz").num_frames == FRAMES
+
+
+def test_rivals_are_known_between_key_frames_and_what_is_seen_alone_is_kept():
+    unlike = np.full((5, 2), 0.2)
+    table = frame_table(np.zeros((5, 3)), limb_doubt=unlike)
+    rivals = merge.over_frames({0: np.array([-0.005, np.nan]), 4: np.array([0.001, np.nan])}, 5)
+    found = with_rivals(table, rivals)
+    np.testing.assert_allclose(found.limb_rival[:, 0], np.linspace(-0.005, 0.001, 5))
+    assert np.isnan(found.limb_rival[:, 1]).all()
+    assert (np.diff(found.limb_doubt[:, 0]) > 0.0).all()
+    np.testing.assert_array_equal(found.limb_doubt[:, 1], unlike[:, 1])
+    np.testing.assert_array_equal(found.limb_unlike, unlike)
+    assert with_rivals(table, merge.over_frames({}, 5)) is table
+    again = with_rivals(found, np.full((5, 2), -0.005))  # poses moved a little, and rivals are known anew
+    np.testing.assert_array_equal(again.limb_doubt, unlike)

@@ -16,6 +16,7 @@ from sogjax.cli.actor import actor_verdict
 from sogjax.io.files import write_json
 from sogjax.io.frame_motions import with_hidden
 from sogjax.quality.limb_warnings import Limits
+from sogjax.quality.remedies import remedies
 from sogjax.quality.verdict import Verdict, verdicts, worst_frames
 from sogjax.run.forward import say_if_other_subject
 from sogjax.run.judge import kept_verdicts
@@ -128,13 +129,17 @@ def test_another_subject_is_told_at_the_first_frame(capsys):
     assert capsys.readouterr().err == ""
 
 
-@pytest.mark.parametrize("likely", [0.9, 0.4])
+@pytest.mark.parametrize("likely", [0.9, 0.45])
 def test_limbs_in_doubt_are_named(walk, likely):
-    doubt = np.full((walk.num_frames, 2), 0.3)
+    doubt = np.full((walk.num_frames, 2), 0.35)
     doubt[3:9, 1] = likely
     doubt[15:18, 0] = likely  # for too few frames
     motion = replace(judged(walk), limb_names=np.array(["head", "left arm"]), limb_doubt=doubt)
-    assert of_one(motion).sentence == f"look at frames {walk.frame[3]}-{walk.frame[8]}, left arm"
+    told = f"look at frames {walk.frame[3]}-{walk.frame[8]}, left arm"
+    assert of_one(motion).sentence == told
+    rivalled = of_one(replace(motion, limb_unlike=np.zeros_like(doubt), limb_rival=np.zeros_like(doubt)))
+    assert rivalled.sentence == f"{told} (might as well be elsewhere)"
+    assert any("sleeves unlike" in each for each in remedies(rivalled))
 
 
 def test_a_limb_that_things_hide_is_named_with_the_cause_and_nobody_is_called_another_subject(walk):

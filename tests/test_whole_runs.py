@@ -1,7 +1,12 @@
 """The table of whole runs: what is told of a run, and what the table says in all."""
 
+import numpy as np
 import pytest
 import whole_runs
+from scipy.special import expit, logit
+
+from sogjax.errors import InputError
+from sogjax.quality.fitted import PATH, read_fitted
 
 
 def actor(mean, astray, looks_right):
@@ -48,3 +53,22 @@ def test_the_table_has_each_recording_once_and_as_it_can_be_run_again():
 def test_cameras_fall_into_one_group(cameras, name):
     lines = whole_runs._in_all({f"walk 1 {cameras} plates 7": {"joints_mm": "20", "silent": "", "astray_percent": ""}})
     assert [line.split("|")[1].strip() for line in lines if "| 1 | 20 |" in line] == [f"plates, {name}", "all"]
+
+
+def run_of(random, count=4000):
+    """A run of one actor whose limb is lost as often as a known weight says."""
+    unlike, rival = random.uniform(0.001, 0.3, count), random.uniform(-0.01, 0.003, count)
+    lost = random.uniform(size=count) < expit(logit(unlike) + 400.0 * np.maximum(rival + 0.005, 0.0))
+    return {"actors": [{"limbs": {"left arm": [unlike.tolist(), rival.tolist(), np.where(lost, 0.3, 0.02).tolist()]}}]}
+
+
+def test_the_weight_of_rivals_is_fitted_to_what_was_lost_and_written(tmp_path):
+    path, random = tmp_path / "fitted.yaml", np.random.default_rng(1)
+    path.write_text(PATH.read_text())
+    count, seen, beside = whole_runs.fit_rivals(path, [run_of(random), run_of(random), {"actors": []}])
+    assert count.startswith("2 runs; 8000 limbs, ")
+    assert read_fitted(path.read_text()).rivals.weight == pytest.approx(4.0, abs=0.3)
+    area = lambda line: float(line.split("ROC ")[1].split(";")[0])
+    assert area(beside) > area(seen) + 0.05
+    with pytest.raises(InputError, match="no limb of these runs is lost"):
+        whole_runs.fit_rivals(path, [{"actors": [{"limbs": {"left arm": [[0.1], [-0.01], [0.02]]}}]}])

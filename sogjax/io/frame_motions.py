@@ -27,7 +27,7 @@ PARTIAL = "run.partial"
 """The folder itself, in that of the results."""
 
 
-MOSTLY_HIDDEN = 0.76
+MOSTLY_HIDDEN = 0.7
 """Part of a limb that must be hidden from the cameras for its place to be doubted, the more the less is seen."""
 UNSEEN_DOUBT = 0.6
 """Doubt of a limb that no camera sees: it is kept by prediction and limits, which is more likely wrong than right."""
@@ -69,11 +69,14 @@ def motions_of(table: FrameTable, bodies: Sequence[Body], clip: ClipFacts) -> di
     for actor, (body, dofs, limbs) in enumerate(parts):
         judged: dict[str, Any] = {}
         if table.limb_doubt is not None and table.explained is not None and table.overlap is not None:
-            hidden = None if table.limb_hidden is None else np.asarray(table.limb_hidden[:, limbs], float)
+            of_limbs = lambda column, limbs=limbs: None if column is None else np.asarray(column[:, limbs], float)
+            hidden = of_limbs(table.limb_hidden)
             judged = {
                 "limb_names": limb_names(body),
                 "joint_limb": joint_limbs(body.skeleton),
                 "limb_doubt": with_hidden(np.asarray(table.limb_doubt[:, limbs], float), hidden),
+                "limb_unlike": of_limbs(table.limb_unlike),
+                "limb_rival": of_limbs(table.limb_rival),
                 "limb_hidden": hidden,
                 "explained": np.asarray(table.explained[:, actor], float),
                 "overlap": np.asarray(table.overlap[:, actor], float),

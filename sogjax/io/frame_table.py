@@ -61,6 +61,14 @@ class FrameTable:
     limb_hidden: Float[np.ndarray, "frame limb"] | None = column(
         "", "part of the limb that things in front hide from the cameras", default=None
     )
+    limb_rival: Float[np.ndarray, "frame limb"] | None = column(
+        "",
+        "part of the energy that the best other way to hold the limb gains; NaN where none was searched",
+        default=None,
+    )
+    limb_unlike: Float[np.ndarray, "frame limb"] | None = column(
+        "", "limb_doubt by what is seen of the limb alone; only where it weighs rivals, too", default=None
+    )
     terms: Mapping[str, Float[np.ndarray, "frame"]] = column(
         "", "each term of the energy without its weight, by name", default_factory=dict
     )
@@ -76,6 +84,11 @@ class FrameTable:
     def is_judged(self) -> bool:
         """Whether the limbs were judged."""
         return self.limb_doubt is not None
+
+    @property
+    def seen_doubt(self) -> Float[np.ndarray, "frame limb"] | None:
+        """What `limb_doubt` is by what is seen of limbs alone."""
+        return self.limb_doubt if self.limb_unlike is None else self.limb_unlike
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The columns that are there, by their names in files."""

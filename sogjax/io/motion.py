@@ -55,6 +55,8 @@ def motion_from_poses(
     limb_names: Sequence[str] | None = None,
     joint_limb: Int[np.ndarray, "joint"] | None = None,
     limb_doubt: Float[np.ndarray, "frame limb"] | None = None,
+    limb_unlike: Float[np.ndarray, "frame limb"] | None = None,
+    limb_rival: Float[np.ndarray, "frame limb"] | None = None,
     limb_hidden: Float[np.ndarray, "frame limb"] | None = None,
     explained: Float[np.ndarray, "frame"] | None = None,
     overlap: Float[np.ndarray, "frame camera"] | None = None,
@@ -95,6 +97,8 @@ def motion_from_poses(
         limb_names=None if limb_names is None else np.array(limb_names, str),
         joint_limb=joint_limb,
         limb_doubt=limb_doubt,
+        limb_unlike=limb_unlike,
+        limb_rival=limb_rival,
         limb_hidden=limb_hidden,
         explained=explained,
         overlap=overlap,
@@ -173,8 +177,11 @@ def _limbs(path: Path, arrays: dict[str, np.ndarray], frames: int, joints: int) 
         "joint_limb": int_array(path, arrays, "joint_limb", (joints,)),
         "limb_doubt": finite_array(path, arrays, "limb_doubt", (frames, len(names))),
     }
-    if "limb_hidden" in arrays:
-        found["limb_hidden"] = finite_array(path, arrays, "limb_hidden", (frames, len(names)))
+    for name in ("limb_unlike", "limb_hidden"):
+        if name in arrays:
+            found[name] = finite_array(path, arrays, name, (frames, len(names)))
+    if "limb_rival" in arrays:  # NaN where none was searched
+        found["limb_rival"] = float_array(path, arrays, "limb_rival", (frames, len(names)))
     wrong = (found["joint_limb"] < -1) | (found["joint_limb"] >= len(names))
     if wrong.any():
         raise InputError(f"{path}: 'joint_limb' holds {found['joint_limb'][wrong][0]}, which is not a limb; correct it")

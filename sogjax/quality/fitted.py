@@ -33,6 +33,14 @@ class LimbWeights:
 
 
 @dataclass(frozen=True)
+class Rivals:
+    """How much other ways to hold a limb count that are worth about as much."""
+
+    weight: float
+    """Of each per cent of an actor's energy, on the log odds that the limb is lost."""
+
+
+@dataclass(frozen=True)
 class LimbBaseline:
     """What a blob usually shows, against which a limb is measured."""
 
@@ -153,6 +161,7 @@ class Fitted:
     """All numbers of the file, by its parts."""
 
     limb_weights: LimbWeights
+    rivals: Rivals
     limb_baseline: LimbBaseline
     verdict: VerdictBounds
     pose_evidence: PoseEvidenceBounds

@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from scipy.special import expit, logit
 
 from sogjax.energy.foreground import cover
 from sogjax.energy.posed import Posed
@@ -76,6 +77,28 @@ def error_probability(measures: LimbMeasures, weights: Weights) -> Float[Array, 
     return jax.nn.sigmoid(
         weights.constant + weights.worse * measures.worse + weights.contradicted * measures.contradicted
     )
+
+
+SURE = 1e-3
+"""Probabilities so near to 0 or 1 are not told from these."""
+LEAST_RIVAL, MOST_RIVAL = -0.005, 0.003
+"""What a rival gains, as a part of an actor's energy, from which on it tells, and beyond which it tells no more."""
+
+
+def beside_rivals(
+    unlike: Float[np.ndarray, "*frame limb"], rival: Float[np.ndarray, "*frame limb"], weight: float | None = None
+) -> Float[np.ndarray, "*frame limb"]:
+    """How likely limbs are lost, by what is seen of them and by what rivals gain, of which none reassures.
+
+    Args:
+        unlike: how likely they are by what is seen alone (`error_probability`).
+        rival: what the best other way to hold a limb gains, as a part of an actor's energy; NaN: none was searched.
+        weight: of each per cent of the energy, on the log odds; None: the fitted one.
+    """
+    weight = fitted_numbers().rivals.weight if weight is None else weight
+    gain = np.nan_to_num(np.clip(rival, LEAST_RIVAL, MOST_RIVAL) - LEAST_RIVAL)
+    doubt = expit(logit(np.clip(unlike, SURE, 1.0 - SURE)) + 100.0 * weight * gain)
+    return np.where(gain > 0.0, doubt, unlike)
 
 
 def _seen(evidence: BlobEvidence) -> Float[Array, "2 blob"]:

@@ -5,7 +5,7 @@ a body's spheres do not tell, that says nothing.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -34,12 +34,15 @@ class DoubtfulLimb:
     """Mean over the stretch: how likely the limb is more than 10 cm off."""
     hidden: bool = False
     """Whether it is in doubt since things in front hide it."""
+    elsewhere: bool = False
+    """Whether it is only in doubt since another way to hold it explains about as much."""
 
     def __str__(self) -> str:
         frames = f"frames {self.first_frame} to {self.last_frame}"
         if self.hidden:
             return f"{self.name} hidden by what stands in front in {frames}"
-        return f"{self.name} doubtful in {frames} ({100.0 * self.doubt:.0f} % likely more than 10 cm off)"
+        also = ", might as well be elsewhere" if self.elsewhere else ""
+        return f"{self.name} doubtful in {frames} ({100.0 * self.doubt:.0f} % likely more than 10 cm off{also})"
 
 
 def in_doubt(motion: Motion, bound: float | None = None) -> Bool[np.ndarray, "frame limb"]:
@@ -56,20 +59,25 @@ def doubtful_limbs(motion: Motion, bound: float | None = None, at_least: int = A
     """All stretches of `at_least` so many frames, by their first frames; `bound` as in `in_doubt`."""
     if motion.limb_doubt is None or motion.limb_names is None:
         return ()
+    doubted, rivalled, found = in_doubt(motion, bound), _rivalled(motion, bound), []
     hidden = np.zeros_like(motion.limb_doubt) if motion.limb_hidden is None else motion.limb_hidden
-    columns = motion.limb_names, motion.limb_doubt.T, in_doubt(motion, bound).T, hidden.T
-    found = [
-        DoubtfulLimb(
-            str(name),
-            int(motion.frame[first]),
-            int(motion.frame[stop - 1]),
-            float(doubt[first:stop].mean()),
-            bool(unseen[first:stop].mean() > HIDDEN),
-        )
-        for name, doubt, doubted, unseen in zip(*columns, strict=True)
-        for first, stop in stretches(doubted, at_least, gap=GAP)
-    ]
+    for limb, name in enumerate(motion.limb_names):
+        for first, stop in stretches(doubted[:, limb], at_least, gap=GAP):
+            doubt, unseen = (float(of[first:stop, limb].mean()) for of in (motion.limb_doubt, hidden))
+            frames = int(motion.frame[first]), int(motion.frame[stop - 1])
+            mostly = rivalled[first:stop, limb].sum() > MOSTLY * doubted[first:stop, limb].sum()
+            causes = unseen > HIDDEN, bool(mostly) and unseen <= HIDDEN
+            found.append(DoubtfulLimb(str(name), *frames, doubt, *causes))
     return tuple(sorted(found, key=lambda limb: (limb.first_frame, limb.name)))
+
+
+def _rivalled(motion: Motion, bound: float | None) -> Bool[np.ndarray, "frame limb"]:
+    """Which limbs are only in doubt since they have rivals."""
+    doubted = in_doubt(motion, bound)
+    if motion.limb_unlike is None or motion.limb_rival is None:
+        return np.zeros_like(doubted)
+    alone = in_doubt(replace(motion, limb_doubt=motion.limb_unlike), bound)
+    return doubted & ~alone & np.isfinite(motion.limb_rival)
 
 
 AT_LIMIT = 0.03

@@ -26,6 +26,8 @@ LOOK = {
     "keypoints tell them apart; start= begins in a frame in which they are clear of each other.",
     "at its limit": "A joint at its limit is drawn to something dark or alike behind it: light from behind, another "
     "background, a cap or shoes of another colour.",
+    "might as well": "A limb that might as well be elsewhere explains the pictures there, too: what it lies on has its "
+    "colours. Cameras on other sides, keypoints, and sleeves unlike trunk and floor help.",
     "hidden by": "What is hidden is guessed. If nothing stands there, look at occluders.png: what is painted white in "
     "occluders/CAMERA.png hides all that is behind it.",
     "initial pose": "The initial pose was not sure: if its frame is wrong, write a rough one into initial_pose.yaml.",

@@ -228,10 +228,15 @@ def _bad_stretches(motion: Motion) -> list[str]:
 
 
 def _limbs(doubtful: Sequence[DoubtfulLimb]) -> list[str]:
-    cause = lambda limb: " hidden by what stands in front" if limb.hidden else ""
     return _shortened(
-        [f"look at {_frames(limb.first_frame, limb.last_frame)}, {limb.name}{cause(limb)}" for limb in doubtful]
+        [f"look at {_frames(limb.first_frame, limb.last_frame)}, {limb.name}{_cause(limb)}" for limb in doubtful]
     )
+
+
+def _cause(limb: DoubtfulLimb) -> str:
+    if limb.hidden:
+        return " hidden by what stands in front"
+    return " (might as well be elsewhere)" if limb.elsewhere else ""
 
 
 def _bent(motion: Motion, limits: Mapping[str, Limits]) -> list[str]:

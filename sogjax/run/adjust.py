@@ -192,5 +192,6 @@ def _table(motion: Motion) -> FrameTable:
         num_matching=np.zeros((count, 1), int),
         num_blocks=np.zeros(count, int),
         capacities=np.zeros((count, 3), int),
+        limb_rival=motion.limb_rival,
         terms={"similarity": motion.similarity},
     )

@@ -222,6 +222,7 @@ def _table(found: Adjustment, setup: Setup, before: FrameTable) -> FrameTable:
         num_matching=none,
         num_blocks=np.zeros(count, int),
         capacities=np.tile([found.capacity, found.capacity, 0], (count, 1)),
+        limb_rival=before.limb_rival,
         terms={name: value.astype(np.float32) for name, value in found.values.items()},
     )
 

@@ -14,7 +14,7 @@ from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.refine.clip_programs import term_values
 from sogjax.refine.clip_shape import frames_by_spread
 from sogjax.refine.pictures import NearPairs, Reader
-from sogjax.run.frames import limb_rows
+from sogjax.run.frames import limb_rows, with_rivals
 from sogjax.run.setup import Setup
 from sogjax.tracking.frame import FrameInput
 from sogjax.tracking.frame_by_frame import confidence_of_poses
@@ -66,12 +66,13 @@ def judged_with_colors(
     for frame in zip(*each, strict=True):  # frame by frame, so that cells need not be kept
         for confidences, confidence in zip(found, frame, strict=True):
             confidences.append(confidence)
-    told = [replace(table, **limb_rows(of_one)) if of_one else table for of_one in found]
+    judged = [replace(table, limb_unlike=None, **limb_rows(of_one)) if of_one else table for of_one in found]
+    told = [with_rivals(one, table.limb_rival) for one in judged]
     chosen = 0 if more_doubtful(told[-1], told[0]) else -1
     return setups[chosen], told[chosen]
 
 
 def more_doubtful(table: FrameTable, than: FrameTable) -> bool:
-    """Whether a limb is in doubt more than the most doubtful one of another table, on average over the frames."""
-    doubt = lambda one: 0.0 if one.limb_doubt is None else float(np.max(np.mean(one.limb_doubt, axis=0), initial=0.0))
+    """Whether a limb, as it is seen, is in doubt more than the most doubtful one of another table, on average."""
+    doubt = lambda one: 0.0 if one.seen_doubt is None else float(np.max(np.mean(one.seen_doubt, axis=0), initial=0.0))
     return doubt(table) > doubt(than) + MORE_DOUBT

@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 
 from sogjax.io.frame_table import FrameTable
 from sogjax.model.sog import Sog
-from sogjax.quality.limb_confidence import LimbConfidence
+from sogjax.quality.limb_confidence import LimbConfidence, beside_rivals
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import FrameInput, FrameResult, TrackedFrame, TrackState, on_device
 from sogjax.tracking.frame_by_frame import Told, image_blobs, track
@@ -48,6 +48,14 @@ def limb_rows(found: Sequence[LimbConfidence]) -> dict[str, np.ndarray]:
     """The columns that say what is thought of limbs, of frames that follow each other."""
     known = {key: name for key, name in _LIMBS.items() if found and getattr(found[0], name) is not None}
     return {key: np.stack([np.asarray(getattr(each, name)) for each in found]) for key, name in known.items()}
+
+
+def with_rivals(table: FrameTable, rivals: Float[np.ndarray, "frame limb"] | None) -> FrameTable:
+    """The table with doubts that weigh what rivals of limbs gain, too; as it is where they are not known."""
+    if rivals is None or table.seen_doubt is None:
+        return table
+    unlike = np.asarray(table.seen_doubt)
+    return replace(table, limb_doubt=beside_rivals(unlike, rivals), limb_rival=rivals, limb_unlike=unlike)
 
 
 def capacities_of(table: FrameTable, row: int | None = -1) -> Capacities:

@@ -1,6 +1,6 @@
 """The pass that searches limbs over the clip and tracks backwards around doubts; parts come from what explains more."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import partial
 
 import numpy as np
@@ -12,7 +12,7 @@ from sogjax.model.limbs import limb_blobs
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.jumps import NEAR, largest_step
 from sogjax.quality.verdict import NEARLY_ALL, expected_of
-from sogjax.run.frames import capacities_of
+from sogjax.run.frames import capacities_of, with_rivals
 from sogjax.run.setup import Setup
 from sogjax.run.terminal import alive, say
 from sogjax.search.merge_passes import Revised, merge_passes
@@ -53,11 +53,13 @@ def merge_backward(setup: Setup, tracked: FrameTable, known: Float[np.ndarray, "
     except InputError as error:
         say(f"warning: limbs were not searched over the clip, which stays as it was tracked: {error}")
         return Merged(tracked)
+    merged = tracked.with_rows(found.frames, [*map(_columns, found.frames.values())])
+    merged = with_rivals(merged, over_frames(found.rivals, len(merged)))
     if not found.frames:
-        return Merged(tracked)
+        return Merged(merged)
     parts = ", ".join(f"{name} ({len(rows)})" for name, rows in sorted(found.parts.items()))
     say(f"taken from other passes in {counted(len(found.frames), 'frame')}: {parts}")
-    return Merged(tracked.with_rows(found.frames, [_columns(revised) for revised in found.frames.values()]))
+    return Merged(merged)
 
 
 KEY_SECONDS = 0.15
@@ -104,6 +106,14 @@ def unseen(setup: Setup, tracked: FrameTable) -> Bool[np.ndarray, "frame actor"]
         hidden = np.asarray(tracked.limb_hidden)[:, actors == actor]
         found[:, actor] |= hidden.min(axis=1, initial=1.0) >= NEARLY_ALL if hidden.size else False
     return found
+
+
+def over_frames(rivals: Mapping[int, Float[np.ndarray, "limb"]], count: int) -> Float[np.ndarray, "frame limb"] | None:
+    """What rivals gain in every frame, interpolated between the key frames in which that is known; None: nowhere."""
+    if not rivals:
+        return None
+    known = np.stack([*rivals.values()])
+    return np.stack([np.interp(np.arange(count), [*rivals], of_limb) for of_limb in known.T], axis=1)
 
 
 def _columns(revised: Revised) -> dict[str, object]:

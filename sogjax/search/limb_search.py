@@ -3,7 +3,7 @@
 The rest of the body is held meanwhile (`energy/part_energy.py`).
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -17,10 +17,12 @@ from sogjax.energy.part_energy import PartEnergy
 from sogjax.energy.views import Views
 from sogjax.model.batches import of_each
 from sogjax.model.cores import in_threads
+from sogjax.model.limbs import limb_names
 from sogjax.model.program import compiled
 from sogjax.model.solid import DEEP, impossibilities
+from sogjax.quality.limb_confidence import LEAST_RIVAL
 from sogjax.search.climbed import FEW, MORE, climbed_in
-from sogjax.search.limb_ways import CROSSED, Unit, UnitArrays, drawn_ways, look_alikes, units_of
+from sogjax.search.limb_ways import CROSSED, Unit, UnitArrays, drawn_ways, look_alikes, outer, units_of
 from sogjax.search.other_pass import REACH, Pass
 from sogjax.search.placed_body import means_of
 from sogjax.search.worth import IMPOSSIBLE_COST
@@ -31,7 +33,10 @@ from sogjax.tracking.frame import AnyFrame, FrameInput, TrackState, on_device
 from sogjax.tracking.tracker import Tracker
 
 NUM_CLIMBED = 8
-"""Different ways that are climbed, the tracked one among them."""
+"""Different ways that are climbed, the tracked one among them. For each limb one more is, in which it is elsewhere."""
+ELSEWHERE, CLIMBED_ELSEWHERE = 0.15, 0.17
+"""Metres, mean over the outer blobs of a limb: how far it is from where it was tracked to be elsewhere; and to be
+climbed as such, since a climb may lead back."""
 ITERATIONS = 12
 APART = 0.08
 """Metres, mean over the blobs of the limb that differs more: ways to hold a unit that count as different."""
@@ -73,6 +78,7 @@ class LimbSearch:
         self._turn = 0
         self._carried: HeldOtherwise | None = None
         self._in_vain: dict[int, list[tuple[np.ndarray, int]]] = {}
+        self._rivals: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
     @classmethod
     def of(cls, tracker: Tracker, capacities: Capacities) -> "LimbSearch | None":
@@ -100,10 +106,40 @@ class LimbSearch:
 
         From a better pose the limbs are searched again: one may have been in the place of another.
         """
-        first = passed.poses[row]
+        first = passed.poses[row].copy()
         views = self.views(on_device(frame), first)
-        found = self.with_better_limbs(views, first, first, passed.energy, self._in_vain.get(row, []))
+        held = self.held_otherwise(views, first)
+        self._rivals[row] = first, self._rivals_among(first, held, passed.energy)
+        found = self.with_better_limbs(views, first, first, passed.energy, self._in_vain.get(row, []), held)
         return None if found.pose is first else found
+
+    def rivals(self, frame: Callable[[], AnyFrame], passed: Pass, row: int) -> Float[np.ndarray, "limb"]:
+        """What the best way with each limb elsewhere gains over the pose in a row of a pass.
+
+        As a part of an actor's energy; losses beyond `LEAST_RIVAL` are cut off there. NaN: the limb is not searched.
+        The `frame` is only read where the pose is another than when the row was searched.
+        """
+        pose = passed.poses[row].copy()
+        if row not in self._rivals or not np.array_equal(self._rivals[row][0], pose):
+            held = self.held_otherwise(self.views(on_device(frame()), pose), pose)
+            self._rivals[row] = pose, self._rivals_among(pose, held, passed.energy)
+        return self._rivals[row][1]
+
+    def _rivals_among(
+        self, pose: Float[np.ndarray, "dof"], found: "HeldOtherwise", energy: float
+    ) -> Float[np.ndarray, "limb"]:
+        """As `rivals`, among ways that were climbed."""
+        body, here = self.tracker.body, means_of(self.tracker.body, pose[None])
+        rivals = np.full(len(limb_names(body)), np.nan)
+        of_an_actor = max(energy, np.finfo(float).tiny) / len(np.unique(body.blob_actors))
+        cheaper = IMPOSSIBLE_COST * energy * self._less_impossible(pose, np.asarray(found.poses))
+        gains = (np.asarray(found.gains, float) + cheaper) / of_an_actor
+        for unit, poses, gained in zip(self.units, found.poses, gains, strict=True):
+            moved, possible = np.linalg.norm(means_of(body, poses) - here, axis=-1), self.possible(pose, poses)
+            for limb, blobs in zip(unit.limbs, unit.blobs, strict=True):
+                elsewhere = np.average(moved[:, blobs], axis=1, weights=outer(len(blobs))) > ELSEWHERE
+                rivals[limb] = np.max(gained, where=elsewhere & possible, initial=LEAST_RIVAL)
+        return rivals
 
     def is_in_vain(self, row: int, pose: Float[np.ndarray, "dof"]) -> bool:
         """Whether passes from such a pose of a frame led nowhere."""
@@ -116,15 +152,17 @@ class LimbSearch:
         pose: Float[np.ndarray, "dof"],
         energy: float,
         in_vain: InVain = (),
+        held: "HeldOtherwise | None" = None,
     ) -> BetterPose:
         """A pose with limbs held otherwise as long as that is worth more; itself, where nothing is.
 
-        `first` is the tracked pose, `energy` that of a frame, for scale. Poses near those `in_vain` do not count.
+        `first` is the tracked pose, `energy` that of a frame, for scale. Poses near those `in_vain` do not count. What
+        is `held` otherwise at first is searched if it is not given.
         """
-        self._turn += 1
         best = BetterPose(pose, 0.0)
-        for _ in range(MOST_ROUNDS):
-            better = self._better(views, first, best.pose, self.held_otherwise(views, best.pose), energy, in_vain)
+        for number in range(MOST_ROUNDS):
+            held = held if held is not None and number == 0 else self.held_otherwise(views, best.pose)
+            better = self._better(views, first, best.pose, held, energy, in_vain)
             if better is None:
                 break
             best = BetterPose(better.pose, best.gain + better.gain)
@@ -143,6 +181,7 @@ class LimbSearch:
 
     def held_otherwise(self, views: Views, pose: Float[np.ndarray, "dof"]) -> "HeldOtherwise":
         """Ways to hold limbs around a pose; some of the next frame's are those found here."""
+        self._turn += 1
         tried = [self._tried(k, unit, pose).astype(pose.dtype) for k, unit in enumerate(self.units)]
         held = lambda k: held_otherwise(self.tracker, views, jnp.asarray(pose), self.arrays[k], jnp.asarray(tried[k]))
         found = in_threads(lambda k: jax.device_get(held(k)), range(len(self.units)))
@@ -198,8 +237,7 @@ class LimbSearch:
         energy: float,
     ) -> tuple[Float[np.ndarray, "start dof"], Float[np.ndarray, "crossed dof"]]:
         """What is possible and worth climbing: the best ways of all units together, single ones; and crossed ends."""
-        known = self._impossible(pose[None])[0]
-        cheaper = lambda poses: IMPOSSIBLE_COST * energy * (known - self._impossible(np.asarray(poses)))
+        cheaper = lambda poses: IMPOSSIBLE_COST * energy * self._less_impossible(pose, np.asarray(poses))
         gains = np.where(found.apart > APART, found.gains + cheaper(found.poses), -np.inf)
         best, starts = gains.argmax(axis=1), []
         gaining = [k for k, way in enumerate(best) if gains[k, way] > 0.0]
@@ -226,18 +264,21 @@ class LimbSearch:
             return np.ones(len(poses), bool)
         return solid.deeper(self.tracker.body, known, poses).max(axis=1, initial=0.0) <= DEEP
 
-    def _impossible(self, poses: Float[np.ndarray, "*start dof"]) -> Float[np.ndarray, "*start"]:
-        """How impossible poses are, 0 to 1."""
-        if self.tracker.solid is None:
-            return np.zeros(poses.shape[:-1], poses.dtype)
-        found = impossibilities(self.tracker.solid, self.tracker.body, jnp.asarray(poses.reshape(-1, poses.shape[-1])))
-        return np.asarray(found).reshape(poses.shape[:-1])
+    def _less_impossible(
+        self, pose: Float[np.ndarray, "dof"], others: Float[np.ndarray, "*start dof"]
+    ) -> Float[np.ndarray, "*start"]:
+        """How much less impossible than a pose others are, -1 to 1."""
+        shape, solid = others.shape[:-1], self.tracker.solid
+        if solid is None:
+            return np.zeros(shape, others.dtype)
+        impossible = lambda poses: np.asarray(impossibilities(solid, self.tracker.body, jnp.asarray(poses)))
+        return impossible(pose[None])[0] - impossible(others.reshape(-1, others.shape[-1])).reshape(shape)
 
     def _tried(self, number: int, unit: Unit, pose: Float[np.ndarray, "dof"]) -> Float[np.ndarray, "seed dof"]:
         """Ways that are drawn, and those of the last key frame."""
         drawn, before = drawn_ways(self.tracker.body, unit, pose, self._turn), np.tile(pose, (NUM_CLIMBED - 1, 1))
         if self._carried is not None:
-            before[:, unit.all_dofs] = self._carried.poses[number, 1:][:, unit.all_dofs]
+            before[:, unit.all_dofs] = self._carried.poses[number, 1:NUM_CLIMBED][:, unit.all_dofs]
         return np.concatenate([before, drawn])
 
 
@@ -286,7 +327,7 @@ def held_otherwise(
     means = lambda params: tracker.body.posed_blobs(held(params)).means[index.blobs]
     params = jax.vmap(index.params)(jnp.concatenate([pose[None], look_alikes(tracker.body, pose, unit), tried]))
     values = of_each(energy, params)
-    chosen = _different(jax.vmap(means)(params), values, limbs)
+    chosen = _different(jax.vmap(means)(params), values, unit)
     climb = lambda start: solver.maximize(energy, start, replace(scales, kinds=scales.kinds[index.dofs]))
     found = of_each(climb, params[chosen])
     apart = jax.vmap(lambda each: _apart(each, means(params[0]), limbs))(jax.vmap(means)(found.params))
@@ -295,16 +336,18 @@ def held_otherwise(
     return HeldOtherwise(*ways, *crossed, _apart(means(params[CROSSED]), means(params[0]), limbs))
 
 
-def _different(
-    means: Float[Array, "seed slot 3"], values: Float[Array, "seed"], limbs: Bool[Array, "limb slot"]
-) -> Int[Array, "way"]:
-    """The first, and the best that lie apart from it and from each other."""
+def _different(means: Float[Array, "seed slot 3"], values: Float[Array, "seed"], unit: UnitArrays) -> Int[Array, "way"]:
+    """The first, and the best that lie apart from it and from each other; then the best with each limb elsewhere."""
     left, chosen = values, [jnp.asarray(0)]
-    for _ in range(NUM_CLIMBED - 1):
-        last = means[chosen[-1]]
-        near = jax.vmap(lambda each, last=last: _apart(each, last, limbs))(means) < APART
+    anywhere = [jnp.ones(len(means), bool)] * (NUM_CLIMBED - 1)
+    moved = jnp.linalg.norm(means - means[:1], axis=-1)
+    outside = jnp.where(unit.limbs, unit.outer[None], 0.0)
+    elsewhere = moved @ outside.T > CLIMBED_ELSEWHERE * jnp.sum(outside, axis=1)[None]
+    elsewhere &= jnp.any(unit.limbs, axis=1)[None]
+    for allowed in (*anywhere, *elsewhere.T):
+        near = jax.vmap(lambda each: _apart(each, means[chosen[-1]], unit.limbs))(means) < APART
         left = jnp.where(near, -jnp.inf, left)
-        chosen.append(jnp.argmax(left))
+        chosen.append(jnp.argmax(jnp.where(allowed, left, -jnp.inf)))
     return jnp.stack(chosen)
 
 

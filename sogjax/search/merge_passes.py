@@ -9,6 +9,7 @@ what hid it, or moved too far for one frame, comes from the other side.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -82,6 +83,8 @@ class Revision:
 
     frames: dict[int, Revised] = field(default_factory=dict)
     parts: dict[str, set[int]] = field(default_factory=dict)
+    rivals: dict[int, Float[np.ndarray, "limb"]] = field(default_factory=dict)
+    """Of the key rows: `LimbSearch.rivals`."""
 
 
 def in_doubt(passed: Pass) -> Bool[np.ndarray, "frame"]:
@@ -117,6 +120,7 @@ def merge_passes(
     revising.smooth_jumps(jump)
     while (stretch := revising.next_stretch()) is not None:
         revising.take(compared_backwards(tracker, revising.passed, frames, revising.parts, *stretch))
+    revising.note_rivals(key_rows, report)
     return revising.revision
 
 
@@ -126,6 +130,7 @@ class _Revising:
     def __init__(self, tracker: Tracker, passed: Pass, frames: FramesOfRows) -> None:
         self.tracker, self.passed, self.frames = tracker, passed, frames
         self.parts, self.revision = body_parts(tracker.body), Revision()
+        self._search = LimbSearch.of(tracker, passed.capacities)
         self._tried: set[int] = set()
         self._changed: set[int] = set()
         self._looked_at = 0
@@ -146,7 +151,7 @@ class _Revising:
 
         Frames that changed meanwhile are searched again: a limb may have been in the place of another.
         """
-        search = LimbSearch.of(self.tracker, self.passed.capacities)
+        search = self._search
         if search is None:
             return
         self._search_limbs(search, rows, report)
@@ -158,6 +163,13 @@ class _Revising:
             self._looked_at += len(lost)  # a look costs about as much as a frame of a pass
             self._search_limbs(search, lost, unreported)
         self._looked_at = 0  # what comes backwards from behind doubts may look at as much
+
+    def note_rivals(self, rows: Sequence[int], report: Report) -> None:
+        """Note what other ways to hold limbs are worth beside the poses that were found in some rows."""
+        for number, row in enumerate(rows):
+            if self._search is not None:
+                report(number / len(rows))
+                self.revision.rivals[row] = self._search.rivals(partial(self._frame, row), self.passed, row)
 
     def take_known(self, poses: Float[np.ndarray, "frame dof"], misplaced: Misplaced | None) -> None:
         """Take what the poses of another pass of the clip explain better, by stretches in which the passes differ."""
@@ -180,7 +192,7 @@ class _Revising:
 
     def place_actors(self, misplaced: Misplaced) -> None:
         """See where it leads if an actor of whom little is explained is where he is found again."""
-        search = LimbSearch.of(self.tracker, self.passed.capacities)
+        search = self._search
         for row, actor in misplaced.places():
             if search is None or self._tired():
                 break
@@ -194,7 +206,7 @@ class _Revising:
 
     def turn_actors(self, rows: Sequence[int]) -> None:
         """See where it leads if an actor is back to front in some frames."""
-        search = LimbSearch.of(self.tracker, self.passed.capacities)
+        search = self._search
         wholes = [part for part in self.parts if part.whole is None]
         for row in rows:
             if search is None or self._tired():
@@ -210,7 +222,7 @@ class _Revising:
 
         First one limb by itself, then all that jump there.
         """
-        search, body = LimbSearch.of(self.tracker, self.passed.capacities), self.tracker.body
+        search, body = self._search, self.tracker.body
         for at_once in (1, 2):
             tried: set[int] = set()
             while search is not None and not self._tired():

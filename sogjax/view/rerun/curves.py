@@ -12,8 +12,8 @@ from sogjax.view.bones import LEFT, MIDDLE, RIGHT, actor_palette
 from sogjax.view.rerun.stream import entity_part, time_columns
 
 _COLORS = ((90, 170, 255), (255, 170, 60), (120, 220, 120), (255, 110, 120), (190, 140, 255), (240, 220, 90))
-_DOUBT = "doubt_"
-"""What the name of a limb's curve begins with."""
+_OF_LIMBS = {"doubt_": "doubts", "rival_": "rivals"}
+"""What the name of a limb's curve begins with, and its plot."""
 _PLOTS = {
     "errors": "Error, mm",
     "energy": "Similarity and energy",
@@ -21,15 +21,18 @@ _PLOTS = {
     "terms": "Further terms of the energy",
     "iterations": "Iterations",
     "doubts": "How likely limbs are more than 10 cm off",
+    "rivals": "What the best other way to hold a limb gains, % of the energy",
 }
 
 
 def own_curves(motion: Motion) -> dict[str, np.ndarray]:
-    """The curves of a motion that are known; one for the doubt about each limb where these were judged."""
+    """The curves of a motion that are known; those of each limb where these were judged."""
     curves = {"similarity": motion.similarity, "energy": motion.energy, "iterations": motion.iterations}
-    if motion.limb_doubt is not None and motion.limb_names is not None:
-        for name, doubt in zip(motion.limb_names, motion.limb_doubt.T, strict=True):
-            curves[_DOUBT + str(name).replace(" ", "_")] = doubt
+    rivals = None if motion.limb_rival is None else 100.0 * motion.limb_rival
+    for begins, of_limbs in zip(_OF_LIMBS, (motion.limb_doubt, rivals), strict=True):
+        if of_limbs is not None and motion.limb_names is not None:
+            names = (begins + str(name).replace(" ", "_") for name in motion.limb_names)
+            curves |= dict(zip(names, of_limbs.T, strict=True))
     return {name: values for name, values in curves.items() if np.isfinite(values).any()}
 
 
@@ -74,8 +77,9 @@ def _curve(name: str, actor: str | None) -> str:
 
 def _plot(curve: str) -> str:
     """The plot that a curve belongs in; what is not known is a term that a user added."""
-    if curve.startswith(_DOUBT):
-        return "doubts"
+    for begins, plot in _OF_LIMBS.items():
+        if curve.startswith(begins):
+            return plot
     if "penalty" in curve:
         return "penalties"
     known = {"similarity": "energy", "energy": "energy", "iterations": "iterations", "error_mm": "errors"}
