@@ -63,7 +63,8 @@ class FrameTable:
     )
     limb_rival: Float[np.ndarray, "frame limb"] | None = column(
         "",
-        "part of the energy that the best other way to hold the limb gains; NaN where none was searched",
+        "part of an actor's energy that the best other way to hold the limb gains (losses beyond 0.5 % are cut off); "
+        "interpolated between key frames, NaN where none was searched",
         default=None,
     )
     limb_unlike: Float[np.ndarray, "frame limb"] | None = column(

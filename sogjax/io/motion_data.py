@@ -59,7 +59,8 @@ class MotionData:
     limb_unlike: Float[np.ndarray, "frame limb"] | None = None
     """The same by what is seen of the limb alone; None where that is all that is known."""
     limb_rival: Float[np.ndarray, "frame limb"] | None = None
-    """What the best other way to hold each limb gains, as a part of the energy; NaN where none was searched."""
+    """What the best other way to hold each limb gains, as a part of the actor's energy, losses beyond 0.5 % cut off;
+    interpolated between key frames, NaN where none was searched."""
     limb_hidden: Float[np.ndarray, "frame limb"] | None = None
     """What part of each limb things in front hide from the cameras, 0 to 1; None where nothing is known to."""
     explained: Float[np.ndarray, "frame"] | None = None
