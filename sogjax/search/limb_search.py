@@ -1,49 +1,31 @@
-"""Other ways to hold the limbs of a body in one frame: many are compared, the best different ones climbed.
-
-The rest of the body is held meanwhile (`energy/part_energy.py`).
-"""
+"""Better poses of single frames, in which limbs are held in other ways; and what rivals of limbs gain."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Bool, Float
 
-from sogjax.energy.part_energy import PartEnergy
 from sogjax.energy.views import Views
-from sogjax.model.batches import of_each
 from sogjax.model.cores import in_threads
 from sogjax.model.limbs import limb_names
-from sogjax.model.program import compiled
 from sogjax.model.solid import DEEP, impossibilities
 from sogjax.quality.limb_confidence import LEAST_RIVAL
 from sogjax.search.climbed import FEW, MORE, climbed_in
-from sogjax.search.limb_ways import CROSSED, Unit, UnitArrays, drawn_ways, look_alikes, outer, units_of
+from sogjax.search.held_otherwise import APART, NUM_CLIMBED, HeldOtherwise, held_otherwise
+from sogjax.search.limb_ways import Unit, UnitArrays, drawn_ways, outer, units_of
 from sogjax.search.other_pass import REACH, Pass
 from sogjax.search.placed_body import means_of
 from sogjax.search.worth import IMPOSSIBLE_COST
-from sogjax.solve.gauss_newton import GaussNewton
 from sogjax.tracking.capacity import views_near
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import AnyFrame, FrameInput, TrackState, on_device
 from sogjax.tracking.tracker import Tracker
 
-NUM_CLIMBED = 8
-"""Different ways that are climbed, the tracked one among them. For each limb one more is, in which it is elsewhere."""
-ELSEWHERE, CLIMBED_ELSEWHERE = 0.15, 0.17
-"""Metres, mean over the outer blobs of a limb: how far it is from where it was tracked to be elsewhere; and to be
-climbed as such, since a climb may lead back."""
-ITERATIONS = 12
-APART = 0.08
-"""Metres, mean over the blobs of the limb that differs more: ways to hold a unit that count as different."""
-LARGEST_ANGLE = 0.3
-"""Radians: bound on a step of a climb."""
-
-
+ELSEWHERE = 0.15
+"""Metres, mean over the outer blobs of a limb, from where it was tracked: then it is elsewhere."""
 SLACK, WORTH = -0.002, 0.001
 """Parts of a frame's energy: what another way gains, while the rest is held, for the whole body to be climbed from
 there, and what it gains then for a pass to go from there."""
@@ -54,6 +36,8 @@ IN_VAIN = 2
 """Passes in vain that hold a pose in a frame, from which on none begins there."""
 MOST_ROUNDS = 3
 """Times that limbs are searched in a frame, each from the better pose that was found."""
+MOST_WHOLE = 3
+"""Poses that are climbed with all degrees of freedom in a frame, beside the tracked one and that with crossed ends."""
 
 
 InVain = Sequence[tuple[Float[np.ndarray, "dof"], int]]
@@ -126,7 +110,7 @@ class LimbSearch:
         return self._rivals[row][1]
 
     def _rivals_among(
-        self, pose: Float[np.ndarray, "dof"], found: "HeldOtherwise", energy: float
+        self, pose: Float[np.ndarray, "dof"], found: HeldOtherwise, energy: float
     ) -> Float[np.ndarray, "limb"]:
         """As `rivals`, among ways that were climbed."""
         body, here = self.tracker.body, means_of(self.tracker.body, pose[None])
@@ -152,7 +136,7 @@ class LimbSearch:
         pose: Float[np.ndarray, "dof"],
         energy: float,
         in_vain: InVain = (),
-        held: "HeldOtherwise | None" = None,
+        held: HeldOtherwise | None = None,
     ) -> BetterPose:
         """A pose with limbs held otherwise as long as that is worth more; itself, where nothing is.
 
@@ -179,7 +163,7 @@ class LimbSearch:
         """What the cameras see where limbs may be held."""
         return views_near(self.tracker, frame, jnp.asarray(pose), self.capacities, REACH)
 
-    def held_otherwise(self, views: Views, pose: Float[np.ndarray, "dof"]) -> "HeldOtherwise":
+    def held_otherwise(self, views: Views, pose: Float[np.ndarray, "dof"]) -> HeldOtherwise:
         """Ways to hold limbs around a pose; some of the next frame's are those found here."""
         self._turn += 1
         tried = [self._tried(k, unit, pose).astype(pose.dtype) for k, unit in enumerate(self.units)]
@@ -193,7 +177,7 @@ class LimbSearch:
         views: Views,
         first: Float[np.ndarray, "dof"],
         pose: Float[np.ndarray, "dof"],
-        found: "HeldOtherwise",
+        found: HeldOtherwise,
         energy: float,
         in_vain: InVain,
     ) -> BetterPose | None:
@@ -233,7 +217,7 @@ class LimbSearch:
         self,
         first: Float[np.ndarray, "dof"],
         pose: Float[np.ndarray, "dof"],
-        found: "HeldOtherwise",
+        found: HeldOtherwise,
         energy: float,
     ) -> tuple[Float[np.ndarray, "start dof"], Float[np.ndarray, "crossed dof"]]:
         """What is possible and worth climbing: the best ways of all units together, single ones; and crossed ends."""
@@ -290,71 +274,3 @@ def compile_search(tracker: Tracker, state: TrackState, frame: FrameInput, capac
         views = search.views(frame, pose)
         search.held_otherwise(views, pose)
         search.climbed(views, pose, pose[None], np.zeros(1))
-
-
-MOST_WHOLE = 3
-"""Poses that are climbed with all degrees of freedom in a frame, beside the tracked one and that with crossed ends."""
-
-
-class HeldOtherwise(eqx.Module):
-    """Ways to hold a unit, or all, climbed from where they were and elsewhere; the rest is as it was tracked."""
-
-    poses: Float[Array, "*unit way dof"]
-    gains: Float[Array, "*unit way"]
-    """The energy above that of the tracked pose."""
-    apart: Float[Array, "*unit way"]
-    """Metres from the tracked pose: mean over the blobs of the limb that differs more."""
-    crossed: Float[Array, "*unit dof"]
-    """With the ends of its limbs exchanged, not climbed."""
-    crossed_gains: Float[Array, "*unit"]
-    """As `gains`, of that."""
-    crossed_apart: Float[Array, "*unit"]
-    """As `apart`, of that."""
-
-
-@compiled
-def held_otherwise(
-    tracker: Tracker, views: Views, pose: Float[Array, "dof"], unit: UnitArrays, tried: Float[Array, "seed dof"]
-) -> HeldOtherwise:
-    """The best different ways to hold a unit in what is seen, climbed.
-
-    Compared are the tracked one, those that look like it, and those that are `tried`.
-    """
-    scales = replace(tracker.scales, largest_steps=jnp.maximum(tracker.scales.largest_steps, LARGEST_ANGLE))
-    solver, index, limbs = GaussNewton(max_iterations=ITERATIONS), unit.index, unit.limbs
-    energy = PartEnergy.around(tracker.body, views, tracker.terms, pose, index)
-    held = lambda params: index.put(pose, params)
-    means = lambda params: tracker.body.posed_blobs(held(params)).means[index.blobs]
-    params = jax.vmap(index.params)(jnp.concatenate([pose[None], look_alikes(tracker.body, pose, unit), tried]))
-    values = of_each(energy, params)
-    chosen = _different(jax.vmap(means)(params), values, unit)
-    climb = lambda start: solver.maximize(energy, start, replace(scales, kinds=scales.kinds[index.dofs]))
-    found = of_each(climb, params[chosen])
-    apart = jax.vmap(lambda each: _apart(each, means(params[0]), limbs))(jax.vmap(means)(found.params))
-    ways = jax.vmap(held)(found.params), found.value - values[0], apart
-    crossed = held(params[CROSSED]), values[CROSSED] - values[0]
-    return HeldOtherwise(*ways, *crossed, _apart(means(params[CROSSED]), means(params[0]), limbs))
-
-
-def _different(means: Float[Array, "seed slot 3"], values: Float[Array, "seed"], unit: UnitArrays) -> Int[Array, "way"]:
-    """The first, and the best that lie apart from it and from each other; then the best with each limb elsewhere."""
-    left, chosen = values, [jnp.asarray(0)]
-    anywhere = [jnp.ones(len(means), bool)] * (NUM_CLIMBED - 1)
-    moved = jnp.linalg.norm(means - means[:1], axis=-1)
-    outside = jnp.where(unit.limbs, unit.outer[None], 0.0)
-    elsewhere = moved @ outside.T > CLIMBED_ELSEWHERE * jnp.sum(outside, axis=1)[None]
-    elsewhere &= jnp.any(unit.limbs, axis=1)[None]
-    for allowed in (*anywhere, *elsewhere.T):
-        near = jax.vmap(lambda each: _apart(each, means[chosen[-1]], unit.limbs))(means) < APART
-        left = jnp.where(near, -jnp.inf, left)
-        chosen.append(jnp.argmax(jnp.where(allowed, left, -jnp.inf)))
-    return jnp.stack(chosen)
-
-
-def _apart(
-    means: Float[Array, "slot 3"], others: Float[Array, "slot 3"], limbs: Bool[Array, "limb slot"]
-) -> Float[Array, ""]:
-    """Metres, mean over the blobs of the limb that is farther off."""
-    moved = jnp.linalg.norm(means - others, axis=-1)
-    sums = jnp.sum(jnp.where(limbs, moved[None], 0.0), axis=1)
-    return jnp.max(sums / jnp.maximum(jnp.sum(limbs, axis=1, dtype=sums.dtype), 1.0))
