@@ -237,7 +237,8 @@ def test_no_pass_begins_where_one_went_in_vain(walking_dog, monkeypatch):
     search = LimbSearch.of(tracker, right.capacities)
     other = right.poses[1].copy()
     other[search.units[0].all_dofs] += 0.5
-    monkeypatch.setattr(LimbSearch, "held_otherwise", lambda *_: None)
+    held = search.held_otherwise(search.views(on_device(cells[1]), right.poses[1]), right.poses[1])
+    monkeypatch.setattr(LimbSearch, "held_otherwise", lambda *_: held)
     monkeypatch.setattr(LimbSearch, "_rivals_among", lambda *_: None)
     monkeypatch.setattr(LimbSearch, "_starts", lambda *_: (other[None], other[:0].reshape(0, len(other))))
     monkeypatch.setattr(LimbSearch, "possible", lambda _, known, poses: np.ones(len(poses), bool))
