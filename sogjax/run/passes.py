@@ -189,7 +189,8 @@ PASSES: tuple[Pass, ...] = (
         lambda run: merge_backward(run.setup, run.frames),
         Merged,
         wanted=lambda run: run.tracks and run.config.tracking.both_ways,
-    ),  # which seldom changes frames
+        changes_frames=True,
+    ),
     Pass(
         "recolored",
         BOTH_WAYS,

@@ -272,5 +272,8 @@ def compile_search(tracker: Tracker, state: TrackState, frame: FrameInput, capac
     if search is not None and tracker.limbs is not None:
         pose = np.asarray(state.previous)
         views = search.views(frame, pose)
-        search.held_otherwise(views, pose)
-        search.climbed(views, pose, pose[None], np.zeros(1))
+        programs = (
+            lambda: search.climbed(views, pose, pose[None], np.zeros(1)),  # the slowest first
+            lambda: search.held_otherwise(views, pose),
+        )
+        in_threads(lambda compiled_by: compiled_by(), programs)

@@ -12,7 +12,6 @@ from jaxtyping import Array, Float, Int, UInt8
 
 from sogjax.errors import InputError
 from sogjax.model.program import compiled
-from sogjax.model.sog import Sog
 from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.tracking.capacity import first_capacities, larger_capacities
 from sogjax.tracking.culling import Capacities
@@ -72,12 +71,6 @@ def compile_step(tracker: Tracker, frame: AnyFrame, at_rest: Float[np.ndarray, "
     unmoved = eqx.tree_at(lambda t: t.solver.max_iterations, tracker, jnp.zeros_like(tracker.solver.max_iterations))
     with suppress(InputError):
         _step(unmoved, state, known, first_capacities(tracker, state, known, MOVED))
-
-
-@compiled
-def image_blobs(tracker: Tracker, state: TrackState, frame: FrameInput, capacities: Capacities) -> Sog:
-    """The image blobs of a frame that was tracked already."""
-    return tracker.views(frame, tracker.led(state, frame), capacities)[0].images
 
 
 @compiled
