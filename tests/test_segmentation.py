@@ -71,6 +71,16 @@ def test_a_shadow_is_no_other_colour_and_told_by_its_pattern():
     assert (found.change[inside] > 8.0).mean() > 0.9
 
 
+@pytest.mark.parametrize(("learnt", "is_other"), [(True, False), (False, True)])
+def test_what_was_learnt_in_a_shadow_and_is_lit_again_is_no_other_colour(learnt, is_other):
+    shaded, lit = scene(), scene()
+    shaded[60:180, 100:220] *= 0.6
+    unknown = np.zeros(lit.shape[:2], bool) if learnt else None
+    found = background_difference(photo(lit, 2), photo(shaded, 1), unknown)
+    share = found.different[70:170, 110:210].mean()
+    assert share > 0.8 if is_other else share < 0.02
+
+
 def test_a_darker_thing_without_the_pattern_is_a_change_but_may_be_a_shadow():
     empty = scene(contrast=8.0)
     thing = empty.copy()

@@ -76,3 +76,14 @@ def test_factors_of_several_groups_multiply():
         np.testing.assert_allclose(lengths(together)[field][1], values, rtol=1e-5, atol=1e-7)
     np.testing.assert_array_equal(together.skeleton.axes, body.skeleton.axes)
     np.testing.assert_array_equal(together.blob_colors, body.blob_colors)
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_a_size_as_nobody_has_it_is_named_and_counts_for_far_more(name):
+    model = ShapeModel.from_body(BODIES[name])
+    last = model.num_shape_params - 1
+    of = lambda times: params(model, {last: times * float(model.spread[last])})
+    assert model.unusual(of(1.0)) == []
+    assert model.unusual(of(-2.0)) == [model.names[last]]
+    assert float(model.penalty(of(1.0))) == pytest.approx(1.0)
+    assert float(model.penalty(of(2.0))) > 20.0

@@ -78,6 +78,7 @@ def actor_report(made: MadeActor, rig: CameraRig) -> ActorReport:
         *(warning for posed in made.pictures for warning in posed.warnings),
         *_poor_silhouettes(ious),
         *([] if (odd := odd_sentence(made.body, made.start)) is None else [odd]),
+        *_unusual_sizes(made),
         *_poorly_seen_dofs(made),
     )
     return ActorReport(made.body.name, ious, bones, warnings, _undetermined_sizes(made))
@@ -103,6 +104,15 @@ def _undetermined_sizes(made: MadeActor) -> tuple[str, ...]:
     ]
     kept = "were not determined by the pictures and stay near those of the starting body"
     return (f"some sizes {kept}; they are uncertain: {', '.join(found)}",) if found else ()
+
+
+def _unusual_sizes(made: MadeActor) -> list[str]:
+    if not (names := made.shape_model.unusual(made.estimate.shape_params)):
+        return []
+    return [
+        f"{', '.join(names)}: beyond what people differ by, as if masks held shadows or things; look at them in "
+        "the report, and correct them or give pictures of the empty scene"
+    ]
 
 
 def _poorly_seen_dofs(made: MadeActor) -> list[str]:

@@ -196,7 +196,7 @@ class SilhouetteFit(eqx.Module):
         return limit_penalty(skeleton.joint_params(pose), lower, upper) + NOISE * unusual
 
     def _shape_penalty(self, shape: Float[Array, "shape"]) -> Float[Array, ""]:
-        return NOISE * jnp.sum((shape / self.model.spread) ** 2)
+        return NOISE * self.model.penalty(shape)
 
 
 def fitted(
@@ -310,6 +310,6 @@ def _climb(
         shape = params[num_pose_params:]
         poses = params[:num_pose_params].reshape(num_poses, -1)
         scores = jax.vmap(still_energy, in_axes=(None, 0, 0, None))(model.shaped(shape), poses, views, terms)
-        return jnp.mean(scores) - SHAPE_WEIGHT * jnp.sum((shape / model.spread) ** 2)
+        return jnp.mean(scores) - SHAPE_WEIGHT * model.penalty(shape)
 
     return ConditionedAscent(max_iterations=max_iterations).maximize(objective, start, scales).params

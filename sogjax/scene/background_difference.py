@@ -18,6 +18,8 @@ DIFFERENT = 4.5
 above this, the colour is another one."""
 SHADOW_RANGE = (0.4, 1.1)
 """Share of the background's light that a shadow or reflected light leaves."""
+LIT_AGAIN = 2.5
+"""The same, at most, of a background that was learnt from the clip, maybe in a shadow that has gone with its owner."""
 EDGE_NOISE = 0.08
 """Noise beside edges of the background, as a share of their contrast: a little misalignment and compression."""
 SHADOW_CORRELATION = 0.65
@@ -74,8 +76,10 @@ def background_difference(
 
     A shadow is the background, darker: Horprasert, Harwood and Davis, "A Statistical Approach for Real-time Robust
     Background Subtraction and Shadow Detection" (1999). Where a brown trouser leg before a brown floor looks like one,
-    the pattern may tell: a shadow keeps the floor's. Where the background is `unknown`, nothing is said.
+    the pattern may tell: a shadow keeps the floor's. Where the background is `unknown`, nothing is said; that of a clip
+    has unknown parts, or none, and may have been learnt where a shadow lay.
     """
+    brightest = SHADOW_RANGE[1] if unknown is None else LIT_AGAIN
     size = working_size(image.shape[1], image.shape[0])
     small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
     light = small.astype(np.float32)
@@ -85,9 +89,9 @@ def background_difference(
     variance = noise**2 + (EDGE_NOISE * contrast) ** 2
     change = _averaged((light - expected) ** 2 / variance)
     brightness = _brightness(light, expected, 1.0 / variance)
-    unexplained = _unexplained(light, expected, brightness, variance)
+    unexplained = _unexplained(light, expected, np.clip(brightness, SHADOW_RANGE[0], brightest), variance)
     different = opened(unexplained > DIFFERENT, 3)
-    shadow = _keeps_pattern(light, expected, noise) & (brightness < 1.0) & ~different
+    shadow = _keeps_pattern(light, expected, noise) & ((brightness < 1.0) | (unknown is not None)) & ~different
     changed = opened(change > CHANGED, 3) & ~opened(shadow, 5)
     if unknown is None:
         return Difference(small, change, unexplained, changed, different, np.zeros_like(changed))
@@ -186,11 +190,11 @@ def _summed(channels: Float[np.ndarray, "rows columns 3"]) -> Float[np.ndarray, 
 def _unexplained(
     light: Float[np.ndarray, "rows columns 3"],
     expected: Float[np.ndarray, "rows columns 3"],
-    brightness: Float[np.ndarray, "rows columns"],
+    share: Float[np.ndarray, "rows columns"],
     variance: Float[np.ndarray, "rows columns 3"],
 ) -> Float[np.ndarray, "rows columns"]:
-    shaded = np.clip(brightness, *SHADOW_RANGE)[..., None] * expected
-    return _averaged((light - shaded) ** 2 / variance)
+    """Squared differences that are left where the background has a share of its light."""
+    return _averaged((light - share[..., None] * expected) ** 2 / variance)
 
 
 def _keeps_pattern(
