@@ -66,9 +66,9 @@ def test_the_motion_of_a_dog_is_found(dog):
 def test_a_step_compiled_beforehand_is_that_of_the_first_frame(walking_dog, monkeypatch):
     tracker, cells, right = walking_dog
     monkeypatch.setattr(frame_by_frame, "MOVED", 1.0)  # the dog at rest is where it is
-    traces, step = [], type(tracker).step
-    watched = eqx.filter_jit(lambda *given: traces.append(1) or step(*given))
-    monkeypatch.setattr(frame_by_frame, "_step", watched)
+    traces, step_in = [], type(tracker).step_in
+    watched = eqx.filter_jit(lambda *given: traces.append(1) or step_in(*given))
+    monkeypatch.setattr(frame_by_frame, "_step_in", watched)
     compile_step(tracker, cells[0], right.poses[0])
     assert traces == [1]
     first = next(track(tracker, jnp.asarray(right.poses[0]), cells))

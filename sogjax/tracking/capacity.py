@@ -1,6 +1,6 @@
 """Room for image blobs and blocks of pairs: how much the first frame needs, and more where a frame needs more."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 import jax
@@ -53,21 +53,36 @@ def views_near(
     Boxes are wider by the part `beyond` of their longer sides, since limbs may be held elsewhere, and hold the `other`
     pose, too; what stands in front hides what it does of the first.
     """
+    poses = pose, pose if other is None else other
+
+    def see(room: Capacities) -> tuple[Views, Needed]:
+        views, near, matching = seen_around(tracker, frame, poses, room, beyond)
+        return views, (near.max(), matching.max(), 0)
+
+    return with_room(see, capacities)
+
+
+def seen_around(
+    tracker: Tracker,
+    frame: FrameInput,
+    poses: Sequence[Float[Array, "dof"]],
+    capacities: Capacities,
+    beyond: float = 0.0,
+) -> tuple[Views, Int[Array, "camera"], Int[Array, "camera"]]:
+    """What the cameras see around two poses, and the counts to hold against the capacities; otherwise `views_near`."""
     part = jnp.asarray(beyond, tracker.body.blob_sigmas.dtype)
-    poses = jnp.stack([pose, pose if other is None else other])
-    return with_room(lambda room: _views_near(tracker, frame, poses, part, room), capacities)
+    return _seen_around(tracker, frame, jnp.stack([*poses]), part, capacities)
 
 
 @compiled
-def _views_near(
+def _seen_around(
     tracker: Tracker, frame: FrameInput, poses: Float[Array, "2 dof"], beyond: Float[Array, ""], capacities: Capacities
-) -> tuple[Views, Needed]:
+) -> tuple[Views, Int[Array, "camera"], Int[Array, "camera"]]:
     states = [TrackState.from_pose(pose) for pose in poses]
     boxes = union_boxes(*map(tracker.boxes, states))
     more = beyond * jnp.max(boxes[..., 1, :] - boxes[..., 0, :], axis=-1, keepdims=True)
     wide = jnp.stack([boxes[..., 0, :] - more, boxes[..., 1, :] + more], axis=-2)
-    views, near, matching = tracker.views(frame, states[0], capacities, wide)
-    return views, (jnp.max(near), jnp.max(matching), 0)
+    return tracker.views(frame, states[0], capacities, wide)
 
 
 def larger_capacities(capacities: Capacities, near: int, matching: int, blocks: int) -> Capacities:

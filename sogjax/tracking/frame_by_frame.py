@@ -1,4 +1,4 @@
-"""Tracking frame by frame (Section 5.3): one compiled step for every frame; and what it would say of known poses."""
+"""Tracking frame by frame (Section 5.3): the same two programs for every frame; and what they say of known poses."""
 
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -13,15 +13,15 @@ from jaxtyping import Array, Float, Int, UInt8
 from sogjax.errors import InputError
 from sogjax.model.program import compiled
 from sogjax.quality.limb_confidence import LimbConfidence
-from sogjax.tracking.capacity import first_capacities, larger_capacities
+from sogjax.tracking.capacity import first_capacities, larger_capacities, seen_around
 from sogjax.tracking.culling import Capacities
-from sogjax.tracking.frame import AnyFrame, FrameInput, TrackedFrame, TrackState, on_device, on_host
+from sogjax.tracking.frame import AnyFrame, FrameInput, FrameResult, TrackedFrame, TrackState, on_device, on_host
 from sogjax.tracking.tracker import Tracker
 
 MOVED = 1.1
 """Image blobs near a body that moves, as a multiple of those near it at rest."""
 
-_step = compiled(Tracker.step)
+_led, _step_in = compiled(Tracker.led), compiled(Tracker.step_in)
 Told = Callable[[TrackState, FrameInput, Capacities], object]
 """Is told of the first frame, and the capacities for it, before the step is compiled."""
 
@@ -60,6 +60,15 @@ def track(
         state = next_state
         seconds = time.perf_counter() - begin
         yield TrackedFrame(index, on_host(result), capacities, tracker.reader.color_space, seconds)
+
+
+def _step(
+    tracker: Tracker, state: TrackState, frame: FrameInput, capacities: Capacities
+) -> tuple[TrackState, FrameResult]:
+    """`Tracker.step` in two programs, of which searches share the first."""
+    state = state if frame.keypoints is None else _led(tracker, state, frame)
+    seen = seen_around(tracker, frame, tracker.box_poses(state), capacities)
+    return _step_in(tracker, state, frame, seen, capacities)
 
 
 def compile_step(tracker: Tracker, frame: AnyFrame, at_rest: Float[np.ndarray, "dof"]) -> None:

@@ -85,14 +85,15 @@ class Tracker(eqx.Module):
         return state.previous + self.extrapolation * (state.previous - state.before_previous)
 
     def boxes(self, state: TrackState) -> Float[Array, "camera actor 2 2"]:
-        """Where the actors may be seen: around the last pose and, unless told otherwise, the predicted one too."""
+        """Where the actors may be seen."""
         around = lambda pose: jax.vmap(body_boxes, in_axes=(None, 0, None, None))(
             self.body.posed_blobs(pose), self.cameras, self.body.blob_actors, self.reader.box_enlargement
         )
-        boxes = around(state.previous)
-        if self.reader.box_around == "predicted":
-            boxes = union_boxes(boxes, around(self.predicted(state)))
-        return boxes
+        return union_boxes(*map(around, self.box_poses(state)))
+
+    def box_poses(self, state: TrackState) -> tuple[Float[Array, "dof"], Float[Array, "dof"]]:
+        """The poses around which the actors may be seen: the last and, unless told otherwise, the predicted one."""
+        return state.previous, self.predicted(state) if self.reader.box_around == "predicted" else state.previous
 
     def rgb(self, frame: FrameInput) -> Float[Array, "camera rows columns 3"]:
         """The colours of a frame's cells (sRGB, 0 to 1)."""
@@ -188,8 +189,7 @@ class Tracker(eqx.Module):
         frame = on_device(frame)
         if capacities is not None:
             state = self.led(state, frame)
-            seen = self.views(frame, state, capacities)
-            return self._judged(*self.found(state, seen, capacities), seen[0], frame)
+            return self.step_in(state, frame, self.views(frame, state, capacities), capacities)
         if self.capacities is None:
             raise ValueError("the tracker has no capacities; give some, or take one of sogjax.make_tracker")
         state, result = self.step(state, frame, self.capacities)
@@ -197,6 +197,16 @@ class Tracker(eqx.Module):
         cut_off = jnp.any(result.num_near > room.near) | jnp.any(result.num_matching > room.matching)
         cut_off |= result.num_blocks > room.blocks
         return eqx.error_if((state, result), cut_off, NO_ROOM)
+
+    def step_in(
+        self,
+        state: TrackState,
+        frame: FrameInput,
+        seen: tuple[Views, Int[Array, "camera"], Int[Array, "camera"]],
+        capacities: Capacities,
+    ) -> tuple[TrackState, FrameResult]:
+        """The rest of a step, from what `views` sees of the frame."""
+        return self._judged(*self.found(state, seen, capacities), seen[0], frame)
 
     def led(self, state: TrackState, frame: FrameInput) -> TrackState:
         """The state, expecting the pose to which keypoints lead; the same where there are none."""
