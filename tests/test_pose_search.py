@@ -84,6 +84,27 @@ def test_what_is_compiled_beforehand_is_what_a_search_of_an_actor_in_its_colors_
     assert 0 < beforehand == len(traced)
 
 
+@pytest.mark.slow
+def test_a_glance_is_what_six_of_eight_cameras_alone_would_say(dog):
+    rig = ring_rig(8, (160, 120), distance=2.5)
+    truth = standing(dog, 1.1, (0.3, -0.2))
+    placed = PlacedSearch.of_places(
+        (search := searcher(dog)), frames_of(draw(dog, truth, rig), rig)(search, 0), centres_of(dog, truth[None])
+    )
+    chosen = np.flatnonzero(placed.glance.energy.counted)
+    assert len(chosen) == 6
+    taken = lambda tree, axis: jax.tree.map(lambda leaf: jnp.take(leaf, chosen, axis), tree)
+    energy = replace(placed.energy, cameras=taken(placed.energy.cameras, 0), counted=jnp.ones(6, bool))
+    alone = replace(placed, energy=energy, windows=taken(placed.windows, 1))
+    near = np.stack([truth, moved(dog, truth, {"root_x": 0.1, "root_yaw": 0.3})]).astype(np.float32)
+    tried = Hypotheses(near, np.zeros(2, int), np.zeros(2))
+    scored, climbed = placed.glance.scored(tried).values, placed.glance.climbed(tried, 3)
+    np.testing.assert_allclose(scored, alone.scored(tried).values, rtol=1e-4)
+    np.testing.assert_allclose(climbed.values, alone.climbed(tried, 3).values, rtol=1e-3)
+    assert abs(placed.scored(tried).values - scored).max() > 1e-3
+    assert (climbed.values >= scored).all()
+
+
 @pytest.fixture(scope="module")
 def dog():
     return in_colors(shipped("dog"))

@@ -4,14 +4,14 @@ For searches: grids around a place, on which a body in any pose there is compare
 products, whatever its distance from the truth.
 """
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeVar
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.energy.foreground import GridRows, grid_rows
 from sogjax.energy.image_term import ImageTerm
@@ -20,6 +20,8 @@ from sogjax.energy.posed import Frame, Posed
 from sogjax.energy.views import odds_on_grid
 from sogjax.model.camera import Camera, project
 from sogjax.model.sog import Sog
+
+Result = TypeVar("Result")
 
 SAMPLES = 2
 """Places along each side of a window's cell at which the picture is looked at."""
@@ -115,6 +117,8 @@ class Appearance(ImageTerm):
     clusters: BlobClusters
     density: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=2.0)
     """A_q in the middle of a blob, as in the foreground term."""
+    counted: Bool[Array, "camera"] | None = None
+    """The cameras that say anything, one after the other; None: all do, at once."""
 
     def value(self, posed: Posed, frame: Frame) -> Float[Array, ""]:
         """The value for the posed blobs."""
@@ -122,13 +126,23 @@ class Appearance(ImageTerm):
         seen = jax.vmap(project, in_axes=(0, None))(cameras, posed.blobs)
         nearness = _nearness(posed.blobs, seen, cameras.focal_length)
         of_camera = lambda windows, seen, near: _value(self._maps(windows, seen, near)[1], windows)
-        values = jax.vmap(of_camera)(self.windows, seen, nearness)
-        return jnp.mean(values / frame.views.normalizers)
+        return jnp.mean(self._of_each(of_camera, seen, nearness) / frame.views.normalizers)
 
     def pulls(self, posed: Posed, seen: Sog, frame: Frame) -> ImagePulls:
         """Gradient in closed form, who is in front taken as it is; springs where more cover is wanted."""
         nearness = _nearness(posed.blobs, seen, frame.views.cameras.focal_length)
-        return jax.vmap(self._pulls)(self.windows, seen, nearness)
+        return self._of_each(self._pulls, seen, nearness)
+
+    def _of_each(self, function: Callable[..., Result], seen: Sog, nearness: Float[Array, "camera blob"]) -> Result:
+        """What a function makes of each camera; 0 of those that do not count."""
+        given = self.windows, seen, nearness
+        if self.counted is None:
+            return jax.vmap(function)(*given)
+        one = jax.jit(lambda *each: function(*each))  # which is traced once
+        shapes = jax.eval_shape(one, *jax.tree.map(lambda leaf: leaf[0], given))
+        nothing = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shapes)
+        if_counted = lambda each: jax.lax.cond(each[0], lambda: one(*each[1]), lambda: nothing)
+        return jax.lax.map(if_counted, (self.counted, given))
 
     def covered(self, posed: Posed, frame: Frame) -> tuple[Float[Array, "camera column row"], Array]:
         """How far cells are covered, and what the body gains there (log likelihood)."""

@@ -14,7 +14,6 @@ from jaxtyping import Array, Float, Int
 from sogjax.energy.appearance import ColorWindows
 from sogjax.energy.term import Term
 from sogjax.model.body import Body
-from sogjax.model.camera import Camera
 from sogjax.model.farthest import farthest
 from sogjax.model.limbs import limbs, with_other_limb
 from sogjax.model.program import compiled
@@ -114,9 +113,8 @@ def search(
     told(found)
     placed = PlacedSearch.of_places(searcher, frame, np.stack([place.centre for place in found]))
     tried = _starts(searcher, found)
-    with ThreadPoolExecutor(2) as beside:
-        for level in placed.levels:
-            beside.submit(level.climbed, tried[np.arange(1)], 0)  # what climbs is compiled meanwhile
+    with ThreadPoolExecutor(1) as beside:
+        beside.submit(placed.climbed, tried[np.arange(1)], 0)  # what climbs is compiled meanwhile
         scored = placed.glance.scored(tried)
         tried = placed.glance.climbed(_spread_best(searcher, scored), FIRST_ITERATIONS)
     tried = _best(searcher, tried, NUM_SECOND)
@@ -134,9 +132,8 @@ def compile_pose_search(searcher: PoseSearch, frame: SeenFrame) -> None:
     """Compile beforehand what a search needs, while other work goes on; only shapes count of body and frame."""
     placed = PlacedSearch.of_places(searcher, frame, np.zeros((1, 3)))
     rest = Hypotheses(np.asarray(searcher.body.poses["rest"])[None], np.zeros(1, int), np.zeros(1))
-    placed.glance.scored(rest)
-    for level in placed.levels:
-        level.climbed(rest, 0)
+    placed.scored(rest)
+    placed.climbed(rest, 0)
 
 
 @dataclass(frozen=True)
@@ -186,13 +183,8 @@ class PlacedSearch:
         seeing = seeing if len(seeing) >= FEW_CAMERAS else np.arange(len(cameras))
         centres = -np.einsum("cji,cj->ci", cameras[:, :3, :3], cameras[:, :3, 3])
         chosen = seeing[farthest(centres[seeing], FEW_CAMERAS)]
-        seen, windows = _of_cameras(self.energy.cameras, self.windows, jnp.asarray(chosen))
-        return replace(self, energy=eqx.tree_at(lambda energy: energy.cameras, self.energy, seen), windows=windows)
-
-    @property
-    def levels(self) -> list["PlacedSearch"]:
-        """The glance, and all cameras if these are more."""
-        return [self] if self.glance is self else [self.glance, self]
+        counted = jnp.asarray(np.isin(np.arange(len(cameras)), chosen))
+        return replace(self, energy=eqx.tree_at(lambda energy: energy.counted, self.energy, counted))
 
     def scored(self, tried: Hypotheses) -> Hypotheses:
         """The hypotheses with their energies."""
@@ -203,12 +195,6 @@ class PlacedSearch:
         scales = self.searcher.scales
         poses, values = climbed(self.energy, self.windows, tried.where, tried.poses, scales, iterations)
         return Hypotheses(poses, tried.where, values)
-
-
-@compiled
-def _of_cameras(cameras: Camera, windows: ColorWindows, chosen: Int[Array, "camera"]) -> tuple[Camera, ColorWindows]:
-    some = lambda tree, axis: jax.tree.map(lambda leaf: jnp.take(leaf, chosen, axis), tree)
-    return some(cameras, 0), some(windows, 1)
 
 
 def _starts(searcher: PoseSearch, found: Sequence[Place]) -> Hypotheses:

@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.energy.appearance import Appearance, BlobClusters, ColorWindows
 from sogjax.energy.foreground import Foreground
@@ -79,6 +79,8 @@ class SearchEnergy(eqx.Module):
     terms: Terms
     """All but the appearance."""
     clusters: BlobClusters
+    counted: Bool[Array, "camera"]
+    """The cameras that say anything."""
 
     @classmethod
     def from_terms(cls, body: Body, cameras: Camera, terms: Sequence[Term], clusters: ColorClusters) -> "SearchEnergy":
@@ -89,13 +91,15 @@ class SearchEnergy(eqx.Module):
         others = [term for term in terms if not isinstance(term, (Similarity, Foreground, AccelerationPenalty))]
         others = [eqx.tree_at(lambda term: term.weight, term, LIMITS * term.weight) for term in others]
         members = BlobClusters.from_members(clusters.members, SLOTS)
-        return cls(replace(body, name=""), cameras, (*others, RestPrior(REST_WEIGHT)), members)
+        every = jnp.ones(cameras.image_size.shape[0], bool)
+        return cls(replace(body, name=""), cameras, (*others, RestPrior(REST_WEIGHT)), members, every)
 
     def appearance(self, windows: ColorWindows) -> Appearance:
         """The appearance, in units of the body's own area in the pictures: it does not matter how large it is seen."""
-        whole = jnp.mean(windows.scale**2 / whole_image_overlap(self.cameras.image_size))
+        wholes = windows.scale**2 / whole_image_overlap(self.cameras.image_size)
+        whole = jnp.mean(jnp.where(self.counted, wholes, 0.0))  # as the appearance is a mean over all cameras
         size = SILHOUETTE * jnp.pi * jnp.sum((DISC * self.body.blob_sigmas) ** 2)
-        return Appearance(1.0 / (size * whole), windows, self.clusters)
+        return Appearance(1.0 / (size * whole), windows, self.clusters, counted=self.counted)
 
     def of_windows(self, windows: ColorWindows) -> FrameEnergy:
         """The energy with what is seen around some poses."""
