@@ -186,6 +186,14 @@ def test_a_good_actor_has_nothing_to_warn_of():
     assert "Notes" not in report_page(report, made, RIG)
 
 
+def test_a_size_that_no_body_has_is_said():
+    made = made_dog()
+    shape = made.estimate.shape_params.at[-1].set(0.2)
+    estimate = eqx.tree_at(lambda e: e.shape_params, made.estimate, shape)
+    (warning,) = actor_report(replace(made, estimate=estimate), RIG).warnings
+    assert warning.startswith(f"{made.shape_names[-1]}: beyond what bodies differ by; masks may hold shadows")
+
+
 def test_an_actor_of_another_size_than_its_masks_is_doubtful():
     made = made_dog()
     assert doubt_of(made.body, made.estimate.poses, made.pictures, made.rig) is None

@@ -83,7 +83,18 @@ def test_a_size_as_nobody_has_it_is_named_and_counts_for_far_more(name):
     model = ShapeModel.from_body(BODIES[name])
     last = model.num_shape_params - 1
     of = lambda times: params(model, {last: times * float(model.spread[last])})
-    assert model.unusual(of(1.0)) == []
-    assert model.unusual(of(-2.0)) == [model.names[last]]
+    assert model.unusual_names(of(1.0)) == []
+    assert model.unusual_names(of(-2.0)) == [model.names[last]]
     assert float(model.penalty(of(1.0))) == pytest.approx(1.0)
-    assert float(model.penalty(of(2.0))) > 20.0
+    assert float(model.penalty(of(2.0))) == pytest.approx(4.0 + 100.0 * 0.25)
+    assert float(model.penalty(params(model, {0: 2.0}))) == pytest.approx(4.0)
+
+
+def test_lengths_of_bones_are_known_best_then_those_of_what_a_skeleton_ends_with():
+    for name, ends in (("human", {"head_length", "hand_length", "foot_length"}), ("dog", {"head_length"})):
+        model = ShapeModel.from_body(BODIES[name])
+        spread = dict(zip(model.names, np.asarray(model.spread, float).round(3).tolist(), strict=True))
+        assert ends <= {group for group, value in spread.items() if value == 0.1}
+        lengths = {group.name for group in BODIES[name].shape_groups if group.joint_offsets}
+        assert {spread[group] for group in lengths} == {0.05}
+    assert spread["chest_place"] == 0.2

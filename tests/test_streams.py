@@ -23,7 +23,8 @@ FRAMES, LAST_GOOD = 14, 10
 def command(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     recording = trackable(tmp_path / "walk", frames=FRAMES)
-    words = ("images.depth=4", "solver.max_iterations=2", "solver.min_iterations=1", "outputs.overlay_width=128")
+    words = ["images.depth=4", "solver.max_iterations=2", "solver.min_iterations=1", "outputs.overlay_width=128"]
+    words.append("tracking.both_ways=false")  # or files that show frames are written at the end
     return ["track", f"recording={recording}", f"actor={actor_file(tmp_path / 'a.yaml')}", *words]
 
 

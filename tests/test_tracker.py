@@ -20,6 +20,7 @@ from sogjax.tracking import frame_by_frame
 from sogjax.tracking.culling import CAPACITIES, Capacities
 from sogjax.tracking.frame import TrackState
 from sogjax.tracking.frame_by_frame import compile_step, track
+from sogjax.tracking.tracker import Tracker
 
 DEPTH, FINE_DEPTH = 6, 7
 """Cells of 4 and 2 pixels: an arm at 3 m is 5 pixels wide."""
@@ -63,16 +64,36 @@ def test_the_motion_of_a_dog_is_found(dog):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("around", ["predicted", "last"])
+def test_a_frame_is_tracked_in_two_programs_as_by_one_step(dog, around):
+    tracker, poses, frames = dog
+    tracker = replace(tracker, reader=replace(tracker.reader, box_around=around))
+    before = [jnp.asarray(pose) for pose in poses[:2]]
+    state = tracker.with_memory(TrackState.from_pose(before[0]).advanced(before[1]))
+    capacities = Capacities(1024, 1024)
+    (found,) = track(tracker, state, frames[2:3], capacities)
+    after, result = eqx.filter_jit(Tracker.step)(tracker, state, frames[2], capacities)
+    for ours, of_step in zip(jax.tree.leaves(found.result.images), jax.tree.leaves(result.images), strict=True):
+        np.testing.assert_array_equal(ours, of_step)
+    np.testing.assert_allclose(found.result.energy, result.energy, rtol=2e-3)  # a hundred steps on a flat hill
+    assert landmark_error(tracker.body, found.result.pose, after.previous) < 0.005
+    assert landmark_error(tracker.body, found.result.pose, poses[0]) > 0.01
+
+
+@pytest.mark.slow
 def test_a_step_compiled_beforehand_is_that_of_the_first_frame(walking_dog, monkeypatch):
     tracker, cells, right = walking_dog
     monkeypatch.setattr(frame_by_frame, "MOVED", 1.0)  # the dog at rest is where it is
-    traces, step_in = [], type(tracker).step_in
-    watched = eqx.filter_jit(lambda *given: traces.append(1) or step_in(*given))
+    traced, views, step_in = [], Tracker.views, Tracker.step_in
+    monkeypatch.setattr(Tracker, "views", lambda *given: traced.append("views") or views(*given))
+    watched = eqx.filter_jit(lambda *given: traced.append("rest") or step_in(*given))
     monkeypatch.setattr(frame_by_frame, "_step_in", watched)
+    jax.clear_caches()
     compile_step(tracker, cells[0], right.poses[0])
-    assert traces == [1]
+    assert traced.count("rest") == 1 < traced.count("views")
+    beforehand = len(traced)
     first = next(track(tracker, jnp.asarray(right.poses[0]), cells))
-    assert traces == [1]
+    assert len(traced) == beforehand
     assert first.result.iterations > 0
 
 

@@ -92,7 +92,8 @@ def example_masks(
 
     def make(decide: bool) -> FoundMasks:
         if decide not in known:
-            known[decide] = masks_from_backgrounds(images, backgrounds, files, cameras, up, unknown, calm, decide)
+            seen = images, backgrounds, files, cameras, up
+            known[decide] = masks_from_backgrounds(*seen, unknown, calm, decide, of_clip)
         return known[decide]
 
     alone = lambda made: _subject_alone(example, names, dict(sorted({**files, **made}.items())))

@@ -107,11 +107,11 @@ def _undetermined_sizes(made: MadeActor) -> tuple[str, ...]:
 
 
 def _unusual_sizes(made: MadeActor) -> list[str]:
-    if not (names := made.shape_model.unusual(made.estimate.shape_params)):
+    if not (names := made.shape_model.unusual_names(made.estimate.shape_params)):
         return []
     return [
-        f"{', '.join(names)}: beyond what people differ by, as if masks held shadows or things; look at them in "
-        "the report, and correct them or give pictures of the empty scene"
+        f"{', '.join(names)}: beyond what bodies differ by; masks may hold shadows or things: look at their pictures "
+        "in the report, and correct the masks or give pictures of the empty scene"
     ]
 
 

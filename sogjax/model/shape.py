@@ -13,14 +13,15 @@ from sogjax.model.body import Body, ShapeGroup
 LENGTH_SPREAD = 0.05
 """Expected deviation of a bone's scale factor from the whole body's (logarithm): people's proportions are alike."""
 END_SPREAD = 0.1
-"""The same of the lengths of hands, feet and heads, which hold landmarks but no joints: shoes and hair add to them."""
+"""Expected deviation of the scale factor (logarithm) of what a skeleton ends with, as hands, feet and heads: shoes and
+hair add to them."""
 SIZE_SPREAD = 0.2
 """Expected deviation of the scale factors (logarithm) of places across a bone and of sizes, which clothes change."""
 WHOLE_SPREAD = 1.0
 """Expected deviation of the whole body's scale factor (logarithm): next to nothing is known."""
 USUAL, BEYOND = 1.5, 100.0
-"""Within how many expected deviations the sizes of a body are, and how much more each further one counts: of 200 actors
-nine had a size beyond, six of them feet with their shadows."""
+"""Within how many expected deviations the sizes of a body are, and what the square of each further one counts: of 200
+actors nine had a size beyond, six of them feet with their shadows."""
 
 
 class ShapeModel(eqx.Module):
@@ -59,10 +60,7 @@ class ShapeModel(eqx.Module):
             membership(body.blobs.names, "blob_sigmas"),
             membership(body.landmarks.names, "landmark_offsets"),
             ("whole_body", *(group.name for group in groups)),
-            jnp.asarray(
-                [WHOLE_SPREAD, *map(_spread, groups)],
-                body.blob_sigmas.dtype,
-            ),
+            jnp.asarray([WHOLE_SPREAD, *(_spread(group, body) for group in groups)], body.blob_sigmas.dtype),
         )
 
     @property
@@ -70,15 +68,16 @@ class ShapeModel(eqx.Module):
         """One for the whole body and one for each group."""
         return self.joint_groups.shape[1]
 
-    def unusual(self, shape_params: Float[Array, "shape"]) -> list[str]:
-        """The names of those that are as far from 0 as no body's are."""
+    def unusual_names(self, shape_params: Float[Array, "shape"]) -> list[str]:
+        """The names of the sizes that are beyond what is usual; that of the whole body never is."""
         far = np.abs(np.asarray(shape_params) / np.asarray(self.spread)) > USUAL
-        return [name for name, is_far in zip(self.names, far, strict=True) if is_far]
+        return [name for name, is_far in zip(self.names[1:], far[1:], strict=True) if is_far]
 
     def penalty(self, shape_params: Float[Array, "shape"]) -> Float[Array, ""]:
-        """How unusual a shape is: squared expected deviations, which count for far more beyond what is usual."""
+        """How unusual a shape is: squared expected deviations, of which those beyond what is usual count far more."""
         deviations = shape_params / self.spread
-        return jnp.sum(deviations**2) + BEYOND * jnp.sum(jnp.maximum(jnp.abs(deviations) - USUAL, 0.0) ** 2)
+        beyond = jnp.maximum(jnp.abs(deviations[1:]) - USUAL, 0.0)
+        return jnp.sum(deviations**2) + BEYOND * jnp.sum(beyond**2)
 
     def shaped(self, shape_params: Float[Array, "shape"]) -> Body:
         """The body with its lengths and sizes scaled."""
@@ -96,11 +95,14 @@ class ShapeModel(eqx.Module):
         )
 
 
-def _spread(group: ShapeGroup) -> float:
+def _spread(group: ShapeGroup, body: Body) -> float:
     """Expected deviation of a group's scale factor from the whole body's (logarithm)."""
     if group.joint_offsets:
         return LENGTH_SPREAD
-    return END_SPREAD if group.landmark_offsets else SIZE_SPREAD
+    joints = dict(zip(body.landmarks.names, body.landmarks.joints, strict=True))
+    at = [joints[name] for name in group.landmark_offsets]
+    ends = bool(at) and not np.isin(at, body.skeleton.parents).any()
+    return END_SPREAD if ends else SIZE_SPREAD
 
 
 def _untied(groups: Sequence[ShapeGroup]) -> list[ShapeGroup]:

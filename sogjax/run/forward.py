@@ -129,16 +129,16 @@ def track_back(setup: Setup, start: InitialPose, times: StageTimes) -> FrameTabl
     return FrameTable.joined(found[::-1])
 
 
-def show_known(setup: Setup, table: FrameTable, streams: ResultStreams, times: StageTimes) -> None:
+def show_known(setup: Setup, table: FrameTable, streams: ResultStreams) -> None:
     """Write the files that show frames, from rows that are known; pictures are read where a file shows them.
 
     Raises:
         InputError: a video cannot be read, or a file cannot be written.
     """
-    found = FramesFound(setup.clip.numbers, table, None, streams, times, 0)
+    found = FramesFound(setup.clip.numbers, table, None, streams, StageTimes(), 0)  # those of tracking stay
     start = InitialPose(setup.clip.numbers[0], table.pose[0], "known")
     with streams, Writer(found.consume, FRAMES_BEHIND) as writer:
-        for done in frames_done(setup, start, table, found, shown=True):
+        for done in frames_done(setup, start, table, found, shown=True, label="writing pictures"):
             writer.put(done)
 
 
@@ -223,14 +223,18 @@ def frames_done(
     found: FramesFound,
     shown: bool,
     told: Told = lambda *_: None,
+    label: str = "tracking",
 ) -> Iterator[FrameDone]:
-    """The frames from the first one that is shown on, with what is made of their pictures; `times` are noted."""
+    """The frames from the first one that is shown on, with what is made of their pictures; `times` are noted.
+
+    The bar has the `label`.
+    """
     numbers, streams, times = setup.clip.numbers[found.row :], found.streams, found.times
     make = None if streams is None else streams.picture_maker()
     waiting: deque[list[Any]] = deque()
 
     def inputs(frames: Iterator[ReadFrame]) -> Iterator[FrameInput]:
-        for frame in progress(frames, len(numbers), "tracking"):
+        for frame in progress(frames, len(numbers), label):
             waiting.append(frame.pictures)
             yield frame.input
 

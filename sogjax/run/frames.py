@@ -11,10 +11,9 @@ from jaxtyping import Array, Float
 from sogjax.io.frame_table import FrameTable
 from sogjax.model.sog import Sog
 from sogjax.quality.limb_confidence import LimbConfidence, beside_rivals
-from sogjax.tracking.capacity import views_near
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import FrameInput, FrameResult, TrackedFrame, TrackState, on_device
-from sogjax.tracking.frame_by_frame import Told, track
+from sogjax.tracking.frame_by_frame import Told, image_blobs, track
 from sogjax.tracking.tracker import Tracker
 
 _COUNTS = ("iterations", "evaluations", "converged", "num_near", "num_matching", "num_blocks")
@@ -76,13 +75,17 @@ def state_after(table: FrameTable, start: Float[np.ndarray | Array, "dof"]) -> T
 def known_frames(
     table: FrameTable, tracker: Tracker, frames: Iterable[FrameInput] | None = None
 ) -> Iterator[TrackedFrame]:
-    """The frames of a table as if they were tracked now; with image blobs where what is seen is given."""
-    capacities, coming = capacities_of(table), iter(frames or ())
-    for row, pose in enumerate(table.pose):
+    """The frames of a table as if they were tracked now; with their image blobs where what is seen is given."""
+    start = jnp.asarray(table.pose[0])
+    state, capacities = TrackState.from_pose(start), capacities_of(table)
+    coming = iter(frames or ())
+    for row in range(len(table)):
         images = _no_blobs(len(tracker.normalizers))
         if frames is not None:
-            images = views_near(tracker, on_device(next(coming)), jnp.asarray(pose), capacities).images
-        yield TrackedFrame(row, _result(table, row, images), capacities, tracker.reader.color_space, 0.0)
+            images = image_blobs(tracker, state, on_device(next(coming)), capacities)
+        result = _result(table, row, images)
+        yield TrackedFrame(row, result, capacities, tracker.reader.color_space, 0.0)
+        state = state.advanced(result.pose)
 
 
 def continued(

@@ -129,7 +129,7 @@ def _recolored(run: Run) -> RecoloredActors:
 
 
 def _tracked(run: Run) -> Tracked:
-    """The frames, tracked; rows and the files that show them are written as they come."""
+    """The frames, tracked; rows are written as they come, and files that show them if no later pass changes any."""
     log = rows = streams = None
     if run.kept is not None:
         rows = kept_rows(run.kept, run.initial_pose, run.clip.numbers)
@@ -188,7 +188,7 @@ PASSES: tuple[Pass, ...] = (
         BOTH_WAYS,
         lambda run: merge_backward(run.setup, run.frames),
         Merged,
-        wanted=lambda run: run.tracks and run.config.tracking.both_ways,
+        wanted=lambda run: run.tracks and run.config.tracking.both_ways and run.setup.tracker.limbs is not None,
         changes_frames=True,
     ),
     Pass(
@@ -197,7 +197,7 @@ PASSES: tuple[Pass, ...] = (
         _recolored,
         RecoloredActors,
         wanted=lambda run: run.tracks and run.recolors_actors,
-    ),  # which seldom changes frames
+    ),  # which seldom finds other frames
     Pass(
         "adjusted",
         ADJUSTING,

@@ -1,4 +1,4 @@
-"""Files that grow while frames are found: overlay video and Rerun file."""
+"""Files that show frames and grow with them: overlay video and Rerun file."""
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack

@@ -59,7 +59,7 @@ class Run:
     times: StageTimes = field(default_factory=StageTimes)
 
     shown: tuple[FrameTable, list[Path]] | None = None
-    """What the files show that grew while frames were tracked, and these files."""
+    """The frames that files show which were written while these were tracked, and the files."""
     records: dict[str, Any] = field(default_factory=dict)
     """What each pass left, by the name of the pass."""
 

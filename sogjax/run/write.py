@@ -166,13 +166,13 @@ def _occluders(run: Run, out: Path) -> list[Path]:
 
 
 def _grown(run: Run, out: Path) -> list[Path]:
-    """The files that grew while frames were tracked; written again where the frames are other ones now."""
+    """The files that show frames; written now, unless they were written while the frames that hold were tracked."""
     setup, table = run.final_setup, run.frames
     if run.shown is not None and run.shown[0] is table:
         return run.shown[1]
     streams = ResultStreams(out, setup.clip, setup.bodies, run.config.outputs)
     if streams.show_frames:
-        show_known(setup, table, streams, run.times)
+        show_known(setup, table, streams)
     return streams.files
 
 

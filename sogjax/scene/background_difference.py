@@ -18,8 +18,9 @@ DIFFERENT = 4.5
 above this, the colour is another one."""
 SHADOW_RANGE = (0.4, 1.1)
 """Share of the background's light that a shadow or reflected light leaves."""
-LIT_AGAIN = 2.5
-"""The same, at most, of a background that was learnt from the clip, maybe in a shadow that has gone with its owner."""
+LIT_AGAIN = 1.7
+"""Share of its light, at most, in which a background shows that was learnt from the clip, maybe in a shadow that has
+gone with its owner."""
 EDGE_NOISE = 0.08
 """Noise beside edges of the background, as a share of their contrast: a little misalignment and compression."""
 SHADOW_CORRELATION = 0.65
@@ -68,6 +69,7 @@ def background_difference(
     image: UInt8[np.ndarray, "height width 3"],
     background: UInt8[np.ndarray, "background_height background_width 3"],
     unknown: Bool[np.ndarray, "_rows _columns"] | None = None,
+    learnt: bool = False,
 ) -> Difference:
     """Compare a picture with the empty scene, seen by the same camera under an exposure that may differ.
 
@@ -76,10 +78,10 @@ def background_difference(
 
     A shadow is the background, darker: Horprasert, Harwood and Davis, "A Statistical Approach for Real-time Robust
     Background Subtraction and Shadow Detection" (1999). Where a brown trouser leg before a brown floor looks like one,
-    the pattern may tell: a shadow keeps the floor's. Where the background is `unknown`, nothing is said; that of a clip
-    has unknown parts, or none, and may have been learnt where a shadow lay.
+    the pattern may tell: a shadow keeps the floor's. Where the background is `unknown`, nothing is said. One that
+    was `learnt` from the clip may have lain in a shadow then, and be lit now.
     """
-    brightest = SHADOW_RANGE[1] if unknown is None else LIT_AGAIN
+    brightest = LIT_AGAIN if learnt else SHADOW_RANGE[1]
     size = working_size(image.shape[1], image.shape[0])
     small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
     light = small.astype(np.float32)
@@ -91,7 +93,7 @@ def background_difference(
     brightness = _brightness(light, expected, 1.0 / variance)
     unexplained = _unexplained(light, expected, np.clip(brightness, SHADOW_RANGE[0], brightest), variance)
     different = opened(unexplained > DIFFERENT, 3)
-    shadow = _keeps_pattern(light, expected, noise) & ((brightness < 1.0) | (unknown is not None)) & ~different
+    shadow = _keeps_pattern(light, expected, noise) & ((brightness < 1.0) | learnt) & ~different
     changed = opened(change > CHANGED, 3) & ~opened(shadow, 5)
     if unknown is None:
         return Difference(small, change, unexplained, changed, different, np.zeros_like(changed))

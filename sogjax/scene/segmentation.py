@@ -1,6 +1,6 @@
 """Masks of a subject from pictures of several cameras and of the empty scene."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -59,6 +59,7 @@ def masks_from_backgrounds(
     unknown: Mapping[int, Mask] | None = None,
     calm: Mapping[int, Mask] | None = None,
     decide: bool = True,
+    learnt: Collection[int] = (),
 ) -> FoundMasks:
     """Masks of the cameras that have a picture of the empty scene.
 
@@ -74,8 +75,9 @@ def masks_from_backgrounds(
         unknown: where the empty scene is not known, by camera at any size; None: it is known everywhere.
         calm: where its colour never varies, by camera at the pictures' size; None: nowhere.
         decide: whether colours and the other cameras decide there; else it is in no mask.
+        learnt: the cameras whose empty scene was learnt from the clip.
     """
-    compare = lambda k: background_difference(images[k], backgrounds[k], (unknown or {}).get(k))
+    compare = lambda k: background_difference(images[k], backgrounds[k], (unknown or {}).get(k), k in learnt)
     compared = dict(zip(backgrounds, in_threads(compare, backgrounds), strict=True))
     given = {k: (cv2.resize(images[k], working_size(*mask.shape[::-1])), mask) for k, mask in known.items()}
     differences = _decided(compared, calm or {}, given, cameras, up) if decide else compared

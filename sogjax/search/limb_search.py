@@ -276,4 +276,4 @@ def compile_search(tracker: Tracker, state: TrackState, frame: FrameInput, capac
             lambda: search.climbed(views, pose, pose[None], np.zeros(1)),  # the slowest first
             lambda: search.held_otherwise(views, pose),
         )
-        in_threads(lambda compiled_by: compiled_by(), programs)
+        in_threads(lambda compile_one: compile_one(), programs)

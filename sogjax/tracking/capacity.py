@@ -11,7 +11,7 @@ from sogjax.energy.frame_energy import FrameEnergy
 from sogjax.energy.posed import History
 from sogjax.energy.views import Views
 from sogjax.model.program import compiled
-from sogjax.tracking.culling import CAPACITIES, Capacities, block_capacity, capacity_for, union_boxes
+from sogjax.tracking.culling import CAPACITIES, Capacities, block_capacity, capacity_for
 from sogjax.tracking.frame import FrameInput, TrackState
 from sogjax.tracking.tracker import Tracker
 
@@ -69,20 +69,20 @@ def seen_around(
     capacities: Capacities,
     beyond: float = 0.0,
 ) -> tuple[Views, Int[Array, "camera"], Int[Array, "camera"]]:
-    """What the cameras see around two poses, and the counts to hold against the capacities; otherwise `views_near`."""
+    """As `views_near`, with each camera's near and matching image blobs, for the caller to hold against the room."""
     part = jnp.asarray(beyond, tracker.body.blob_sigmas.dtype)
-    return _seen_around(tracker, frame, jnp.stack([*poses]), part, capacities)
+    room = Capacities(capacities.near, capacities.matching)  # one program, whatever room pairs have
+    return _seen_around(tracker, frame, jnp.stack([*poses]), part, room)
 
 
 @compiled
 def _seen_around(
     tracker: Tracker, frame: FrameInput, poses: Float[Array, "2 dof"], beyond: Float[Array, ""], capacities: Capacities
 ) -> tuple[Views, Int[Array, "camera"], Int[Array, "camera"]]:
-    states = [TrackState.from_pose(pose) for pose in poses]
-    boxes = union_boxes(*map(tracker.boxes, states))
+    boxes = tracker.boxes_around(*poses)
     more = beyond * jnp.max(boxes[..., 1, :] - boxes[..., 0, :], axis=-1, keepdims=True)
     wide = jnp.stack([boxes[..., 0, :] - more, boxes[..., 1, :] + more], axis=-2)
-    return tracker.views(frame, states[0], capacities, wide)
+    return tracker.views(frame, TrackState.from_pose(poses[0]), capacities, wide)
 
 
 def larger_capacities(capacities: Capacities, near: int, matching: int, blocks: int) -> Capacities:

@@ -12,6 +12,7 @@ from jaxtyping import Array, Float, Int, UInt8
 
 from sogjax.errors import InputError
 from sogjax.model.program import compiled
+from sogjax.model.sog import Sog
 from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.tracking.capacity import first_capacities, larger_capacities, seen_around
 from sogjax.tracking.culling import Capacities
@@ -35,9 +36,9 @@ def track(
 ) -> Iterator[TrackedFrame]:
     """Track the frames one after the other from a rough pose of the first one, or from where another run stopped.
 
-    The step is compiled once, with room for `HEADROOM` times the image blobs of the first frame, or with the given
-    capacities (of a run whose program can so serve this one); a frame that needs more is done again with the next
-    capacity (and compiles again), so no blob is ever cut off unseen. To continue a run, pass the capacities that
+    Its two programs are compiled once, with room for `HEADROOM` times the image blobs of the first frame, or with the
+    given capacities (of a run whose programs can so serve this one); a frame that needs more is done again with the
+    next capacity (and compiles again), so no blob is ever cut off unseen. To continue a run, pass the capacities that
     it stopped with: sums of other lengths round differently.
 
     Raises:
@@ -69,6 +70,12 @@ def _step(
     state = state if frame.keypoints is None else _led(tracker, state, frame)
     seen = seen_around(tracker, frame, tracker.box_poses(state), capacities)
     return _step_in(tracker, state, frame, seen, capacities)
+
+
+def image_blobs(tracker: Tracker, state: TrackState, frame: FrameInput, capacities: Capacities) -> Sog:
+    """The image blobs of a frame that was tracked already."""
+    state = state if frame.keypoints is None else _led(tracker, state, frame)
+    return seen_around(tracker, frame, tracker.box_poses(state), capacities)[0].images
 
 
 def compile_step(tracker: Tracker, frame: AnyFrame, at_rest: Float[np.ndarray, "dof"]) -> None:

@@ -1,4 +1,4 @@
-"""Tracking (Section 5.3): predict, cull, solve, advance; one compiled step for every frame of a recording."""
+"""Tracking (Section 5.3): predict, cull, solve, advance; the same compiled step for every frame of a recording."""
 
 from dataclasses import replace
 from functools import partial
@@ -86,10 +86,14 @@ class Tracker(eqx.Module):
 
     def boxes(self, state: TrackState) -> Float[Array, "camera actor 2 2"]:
         """Where the actors may be seen."""
+        return self.boxes_around(*self.box_poses(state))
+
+    def boxes_around(self, pose: Float[Array, "dof"], other: Float[Array, "dof"]) -> Float[Array, "camera actor 2 2"]:
+        """Where the actors may be seen in either pose."""
         around = lambda pose: jax.vmap(body_boxes, in_axes=(None, 0, None, None))(
             self.body.posed_blobs(pose), self.cameras, self.body.blob_actors, self.reader.box_enlargement
         )
-        return union_boxes(*map(around, self.box_poses(state)))
+        return union_boxes(around(pose), around(other))
 
     def box_poses(self, state: TrackState) -> tuple[Float[Array, "dof"], Float[Array, "dof"]]:
         """The poses around which the actors may be seen: the last and, unless told otherwise, the predicted one."""
