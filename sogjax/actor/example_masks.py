@@ -92,8 +92,9 @@ def example_masks(
 
     def make(decide: bool) -> FoundMasks:
         if decide not in known:
-            seen = images, backgrounds, files, cameras, up
-            known[decide] = masks_from_backgrounds(*seen, unknown, calm, decide, of_clip)
+            known[decide] = masks_from_backgrounds(
+                images, backgrounds, files, cameras, up, unknown, calm, decide, learnt=of_clip
+            )
         return known[decide]
 
     alone = lambda made: _subject_alone(example, names, dict(sorted({**files, **made}.items())))

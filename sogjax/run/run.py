@@ -59,7 +59,7 @@ class Run:
     times: StageTimes = field(default_factory=StageTimes)
 
     shown: tuple[FrameTable, list[Path]] | None = None
-    """The frames that files show which were written while these were tracked, and the files."""
+    """The frames that were tracked while files that show them were written, and these files."""
     records: dict[str, Any] = field(default_factory=dict)
     """What each pass left, by the name of the pass."""
 
