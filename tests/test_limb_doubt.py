@@ -26,7 +26,7 @@ from sogjax.quality.limb_confidence import (
     error_probability,
     limb_confidence,
 )
-from sogjax.quality.limb_evidence import CLEARLY, BlobEvidence, LimbBlobs, blob_evidence
+from sogjax.quality.limb_evidence import CLEARLY, BlobEvidence, LimbBlobs, blob_evidence, own_or_hidden
 from sogjax.quality.limb_warnings import doubtful_limbs
 from sogjax.scene.background import BackgroundCells
 from sogjax.scene.foreground import LARGEST, BackgroundModel, own_density, subject_colors, subject_density
@@ -34,7 +34,7 @@ from sogjax.tracking.frame import FrameInput
 from sogjax.tracking.frame_by_frame import track
 
 DEPTH = 6
-LIMB = "left front leg"
+LIMB, BESIDE = "left front leg", "right front leg"
 ELSEWHERE = {"left_front_swing": 0.9, "left_elbow": -0.4}
 
 
@@ -106,8 +106,10 @@ def test_only_a_limb_that_is_elsewhere_is_in_doubt(dog):
     assert float(before.error_probability.max()) < 0.1
     after = judged(tracker, moved(tracker.body, pose, ELSEWHERE), cells, before.baseline)
     assert float(after.error_probability[names.index(LIMB)]) > 0.5
-    others = np.delete(np.asarray(after.error_probability), names.index(LIMB))
+    beside = float(after.error_probability[names.index(BESIDE)])
+    others = np.delete(np.asarray(after.error_probability), [names.index(LIMB), names.index(BESIDE)])
     assert others.max() < 0.3
+    assert beside < 0.5  # before it is seen what nothing explains any more
 
 
 @pytest.mark.parametrize("light", fast_and_slow(0.55, 1.15))
@@ -187,6 +189,29 @@ def test_what_hides_a_limb_is_no_evidence_against_it():
     seen = np.asarray(evidence_of(tracker, jnp.asarray(pose), jnp.asarray(cells)).seen)
     assert seen.min() < 0.2
     assert seen.max() > 0.8
+
+
+CROSSED = {"left_front_side": -0.3, "right_front_side": -0.3, "left_front_swing": 0.15}
+
+
+def test_limbs_that_touch_do_not_contradict_each_other():
+    """Which of them is in front is not known to their width: either may show the colours of the other."""
+    body, rig = in_colors(shipped("dog")), ring_rig(5, (160, 120), distance=1.6)
+    tracker, pose = judging(body, rig, True), standing(body, 1.1)
+    cells = cells_of(rig, draw(body, pose, rig), DEPTH)
+    baseline = judged(tracker, pose, cells, jnp.full((2, body.num_blobs), jnp.nan)).baseline
+    crossed = moved(body, pose, CROSSED)
+    shown = cells_of(rig, draw(body, crossed, rig), DEPTH)
+    assert float(judged(tracker, crossed, shown, baseline).error_probability.max()) < 0.35  # 0.57 by their own colours
+
+
+def test_colours_are_a_blobs_own_or_those_of_what_hides_it():
+    own, hiding = jnp.asarray([-4.0, 2.0, -4.0]), jnp.asarray([3.0, -4.0, -4.0])
+    of = lambda visible: np.asarray(own_or_hidden(own, hiding, jnp.asarray(visible)))
+    np.testing.assert_allclose(of(1.0), own, atol=2.0)  # what is hardly hidden may hardly be something else
+    np.testing.assert_allclose(of(0.5), np.logaddexp(own, hiding), atol=1e-5)
+    np.testing.assert_allclose(of(0.1), of(0.5), atol=1e-5)  # at most even: it may be seen
+    np.testing.assert_allclose(of(0.8), np.log(np.exp(own) + 0.25 * np.exp(hiding)), atol=1e-5)
 
 
 def test_densities_of_colours_are_those_of_the_subjects_table():

@@ -58,6 +58,11 @@ SAMPLES = ((0.0, 0.0), (0.6, 0.0), (-0.6, 0.0), (0.0, 0.6), (0.0, -0.6))
 """Where a blob is looked at, in units of its size."""
 DEPTH_SCALE = 0.16
 """Metres of depth over which a blob comes to hide another."""
+TOUCHING, INSIDE = 1.3, 0.25
+"""Sigmas from the middle of a blob to its surface; and the part of the way between the middles of two that touch up to
+which they are inside each other, so that neither hides the other."""
+HARDLY = 1e-3
+"""Part of a blob that is visible, and that is hidden, at least."""
 DENSITY = 2.0
 """Density of a blob's middle along a ray, as in the foreground term."""
 BACKGROUND = -0.3
@@ -69,12 +74,23 @@ DARKEST = 0.05
 """A limb's light, at least: nothing is told of colours that are nearly black."""
 
 
+class Visible(NamedTuple):
+    """What other parts of a body leave of its blobs in each picture."""
+
+    part: Float[Array, "camera blob"]
+    """How much of each blob's middle is visible."""
+    of_solids: Float[Array, "camera blob"]
+    """The same by what does not reach into it alone: bodies are solid."""
+    hider: Int[Array, "camera blob"]
+    """Which blob hides most of it then."""
+
+
 class BlobEvidence(NamedTuple):
     """The evidence for each blob, over all cameras, where other limbs and the trunk do not hide it."""
 
     own: Float[Array, "blob"]
-    """Log likelihood of the colours seen, in the limb's light, as the blob's own against any of the subject's; mean of
-    the samples."""
+    """Log likelihood of the colours seen, in the limb's light, as the blob's own, or as those of what may hide it,
+    against any of the subject's; mean of the samples."""
     contradicted: Float[Array, "blob"]
     """Part of the samples that are background; 0 where none is known. What looks like the background and like the blob
     is either: it counts as far as the blob's own colour is another."""
@@ -116,7 +132,8 @@ def blob_evidence(
     odds = jnp.zeros(inside.shape) if windows is None else _odds_at(limbs, windows, places)
     against = odds < BACKGROUND
     areas = jnp.where(seen.mask, seen.sigmas, 0.0) ** 2
-    weights = jnp.where(inside, (areas * _visible(limbs, posed.blobs, seen, cameras))[:, :, None], 0.0)
+    visible = _visible(limbs, posed.blobs, seen, cameras)
+    weights = jnp.where(inside, (areas * visible.part)[:, :, None], 0.0)
     hidden = None
     if hidden_from is not None:
         depths = jax.vmap(point_depths, in_axes=(0, None))(cameras, posed.blobs.means)
@@ -126,10 +143,14 @@ def blob_evidence(
     whole = jnp.sum(weights, axis=(0, 2)) + 1e-6
     mean = lambda values: jnp.sum(weights * values, axis=(0, 2)) / whole
     shares = jnp.where(against, 0.0, weights) / jnp.maximum(len(SAMPLES) * areas, 1e-6)[:, :, None]
-    light = _light(limbs, colors, own_colors, shares)[:, :, None, None]
-    lit = jnp.clip(colors / light, 0.0, 1.0)
+    light = _light(limbs, colors, own_colors, shares)
+    lit = jnp.clip(colors / light[:, :, None, None], 0.0, 1.0)
+    of_hider = jnp.take_along_axis(light, visible.hider, axis=1), posed.body.blob_colors[visible.hider]
+    hiders_light, hiders_colors = (of[:, :, None] for of in of_hider)
+    as_hider = own_density(jnp.clip(colors / hiders_light[..., None], 0.0, 1.0), hiders_colors)
+    found = own_or_hidden(own_density(lit, own_colors), as_hider, visible.of_solids[:, :, None])
     return BlobEvidence(
-        own=mean(own_density(lit, own_colors) - subject_density(lit, subject)),
+        own=mean(found - subject_density(lit, subject)),
         contradicted=mean(jnp.where(against, 1.0 - alike, 0.0)),
         seen=whole / (len(SAMPLES) * jnp.sum(areas, axis=0) + 1e-6),
         explained=mean(jnp.where(odds < -CLEARLY, 0.0, alike)),
@@ -164,15 +185,30 @@ def _cells_of(
     return cell.reshape(*places.shape[:2], 2), inside.reshape(places.shape[:2])
 
 
-def _visible(limbs: LimbBlobs, blobs: Sog, seen: Sog, cameras: Camera) -> Float[Array, "camera blob"]:
-    """How much of each blob's middle is left visible by blobs of other parts of a body."""
+def _visible(limbs: LimbBlobs, blobs: Sog, seen: Sog, cameras: Camera) -> Visible:
+    """What blobs of other parts of a body leave visible of each blob, and which of them may hide it."""
     sigmas = jnp.where(seen.mask, seen.sigmas, 1.0)
     depths = blobs.sigmas[None, :] * cameras.focal_length[:, None] / sigmas
     apart = sum((seen.means[:, :, None, k] - seen.means[:, None, :, k]) ** 2 for k in range(2))
-    before = jnp.clip((depths[:, None, :] - depths[:, :, None]) / DEPTH_SCALE + 0.5, 0.0, 1.0)
     height = jnp.where(seen.mask, DENSITY, 0.0)[:, :, None] * limbs.of_other_parts[None]
-    hiding = height * before * jnp.exp((-0.5 / sigmas**2)[:, :, None] * apart)
-    return jnp.where(seen.mask, jnp.exp(-jnp.sum(hiding, axis=1)), 0.0)
+    covering = height * jnp.exp((-0.5 / sigmas**2)[:, :, None] * apart)
+    behind = depths[:, None, :] - depths[:, :, None]
+    touching = TOUCHING * (blobs.sigmas[:, None] + blobs.sigmas[None, :])
+    left = lambda hiding: jnp.where(seen.mask, jnp.exp(-jnp.sum(hiding, axis=1)), 0.0)
+    before = covering * jnp.clip(behind / DEPTH_SCALE + 0.5, 0.0, 1.0)
+    outside = covering * jnp.clip((behind / touching[None] - INSIDE) / (1.0 - 2.0 * INSIDE), 0.0, 1.0)
+    return Visible(left(before), left(outside), jnp.argmax(outside, axis=1))
+
+
+def own_or_hidden(
+    own: Float[Array, "*place"], hiding: Float[Array, "*place"], visible: Float[Array, "*#place"]
+) -> Float[Array, "*place"]:
+    """Log density of colours as a blob's own or, by the odds (at most even) that it is hidden, as those of its hider.
+
+    Which of two limbs that touch is in front is not known: crossed arms would contradict each other.
+    """
+    visible = jnp.clip(visible, HARDLY, 1.0 - HARDLY)
+    return jnp.logaddexp(own, hiding + jnp.minimum(jnp.log1p(-visible) - jnp.log(visible), 0.0))
 
 
 def _odds_at(
