@@ -59,10 +59,8 @@ SAMPLES = ((0.0, 0.0), (0.6, 0.0), (-0.6, 0.0), (0.0, 0.6), (0.0, -0.6))
 DEPTH_SCALE = 0.16
 """Metres of depth over which a blob comes to hide another."""
 TOUCHING, INSIDE = 1.3, 0.25
-"""Sigmas from the middle of a blob to its surface; and the part of the way between the middles of two that touch up to
-which they are inside each other, so that neither hides the other."""
-HARDLY = 1e-3
-"""Part of a blob that is visible, and that is hidden, at least."""
+"""Sigmas from the middle of a blob to its surface; and how much farther one blob must be than another to be behind it,
+not inside it, as a part of what two are apart that touch. It is so wholly from one minus that part on."""
 DENSITY = 2.0
 """Density of a blob's middle along a ray, as in the foreground term."""
 BACKGROUND = -0.3
@@ -80,17 +78,17 @@ class Visible(NamedTuple):
     part: Float[Array, "camera blob"]
     """How much of each blob's middle is visible."""
     of_solids: Float[Array, "camera blob"]
-    """The same by what does not reach into it alone: bodies are solid."""
+    """The same, but for blobs that reach into it: of two in one place, neither hides the other."""
     hider: Int[Array, "camera blob"]
-    """Which blob hides most of it then."""
+    """The blob that hides most of it then, which stands for all that do; any where none does."""
 
 
 class BlobEvidence(NamedTuple):
     """The evidence for each blob, over all cameras, where other limbs and the trunk do not hide it."""
 
     own: Float[Array, "blob"]
-    """Log likelihood of the colours seen, in the limb's light, as the blob's own, or as those of what may hide it,
-    against any of the subject's; mean of the samples."""
+    """Log likelihood of the colours seen, in the limb's light, as the blob's own (of one behind another, as those of
+    either) against any of the subject's; mean of the samples."""
     contradicted: Float[Array, "blob"]
     """Part of the samples that are background; 0 where none is known. What looks like the background and like the blob
     is either: it counts as far as the blob's own colour is another."""
@@ -132,7 +130,7 @@ def blob_evidence(
     odds = jnp.zeros(inside.shape) if windows is None else _odds_at(limbs, windows, places)
     against = odds < BACKGROUND
     areas = jnp.where(seen.mask, seen.sigmas, 0.0) ** 2
-    visible = _visible(limbs, posed.blobs, seen, cameras)
+    visible = visible_parts(limbs, posed.blobs, seen, cameras)
     weights = jnp.where(inside, (areas * visible.part)[:, :, None], 0.0)
     hidden = None
     if hidden_from is not None:
@@ -145,12 +143,13 @@ def blob_evidence(
     shares = jnp.where(against, 0.0, weights) / jnp.maximum(len(SAMPLES) * areas, 1e-6)[:, :, None]
     light = _light(limbs, colors, own_colors, shares)
     lit = jnp.clip(colors / light[:, :, None, None], 0.0, 1.0)
-    of_hider = jnp.take_along_axis(light, visible.hider, axis=1), posed.body.blob_colors[visible.hider]
-    hiders_light, hiders_colors = (of[:, :, None] for of in of_hider)
-    as_hider = own_density(jnp.clip(colors / hiders_light[..., None], 0.0, 1.0), hiders_colors)
-    found = own_or_hidden(own_density(lit, own_colors), as_hider, visible.of_solids[:, :, None])
+    hiders_light = jnp.take_along_axis(light, visible.hider, axis=1)[:, :, None, None]
+    lit_as_hider = jnp.clip(colors / hiders_light, 0.0, 1.0)
+    against_any = lambda shown, color: own_density(shown, color) - subject_density(shown, subject)
+    as_hider = against_any(lit_as_hider, posed.body.blob_colors[visible.hider][:, :, None])
+    own = own_or_hidden(against_any(lit, own_colors), as_hider, visible.of_solids[:, :, None])
     return BlobEvidence(
-        own=mean(found - subject_density(lit, subject)),
+        own=mean(own),
         contradicted=mean(jnp.where(against, 1.0 - alike, 0.0)),
         seen=whole / (len(SAMPLES) * jnp.sum(areas, axis=0) + 1e-6),
         explained=mean(jnp.where(odds < -CLEARLY, 0.0, alike)),
@@ -185,30 +184,30 @@ def _cells_of(
     return cell.reshape(*places.shape[:2], 2), inside.reshape(places.shape[:2])
 
 
-def _visible(limbs: LimbBlobs, blobs: Sog, seen: Sog, cameras: Camera) -> Visible:
+def visible_parts(limbs: LimbBlobs, blobs: Sog, seen: Sog, cameras: Camera) -> Visible:
     """What blobs of other parts of a body leave visible of each blob, and which of them may hide it."""
     sigmas = jnp.where(seen.mask, seen.sigmas, 1.0)
     depths = blobs.sigmas[None, :] * cameras.focal_length[:, None] / sigmas
     apart = sum((seen.means[:, :, None, k] - seen.means[:, None, :, k]) ** 2 for k in range(2))
     height = jnp.where(seen.mask, DENSITY, 0.0)[:, :, None] * limbs.of_other_parts[None]
     covering = height * jnp.exp((-0.5 / sigmas**2)[:, :, None] * apart)
-    behind = depths[:, None, :] - depths[:, :, None]
+    farther = depths[:, None, :] - depths[:, :, None]
     touching = TOUCHING * (blobs.sigmas[:, None] + blobs.sigmas[None, :])
     left = lambda hiding: jnp.where(seen.mask, jnp.exp(-jnp.sum(hiding, axis=1)), 0.0)
-    before = covering * jnp.clip(behind / DEPTH_SCALE + 0.5, 0.0, 1.0)
-    outside = covering * jnp.clip((behind / touching[None] - INSIDE) / (1.0 - 2.0 * INSIDE), 0.0, 1.0)
+    before = covering * jnp.clip(farther / DEPTH_SCALE + 0.5, 0.0, 1.0)
+    outside = covering * jnp.clip((farther / touching[None] - INSIDE) / (1.0 - 2.0 * INSIDE), 0.0, 1.0)
     return Visible(left(before), left(outside), jnp.argmax(outside, axis=1))
 
 
 def own_or_hidden(
     own: Float[Array, "*place"], hiding: Float[Array, "*place"], visible: Float[Array, "*#place"]
 ) -> Float[Array, "*place"]:
-    """Log density of colours as a blob's own or, by the odds (at most even) that it is hidden, as those of its hider.
+    """Log likelihood of colours as a blob's own or, by the odds that it is hidden (at most even), as its hider's.
 
-    Which of two limbs that touch is in front is not known: crossed arms would contradict each other.
+    A limb close behind another is still partly looked at, as depths are not exact; what is seen may be the other's.
     """
-    visible = jnp.clip(visible, HARDLY, 1.0 - HARDLY)
-    return jnp.logaddexp(own, hiding + jnp.minimum(jnp.log1p(-visible) - jnp.log(visible), 0.0))
+    odds = 1.0 / jnp.maximum(visible, 0.5) - 1.0
+    return jnp.logaddexp(own, hiding + jnp.log(odds))
 
 
 def _odds_at(
