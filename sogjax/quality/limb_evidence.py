@@ -59,8 +59,8 @@ SAMPLES = ((0.0, 0.0), (0.6, 0.0), (-0.6, 0.0), (0.0, 0.6), (0.0, -0.6))
 DEPTH_SCALE = 0.16
 """Metres of depth over which a blob comes to hide another."""
 TOUCHING, INSIDE = 1.3, 0.25
-"""Sigmas from the middle of a blob to its surface; and how much farther one blob must be than another to be behind it,
-not inside it, as a part of what two are apart that touch. It is so wholly from one minus that part on."""
+"""Sigmas from a blob's middle to its surface. Two touch where their depths differ by as much as both have; one is
+behind the other from the part `INSIDE` of that on, and wholly so from one minus that part on."""
 DENSITY = 2.0
 """Density of a blob's middle along a ray, as in the foreground term."""
 BACKGROUND = -0.3
@@ -78,9 +78,9 @@ class Visible(NamedTuple):
     part: Float[Array, "camera blob"]
     """How much of each blob's middle is visible."""
     of_solids: Float[Array, "camera blob"]
-    """The same, but for blobs that reach into it: of two in one place, neither hides the other."""
+    """Likewise, by the size of both instead of `DEPTH_SCALE`: of two in one place, neither hides the other."""
     hider: Int[Array, "camera blob"]
-    """The blob that hides most of it then, which stands for all that do; any where none does."""
+    """The blob that covers most of it by that measure, whose colour stands for all; the first where none does."""
 
 
 class BlobEvidence(NamedTuple):
