@@ -142,14 +142,8 @@ def blob_evidence(
     mean = lambda values: jnp.sum(weights * values, axis=(0, 2)) / whole
     shares = jnp.where(against, 0.0, weights) / jnp.maximum(len(SAMPLES) * areas, 1e-6)[:, :, None]
     light = _light(limbs, colors, own_colors, shares)
-    lit = jnp.clip(colors / light[:, :, None, None], 0.0, 1.0)
-    hiders_light = jnp.take_along_axis(light, visible.hider, axis=1)[:, :, None, None]
-    lit_as_hider = jnp.clip(colors / hiders_light, 0.0, 1.0)
-    against_any = lambda shown, color: own_density(shown, color) - subject_density(shown, subject)
-    as_hider = against_any(lit_as_hider, posed.body.blob_colors[visible.hider][:, :, None])
-    own = own_or_hidden(against_any(lit, own_colors), as_hider, visible.of_solids[:, :, None])
     return BlobEvidence(
-        own=mean(own),
+        own=mean(_own(colors, own_colors, light, visible, subject)),
         contradicted=mean(jnp.where(against, 1.0 - alike, 0.0)),
         seen=whole / (len(SAMPLES) * jnp.sum(areas, axis=0) + 1e-6),
         explained=mean(jnp.where(odds < -CLEARLY, 0.0, alike)),
@@ -197,6 +191,24 @@ def visible_parts(limbs: LimbBlobs, blobs: Sog, seen: Sog, cameras: Camera) -> V
     before = covering * jnp.clip(farther / DEPTH_SCALE + 0.5, 0.0, 1.0)
     outside = covering * jnp.clip((farther / touching[None] - INSIDE) / (1.0 - 2.0 * INSIDE), 0.0, 1.0)
     return Visible(left(before), left(outside), jnp.argmax(outside, axis=1))
+
+
+def _own(
+    colors: Float[Array, "camera blob sample 3"],
+    own_colors: Float[Array, "1 blob 1 3"],
+    light: Float[Array, "camera blob"],
+    visible: Visible,
+    subject: SubjectColors,
+) -> Float[Array, "camera blob sample"]:
+    """Log likelihood of colours as a blob's own, or its hider's, each in its limb's light, against any of a subject."""
+
+    def against_any(light: Float[Array, "camera blob"], own: Float[Array, "*#camera blob 3"]) -> Array:
+        lit = jnp.clip(colors / light[:, :, None, None], 0.0, 1.0)
+        return own_density(lit, own[..., None, :]) - subject_density(lit, subject)
+
+    hiders_light = jnp.take_along_axis(light, visible.hider, axis=1)
+    as_hider = against_any(hiders_light, own_colors[0, :, 0][visible.hider])
+    return own_or_hidden(against_any(light, own_colors[:, :, 0]), as_hider, visible.of_solids[:, :, None])
 
 
 def own_or_hidden(
