@@ -89,6 +89,18 @@ def test_where_somebody_stands_in_the_picture_it_says_nothing():
     assert found.known[:, 290:].all()
 
 
+def test_a_shadow_between_the_legs_of_a_chair_is_nobody_in_the_picture():
+    plate = room()
+    for column in (150, 200):
+        plate[100:190, column : column + 6] = 25
+    plate[94:100, 144:212] = 25
+    scene = plate.copy()
+    scene[100:185, 156:200] = 0.6 * scene[100:185, 156:200]
+    assert fitted_plate(plate, scene).known.all()
+    plate[100:185, 156:200] = (20, 30, 190)
+    assert not fitted_plate(plate, scene).known[110:175, 160:196].any()
+
+
 def test_the_picture_of_another_camera_does_not_fit():
     found = fitted_plate(room(1), scene_with_subject())
     assert not found.fits

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from sogjax.scene.background_difference import channel_max, opened, same_exposure
+from sogjax.scene.background_difference import background_difference, channel_max, opened, same_exposure
 
 
 def median_picture(frames: Sequence[UInt8[np.ndarray, "rows columns 3"]]) -> UInt8[np.ndarray, "rows columns 3"]:
@@ -69,6 +69,9 @@ LEAST_ALIKE = 0.8
 """Share of the picture that must be that of the videos where too few blocks have a pattern to tell."""
 LARGE = 3e-3
 """Share of a picture from which on a difference may be somebody."""
+OF_OTHER_COLOR = 0.3
+"""Share of a difference that no shadow explains, from which on it may be somebody: between the legs of a chair the
+floor lies in the shadow of who sits on it, and its outline is clearer in the light."""
 CLEARER = 1.2
 """How many times as clear the outline of what stands in one picture is, as the same line is in the other one."""
 
@@ -200,10 +203,11 @@ def _only_in(
     square = lambda width: np.ones((width, width), np.uint8)
     edges = [channel_max(cv2.morphologyEx(part, cv2.MORPH_GRADIENT, square(3))) for part in (plate, scene)]
     count, labels = cv2.connectedComponents(opened(off > GROWN, 3).astype(np.uint8))
+    different = background_difference(scene, plate).different
     found = np.zeros(off.shape, bool)
     for number in range(1, count):
         part = labels == number
-        if part.mean() < LARGE or off[part].max() < DIFFERENT:
+        if part.mean() < LARGE or off[part].max() < DIFFERENT or different[part].mean() < OF_OTHER_COLOR:
             continue
         wide = cv2.dilate(part.astype(np.uint8), square(5)) > 0
         outline = wide & ~(cv2.erode(part.astype(np.uint8), square(3)) > 0)
