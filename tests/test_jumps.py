@@ -51,6 +51,16 @@ def test_what_moves_steadily_or_is_only_begun_does_not_jump():
     assert steps(np.ones((3, 5, 3))).shape == (3, 5)
 
 
+def test_who_throws_keeps_the_pace_and_who_jumps_does_not():
+    """A hand that is thrown forward goes on, fast; one that was lost, and is found, stands before and after."""
+    pace = np.array([0.03, 0.02, 0.03, 0.02, 0.16, 0.44, 0.40, 0.27, 0.11, 0.08, 0.06, 0.02])
+    thrown, lost = (np.cumsum(np.append(0.0, moved))[:, None] * [1.0, 0.0, 0.0] for moved in (pace, pace > 0.43))
+    assert steps(thrown).max() < 0.5 * largest_step(FPS)
+    assert steps(lost).max() == pytest.approx(1.0)
+    back = np.where(np.arange(12)[:, None] == 5, [0.25, 0.0, 0.0], 0.0)
+    assert steps(back).max() == pytest.approx(0.375)  # there and back at once is no pace that is kept
+
+
 def test_jumps_are_named_with_their_frames():
     assert jumps(BODY, standing_still()) == []
     wrong = standing_still(raised=range(10, 24))

@@ -12,6 +12,8 @@ from sogjax.quality.metrics import stretches
 
 FAR, FPS = 0.2, 25.0
 """Metres of a jump, and the frames a second from which on nobody does so: arms that throw or hit are within 0.15."""
+IN_PACE = 0.25
+"""Part of a blob's pace by which that may change from frame to frame: who throws is fast over several frames."""
 NEAR = 0.6
 """Part of the `FAR` from which on a jump is worth a search."""
 
@@ -24,15 +26,25 @@ def largest_step(fps: float) -> float:
 def steps(means: Float[np.ndarray, "frame *blob 3"]) -> Float[np.ndarray, "frame *blob"]:
     """How far each blob jumps behind each frame, in metres, beyond how it moves before and after; 0 behind the last.
 
-    Beside a single jump half of it is seen. The clip goes on at its ends as it moves there.
+    Beside a single jump half of it is seen. The clip goes on at its ends as it moves there. Less is left where a blob
+    keeps its pace before or after.
     """
     if len(means) < 4:
         return np.zeros(means.shape[:-1])
     first, last = means[:1] - means[2:3] + means[1:2], means[-1:] + means[-2:-1] - means[-3:-2]
     path = np.concatenate([first, means, last])
     bend = path[1:-1] - 0.5 * (path[2:] + path[:-2])
-    found = np.linalg.norm(np.diff(bend, axis=0), axis=-1)
-    return np.concatenate([found, np.zeros_like(found[:1])])
+    found = np.linalg.norm(np.diff(bend, axis=0), axis=-1) - IN_PACE * _pace_kept(path)[1:-1]
+    return np.concatenate([np.maximum(found, 0.0), np.zeros_like(found[:1])])
+
+
+def _pace_kept(path: Float[np.ndarray, "frame *blob 3"]) -> Float[np.ndarray, "step *blob"]:
+    """How far each step goes on in the step before or after it, metres; 0 where it turns back."""
+    move = np.diff(path, axis=0)
+    along = move / np.maximum(np.linalg.norm(move, axis=-1, keepdims=True), 1e-9)
+    beside = np.pad(move, [(1, 1), *[(0, 0)] * (move.ndim - 1)])
+    on = [np.sum(along * other, axis=-1) for other in (beside[:-2], beside[2:])]
+    return np.maximum(np.maximum(*on), 0.0)
 
 
 def limb_jumps(
