@@ -6,12 +6,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from motion_cases import walking_motion
+from run_cases import DOG, stand_in_passes, tiny_run
 
 from sogjax.errors import InputError
 from sogjax.quality.verdict import verdicts
-from sogjax.run import clip_search
+from sogjax.run import clip_search, judge
+from sogjax.run.actors import Actors
 from sogjax.run.clip_search import ClipSearch, Guess, best_guess, likeliest, nobody_there
 from sogjax.run.initial_pose import InitialPose
+from sogjax.run.runner import run_passes
 from sogjax.search.found_pose import TRUNK, FoundPose
 from sogjax.search.pose_search import unreported
 
@@ -124,3 +127,11 @@ def test_a_doubtful_begin_is_told_only_where_the_motion_is_doubtful_too():
     judge = lambda found: verdicts({"anna": found}, {"anna": 0.75}, begun=said)["anna"]
     assert judge(good).looks_right
     assert said["anna"] in judge(replace(good, explained=np.full(motion.num_frames, 0.1))).findings
+
+
+@pytest.mark.parametrize(("likely", "told"), [(0.06, True), (0.5, False), (1.0, False)])
+def test_a_begin_that_is_hardly_likely_is_told_whatever_the_motion_looks_like(likely, told):
+    begun = InitialPose(18, np.zeros(DOG.skeleton.num_dofs, np.float32), "search", np.array([likely]))
+    run = run_passes(tiny_run(actors=Actors((DOG,)), initial_pose=begun), stand_in_passes())
+    said = judge.judged_result(run).verdicts["dog"].findings
+    assert ("the initial pose was not sure (6%): look at frame 18" in said) == told

@@ -26,6 +26,10 @@ from sogjax.run.run_files import PAGE, WORST
 from sogjax.run.terminal import say
 from sogjax.search.pose_confidence import SURE
 
+HARDLY = 0.1
+"""Confidence of an initial pose below which that is told whatever the motion looks like: it was wrong for one of the
+actors in all of the first five such runs."""
+
 
 def judged_result(run: Run) -> RunResult:
     """The result of a run, with the comparison with a truth, if there is one, and with what the run thinks of it."""
@@ -33,14 +37,15 @@ def judged_result(run: Run) -> RunResult:
     limits = {body.name: limits_of(body) for body in result.bodies}
     doubts = dict(zip((body.name for body in run.actors.bodies), run.actors.doubts, strict=False))
     sides = _sides(run, result)
-    told = lambda body: (doubts.get(body.name), odd_sentence(body), sides.get(body.name))
+    hardly, begun = _doubtful_begin(run)
+    told = lambda body: (doubts.get(body.name), odd_sentence(body), sides.get(body.name), hardly.get(body.name))
     odd = {body.name: [said for said in told(body) if said] for body in result.bodies}
     moved = {body.name: (body, result.motions[body.name]) for body in result.bodies}
     limbs = {name: [*jumps(*of_body), *passages(*of_body)] for name, of_body in moved.items()}
     return replace(
         result,
         evaluation=compared(result.recording, result.motions),
-        verdicts=verdicts(result.motions, expected_of(result.bodies), limits, _doubtful_begin(run), odd, limbs),
+        verdicts=verdicts(result.motions, expected_of(result.bodies), limits, begun, odd, limbs),
     )
 
 
@@ -61,17 +66,19 @@ def _sides(run: Run, result: RunResult) -> dict[str, str | None]:
     return {name: unlike_where_tracked(of_actor) for name, of_actor in apart.items()}
 
 
-def _doubtful_begin(run: Run) -> dict[str, str]:
-    """What is said of each actor whose initial pose was not sure."""
+def _doubtful_begin(run: Run) -> tuple[dict[str, str], dict[str, str]]:
+    """What is said of each actor whose initial pose was hardly likely, and of others for whom it was not sure."""
     start = run.initial_pose if run.tracks else None
     if start is None or start.confidence is None:
-        return {}
-    names = [body.name for body in run.actors.bodies]
-    return {
-        name: f"the initial pose was not sure ({likely:.0%}): look at frame {start.frame}"
-        for name, likely in zip(names, start.confidence.tolist(), strict=True)
-        if likely < SURE
+        return {}, {}
+    names, likely = [body.name for body in run.actors.bodies], start.confidence.tolist()
+    sentence = "the initial pose was not sure ({:.0%}): look at frame {}"
+    said = lambda low, high: {
+        name: sentence.format(share, start.frame)
+        for name, share in zip(names, likely, strict=True)
+        if low <= share < high
     }
+    return said(0.0, HARDLY), said(HARDLY, SURE)
 
 
 def compared(recording: Recording, motions: Mapping[str, Motion]) -> GroupEvaluation | None:
