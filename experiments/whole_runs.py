@@ -168,8 +168,12 @@ def _read(path: Path) -> dict:
     return json.loads(path.read_text(encoding="utf-8"))
 
 
-def _run(row: str, frames: int, folder: Path) -> dict:
-    """Render, track and compare; what was found is kept in the folder."""
+def linked_recording(row: str, frames: int, folder: Path) -> tuple[Path, Path]:
+    """The recording of a row, with what is given beside its videos, and the whole one that was rendered.
+
+    Raises:
+        InputError: the row is none.
+    """
     try:
         motion, actors, cameras, given, seed, *more = row.split()
         chosen = dict(pair.split("=") for pair in more)
@@ -178,13 +182,21 @@ def _run(row: str, frames: int, folder: Path) -> dict:
     except (ValueError, KeyError) as error:
         raise InputError(f"rows: {row}: write MOTION PEOPLE CAMERAS {'|'.join(GIVEN)} SEED [SETTING=VALUE]") from error
     rendered = cached_recording(synth_settings({"motion": motion, **numbers, **chosen}))
-    recording, results = folder / "recording", folder / "results"
+    recording = folder / "recording"
     recording.mkdir(parents=True, exist_ok=True)
     for file in (VIDEOS, CALIBRATION, *files):
         path = file.of(recording)
         if not path.is_symlink():
             path.symlink_to(file.of(rendered), file.is_folder)
-    people = (f"actors={actors}",) if given == "videos" and numbers["actors"] > 1 else ()
+    return recording, rendered
+
+
+def _run(row: str, frames: int, folder: Path) -> dict:
+    """Render, track and compare; what was found is kept in the folder."""
+    recording, rendered = linked_recording(row, frames, folder)
+    actors, given = row.split()[1], row.split()[3]
+    people = (f"actors={actors}",) if given == "videos" and int(actors) > 1 else ()
+    results = folder / "results"
     command = [sys.executable, "-m", "sogjax", "track", f"recording={recording}", f"out={results}", *LEAN, *people]
     unkept = os.environ | {VARIABLE: OFF}  # a background of an earlier program is none of this one's
     ran = subprocess.run(command, capture_output=True, text=True, check=False, env=unkept)

@@ -20,7 +20,7 @@ from sogjax.scene.background_difference import (
     without_holes,
     working_size,
 )
-from sogjax.scene.subject_colors import Scene, subject_colors
+from sogjax.scene.subject_colors import Decided, Scene, decided_together
 from sogjax.scene.visual_hull import LOW_VOXELS, MANY, VoxelPixels, cube_around, resized, voxel_pixels, without_floor
 
 LARGEST_SHARE = 0.5
@@ -45,7 +45,8 @@ class FoundMasks(NamedTuple):
     masks: dict[int, Mask]
     """A camera is absent if no subject could be told apart from its background."""
     by_colors: dict[int, Mask]
-    """Where the background is unknown and all cameras, or all but one of many, allow the subject: colours alone tell.
+    """Where the background is unknown, all cameras, or all but one of many, allow the subject, and their colours do not
+    speak against it.
 
     Empty if what they allow does not meet."""
 
@@ -80,7 +81,8 @@ def masks_from_backgrounds(
     compare = lambda k: background_difference(images[k], backgrounds[k], (unknown or {}).get(k), k in learnt)
     compared = dict(zip(backgrounds, in_threads(compare, backgrounds), strict=True))
     given = {k: (cv2.resize(images[k], working_size(*mask.shape[::-1])), mask) for k, mask in known.items()}
-    differences = _decided(compared, calm or {}, given, cameras, up) if decide else compared
+    decided = _decided(compared, calm or {}, given, cameras, up) if decide else {}
+    differences = {**compared} | {k: _with_subject(compared[k], told) for k, told in decided.items()}
     guesses = {camera: first_guess(difference) for camera, difference in differences.items()}
     guesses = {camera: guess for camera, guess in guesses.items() if is_subject(guess)}
     possible = {c: compared[c].open | guess for c, guess in guesses.items()}
@@ -91,7 +93,8 @@ def masks_from_backgrounds(
     cut = lambda c: told(c, cut_out(differences[c], guesses[c], hull.get(c) if decide else None))
     cuts = in_threads(cut, guesses)
     sized = {camera: _enlarged(mask, images[camera]) for camera, mask in zip(guesses, cuts, strict=True)}
-    by_colors = {c: _enlarged(mask & compared[c].unknown, images[c]) for c, mask in hull.items()}
+    possible = {k: decided[k].possible if k in decided else compared[k].unknown for k in hull}
+    by_colors = {c: _enlarged(mask & possible[c], images[c]) for c, mask in hull.items()}
     return FoundMasks({camera: mask for camera, mask in sized.items() if is_subject(mask)}, by_colors)
 
 
@@ -107,15 +110,15 @@ def _decided(
     given: Mapping[int, tuple[UInt8[np.ndarray, "_h _w 3"], Mask]],
     cameras: Mapping[int, Camera],
     up: Float[np.ndarray, "3"],
-) -> dict[int, Difference]:
-    """The differences, in which colours tell the subject from the room where that is unknown.
+) -> dict[int, Decided]:
+    """What colours tell of the cameras for which something is unknown; nothing where they tell nothing.
 
     `given` are pictures and masks of other cameras.
     """
     guesses = {k: first_guess(difference) for k, difference in differences.items()}
     unsure = [k for k, difference in differences.items() if difference.unknown.any()]
     if not unsure:
-        return {**differences}
+        return {}
     masks = guesses | {k: reduced_mask(mask) for k, (_, mask) in given.items()}
     nothing = {k: np.zeros_like(mask) for k, mask in masks.items()}
     scene = Scene(
@@ -125,23 +128,21 @@ def _decided(
         nothing | {k: reduced_mask(calm[k]) for k in guesses if k in calm},
     )
     small = {k: resized(cameras[k], mask.shape[::-1]) for k, mask in masks.items()}
-    if (colors := subject_colors([scene], small, up)) is None:
-        return {**differences}
-    told = lambda k: colors.decided(k, scene)
-    return {**differences} | {k: _with_subject(differences[k], *told(k)) for k in unsure}
+    told = decided_together(scene, small, up)
+    return {} if told is None else {k: told[k] for k in unsure}
 
 
-def _with_subject(difference: Difference, subject: Mask, untold: Mask) -> Difference:
+def _with_subject(difference: Difference, told: Decided) -> Difference:
     """The difference, in which the subject is different, and less is unknown."""
-    decided = difference.unknown & ~untold
-    told = lambda before: np.where(decided, np.where(subject, 2.0 * CERTAIN, 0.0), before)
+    decided = difference.unknown & ~told.untold
+    put = lambda before: np.where(decided, np.where(told.subject, 2.0 * CERTAIN, 0.0), before)
     return replace(
         difference,
-        change=told(difference.change),
-        unexplained=told(difference.unexplained),
-        changed=np.where(decided, subject, difference.changed),
-        different=difference.different | subject,
-        unknown=untold,
+        change=put(difference.change),
+        unexplained=put(difference.unexplained),
+        changed=np.where(decided, told.subject, difference.changed),
+        different=difference.different | told.subject,
+        unknown=told.untold,
     )
 
 

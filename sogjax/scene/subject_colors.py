@@ -6,6 +6,7 @@ all backgrounds is somebody, what a camera also shows beside him is the room.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -14,7 +15,7 @@ from scipy.ndimage import gaussian_filter
 
 from sogjax.model.camera import Camera
 from sogjax.scene.background_difference import widened
-from sogjax.scene.visual_hull import MANY, SIDE, Cube, VoxelPixels, cube_around, voxel_pixels, without_floor
+from sogjax.scene.visual_hull import MANY, SIDE, VOXELS, Cube, VoxelPixels, cube_around, voxel_pixels, without_floor
 
 COLOR_BINS = 24
 """Bins of each channel: brown hair is not a brown floor."""
@@ -27,12 +28,16 @@ NEAR = 0.12
 subject is likely to look the same."""
 PIXELS = 1.0
 """Standard deviation in pixels over which colours are told together."""
-DECISIVE = 0.5
-"""Logarithm of odds from which on a camera says that a place is the subject's, or the room's."""
-LEAST = 0.1
-"""The same, where a camera alone decides: what is not like the room is the subject if the others show its colours."""
-MOST = 0.85
-"""Share of the cameras that say anything of a place where nothing is known that must say it is the subject's."""
+LEAST, DECISIVE = 0.1, 0.5
+"""Logarithms of odds from which on a camera alone says that a pixel is the subject's, or the room's: what is not like
+the room is the subject if the others show its colours."""
+LEAST_SAID, MOST_SAID, MEAN_SAID = -2.0, 0.7, 0.25
+"""Logarithms of odds: least and most that one camera says for a place, and what all must say on average. What looks
+like the subject to few cameras is a box of his colours; a single one that sees the wall in him does not cut him."""
+CLEARLY = 1.5
+"""Logarithm of odds from which on a pixel is the room's all the same: one in fifty of the subject is so like a room."""
+VOTED = 0.7
+"""Standard deviation in voxels over which places are told together: shirts have patterns."""
 OWN = 0.1
 """A colour that the other cameras show this many times as often as a camera where it does not know its room, or less,
 is not the subject's: it is of something that stands in front of that camera alone."""
@@ -43,6 +48,7 @@ NONE = np.zeros(COLOR_BINS**3)
 Counts = Float[np.ndarray, "bin"]
 Mask = Bool[np.ndarray, "_h _w"]
 Picture = UInt8[np.ndarray, "_h _w 3"]
+Voxels = Bool[np.ndarray, "voxel"]
 
 
 @dataclass(frozen=True)
@@ -64,26 +70,45 @@ class Scene:
 
 @dataclass(frozen=True)
 class SubjectColors:
-    """Logarithm of how much likelier each colour is of the subject than of the room, by camera."""
+    """Logarithm of how much likelier each colour is of the subject, by camera."""
 
     odds: Mapping[int, Float[np.ndarray, "bin"]]
+    """Than of the room, or of what stands in front of that camera."""
+    beside_room: Mapping[int, Float[np.ndarray, "bin"]]
+    """Than of the room: what stands in front tells nothing of the places behind it."""
 
-    def decided(self, camera: int, scene: Scene) -> tuple[Mask, Mask]:
-        """Where colours say that what is unknown is the subject, and where they do not tell.
-
-        A camera that is absent tells nothing.
-        """
+    def decided(self, camera: int, scene: Scene) -> "Decided":
+        """What the colours of one camera alone say; nothing where it is absent."""
         unknown, moving = scene.unknown[camera], scene.moving(camera)
         if camera not in self.odds:
-            return np.zeros_like(unknown), unknown
+            return Decided(np.zeros_like(unknown), unknown, unknown)
         odds = self.told(camera, scene.pictures[camera])
         subject = moving & (odds > LEAST)
-        return subject, unknown & ~subject & ~(moving & (odds <= -DECISIVE))
+        return Decided(subject, unknown & ~subject & ~(moving & (odds <= -DECISIVE)), unknown)
 
     def told(self, camera: int, picture: Picture) -> Float[np.ndarray, "_h _w"]:
         """The logarithm of the odds that a pixel shows the subject, from its colour and its neighbours'."""
-        each = self.odds[camera][_bins(picture)].astype(np.float32)
+        return self._told(self.odds[camera], picture)
+
+    def told_of_places(self, camera: int, picture: Picture) -> Float[np.ndarray, "_h _w"]:
+        """The same against the room alone."""
+        return self._told(self.beside_room[camera], picture)
+
+    @staticmethod
+    def _told(table: Float[np.ndarray, "bin"], picture: Picture) -> Float[np.ndarray, "_h _w"]:
+        each = table[_bins(picture)].astype(np.float32)
         return cv2.GaussianBlur(np.clip(each, -3.0, 3.0), (0, 0), PIXELS)
+
+
+class Decided(NamedTuple):
+    """What colours say of one camera's picture, where the background is unknown."""
+
+    subject: Mask
+    """What is the subject."""
+    untold: Mask
+    """What may be either."""
+    possible: Mask
+    """Where all cameras together do not speak against somebody, whatever this one sees."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +117,7 @@ class _Space:
 
     scene: Scene
     pixels: Mapping[int, VoxelPixels]
-    open: Bool[np.ndarray, "voxel"]
+    open: Voxels
     """What no camera rules out."""
 
 
@@ -103,22 +128,65 @@ def subject_colors(
 
     A camera that shows nothing of the room beside them is absent. The cameras are those of pictures of the masks' size.
     """
-    spaces = [space for scene in scenes if (space := _space(scene, cameras, up)) is not None]
+    found = _learnt([space for scene in scenes if (space := _space(scene, cameras, up)) is not None], cameras)
+    return None if found is None else found[0]
+
+
+def decided_together(
+    scene: Scene, cameras: Mapping[int, Camera], up: Float[np.ndarray, "3"]
+) -> dict[int, Decided] | None:
+    """What colours say of one moment, by camera; None where cameras do not show anybody together.
+
+    A shirt that looks like the wall behind it to one camera, and a box that looks like a shirt, are told by the others,
+    if there are many.
+    """
+    space = _space(scene, cameras, up)
+    found = None if space is None else _learnt([space], cameras)
+    if space is None or found is None:
+        return None
+    colors, (body,) = found
+    decided = {k: colors.decided(k, scene) for k in scene.unknown}
+    if len(space.pixels) < MANY:
+        return decided
+    maybe = _body(space, colors, 0.0)
+    told = [k for k in decided if k in colors.odds and k in space.pixels]
+    return decided | {k: _with_others(decided[k], k, space, colors, (body, maybe)) for k in told}
+
+
+def _with_others(
+    alone: Decided, camera: int, space: _Space, colors: SubjectColors, bodies: tuple[Voxels, Voxels]
+) -> Decided:
+    """What a camera alone says beside where somebody is, and may be, by all together.
+
+    Less than a voxel beside somebody, and where it clearly sees the room in him, the camera decides.
+    """
+    pixels, scene = space.pixels[camera], space.scene
+    inside, possible = (pixels.silhouette_of(body) for body in bodies)
+    like_room = colors.told(camera, scene.pictures[camera]) < -CLEARLY
+    beside = widened(inside, pixels.footprint) & alone.subject
+    subject = scene.moving(camera) & ((inside & ~like_room) | beside)
+    return Decided(subject, alone.untold & ~subject, scene.unknown[camera] & widened(possible, pixels.footprint // 2))
+
+
+def _learnt(spaces: Sequence[_Space], cameras: Mapping[int, Camera]) -> tuple[SubjectColors, list[Voxels]] | None:
+    """The colours, and where the subject is in each moment by them; None where no room is seen beside him."""
     rooms = {k: sum((_beside(space, k) for space in spaces if k in space.pixels), NONE) for k in cameras}
     room = {k: counts for k, counts in rooms.items() if counts.any()}
     if not room:
         return None
     certain = sum((_in_masks(space) for space in spaces), NONE)
-    bodies, found = [space.open for space in spaces], SubjectColors({})
+    bodies, found = [space.open for space in spaces], SubjectColors({}, {})
     for _ in range(ROUNDS):
         both = list(zip(spaces, bodies, strict=True))
         mixed = {k: sum((_covered(*each, k) for each in both if k in each[0].pixels), NONE) for k in room}
         left = {k: _unmixed(mixed[k], room[k]) for k in room}
         every = sum(left.values(), certain)
+        own = {k: _density(every - left[k]) for k in room}
         other = {k: np.maximum(_density(room[k]), OWN * _density(left[k])) for k in room}
-        found = SubjectColors({k: np.log(_density(every - left[k]) / other[k]) for k in room})
+        odds = {k: np.log(own[k] / other[k]) for k in room}
+        found = SubjectColors(odds, {k: np.log(own[k] / _density(room[k])) for k in room})
         bodies = [_body(space, found) for space in spaces]
-    return found
+    return found, bodies
 
 
 def _space(scene: Scene, cameras: Mapping[int, Camera], up: Float[np.ndarray, "3"]) -> _Space | None:
@@ -169,20 +237,21 @@ def _in_masks(space: _Space) -> Counts:
     return sum((_counts(space.scene.pictures[k], space.scene.masks[k]) for k in space.pixels), NONE)
 
 
-def _covered(space: _Space, body: Bool[np.ndarray, "voxel"], camera: int) -> Counts:
+def _covered(space: _Space, body: Voxels, camera: int) -> Counts:
     """The colours where somebody is seen before what is unknown, if he is a `body`."""
     moving = space.scene.moving(camera)
     return _counts(space.scene.pictures[camera], moving & space.pixels[camera].silhouette_of(body))
 
 
-def _body(space: _Space, colors: SubjectColors) -> Bool[np.ndarray, "voxel"]:
-    """The places that most cameras with an opinion give to the subject."""
-    told = dict.fromkeys((True, False), np.zeros(len(space.open), int))
+def _body(space: _Space, colors: SubjectColors, least: float = MEAN_SAID) -> Voxels:
+    """The places of which all cameras together say more than this, on average, for the subject."""
+    said = np.zeros(len(space.open), np.float32)
     for k, pixels in ((k, space.pixels[k]) for k in space.pixels if k in colors.odds):
-        odds, unknown = colors.told(k, space.scene.pictures[k]), space.scene.moving(k)
-        told[True] = told[True] + pixels.shows(unknown & (odds > DECISIVE))
-        told[False] = told[False] + pixels.shows(unknown & (odds < -DECISIVE))
-    return space.open & (told[True] >= MOST * (told[True] + told[False]))
+        odds, unknown = colors.told_of_places(k, space.scene.pictures[k]), space.scene.moving(k)
+        shown = np.where(unknown, np.clip(odds, LEAST_SAID, MOST_SAID), np.where(space.scene.masks[k], MOST_SAID, 0.0))
+        said += np.where(pixels.inside, shown[pixels.rows, pixels.columns], 0.0).astype(np.float32)
+    agreed = gaussian_filter(said.reshape(3 * (VOXELS,)), VOTED).ravel() > least * len(space.pixels)
+    return space.open & agreed
 
 
 def _bins(picture: Picture) -> Int[np.ndarray, "_h _w"]:
