@@ -12,7 +12,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, UInt8
+from jaxtyping import Bool, Int, UInt8
 from whole_runs import Settings as Runs
 from whole_runs import linked_recording
 
@@ -67,21 +67,21 @@ def _of_row(row: str, frames: list[int], folder: Path) -> tuple[float, float, fl
         images = {k: picture for k, picture in enumerate(pictures) if picture is not None}
         example = ExamplePose(f"frame_{frame}", None, {}, {}, None, frame).of_everybody(names)
         found = example_masks(recording, example, images, learnt)
-        for k, mask in (found.masks | found.left_out).items():
-            counts += _counts(images[k], empty[k], mask, learnt[k].known)
+        masks = found.masks | found.left_out
+        for k, image in images.items():
+            counts += _counts(image, empty[k], masks.get(k, np.zeros(image.shape[:2], bool)), learnt[k].known)
     people, before, missed, room = counts
     return before / people, missed / before, room / before
 
 
 def _counts(
     image: UInt8[np.ndarray, "_h _w 3"], empty: UInt8[np.ndarray, "_h _w 3"], mask: Mask, known: Mask
-) -> tuple[int, int, int, int]:
+) -> Int[np.ndarray, "4"]:
     """Pixels of people; of these before what is unknown; missed there; and of the room that is in the mask there."""
     people, shown = first_guess(background_difference(image, empty)), reduced_mask(mask)
     unknown = cv2.resize(known.astype(np.uint8), people.shape[::-1], interpolation=cv2.INTER_NEAREST) == 0
-    counts = (people, people & unknown, people & ~shown & unknown, shown & ~people & unknown)
-    first, *others = (int(part.sum()) for part in counts)
-    return first, others[0], others[1], others[2]
+    counted = (people, people & unknown, people & ~shown & unknown, shown & ~people & unknown)
+    return np.array([part.sum() for part in counted])
 
 
 if __name__ == "__main__":

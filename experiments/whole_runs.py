@@ -194,7 +194,7 @@ def linked_recording(row: str, frames: int, folder: Path) -> tuple[Path, Path]:
 def _run(row: str, frames: int, folder: Path) -> dict:
     """Render, track and compare; what was found is kept in the folder."""
     recording, rendered = linked_recording(row, frames, folder)
-    actors, given = row.split()[1], row.split()[3]
+    _, actors, _, given, *_ = row.split()
     people = (f"actors={actors}",) if given == "videos" and int(actors) > 1 else ()
     results = folder / "results"
     command = [sys.executable, "-m", "sogjax", "track", f"recording={recording}", f"out={results}", *LEAN, *people]

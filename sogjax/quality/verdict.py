@@ -90,7 +90,8 @@ def verdicts(
 
     `expected` is what actors explain in their example poses, where that is known; `limits` are those of their bodies
     (`limits_of`); `begun` says of actors that their initial pose was not sure, which counts where there is more; `odd`
-    says what is odd or doubtful about bodies, `limbs` where they jump (`jumps`) or are in each other (`passages`).
+    says what is odd or doubtful about bodies, and of initial poses that were hardly likely; `limbs` where they jump
+    (`jumps`) or are in each other (`passages`).
     """
     limits, begun, odd, limbs = limits or {}, begun or {}, odd or {}, limbs or {}
     return {

@@ -72,13 +72,12 @@ class SampledMasks:
         colors = subject_colors(scenes[:: max(-(-len(scenes) // LEARNT_FROM), 1)], self.cameras, up)
         if colors is None:
             return self
-        told = lambda scene: {k: colors.decided(k, scene) for k in scene.masks}
-        decided = in_threads(told, scenes)
+        decided = in_threads(lambda scene: {k: colors.decided(k, scene) for k in scene.masks}, scenes)
         masks = [
-            {k: _joined(mask | subject[k][0], self.unknown[k]) for k, mask in scene.masks.items()}
-            for scene, subject in zip(scenes, decided, strict=True)
+            {k: _joined(mask | told[k].subject, self.unknown[k]) for k, mask in scene.masks.items()}
+            for scene, told in zip(scenes, decided, strict=True)
         ]
-        untold = {k: np.mean([of_frame[k][1] for of_frame in decided], axis=0) > 0.5 for k in self.unknown}
+        untold = {k: np.mean([of_frame[k].untold for of_frame in decided], axis=0) > 0.5 for k in self.unknown}
         return replace(self, masks=masks, unknown=untold)
 
 

@@ -45,8 +45,8 @@ class FoundMasks(NamedTuple):
     masks: dict[int, Mask]
     """A camera is absent if no subject could be told apart from its background."""
     by_colors: dict[int, Mask]
-    """Where the background is unknown, all cameras, or all but one of many, allow the subject, and their colours do not
-    speak against it.
+    """Where the background is unknown, all cameras, or all but one of many, allow the subject, and the colours of many
+    do not speak against it.
 
     Empty if what they allow does not meet."""
 
@@ -82,7 +82,7 @@ def masks_from_backgrounds(
     compared = dict(zip(backgrounds, in_threads(compare, backgrounds), strict=True))
     given = {k: (cv2.resize(images[k], working_size(*mask.shape[::-1])), mask) for k, mask in known.items()}
     decided = _decided(compared, calm or {}, given, cameras, up) if decide else {}
-    differences = {**compared} | {k: _with_subject(compared[k], told) for k, told in decided.items()}
+    differences = compared | {k: _with_subject(compared[k], told) for k, told in decided.items()}
     guesses = {camera: first_guess(difference) for camera, difference in differences.items()}
     guesses = {camera: guess for camera, guess in guesses.items() if is_subject(guess)}
     possible = {c: compared[c].open | guess for c, guess in guesses.items()}

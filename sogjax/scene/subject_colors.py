@@ -31,11 +31,13 @@ PIXELS = 1.0
 LEAST, DECISIVE = 0.1, 0.5
 """Logarithms of odds from which on a camera alone says that a pixel is the subject's, or the room's: what is not like
 the room is the subject if the others show its colours."""
-LEAST_SAID, MOST_SAID, MEAN_SAID = -2.0, 0.7, 0.25
-"""Logarithms of odds: least and most that one camera says for a place, and what all must say on average. What looks
-like the subject to few cameras is a box of his colours; a single one that sees the wall in him does not cut him."""
+UNLIKELY, LIKELY, MEAN = 2.0, 0.7, 0.3
+"""Most that a camera says against a place and for it (logarithms of odds), and what those that tell of it must say on
+average. What looks like the subject to few is a box of his colours; of seven, one that clearly sees the wall in him
+does not cut him."""
 CLEARLY = 1.5
-"""Logarithm of odds from which on a pixel is the room's all the same: one in fifty of the subject is so like a room."""
+"""Logarithm of odds from which on a pixel is the room's, whatever other cameras say: of people who talk in
+`experiments/masks.py` one pixel in fifty looks so like it."""
 VOTED = 0.7
 """Standard deviation in voxels over which places are told together: shirts have patterns."""
 OWN = 0.1
@@ -73,9 +75,9 @@ class SubjectColors:
     """Logarithm of how much likelier each colour is of the subject, by camera."""
 
     odds: Mapping[int, Float[np.ndarray, "bin"]]
-    """Than of the room, or of what stands in front of that camera."""
+    """Beside the room, and what stands in front of that camera."""
     beside_room: Mapping[int, Float[np.ndarray, "bin"]]
-    """Than of the room: what stands in front tells nothing of the places behind it."""
+    """Beside the room alone: what stands in front tells nothing of the places behind it."""
 
     def decided(self, camera: int, scene: Scene) -> "Decided":
         """What the colours of one camera alone say; nothing where it is absent."""
@@ -91,7 +93,7 @@ class SubjectColors:
         return self._told(self.odds[camera], picture)
 
     def told_of_places(self, camera: int, picture: Picture) -> Float[np.ndarray, "_h _w"]:
-        """The same against the room alone."""
+        """The logarithm of the odds against the room alone, as `told` otherwise."""
         return self._told(self.beside_room[camera], picture)
 
     @staticmethod
@@ -108,7 +110,7 @@ class Decided(NamedTuple):
     untold: Mask
     """What may be either."""
     possible: Mask
-    """Where all cameras together do not speak against somebody, whatever this one sees."""
+    """Where all cameras together, if these are many, do not speak against somebody, whatever this one sees."""
 
 
 @dataclass(frozen=True)
@@ -146,7 +148,7 @@ def decided_together(
         return None
     colors, (body,) = found
     decided = {k: colors.decided(k, scene) for k in scene.unknown}
-    if len(space.pixels) < MANY:
+    if len(space.pixels) < MANY or not body.any():
         return decided
     maybe = _body(space, colors, 0.0)
     told = [k for k in decided if k in colors.odds and k in space.pixels]
@@ -156,16 +158,18 @@ def decided_together(
 def _with_others(
     alone: Decided, camera: int, space: _Space, colors: SubjectColors, bodies: tuple[Voxels, Voxels]
 ) -> Decided:
-    """What a camera alone says beside where somebody is, and may be, by all together.
+    """What a camera alone says, corrected by where somebody is, and may be, by all together.
 
-    Less than a voxel beside somebody, and where it clearly sees the room in him, the camera decides.
+    It decides outside of the space that is looked at, at most a voxel beside somebody, and where it clearly sees the
+    room in him.
     """
     pixels, scene = space.pixels[camera], space.scene
-    inside, possible = (pixels.silhouette_of(body) for body in bodies)
+    inside, possible, looked_at = (pixels.silhouette_of(each) for each in (*bodies, np.ones_like(space.open)))
     like_room = colors.told(camera, scene.pictures[camera]) < -CLEARLY
-    beside = widened(inside, pixels.footprint) & alone.subject
-    subject = scene.moving(camera) & ((inside & ~like_room) | beside)
-    return Decided(subject, alone.untold & ~subject, scene.unknown[camera] & widened(possible, pixels.footprint // 2))
+    own = alone.subject & (widened(inside, pixels.footprint) | ~looked_at)
+    subject = own | (scene.moving(camera) & inside & ~like_room)
+    maybe = widened(possible, pixels.footprint // 2) | ~looked_at
+    return Decided(subject, alone.untold & ~subject, scene.unknown[camera] & maybe)
 
 
 def _learnt(spaces: Sequence[_Space], cameras: Mapping[int, Camera]) -> tuple[SubjectColors, list[Voxels]] | None:
@@ -243,15 +247,17 @@ def _covered(space: _Space, body: Voxels, camera: int) -> Counts:
     return _counts(space.scene.pictures[camera], moving & space.pixels[camera].silhouette_of(body))
 
 
-def _body(space: _Space, colors: SubjectColors, least: float = MEAN_SAID) -> Voxels:
-    """The places of which all cameras together say more than this, on average, for the subject."""
-    said = np.zeros(len(space.open), np.float32)
+def _body(space: _Space, colors: SubjectColors, least: float = MEAN) -> Voxels:
+    """The places of which the cameras that tell of them say this, on average, for the subject, or more."""
+    said, telling = np.zeros((2, len(space.open)), np.float32)
     for k, pixels in ((k, space.pixels[k]) for k in space.pixels if k in colors.odds):
         odds, unknown = colors.told_of_places(k, space.scene.pictures[k]), space.scene.moving(k)
-        shown = np.where(unknown, np.clip(odds, LEAST_SAID, MOST_SAID), np.where(space.scene.masks[k], MOST_SAID, 0.0))
-        said += np.where(pixels.inside, shown[pixels.rows, pixels.columns], 0.0).astype(np.float32)
-    agreed = gaussian_filter(said.reshape(3 * (VOXELS,)), VOTED).ravel() > least * len(space.pixels)
-    return space.open & agreed
+        shown = np.where(unknown, np.clip(odds, -UNLIKELY, LIKELY), np.where(space.scene.masks[k], LIKELY, 0.0))
+        told = pixels.shows(unknown | space.scene.masks[k])
+        said += np.where(told, shown[pixels.rows, pixels.columns], 0.0).astype(np.float32)
+        telling += told
+    around = lambda values: gaussian_filter(values.reshape(3 * (VOXELS,)), VOTED).ravel()
+    return space.open & (around(said - least * telling) >= 0.0)
 
 
 def _bins(picture: Picture) -> Int[np.ndarray, "_h _w"]:
