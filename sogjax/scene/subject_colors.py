@@ -31,10 +31,12 @@ PIXELS = 1.0
 LEAST, DECISIVE = 0.1, 0.5
 """Logarithms of odds from which on a camera alone says that a pixel is the subject's, or the room's: what is not like
 the room is the subject if the others show its colours."""
-UNLIKELY, LIKELY, MEAN = 2.0, 0.7, 0.3
-"""Most that a camera says against a place and for it (logarithms of odds), and what those that tell of it must say on
-average. What looks like the subject to few is a box of his colours; of seven, one that clearly sees the wall in him
-does not cut him."""
+UNLIKELY, LIKELY = 2.0, 0.7
+"""Most that a camera says against a place and for it, logarithms of odds."""
+MEAN, MAYBE = 0.3, 0.15
+"""What the cameras that tell of a place, counted as half of all at least, must say on average for somebody to be there,
+and for him not to be ruled out: what looks like the subject to few is a box of his colours; of seven, one that clearly
+sees the wall in him does not cut him."""
 CLEARLY = 1.5
 """Logarithm of odds from which on a pixel is the room's, whatever other cameras say: of people who talk in
 `experiments/masks.py` one pixel in fifty looks so like it."""
@@ -110,7 +112,7 @@ class Decided(NamedTuple):
     untold: Mask
     """What may be either."""
     possible: Mask
-    """Where all cameras together, if these are many, do not speak against somebody, whatever this one sees."""
+    """Where all cameras together, if these are many, do not rule somebody out, whatever this one sees."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +142,7 @@ def decided_together(
     """What colours say of one moment, by camera; None where cameras do not show anybody together.
 
     A shirt that looks like the wall behind it to one camera, and a box that looks like a shirt, are told by the others,
-    if there are many.
+    if there are many. Beside furniture each decides alone: too few see legs behind a table.
     """
     space = _space(scene, cameras, up)
     found = None if space is None else _learnt([space], cameras)
@@ -148,9 +150,10 @@ def decided_together(
         return None
     colors, (body,) = found
     decided = {k: colors.decided(k, scene) for k in scene.unknown}
-    if len(space.pixels) < MANY or not body.any():
+    furnished = any(mask.any() for mask in scene.calm.values())
+    if len(space.pixels) < MANY or furnished or not body.any():
         return decided
-    maybe = _body(space, colors, 0.0)
+    maybe = _maybe(space, colors)
     told = [k for k in decided if k in colors.odds and k in space.pixels]
     return decided | {k: _with_others(decided[k], k, space, colors, (body, maybe)) for k in told}
 
@@ -247,8 +250,20 @@ def _covered(space: _Space, body: Voxels, camera: int) -> Counts:
     return _counts(space.scene.pictures[camera], moving & space.pixels[camera].silhouette_of(body))
 
 
-def _body(space: _Space, colors: SubjectColors, least: float = MEAN) -> Voxels:
-    """The places of which the cameras that tell of them say this, on average, for the subject, or more."""
+def _body(space: _Space, colors: SubjectColors) -> Voxels:
+    """The places that the cameras together give to the subject."""
+    said, telling = _said(space, colors)
+    return space.open & (said >= MEAN * np.maximum(telling, 0.5 * len(space.pixels)))
+
+
+def _maybe(space: _Space, colors: SubjectColors) -> Voxels:
+    """The places that they do not rule out."""
+    said, telling = _said(space, colors)
+    return space.open & (said >= MAYBE * telling)
+
+
+def _said(space: _Space, colors: SubjectColors) -> tuple[Float[np.ndarray, "voxel"], Float[np.ndarray, "voxel"]]:
+    """What all cameras together say for each place, and how many tell of it."""
     said, telling = np.zeros((2, len(space.open)), np.float32)
     for k, pixels in ((k, space.pixels[k]) for k in space.pixels if k in colors.odds):
         odds, unknown = colors.told_of_places(k, space.scene.pictures[k]), space.scene.moving(k)
@@ -257,7 +272,7 @@ def _body(space: _Space, colors: SubjectColors, least: float = MEAN) -> Voxels:
         said += np.where(told, shown[pixels.rows, pixels.columns], 0.0).astype(np.float32)
         telling += told
     around = lambda values: gaussian_filter(values.reshape(3 * (VOXELS,)), VOTED).ravel()
-    return space.open & (around(said - least * telling) >= 0.0)
+    return around(said), around(telling)
 
 
 def _bins(picture: Picture) -> Int[np.ndarray, "_h _w"]:
