@@ -34,9 +34,9 @@ the room is the subject if the others show its colours."""
 UNLIKELY, LIKELY = 2.0, 0.7
 """Most that a camera says against a place and for it, logarithms of odds."""
 MEAN, MAYBE = 0.3, 0.15
-"""What the cameras that tell of a place, counted as half of all at least, must say on average for somebody to be there,
-and for him not to be ruled out: what looks like the subject to few is a box of his colours; of seven, one that clearly
-sees the wall in him does not cut him."""
+"""What the cameras that tell of a place must say on average for somebody to be there, where they count as half of all
+at least, and for him not to be ruled out: what looks like the subject to few is a box of his colours; of seven, one
+that clearly sees the wall in him does not cut him."""
 CLEARLY = 1.5
 """Logarithm of odds from which on a pixel is the room's, whatever other cameras say: of people who talk in
 `experiments/masks.py` one pixel in fifty looks so like it."""
