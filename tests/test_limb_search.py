@@ -276,14 +276,14 @@ def test_passes_begin_where_most_is_gained_and_where_nothing_changed_meanwhile(w
     def begin(search, row, pose, patience=0):
         begun.append((row, np.array_equal(pose, away(row, 0.5))))
         if row == 2:
-            revising._changed |= {2, 3}
+            revising.revised.changed |= {2, 3}
         if row == 4:  # its pass went in vain where the one of row 0 would begin
             search.note_in_vain([0], [away(0, 0.5)], [-0.1])
 
     monkeypatch.setattr(LimbSearch, "better_pose", better_pose)
     monkeypatch.setattr(revising, "_pass_from", begin)
     monkeypatch.setattr(revising, "_tired", lambda row=None: row == 5)
-    revising._changed |= {4}  # by what was done before
+    revising.revised.changed |= {4}  # by what was done before
     revising._search_limbs(search, [*gains], lambda share: None)
     assert begun == [(2, True), (4, True), (0, False)]
 

@@ -14,7 +14,7 @@ from sogjax.run import merge, passes
 from sogjax.run.clip import Clip
 from sogjax.run.frames import with_rivals
 from sogjax.run.initial_pose import InitialPose
-from sogjax.search.merge_passes import Revised, Revision
+from sogjax.search.revision import Revised, Revision
 
 FRAMES, ROW, FARTHER = 12, 5, 0.25
 SMALL = ("images.depth=4", "solver.max_iterations=3", "solver.min_iterations=1", "outputs.bvh=false")

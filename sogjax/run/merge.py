@@ -15,9 +15,10 @@ from sogjax.quality.verdict import NEARLY_ALL, expected_of
 from sogjax.run.frames import capacities_of, with_rivals
 from sogjax.run.setup import Setup
 from sogjax.run.terminal import alive, say
-from sogjax.search.merge_passes import Revised, merge_passes
+from sogjax.search.merge_passes import merge_passes
 from sogjax.search.misplaced import Misplaced
 from sogjax.search.other_pass import Pass
+from sogjax.search.revision import Revised
 from sogjax.tracking.frame import FrameInput
 
 

@@ -7,26 +7,17 @@ limbs are in doubt then, a pass comes backwards from behind: a limb that is lost
 what hid it, or moved too far for one frame, comes from the other side.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
-import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Bool, Float
 
-from sogjax.energy.frame_energy import FrameEnergy
-from sogjax.energy.posed import History
-from sogjax.energy.views import Views
-from sogjax.model.cores import in_threads
-from sogjax.model.limbs import limb_names
-from sogjax.model.program import compiled
 from sogjax.quality.fitted import fitted_numbers
-from sogjax.quality.limb_confidence import LimbConfidence
 from sogjax.quality.metrics import stretches
-from sogjax.search.body_parts import PartArrays, body_parts, merged_pose, select_parts
-from sogjax.search.climbed import MORE, climbed_in
+from sogjax.search.body_parts import PartArrays
 from sogjax.search.jump_passes import ChosenRows, Jump, chosen_rows, largest_jump, passes_without
 from sogjax.search.limb_search import BetterPose, LimbSearch
 from sogjax.search.misplaced import Misplaced
@@ -34,7 +25,6 @@ from sogjax.search.other_pass import (
     MOST_FRAMES,
     PATIENCE,
     SURE_FRAMES,
-    BothSeen,
     Compared,
     FramesOfRows,
     Pass,
@@ -44,10 +34,10 @@ from sogjax.search.other_pass import (
     parts_apart,
 )
 from sogjax.search.pose_search import Report, unreported
-from sogjax.search.tracklets import PosesOfRows, Tracklets
+from sogjax.search.revision import RevisedPass, Revision
+from sogjax.search.tracklets import PosesOfRows
 from sogjax.search.turned_body import turned_pose
-from sogjax.tracking.capacity import views_near
-from sogjax.tracking.frame import AnyFrame, FrameInput, on_device
+from sogjax.tracking.frame import AnyFrame
 from sogjax.tracking.tracker import Tracker
 
 LIKELY_LOST = 0.5
@@ -65,26 +55,6 @@ LOOK_FOR_ACTOR = 20
 """Frames of a pass that take as long as looking for an actor in one."""
 TURNED_PATIENCE = 20
 """`PATIENCE` of a pass with an actor turned: while he stands still, front and back are worth the same."""
-
-
-@dataclass(frozen=True)
-class Revised:
-    """What holds for a frame of which some part comes from the other pass."""
-
-    pose: Float[np.ndarray, "dof"]
-    energy: float
-    terms: dict[str, float]
-    judged: LimbConfidence
-
-
-@dataclass
-class Revision:
-    """Frames that were revised, and in which of them each part of the body was taken from the other pass."""
-
-    frames: dict[int, Revised] = field(default_factory=dict)
-    parts: dict[str, set[int]] = field(default_factory=dict)
-    rivals: dict[int, Float[np.ndarray, "limb"]] = field(default_factory=dict)
-    """Of the key rows: `LimbSearch.rivals`."""
 
 
 def in_doubt(passed: Pass) -> Bool[np.ndarray, "frame"]:
@@ -119,9 +89,9 @@ def merge_passes(
     revising.search_limbs(key_rows, report)
     revising.smooth_jumps(jump)
     while (stretch := revising.next_stretch()) is not None:
-        revising.take(compared_backwards(tracker, revising.passed, frames, revising.parts, *stretch))
+        revising.take(compared_backwards(tracker, revising.passed, frames, revising.revised.parts, *stretch))
     revising.note_rivals(key_rows, report)
-    return revising.revision
+    return revising.revised.revision
 
 
 class _Revising:
@@ -129,12 +99,10 @@ class _Revising:
 
     def __init__(self, tracker: Tracker, passed: Pass, frames: FramesOfRows) -> None:
         self.tracker, self.passed, self.frames = tracker, passed, frames
-        self.parts, self.revision = body_parts(tracker.body), Revision()
+        self.revised = RevisedPass(tracker, passed)
         self._search = LimbSearch.of(tracker, passed.capacities)
         self._tried: set[int] = set()
-        self._changed: set[int] = set()
         self._looked_at = 0
-        self._tracklets = Tracklets(tracker.body)
 
     def _tired(self, row: int | None = None) -> bool:
         """Whether too much was looked at in vain for another pass, which begins in a row."""
@@ -156,7 +124,7 @@ class _Revising:
             return
         self._search_limbs(search, rows, report)
         for _ in range(MOST_SWEEPS - 1):
-            self._search_limbs(search, [row for row in rows if row in self._changed], unreported)
+            self._search_limbs(search, [row for row in rows if row in self.revised.changed], unreported)
         for _ in range(MORE_SWEEPS):
             likely = self._likely_lost
             lost = [row for row in rows if likely[row]]
@@ -169,26 +137,29 @@ class _Revising:
         for number, row in enumerate(rows):
             if self._search is not None:
                 report(number / len(rows))
-                self.revision.rivals[row] = self._search.rivals(partial(self._frame, row), self.passed, row)
+                self.revised.revision.rivals[row] = self._search.rivals(partial(self._frame, row), self.passed, row)
 
     def take_known(self, poses: Float[np.ndarray, "frame dof"], misplaced: Misplaced | None) -> None:
         """Take what the poses of another pass of the clip explain better, by stretches in which the passes differ."""
-        blobs, least = PartArrays.of(self.tracker.body, self.parts).blobs, fitted_numbers().merge_passes.compared
+        blobs, least = (
+            PartArrays.of(self.tracker.body, self.revised.parts).blobs,
+            fitted_numbers().merge_passes.compared,
+        )
         both = zip(map(jnp.asarray, self.passed.poses), map(jnp.asarray, poses), strict=True)
         differ = np.array([np.max(parts_apart(self.tracker.body, blobs, *pair), initial=0.0) > least for pair in both])
         for first, stop in stretches(differ, gap=SURE_FRAMES):
             for begin in range(max(first - 1, 0), stop, MOST_FRAMES):
                 rows = range(begin, min(begin + MOST_FRAMES, stop + 1, len(poses)))
-                self.take(compared_known(self.tracker, self.passed, self.frames, self.parts, rows, poses))
+                self.take(compared_known(self.tracker, self.passed, self.frames, self.revised.parts, rows, poses))
         self._note_explained(misplaced)
-        self._changed.clear()
+        self.revised.changed.clear()
         self._looked_at = 0
 
     def _note_explained(self, misplaced: Misplaced | None) -> None:
         """Tell the search for misplaced actors what is explained of them in frames that changed."""
         if misplaced is not None:
-            for changed in self._changed:
-                misplaced.explained[changed] = self.revision.frames[changed].judged.explained
+            for changed in self.revised.changed:
+                misplaced.explained[changed] = self.revised.revision.frames[changed].judged.explained
 
     def place_actors(self, misplaced: Misplaced) -> None:
         """See where it leads if an actor of whom little is explained is where he is found again."""
@@ -201,20 +172,20 @@ class _Revising:
             if pose is not None:
                 self._pass_from(search, row, pose, TURNED_PATIENCE)
                 self._note_explained(misplaced)
-        self._changed.clear()
+        self.revised.changed.clear()
         self._looked_at = 0
 
     def turn_actors(self, rows: Sequence[int]) -> None:
         """See where it leads if an actor is back to front in some frames."""
         search = self._search
-        wholes = [part for part in self.parts if part.whole is None]
+        wholes = [part for part in self.revised.parts if part.whole is None]
         for row in rows:
             if search is None or self._tired():
                 break
             pose = turned_pose(search, wholes, self._frame(row), self.passed, row)
             if pose is not None:
                 self._pass_from(search, row, pose, TURNED_PATIENCE)
-        self._changed.clear()  # limbs are searched all over the clip next
+        self.revised.changed.clear()  # limbs are searched all over the clip next
         self._looked_at = 0
 
     def smooth_jumps(self, least: float) -> None:
@@ -243,11 +214,11 @@ class _Revising:
                 best = choice if best is None or choice.value > best.value else best
         if best is not None and best.taken.any():
             self._looked_at -= len(best.taken)
-            self._revise_rows(best.found, best.poses)
+            self.revised.put(best.found, best.poses)
 
     def _search_limbs(self, search: LimbSearch, rows: Sequence[int], report: Report) -> None:
         """Search limbs in some rows, then see where what was found leads, what gains most in its row first."""
-        self._changed.clear()
+        self.revised.changed.clear()
         found: dict[int, BetterPose] = {}
         for number, row in enumerate(rows):
             report(number / len(rows))
@@ -256,13 +227,13 @@ class _Revising:
                 found[row] = better
         report(0.0)  # how long the rest takes depends on what was found
         for row, better in sorted(found.items(), key=lambda item: -item[1].gain):
-            if row in self._changed or self._tired(row):
+            if row in self.revised.changed or self._tired(row):
                 continue
             if search.is_in_vain(row, better.pose):
                 better = search.better_pose(self._frame(row), self.passed, row)
             if better is not None:
                 self._pass_from(search, row, better.pose)
-        path = self._tracklets.best_path(self.passed)
+        path = self.revised.tracklets.best_path(self.passed)
         self._take_path(path)
         search.forget_in_vain(path)
         self._looked_at = max(self._looked_at - len(path), 0)  # what leads somewhere together was not in vain
@@ -270,7 +241,7 @@ class _Revising:
     def _take_path(self, path: PosesOfRows) -> None:
         """Take poses of several passes, in the order of the rows; the cells of so many are held as of a pass."""
         moved = np.isin(np.arange(len(self.passed.poses)), [*path])
-        blobs = PartArrays.of(self.tracker.body, self.parts).blobs
+        blobs = PartArrays.of(self.tracker.body, self.revised.parts).blobs
         for first, stop in stretches(moved):
             for begin in range(first, stop, MOST_FRAMES):
                 rows = range(begin, min(begin + MOST_FRAMES, stop))
@@ -278,7 +249,7 @@ class _Revising:
                 for row in rows:
                     both = jnp.asarray(self.passed.poses[row]), jnp.asarray(path[row])
                     found.add(row, path[row], np.asarray(parts_apart(self.tracker.body, blobs, *both)))
-                self._revise_rows(found, {row: path[row] for row in rows})
+                self.revised.put(found, {row: path[row] for row in rows})
 
     def _frame(self, row: int) -> AnyFrame:
         return next(iter(self.frames(range(row, row + 1))))
@@ -287,8 +258,8 @@ class _Revising:
         self, search: LimbSearch, row: int, pose: Float[np.ndarray, "dof"], patience: int = PATIENCE
     ) -> None:
         """Go both ways from another pose of a frame, and take what that explains better."""
-        found = compared_both_ways(self.tracker, self.passed, self.frames, self.parts, row, pose, patience)
-        self._tracklets.add(found)  # what of it is taken is forgotten
+        found = compared_both_ways(self.tracker, self.passed, self.frames, self.revised.parts, row, pose, patience)
+        self.revised.tracklets.add(found)  # what of it is taken is forgotten
         changed = self.take(found)
         search.forget_in_vain(changed)
         if not changed:
@@ -305,101 +276,7 @@ class _Revising:
         return left[-1] if left else None
 
     def take(self, found: Compared) -> set[int]:
-        """Revise what another pass explains better, if the stretch gains, each pose climbed; the rows that changed."""
-        rows = np.array(found.rows)
-        apart, gains = np.stack(found.apart), np.stack(found.gains)
-        ends, doubts = self._open_ends(found.rows), self._doubts(rows)
-        taken = select_parts(self.parts, apart, gains, self.passed.energy, ends, doubts)
-        changed = [(int(k), int(rows[k])) for k in np.flatnonzero(taken.any(axis=1))]
-        poses = in_threads(lambda at: self._merged(self.passed.poses[at[1]], found, at[0], taken[at[0]]), changed)
-        merged = {row: pose for (_, row), pose in zip(changed, poses, strict=True)}
-        gained = in_threads(lambda at: self._gained(found, at[0], merged[at[1]]), changed)
-        if not sum(gained) > 0.0:
-            self._looked_at += len(rows)
-            return set()
-        self._revise_rows(found, merged, taken)
-        return set(merged)
-
-    def _open_ends(self, rows: Sequence[int]) -> tuple[bool, bool]:
-        """Whether the clip ends before the first and behind the last of some rows."""
-        ends = (0, len(self.passed.poses) - 1)
-        return rows[0] in ends, rows[-1] in ends
-
-    def _revise_rows(
-        self,
-        found: Compared,
-        merged: Mapping[int, Float[np.ndarray, "dof"]],
-        taken: Bool[np.ndarray, "frame part"] | None = None,
-    ) -> None:
-        """Put poses into the rows of another pass, of which parts were `taken`; None: what is elsewhere then."""
-        rows = np.array(found.rows)
-        if taken is None:
-            by_itself = np.array([len(part.names) == 1 for part in self.parts])
-            elsewhere = np.stack(found.apart) > fitted_numbers().merge_passes.apart
-            taken = elsewhere & by_itself & np.isin(rows, [*merged])[:, None]
-        for row, pose in merged.items():
-            self.passed.poses[row] = pose
-            self.passed.climbed.pop(row, None)
-        in_threads(lambda k: self._revise(found.rows[k], found.cells[k]), np.flatnonzero(np.isin(rows, [*merged])))
-        self._changed |= set(merged)
-        self._tracklets.forget(merged)
-        for part, of_part in zip(self.parts, taken.T, strict=True):
-            for name in part.names if of_part.any() else ():
-                self.revision.parts.setdefault(name, set()).update(rows[of_part].tolist())
-
-    def _doubts(self, rows: Int[np.ndarray, "frame"]) -> Float[np.ndarray, "frame part"]:
-        """How likely a limb of each part is lost; 0 for whole actors."""
-        names = limb_names(self.tracker.body)
-        limbs = [[k for k, name in enumerate(names) if name in part.names] for part in self.parts]
-        return np.stack([self.passed.doubts[rows][:, of_part].max(axis=1, initial=0.0) for of_part in limbs], axis=1)
-
-    def _gained(self, found: Compared, k: int, merged: Float[np.ndarray, "dof"]) -> float:
-        """What a frame gains with a merged pose, which may be that of the other pass, once both are climbed."""
-        if np.array_equal(merged, found.poses[k]):
-            return found.gained[k]
-        row, passed = found.rows[k], self.passed
-        seen = BothSeen.of(self.tracker, found.cells[k], passed.capacities, passed.poses[row], merged)
-        return seen.climbed_gain(passed.climbed, row)
-
-    def _merged(
-        self, pose: Float[np.ndarray, "dof"], found: Compared, k: int, taken: Bool[np.ndarray, "part"]
-    ) -> Float[np.ndarray, "dof"]:
-        """A pose with the parts that are taken; the other pass's as it is, where the rest is alike, else climbed."""
-        moved = np.any([part.blobs for part, is_taken in zip(self.parts, taken, strict=True) if is_taken], axis=0)
-        rest = [np.any(part.blobs & ~moved) for part in self.parts]
-        alike = np.where(rest & ~taken, found.apart[k], 0.0).max() <= fitted_numbers().merge_passes.apart
-        if alike:
-            return found.poses[k].copy()
-        mixed = jnp.asarray(merged_pose(self.tracker.body, self.parts, pose, found.poses[k], taken))
-        room = self.passed.capacities
-        views = views_near(self.tracker, on_device(found.cells[k]), mixed, room)
-        return np.asarray(climbed_in(self.tracker, views, mixed, MORE, room)[0])
-
-    def _revise(self, row: int, frame: AnyFrame) -> None:
-        """Note what the pose of a frame, which changed, is worth."""
-        poses = self.passed.poses
-        before, before_that = (jnp.asarray(poses[max(row - j, 0)]) for j in (1, 2))
-        history = History(before, before_that, jnp.asarray(row >= 2))
-        pose, baseline = jnp.asarray(poses[row]), jnp.asarray(self.passed.baseline[row])
-        known = on_device(frame)
-        views = views_near(self.tracker, known, pose, self.passed.capacities)
-        found = _valued(self.tracker, history, known, views, pose, baseline)
-        energy, terms, judged = jax.device_get(found)
-        values = {name: float(term) for name, term in terms.items()}
-        self.revision.frames[row] = Revised(poses[row].copy(), float(energy), values, judged)
-        self.passed.energies[row], self.passed.doubts[row] = float(energy), judged.error_probability
-
-
-@compiled
-def _valued(
-    tracker: Tracker,
-    history: History,
-    frame: FrameInput,
-    views: Views,
-    pose: Float[Array, "dof"],
-    baseline: Float[Array, "2 blob"],
-) -> tuple[Float[Array, ""], dict[str, Float[Array, ""]], LimbConfidence]:
-    """Energy, terms and doubts of a pose that is known."""
-    energy = FrameEnergy(tracker.body, views, history, tracker.terms)
-    judged = tracker.judged(pose, baseline, views.windows, frame)
-    return energy(pose), energy.values(pose), judged
+        """Take what another pass explains better; the rows that changed."""
+        changed = self.revised.take(found)
+        self._looked_at += 0 if changed else len(found.rows)
+        return changed
