@@ -97,6 +97,18 @@ def test_a_mask_of_something_else_is_left_out_and_said(tmp_path):
     assert "cam2.mask.png" in said[0]
 
 
+def test_a_mask_that_lacks_a_part_is_not_said_to_disagree(tmp_path):
+    recording = example_recording(tmp_path, masks=(0, 1, 2, 3))
+    rows = np.flatnonzero(TRUTH[2].any(axis=1))
+    half = TRUTH[2] & (np.arange(120) < rows.mean())[:, None]
+    write(recording.example_poses[0].masks["cam2"], half.astype(np.uint8) * 255)
+    found = masks_of(recording)
+    assert list(found.masks) == [0, 1, 3]
+    (said,) = found.warnings
+    assert "cam2 is left out, since the masks of the other cameras agree with each other only without its own" in said
+    assert "%" not in said
+
+
 def test_where_furniture_hides_the_room_masks_say_nothing(tmp_path):
     """A table before the legs in two of four cameras, and nobody knows what is behind it."""
     recording = example_recording(tmp_path)

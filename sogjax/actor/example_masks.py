@@ -239,9 +239,14 @@ def _check_found(recording: Recording, example: ExamplePose, found: list[int], f
 
 
 def _unlike(example: ExamplePose, camera: str, share: float) -> str:
+    why = (
+        f"its mask does not agree with the other cameras ({share:.0%} of it does)"
+        if share < AGREEING
+        else "the masks of the other cameras agree with each other only without its own, which may lack a part"
+    )
     return (
-        f"example pose {example.name!r}: {camera} is left out, since its mask does not agree with the other "
-        f"cameras ({share:.0%} of it does); look at it with `sogjax segment`, and give {camera}.mask.png"
+        f"example pose {example.name!r}: {camera} is left out, since {why}; look at it with `sogjax segment`, and "
+        f"give {camera}.mask.png"
     )
 
 
