@@ -62,8 +62,16 @@ def test_the_jacobian_of_points_is_that_of_jacfwd():
             frames = body.skeleton.world_from_joint(pose)
             return body.skeleton.point_jacobian(frames, body.blobs.joints, body.blobs.points_world(frames))
 
+        def some(pose, blobs, dofs):
+            frames = body.skeleton.world_from_joint(pose)
+            joints, points = jnp.asarray(body.blobs.joints)[blobs], body.blobs.points_world(frames)[blobs]
+            return body.skeleton.point_jacobian(frames, joints, points, dofs)
+
         expected = jax.jit(jax.jacfwd(lambda p: body.posed_blobs(p).means))(pose)
         np.testing.assert_allclose(jax.jit(closed)(pose), expected, atol=FLOAT64)
+        blobs, dofs = np.array([body.num_blobs - 1, 0, 2]), np.array([3, 0])
+        found = jax.jit(some)(pose, jnp.asarray(blobs), jnp.asarray(dofs))
+        np.testing.assert_allclose(found, expected[np.ix_(blobs, range(3), dofs)], atol=FLOAT64)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.03, 0.6, 1.0])

@@ -15,7 +15,7 @@ from sogjax.energy.views import Windows
 from sogjax.model.camera import project
 from sogjax.model.sog import Sog
 
-LANES = 64
+LANES = 8
 """Entries along the last axis that XLA on a CPU computes at once; an exponential of those left over takes six times as
 long."""
 

@@ -36,6 +36,12 @@ class PartIndex(eqx.Module):
     blobs: Int[Array, "*part slot"]
     blob_mask: Bool[Array, "*part slot"]
 
+    @classmethod
+    def whole(cls, body: Body) -> "PartIndex":
+        """All of a body."""
+        every = lambda count: (jnp.arange(count), jnp.ones(count, bool))
+        return cls(*every(body.skeleton.num_dofs), *every(body.num_blobs))
+
     def params(self, pose: Float[Array, "dof"]) -> Float[Array, "param"]:
         """The part of a pose; 0 in the padding."""
         return jnp.where(self.dof_mask, pose[self.dofs], 0.0)
@@ -110,10 +116,11 @@ class PartEnergy(eqx.Module):
         return seen + QuadraticModel(limits.value, limits.gradient[dofs] * mask, curvature)
 
     def _posed(self, whole: Posed) -> PosedPart:
-        jacobian = whole.point_jacobian()[self.part.blobs][:, :, self.part.dofs]
-        blobs, shape = self.part.blobs_of(whole.blobs), (1, 1, -1)
+        body, blobs, shape = whole.body, self.part.blobs_of(whole.blobs), (1, 1, -1)
+        joints = jnp.asarray(body.blobs.joints)[self.part.blobs]
+        jacobian = body.skeleton.point_jacobian(whole.world_from_joint, joints, blobs.means, self.part.dofs)
         return PosedPart(
-            whole.body,
+            body,
             whole.pose,
             whole.joint_params,
             whole.world_from_joint,

@@ -86,12 +86,14 @@ class Skeleton(eqx.Module):
     def point_jacobian(
         self,
         world_from_joint: Float[Array, "joint 4 4"],
-        joints: tuple[int, ...],
+        joints: tuple[int, ...] | Int[Array, "point"],
         points_world: Float[Array, "point 3"],
+        dofs: Int[Array, "dof"] | None = None,
     ) -> Float[Array, "point 3 dof"]:
-        """Derivatives by the pose of points fixed to `joints`, which lie at `points_world` (metres)."""
+        """Derivatives by the pose, or by `dofs`, of points fixed to `joints`, which lie at `points_world` (metres)."""
         by_joint_param = point_jacobian(self.parents, self.revolute, self.axes, world_from_joint, joints, points_world)
-        return jnp.matmul(by_joint_param, self.parameter_transform, precision="highest")
+        transform = self.parameter_transform if dofs is None else self.parameter_transform[:, dofs]
+        return jnp.matmul(by_joint_param, transform, precision="highest")
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
@@ -165,12 +167,12 @@ def point_jacobian(
     revolute: Bool[Array, "joint"],
     axes: Float[Array, "joint 3"],
     world_from_joint: Frames,
-    joints: tuple[int, ...],
+    joints: tuple[int, ...] | Int[Array, "point"],
     points_world: Float[Array, "point 3"],
 ) -> Float[Array, "point 3 joint"]:
     """Derivatives by the joint parameters of points fixed to `joints`, which lie at `points_world` (metres)."""
     turning, sliding = _screws(revolute, axes, world_from_joint)
-    moved = jnp.asarray(ancestor_table(parents)[np.array(joints, int)], axes.dtype)
+    moved = jnp.asarray(ancestor_table(parents), axes.dtype)[jnp.asarray(joints)]
     arms = points_world - world_from_joint[:1, :3, 3]
     velocities = jnp.cross(turning[None, :, :], arms[:, None, :]) + sliding[None, :, :]
     return jnp.swapaxes(velocities * moved[:, :, None], 1, 2)

@@ -16,7 +16,7 @@ from sogjax.energy.part_energy import PartIndex
 from sogjax.model.body import Body
 from sogjax.model.limbs import limb_blobs, limb_names, limbs
 from sogjax.search.body_parts import limb_groups
-from sogjax.search.mirrored import fitted_to_blobs, other_side
+from sogjax.search.mirrored import fitted_part, other_side
 
 NUM_DRAWN = 100
 """Ways to hold a unit that are drawn in a frame; another frame draws others."""
@@ -123,14 +123,12 @@ def look_alikes(body: Body, pose: Float[Array, "dof"], unit: UnitArrays) -> Floa
     means, index = body.posed_blobs(pose).means, unit.index
     here = means[index.blobs]
     turned = jax.vmap(lambda two: _half_turned(here, means[two[0]], means[two[1]]))(unit.ends)
-    place = lambda moved: means.at[jnp.where(index.blob_mask, index.blobs, len(means))].set(moved, mode="drop")
     first, second = (jnp.where(each[:, None], moved, here) for each, moved in zip(unit.limbs, turned, strict=True))
     both = jnp.where(unit.limbs[1][:, None], second, first)
     exchanged = means[unit.counterparts[index.blobs]]
     crossed = here + unit.outer[:, None] * (exchanged - here)
-    targets = jnp.stack([place(each) for each in (exchanged, crossed, first, second, both)])
-    fitted = fitted_to_blobs(body, jnp.tile(pose, (len(targets), 1)), targets, FIT_ITERATIONS)[0]
-    return jax.vmap(lambda each: index.put(pose, index.params(each)))(fitted)
+    targets = jnp.stack([exchanged, crossed, first, second, both])
+    return jax.vmap(lambda target: fitted_part(body, index, FIT_ITERATIONS, pose, target)[0])(targets)
 
 
 def _half_turned(

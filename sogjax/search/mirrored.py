@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from sogjax.energy.part_energy import PartIndex
 from sogjax.model.body import Body
 from sogjax.model.limbs import limb_blobs, limbs
 from sogjax.model.program import compiled
@@ -92,24 +93,33 @@ def fitted_to_blobs(
     body: Body, starts: Float[Array, "start dof"], targets: Float[Array, "start blob 3"], iterations: int = ITERATIONS
 ) -> tuple[Float[Array, "start dof"], Float[Array, "start"]]:
     """Poses whose blobs lie near some points, and how far off they are (metres, root of the mean square)."""
-    return jax.vmap(partial(_fit, body, iterations))(starts, targets)
+    return jax.vmap(partial(fitted_part, body, PartIndex.whole(body), iterations))(starts, targets)
 
 
-def _fit(body: Body, iterations: int, start: Array, target: Array) -> tuple[Array, Array]:
+def fitted_part(
+    body: Body, part: PartIndex, iterations: int, start: Float[Array, "dof"], target: Float[Array, "slot 3"]
+) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
+    """A pose in which a part is held so that its blobs lie near some points, and how far off they are, as above."""
     # A tracked pose may be beyond a limit; what is not to move is not to be moved back either.
     lower, upper = jnp.minimum(body.skeleton.dof_lower, start), jnp.maximum(body.skeleton.dof_upper, start)
+    joints, count = jnp.asarray(body.blobs.joints)[part.blobs], part.dofs.shape[0]
+
+    def away(pose: Array) -> tuple[Array, Array, Array]:
+        frames = body.skeleton.world_from_joint(pose)
+        means = body.blobs.points_world(frames)[part.blobs]
+        return frames, means, jnp.where(part.blob_mask[:, None], target - means, 0.0)
 
     def step(_: Array, pose: Array) -> Array:
-        frames = body.skeleton.world_from_joint(pose)
-        means = body.blobs.points_world(frames)
-        jacobian = body.skeleton.point_jacobian(frames, body.blobs.joints, means).reshape(-1, pose.shape[0])
+        frames, means, off = away(pose)
+        moved = part.blob_mask[:, None, None] & part.dof_mask[None, None]
+        jacobian = jnp.where(moved, body.skeleton.point_jacobian(frames, joints, means, part.dofs), 0.0)
+        jacobian = jacobian.reshape(-1, count)
         curvature = jnp.matmul(jacobian.T, jacobian, precision="highest")
-        curvature = curvature + POSE_SPREAD**2 * jnp.eye(pose.shape[0], dtype=pose.dtype)
-        pull = jnp.matmul(jacobian.T, (target - means).reshape(-1), precision="highest")
-        move = solve_positive(curvature, pull)
+        curvature = curvature + POSE_SPREAD**2 * jnp.eye(count, dtype=pose.dtype)
+        move = solve_positive(curvature, jnp.matmul(jacobian.T, off.reshape(-1), precision="highest"))
         move = move / jnp.maximum(jnp.max(jnp.abs(move)) / 0.5, 1.0)
-        return jnp.clip(pose + move, lower, upper)
+        return jnp.clip(part.put(pose, pose[part.dofs] + move), lower, upper)
 
     pose = jax.lax.fori_loop(0, iterations, step, start)
-    off = body.blobs.points_world(body.skeleton.world_from_joint(pose)) - target
-    return pose, jnp.sqrt(jnp.mean(jnp.sum(off * off, axis=-1)))
+    off = away(pose)[2]
+    return pose, jnp.sqrt(jnp.sum(off * off) / jnp.sum(part.blob_mask, dtype=off.dtype))
