@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from motion_cases import walking_motion
-from run_cases import DOG, stand_in_passes, tiny_run
+from run_cases import DOG, pose_request, stand_in_passes, tiny_run
 
 from sogjax.errors import InputError
 from sogjax.quality.verdict import verdicts
@@ -86,6 +86,17 @@ def test_several_actors_who_keep_what_they_explain_beside_the_others_are_searche
     assert search.asked == [0]
     alone = Searched({0: [found(0.01)], 9: [found(1.0)]})
     assert best_guess(alone).frame == 9
+
+
+@pytest.mark.parametrize(("numbers", "frames"), [(range(8), [0]), (range(12), [0, 10]), (range(0, 12, 3), [0])])
+def test_tracking_begins_in_no_frame_that_is_not_tracked(monkeypatch, numbers, frames):
+    """Another frame than those to track is looked at, to see whether its search agrees."""
+    guesses, request = [Guess(0, [found(0.2)]), Guess(10, [found(0.9)])], pose_request()
+    monkeypatch.setattr(clip_search, "agreed", lambda *given: guesses)
+    search = ClipSearch(replace(request.clip, numbers=numbers), request.background, [DOG], request.config)
+    monkeypatch.setattr(ClipSearch, "paths", lambda *given: [])
+    monkeypatch.setattr(ClipSearch, "_followed_frames", lambda search, frame: range(0, 15, 5))
+    assert [guess.frame for guess in search.guesses(0)] == frames
 
 
 def test_what_shows_no_actor_or_too_few_people_is_refused(drawn):

@@ -126,12 +126,15 @@ class ClipSearch:
     def guesses(self, frame: int, report: Report = unreported) -> list[Guess]:
         """The guess of a frame, and that of the frame whose search was to agree with it, if there was one.
 
+        Not that of a frame that is seen, but is not to be tracked.
+
         Raises:
             InputError: no camera has the frame.
         """
         paths, other = self.paths(frame, lambda share: report(0.5 * share)), self._followed_frames(frame)[-1]
         second = lambda: None if other == frame else self.paths(other, lambda share: report(0.5 + 0.5 * share))
-        return agreed(self.bodies, (frame, other), paths, second)
+        first, *agreeing = agreed(self.bodies, (frame, other), paths, second)
+        return [first, *(guess for guess in agreeing if guess.frame in self.clip.numbers)]
 
     def paths(self, frame: int, report: Report = unreported) -> list[found_pose.Path]:
         """The best poses of all actors in a frame and those that come next, by what is seen there.
