@@ -4,11 +4,13 @@ What the rest explains is taken from the pictures: from the caps of Eq. 8, and f
 where it covers. What is left is the same energy of a few blobs, so that many ways to hold a limb can be compared.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from sogjax.energy.foreground import Foreground, cover
@@ -37,10 +39,15 @@ class PartIndex(eqx.Module):
     blob_mask: Bool[Array, "*part slot"]
 
     @classmethod
+    def of(cls, dofs: Sequence[Int[np.ndarray, "_param"]], blobs: Sequence[Int[np.ndarray, "_slot"]]) -> "PartIndex":
+        """Some parts, padded to the largest."""
+        return cls(*map(jnp.asarray, (*_padded(dofs), *_padded(blobs))))
+
+    @classmethod
     def whole(cls, body: Body) -> "PartIndex":
         """All of a body."""
-        every = lambda count: (jnp.arange(count), jnp.ones(count, bool))
-        return cls(*every(body.skeleton.num_dofs), *every(body.num_blobs))
+        every = cls.of([np.arange(body.skeleton.num_dofs)], [np.arange(body.num_blobs)])
+        return jax.tree.map(lambda leaf: leaf[0], every)
 
     def params(self, pose: Float[Array, "dof"]) -> Float[Array, "param"]:
         """The part of a pose; 0 in the padding."""
@@ -59,6 +66,15 @@ class PartIndex(eqx.Module):
         """All blobs, those of the part masked out."""
         mask = blobs.mask.at[jnp.where(self.blob_mask, self.blobs, blobs.capacity)].set(False, mode="drop")
         return eqx.tree_at(lambda sog: sog.mask, blobs, mask)
+
+
+def _padded(rows: Sequence[Int[np.ndarray, "_n"]]) -> tuple[Int[np.ndarray, "row n"], Bool[np.ndarray, "row n"]]:
+    """Rows of the same length, and what of them is real."""
+    size = max(map(len, rows))
+    return (
+        np.stack([np.pad(row, (0, size - len(row))) for row in rows]),
+        np.stack([np.arange(size) < len(row) for row in rows]),
+    )
 
 
 class PosedPart(Posed):

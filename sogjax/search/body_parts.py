@@ -2,19 +2,22 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from sogjax.energy.part_energy import PartIndex
 from sogjax.model.body import Body
 from sogjax.model.limbs import limb_blobs, limb_names, limbs
 from sogjax.model.program import compiled
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.metrics import stretches
 from sogjax.search.best_passes import best_passes
-from sogjax.search.mirrored import fitted_to_blobs, other_side
+from sogjax.search.mirrored import fitted_part, other_side
 
 ITERATIONS = 8
 """Steps to put a limb in its place: the two poses are near each other."""
@@ -75,6 +78,8 @@ class PartArrays(eqx.Module):
     blobs: Bool[Array, "part blob"]
     in_pairs: Bool[Array, "part"]
     """Which are a limb of a pair."""
+    actors: PartIndex
+    """All of the actor whose each of them is."""
 
     @classmethod
     def of(cls, body: Body, parts: Sequence[Part]) -> "PartArrays":
@@ -85,11 +90,14 @@ class PartArrays(eqx.Module):
         paired = {name for part in parts if len(part.names) > 1 for name in part.names}
         in_pairs = [len(part.names) == 1 and part.names[0] in paired for part in parts]
         whole, blobs = [part.whole is None for part in parts], np.stack([part.blobs for part in parts])
-        return cls(*(jnp.asarray(array) for array in (np.array(whole), dofs, blobs, np.array(in_pairs))))
+        actors = [k if part.whole is None else part.whole for k, part in enumerate(parts)]
+        of_actors = [np.flatnonzero(body.blob_actors == actor) for actor in actors]
+        index = PartIndex.of([parts[actor].dofs for actor in actors], of_actors)
+        return cls(jnp.asarray(whole), jnp.asarray(dofs), jnp.asarray(blobs), jnp.asarray(in_pairs), index)
 
     def mixed(self, body: Body, pose: Float[Array, "dof"], other: Float[Array, "dof"]) -> Float[Array, "part dof"]:
         """The pose with each part as it is in the other one."""
-        limbs = with_blobs(body, pose, other, self.blobs)
+        limbs = jax.vmap(partial(with_blobs, body, pose, other))(self.blobs, self.actors)
         return jnp.where(self.whole[:, None], jnp.where(self.dofs, other, pose), limbs)
 
 
@@ -109,20 +117,22 @@ def merged_pose(
             blobs |= part.blobs
     if not blobs.any():
         return base
-    return np.asarray(with_blobs(body, jnp.asarray(base), jnp.asarray(other), jnp.asarray(blobs[None]))[0])
+    return np.asarray(
+        with_blobs(body, jnp.asarray(base), jnp.asarray(other), jnp.asarray(blobs), PartIndex.whole(body))
+    )
 
 
 @compiled
 def with_blobs(
-    body: Body, pose: Float[Array, "dof"], other: Float[Array, "dof"], blobs: Bool[Array, "choice blob"]
-) -> Float[Array, "choice dof"]:
-    """The pose with some blobs where they are in the other one, for each choice of blobs.
+    body: Body, pose: Float[Array, "dof"], other: Float[Array, "dof"], blobs: Bool[Array, "blob"], moved: PartIndex
+) -> Float[Array, "dof"]:
+    """The pose with some blobs, of a part that may be moved, where they are in the other one.
 
     Angles cannot just be exchanged: where the trunk is turned a little, a limb would go elsewhere.
     """
     means, others = (body.posed_blobs(each).means for each in (pose, other))
-    targets = jnp.where(blobs[..., None], others, means)
-    return fitted_to_blobs(body, jnp.broadcast_to(pose, (len(blobs), len(pose))), targets, ITERATIONS)[0]
+    targets = jnp.where(blobs[:, None], others, means)
+    return fitted_part(body, moved, ITERATIONS, pose, targets[moved.blobs])[0]
 
 
 def select_parts(

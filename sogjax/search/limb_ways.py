@@ -81,16 +81,16 @@ class UnitArrays(eqx.Module):
     @classmethod
     def of(cls, body: Body, units: Sequence[Unit]) -> "list[UnitArrays]":
         """Each unit, padded to the largest."""
-        dofs, blobs = _padded([unit.all_dofs for unit in units]), _padded([unit.all_blobs for unit in units])
+        parts = PartIndex.of([unit.all_dofs for unit in units], [unit.all_blobs for unit in units])
         counterparts, found = jnp.asarray(other_side(body.blobs.names)), []
         for k, unit in enumerate(units):
-            slots, has_blob = blobs[0][k], blobs[1][k]
+            index = jax.tree.map(lambda leaf, k=k: leaf[k], parts)
+            slots, has_blob = np.asarray(index.blobs), np.asarray(index.blob_mask)
             of_limb, outer_part = np.zeros((2, len(slots)), bool), np.zeros(len(slots))
             for j, each in enumerate(unit.blobs):
                 of_limb[j] = np.isin(slots, each) & has_blob
             ends = [[each[0], each[-1]] for each in (unit.blobs[0], unit.blobs[-1])]
             outer_part[: len(unit.all_blobs)] = np.concatenate([outer(len(each)) for each in unit.blobs])
-            index = PartIndex(*(jnp.asarray(array[k]) for array in (*dofs, *blobs)))
             arrays = jnp.asarray(of_limb), jnp.asarray(ends), jnp.asarray(outer_part, body.blob_sigmas.dtype)
             found.append(cls(index, *arrays, counterparts))
         return found
@@ -99,15 +99,6 @@ class UnitArrays(eqx.Module):
 def outer(count: int) -> Float[np.ndarray, "blob"]:
     """How far beyond the middle of a limb each of its blobs is, from root to end: 0 up to there, 1 at the end."""
     return np.maximum(np.linspace(-1.0, 1.0, count), 0.0) if count > 1 else np.ones(count)
-
-
-def _padded(rows: Sequence[Int[np.ndarray, "_n"]]) -> tuple[Int[np.ndarray, "row n"], Bool[np.ndarray, "row n"]]:
-    """Rows of the same length, and what of them is real."""
-    size = max(map(len, rows))
-    return (
-        np.stack([np.pad(row, (0, size - len(row))) for row in rows]),
-        np.stack([np.arange(size) < len(row) for row in rows]),
-    )
 
 
 CROSSED = 2
