@@ -12,6 +12,7 @@ from rig_cases import ring_rig
 from walking_dog import DEPTH, FRAMES, HEIGHT, judging_tracker, pass_of
 
 from sogjax.energy.frame_energy import FrameEnergy
+from sogjax.energy.part_energy import PartIndex
 from sogjax.energy.posed import History
 from sogjax.model.body import concatenate
 from sogjax.model.limbs import limb_names, limbs
@@ -19,7 +20,7 @@ from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.metrics import stretches
 from sogjax.search import merge_passes as both_ways
 from sogjax.search.best_passes import best_passes
-from sogjax.search.body_parts import PartArrays, body_parts, changes_between, merged_pose, select_parts
+from sogjax.search.body_parts import PartArrays, body_parts, changes_between, merged_pose, select_parts, with_blobs
 from sogjax.search.merge_passes import merge_passes
 from sogjax.search.other_pass import REACH, BothSeen, Compared, part_gains
 from sogjax.search.placed_body import means_of
@@ -29,7 +30,23 @@ from sogjax.tracking.frame import FrameInput, on_device
 from sogjax.tracking.frame_by_frame import track
 
 LOST = slice(4, 7)
+TWO = concatenate([shipped("human"), shipped("dog")])
 COSTS = fitted_numbers().merge_passes
+
+
+def test_a_limb_is_put_into_its_place_beside_an_actor_of_another_size():
+    """Only its own actor is fitted; the arrays of the smaller one are padded."""
+    parts = body_parts(TWO)
+    rest, rng = np.asarray(TWO.poses["rest"]), np.random.default_rng(0)
+    one, two = (jnp.asarray(rest + rng.normal(0.0, 0.05, rest.shape).astype(rest.dtype)) for _ in range(2))
+    arrays, whole = PartArrays.of(TWO, parts), PartIndex.whole(TWO)
+    found = np.asarray(arrays.mixed(TWO, one, two))
+    for part, blobs, mixed in zip(parts, arrays.blobs, found, strict=True):
+        if part.whole is not None:
+            np.testing.assert_allclose(mixed, with_blobs(TWO, one, two, blobs, whole), atol=1e-3)
+            others = TWO.blob_actors != part.whole
+            assert np.abs(means_of(TWO, mixed[None]) - means_of(TWO, np.asarray(one)[None]))[0, others].max() < 1e-5
+            assert np.abs(mixed - np.asarray(one)).max() > 0.01
 
 
 def reader(cells, asked=None):

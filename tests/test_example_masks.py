@@ -105,7 +105,7 @@ def test_a_mask_that_lacks_a_part_is_not_said_to_disagree(tmp_path):
     found = masks_of(recording)
     assert list(found.masks) == [0, 1, 3]
     (said,) = found.warnings
-    assert "cam2 is left out, since the masks of the other cameras agree with each other only without its own" in said
+    assert "cam2 is left out, since the other cameras agree better without its mask" in said
     assert "%" not in said
 
 

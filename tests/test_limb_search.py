@@ -113,6 +113,18 @@ def test_what_looks_alike_has_its_legs_exchanged_or_its_knees_on_the_other_side(
     assert len(arms)
 
 
+def test_what_looks_like_arms_moves_nothing_else():
+    """There are fewer degrees of freedom and blobs than in legs: the arrays are padded."""
+    pose = np.asarray(HUMAN.poses["elbows"])
+    arms = units_of(HUMAN)[1]
+    others = np.setdiff1d(np.arange(len(pose)), arms.all_dofs)
+    for found in alike_of(1, pose):
+        np.testing.assert_array_equal(found[others], pose[others])
+        moved = np.linalg.norm(means_of(HUMAN, found[None]) - means_of(HUMAN, pose[None]), axis=-1)[0]
+        assert moved[arms.all_blobs].max() > 0.1
+        assert np.delete(moved, arms.all_blobs).max() < 1e-5
+
+
 def test_drawn_ways_lie_within_the_limits_and_are_others_each_turn():
     pose, unit = np.asarray(HUMAN.poses["tpose"]), units_of(HUMAN)[1]
     one, two = (drawn_ways(HUMAN, unit, pose, turn) for turn in (0, 1))
@@ -276,14 +288,14 @@ def test_passes_begin_where_most_is_gained_and_where_nothing_changed_meanwhile(w
     def begin(search, row, pose, patience=0):
         begun.append((row, np.array_equal(pose, away(row, 0.5))))
         if row == 2:
-            revising.revised.changed |= {2, 3}
+            revising.known.changed |= {2, 3}
         if row == 4:  # its pass went in vain where the one of row 0 would begin
             search.note_in_vain([0], [away(0, 0.5)], [-0.1])
 
     monkeypatch.setattr(LimbSearch, "better_pose", better_pose)
     monkeypatch.setattr(revising, "_pass_from", begin)
     monkeypatch.setattr(revising, "_tired", lambda row=None: row == 5)
-    revising.revised.changed |= {4}  # by what was done before
+    revising.known.changed |= {4}  # by what was done before
     revising._search_limbs(search, [*gains], lambda share: None)
     assert begun == [(2, True), (4, True), (0, False)]
 

@@ -242,7 +242,7 @@ def _unlike(example: ExamplePose, camera: str, share: float) -> str:
     why = (
         f"its mask does not agree with the other cameras ({share:.0%} of it does)"
         if share < AGREEING
-        else "the masks of the other cameras agree with each other only without its own, which may lack a part"
+        else "the other cameras agree better without its mask, which may lack a part of the subject"
     )
     return (
         f"example pose {example.name!r}: {camera} is left out, since {why}; look at it with `sogjax segment`, and "

@@ -172,7 +172,7 @@ def point_jacobian(
 ) -> Float[Array, "point 3 joint"]:
     """Derivatives by the joint parameters of points fixed to `joints`, which lie at `points_world` (metres)."""
     turning, sliding = _screws(revolute, axes, world_from_joint)
-    moved = jnp.asarray(ancestor_table(parents), axes.dtype)[jnp.asarray(joints)]
+    moved = jnp.asarray(ancestor_table(parents), axes.dtype)[jnp.asarray(joints, int)]
     arms = points_world - world_from_joint[:1, :3, 3]
     velocities = jnp.cross(turning[None, :, :], arms[:, None, :]) + sliding[None, :, :]
     return jnp.swapaxes(velocities * moved[:, :, None], 1, 2)

@@ -126,7 +126,7 @@ class ClipSearch:
     def guesses(self, frame: int, report: Report = unreported) -> list[Guess]:
         """The guess of a frame, and that of the frame whose search was to agree with it, if there was one.
 
-        Not that of a frame that is seen, but is not to be tracked.
+        A frame that is not to be tracked is only looked at: tracking cannot begin there.
 
         Raises:
             InputError: no camera has the frame.

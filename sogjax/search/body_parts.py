@@ -79,7 +79,7 @@ class PartArrays(eqx.Module):
     in_pairs: Bool[Array, "part"]
     """Which are a limb of a pair."""
     actors: PartIndex
-    """All of the actor whose each of them is."""
+    """For each part, its whole actor."""
 
     @classmethod
     def of(cls, body: Body, parts: Sequence[Part]) -> "PartArrays":
@@ -117,9 +117,8 @@ def merged_pose(
             blobs |= part.blobs
     if not blobs.any():
         return base
-    return np.asarray(
-        with_blobs(body, jnp.asarray(base), jnp.asarray(other), jnp.asarray(blobs), PartIndex.whole(body))
-    )
+    poses, everybody = (jnp.asarray(base), jnp.asarray(other)), PartIndex.whole(body)
+    return np.asarray(with_blobs(body, *poses, jnp.asarray(blobs), everybody))
 
 
 @compiled

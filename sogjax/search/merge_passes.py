@@ -89,17 +89,17 @@ def merge_passes(
     revising.search_limbs(key_rows, report)
     revising.smooth_jumps(jump)
     while (stretch := revising.next_stretch()) is not None:
-        revising.take(compared_backwards(tracker, revising.passed, frames, revising.revised.parts, *stretch))
+        revising.take(compared_backwards(tracker, revising.passed, frames, revising.known.parts, *stretch))
     revising.note_rivals(key_rows, report)
-    return revising.revised.revision
+    return revising.known.revision
 
 
 class _Revising:
-    """A pass while it is revised, one stretch after the other, the last one first."""
+    """The search for passes that explain more than the known one, which is revised meanwhile."""
 
     def __init__(self, tracker: Tracker, passed: Pass, frames: FramesOfRows) -> None:
         self.tracker, self.passed, self.frames = tracker, passed, frames
-        self.revised = RevisedPass(tracker, passed)
+        self.known = RevisedPass(tracker, passed)
         self._search = LimbSearch.of(tracker, passed.capacities)
         self._tried: set[int] = set()
         self._looked_at = 0
@@ -124,7 +124,7 @@ class _Revising:
             return
         self._search_limbs(search, rows, report)
         for _ in range(MOST_SWEEPS - 1):
-            self._search_limbs(search, [row for row in rows if row in self.revised.changed], unreported)
+            self._search_limbs(search, [row for row in rows if row in self.known.changed], unreported)
         for _ in range(MORE_SWEEPS):
             likely = self._likely_lost
             lost = [row for row in rows if likely[row]]
@@ -137,29 +137,27 @@ class _Revising:
         for number, row in enumerate(rows):
             if self._search is not None:
                 report(number / len(rows))
-                self.revised.revision.rivals[row] = self._search.rivals(partial(self._frame, row), self.passed, row)
+                self.known.revision.rivals[row] = self._search.rivals(partial(self._frame, row), self.passed, row)
 
     def take_known(self, poses: Float[np.ndarray, "frame dof"], misplaced: Misplaced | None) -> None:
         """Take what the poses of another pass of the clip explain better, by stretches in which the passes differ."""
-        blobs, least = (
-            PartArrays.of(self.tracker.body, self.revised.parts).blobs,
-            fitted_numbers().merge_passes.compared,
-        )
+        blobs = PartArrays.of(self.tracker.body, self.known.parts).blobs
+        least = fitted_numbers().merge_passes.compared
         both = zip(map(jnp.asarray, self.passed.poses), map(jnp.asarray, poses), strict=True)
         differ = np.array([np.max(parts_apart(self.tracker.body, blobs, *pair), initial=0.0) > least for pair in both])
         for first, stop in stretches(differ, gap=SURE_FRAMES):
             for begin in range(max(first - 1, 0), stop, MOST_FRAMES):
                 rows = range(begin, min(begin + MOST_FRAMES, stop + 1, len(poses)))
-                self.take(compared_known(self.tracker, self.passed, self.frames, self.revised.parts, rows, poses))
+                self.take(compared_known(self.tracker, self.passed, self.frames, self.known.parts, rows, poses))
         self._note_explained(misplaced)
-        self.revised.changed.clear()
+        self.known.changed.clear()
         self._looked_at = 0
 
     def _note_explained(self, misplaced: Misplaced | None) -> None:
         """Tell the search for misplaced actors what is explained of them in frames that changed."""
         if misplaced is not None:
-            for changed in self.revised.changed:
-                misplaced.explained[changed] = self.revised.revision.frames[changed].judged.explained
+            for changed in self.known.changed:
+                misplaced.explained[changed] = self.known.revision.frames[changed].judged.explained
 
     def place_actors(self, misplaced: Misplaced) -> None:
         """See where it leads if an actor of whom little is explained is where he is found again."""
@@ -172,20 +170,20 @@ class _Revising:
             if pose is not None:
                 self._pass_from(search, row, pose, TURNED_PATIENCE)
                 self._note_explained(misplaced)
-        self.revised.changed.clear()
+        self.known.changed.clear()
         self._looked_at = 0
 
     def turn_actors(self, rows: Sequence[int]) -> None:
         """See where it leads if an actor is back to front in some frames."""
         search = self._search
-        wholes = [part for part in self.revised.parts if part.whole is None]
+        wholes = [part for part in self.known.parts if part.whole is None]
         for row in rows:
             if search is None or self._tired():
                 break
             pose = turned_pose(search, wholes, self._frame(row), self.passed, row)
             if pose is not None:
                 self._pass_from(search, row, pose, TURNED_PATIENCE)
-        self.revised.changed.clear()  # limbs are searched all over the clip next
+        self.known.changed.clear()  # limbs are searched all over the clip next
         self._looked_at = 0
 
     def smooth_jumps(self, least: float) -> None:
@@ -214,11 +212,11 @@ class _Revising:
                 best = choice if best is None or choice.value > best.value else best
         if best is not None and best.taken.any():
             self._looked_at -= len(best.taken)
-            self.revised.put(best.found, best.poses)
+            self.known.put(best.found, best.poses)
 
     def _search_limbs(self, search: LimbSearch, rows: Sequence[int], report: Report) -> None:
         """Search limbs in some rows, then see where what was found leads, what gains most in its row first."""
-        self.revised.changed.clear()
+        self.known.changed.clear()
         found: dict[int, BetterPose] = {}
         for number, row in enumerate(rows):
             report(number / len(rows))
@@ -227,13 +225,13 @@ class _Revising:
                 found[row] = better
         report(0.0)  # how long the rest takes depends on what was found
         for row, better in sorted(found.items(), key=lambda item: -item[1].gain):
-            if row in self.revised.changed or self._tired(row):
+            if row in self.known.changed or self._tired(row):
                 continue
             if search.is_in_vain(row, better.pose):
                 better = search.better_pose(self._frame(row), self.passed, row)
             if better is not None:
                 self._pass_from(search, row, better.pose)
-        path = self.revised.tracklets.best_path(self.passed)
+        path = self.known.tracklets.best_path(self.passed)
         self._take_path(path)
         search.forget_in_vain(path)
         self._looked_at = max(self._looked_at - len(path), 0)  # what leads somewhere together was not in vain
@@ -241,7 +239,7 @@ class _Revising:
     def _take_path(self, path: PosesOfRows) -> None:
         """Take poses of several passes, in the order of the rows; the cells of so many are held as of a pass."""
         moved = np.isin(np.arange(len(self.passed.poses)), [*path])
-        blobs = PartArrays.of(self.tracker.body, self.revised.parts).blobs
+        blobs = PartArrays.of(self.tracker.body, self.known.parts).blobs
         for first, stop in stretches(moved):
             for begin in range(first, stop, MOST_FRAMES):
                 rows = range(begin, min(begin + MOST_FRAMES, stop))
@@ -249,7 +247,7 @@ class _Revising:
                 for row in rows:
                     both = jnp.asarray(self.passed.poses[row]), jnp.asarray(path[row])
                     found.add(row, path[row], np.asarray(parts_apart(self.tracker.body, blobs, *both)))
-                self.revised.put(found, {row: path[row] for row in rows})
+                self.known.put(found, {row: path[row] for row in rows})
 
     def _frame(self, row: int) -> AnyFrame:
         return next(iter(self.frames(range(row, row + 1))))
@@ -258,8 +256,8 @@ class _Revising:
         self, search: LimbSearch, row: int, pose: Float[np.ndarray, "dof"], patience: int = PATIENCE
     ) -> None:
         """Go both ways from another pose of a frame, and take what that explains better."""
-        found = compared_both_ways(self.tracker, self.passed, self.frames, self.revised.parts, row, pose, patience)
-        self.revised.tracklets.add(found)  # what of it is taken is forgotten
+        found = compared_both_ways(self.tracker, self.passed, self.frames, self.known.parts, row, pose, patience)
+        self.known.tracklets.add(found)  # what of it is taken is forgotten
         changed = self.take(found)
         search.forget_in_vain(changed)
         if not changed:
@@ -277,6 +275,6 @@ class _Revising:
 
     def take(self, found: Compared) -> set[int]:
         """Take what another pass explains better; the rows that changed."""
-        changed = self.revised.take(found)
+        changed = self.known.take(found)
         self._looked_at += 0 if changed else len(found.rows)
         return changed

@@ -99,7 +99,7 @@ def fitted_to_blobs(
 def fitted_part(
     body: Body, part: PartIndex, iterations: int, start: Float[Array, "dof"], target: Float[Array, "slot 3"]
 ) -> tuple[Float[Array, "dof"], Float[Array, ""]]:
-    """A pose in which a part is held so that its blobs lie near some points, and how far off they are, as above."""
+    """A pose with a part held so that its blobs lie near some points, and how far off they are (metres, RMS)."""
     # A tracked pose may be beyond a limit; what is not to move is not to be moved back either.
     lower, upper = jnp.minimum(body.skeleton.dof_lower, start), jnp.maximum(body.skeleton.dof_upper, start)
     joints, count = jnp.asarray(body.blobs.joints)[part.blobs], part.dofs.shape[0]
@@ -111,8 +111,8 @@ def fitted_part(
 
     def step(_: Array, pose: Array) -> Array:
         frames, means, off = away(pose)
-        moved = part.blob_mask[:, None, None] & part.dof_mask[None, None]
-        jacobian = jnp.where(moved, body.skeleton.point_jacobian(frames, joints, means, part.dofs), 0.0)
+        counts = part.blob_mask[:, None, None] & part.dof_mask[None, None]
+        jacobian = jnp.where(counts, body.skeleton.point_jacobian(frames, joints, means, part.dofs), 0.0)
         jacobian = jacobian.reshape(-1, count)
         curvature = jnp.matmul(jacobian.T, jacobian, precision="highest")
         curvature = curvature + POSE_SPREAD**2 * jnp.eye(count, dtype=pose.dtype)
