@@ -91,8 +91,8 @@ class PartArrays(eqx.Module):
         in_pairs = [len(part.names) == 1 and part.names[0] in paired for part in parts]
         whole, blobs = [part.whole is None for part in parts], np.stack([part.blobs for part in parts])
         actors = [k if part.whole is None else part.whole for k, part in enumerate(parts)]
-        of_actors = [np.flatnonzero(body.blob_actors == actor) for actor in actors]
-        index = PartIndex.of([parts[actor].dofs for actor in actors], of_actors)
+        actor_blobs = [np.flatnonzero(body.blob_actors == actor) for actor in actors]
+        index = PartIndex.of([parts[actor].dofs for actor in actors], actor_blobs)
         return cls(jnp.asarray(whole), jnp.asarray(dofs), jnp.asarray(blobs), jnp.asarray(in_pairs), index)
 
     def mixed(self, body: Body, pose: Float[Array, "dof"], other: Float[Array, "dof"]) -> Float[Array, "part dof"]:

@@ -17,7 +17,6 @@ from jaxtyping import Bool, Float
 
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.metrics import stretches
-from sogjax.search.body_parts import PartArrays
 from sogjax.search.jump_passes import ChosenRows, Jump, chosen_rows, largest_jump, passes_without
 from sogjax.search.limb_search import BetterPose, LimbSearch
 from sogjax.search.misplaced import Misplaced
@@ -141,8 +140,7 @@ class _Revising:
 
     def take_known(self, poses: Float[np.ndarray, "frame dof"], misplaced: Misplaced | None) -> None:
         """Take what the poses of another pass of the clip explain better, by stretches in which the passes differ."""
-        blobs = PartArrays.of(self.tracker.body, self.known.parts).blobs
-        least = fitted_numbers().merge_passes.compared
+        blobs, least = self.known.part_blobs, fitted_numbers().merge_passes.compared
         both = zip(map(jnp.asarray, self.passed.poses), map(jnp.asarray, poses), strict=True)
         differ = np.array([np.max(parts_apart(self.tracker.body, blobs, *pair), initial=0.0) > least for pair in both])
         for first, stop in stretches(differ, gap=SURE_FRAMES):
@@ -239,7 +237,7 @@ class _Revising:
     def _take_path(self, path: PosesOfRows) -> None:
         """Take poses of several passes, in the order of the rows; the cells of so many are held as of a pass."""
         moved = np.isin(np.arange(len(self.passed.poses)), [*path])
-        blobs = PartArrays.of(self.tracker.body, self.known.parts).blobs
+        blobs = self.known.part_blobs
         for first, stop in stretches(moved):
             for begin in range(first, stop, MOST_FRAMES):
                 rows = range(begin, min(begin + MOST_FRAMES, stop))

@@ -51,6 +51,7 @@ class RevisedPass:
     def __init__(self, tracker: Tracker, passed: Pass) -> None:
         self.tracker, self.passed = tracker, passed
         self.parts, self.revision = body_parts(tracker.body), Revision()
+        self.part_blobs = jnp.asarray(np.stack([part.blobs for part in self.parts]))
         self.tracklets = Tracklets(tracker.body)
         """What is known of other passes."""
         self.changed: set[int] = set()
