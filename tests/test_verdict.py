@@ -214,18 +214,23 @@ def test_closeups_show_the_body_in_each_frame(walk, tmp_path):
     cv2.imwrite(str(tmp_path / "closeups.png"), drawn)
 
 
+LEG = "the left leg of the actor may be anywhere"
+
+
 @pytest.mark.parametrize(
-    ("iou", "explained", "warnings", "said"),
+    ("iou", "explained", "doubts", "warnings", "said"),
     [
-        (0.86, 0.7, 0, "looks right (its example poses explain 70% of it)"),
-        (0.6, 0.7, 0, "silhouettes agree to 60% only"),
+        (0.86, 0.7, (), 0, "looks right (its example poses explain 70% of it)"),
+        (0.86, 0.7, (LEG,), 1, f"{LEG}; 1 warning in its report"),
+        (0.6, 0.7, (), 0, "silhouettes agree to 60% only"),
         (
             0.86,
             0.2,
+            (),
             1,
             "explain 20% of it only (60 to 75 % is usual): look at the colours in its report; 1 warning",
         ),
     ],
 )
-def test_an_actor_is_judged_by_its_example_poses(iou, explained, warnings, said):
-    assert said in actor_verdict(iou, explained, warnings)
+def test_an_actor_is_judged_by_its_example_poses(iou, explained, doubts, warnings, said):
+    assert said in actor_verdict(iou, explained, doubts, warnings)

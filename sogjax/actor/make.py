@@ -94,6 +94,11 @@ class MadeActor:
         return silhouettes * self.explained.get(name, 1.0)
 
     @property
+    def doubts(self) -> tuple[str, ...]:
+        """What is doubtful of it, one sentence each with the remedy."""
+        return tuple(said for said in (self.doubt, self.unlike) if said is not None)
+
+    @property
     def shape_names(self) -> tuple[str, ...]:
         """Names of the shape parameters."""
         return self.shape_model.names

@@ -1,5 +1,6 @@
 """`sogjax actor`: an actor file from the example poses of a recording, with a report beside it."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -67,13 +68,13 @@ def run(config: ActorConfig, name: str | None = None) -> Path:
         say(f"note: {note}")
     print(out)
     print(folder / PAGE)
-    print(f"\nverdict: {actor_verdict(report.mean_iou, float(made.body.explained), len(report.warnings))}")
+    print(f"\nverdict: {actor_verdict(report.mean_iou, float(made.body.explained), made.doubts, len(report.warnings))}")
     return out
 
 
-def actor_verdict(mean_iou: float, explained: float, num_warnings: int) -> str:
-    """What is thought of an actor, from what its own example poses show: both are parts of 1."""
-    found = []
+def actor_verdict(mean_iou: float, explained: float, doubts: Sequence[str], num_warnings: int) -> str:
+    """What is thought of an actor, from what its own example poses show: the first two are parts of 1."""
+    found = [*doubts]
     if mean_iou < GOOD_IOU:
         found.append(f"silhouettes agree to {mean_iou:.0%} only (80 % and more is usual): look at its report")
     if explained < GOOD_COLORS:
