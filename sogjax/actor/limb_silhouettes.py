@@ -4,7 +4,7 @@ Poses are compared by the edges of their silhouettes. Eq. 9 does not ask that al
 hides in the trunk costs it nothing.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import jax
@@ -33,8 +33,8 @@ APART = 0.25
 
 ITERATIONS = 15
 """Steps by which each of them is climbed."""
-AT_ONCE = 16
-"""Ways that are compared in one step."""
+AT_ONCE, CHECKED_AT_ONCE = 16, 128
+"""Ways that are compared in one step, and of which it is computed in one step how impossible they are."""
 
 LEAST_GAIN = 0.05
 """Part of its cost by which another way to hold a unit must be better: masks are not that exact."""
@@ -140,8 +140,8 @@ class _SeenUnit:
         for of_limb, row, (limb, _) in zip(ways, rows, limbs, strict=True):
             held[:, limb.all_dofs] = of_limb[row][:, limb.all_dofs]
         together = sum(fills[row] for fills, row in zip(covered, rows, strict=True))
-        cost = self._cost(held, rest, jnp.asarray(together), self.unit.all_blobs)
-        best = int(np.argmin(cost))
+        least = lambda cost: [0, int(np.argmin(cost))]
+        (_, best), cost = self._chosen(held, rest, jnp.asarray(together), self.unit.all_blobs, least)
         return held[best] if cost[best] < (1.0 - LEAST_GAIN) * cost[0] else self.pose
 
     def _best_ways(
@@ -154,28 +154,40 @@ class _SeenUnit:
         drawn = drawn_ways(self.body, limb, self.pose, self.turn, NUM_DRAWN)
         drawn[0] = self.pose
         fills = _part_covered(self.body, jnp.asarray(drawn), part, self.silhouettes)
-        kept = _different(drawn[:, limb.all_dofs], self._cost(drawn, rest, fills, limb.all_blobs))
+        different = lambda cost: _different(drawn[:, limb.all_dofs], cost)
+        kept, _ = self._chosen(drawn, rest, fills, limb.all_blobs, different)
         given = (self.body, part, rest, self.silhouettes, pose_scales(self.body.skeleton))
         climbed = shared_out(lambda count, poses: (_climbed(count, poses, *given),), NUM_KEPT // THREADS, drawn[kept])
         ways = np.resize(climbed[0], (NUM_KEPT, len(self.pose)))
         ways[0] = self.pose
         return ways, np.asarray(_part_covered(self.body, jnp.asarray(ways), part, self.silhouettes))
 
-    def _cost(
+    def _chosen(
         self,
         ways: Float[np.ndarray, "way dof"],
         rest: Float[Array, "camera cell"],
         fills: Float[Array, "way camera cell"],
         moved: Int[np.ndarray, "_blob"],
-    ) -> Float[np.ndarray, "way"]:
-        """The mismatch of the body held in some ways, with `REST`, up to twice as much where that is impossible.
+        choose: Callable[[Float[np.ndarray, "way"]], list[int]],
+    ) -> tuple[list[int], Float[np.ndarray, "way"]]:
+        """The first of some ways and others that cost little, as is chosen, and what each way costs.
 
-        Blobs of the unit that are not `moved` may be anywhere.
+        That is the mismatch of the body held so, with `REST`, up to twice as much where that is impossible, which is
+        computed in steps: of the first way and of those that fit best, until no other can cost as little as those that
+        are chosen. Others cost infinity. Blobs of the unit that are not `moved` may be anywhere.
         """
         unsure = np.setdiff1d(self.unit.all_blobs, moved)
         twisted = np.asarray(_from_rest(self.body, jnp.asarray(ways)))
         mismatches = np.asarray(_mismatches(rest, fills, self.silhouettes)) + REST * twisted
-        return mismatches * (1.0 + self.everybody.impossibility(self.number, ways, self.poses, moved, unsure))
+        coming = np.append(0, 1 + np.argsort(mismatches[1:], kind="stable"))
+        costs = np.full(len(ways), np.inf)
+        while True:
+            these, coming = np.split(coming, [CHECKED_AT_ONCE])
+            impossible = self.everybody.impossibility(self.number, ways[these], self.poses, moved, unsure)
+            costs[these] = mismatches[these] * (1.0 + impossible)
+            chosen = choose(costs)
+            if not len(coming) or costs[chosen[1:]].max(initial=0.0) <= mismatches[coming[0]]:
+                return chosen, costs
 
 
 def _different(angles: Float[np.ndarray, "way param"], cost: Float[np.ndarray, "way"]) -> list[int]:
