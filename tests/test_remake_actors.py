@@ -3,12 +3,14 @@
 from dataclasses import replace
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from run_cases import DOG, pose_request, tiny_clip, tiny_run
 
 from sogjax.errors import InputError
 from sogjax.io.example_poses import ExamplePose
+from sogjax.model.shape import ShapeModel
 from sogjax.run import passes, remake_actors, run
 from sogjax.run.actors import ActorRequest, Actors
 from sogjax.run.background import Background
@@ -26,10 +28,16 @@ FRAME = ExamplePose("frame_3", None, {}, {}, None, 3)
 PICTURE = ExamplePose("sit", None, {"cam0": Path("a.jpg")}, {"cam0": Path("a.mask.png")}, None)
 
 
+def of_size(factor):
+    """The dog, so many times as large."""
+    model = ShapeModel.from_body(DOG)
+    return model.shaped(jnp.zeros(model.num_shape_params).at[0].set(np.log(factor)))
+
+
 def request_of(*examples, files=None):
     clip = tiny_clip()
     shown = replace(clip, recording=replace(clip.recording, example_poses=examples))
-    return ActorRequest(shown, lambda: Background(None), files)
+    return ActorRequest(shown, lambda: Background(None), files, body="dog")
 
 
 @pytest.mark.parametrize(
@@ -74,7 +82,7 @@ def remade(monkeypatch, made, begin=BEGUN):
     return found, reported, begun
 
 
-@pytest.mark.parametrize("made", [SURE, UNLIKE, DOUBTFUL])
+@pytest.mark.parametrize("made", [SURE, UNLIKE, DOUBTFUL, replace(DOUBTFUL, bodies=(of_size(0.9),))])
 def test_tracking_begins_anew_with_actors_that_are_no_more_doubtful(monkeypatch, made):
     found, reported, begun = remade(monkeypatch, made)
     assert found.actors is begun[0] is reported[0] is made
@@ -85,6 +93,8 @@ def test_tracking_begins_anew_with_actors_that_are_no_more_doubtful(monkeypatch,
     ("made", "begin"),
     [
         (Actors((DOG, DOG), doubts=("one", "two")), BEGUN),
+        (replace(DOUBTFUL, bodies=(of_size(0.7),)), BEGUN),
+        (replace(SURE, bodies=(of_size(1.4),)), BEGUN),
         (InputError("nobody is seen"), BEGUN),
         (SURE, InputError("nothing like dog is seen")),
     ],

@@ -36,11 +36,15 @@ def odd_bones(body: Body, start: Body | None = None) -> dict[str, float]:
 def odd_size(body: Body) -> float | None:
     """How many times as long as an adult's the bones of a human are, if they are odd."""
     like = bundled_like(body)
-    ratios = _ratios(like, body) if like is not None and like.name == ADULT else {}
-    if len(ratios) < FEWEST:
-        return None
-    size, bounds = float(np.median([*ratios.values()])), fitted_numbers().proportions
-    return None if bounds.least_size <= size <= bounds.most_size else size
+    size = size_beside(like, body) if like is not None and like.name == ADULT else None
+    bounds = fitted_numbers().proportions
+    return None if size is None or bounds.least_size <= size <= bounds.most_size else size
+
+
+def size_beside(like: Body | None, body: Body) -> float | None:
+    """How many times as long as another body's the bones of a body are; None: they cannot be compared."""
+    ratios = _ratios(like, body)
+    return float(np.median([*ratios.values()])) if len(ratios) >= FEWEST else None
 
 
 def odd_sentence(body: Body, start: Body | None = None) -> str | None:
