@@ -8,8 +8,18 @@ import pytest
 from body_cases import shipped
 from rig_cases import ring_rig
 
+from sogjax.actor import silhouette_fit
 from sogjax.actor.coverage import Silhouettes, _blobs, _covered, _fills, mismatch
-from sogjax.actor.silhouette_fit import COARSE_CELLS, MAX_CELLS, SilhouetteFit, cells_of, fitted, silhouettes_of
+from sogjax.actor.silhouette_fit import (
+    COARSE_CELLS,
+    MAX_CELLS,
+    MAX_ITERATIONS,
+    Estimate,
+    SilhouetteFit,
+    cells_of,
+    fitted,
+    silhouettes_of,
+)
 from sogjax.actor.silhouettes import PosedPictures
 from sogjax.energy.priors import pose_spread
 from sogjax.model.camera import project
@@ -50,6 +60,12 @@ def case():
     model = ShapeModel.from_body(dog)
     fit = SilhouetteFit(model, cells_covered_by(dog, pose, rig), pose_spread(dog))
     return fit, jnp.concatenate([pose, jnp.zeros(model.num_shape_params)])
+
+
+def held(near, model, silhouettes, weight):
+    """The fit near an estimate, with so much weight of being near rest."""
+    start = jnp.append(near.poses, near.shape_params)
+    return silhouette_fit._edges(model, start, silhouettes, MAX_ITERATIONS, weight)
 
 
 def moved(params, fit):
@@ -132,6 +148,18 @@ def test_a_start_a_little_off_ends_at_the_truth(case):
     shape = np.asarray(deviations)[-fit.model.num_shape_params :]
     assert np.all(shape <= 1.01 * np.asarray(fit.model.spread))
     assert shape[0] < 0.2 * float(fit.model.spread[0])
+
+
+@pytest.mark.slow
+def test_where_masks_say_little_a_body_can_be_held_nearer_to_rest(case):
+    fit, truth = case
+    side = fit.silhouettes.means[..., 0] < 80.0  # the half of each picture that says nothing
+    some = eqx.tree_at(lambda f: f.silhouettes.mask, fit, fit.silhouettes.mask & ~side).silhouettes
+    dofs = fit.model.body.skeleton.num_dofs
+    near = Estimate(truth[None, :dofs], truth[dofs:], truth[None, :dofs], truth[dofs:])
+    rest = fit.model.body.poses["rest"]
+    away = lambda weight: jnp.sum(((held(near, fit.model, some, weight).poses[0] - rest) / fit.spread) ** 2)
+    assert away(25.0) < 0.7 * away(1.0)
 
 
 def test_cells_cover_what_the_mask_does():

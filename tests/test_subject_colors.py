@@ -125,6 +125,20 @@ def test_only_what_is_unknown_and_never_moves_beside_furniture_is_calm():
     assert not BackgroundImage(picture, spread, np.zeros_like(known), "clip", furnished=True).calm.any()
 
 
+def test_furniture_stays_calm_where_a_background_that_is_learnt_again_knows_nothing():
+    spread, known = np.full((40, 60), 3.0, np.float32), np.ones((40, 60), bool)
+    known[:, 30:], spread[20:, 30:] = False, 6.0
+    first = BackgroundImage(np.zeros((40, 60, 3), np.uint8), spread, known, "clip", furnished=True)
+    left_out = np.ones_like(known)
+    left_out[:, 40:] = False  # where the body was believed to be, no sample tells how far colours vary
+    again = BackgroundImage(first.picture, np.full_like(spread, 3.0), left_out, "clip").filled(first)
+    assert again.furnished
+    assert again.known[:, :40].all()
+    assert not again.known[:, 40:].any()
+    assert again.calm[:16, 44:].all()
+    assert not again.calm[24:].any()
+
+
 def test_a_camera_that_shows_no_room_tells_nothing():
     rig, pictures, truth, _, pillars = who_hardly_moves(CAMERAS)
     unknown = {**pillars, 1: np.ones_like(pillars[1])}

@@ -47,9 +47,10 @@ from sogjax.search.search_energy import RestPrior
 
 _shaped = compiled_hastily(ShapeModel.shaped)
 
-UNDECIDED_REST = 0.03
-"""Weight of being near the rest pose (`RestPrior`), in units of the masks' area, where masks say nothing of what is
-unknown: a leg behind a table may be anywhere else."""
+UNDECIDED_REST, UNDECIDED_EDGES = 0.1, 5.0
+"""Where masks say nothing of what is unknown, the weight of being near the rest pose (`RestPrior`), in units of the
+masks' area, and how much more than elsewhere it counts beside the masks' edges: a leg behind a table may be anywhere,
+and lay on the table, or before the floor where masks took it for the room."""
 POSE_FOUND = 0.5
 """Least IoU of masks and silhouettes, the mean over the cameras. Good fits have 0.8 to 0.9."""
 
@@ -159,12 +160,14 @@ class Making:
         """
         recording, model, rig, best = self.recording, self.shape_model, self.rig, self.best
         examples, pictures = self.examples, self._pictures(progress, learnt, shared or SharedFrames())
-        if any(posed.undecided for posed in pictures):
+        undecided = any(posed.undecided for posed in pictures)
+        if undecided:
             share = float(np.mean([posed.mask_share() for posed in pictures]))
             terms = (*terms, RestPrior(UNDECIDED_REST * share))
         found = _found_poses(model.body, model, examples, pictures, rig, recording, terms, best, self.report, progress)
         self.report("shape")
-        estimate = _best_estimate(model, found, rig, terms, ways=1 if best is None else 2)
+        rest_weight = UNDECIDED_EDGES if undecided else 1.0
+        estimate = _best_estimate(model, found, rig, terms, 1 if best is None else 2, rest_weight)
         body = _shaped(model, estimate.shape_params)
         _check_fit(recording, body, estimate, found.pictures, rig, unchosen=best is not None and self.subject is None)
         return self.finished(found.pictures, estimate, found.rough, self.unsuitable(found.pictures, estimate))
@@ -302,14 +305,17 @@ def _found_poses(
     return _FoundPoses(some(pictures), some(views), some(ways), rough)
 
 
-def _best_estimate(model: ShapeModel, found: _FoundPoses, rig: Camera, terms: Terms, ways: int) -> Estimate:
+def _best_estimate(
+    model: ShapeModel, found: _FoundPoses, rig: Camera, terms: Terms, ways: int, rest_weight: float
+) -> Estimate:
     """Poses and shape fitted to the silhouettes, in so many ways, if found: that which agrees best with the masks.
 
     Rough silhouettes hardly tell front from back; the fitted body does.
     """
     silhouettes, views = silhouettes_of(found.pictures, rig), stack_views(found.views)
+    posed = lambda way: jnp.stack([poses[way] for poses in found.ways])
     estimates = [
-        estimate_shape(model, jnp.stack([poses[way] for poses in found.ways]), views, silhouettes, terms)
+        estimate_shape(model, posed(way), views, silhouettes, terms, rest_weight=rest_weight)
         for way in range(min(ways, *map(len, found.ways)))
     ]
     agrees = lambda estimate: overlap_of(_shaped(model, estimate.shape_params), estimate.poses, found.pictures, rig)

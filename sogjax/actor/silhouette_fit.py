@@ -262,16 +262,18 @@ def estimate_shape(
     silhouettes: Silhouettes,
     terms: Terms,
     max_iterations: tuple[int, int] = (CLIMB_ITERATIONS, MAX_ITERATIONS),
+    rest_weight: float = 1.0,
 ) -> Estimate:
     """The poses and the one shape that fit all masks best, from rough poses.
 
-    `views` and `silhouettes` have a leading axis for the poses; `max_iterations` are those of the climb and of the fit.
+    `views` and `silhouettes` have a leading axis for the poses; `max_iterations` are those of the climb and of the fit,
+    which weighs how far poses are from rest so many times as much as usual.
     """
     scales, num_poses = pose_scales(model.body.skeleton), poses.shape[0]
     start = jnp.concatenate([poses.reshape(-1), jnp.zeros(model.num_shape_params, poses.dtype)])
     with_shape = scales_with_shape(scales, num_poses, model.num_shape_params)
     start = _climb(model, start, num_poses, views, terms, with_shape, jnp.asarray(max_iterations[0]))
-    return _edges(model, start, silhouettes, max_iterations[1])
+    return _edges(model, start, silhouettes, max_iterations[1], rest_weight)
 
 
 def fit_edges(
@@ -281,8 +283,14 @@ def fit_edges(
     return _edges(model, jnp.append(near.poses, near.shape_params), silhouettes, max_iterations)
 
 
-def _edges(model: ShapeModel, start: Float[Array, "param"], silhouettes: Silhouettes, max_iterations: int) -> Estimate:
-    fit = SilhouetteFit(model, silhouettes, pose_spread(model.body))
+def _edges(
+    model: ShapeModel,
+    start: Float[Array, "param"],
+    silhouettes: Silhouettes,
+    max_iterations: int,
+    rest_weight: float = 1.0,
+) -> Estimate:
+    fit = SilhouetteFit(model, silhouettes, pose_spread(model.body) / rest_weight**0.5)
     params, deviations = fitted(fit, start, pose_scales(model.body.skeleton), max_iterations)
     return Estimate(*fit.split(params), *fit.split(deviations))
 
