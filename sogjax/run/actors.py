@@ -26,6 +26,7 @@ from sogjax.run.background import Background, learn_background
 from sogjax.run.build import color_space_and_radius, energy_terms
 from sogjax.run.clip import Clip
 from sogjax.run.example_frames import check_actors, with_examples
+from sogjax.run.example_people import person_name
 from sogjax.run.fingerprint import digest
 from sogjax.run.keypoint_actor import keypoint_actor, with_rough_poses
 from sogjax.run.recordings import body_named, check_scale, file_list
@@ -137,7 +138,16 @@ class ActorRequest:
 
     @classmethod
     def from_config(cls, recording: Recording, config: ActorConfig) -> "ActorRequest":
-        """One actor with the settings of `sogjax actor`."""
+        """One actor with the settings of `sogjax actor`.
+
+        Raises:
+            InputError: several people are to be found, and none of them is chosen.
+        """
+        if not recording.example_poses and (config.actors or 1) > 1:
+            people = [*map(person_name, range(config.actors or 1))]
+            if config.subject not in people:
+                given = "" if config.subject is None else f", not {config.subject}"
+                raise InputError(f"actors={config.actors}: choose one of {', '.join(people)} with subject=NAME{given}")
         images = ImagesConfig()
         clip = Clip(recording, recording.frames, images.depth)
         background = lambda: learn_background(clip, images.background)
