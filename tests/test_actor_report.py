@@ -95,6 +95,7 @@ def test_limbs_that_no_mask_shows_are_said():
     assert said is not None
     assert said.startswith(f"the {limb_names(made.body)[1]} of the actor may be anywhere")
     assert "background/CAMERA.jpg" in said
+    assert actor_report(replace(made, doubt=said), RIG).warnings[0] == said
 
 
 def test_limbs_whose_sides_have_other_colours_are_said():

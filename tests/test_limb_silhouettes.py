@@ -1,5 +1,7 @@
 """Limbs of example poses, searched by the edges of masks, beside others."""
 
+from types import SimpleNamespace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -8,9 +10,10 @@ from body_cases import shipped
 from drawn_scene import moved, standing
 from rig_cases import ring_rig
 
+from sogjax.actor import body_silhouettes, limb_silhouettes
 from sogjax.actor.body_silhouettes import WaysRound, upright_all_round
 from sogjax.actor.coverage import body_silhouette
-from sogjax.actor.limb_silhouettes import Everybody, with_limbs_found
+from sogjax.actor.limb_silhouettes import Everybody, _different, _SeenUnit, with_limbs_found
 from sogjax.actor.silhouette_fit import COARSE_CELLS, silhouettes_of
 from sogjax.actor.silhouettes import PosedPictures
 from sogjax.model.body import concatenate
@@ -22,6 +25,11 @@ pytestmark = pytest.mark.slow
 
 RIG = ring_rig(4, (320, 240), distance=3.5)
 HUMAN = shipped("human")
+
+
+def least(cost):
+    """The first way and the one that costs least."""
+    return [0, int(np.argmin(cost))]
 
 
 def hands_off(pose, truth):
@@ -74,8 +82,10 @@ def nose_off(pose, truth):
     return np.linalg.norm(places[0] - places[1])
 
 
-def test_a_pose_that_covers_the_masks_fits_better_than_turned_round():
+def test_a_pose_that_covers_the_masks_fits_better_than_turned_round(monkeypatch):
     truth = bent()
+    assert len(ways_of(truth, truth, upright_all_round(HUMAN, "z"))) == 2  # the pose, and where it is climbed to
+    monkeypatch.setattr(body_silhouettes, "HOPELESS", 10.0)
     (found, miss), *others = ways_of(truth, truth, upright_all_round(HUMAN, "z"))
     turned, turned_miss = others[-1]
     assert nose_off(found, truth) < 0.05 < nose_off(turned, truth)
@@ -127,3 +137,24 @@ def test_a_limb_in_somebody_elses_trunk_is_impossible_but_in_his_arm_not():
     np.testing.assert_array_equal(everybody.blobs(1), own + HUMAN.num_blobs)
     means = whole.posed_blobs(jnp.asarray(np.concatenate([start, beside]))).means
     assert Solid.of(whole).regardless_of(np.arange(whole.num_blobs)).impossibility(means) == 0.0
+
+
+@pytest.mark.parametrize("choose", [lambda _: least, lambda angles: lambda cost: _different(angles, cost)])
+@pytest.mark.parametrize("possible", [0.0, 0.1, 0.9])
+def test_ways_that_are_not_checked_would_not_be_chosen(monkeypatch, choose, possible):
+    rng = np.random.default_rng(7)
+    for count in (1, 16, 129, 512):
+        mismatches = rng.gamma(2.0, 0.1, count)
+        impossible = np.where(rng.random(count) < possible, 0.0, rng.random(count))
+        monkeypatch.setattr(limb_silhouettes, "_from_rest", lambda _, ways: np.zeros(len(ways)))
+        monkeypatch.setattr(limb_silhouettes, "_mismatches", lambda *_, known=mismatches: known)
+        checked = lambda _, ways, *__, known=impossible: known[ways[:, 0].astype(int)]
+        unit = SimpleNamespace(all_blobs=np.arange(3))
+        everybody = SimpleNamespace(impossibility=checked)
+        seen = _SeenUnit(everybody, 0, [np.zeros(1)], None, 0, unit)  # type: ignore[arg-type]
+        chosen = choose(rng.normal(0.0, 0.3, (count, 2)))
+        ways = np.arange(count, dtype=float)[:, None]
+        kept, costs = seen._chosen(ways, None, None, np.arange(1), chosen)  # type: ignore[arg-type]
+        everything = mismatches * (1.0 + impossible)
+        assert kept == chosen(everything)
+        np.testing.assert_allclose(costs[kept], everything[kept])

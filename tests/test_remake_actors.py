@@ -64,7 +64,7 @@ def raised(value):
     return value
 
 
-def remade(monkeypatch, made, begin=BEGUN):
+def remade(monkeypatch, made, begin=BEGUN, first=DOUBTFUL):
     """What comes of actors that are made as `made`, or that error; what is reported, and whose pose is asked for."""
     reported, asked, begun = [], [], []
 
@@ -77,7 +77,7 @@ def remade(monkeypatch, made, begin=BEGUN):
     monkeypatch.setattr(
         remake_actors, "find_initial_pose", lambda request, _: begun.append(request.actors) or raised(begin)
     )
-    found = remake_actors.remake_actors(request_of(), DOUBTFUL, NOTHING, pose_request(), (), reported.extend)
+    found = remake_actors.remake_actors(request_of(), first, NOTHING, pose_request(), (), reported.extend)
     assert asked[0] is NOTHING
     return found, reported, begun
 
@@ -103,6 +103,25 @@ def test_the_first_actors_hold_where_others_are_worse_or_none(monkeypatch, made,
     found, reported, _ = remade(monkeypatch, made, begin)
     assert found.actors is found.initial_pose is None
     assert not reported
+
+
+def of_sizes(*factors):
+    """Actors of which nothing is doubtful but the sizes."""
+    return Actors(tuple(map(of_size, factors)), doubts=("",) * len(factors))
+
+
+@pytest.mark.parametrize(
+    ("first", "made", "taken"),
+    [
+        ((1.2,), (0.8,), False),
+        ((0.7,), (1.0,), True),  # the first one was wrong
+        ((1.0, 0.8), (0.8, 1.0), True),  # who is first is chance
+        ((1.0, 0.8), (0.6, 1.0), False),
+    ],
+)
+def test_nobody_becomes_much_shorter_or_taller(monkeypatch, first, made, taken):
+    found, _, _ = remade(monkeypatch, of_sizes(*made), first=of_sizes(*first))
+    assert (found.actors is not None) == taken
 
 
 @pytest.mark.parametrize("record", [RemadeActors(), RemadeActors(UNLIKE, BEGUN)])

@@ -131,7 +131,7 @@ def test_furniture_stays_calm_where_a_background_that_is_learnt_again_knows_noth
     first = BackgroundImage(np.zeros((40, 60, 3), np.uint8), spread, known, "clip", furnished=True)
     left_out = np.ones_like(known)
     left_out[:, 40:] = False  # where the body was believed to be, no sample tells how far colours vary
-    again = BackgroundImage(first.picture, np.full_like(spread, 3.0), left_out, "clip").filled(first)
+    again = BackgroundImage(first.picture, np.full_like(spread, 3.0), left_out, "clip").filled(first).calm_as(first)
     assert again.furnished
     assert again.known[:, :40].all()
     assert not again.known[:, 40:].any()

@@ -34,7 +34,7 @@ APART = 0.25
 ITERATIONS = 15
 """Steps by which each of them is climbed."""
 AT_ONCE, CHECKED_AT_ONCE = 16, 128
-"""Ways that are compared in one step, and of which it is computed in one step how impossible they are."""
+"""Ways that are compared in one step, and that are checked in one step for being possible."""
 
 LEAST_GAIN = 0.05
 """Part of its cost by which another way to hold a unit must be better: masks are not that exact."""
@@ -170,11 +170,12 @@ class _SeenUnit:
         moved: Int[np.ndarray, "_blob"],
         choose: Callable[[Float[np.ndarray, "way"]], list[int]],
     ) -> tuple[list[int], Float[np.ndarray, "way"]]:
-        """The first of some ways and others that cost little, as is chosen, and what each way costs.
+        """Which ways are chosen by their costs, and these.
 
-        That is the mismatch of the body held so, with `REST`, up to twice as much where that is impossible, which is
-        computed in steps: of the first way and of those that fit best, until no other can cost as little as those that
-        are chosen. Others cost infinity. Blobs of the unit that are not `moved` may be anywhere.
+        A cost is the mismatch of the body held so, with `REST`, up to twice as much where that is impossible. What is
+        possible is checked in steps, the first way and those that fit best before others, until none of the others can
+        cost as little as those that are chosen; these cost infinity. Blobs of the unit that are not `moved` may be
+        anywhere. `choose` returns 0, for the first way, and then what costs least.
         """
         unsure = np.setdiff1d(self.unit.all_blobs, moved)
         twisted = np.asarray(_from_rest(self.body, jnp.asarray(ways)))

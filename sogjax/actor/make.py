@@ -47,10 +47,12 @@ from sogjax.search.search_energy import RestPrior
 
 _shaped = compiled_hastily(ShapeModel.shaped)
 
-UNDECIDED_REST, UNDECIDED_EDGES = 0.1, 5.0
-"""Where masks say nothing of what is unknown, the weight of being near the rest pose (`RestPrior`), in units of the
-masks' area, and how much more than elsewhere it counts beside the masks' edges: a leg behind a table may be anywhere,
-and lay on the table, or before the floor where masks took it for the room."""
+UNDECIDED_REST = 0.1
+"""Weight of being near the rest pose (`RestPrior`), in units of the masks' area, where masks say nothing of what is
+unknown: a leg behind a table may be anywhere else."""
+UNDECIDED_EDGES = 5.0
+"""How many times as much as elsewhere being near rest then counts beside the edges of masks: legs that never moved are
+the room to masks, which draws them to where masks say nothing, such as onto a table."""
 POSE_FOUND = 0.5
 """Least IoU of masks and silhouettes, the mean over the cameras. Good fits have 0.8 to 0.9."""
 
@@ -95,7 +97,7 @@ class MadeActor:
         return silhouettes * self.explained.get(name, 1.0)
 
     @property
-    def doubts(self) -> tuple[str, ...]:
+    def doubtful(self) -> tuple[str, ...]:
         """What is doubtful of it, one sentence each with the remedy."""
         return tuple(said for said in (self.doubt, self.unlike) if said is not None)
 
@@ -160,13 +162,12 @@ class Making:
         """
         recording, model, rig, best = self.recording, self.shape_model, self.rig, self.best
         examples, pictures = self.examples, self._pictures(progress, learnt, shared or SharedFrames())
-        undecided = any(posed.undecided for posed in pictures)
-        if undecided:
+        if any(posed.undecided for posed in pictures):
             share = float(np.mean([posed.mask_share() for posed in pictures]))
             terms = (*terms, RestPrior(UNDECIDED_REST * share))
         found = _found_poses(model.body, model, examples, pictures, rig, recording, terms, best, self.report, progress)
         self.report("shape")
-        rest_weight = UNDECIDED_EDGES if undecided else 1.0
+        rest_weight = UNDECIDED_EDGES if any(posed.undecided for posed in found.pictures) else 1.0
         estimate = _best_estimate(model, found, rig, terms, 1 if best is None else 2, rest_weight)
         body = _shaped(model, estimate.shape_params)
         _check_fit(recording, body, estimate, found.pictures, rig, unchosen=best is not None and self.subject is None)

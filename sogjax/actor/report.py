@@ -75,7 +75,7 @@ def actor_report(made: MadeActor, rig: CameraRig) -> ActorReport:
     before, after = bone_lengths(made.start), bone_lengths(made.body)
     bones = tuple(BoneChange(name, before[name], length) for name, length in after.items())
     warnings = (
-        *made.doubts,
+        *made.doubtful,
         *(warning for posed in made.pictures for warning in posed.warnings),
         *_poor_silhouettes(ious),
         *([] if (odd := odd_sentence(made.body, made.start)) is None else [odd]),

@@ -267,7 +267,7 @@ def estimate_shape(
     """The poses and the one shape that fit all masks best, from rough poses.
 
     `views` and `silhouettes` have a leading axis for the poses; `max_iterations` are those of the climb and of the fit,
-    which weighs how far poses are from rest so many times as much as usual.
+    which weighs how far poses are from rest so many times as much as usual; deviations are those of the usual weight.
     """
     scales, num_poses = pose_scales(model.body.skeleton), poses.shape[0]
     start = jnp.concatenate([poses.reshape(-1), jnp.zeros(model.num_shape_params, poses.dtype)])
@@ -290,8 +290,11 @@ def _edges(
     max_iterations: int,
     rest_weight: float = 1.0,
 ) -> Estimate:
-    fit = SilhouetteFit(model, silhouettes, pose_spread(model.body) / rest_weight**0.5)
-    params, deviations = fitted(fit, start, pose_scales(model.body.skeleton), max_iterations)
+    spread, scales = pose_spread(model.body), pose_scales(model.body.skeleton)
+    fit = SilhouetteFit(model, silhouettes, spread / rest_weight**0.5)
+    params, deviations = fitted(fit, start, scales, max_iterations)
+    if rest_weight != 1.0:
+        _, deviations = fitted(SilhouetteFit(model, silhouettes, spread), params, scales, 0)
     return Estimate(*fit.split(params), *fit.split(deviations))
 
 

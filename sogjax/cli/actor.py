@@ -68,22 +68,30 @@ def run(config: ActorConfig, name: str | None = None) -> Path:
         say(f"note: {note}")
     print(out)
     print(folder / PAGE)
-    print(f"\nverdict: {actor_verdict(report.mean_iou, float(made.body.explained), made.doubts, len(report.warnings))}")
+    others = len(report.warnings) - len(made.doubtful)
+    print(f"\nverdict: {actor_verdict(report.mean_iou, float(made.body.explained), made.doubtful, others)}")
     return out
 
 
-def actor_verdict(mean_iou: float, explained: float, doubts: Sequence[str], num_warnings: int) -> str:
-    """What is thought of an actor, from what its own example poses show: the first two are parts of 1."""
-    found = [*doubts]
-    if mean_iou < GOOD_IOU:
+def actor_verdict(mean_iou: float, explained: float, doubtful: Sequence[str], num_others: int) -> str:
+    """What is thought of an actor, from what its own example poses show.
+
+    Args:
+        mean_iou: how well masks and silhouettes agree, 0 to 1.
+        explained: how much of it shows its own colours, 0 to 1.
+        doubtful: what is doubtful of it, one sentence each.
+        num_others: how many other warnings its report has.
+    """
+    found = [*doubtful]
+    if mean_iou < GOOD_IOU and not doubtful:
         found.append(f"silhouettes agree to {mean_iou:.0%} only (80 % and more is usual): look at its report")
     if explained < GOOD_COLORS:
         found.append(
             f"its example poses explain {explained:.0%} of it only (60 to 75 % is usual): look at the colours "
             "in its report"
         )
-    if num_warnings:
-        found.append(f"{counted(num_warnings, 'warning')} in its report")
+    if num_others:
+        found.append(f"{counted(num_others, 'more warning' if doubtful else 'warning')} in its report")
     return "; ".join(found) or f"looks right (its example poses explain {explained:.0%} of it)"
 
 

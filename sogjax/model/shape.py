@@ -18,8 +18,8 @@ hair add to them."""
 SIZE_SPREAD = 0.2
 """Expected deviation of the scale factors (logarithm) of places across a bone and of sizes, which clothes change."""
 WHOLE_SPREAD = 0.15
-"""Expected deviation of the whole body's scale factor (logarithm): twice as much as grown-ups differ. Masks that show
-somebody tell it far better; those that say nothing of most of him must not make a child or a giant of him."""
+"""Expected deviation of the whole body's scale factor (logarithm): three times as much as grown-ups differ. Masks
+that show somebody tell it far better; those that say nothing of most of him must not make a child or a giant of him."""
 USUAL, BEYOND = 1.5, 100.0
 """Within how many expected deviations the sizes of a body are, and what the square of each further one counts: of 200
 actors nine had a size beyond, six of them feet with their shadows."""

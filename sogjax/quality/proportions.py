@@ -41,7 +41,7 @@ def odd_size(body: Body) -> float | None:
     return None if size is None or bounds.least_size <= size <= bounds.most_size else size
 
 
-def size_beside(like: Body | None, body: Body) -> float | None:
+def size_beside(like: Body, body: Body) -> float | None:
     """How many times as long as another body's the bones of a body are; None: they cannot be compared."""
     ratios = _ratios(like, body)
     return float(np.median([*ratios.values()])) if len(ratios) >= FEWEST else None

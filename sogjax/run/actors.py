@@ -246,7 +246,7 @@ def actors_of_pictures(request: ActorRequest) -> list[MadeActor]:
     if shared is not None:
         made = made_together(makings, made, _of_everybody(recording, made, learnt, shared))
     for making, actor in zip(makings, made, strict=True):
-        for said in actor.doubts:
+        for said in actor.doubtful:
             making.report(f"warning: {said}")
     return made
 

@@ -52,11 +52,11 @@ class RelearntBackground:
 
     @property
     def whole(self) -> Background | None:
-        """What is known of the empty scene by now; None: no more than before."""
+        """What is known of the empty scene by now, and of furniture from the first; None: no more than before."""
         if self.background is None or self.first is None:
             return None
         pairs = zip(self.background.required(), self.first.required(), strict=True)
-        return Background(tuple(again.filled(before) for again, before in pairs))
+        return Background(tuple(again.filled(before).calm_as(before) for again, before in pairs))
 
     def in_setup(self, setup: Setup) -> Setup:
         """The setup with this background where something is known of it, and with its own elsewhere."""

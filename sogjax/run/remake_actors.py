@@ -99,12 +99,13 @@ def remake_actors(
 def _why_worse(start: Body, first: Actors, again: Actors) -> str | None:
     """Why actors that were made again are worse than the first; None: nothing says so.
 
-    One of two very different sizes of somebody is wrong: the one that is farther from the starting body's.
+    Of two very different sizes of somebody one is wrong: that which is farther from the starting body's. Several people
+    are told apart by their sizes.
     """
     if sum(map(bool, again.doubts)) > sum(map(bool, first.doubts)):
         return "the sizes of the new ones are more doubtful"
     sizes = [sorted(size_beside(start, body) or 1.0 for body in actors.bodies) for actors in (first, again)]
-    for before, after in zip(*sizes, strict=False):
-        if abs(np.log(after)) > abs(np.log(before)) + SAME_SIZE:
-            return f"the bones of one would be {after / before:.0%} as long now"
+    for before, after in zip(*np.log(sizes), strict=True):
+        if abs(after - before) > SAME_SIZE and abs(after) > abs(before):
+            return f"somebody's bones would be {np.exp(after - before):.0%} as long as the first time"
     return None

@@ -64,14 +64,20 @@ class BackgroundImage:
         return replace(cls.from_photograph(plate.picture), known=plate.known)
 
     def filled(self, other: "BackgroundImage") -> "BackgroundImage":
-        """With what another one knows where this one does not, and how far colours vary where neither does."""
+        """With what another one knows where this one does not."""
         size = (self.known.shape[1], self.known.shape[0])
         resized = lambda values: cv2.resize(values, size, interpolation=cv2.INTER_LINEAR)
         there = ~self.known & (resized(other.known.astype(np.float32)) > 0.99)
         picture = np.where(there[..., None], resized(other.picture), self.picture)
-        spread = np.where(self.known, self.spread, resized(other.spread.astype(np.float32)))
-        furnished = self.furnished or other.furnished
-        return replace(self, picture=picture, spread=spread, known=self.known | there, furnished=furnished)
+        spread = np.where(there, resized(other.spread.astype(np.float32)), self.spread)
+        return replace(self, picture=picture, spread=spread, known=self.known | there)
+
+    def calm_as(self, first: "BackgroundImage") -> "BackgroundImage":
+        """With what another one of this size, which was learnt from all of each picture, tells of furniture.
+
+        Where this one knows nothing, that one says how far colours vary.
+        """
+        return replace(self, spread=np.where(self.known, self.spread, first.spread), furnished=first.furnished)
 
     @property
     def calm(self) -> Bool[np.ndarray, "_h _w"]:
