@@ -22,6 +22,7 @@ from sogjax.scene.background import BackgroundImage
 
 SURE, DOUBTFUL = Actors((DOG,), doubts=("",)), Actors((DOG,), doubts=("too little is seen",))
 UNLIKE = Actors((DOG,), doubts=("",), unlike=("a paw was not found",))
+UNSUITED = replace(DOUBTFUL, unsuited=1)
 BEGUN = InitialPose(3, np.zeros(DOG.skeleton.num_dofs, np.float32), "example frames")
 NOTHING = Background((BackgroundImage.nothing(4, 4),))
 FRAME = ExamplePose("frame_3", None, {}, {}, None, 3)
@@ -93,6 +94,7 @@ def test_tracking_begins_anew_with_actors_that_are_no_more_doubtful(monkeypatch,
     ("made", "begin"),
     [
         (Actors((DOG, DOG), doubts=("one", "two")), BEGUN),
+        (UNSUITED, BEGUN),
         (replace(DOUBTFUL, bodies=(of_size(0.7),)), BEGUN),
         (replace(SURE, bodies=(of_size(1.4),)), BEGUN),
         (InputError("nobody is seen"), BEGUN),
@@ -124,7 +126,7 @@ def test_nobody_becomes_much_shorter_or_taller(monkeypatch, first, made, taken):
     assert (found.actors is not None) == taken
 
 
-@pytest.mark.parametrize("record", [RemadeActors(), RemadeActors(UNLIKE, BEGUN)])
+@pytest.mark.parametrize("record", [RemadeActors(), RemadeActors(UNLIKE, BEGUN), RemadeActors(UNSUITED, BEGUN)])
 def test_what_was_made_again_is_kept(tmp_path, record):
     assert RemadeActors.load(tmp_path) is None
     record.save(tmp_path)
@@ -133,7 +135,8 @@ def test_what_was_made_again_is_kept(tmp_path, record):
     assert RemadeActors.load(tmp_path) is None  # it was stopped before all was kept
     assert (kept.actors is None) == (record.actors is None)
     if record.actors is not None:
-        assert (kept.actors.doubts, kept.actors.unlike) == (UNLIKE.doubts, UNLIKE.unlike)
+        said = lambda actors: (actors.doubts, actors.unlike, actors.unsuited)
+        assert said(kept.actors) == said(record.actors)
         assert (kept.initial_pose.frame, kept.initial_pose.source) == (BEGUN.frame, BEGUN.source)
 
 

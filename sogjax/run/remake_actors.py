@@ -102,7 +102,8 @@ def _why_worse(start: Body, first: Actors, again: Actors) -> str | None:
     Of two very different sizes of somebody one is wrong: that which is farther from the starting body's. Several people
     are told apart by their sizes.
     """
-    if sum(map(bool, again.doubts)) > sum(map(bool, first.doubts)):
+    worse = lambda actors: (actors.unsuited, sum(map(bool, actors.doubts)))
+    if worse(again) > worse(first):
         return "the sizes of the new ones are more doubtful"
     sizes = [sorted(size_beside(start, body) or 1.0 for body in actors.bodies) for actors in (first, again)]
     for before, after in zip(*np.log(sizes), strict=True):
