@@ -11,6 +11,7 @@ from sogjax.actor.frame_choice import SeenShape, seen_shape, subject_cubes
 from sogjax.actor.people import PersonSeen, _needed, matched, people_apart, runs_by_place, told_apart, unlike
 from sogjax.io.example_poses import ExamplePose
 from sogjax.io.pose_description import PoseDescription
+from sogjax.run.example_frames import _found_otherwise, _suit, seen_shapes
 from sogjax.run.example_people import chosen_frames, examples_of_masks, told_by_name, too_few_apart
 from sogjax.run.sampled_masks import SampledMasks
 from sogjax.scene.cells import CellGrid
@@ -177,6 +178,28 @@ def sampled(clip, first=0):
         cameras=CAMERAS,
         grids=tuple(CellGrid(*SIZE, 1) for _ in CAMERAS),
     )
+
+
+def screened():
+    """Somebody who walks before six cameras: one sees a screen, two others his trousers before it, in its colour."""
+    seen = sampled([[(box(at * ALONG), RED)] for at in (-0.4, 0.0, 0.4)])
+    for masks in seen.masks:
+        masks[0][:] = False
+        for k in (1, 3):
+            rows = np.flatnonzero(masks[k].any(axis=1))
+            masks[k][rows[len(rows) // 2] : rows[2 * len(rows) // 3]] = False
+    return seen
+
+
+def test_who_is_hidden_from_some_cameras_is_seen_by_the_others():
+    seen = screened()
+    assert not _suit(seen_shapes(seen, "z"))
+    found = next(filter(_suit, _found_otherwise(seen, "z", False)))
+    assert [shape.num_bodies for shape in found] == [1, 1, 1]
+    assert min(shape.height for shape in found) > 1.5
+    assert [*_found_otherwise(seen, "z", True)] == []  # somebody is seen, but not apart from others
+    few = replace(seen, masks=[{k: masks[k] for k in (1, 2, 3, 4)} for masks in seen.masks])
+    assert [*_found_otherwise(replace(few, cameras={k: CAMERAS[k] for k in (1, 2, 3, 4)}), "z", False)] == []
 
 
 def passing(count):

@@ -73,17 +73,19 @@ def seen_shape(
     cube: Cube,
     up: Float[np.ndarray, "3"],
     least_shown: float = 0.0,
+    misses: int = 0,
 ) -> SeenShape | None:
     """What the silhouettes of one frame tell; None if they do not meet anywhere.
 
     The hull is what this share of the masks show at least: furniture that no camera knows the room behind is in none.
+    So many masks more than usual may lack a part of it.
 
     By camera, `masks` say what is not the background and `unknown` where nothing is known of it; the cameras are those
     of pictures of the masks' size. The subject is in the cube.
     """
     pixels = {k: voxel_pixels(cube, cameras[k], mask.shape) for k, mask in masks.items()}
     seen = np.sum([pixels[k].shows(widened(mask)) for k, mask in masks.items()], axis=0) >= least_shown * len(masks)
-    connected: Any = label((hull_within(masks, unknown, pixels) & seen).reshape(VOXELS, VOXELS, VOXELS))
+    connected: Any = label((hull_within(masks, unknown, pixels, misses) & seen).reshape(VOXELS, VOXELS, VOXELS))
     labels, count = connected
     volumes = np.bincount(labels.ravel())[1:]
     if not count:
@@ -103,12 +105,15 @@ def seen_shape(
 
 
 def hull_within(
-    masks: Mapping[int, Mask], unknown: Mapping[int, Mask], pixels: Mapping[int, VoxelPixels]
+    masks: Mapping[int, Mask], unknown: Mapping[int, Mask], pixels: Mapping[int, VoxelPixels], more: int = 0
 ) -> Bool[np.ndarray, "voxel"]:
-    """The voxels that (almost) no camera rules out, of those in enough pictures: beside a picture all is allowed."""
-    misses = np.sum([~pixels[k].hits(widened(mask | unknown[k])) for k, mask in masks.items()], axis=0)
+    """The voxels that (almost) no camera rules out, of those in enough pictures: beside a picture all is allowed.
+
+    Of many cameras one may, and so many `more`.
+    """
+    ruling_out = np.sum([~pixels[k].hits(widened(mask | unknown[k])) for k, mask in masks.items()], axis=0)
     shown = np.sum([pixels[k].inside for k in masks], axis=0)
-    return (misses <= (1 if len(masks) >= MANY else 0)) & (shown >= max(2, LEAST_PARTS * len(masks)))
+    return (ruling_out <= (1 + more if len(masks) >= MANY else 0)) & (shown >= max(2, LEAST_PARTS * len(masks)))
 
 
 def _part_shown(

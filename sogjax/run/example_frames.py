@@ -1,7 +1,7 @@
 """Example poses from the frames of the videos, where a recording has none."""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,6 +26,7 @@ from sogjax.run.example_people import (
 from sogjax.run.sampled_masks import SampledMasks, masks_of_samples
 from sogjax.run.terminal import say
 from sogjax.scene.background import BackgroundImage
+from sogjax.scene.visual_hull import MANY
 
 NUM_TRIED, NUM_EXAMPLES = 8, 5
 """Frames in which the pose is looked for, and those of them that the actor is made of."""
@@ -39,6 +40,8 @@ LEAST_KNOWN, MOSTLY_KNOWN = 0.2, 0.95
 """Part of the silhouettes where the background must be, and had better be, known."""
 LEAST_SHOWN = 0.25
 """Share of the masks that must show a place for it to be the subject's."""
+BEHIND = 1
+"""Masks more than usual that may lack a part of somebody whom no frame shows otherwise."""
 FEW_CAMERAS = 4
 """Fewer of them see too little of a body."""
 
@@ -138,16 +141,31 @@ def _person_examples(clip: Clip, learnt: Sequence[BackgroundImage]) -> tuple[Exa
     recording, seen = clip.recording, masks_of_samples(clip, learnt)
     shapes = seen_shapes(seen, recording.up)
     problem = unsuitable(shapes, lambda: num_people_seen(clip, learnt), has_plates(recording))
-    if problem is not None and seen.undecided:
-        decided = seen_shapes(seen.decided(axis_vector(recording.up)), recording.up)
-        if unsuitable(decided, lambda: most_seen([shape.num_bodies for shape in decided])) is None:
-            shapes, problem = decided, None
     if problem is not None:
-        raise _no_examples(recording, problem)
+        found = next(filter(_suit, _found_otherwise(seen, recording.up, bool(shapes))), None)
+        if found is None:
+            raise _no_examples(recording, problem)
+        shapes = found
     chosen = spread_choice([shape for shape in shapes if shape.agreement > AGREEING], NUM_TRIED)
     _say_chosen([shape.frame for shape in chosen], len(shapes))
     say(f"the actor would gain most from {most_helpful(chosen, len(recording.rig.names), has_plates(recording))}")
     return tuple(ExamplePose(frame_name(shape.frame), None, {}, {}, None, shape.frame) for shape in chosen)
+
+
+def _suit(shapes: Sequence[SeenShape]) -> bool:
+    """Whether example poses of one person can be taken from frames."""
+    return unsuitable(shapes, lambda: most_seen([shape.num_bodies for shape in shapes])) is None
+
+
+def _found_otherwise(seen: SampledMasks, up: str, somebody: bool) -> Iterator[list[SeenShape]]:
+    """What the frames show where colours decide what is unknown, and then, if not `somebody`, who is hidden from some.
+
+    What hides him from them stands behind him in others, and may have the colours of his clothes.
+    """
+    if seen.undecided:
+        yield seen_shapes(seen.decided(axis_vector(up)), up)
+    if not somebody and len((apart := seen.where_seen()).cameras) >= MANY:
+        yield seen_shapes(apart.decided(axis_vector(up)), up, BEHIND)
 
 
 def _people_examples(clip: Clip, learnt: Sequence[BackgroundImage], actors: int) -> tuple[ExamplePose, ...]:
@@ -227,11 +245,11 @@ def most_helpful(chosen: Sequence[SeenShape], num_cameras: int, plates: bool = F
     return "pictures of a T-pose, of bent elbows and of a squat (example_poses/POSE/CAMERA.jpg)"
 
 
-def seen_shapes(seen: SampledMasks, up: str) -> list[SeenShape]:
-    """What frames spread over the videos show, where somebody is seen."""
+def seen_shapes(seen: SampledMasks, up: str, misses: int = 0) -> list[SeenShape]:
+    """What frames spread over the videos show, where somebody is seen; `misses` as in `seen_shape`."""
     cubes = subject_cubes(seen.masks, seen.cameras)
     shapes = [
-        seen_shape(frame, masks, seen.unknown, seen.cameras, cube, axis_vector(up), LEAST_SHOWN)
+        seen_shape(frame, masks, seen.unknown, seen.cameras, cube, axis_vector(up), LEAST_SHOWN, misses)
         for frame, masks, cube in zip(seen.frames, seen.masks, cubes, strict=True)
         if cube is not None
     ]

@@ -32,6 +32,8 @@ FOREGROUND = 0.5
 """Log odds above which a cell counts as foreground."""
 LEARNT_FROM = 8
 """So many of the frames show the people's colours."""
+SELDOM = 0.5
+"""Part of the frames in which a camera shows something that is not the background, or it hardly ever shows anybody."""
 SEAM = 5
 """Cells: a narrower gap in what is not the background lies between what was told from it in two ways."""
 
@@ -60,6 +62,18 @@ class SampledMasks:
     def undecided(self) -> bool:
         """Whether anything is unknown."""
         return any(mask.any() for mask in self.unknown.values())
+
+    def where_seen(self) -> "SampledMasks":
+        """The same without the cameras that hardly ever show anybody: something stands before them."""
+        shown = [k for k in self.cameras if np.mean([masks[k].any() for masks in self.masks]) > SELDOM]
+        return replace(
+            self,
+            masks=[{k: masks[k] for k in shown} for masks in self.masks],
+            pictures=[{k: pictures[k] for k in shown} for pictures in self.pictures],
+            unknown={k: self.unknown[k] for k in shown},
+            calm={k: self.calm[k] for k in shown},
+            cameras={k: self.cameras[k] for k in shown},
+        )
 
     def decided(self, up: Float[np.ndarray, "3"]) -> "SampledMasks":
         """The same, in which colours tell the people from the room where nothing is known.
