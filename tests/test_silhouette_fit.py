@@ -65,7 +65,9 @@ def case():
 def held(near, model, silhouettes, weight):
     """The fit near an estimate, with so much weight of being near rest."""
     start = jnp.append(near.poses, near.shape_params)
-    return silhouette_fit._edges(model, start, silhouettes, MAX_ITERATIONS, weight)
+    return silhouette_fit._edges(
+        model, start, silhouettes, MAX_ITERATIONS, np.full(len(near.poses[0]), weight, np.float32)
+    )
 
 
 def moved(params, fit):

@@ -32,13 +32,18 @@ def doubt_of(body: Body, poses: Float[Array, "pose dof"], pictures: Sequence[Pos
     )
 
 
+def hardly_shown(body: Body, shown: Bool[np.ndarray, "blob"]) -> Bool[np.ndarray, "limb"]:
+    """Of which limbs too little is among the blobs that some mask shows."""
+    members = limb_blobs(body)
+    return (members & shown).sum(axis=1) < LEAST_SHOWN * members.sum(axis=1)
+
+
 def unseen_limbs(body: Body, shown: Bool[np.ndarray, "blob"], pictures: Sequence[PosedPictures]) -> str | None:
     """Of which limbs the pictures show too little, with the remedy; None: they show enough of all.
 
     `shown` are the blobs that some mask shows.
     """
-    members = limb_blobs(body)
-    little = (members & shown).sum(axis=1) < LEAST_SHOWN * members.sum(axis=1)
+    little = hardly_shown(body, shown)
     if not little.any():
         return None
     names = " and ".join(name for name, less in zip(limb_names(body), little, strict=True) if less)

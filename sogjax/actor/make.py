@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from sogjax.actor.colors import all_samples, colored, colors_of, joined_samples
-from sogjax.actor.doubts import doubt_of, unlike_sides, unseen_limbs
+from sogjax.actor.doubts import doubt_of, hardly_shown, unlike_sides, unseen_limbs
 from sogjax.actor.limb_colors import agreed_samples
 from sogjax.actor.posed_examples import (
     Progress,
@@ -40,6 +40,7 @@ from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera
 from sogjax.model.compiled import compiled_hastily
+from sogjax.model.limbs import limbs
 from sogjax.model.rotation import world_from_upright
 from sogjax.model.shape import ShapeModel
 from sogjax.scene.background import BackgroundImage
@@ -51,8 +52,8 @@ UNDECIDED_REST = 0.1
 """Weight of being near the rest pose (`RestPrior`), in units of the masks' area, where masks say nothing of what is
 unknown: a leg behind a table may be anywhere else."""
 UNDECIDED_EDGES = 5.0
-"""How many times as much as elsewhere being near rest then counts beside the edges of masks: legs that never moved are
-the room to masks, which draws them to where masks say nothing, such as onto a table."""
+"""How many times as much as usual it then counts, beside the edges of masks, that limbs are near rest which hardly any
+mask shows: legs that never moved are the room to masks, which draws them onto a table, where these say nothing."""
 POSE_FOUND = 0.5
 """Least IoU of masks and silhouettes, the mean over the cameras. Good fits have 0.8 to 0.9."""
 
@@ -167,11 +168,22 @@ class Making:
             terms = (*terms, RestPrior(UNDECIDED_REST * share))
         found = _found_poses(model.body, model, examples, pictures, rig, recording, terms, best, self.report, progress)
         self.report("shape")
-        rest_weight = UNDECIDED_EDGES if any(posed.undecided for posed in found.pictures) else 1.0
-        estimate = _best_estimate(model, found, rig, terms, 1 if best is None else 2, rest_weight)
+        estimate = _best_estimate(model, found, rig, terms, 1 if best is None else 2, self._rest_weights(found))
         body = _shaped(model, estimate.shape_params)
         _check_fit(recording, body, estimate, found.pictures, rig, unchosen=best is not None and self.subject is None)
         return self.finished(found.pictures, estimate, found.rough, self.unsuitable(found.pictures, estimate))
+
+    def _rest_weights(self, found: "_FoundPoses") -> Float[np.ndarray, "dof"]:
+        """How many times as much as usual it counts that each degree of freedom is near rest: `UNDECIDED_EDGES`."""
+        body, rig = self.shape_model.body, self.rig
+        weights = np.ones(body.skeleton.num_dofs, np.float32)
+        if any(posed.undecided for posed in found.pictures):
+            pairs = zip(found.pictures, found.ways, strict=True)
+            samples = [all_samples(body, colored_views(posed, rig, ways[0])) for posed, ways in pairs]
+            shown = colors_of(body, joined_samples(samples), self.color_space).shown
+            for limb, little in zip(limbs(body.skeleton), hardly_shown(body, shown), strict=True):
+                weights[limb] = UNDECIDED_EDGES if little else 1.0
+        return weights
 
     def _pictures(
         self, progress: Progress, learnt: Sequence[BackgroundImage] | None, shared: SharedFrames
@@ -307,7 +319,12 @@ def _found_poses(
 
 
 def _best_estimate(
-    model: ShapeModel, found: _FoundPoses, rig: Camera, terms: Terms, ways: int, rest_weight: float
+    model: ShapeModel,
+    found: _FoundPoses,
+    rig: Camera,
+    terms: Terms,
+    ways: int,
+    rest_weights: Float[np.ndarray, "dof"],
 ) -> Estimate:
     """Poses and shape fitted to the silhouettes, in so many ways, if found: that which agrees best with the masks.
 
@@ -316,7 +333,7 @@ def _best_estimate(
     silhouettes, views = silhouettes_of(found.pictures, rig), stack_views(found.views)
     posed = lambda way: jnp.stack([poses[way] for poses in found.ways])
     estimates = [
-        estimate_shape(model, posed(way), views, silhouettes, terms, rest_weight=rest_weight)
+        estimate_shape(model, posed(way), views, silhouettes, terms, rest_weights=rest_weights)
         for way in range(min(ways, *map(len, found.ways)))
     ]
     agrees = lambda estimate: overlap_of(_shaped(model, estimate.shape_params), estimate.poses, found.pictures, rig)

@@ -262,18 +262,18 @@ def estimate_shape(
     silhouettes: Silhouettes,
     terms: Terms,
     max_iterations: tuple[int, int] = (CLIMB_ITERATIONS, MAX_ITERATIONS),
-    rest_weight: float = 1.0,
+    rest_weights: Float[np.ndarray, "dof"] | None = None,
 ) -> Estimate:
     """The poses and the one shape that fit all masks best, from rough poses.
 
     `views` and `silhouettes` have a leading axis for the poses; `max_iterations` are those of the climb and of the fit,
-    which weighs how far poses are from rest so many times as much as usual; deviations are those of the usual weight.
+    for which being near rest counts so many times as much as usual, by degree of freedom; deviations are as usual.
     """
     scales, num_poses = pose_scales(model.body.skeleton), poses.shape[0]
     start = jnp.concatenate([poses.reshape(-1), jnp.zeros(model.num_shape_params, poses.dtype)])
     with_shape = scales_with_shape(scales, num_poses, model.num_shape_params)
     start = _climb(model, start, num_poses, views, terms, with_shape, jnp.asarray(max_iterations[0]))
-    return _edges(model, start, silhouettes, max_iterations[1], rest_weight)
+    return _edges(model, start, silhouettes, max_iterations[1], rest_weights)
 
 
 def fit_edges(
@@ -288,13 +288,16 @@ def _edges(
     start: Float[Array, "param"],
     silhouettes: Silhouettes,
     max_iterations: int,
-    rest_weight: float = 1.0,
+    rest_weights: Float[np.ndarray, "dof"] | None = None,
 ) -> Estimate:
     spread, scales = pose_spread(model.body), pose_scales(model.body.skeleton)
-    fit = SilhouetteFit(model, silhouettes, spread / rest_weight**0.5)
-    params, deviations = fitted(fit, start, scales, max_iterations)
-    if rest_weight != 1.0:
-        _, deviations = fitted(SilhouetteFit(model, silhouettes, spread), params, scales, 0)
+    fit = SilhouetteFit(model, silhouettes, spread)
+    if rest_weights is None or np.all(rest_weights == 1.0):
+        params, deviations = fitted(fit, start, scales, max_iterations)
+    else:
+        held = SilhouetteFit(model, silhouettes, spread / np.sqrt(rest_weights))
+        params, _ = fitted(held, start, scales, max_iterations)
+        _, deviations = fitted(fit, params, scales, 0)
     return Estimate(*fit.split(params), *fit.split(deviations))
 
 
