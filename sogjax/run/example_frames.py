@@ -158,13 +158,15 @@ def _suit(shapes: Sequence[SeenShape]) -> bool:
 
 
 def _found_otherwise(seen: SampledMasks, up: str, somebody: bool) -> Iterator[list[SeenShape]]:
-    """What the frames show where colours decide what is unknown, and then, if not `somebody`, who is hidden from some.
+    """What the frames show where colours decide what is unknown, and then to those cameras that show anybody at all.
 
-    What hides him from them stands behind him in others, and may have the colours of his clothes.
+    What hides him from the others stands behind him in some, and may have the colours of his clothes. Where all cameras
+    show `somebody`, who is only not apart from others or the room, nothing more is tried.
     """
     if seen.undecided:
         yield seen_shapes(seen.decided(axis_vector(up)), up)
-    if not somebody and len((apart := seen.where_seen()).cameras) >= MANY:
+    apart = seen.where_seen()
+    if len(apart.cameras) >= MANY and (not somebody or len(apart.cameras) < len(seen.cameras)):
         yield seen_shapes(apart.decided(axis_vector(up)), up, BEHIND)
 
 
