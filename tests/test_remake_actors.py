@@ -22,7 +22,7 @@ from sogjax.scene.background import BackgroundImage
 
 SURE, DOUBTFUL = Actors((DOG,), doubts=("",)), Actors((DOG,), doubts=("too little is seen",))
 UNLIKE = Actors((DOG,), doubts=("",), unlike=("a paw was not found",))
-UNSUITED = replace(DOUBTFUL, unsuited=1)
+UNSUITED = replace(DOUBTFUL, overlap=0.7)
 BEGUN = InitialPose(3, np.zeros(DOG.skeleton.num_dofs, np.float32), "example frames")
 NOTHING = Background((BackgroundImage.nothing(4, 4),))
 FRAME = ExamplePose("frame_3", None, {}, {}, None, 3)
@@ -107,6 +107,12 @@ def test_the_first_actors_hold_where_others_are_worse_or_none(monkeypatch, made,
     assert not reported
 
 
+def test_of_two_that_hardly_suit_the_new_ones_are_taken_unless_they_suit_less(monkeypatch):
+    first = replace(DOUBTFUL, overlap=0.72)
+    assert remade(monkeypatch, UNSUITED, first=first)[0].actors is UNSUITED
+    assert remade(monkeypatch, replace(UNSUITED, overlap=0.6), first=first)[0].actors is None
+
+
 def of_sizes(*factors):
     """Actors of which nothing is doubtful but the sizes."""
     return Actors(tuple(map(of_size, factors)), doubts=("",) * len(factors))
@@ -135,7 +141,7 @@ def test_what_was_made_again_is_kept(tmp_path, record):
     assert RemadeActors.load(tmp_path) is None  # it was stopped before all was kept
     assert (kept.actors is None) == (record.actors is None)
     if record.actors is not None:
-        said = lambda actors: (actors.doubts, actors.unlike, actors.unsuited)
+        said = lambda actors: (actors.doubts, actors.unlike, actors.overlap)
         assert said(kept.actors) == said(record.actors)
         assert (kept.initial_pose.frame, kept.initial_pose.source) == (BEGUN.frame, BEGUN.source)
 

@@ -12,13 +12,14 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from sogjax.actor.make import MadeActor, Making, subjects_of
+from sogjax.actor.posed_examples import overlap_of
 from sogjax.actor.silhouettes import PosedPictures, SharedFrames, load_pictures
 from sogjax.actor.together import made_together
 from sogjax.energy.term import Terms
 from sogjax.errors import InputError
 from sogjax.io.actor_file import load_body, save_body
 from sogjax.io.background_cache import background_origin
-from sogjax.io.npz_file import int_array, read_npz, save_npz, text_array
+from sogjax.io.npz_file import float_array, read_npz, save_npz, text_array
 from sogjax.io.recording import Recording
 from sogjax.io.source import fingerprint
 from sogjax.model.body import Body
@@ -63,8 +64,8 @@ class Actors:
     """Why each may be of the wrong sizes; "" where nothing says so. None at all: nothing does."""
     unlike: tuple[str, ...] = ()
     """Which limbs of each were not found in the example poses; "" and none at all as for `doubts`."""
-    unsuited: int = 0
-    """How many were made of frames that hardly suit them: all their sizes may be wrong, not those of a limb."""
+    overlap: float = 1.0
+    """How well masks and body agree (mean IoU) in the frames that they are made of, of the one of whom it is least."""
 
     def save(self, folder: Path) -> None:
         """Keep them exactly in a run's folder; actor files hold rounded colours."""
@@ -76,7 +77,7 @@ class Actors:
             arrays |= {f"known_{k}": known.pose, f"where_{k}": np.array([known.frame, known.agreement])}
         for kind, sentences in (("doubt", self.doubts), ("unlike", self.unlike)):
             arrays |= {f"{kind}_{k}": np.array(sentence) for k, sentence in enumerate(sentences)}
-        save_npz(folder / FILE, arrays | {"unsuited": np.array(self.unsuited)})
+        save_npz(folder / FILE, arrays | {"overlap": np.array(self.overlap)})
 
     @classmethod
     def load(cls, folder: Path) -> "Actors | None":
@@ -99,8 +100,8 @@ class Actors:
         known = []
         for k in count():
             if f"known_{k}" not in exact:
-                unsuited = int(int_array(file, exact, "unsuited", ())) if "unsuited" in exact else 0
-                return cls(tuple(bodies), tuple(known), said("doubt"), said("unlike"), unsuited)
+                overlap = float(float_array(file, exact, "overlap", ())) if "overlap" in exact else 1.0
+                return cls(tuple(bodies), tuple(known), said("doubt"), said("unlike"), overlap)
             frame, agreement = exact[f"where_{k}"].tolist()
             known.append(KnownFrame(int(frame), exact[f"known_{k}"], agreement))
         raise AssertionError
@@ -205,8 +206,8 @@ def new_actors(request: ActorRequest, report: Report = lambda _: None) -> Actors
     if reasons and (actor := _of_keypoints(request, reasons)) is not None:
         return Actors((actor,))
     report(made)
-    unsuited = sum(actor.unsuitable is not None for actor in made)
-    return Actors(tuple(actor.body for actor in made), known_frames(made), doubts, unlike, unsuited)
+    overlap = min(overlap_of(each.upright_body, each.estimate.poses, each.pictures, each.rig) for each in made)
+    return Actors(tuple(actor.body for actor in made), known_frames(made), doubts, unlike, overlap)
 
 
 def _doubts(actor: MadeActor) -> tuple[str | None, str | None]:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sogjax.actor.doubts import FRAMES_SUIT
 from sogjax.actor.make import MadeActor
 from sogjax.errors import InputError
 from sogjax.io.files import write_json
@@ -23,6 +24,8 @@ from sogjax.run.recordings import body_named
 from sogjax.run.terminal import say
 
 FOLDER, LAST = "remade", "made.json"
+MUCH = 0.03
+"""By how much less the masks of frames that hardly suit must agree with new actors for these to be worse (IoU)."""
 SAME_SIZE = 0.15
 """Logarithm of a factor: sizes of one person differ by less. Those of 111 actors were right within 0.04, one by 0.34
 too small: who was made again of masks that said nothing of most of him."""
@@ -102,8 +105,8 @@ def _why_worse(start: Body, first: Actors, again: Actors) -> str | None:
     Of two very different sizes of somebody one is wrong: that which is farther from the starting body's. Several people
     are told apart by their sizes.
     """
-    worse = lambda actors: (actors.unsuited, sum(map(bool, actors.doubts)))
-    if worse(again) > worse(first):
+    suits_less = again.overlap < min(FRAMES_SUIT, first.overlap - MUCH)
+    if suits_less or sum(map(bool, again.doubts)) > sum(map(bool, first.doubts)):
         return "the sizes of the new ones are more doubtful"
     sizes = [sorted(size_beside(start, body) or 1.0 for body in actors.bodies) for actors in (first, again)]
     for before, after in zip(*np.log(sizes), strict=True):
