@@ -149,12 +149,14 @@ def test_ways_that_are_not_checked_would_not_be_chosen(monkeypatch, choose, poss
         monkeypatch.setattr(limb_silhouettes, "_from_rest", lambda _, ways: np.zeros(len(ways)))
         monkeypatch.setattr(limb_silhouettes, "_mismatches", lambda *_, known=mismatches: known)
         checked = lambda _, ways, *__, known=impossible: known[ways[:, 0].astype(int)]
-        unit = SimpleNamespace(all_blobs=np.arange(3))
-        everybody = SimpleNamespace(impossibility=checked)
-        seen = _SeenUnit(everybody, 0, [np.zeros(1)], None, 0, unit)  # type: ignore[arg-type]
+        seen = object.__new__(_SeenUnit)
+        parts = {"number": 0, "poses": [], "silhouettes": None, "unit": SimpleNamespace(all_blobs=np.arange(3))}
+        parts["everybody"] = SimpleNamespace(bodies=[HUMAN], impossibility=checked)
+        for name, part in parts.items():
+            object.__setattr__(seen, name, part)
         chosen = choose(rng.normal(0.0, 0.3, (count, 2)))
-        ways = np.arange(count, dtype=float)[:, None]
-        kept, costs = seen._chosen(ways, None, None, np.arange(1), chosen)  # type: ignore[arg-type]
+        ways, fills = np.arange(count, dtype=float)[:, None], jnp.zeros((count, 1, 1))
+        kept, costs = seen._chosen(ways, fills[0], fills, np.arange(1), chosen)
         everything = mismatches * (1.0 + impossible)
         assert kept == chosen(everything)
         np.testing.assert_allclose(costs[kept], everything[kept])
