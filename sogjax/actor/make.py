@@ -174,7 +174,7 @@ class Making:
         return self.finished(found.pictures, estimate, found.rough, self.unsuitable(found.pictures, estimate))
 
     def _rest_weights(self, found: "_FoundPoses") -> Float[np.ndarray, "dof"]:
-        """How many times as much as usual it counts that each degree of freedom is near rest: `UNDECIDED_EDGES`."""
+        """How many times as much as usual being near rest counts, by degree of freedom: `UNDECIDED_EDGES`, or 1."""
         body, rig = self.shape_model.body, self.rig
         weights = np.ones(body.skeleton.num_dofs, np.float32)
         if any(posed.undecided for posed in found.pictures):

@@ -73,11 +73,12 @@ class BackgroundImage:
         return replace(self, picture=picture, spread=spread, known=self.known | there)
 
     def calm_as(self, first: "BackgroundImage") -> "BackgroundImage":
-        """With what another one of this size, which was learnt from all of each picture, tells of furniture.
+        """With what another one, which was learnt from all of each picture, tells of furniture.
 
         Where this one knows nothing, that one says how far colours vary.
         """
-        return replace(self, spread=np.where(self.known, self.spread, first.spread), furnished=first.furnished)
+        spread = cv2.resize(first.spread.astype(np.float32), self.known.shape[::-1], interpolation=cv2.INTER_LINEAR)
+        return replace(self, spread=np.where(self.known, self.spread, spread), furnished=first.furnished)
 
     @property
     def calm(self) -> Bool[np.ndarray, "_h _w"]:
