@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from body_cases import random_body, reference_points, shipped
 
-from sogjax.model.shape import ShapeModel
+from sogjax.model.shape import WHOLE_SPREAD, ShapeModel
 
 BODIES = {"human": shipped("human"), "dog": shipped("dog"), "random": random_body(0)}
 
@@ -87,7 +87,8 @@ def test_a_size_as_nobody_has_it_is_named_and_counts_for_far_more(name):
     assert model.unusual_names(of(-2.0)) == [model.names[last]]
     assert float(model.penalty(of(1.0))) == pytest.approx(1.0)
     assert float(model.penalty(of(2.0))) == pytest.approx(4.0 + 100.0 * 0.25)
-    assert float(model.penalty(params(model, {0: 2.0}))) == pytest.approx(4.0)
+    whole = params(model, {0: 2.0 * WHOLE_SPREAD})  # no size of a whole body is one that nobody has
+    assert float(model.penalty(whole)) == pytest.approx(4.0)
 
 
 def test_lengths_of_bones_are_known_best_then_those_of_what_a_skeleton_ends_with():

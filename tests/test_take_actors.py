@@ -96,6 +96,7 @@ class Made:
 
     body: Body
     upright_body: Body
+    doubtful: tuple[str, ...] = ()
 
 
 @pytest.fixture
