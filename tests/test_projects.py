@@ -100,6 +100,7 @@ def test_points_are_written_where_the_next_steps_look(tmp_path, capsys):
     command += [
         "images.depth=4",
         "solver.max_iterations=1",
+        "tracking.both_ways=false",
         "outputs.overlay=false",
         "outputs.rerun=false",
         "outputs.page=false",
