@@ -199,13 +199,12 @@ def test_rivals_that_are_impossible_or_near_do_not_count(walking_dog, monkeypatc
     limbs = [*unit.limbs]
     with_gains = lambda gain: eqx.tree_at(lambda held: held.gains, found, np.full_like(found.gains, gain))
     near = eqx.tree_at(lambda held: held.poses, with_gains(100.0), np.tile(pose, (*found.gains.shape, 1)))
-    assert (search._rivals_among(pose, near, right.energy)[limbs] == LEAST_RIVAL).all()
+    among = lambda held: search._rivals_among(pose, held.poses, held.gains, right.energy)[limbs]
+    assert (among(near) == LEAST_RIVAL).all()
     worth = with_gains(0.01 * right.energy)
-    monkeypatch.setattr(LimbSearch, "_less_impossible", lambda _, pose, poses: np.zeros(poses.shape[:-1]))
-    rivals = search._rivals_among(pose, worth, right.energy)[limbs]  # a climb may have led back
-    np.testing.assert_allclose(rivals.max(), 0.01, rtol=1e-5)
+    np.testing.assert_allclose(among(worth).max(), 0.01, rtol=1e-5)  # a climb may have led back
     monkeypatch.setattr(LimbSearch, "possible", lambda _, known, poses: np.zeros(len(poses), bool))
-    assert (search._rivals_among(pose, worth, right.energy)[limbs] == LEAST_RIVAL).all()
+    assert (among(worth) == LEAST_RIVAL).all()
 
 
 @pytest.mark.slow
@@ -321,3 +320,37 @@ def test_a_right_pass_stays_as_it_is_when_limbs_are_searched(walking_dog):
     tracker, cells, right = walking_dog
     sound = replace(right, doubts=np.zeros_like(right.doubts))
     assert not merge_passes(tracker, sound, reader(cells), range(0, len(cells), 3)).frames
+
+
+@pytest.mark.slow
+def test_exchanged_ends_are_rivals_where_they_may_be_worth_as_much(walking_dog, monkeypatch):
+    tracker, cells, right = walking_dog
+    search, row, energy = LimbSearch.of(tracker, right.capacities), 3, right.energy
+    pose = right.poses[row]
+    views = search.views(on_device(cells[row]), pose)
+    found = jax.device_get(search.held_otherwise(views, pose))
+    elsewhere = found.poses[0, -1]  # the last way has a limb elsewhere
+    crossed = np.stack([elsewhere, *found.crossed[1:]])
+    with_losses = lambda loss: replace(
+        found,
+        gains=np.full_like(found.gains, -energy),
+        crossed=crossed,
+        crossed_gains=np.where(np.arange(len(crossed)) == 0, -loss * energy, -energy).astype(np.float32),
+        crossed_apart=np.ones(len(crossed), np.float32),
+    )
+    climbed = []
+    gain = lambda _, views, known, starts, shares: (
+        climbed.extend(starts),
+        (starts, np.full(len(starts), 0.01 * energy)),
+    )[1]
+    monkeypatch.setattr(LimbSearch, "climbed", gain)
+    monkeypatch.setattr(LimbSearch, "possible", lambda _, known, poses: np.ones(len(poses), bool))
+    among = lambda held: search._rivals_among(pose, *search._ways(views, pose, held, energy), energy)
+    rivals = among(with_losses(0.01))
+    np.testing.assert_array_equal(climbed, [elsewhere])
+    of_first = [*search.units[0].limbs]
+    np.testing.assert_allclose(rivals[of_first].max(), 0.01, rtol=1e-5)
+    others = np.isfinite(rivals) & ~np.isin(np.arange(len(rivals)), of_first)
+    assert (rivals[others] == LEAST_RIVAL).all()
+    assert np.nanmax(among(with_losses(0.1))) == LEAST_RIVAL  # exchanged, they lose too much to be climbed
+    assert len(climbed) == 1

@@ -32,6 +32,8 @@ there, and what it gains then for a pass to go from there."""
 CROSSED_SLACK, CROSSED_APART = -0.01, 0.03
 """What hands or feet that are exchanged gain at least, as a part of a frame's energy, to be climbed with the whole body
 (with the rest held, elbows are not where they would be), and how far they then are, as `APART`."""
+CROSSED_RIVAL = -0.02
+"""The same as a part of an actor's energy, for them to be climbed as rivals, whatever other limbs gain."""
 IN_VAIN = 2
 """Passes in vain that hold a pose in a frame, from which on none begins there."""
 MOST_ROUNDS = 3
@@ -93,7 +95,7 @@ class LimbSearch:
         first = passed.poses[row].copy()
         views = self.views(on_device(frame), first)
         held = self.held_otherwise(views, first)
-        self._rivals[row] = first, self._rivals_among(first, held, passed.energy)
+        self._note_rivals(row, views, first, held, passed.energy)
         found = self.with_better_limbs(views, first, first, passed.energy, self._in_vain.get(row, []), held)
         return None if found.pose is first else found
 
@@ -104,26 +106,56 @@ class LimbSearch:
         The `frame` is only read where the pose is another than when the row was searched.
         """
         pose = passed.poses[row].copy()
-        if row not in self._rivals or not np.array_equal(self._rivals[row][0], pose):
-            held = self.held_otherwise(self.views(on_device(frame()), pose), pose)
-            self._rivals[row] = pose, self._rivals_among(pose, held, passed.energy)
+        if not self._knows_rivals(row, pose):
+            views = self.views(on_device(frame()), pose)
+            self._note_rivals(row, views, pose, self.held_otherwise(views, pose), passed.energy)
         return self._rivals[row][1]
 
+    def _knows_rivals(self, row: int, pose: Float[np.ndarray, "dof"]) -> bool:
+        return row in self._rivals and np.array_equal(self._rivals[row][0], pose)
+
+    def _note_rivals(
+        self, row: int, views: Views, pose: Float[np.ndarray, "dof"], found: HeldOtherwise, energy: float
+    ) -> None:
+        if not self._knows_rivals(row, pose):
+            self._rivals[row] = pose, self._rivals_among(pose, *self._ways(views, pose, found, energy), energy)
+
+    def _ways(
+        self, views: Views, pose: Float[np.ndarray, "dof"], found: HeldOtherwise, energy: float
+    ) -> tuple[Float[np.ndarray, "unit way dof"], Float[np.ndarray, "unit way"]]:
+        """The ways to hold each unit, and one more: its ends exchanged, climbed with the whole body; what they gain.
+
+        Where hands meet, elbows and trunk go with them: with the rest held, hands that were exchanged stay worth less.
+        """
+        crossed, ends = np.asarray(found.crossed), np.tile(pose, (len(self.units), 1))
+        lead = (found.crossed_apart > CROSSED_APART) & (found.crossed_gains > CROSSED_RIVAL * self._of_an_actor(energy))
+        gains = np.full(len(self.units), -np.inf)
+        if lead.any():
+            ends[lead], gains[lead] = self.climbed(views, pose, crossed[lead], np.full(int(lead.sum()), MORE))
+        cheaper = IMPOSSIBLE_COST * energy * self._less_impossible(pose, np.asarray(found.poses))
+        of_ways = np.asarray(found.gains, float) + cheaper  # those of climbs count it already
+        return np.concatenate([found.poses, ends[:, None]], axis=1), np.concatenate([of_ways, gains[:, None]], axis=1)
+
     def _rivals_among(
-        self, pose: Float[np.ndarray, "dof"], found: HeldOtherwise, energy: float
+        self,
+        pose: Float[np.ndarray, "dof"],
+        ways: Float[np.ndarray, "unit way dof"],
+        gains: Float[np.ndarray, "unit way"],
+        energy: float,
     ) -> Float[np.ndarray, "limb"]:
         """As `rivals`, among ways that were climbed."""
         body, here = self.tracker.body, means_of(self.tracker.body, pose[None])
         rivals = np.full(len(limb_names(body)), np.nan)
-        of_an_actor = max(energy, np.finfo(float).tiny) / len(np.unique(body.blob_actors))
-        cheaper = IMPOSSIBLE_COST * energy * self._less_impossible(pose, np.asarray(found.poses))
-        gains = (np.asarray(found.gains, float) + cheaper) / of_an_actor
-        for unit, poses, gained in zip(self.units, found.poses, gains, strict=True):
+        for unit, poses, gained in zip(self.units, ways, gains / self._of_an_actor(energy), strict=True):
             moved, possible = np.linalg.norm(means_of(body, poses) - here, axis=-1), self.possible(pose, poses)
             for limb, blobs in zip(unit.limbs, unit.blobs, strict=True):
                 elsewhere = np.average(moved[:, blobs], axis=1, weights=outer(len(blobs))) > ELSEWHERE
                 rivals[limb] = np.max(gained, where=elsewhere & possible, initial=LEAST_RIVAL)
         return rivals
+
+    def _of_an_actor(self, energy: float) -> float:
+        """An actor's part of a frame's energy."""
+        return max(energy, np.finfo(float).tiny) / len(np.unique(self.tracker.body.blob_actors))
 
     def is_in_vain(self, row: int, pose: Float[np.ndarray, "dof"]) -> bool:
         """Whether passes from such a pose of a frame led nowhere."""
