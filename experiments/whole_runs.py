@@ -7,8 +7,8 @@ poses; `poses`: example poses; `videos`: nothing), the seed of people, clothes a
 Each recording is rendered, `sogjax track` is run on it without a pose, and its motions are held against the truth. Runs
 are kept in `out` and not made again. The table is printed, with how often verdicts hold, and written as table.md. With
 `update`, `whole_runs.csv`, which has every recording as it was last run, is brought up to date, and what it says in all
-is printed. With `fit` the weight by which rivals of limbs count is fitted to the limbs of these runs, and written
-into `sogjax/quality/fitted.yaml`; what is printed of it judges each run by the weight that comes from the others.
+is printed. With `fit` what rivals of limbs count is chosen by the actors of these runs, and written into
+`sogjax/quality/fitted.yaml`.
 """
 
 import csv
@@ -22,7 +22,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
-from beside_truth import FAR, OFTEN, beside_truth
+from beside_truth import OFTEN, beside_truth
 from limb_doubt import change_part
 from scipy.optimize import linear_sum_assignment
 
@@ -33,15 +33,14 @@ from sogjax.io.files import csv_text, write_file, write_json
 from sogjax.io.ground_truth import GroundTruth, load_ground_truth
 from sogjax.io.motion import Motion, load_motion
 from sogjax.io.recording_files import BACKGROUND, CALIBRATION, EXAMPLE_POSES, GROUND_TRUTH, SETTINGS, VIDEOS
-from sogjax.quality.fitted import PATH, fitted_numbers
-from sogjax.quality.limb_confidence import SURE, beside_rivals
-from sogjax.quality.limb_warnings import doubtful_limbs
+from sogjax.quality.fitted import PATH
+from sogjax.quality.limb_confidence import beside_rivals
+from sogjax.quality.limb_warnings import AT_LEAST, GAP, doubtful_limbs
 from sogjax.quality.markers import common_frames, joint_errors
-from sogjax.quality.metrics import mean_per_frame
+from sogjax.quality.metrics import mean_per_frame, stretches
 from sogjax.quality.verdict import Verdict
 from sogjax.run.run_files import METRICS, MOTION
 from sogjax.study.experiment import synth_settings
-from sogjax.study.limb_calibration import area_under_roc
 from sogjax.study.script import machine_line, run_script, settings_from
 from sogjax.study.true_poses import limb_of
 from sogjax.synth.cache import cached_recording
@@ -61,8 +60,8 @@ GROUPS = ((10, "10 to 12"), (5, "5 to 8"), (0, "3 or 4"))
 """Cameras from which on a group of recordings begins, and its name."""
 BOUNDS, LEAST = (0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5), (3, 4, 5)
 """Of how likely a limb is lost, from which it could be named, and the frames for which it must be so."""
-WEIGHTS = [0.1 * k for k in range(200)]
-"""Of rivals, one of which is chosen."""
+CHOICES, COSTS = [(0.5 * k, bound) for k in range(17) for bound in BOUNDS], (2, 1)
+"""Weights of rivals and bounds of which one is chosen; what a loss that is not told and a wrong doubt count."""
 SHOWN = ((1e3, "mean"), (100, "astray"))
 FOUND = "found.json"
 LEAN = ("outputs.rerun=false", "outputs.overlay=false", "overwrite=true")
@@ -251,45 +250,42 @@ def limbs_beside(motion: Motion, person: GroundTruth) -> dict[str, list[list[flo
 
 
 def fit_rivals(path: Path, runs: Sequence[dict]) -> list[str]:
-    """Fit the weight of rivals to the limbs of runs and write it; how well each is judged by that of the others."""
-    limbs = [np.concatenate([np.zeros((3, 0)), *_measured(run)], axis=1) for run in runs]
-    limbs = [of_run for of_run in limbs if of_run.size]
-    unlike, _, error = np.concatenate(limbs or [np.zeros((3, 0))], axis=1)
-    if not (error > FAR).any():
-        raise InputError("fit=true: no limb of these runs is lost; give more rows")
-    others = lambda left: [of_run for k, of_run in enumerate(limbs) if k != left] or limbs
-    said = [beside_rivals(of_run[0], of_run[1], likeliest_weight(others(k))) for k, of_run in enumerate(limbs)]
-    count = f"{len(limbs)} runs; {len(error)} limbs, {int((error > FAR).sum())} lost"
+    """Choose what rivals count and from where limbs are named by the actors of runs, and write it; how well that does.
+
+    What is told of it by others judges each run by what is chosen without it.
+    """
+    actors = [[_judged(actor) for actor in run["actors"] if actor.get("limbs")] for run in runs]
+    wrong = sum(astray for of_run in actors for astray, _ in of_run)
+    if not wrong:
+        raise InputError("fit=true: nobody of these runs has a joint astray; give more rows")
+    counts = np.array([[_mistakes(of_run, *choice) for choice in CHOICES] for of_run in actors])
+    total, best = counts.sum(axis=0), lambda of: int(np.argmin(of @ COSTS))
+    by_others = np.sum([of_run[best(total - of_run)] for of_run in counts], axis=0)
+    weight, bound = CHOICES[best(total)]
+    right, told = sum(map(len, actors)) - wrong, total[best(total)]
+    count = f"{len(runs)} runs; {wrong + right} actors, {wrong} with a joint astray"
 
     def refit(part: dict) -> None:
-        part["values"], part["recordings"] = {"weight": round(likeliest_weight(limbs), 1)}, count
+        part["values"], part["recordings"] = {"weight": weight, "doubtful": bound}, count
 
     change_part(path, "rivals", refit)
-    by_both = {"as it is seen": unlike, "beside rivals": np.concatenate(said)}
-    return [count, *(_noticed(name, doubt, error > FAR) for name, doubt in by_both.items())]
+    return [
+        f"{count}: weight {weight:g}, named from {bound:g}",
+        f"- a joint is astray, and no limb is named: {told[0]} of {wrong}, by others {by_others[0]}",
+        f"- none is, and one is named: {told[1]} of {right}, by others {by_others[1]}",
+    ]
 
 
-def likeliest_weight(limbs: Sequence[np.ndarray]) -> float:
-    """The weight of rivals with which what was lost of limbs is likeliest."""
-    unlike, rival, error = np.concatenate([*limbs], axis=1)
-
-    def surprise(weight: float) -> float:
-        doubt = np.clip(beside_rivals(unlike, rival, weight), SURE, 1.0 - SURE)
-        return -float(np.mean(np.log(np.where(error > FAR, doubt, 1.0 - doubt))))
-
-    return min(WEIGHTS, key=surprise)
+def _judged(actor: dict) -> tuple[bool, list[np.ndarray]]:
+    """Whether a joint of an actor is astray, and of each limb how it is seen and what its rival gains."""
+    return actor["astray"] > OFTEN, [np.array(values)[:2] for values in actor["limbs"].values()]
 
 
-def _measured(run: dict) -> list[np.ndarray]:
-    return [np.array(values) for actor in run["actors"] for values in actor.get("limbs", {}).values()]
-
-
-def _noticed(name: str, said: np.ndarray, wrong: np.ndarray) -> str:
-    named = said > fitted_numbers().verdict.limb_doubtful
-    shares = (
-        f"{100 * named[wrong].mean():.0f} % of the lost are named, {100 * named[~wrong].mean():.2f} % of the others"
-    )
-    return f"- {name}: area under the ROC {area_under_roc(said, wrong):.3f}; {shares}"
+def _mistakes(actors: Sequence[tuple[bool, list[np.ndarray]]], weight: float, bound: float) -> tuple[int, int]:
+    """How many actors with a joint astray have no limb named, and how many others have one."""
+    doubted = lambda limb: stretches(beside_rivals(limb[0], limb[1], weight) > bound, AT_LEAST, gap=GAP)
+    named = [(astray, any(map(doubted, limbs))) for astray, limbs in actors]
+    return sum(astray and not said for astray, said in named), sum(said and not astray for astray, said in named)
 
 
 def _of_verdicts(runs: list[dict]) -> list[str]:

@@ -38,7 +38,7 @@ from sogjax.quality.limb_evidence import (
     own_or_hidden,
     visible_parts,
 )
-from sogjax.quality.limb_warnings import doubtful_limbs
+from sogjax.quality.limb_warnings import doubtful_limbs, in_doubt
 from sogjax.scene.background import BackgroundCells
 from sogjax.scene.foreground import LARGEST, BackgroundModel, own_density, subject_colors, subject_density
 from sogjax.tracking.frame import FrameInput
@@ -309,10 +309,24 @@ def test_a_limb_is_the_more_doubtful_the_more_its_rival_gains_and_none_reassures
     unlike, gains = np.full(5, 0.1), np.array([2.0 * LEAST_RIVAL, LEAST_RIVAL, 0.5 * LEAST_RIVAL, MOST_RIVAL, 0.5])
     said = beside_rivals(unlike, gains)
     assert unlike[0] == said[0] == said[1] < said[2] < said[3] == said[4]
-    assert said[3] > fitted_numbers().verdict.limb_doubtful
+    assert said[3] > fitted_numbers().rivals.doubtful
     assert (np.diff(beside_rivals(np.linspace(0.0, 1.0, 9), np.full(9, -0.001))) >= 0.0).all()
     assert beside_rivals(np.array([0.3, 0.0]), np.full(2, np.nan)).tolist() == [0.3, 0.0]
     np.testing.assert_allclose(beside_rivals(np.array([0.5]), np.array([0.0]), 2.0), expit(1.0))
+
+
+def test_less_is_enough_for_doubt_where_rivals_are_known():
+    numbers, between = fitted_numbers(), 0.35
+    assert numbers.rivals.doubtful < between < numbers.verdict.limb_doubtful
+    judged = replace(
+        walking_motion(num_frames=9),
+        limb_names=np.array(["head", "left leg"]),
+        limb_doubt=np.full((9, 2), between),
+        limb_rival=np.tile([np.nan, 0.0], (9, 1)),
+    )
+    assert [limb.name for limb in doubtful_limbs(judged)] == ["left leg"]
+    assert in_doubt(judged, 0.2).all()
+    assert not in_doubt(replace(judged, limb_rival=None)).any()
 
 
 def test_who_is_doubted_for_a_rival_alone_might_as_well_be_elsewhere():

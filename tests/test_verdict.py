@@ -131,7 +131,7 @@ def test_another_subject_is_told_at_the_first_frame(capsys):
 
 @pytest.mark.parametrize("likely", [0.9, 0.45])
 def test_limbs_in_doubt_are_named(walk, likely):
-    doubt = np.full((walk.num_frames, 2), 0.35)
+    doubt = np.full((walk.num_frames, 2), 0.25)
     doubt[3:9, 1] = likely
     doubt[15:18, 0] = likely  # for too few frames
     motion = replace(judged(walk), limb_names=np.array(["head", "left arm"]), limb_doubt=doubt)

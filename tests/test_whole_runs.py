@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 import whole_runs
-from scipy.special import expit, logit
 
 from sogjax.errors import InputError
 from sogjax.quality.fitted import PATH, read_fitted
+from sogjax.quality.limb_confidence import beside_rivals
 
 
 def actor(mean, astray, looks_right):
@@ -55,20 +55,22 @@ def test_cameras_fall_into_one_group(cameras, name):
     assert [line.split("|")[1].strip() for line in lines if "| 1 | 20 |" in line] == [f"plates, {name}", "all"]
 
 
-def run_of(random, count=4000):
-    """A run of one actor whose limb is lost as often as a known weight says."""
-    unlike, rival = random.uniform(0.001, 0.3, count), random.uniform(-0.01, 0.003, count)
-    lost = random.uniform(size=count) < expit(logit(unlike) + 400.0 * np.maximum(rival + 0.005, 0.0))
-    return {"actors": [{"limbs": {"left arm": [unlike.tolist(), rival.tolist(), np.where(lost, 0.3, 0.02).tolist()]}}]}
+def judged(astray, unlike, rival):
+    """A run of one actor, of one of whose limbs so much is known in ten frames out of thirty."""
+    limb = np.full((3, 30), [[0.01], [-0.01], [0.02]])
+    limb[:2, 10:20] = [[unlike], [rival]]
+    return {"actors": [{"astray": astray, "limbs": {"left arm": limb.tolist(), "right arm": limb[:, :9].tolist()}}]}
 
 
-def test_the_weight_of_rivals_is_fitted_to_what_was_lost_and_written(tmp_path):
-    path, random = tmp_path / "fitted.yaml", np.random.default_rng(1)
+def test_what_rivals_count_is_chosen_by_who_is_told_to_be_wrong(tmp_path):
+    path = tmp_path / "fitted.yaml"
     path.write_text(PATH.read_text())
-    count, seen, beside = whole_runs.fit_rivals(path, [run_of(random), run_of(random), {"actors": []}])
-    assert count.startswith("2 runs; 8000 limbs, ")
-    assert read_fitted(path.read_text()).rivals.weight == pytest.approx(4.0, abs=0.3)
-    area = lambda line: float(line.split("ROC ")[1].split(";")[0])
-    assert area(beside) > area(seen) + 0.05
-    with pytest.raises(InputError, match="no limb of these runs is lost"):
-        whole_runs.fit_rivals(path, [{"actors": [{"limbs": {"left arm": [[0.1], [-0.01], [0.02]]}}]}])
+    lost, right = [judged(0.3, 0.05, 0.002)] * 3, [judged(0.0, 0.35, -0.006), judged(0.0, 0.02, -0.003)] * 2
+    said, missed, doubted = whole_runs.fit_rivals(path, [*lost, *right, {"actors": []}])
+    found = read_fitted(path.read_text()).rivals
+    assert said.startswith(f"8 runs; 7 actors, 3 with a joint astray: weight {found.weight:g}, ")
+    assert missed.endswith("0 of 3, by others 0")
+    assert doubted.endswith("0 of 4, by others 0")
+    assert beside_rivals(np.array([0.05]), np.array([0.002]), found.weight) > found.doubtful >= 0.35
+    with pytest.raises(InputError, match="nobody of these runs has a joint astray"):
+        whole_runs.fit_rivals(path, right)

@@ -38,6 +38,8 @@ class Rivals:
 
     weight: float
     """Of each per cent of an actor's energy, on the log odds that the limb is lost."""
+    doubtful: float
+    """From how likely lost on a limb is in doubt whose rivals are known."""
 
 
 @dataclass(frozen=True)

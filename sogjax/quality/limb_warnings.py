@@ -48,11 +48,15 @@ class DoubtfulLimb:
 def in_doubt(motion: Motion, bound: float | None = None) -> Bool[np.ndarray, "frame limb"]:
     """Which limbs are in doubt in which frames; none where they were not judged.
 
-    `bound` is how likely lost they must be; None: `limb_doubtful` of the fitted numbers.
+    `bound` is how likely lost they must be; None: `limb_doubtful` of the fitted numbers, or `doubtful` of those of
+    rivals where it is known what these gain.
     """
     if motion.limb_doubt is None:
         return np.zeros((motion.num_frames, 0), bool)
-    return motion.limb_doubt > (fitted_numbers().verdict.limb_doubtful if bound is None else bound)
+    numbers = fitted_numbers()
+    has_rivals = np.zeros_like(motion.limb_doubt, bool) if motion.limb_rival is None else np.isfinite(motion.limb_rival)
+    bounds = np.where(has_rivals, numbers.rivals.doubtful, numbers.verdict.limb_doubtful)
+    return motion.limb_doubt > (bounds if bound is None else bound)
 
 
 def doubtful_limbs(motion: Motion, bound: float | None = None, at_least: int = AT_LEAST) -> tuple[DoubtfulLimb, ...]:
@@ -76,7 +80,7 @@ def _rivalled(motion: Motion, bound: float | None) -> Bool[np.ndarray, "frame li
     doubted = in_doubt(motion, bound)
     if motion.limb_unlike is None or motion.limb_rival is None:
         return np.zeros_like(doubted)
-    alone = in_doubt(replace(motion, limb_doubt=motion.limb_unlike), bound)
+    alone = in_doubt(replace(motion, limb_doubt=motion.limb_unlike, limb_rival=None), bound)
     return doubted & ~alone & np.isfinite(motion.limb_rival)
 
 
