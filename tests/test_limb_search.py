@@ -199,7 +199,7 @@ def test_rivals_that_are_impossible_or_near_do_not_count(walking_dog, monkeypatc
     limbs = [*unit.limbs]
     with_gains = lambda gain: eqx.tree_at(lambda held: held.gains, found, np.full_like(found.gains, gain))
     near = eqx.tree_at(lambda held: held.poses, with_gains(100.0), np.tile(pose, (*found.gains.shape, 1)))
-    among = lambda held: search._rivals_among(pose, held.poses, held.gains, right.energy)[limbs]
+    among = lambda held: search._rivals_among(pose, held.poses, held.gains.astype(float), right.energy)[limbs]
     assert (among(near) == LEAST_RIVAL).all()
     worth = with_gains(0.01 * right.energy)
     np.testing.assert_allclose(among(worth).max(), 0.01, rtol=1e-5)  # a climb may have led back
@@ -329,15 +329,13 @@ def test_exchanged_ends_are_rivals_where_they_may_be_worth_as_much(walking_dog, 
     pose = right.poses[row]
     views = search.views(on_device(cells[row]), pose)
     found = jax.device_get(search.held_otherwise(views, pose))
-    elsewhere = found.poses[0, -1]  # the last way has a limb elsewhere
+    elsewhere = found.poses[0, np.argmax(found.apart[0])]
+    monkeypatch.setattr(limb_search, "ELSEWHERE", 0.25 * found.apart[0].max())
     crossed = np.stack([elsewhere, *found.crossed[1:]])
-    with_losses = lambda loss: replace(
-        found,
-        gains=np.full_like(found.gains, -energy),
-        crossed=crossed,
-        crossed_gains=np.where(np.arange(len(crossed)) == 0, -loss * energy, -energy).astype(np.float32),
-        crossed_apart=np.ones(len(crossed), np.float32),
-    )
+    parts = lambda held: (held.gains, held.crossed, held.crossed_gains, held.crossed_apart)
+    loses = lambda loss: np.where(np.arange(len(crossed)) == 0, -loss, -1.0).astype(np.float32) * np.float32(energy)
+    given = np.full_like(found.gains, -energy), crossed, np.ones(len(crossed), np.float32)
+    with_losses = lambda loss: eqx.tree_at(parts, found, (*given[:2], loses(loss), given[2]))
     climbed = []
     gain = lambda _, views, known, starts, shares: (
         climbed.extend(starts),
