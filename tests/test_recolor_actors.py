@@ -183,6 +183,8 @@ def test_limbs_are_named_that_are_often_in_doubt_unless_something_hides_them(fra
     assert named_limbs(DOG, motion, unlike) == ({LEG} if named else set())
     rivalled = replace(motion, limb_unlike=np.zeros_like(doubts))  # it looks like itself
     assert named_limbs(DOG, rivalled, unlike) == ({LEG} if unlike else set())
+    slightly = replace(motion, limb_unlike=np.full_like(doubts, 0.35), limb_rival=np.zeros_like(doubts))
+    assert named_limbs(DOG, slightly, unlike) == ({LEG} if unlike else set())  # rivals do not count
     assert named_limbs(DOG, replace(motion, limb_doubt=None, limb_hidden=None), "") == set()
 
 

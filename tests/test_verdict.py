@@ -158,6 +158,11 @@ def test_a_limb_that_things_hide_is_named_with_the_cause_and_nobody_is_called_an
     part = lambda share: replace(motion, limb_doubt=with_hidden(np.zeros_like(hidden), np.full_like(hidden, share)))
     assert of_one(part(0.89)).looks_right
     assert not of_one(part(0.91)).looks_right
+    rivalled = lambda share: replace(
+        part(share), limb_hidden=np.full_like(hidden, share), limb_rival=np.zeros_like(hidden)
+    )
+    assert of_one(rivalled(0.89)).looks_right  # as without
+    assert not of_one(rivalled(0.91)).looks_right
     unseen = replace(motion, explained=np.full(walk.num_frames, 0.01), limb_hidden=np.ones_like(hidden))
     assert not of_one(unseen).wrong
     assert of_one(replace(unseen, limb_hidden=None)).wrong

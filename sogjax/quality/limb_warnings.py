@@ -49,12 +49,14 @@ def in_doubt(motion: Motion, bound: float | None = None) -> Bool[np.ndarray, "fr
     """Which limbs are in doubt in which frames; none where they were not judged.
 
     `bound` is how likely lost they must be; None: `limb_doubtful` of the fitted numbers, or `doubtful` of those of
-    rivals where it is known what these gain.
+    rivals where it is known what these gain and the limb is not mostly hidden.
     """
     if motion.limb_doubt is None:
         return np.zeros((motion.num_frames, 0), bool)
     numbers = fitted_numbers()
     has_rivals = np.zeros_like(motion.limb_doubt, bool) if motion.limb_rival is None else np.isfinite(motion.limb_rival)
+    if motion.limb_hidden is not None:
+        has_rivals &= motion.limb_hidden <= HIDDEN
     bounds = np.where(has_rivals, numbers.rivals.doubtful, numbers.verdict.limb_doubtful)
     return motion.limb_doubt > (bounds if bound is None else bound)
 

@@ -114,7 +114,8 @@ def recolor_actors(
 def named_limbs(body: Body, motion: Motion, unlike: str) -> set[str]:
     """The limbs with a counterpart that often look doubtful, where nothing hides them, or are said to be `unlike`."""
     names = limb_names(body)
-    motion = motion if motion.limb_unlike is None else replace(motion, limb_doubt=motion.limb_unlike)
+    if motion.limb_unlike is not None:
+        motion = replace(motion, limb_doubt=motion.limb_unlike, limb_rival=None)
     doubted = in_doubt(motion) if motion.limb_doubt is not None else np.zeros((1, len(names)), bool)
     if motion.limb_hidden is not None:
         doubted &= motion.limb_hidden <= HIDDEN

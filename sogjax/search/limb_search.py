@@ -33,7 +33,7 @@ CROSSED_SLACK, CROSSED_APART = -0.01, 0.03
 """What hands or feet that are exchanged gain at least, as a part of a frame's energy, to be climbed with the whole body
 (with the rest held, elbows are not where they would be), and how far they then are, as `APART`."""
 CROSSED_RIVAL = -0.02
-"""The same as a part of an actor's energy, for them to be climbed as rivals, whatever other limbs gain."""
+"""The least of that as a part of an actor's energy, impossible or not, for them to be climbed as rivals."""
 IN_VAIN = 2
 """Passes in vain that hold a pose in a frame, from which on none begins there."""
 MOST_ROUNDS = 3
