@@ -28,6 +28,7 @@ from sogjax.search.limb_search import BetterPose, LimbSearch, compile_search
 from sogjax.search.limb_ways import UnitArrays, drawn_ways, look_alikes, units_of
 from sogjax.search.merge_passes import merge_passes
 from sogjax.search.placed_body import means_of
+from sogjax.search.worth import IMPOSSIBLE_COST
 from sogjax.tracking.frame import on_device
 from sogjax.tracking.frame_by_frame import track
 
@@ -334,13 +335,14 @@ def test_exchanged_ends_are_rivals_where_they_may_be_worth_as_much(walking_dog, 
     crossed = np.stack([elsewhere, *found.crossed[1:]])
     parts = lambda held: (held.gains, held.crossed, held.crossed_gains, held.crossed_apart)
     loses = lambda loss: np.where(np.arange(len(crossed)) == 0, -loss, -1.0).astype(np.float32) * np.float32(energy)
-    given = np.full_like(found.gains, -energy), crossed, np.ones(len(crossed), np.float32)
-    with_losses = lambda loss: eqx.tree_at(parts, found, (*given[:2], loses(loss), given[2]))
+    held, away = np.full_like(found.gains, -energy), np.ones(len(crossed), np.float32)
+    with_losses = lambda loss, apart=1.0: eqx.tree_at(parts, found, (held, crossed, loses(loss), away * apart))
     climbed = []
-    gain = lambda _, views, known, starts, shares: (
-        climbed.extend(starts),
-        (starts, np.full(len(starts), 0.01 * energy)),
-    )[1]
+
+    def gain(search, views, known, starts, shares):
+        climbed.extend(starts)
+        return starts, np.full(len(starts), 0.01 * energy)
+
     monkeypatch.setattr(LimbSearch, "climbed", gain)
     monkeypatch.setattr(LimbSearch, "possible", lambda _, known, poses: np.ones(len(poses), bool))
     among = lambda held: search._rivals_among(pose, *search._ways(views, pose, held, energy), energy)
@@ -351,4 +353,9 @@ def test_exchanged_ends_are_rivals_where_they_may_be_worth_as_much(walking_dog, 
     others = np.isfinite(rivals) & ~np.isin(np.arange(len(rivals)), of_first)
     assert (rivals[others] == LEAST_RIVAL).all()
     assert np.nanmax(among(with_losses(0.1))) == LEAST_RIVAL  # exchanged, they lose too much to be climbed
+    assert np.nanmax(among(with_losses(0.01, apart=0.0))) == LEAST_RIVAL  # they are where they were
     assert len(climbed) == 1
+    monkeypatch.setattr(LimbSearch, "_less_impossible", lambda _, pose, poses: np.ones(poses.shape[:-1]))
+    gains = search._ways(views, pose, with_losses(0.01), energy)[1]
+    np.testing.assert_allclose(gains[:, :-1], (IMPOSSIBLE_COST - 1.0) * energy, rtol=1e-5)
+    assert gains[0, -1] == 0.01 * energy  # a climb counts it already
