@@ -25,6 +25,20 @@ def test_results_come_in_the_order_of_the_items(number, count):
     assert in_threads(later_first, range(count)) == [k * k for k in range(count)]
 
 
+def test_what_is_made_is_watched_in_order_as_it_comes(number):
+    def watched(results):
+        for result in results:
+            seen.append((result, made.count(2)))
+            yield result
+
+    made, seen = [], []
+    assert in_threads(lambda k: made.append(k) or k, range(3), 1, watched) == [0, 1, 2]
+    assert seen == [(0, 0), (1, 0), (2, 1)]
+    seen.clear()
+    assert in_threads(lambda k: k, range(3), watched=watched) == [0, 1, 2]
+    assert [result for result, _ in seen] == [0, 1, 2]
+
+
 def test_threads_within_a_thread_take_items_in_order(number):
     inner = lambda k: in_threads(lambda j: (k, j, hasattr(cores._here, "left")), range(3))
     assert in_threads(inner, range(2)) == [[(k, j, number > 1) for j in range(3)] for k in range(2)]

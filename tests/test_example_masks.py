@@ -11,7 +11,7 @@ from rig_cases import recording_of, ring_rig
 from test_segmentation import FLESH, iou, photo, scene
 
 from sogjax.actor.example_masks import FROM_FILE, FROM_PHOTOGRAPH, example_masks
-from sogjax.actor.silhouettes import load_images, load_pictures
+from sogjax.actor.silhouettes import load_all_pictures, load_images, load_pictures
 from sogjax.errors import InputError
 from sogjax.io.example_poses import ExamplePose
 from sogjax.scene.background import BackgroundImage
@@ -90,11 +90,28 @@ def test_a_mask_of_something_else_is_left_out_and_said(tmp_path):
     assert list(found.masks) == [0, 1, 3]
     np.testing.assert_array_equal(found.left_out[2], wrong > 0)
     assert found.origins[2] == FROM_FILE
-    said = []
-    load_pictures(recording, recording.example_poses[0], said.append)
+    said = load_pictures(recording, recording.example_poses[0]).warnings
     assert len(said) == 1
     assert "'stand': cam2 is left out" in said[0]
     assert "cam2.mask.png" in said[0]
+
+
+def test_pictures_of_all_example_poses_come_in_their_order_each_counted(tmp_path):
+    recordings = [
+        example_recording(tmp_path / name, masks=masks) for name, masks in (("a", (0, 1, 2)), ("b", (1, 2, 3)))
+    ]
+    examples = [replace(each.example_poses[0], name=f"pose_{k}") for k, each in enumerate(recordings)]
+    counted = []
+
+    def progress(items, total, label):
+        for item in items:
+            counted.append((total, label))
+            yield item
+
+    found = load_all_pictures(recordings[0], examples, progress=progress)
+    assert [posed.name for posed in found] == ["pose_0", "pose_1"]
+    assert [list(posed.masks) for posed in found] == [[0, 1, 2], [1, 2, 3]]
+    assert counted == [(2, "masks")] * 2
 
 
 def test_a_mask_that_lacks_a_part_is_not_said_to_disagree(tmp_path):

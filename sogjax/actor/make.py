@@ -14,7 +14,6 @@ from sogjax.actor.colors import all_samples, colored, colors_of, joined_samples
 from sogjax.actor.doubts import doubt_of, hardly_shown, unlike_sides, unseen_limbs
 from sogjax.actor.limb_colors import agreed_samples
 from sogjax.actor.posed_examples import (
-    Progress,
     Report,
     agreement,
     colored_views,
@@ -27,8 +26,9 @@ from sogjax.actor.silhouette_fit import Estimate, compile_estimate, estimate_sha
 from sogjax.actor.silhouettes import (
     COARSE_DEPTH,
     PosedPictures,
-    SharedFrames,
-    load_pictures,
+    Progress,
+    load_all_pictures,
+    silently,
     silhouette_views,
     stack_views,
 )
@@ -43,7 +43,6 @@ from sogjax.model.compiled import compiled_hastily
 from sogjax.model.limbs import limbs
 from sogjax.model.rotation import world_from_upright
 from sogjax.model.shape import ShapeModel
-from sogjax.scene.background import BackgroundImage
 from sogjax.search.search_energy import RestPrior
 
 _shaped = compiled_hastily(ShapeModel.shaped)
@@ -149,20 +148,19 @@ class Making:
     def made(
         self,
         terms: Terms,
-        progress: Progress = lambda items, total, label: items,
-        learnt: Sequence[BackgroundImage] | None = None,
-        shared: SharedFrames | None = None,
+        pictures: list[PosedPictures],
+        progress: Progress = silently,
     ) -> MadeActor:
-        """The body scaled and coloured after the example poses of the subject.
-
-        `learnt` is the background of every camera, for pictures that have neither masks nor pictures of the empty
-        scene; `shared` keeps frames for other subjects.
+        """The body scaled and coloured after the example poses of the subject, of which `pictures` are given.
 
         Raises:
-            InputError: no example poses of the subject, or pictures without masks.
+            InputError: no example poses of the subject, or a pose that was not found.
         """
         recording, model, rig, best = self.recording, self.shape_model, self.rig, self.best
-        examples, pictures = self.examples, self._pictures(progress, learnt, shared or SharedFrames())
+        examples = self.examples
+        for posed in pictures:
+            for warning in posed.warnings:
+                self.report(f"warning: {warning}")
         if any(posed.undecided for posed in pictures):
             share = float(np.mean([posed.mask_share() for posed in pictures]))
             terms = (*terms, RestPrior(UNDECIDED_REST * share))
@@ -184,14 +182,6 @@ class Making:
             for limb, little in zip(limbs(body.skeleton), hardly_shown(body, shown), strict=True):
                 weights[limb] = UNDECIDED_EDGES if little else 1.0
         return weights
-
-    def _pictures(
-        self, progress: Progress, learnt: Sequence[BackgroundImage] | None, shared: SharedFrames
-    ) -> list[PosedPictures]:
-        examples = self.examples
-        shared.read(self.recording, examples)
-        shown = progress(examples, len(examples), "masks")
-        return [load_pictures(self.recording, example, self.report, learnt, shared) for example in shown]
 
     @property
     def examples(self) -> list[ExamplePose]:
@@ -272,7 +262,7 @@ def make_actor(
         InputError: no example poses of the subject, or pictures without masks.
     """
     making = Making.of(recording, body, subject, color_space, True, best=best, report=report)
-    return making.made(terms)
+    return making.made(terms, load_all_pictures(recording, making.examples))
 
 
 class _FoundPoses(NamedTuple):

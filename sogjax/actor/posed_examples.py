@@ -1,7 +1,6 @@
 """Where the subject of each example pose is: rough poses by silhouettes, which were found well, what they explain."""
 
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
 
 import cv2
 import jax.numpy as jnp
@@ -12,7 +11,7 @@ from sogjax.actor.colors import ColoredView
 from sogjax.actor.coverage import silhouette_iou
 from sogjax.actor.example_pose import poses_from_silhouettes, starts_at
 from sogjax.actor.facing import Way, consistent_ways, forward, side_colors
-from sogjax.actor.silhouettes import PosedPictures, subject_centre
+from sogjax.actor.silhouettes import PosedPictures, Progress, subject_centre
 from sogjax.energy.posed import Posed
 from sogjax.energy.term import Terms
 from sogjax.energy.views import Views
@@ -21,14 +20,13 @@ from sogjax.io.recording import Recording
 from sogjax.model.body import Body
 from sogjax.model.camera import Camera, camera_of
 from sogjax.model.compiled import compiled_hastily
+from sogjax.model.cores import go_on
 from sogjax.quality.limb_confidence import frame_fit
 from sogjax.quality.limb_evidence import LimbBlobs, blob_evidence
 from sogjax.scene.foreground import subject_colors
 from sogjax.search.described_pose import described_pose
 
 Report = Callable[[str], None]
-Progress = Callable[[Iterable[Any], int, str], Iterable[Any]]
-"""Wraps items, of which there are so many, to show the progress under a label."""
 
 AS_GOOD = 0.88
 """Share of the best one's IoU that another frame must reach, before the body is fitted. A pose that was not found
@@ -51,6 +49,7 @@ def rough_poses(
     """
     found, up = [], recording.up
     for example, posed, coarse, fine in progress(shown, len(shown), "example poses"):
+        go_on()
         report(f"pose of {example.name}")
         starts = _starts(body, example, posed, rig, up)
         found.append(poses_from_silhouettes(body, coarse, fine, starts, terms, up))

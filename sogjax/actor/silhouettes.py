@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -33,6 +34,14 @@ DEPTH, COARSE_DEPTH = 7, 6
 """Depth of the quad-tree of a silhouette, and where poses are only told apart; the edges are fitted to cells of their
 own."""
 SILHOUETTE_TOLERANCE = 0.15
+
+Progress = Callable[[Iterable[Any], int, str], Iterable[Any]]
+"""Wraps items, of which there are so many, to show the progress under a label."""
+
+
+def silently(items: Iterable[Any], total: int, label: str) -> Iterable[Any]:
+    """The `Progress` that nobody sees."""
+    return items
 
 
 @dataclass(frozen=True)
@@ -82,7 +91,6 @@ class SharedFrames:
 def load_pictures(
     recording: Recording,
     example: ExamplePose,
-    report: Callable[[str], None] = lambda _: None,
     learnt: Sequence[BackgroundImage] | None = None,
     shared: SharedFrames | None = None,
 ) -> PosedPictures:
@@ -94,10 +102,32 @@ def load_pictures(
     """
     images, known = (shared or SharedFrames()).of(recording, example)
     masks = example_masks(recording, example, images, learnt, known)
-    for warning in masks.warnings:
-        report(f"warning: {warning}")
     shown = {k: images[k] for k in masks.masks}
     return PosedPictures(example.name, shown, masks.masks, masks.untold, masks.warnings, masks.undecided)
+
+
+def load_all_pictures(
+    recording: Recording,
+    examples: Sequence[ExamplePose],
+    learnt: Sequence[BackgroundImage] | None = None,
+    shared: SharedFrames | None = None,
+    progress: Progress = silently,
+) -> list[PosedPictures]:
+    """`load_pictures` of each example pose; those in one frame of the videos in one thread.
+
+    Raises:
+        InputError: as `load_pictures`.
+    """
+    shared = shared or SharedFrames()
+    shared.read(recording, examples)
+    together: dict[str | int, list[int]] = {}
+    for place, example in enumerate(examples):
+        together.setdefault(example.name if example.frame is None else example.frame, []).append(place)
+    load = lambda places: {k: load_pictures(recording, examples[k], learnt, shared) for k in places}
+    watched = lambda loaded: progress(loaded, len(together), "masks")
+    found = in_threads(load, together.values(), watched=watched)
+    pictures = {place: posed for loaded in found for place, posed in loaded.items()}
+    return [pictures[k] for k in range(len(examples))]
 
 
 def load_images(recording: Recording, example: ExamplePose) -> dict[int, UInt8[np.ndarray, "_h _w 3"]]:

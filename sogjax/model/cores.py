@@ -1,7 +1,7 @@
 """The processor's cores: how many there are, and what is done on all of them."""
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from threading import Event, local
 from typing import TypeVar
@@ -17,16 +17,21 @@ def usable_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def in_threads(function: Callable[[Item], Result], items: Iterable[Item], most: int | None = None) -> list[Result]:
+def in_threads(
+    function: Callable[[Item], Result],
+    items: Iterable[Item],
+    most: int | None = None,
+    watched: Callable[[Iterator[Result]], Iterable[Result]] = iter,
+) -> list[Result]:
     """What a function makes of each item, with a thread for each core, or `most`: jax and OpenCV work beside Python.
 
     Within one of these threads items are taken in order. After an error, or Ctrl-C, those begun end first: where that
-    takes long, the function calls `go_on`.
+    takes long, the function calls `go_on`. What is made passes through `watched` as it comes, in order.
     """
     given = [*items]
     threads = min(len(given), usable_cores(), most or len(given))
     if threads < 2 or hasattr(_here, "left"):
-        return [function(item) for item in given]
+        return [*watched(map(function, given))]
     left = Event()
 
     def of_item(item: Item) -> Result:
@@ -35,7 +40,7 @@ def in_threads(function: Callable[[Item], Result], items: Iterable[Item], most: 
 
     with ThreadPoolExecutor(threads) as pool:
         try:
-            return [*pool.map(of_item, given)]
+            return [*watched(pool.map(of_item, given))]
         except BaseException:
             left.set()
             raise

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from itertools import count
+from itertools import chain, count, islice
 from pathlib import Path
 
 import jax
@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 
 from sogjax.actor.make import MadeActor, Making, subjects_of
 from sogjax.actor.posed_examples import overlap_of
-from sogjax.actor.silhouettes import PosedPictures, SharedFrames, load_pictures
+from sogjax.actor.silhouettes import PosedPictures, SharedFrames, load_all_pictures
 from sogjax.actor.together import made_together
 from sogjax.energy.term import Terms
 from sogjax.errors import InputError
@@ -23,6 +23,7 @@ from sogjax.io.npz_file import float_array, read_npz, save_npz, text_array
 from sogjax.io.recording import Recording
 from sogjax.io.source import fingerprint
 from sogjax.model.body import Body
+from sogjax.model.cores import in_threads
 from sogjax.run.background import Background, learn_background
 from sogjax.run.build import color_space_and_radius, energy_terms
 from sogjax.run.clip import Clip
@@ -246,9 +247,12 @@ def actors_of_pictures(request: ActorRequest) -> list[MadeActor]:
     recording = with_rough_poses(recording, start)
     subjects = subjects_of(recording) if request.subjects is None else request.subjects
     makings = [_making(request, recording, start, subject, best) for subject in subjects]
-    shared = SharedFrames() if len(makings) > 1 else None
-    made = [making.made(request.terms, progress, learnt, shared) for making in makings]
-    if shared is not None:
+    shared, examples = SharedFrames(), [making.examples for making in makings]
+    loaded = iter(load_all_pictures(recording, [*chain(*examples)], learnt, shared, progress))
+    pictures = [[*islice(loaded, len(of_actor))] for of_actor in examples]
+    make = lambda each: each[0].made(request.terms, each[1], progress)
+    made = in_threads(make, zip(makings, pictures, strict=True))
+    if len(makings) > 1:
         made = made_together(makings, made, _of_everybody(recording, made, learnt, shared))
     for making, actor in zip(makings, made, strict=True):
         for said in actor.doubtful:
@@ -271,11 +275,8 @@ def _of_everybody(
     """The masks of all people in the frames of the videos that show several actors, by the names of the examples."""
     used = {name for actor in made for name in actor.frames}
     examples = {example.name: example for example in recording.example_poses if example.within and example.name in used}
-    names = recording.rig.names
-    return {
-        name: load_pictures(recording, example.of_everybody(names), learnt=learnt, shared=shared)
-        for name, example in examples.items()
-    }
+    everybodys = [example.of_everybody(recording.rig.names) for example in examples.values()]
+    return dict(zip(examples, load_all_pictures(recording, everybodys, learnt, shared), strict=True))
 
 
 def known_frames(made: Sequence[MadeActor]) -> tuple[KnownFrame, ...]:

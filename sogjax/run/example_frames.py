@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from sogjax.actor.frame_choice import SeenShape, seen_shape, spread_choice, subject_cubes
+from sogjax.actor.frame_choice import Mask, SeenShape, seen_shape, spread_choice, subject_cubes
 from sogjax.actor.make import subjects_of
 from sogjax.errors import InputError, counted, listed
 from sogjax.io.example_poses import ExamplePose, frame_name
 from sogjax.io.recording import Recording
+from sogjax.model.cores import in_threads
 from sogjax.model.rotation import axis_vector
 from sogjax.run.background import Background
 from sogjax.run.clip import Clip
@@ -26,7 +27,7 @@ from sogjax.run.example_people import (
 from sogjax.run.sampled_masks import SampledMasks, masks_of_samples
 from sogjax.run.terminal import say
 from sogjax.scene.background import BackgroundImage
-from sogjax.scene.visual_hull import MANY
+from sogjax.scene.visual_hull import MANY, Cube
 
 NUM_TRIED, NUM_EXAMPLES = 8, 5
 """Frames in which the pose is looked for, and those of them that the actor is made of."""
@@ -249,10 +250,12 @@ def most_helpful(chosen: Sequence[SeenShape], num_cameras: int, plates: bool = F
 
 def seen_shapes(seen: SampledMasks, up: str, misses: int = 0) -> list[SeenShape]:
     """What frames spread over the videos show, where somebody is seen; `misses` as in `seen_shape`."""
-    cubes = subject_cubes(seen.masks, seen.cameras)
-    shapes = [
-        seen_shape(frame, masks, seen.unknown, seen.cameras, cube, axis_vector(up), LEAST_SHOWN, misses)
-        for frame, masks, cube in zip(seen.frames, seen.masks, cubes, strict=True)
-        if cube is not None
-    ]
-    return [shape for shape in shapes if shape is not None]
+
+    def of_frame(row: tuple[int, dict[int, Mask], Cube | None]) -> SeenShape | None:
+        frame, masks, cube = row
+        if cube is None:
+            return None
+        return seen_shape(frame, masks, seen.unknown, seen.cameras, cube, axis_vector(up), LEAST_SHOWN, misses)
+
+    rows = zip(seen.frames, seen.masks, subject_cubes(seen.masks, seen.cameras), strict=True)
+    return [shape for shape in in_threads(of_frame, rows) if shape is not None]

@@ -8,6 +8,7 @@ import numpy as np
 
 from sogjax.actor.frame_choice import (
     LEAST_BESIDE,
+    Mask,
     SeenShape,
     seen_shape,
     spread_choice,
@@ -18,12 +19,14 @@ from sogjax.actor.people import PersonSeen, matched, people_apart, told_apart
 from sogjax.errors import counted
 from sogjax.io.example_poses import ExamplePose, frame_name
 from sogjax.io.recording import Recording
+from sogjax.model.cores import in_threads
 from sogjax.model.rotation import axis_vector
 from sogjax.run.clip import Clip
-from sogjax.run.sampled_masks import SampledMasks, masks_of_samples
+from sogjax.run.sampled_masks import Picture, SampledMasks, masks_of_samples
 from sogjax.scene.background import BackgroundImage
 from sogjax.scene.background_difference import reduced_mask
 from sogjax.scene.cells import CellGrid
+from sogjax.scene.visual_hull import Cube
 
 AGREEING = 0.45
 """Least agreement of everybody's hull and silhouettes in a frame."""
@@ -180,12 +183,14 @@ def everybody(seen: SampledMasks, up: str, count: int = 0) -> list[list[PersonSe
     """The people in each of some frames; none, where too few cameras show any. `count` as in `people_apart`."""
     cubes = subject_cubes(seen.masks, seen.cameras)
     rows = zip(seen.frames, seen.masks, seen.pictures, cubes, strict=True)
-    return [
-        []
-        if cube is None
-        else people_apart(frame, masks, seen.unknown, pictures, seen.cameras, cube, axis_vector(up), count)
-        for frame, masks, pictures, cube in rows
-    ]
+
+    def of_frame(row: tuple[int, dict[int, Mask], dict[int, Picture], Cube | None]) -> list[PersonSeen]:
+        frame, masks, pictures, cube = row
+        if cube is None:
+            return []
+        return people_apart(frame, masks, seen.unknown, pictures, seen.cameras, cube, axis_vector(up), count)
+
+    return in_threads(of_frame, rows)
 
 
 def chosen_frames(shapes: Sequence[Mapping[int, SeenShape]], count: int) -> list[list[int]]:
@@ -210,16 +215,19 @@ def suitable_moments(shapes: Sequence[Mapping[int, SeenShape]]) -> list[Moment]:
 
 def _shapes(person: Sequence[PersonSeen], seen: SampledMasks, up: str) -> dict[int, SeenShape]:
     """What the silhouettes of one person tell, by frame; cameras in which others hide him show nothing of him."""
-    shapes: dict[int, SeenShape] = {}
-    cubes = subject_cubes([one.masks for one in person], seen.cameras, LEAST_BESIDE)
-    for one, cube in zip(person, cubes, strict=True):
+
+    def of_frame(row: tuple[PersonSeen, Cube | None]) -> SeenShape | None:
+        one, cube = row
         if cube is None:
-            continue
+            return None
         unknown = {k: seen.unknown[k] & region for k, region in one.regions.items()}
         cameras = {k: seen.cameras[k] for k in one.masks}
-        if (shape := seen_shape(one.frame, one.masks, unknown, cameras, cube, axis_vector(up))) is not None:
-            shapes[one.frame] = replace(shape, whole=shape.whole * len(cameras) / len(seen.cameras))
-    return shapes
+        shape = seen_shape(one.frame, one.masks, unknown, cameras, cube, axis_vector(up))
+        return None if shape is None else replace(shape, whole=shape.whole * len(cameras) / len(seen.cameras))
+
+    cubes = subject_cubes([one.masks for one in person], seen.cameras, LEAST_BESIDE)
+    shapes = in_threads(of_frame, zip(person, cubes, strict=True))
+    return {shape.frame: shape for shape in shapes if shape is not None}
 
 
 def _example(recording: Recording, actor: str, person: PersonSeen, grids: Sequence[CellGrid]) -> ExamplePose:
