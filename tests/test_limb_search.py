@@ -17,6 +17,7 @@ from sogjax.energy.frame_energy import FrameEnergy, standard_terms
 from sogjax.energy.part_energy import PartEnergy
 from sogjax.energy.posed import History
 from sogjax.energy.views import Windows
+from sogjax.model import cores as cores_of
 from sogjax.model.body import concatenate
 from sogjax.model.limbs import limb_names
 from sogjax.model.solid import Solid, impossibilities
@@ -24,7 +25,8 @@ from sogjax.quality.limb_confidence import LEAST_RIVAL
 from sogjax.search import climbed, limb_search
 from sogjax.search import merge_passes as merging
 from sogjax.search.climbed import climbed_in
-from sogjax.search.limb_search import BetterPose, LimbSearch, compile_search
+from sogjax.search.held_otherwise import NUM_CLIMBED
+from sogjax.search.limb_search import BetterPose, LimbSearch, compile_search, in_lanes
 from sogjax.search.limb_ways import UnitArrays, drawn_ways, look_alikes, units_of
 from sogjax.search.merge_passes import merge_passes
 from sogjax.search.placed_body import means_of
@@ -140,6 +142,27 @@ def test_drawn_ways_lie_within_the_limits_and_are_others_each_turn():
     assert alone[1].any()
     assert (~alone[0] & ~alone[1]).any()
     assert np.abs(one - two).max() > 0.1
+
+
+@pytest.mark.parametrize("cores", [1, 2, 4])
+def test_lanes_are_the_same_on_any_number_of_cores(cores, monkeypatch):
+    monkeypatch.setattr(cores_of, "usable_cores", lambda: cores)
+    with_lane = lambda lane, row: (lane, row)
+    assert in_lanes(with_lane, range(3, 8)) == [(0, 3), (0, 4), (0, 5), (1, 6), (1, 7)]
+    assert in_lanes(with_lane, [5]) == [(0, 5)]
+    assert in_lanes(with_lane, []) == []
+
+
+@pytest.mark.slow
+def test_each_lane_draws_ways_of_its_own(walking_dog):
+    tracker, cells, right = walking_dog
+    search, pose = LimbSearch.of(tracker, right.capacities), right.poses[1]
+    tried = lambda lane: search._tried(0, search.units[0], pose, lane)
+    views, seen = search.views(on_device(cells[1]), pose), []
+    for lane in (0, 1, 0, 1):
+        search.held_otherwise(views, pose, lane)
+        seen.append(tried(lane)[NUM_CLIMBED - 1 :])
+    assert all(np.abs(one - other).max() > 0.1 for k, one in enumerate(seen) for other in seen[:k])
 
 
 @pytest.mark.slow
@@ -280,7 +303,7 @@ def test_passes_begin_where_most_is_gained_and_where_nothing_changed_meanwhile(w
     away = lambda row, far: right.poses[row] + np.float32(far) * np.isin(np.arange(right.poses.shape[1]), dofs)
     dofs, gains, asked = search.units[0].all_dofs, {0: 0.1, 1: 0.0, 2: 0.4, 3: 0.3, 4: 0.2, 5: 0.05}, []
 
-    def better_pose(_, frame, passed, row):
+    def better_pose(_, frame, passed, row, lane=0):
         asked.append(row)
         far = 1.0 if asked.count(row) > 1 else 0.5
         return BetterPose(away(row, far), gains[row]) if gains[row] else None

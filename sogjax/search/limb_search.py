@@ -1,7 +1,7 @@
 """Better poses of single frames, in which limbs are held in other ways; and what rivals of limbs gain."""
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from sogjax.energy.views import Views
-from sogjax.model.cores import in_threads
+from sogjax.model.cores import go_on, in_threads
 from sogjax.model.limbs import limb_names
 from sogjax.model.solid import DEEP, impossibilities
 from sogjax.quality.limb_confidence import LEAST_RIVAL
@@ -23,6 +23,8 @@ from sogjax.tracking.capacity import views_near
 from sogjax.tracking.culling import Capacities
 from sogjax.tracking.frame import AnyFrame, FrameInput, TrackState, on_device
 from sogjax.tracking.tracker import Tracker
+
+Found = TypeVar("Found")
 
 ELSEWHERE = 0.15
 """Metres, mean over the outer blobs of a limb, from where it was tracked: then it is elsewhere."""
@@ -42,6 +44,10 @@ MOST_WHOLE = 3
 """Poses that are climbed with all degrees of freedom in a frame, beside the tracked one and that with crossed ends."""
 
 
+LANES = 2
+"""Parts of a clip whose key frames are searched beside each other; not the number of cores, on which no result may
+depend."""
+
 InVain = Sequence[tuple[Float[np.ndarray, "dof"], int]]
 """Poses of passes in vain in a frame, and what each counts."""
 
@@ -56,13 +62,13 @@ class BetterPose(NamedTuple):
 
 
 class LimbSearch:
-    """Looks for better ways to hold limbs, in one key frame after the other."""
+    """Looks for better ways to hold limbs, in one key frame of a lane after the other."""
 
     def __init__(self, tracker: Tracker, units: Sequence[Unit], capacities: Capacities) -> None:
         self.tracker, self.units, self.arrays = tracker, units, UnitArrays.of(tracker.body, units)
         self.capacities = capacities
-        self._turn = 0
-        self._carried: HeldOtherwise | None = None
+        self._turns = [*range(LANES)]
+        self._carried: list[HeldOtherwise | None] = [None] * LANES
         self._in_vain: dict[int, list[tuple[np.ndarray, int]]] = {}
         self._rivals: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
@@ -87,19 +93,19 @@ class LimbSearch:
         for row in rows:
             self._in_vain.pop(row, None)
 
-    def better_pose(self, frame: AnyFrame, passed: Pass, row: int) -> BetterPose | None:
+    def better_pose(self, frame: AnyFrame, passed: Pass, row: int, lane: int = 0) -> BetterPose | None:
         """The pose of a frame with limbs held otherwise, climbed with all degrees of freedom, if that is worth more.
 
         From a better pose the limbs are searched again: one may have been in the place of another.
         """
         first = passed.poses[row].copy()
         views = self.views(on_device(frame), first)
-        held = self.held_otherwise(views, first)
+        held = self.held_otherwise(views, first, lane)
         self._note_rivals(row, views, first, held, passed.energy)
-        found = self.with_better_limbs(views, first, first, passed.energy, self._in_vain.get(row, []), held)
+        found = self.with_better_limbs(views, first, first, passed.energy, self._in_vain.get(row, []), held, lane)
         return None if found.pose is first else found
 
-    def rivals(self, frame: Callable[[], AnyFrame], passed: Pass, row: int) -> Float[np.ndarray, "limb"]:
+    def rivals(self, frame: Callable[[], AnyFrame], passed: Pass, row: int, lane: int = 0) -> Float[np.ndarray, "limb"]:
         """What the best way with each limb elsewhere gains over the pose in a row of a pass.
 
         As a part of an actor's energy; losses beyond `LEAST_RIVAL` are cut off there. NaN: the limb is not searched.
@@ -108,7 +114,7 @@ class LimbSearch:
         pose = passed.poses[row].copy()
         if not self._knows_rivals(row, pose):
             views = self.views(on_device(frame()), pose)
-            self._note_rivals(row, views, pose, self.held_otherwise(views, pose), passed.energy)
+            self._note_rivals(row, views, pose, self.held_otherwise(views, pose, lane), passed.energy)
         return self._rivals[row][1]
 
     def _knows_rivals(self, row: int, pose: Float[np.ndarray, "dof"]) -> bool:
@@ -169,6 +175,7 @@ class LimbSearch:
         energy: float,
         in_vain: InVain = (),
         held: HeldOtherwise | None = None,
+        lane: int = 0,
     ) -> BetterPose:
         """A pose with limbs held otherwise as long as that is worth more; itself, where nothing is.
 
@@ -177,7 +184,7 @@ class LimbSearch:
         """
         best = BetterPose(pose, 0.0)
         for number in range(MOST_ROUNDS):
-            held = held if held is not None and number == 0 else self.held_otherwise(views, best.pose)
+            held = held if held is not None and number == 0 else self.held_otherwise(views, best.pose, lane)
             better = self._better(views, first, best.pose, held, energy, in_vain)
             if better is None:
                 break
@@ -195,13 +202,13 @@ class LimbSearch:
         """What the cameras see where limbs may be held."""
         return views_near(self.tracker, frame, jnp.asarray(pose), self.capacities, REACH)
 
-    def held_otherwise(self, views: Views, pose: Float[np.ndarray, "dof"]) -> HeldOtherwise:
-        """Ways to hold limbs around a pose; some of the next frame's are those found here."""
-        self._turn += 1
-        tried = [self._tried(k, unit, pose).astype(pose.dtype) for k, unit in enumerate(self.units)]
+    def held_otherwise(self, views: Views, pose: Float[np.ndarray, "dof"], lane: int = 0) -> HeldOtherwise:
+        """Ways to hold limbs around a pose; some of the lane's next frame are those found here."""
+        self._turns[lane] += LANES
+        tried = [self._tried(k, unit, pose, lane).astype(pose.dtype) for k, unit in enumerate(self.units)]
         held = lambda k: held_otherwise(self.tracker, views, jnp.asarray(pose), self.arrays[k], jnp.asarray(tried[k]))
         found = in_threads(lambda k: jax.device_get(held(k)), range(len(self.units)))
-        together = self._carried = jax.tree.map(lambda *of_units: np.stack(of_units), *found)
+        together = self._carried[lane] = jax.tree.map(lambda *of_units: np.stack(of_units), *found)
         return together
 
     def _better(
@@ -290,12 +297,31 @@ class LimbSearch:
         impossible = lambda poses: np.asarray(impossibilities(solid, self.tracker.body, jnp.asarray(poses)))
         return impossible(pose[None])[0] - impossible(others.reshape(-1, others.shape[-1])).reshape(shape)
 
-    def _tried(self, number: int, unit: Unit, pose: Float[np.ndarray, "dof"]) -> Float[np.ndarray, "seed dof"]:
-        """Ways that are drawn, and those of the last key frame."""
-        drawn, before = drawn_ways(self.tracker.body, unit, pose, self._turn), np.tile(pose, (NUM_CLIMBED - 1, 1))
-        if self._carried is not None:
-            before[:, unit.all_dofs] = self._carried.poses[number, 1:NUM_CLIMBED][:, unit.all_dofs]
+    def _tried(
+        self, number: int, unit: Unit, pose: Float[np.ndarray, "dof"], lane: int
+    ) -> Float[np.ndarray, "seed dof"]:
+        """Ways that are drawn, and those of the lane's last key frame."""
+        drawn, carried = drawn_ways(self.tracker.body, unit, pose, self._turns[lane]), self._carried[lane]
+        before = np.tile(pose, (NUM_CLIMBED - 1, 1))
+        if carried is not None:
+            before[:, unit.all_dofs] = carried.poses[number, 1:NUM_CLIMBED][:, unit.all_dofs]
         return np.concatenate([before, drawn])
+
+
+def in_lanes(function: Callable[[int, int], Found], rows: Sequence[int]) -> list[Found]:
+    """What a function makes of each row, given with its lane: each lane takes a part of the rows, in order."""
+    if len(rows) < LANES:
+        return [function(0, row) for row in rows]  # which has all cores
+    parts = [part.tolist() for part in np.array_split(np.asarray(rows), LANES)]
+
+    def of_lane(lane: int) -> list[Found]:
+        found = []
+        for row in parts[lane]:
+            go_on()
+            found.append(function(lane, row))
+        return found
+
+    return [found for of_rows in in_threads(of_lane, range(LANES)) for found in of_rows]
 
 
 def compile_search(tracker: Tracker, state: TrackState, frame: FrameInput, capacities: Capacities) -> None:

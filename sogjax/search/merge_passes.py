@@ -7,9 +7,10 @@ limbs are in doubt then, a pass comes backwards from behind: a limb that is lost
 what hid it, or moved too far for one frame, comes from the other side.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import count
 
 import jax.numpy as jnp
 import numpy as np
@@ -18,7 +19,7 @@ from jaxtyping import Bool, Float
 from sogjax.quality.fitted import fitted_numbers
 from sogjax.quality.metrics import stretches
 from sogjax.search.jump_passes import ChosenRows, Jump, chosen_rows, largest_jump, passes_without
-from sogjax.search.limb_search import BetterPose, LimbSearch
+from sogjax.search.limb_search import Found, LimbSearch, in_lanes
 from sogjax.search.misplaced import Misplaced
 from sogjax.search.other_pass import (
     MOST_FRAMES,
@@ -133,10 +134,11 @@ class _Revising:
 
     def note_rivals(self, rows: Sequence[int], report: Report) -> None:
         """Note what other ways to hold limbs are worth beside the poses that were found in some rows."""
-        for number, row in enumerate(rows):
-            if self._search is not None:
-                report(number / len(rows))
-                self.known.revision.rivals[row] = self._search.rivals(partial(self._frame, row), self.passed, row)
+        search = self._search
+        if search is None:
+            return
+        rivals = lambda lane, row: search.rivals(partial(self._frame, row), self.passed, row, lane)
+        self.known.revision.rivals |= dict(zip(rows, in_lanes(_reported(rivals, len(rows), report), rows), strict=True))
 
     def take_known(self, poses: Float[np.ndarray, "frame dof"], misplaced: Misplaced | None) -> None:
         """Take what the poses of another pass of the clip explain better, by stretches in which the passes differ."""
@@ -215,12 +217,10 @@ class _Revising:
     def _search_limbs(self, search: LimbSearch, rows: Sequence[int], report: Report) -> None:
         """Search limbs in some rows, then see where what was found leads, what gains most in its row first."""
         self.known.changed.clear()
-        found: dict[int, BetterPose] = {}
-        for number, row in enumerate(rows):
-            report(number / len(rows))
-            better = None if self._tired(row) else search.better_pose(self._frame(row), self.passed, row)
-            if better is not None:
-                found[row] = better
+        rows = [row for row in rows if not self._tired(row)]
+        better_pose = lambda lane, row: search.better_pose(self._frame(row), self.passed, row, lane)
+        looked = zip(rows, in_lanes(_reported(better_pose, len(rows), report), rows), strict=True)
+        found = {row: better for row, better in looked if better is not None}
         report(0.0)  # how long the rest takes depends on what was found
         for row, better in sorted(found.items(), key=lambda item: -item[1].gain):
             if row in self.known.changed or self._tired(row):
@@ -276,3 +276,14 @@ class _Revising:
         changed = self.known.take(found)
         self._looked_at += 0 if changed else len(found.rows)
         return changed
+
+
+def _reported(function: Callable[[int, int], Found], total: int, report: Report) -> Callable[[int, int], Found]:
+    """The function of a lane and a row, which reports the share of all rows that are done."""
+    done = count()
+
+    def of_row(lane: int, row: int) -> Found:
+        report(next(done) / total)
+        return function(lane, row)
+
+    return of_row
