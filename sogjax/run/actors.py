@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 
 from sogjax.actor.make import MadeActor, Making, subjects_of
 from sogjax.actor.posed_examples import overlap_of
-from sogjax.actor.silhouettes import PosedPictures, SharedFrames, load_all_pictures
+from sogjax.actor.silhouettes import PosedPictures, Progress, SharedFrames, load_all_pictures
 from sogjax.actor.together import made_together
 from sogjax.energy.term import Terms
 from sogjax.errors import InputError
@@ -250,7 +250,7 @@ def actors_of_pictures(request: ActorRequest) -> list[MadeActor]:
     shared, examples = SharedFrames(), [making.examples for making in makings]
     loaded = iter(load_all_pictures(recording, [*chain(*examples)], learnt, shared, progress))
     pictures = [[*islice(loaded, len(of_actor))] for of_actor in examples]
-    make = lambda each: each[0].made(request.terms, each[1], progress)
+    make = lambda each: each[0].made(request.terms, each[1], _progress_of(each[0].subject))
     made = in_threads(make, zip(makings, pictures, strict=True))
     if len(makings) > 1:
         made = made_together(makings, made, _of_everybody(recording, made, learnt, shared))
@@ -264,6 +264,11 @@ def _making(request: ActorRequest, recording: Recording, start: Body, subject: s
     label = "actor" if subject is None else f"actor {subject}"
     said = lambda stage: say(f"{label}: {stage}")
     return Making.of(recording, start, subject, request.color_space, request.symmetric, best=best, report=said)
+
+
+def _progress_of(subject: str | None) -> Progress:
+    """Bars that say whose they are, since several actors are made beside each other."""
+    return lambda items, total, label: progress(items, total, label if subject is None else f"{label} of {subject}")
 
 
 def _of_everybody(
