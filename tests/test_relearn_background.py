@@ -47,15 +47,26 @@ def test_samples_that_are_not_tracked_are_told(capsys):
     assert "of 20 frames to learn the background from, 10 are tracked" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("stays", "alike", "known"), [(9, True, False), (9, False, True), (4, True, True)])
-def test_what_a_background_took_from_a_body_that_stays_is_unknown(stays, alike, known):
+@pytest.mark.parametrize(
+    ("stays", "alike", "fewest", "known"),
+    [(9, True, 8, False), (9, False, 8, True), (4, True, 8, True), (1, True, 1, False), (1, False, 1, True)],
+)
+def test_what_a_background_took_from_a_body_that_stays_is_unknown(stays, alike, fewest, known):
     """Covered by the body in so many of twelve samples, which show what was taken for background, or something else."""
     picture = np.full((4, 6, 3), 90, np.uint8)
     first = BackgroundImage(picture, np.full((4, 6), 2.0, np.float32), np.ones((4, 6), bool), "clip")
     shown = {frame: picture + np.uint8(0 if alike else 60) for frame in range(12)}
     body = np.zeros((4, 6), bool)
     body[1:3, 2:4] = True
-    found = without_body(first, shown, {frame: body & (frame < stays) for frame in range(12)})
+    found = without_body(first, shown, {frame: body & (frame < stays) for frame in range(12)}, fewest)
     assert (found.known[body] == known).all()
     assert found.known[~body].all()
-    assert without_body(replace(first, origin="picture"), shown, dict.fromkeys(range(12), body)).known.all()
+    assert without_body(replace(first, origin="picture"), shown, dict.fromkeys(range(12), body), 1).known.all()
+
+
+def test_poses_that_are_known_are_those_of_the_samples_nearest_to_them():
+    one, other = np.zeros(3, np.float32), np.ones(3, np.float32)
+    found = relearn_background._at_samples({44: one, 299: other}, SAMPLES)
+    assert [*found] == [30, 270]
+    assert found[30] is one
+    assert found[270] is other

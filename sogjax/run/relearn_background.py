@@ -106,18 +106,23 @@ def relearn_background(
     samples = reason and frames_to_learn_from(background_samples(setup.clip.recording).frames, setup.clip.numbers)
     if not samples:
         return RelearntBackground(None)
+    body, firsts = setup.tracker.body, background.required()
+    shown = setup.clip.sampled([background_samples(setup.clip.recording)])[0]
     if poses is None:
         say(f"{reason}: the clip is tracked once to learn the background where the body is not, then again")
-        poses = _tracked_poses(setup, start, frozenset(samples))
-    body = setup.tracker.body
+        there = _at_samples(told | {start.frame: start.pose}, samples)
+        masks = body_masks(setup.clip.recording, body, there, border=0.0)
+        open_there = [without_body(*of_camera, 1) for of_camera in zip(firsts, shown, masks.values(), strict=True)]
+        poses = _tracked_poses(_with_background(setup, Background(tuple(open_there))), start, frozenset(samples))
     try:
         learnt = learnt_from(setup.clip, body_masks(setup.clip.recording, body, poses))
     except UnsuitableError as reason:
         raise InputError(f"{setup.clip.recording.path}: no background can be learnt, since {reason}") from reason
-    shown = setup.clip.sampled([background_samples(setup.clip.recording)])[0]
     masks = body_masks(setup.clip.recording, body, poses, border=0.0)
-    firsts = background.required()
-    without = [without_body(*of_camera) for of_camera in zip(firsts, shown, masks.values(), strict=True)]
+    without = [
+        without_body(*of_camera, max(FEWEST_AGREEING, int(np.ceil(STAYS * len(of_camera[1])))))
+        for of_camera in zip(firsts, shown, masks.values(), strict=True)
+    ]
     again = [first if first.origin == "picture" else one for first, one in zip(firsts, learnt, strict=True)]
     return RelearntBackground(Background(tuple(again)), Background(tuple(without)))
 
@@ -126,6 +131,7 @@ def without_body(
     first: BackgroundImage,
     shown: Mapping[int, UInt8[np.ndarray, "rows columns 3"]],
     covered: Mapping[int, Bool[np.ndarray, "rows columns"]],
+    fewest: int,
 ) -> BackgroundImage:
     """A learnt background that knows nothing where it shows what the body did that stood there.
 
@@ -133,6 +139,7 @@ def without_body(
         first: of one camera.
         shown: what it showed, by frame.
         covered: where the body was, by frame.
+        fewest: frames in which the body must have been there.
     """
     if first.origin != "clip":
         return first
@@ -141,9 +148,21 @@ def without_body(
         if not covered[frame].all():
             count += covered[frame]
             same += covered[frame] & (channel_max(cv2.absdiff(first.picture, np.asarray(shown[frame]))) <= SAME)
-    stays = count >= max(FEWEST_AGREEING, STAYS * len(shown))
-    taken = stays & (same >= MOSTLY * count)
+    taken = (count >= fewest) & (same >= MOSTLY * count)
     return replace(first, known=first.known & ~taken)
+
+
+def _at_samples(
+    known: Mapping[int, Float[np.ndarray, "dof"]], samples: Sequence[int]
+) -> dict[int, Float[np.ndarray, "dof"]]:
+    """Known poses by the sampled frames that are nearest to theirs: legs that stand there are there as well."""
+    nearest = lambda frame: min(samples, key=lambda sample: abs(sample - frame))
+    return {nearest(frame): pose for frame, pose in known.items()}
+
+
+def _with_background(setup: Setup, background: Background) -> Setup:
+    tracker = eqx.tree_at(lambda t: t.reader.background, setup.tracker, background.model(setup.clip.grids))
+    return replace(setup, tracker=tracker)
 
 
 def frames_to_learn_from(samples: Sequence[int], numbers: range) -> list[int]:
@@ -195,7 +214,9 @@ def _tracked_poses(setup: Setup, start: InitialPose, wanted: frozenset[int]) -> 
     return poses
 
 
-def body_masks(recording: Recording, body: Body, poses: Mapping[int, Array], border: float = BORDER) -> LeftOut:
+def body_masks(
+    recording: Recording, body: Body, poses: Mapping[int, Array] | Mapping[int, np.ndarray], border: float = BORDER
+) -> LeftOut:
     """Where a body is in the sampled frames, widened; a frame whose pose is not known is left out as a whole.
 
     Args:
