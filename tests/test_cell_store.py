@@ -202,6 +202,27 @@ def test_a_disk_that_fills_stops_keeping_but_not_the_run(walk, tmp_path, monkeyp
         cells(opened(walk, tmp_path / "asked for"))
 
 
+def test_a_disk_that_fills_with_samples_stops_keeping_but_not_the_run(walk, tmp_path, monkeypatch, capsys):
+    def full(path, array):
+        raise OSError("Not enough free space to write 56687040 bytes after offset 128")  # numpy's own, without a number
+
+    monkeypatch.setattr(np, "save", full)
+    recording = open_recording(walk)
+    clip, kind = Clip(recording, recording.frames, DEPTH), SampleKind("shown", (0, 2), lambda camera, picture: picture)
+    keeping = clip.kept_in(tmp_path, None)
+    found = keeping.sampled([kind])[0]
+    keeping.close()
+    for one, other in zip(found, clip.sampled([kind])[0], strict=True):
+        assert [*one] == [*other] == [0, 2]
+        np.testing.assert_array_equal(one[2], other[2])
+    assert "Not enough free space" in (said := capsys.readouterr().err)
+    assert "decoded again" in said
+    asked = opened(walk, tmp_path / "asked for")
+    with pytest.raises(InputError, match="Not enough free space"):
+        asked.sampled([kind])
+    asked.close()
+
+
 @pytest.mark.slow
 def test_tracking_with_and_without_kept_cells_gives_one_motion(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

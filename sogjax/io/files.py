@@ -94,9 +94,9 @@ def disk_trouble_told(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        if error.errno not in _DISK_TROUBLE:
+        if error.errno not in (*_DISK_TROUBLE, None):  # numpy's own errors have none
             raise
-        raise InputError(f"{path}: could not be written ({error.strerror}); choose another disk") from error
+        raise InputError(f"{path}: could not be written ({error.strerror or error}); choose another disk") from error
 
 
 def objection(name: str) -> str | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import cv2
 import numpy as np
@@ -31,6 +31,8 @@ FRAMES_AHEAD = 3
 """Decoded frames that wait for whoever takes them, at most."""
 BLOCK = 32
 """Frames that are decoded at once where they are wanted backwards."""
+
+Kept = TypeVar("Kept")
 
 PictureMaker = Callable[[int, int, np.ndarray], Any]
 """Makes something of a picture (BGR) while it is there, from the camera's index, the frame and the picture."""
@@ -156,8 +158,8 @@ class Clip:
         if missing:
             taken = self._taken(missing)
             for name, samples in taken.items():
-                if self.store is not None and not self.store.is_full:
-                    taken[name] = self.store.keep_samples(name, samples)
+                if (kept := self._kept_on_disk(lambda store, of=(name, samples): store.keep_samples(*of))) is not None:
+                    taken[name] = kept
         return [
             taken[kind.name] if kind.name in taken or self.store is None else self.store.samples(kind.name)
             for kind in kinds
@@ -233,19 +235,21 @@ class Clip:
             return None
         stacked = np.stack([np.zeros_like(some) if of_camera is None else of_camera for of_camera in cells])
         present = np.array([of_camera is not None for of_camera in cells])
-        self._keep(number, stacked, present)
+        self._kept_on_disk(lambda store: store.keep(number, stacked, present))
         return self._input(number, stacked, present)
 
-    def _keep(self, number: int, cells: np.ndarray, present: np.ndarray) -> None:
+    def _kept_on_disk(self, keep: Callable[[CellStore], Kept]) -> Kept | None:
+        """What comes of keeping something; None: nothing is kept, or any more since the disk became full."""
         if self.store is None or self.store.is_full:
-            return
+            return None
         try:
-            self.store.keep(number, cells, present)
+            return keep(self.store)
         except InputError as error:
             if self.store_lasts:
                 raise
             self.store.is_full = True
             say(f"warning: {error}; frames are decoded again where they are needed again")
+            return None
 
     def _input(self, number: int, cells: np.ndarray, present: np.ndarray) -> FrameInput:
         seen = None if self.keypoints is None else self.keypoints.of_frame(number)
