@@ -2,7 +2,7 @@
 
 import time
 from concurrent.futures import CancelledError
-from threading import Event
+from threading import Event, get_ident
 
 import pytest
 
@@ -71,3 +71,45 @@ def test_an_error_is_raised_and_ends_what_goes_on_beside_it(monkeypatch):
         in_threads(work, range(2))
     assert ended == [1]
     go_on()  # here nobody has left
+
+
+def test_what_goes_on_within_a_thread_ends_when_the_outer_caller_leaves(monkeypatch):
+    monkeypatch.setattr(cores, "usable_cores", lambda: 2)
+    begun, done = Event(), []
+
+    def inner(k):
+        done.append(k)
+        begun.set()
+        time.sleep(0.01)
+
+    def outer(k):
+        if k == 0:
+            begun.wait(10.0)
+            raise ValueError("the first one fails")
+        in_threads(inner, range(1000))
+
+    with pytest.raises(ValueError, match="the first one fails"):
+        in_threads(outer, range(2))
+    assert len(done) < 900
+
+
+def test_nothing_more_is_begun_when_whoever_watches_leaves(monkeypatch):
+    monkeypatch.setattr(cores, "usable_cores", lambda: 2)
+    done = []
+
+    def watched(results):
+        for _ in results:
+            raise KeyboardInterrupt
+        yield from results
+
+    with pytest.raises(KeyboardInterrupt):
+        in_threads(lambda k: done.append(k) or time.sleep(0.01), range(1000), watched=watched)
+    assert len(done) < 900
+
+
+@pytest.mark.parametrize(("number", "within"), [(2, 1), (4, 2), (5, 2)])
+def test_threads_share_the_cores_with_those_within_them(monkeypatch, number, within):
+    monkeypatch.setattr(cores, "usable_cores", lambda: number)
+    assert in_threads(lambda k: cores._here.cores, range(2)) == [within] * 2
+    deep = in_threads(lambda k: len({*in_threads(lambda j: (time.sleep(0.05), get_ident())[1], range(2))}), range(2))
+    assert deep == [within] * 2

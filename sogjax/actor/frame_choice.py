@@ -17,6 +17,8 @@ SMALLEST_BODY = 0.1
 """Volume of a separate part of a hull, as a share of the largest, from which on it may be somebody else."""
 LEAST_PARTS, LEAST_BESIDE = 0.5, 0.25
 """Least share of the cameras that must show the subject; somebody beside others, who hide him from the rest."""
+FRAMES_AT_ONCE = 4
+"""Whose hulls are carved at the same time: each takes some 55 MB with twelve cameras."""
 SHAPE_VOXELS = 16
 """Voxels along each side of the cube in which shapes are compared."""
 

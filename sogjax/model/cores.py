@@ -9,7 +9,7 @@ from typing import TypeVar
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 _here = local()
-"""In a thread of `in_threads`: `left`, the event of its caller having left."""
+"""In a thread of `in_threads`: `left`, the events of its callers having left, and how many `cores` are its share."""
 
 
 def usable_cores() -> int:
@@ -25,18 +25,24 @@ def in_threads(
 ) -> list[Result]:
     """What a function makes of each item, with a thread for each core, or `most`: jax and OpenCV work beside Python.
 
-    Within one of these threads items are taken in order. After an error, or Ctrl-C, those begun end first: where that
-    takes long, the function calls `go_on`. What is made passes through `watched` as it comes, in order.
+    Within one of these threads, others have its share of the cores. After an error, or Ctrl-C, items that were begun
+    end first: where that takes long, the function calls `go_on`. What is made passes through `watched` as it comes, in
+    order.
     """
-    given = [*items]
-    threads = min(len(given), usable_cores(), most or len(given))
-    if threads < 2 or hasattr(_here, "left"):
-        return [*watched(map(function, given))]
+    given, cores = [*items], getattr(_here, "cores", None) or usable_cores()
+    threads, outer = min(len(given), cores, most or len(given)), getattr(_here, "left", ())
+
+    def of_next(item: Item) -> Result:
+        go_on()
+        return function(item)
+
+    if threads < 2:
+        return [*watched(map(of_next, given))]
     left = Event()
 
     def of_item(item: Item) -> Result:
-        _here.left = left
-        return function(item)
+        _here.left, _here.cores = (*outer, left), max(cores // threads, 1)
+        return of_next(item)
 
     with ThreadPoolExecutor(threads) as pool:
         try:
@@ -52,5 +58,5 @@ def go_on() -> None:
     Raises:
         CancelledError: who called `in_threads` has left.
     """
-    if hasattr(_here, "left") and _here.left.is_set():
+    if any(left.is_set() for left in getattr(_here, "left", ())):
         raise CancelledError

@@ -250,6 +250,8 @@ def actors_of_pictures(request: ActorRequest) -> list[MadeActor]:
     shared, examples = SharedFrames(), [making.examples for making in makings]
     loaded = iter(load_all_pictures(recording, [*chain(*examples)], learnt, shared, progress))
     pictures = [[*islice(loaded, len(of_actor))] for of_actor in examples]
+    if len(makings) == 1:
+        shared.masks.clear()  # nobody else is told by them
     make = lambda each: each[0].made(request.terms, each[1], _progress_of(each[0].subject))
     made = in_threads(make, zip(makings, pictures, strict=True))
     if len(makings) > 1:

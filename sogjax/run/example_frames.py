@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sogjax.actor.frame_choice import Mask, SeenShape, seen_shape, spread_choice, subject_cubes
+from sogjax.actor.frame_choice import FRAMES_AT_ONCE, Mask, SeenShape, seen_shape, spread_choice, subject_cubes
 from sogjax.actor.make import subjects_of
 from sogjax.errors import InputError, counted, listed
 from sogjax.io.example_poses import ExamplePose, frame_name
@@ -258,4 +258,4 @@ def seen_shapes(seen: SampledMasks, up: str, misses: int = 0) -> list[SeenShape]
         return seen_shape(frame, masks, seen.unknown, seen.cameras, cube, axis_vector(up), LEAST_SHOWN, misses)
 
     rows = zip(seen.frames, seen.masks, subject_cubes(seen.masks, seen.cameras), strict=True)
-    return [shape for shape in in_threads(of_frame, rows) if shape is not None]
+    return [shape for shape in in_threads(of_frame, rows, FRAMES_AT_ONCE) if shape is not None]

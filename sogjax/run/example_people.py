@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from sogjax.actor.frame_choice import (
+    FRAMES_AT_ONCE,
     LEAST_BESIDE,
     Mask,
     SeenShape,
@@ -190,7 +191,7 @@ def everybody(seen: SampledMasks, up: str, count: int = 0) -> list[list[PersonSe
             return []
         return people_apart(frame, masks, seen.unknown, pictures, seen.cameras, cube, axis_vector(up), count)
 
-    return in_threads(of_frame, rows)
+    return in_threads(of_frame, rows, FRAMES_AT_ONCE)
 
 
 def chosen_frames(shapes: Sequence[Mapping[int, SeenShape]], count: int) -> list[list[int]]:
@@ -226,7 +227,7 @@ def _shapes(person: Sequence[PersonSeen], seen: SampledMasks, up: str) -> dict[i
         return None if shape is None else replace(shape, whole=shape.whole * len(cameras) / len(seen.cameras))
 
     cubes = subject_cubes([one.masks for one in person], seen.cameras, LEAST_BESIDE)
-    shapes = in_threads(of_frame, zip(person, cubes, strict=True))
+    shapes = in_threads(of_frame, zip(person, cubes, strict=True), FRAMES_AT_ONCE)
     return {shape.frame: shape for shape in shapes if shape is not None}
 
 

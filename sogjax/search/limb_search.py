@@ -43,7 +43,6 @@ MOST_ROUNDS = 3
 MOST_WHOLE = 3
 """Poses that are climbed with all degrees of freedom in a frame, beside the tracked one and that with crossed ends."""
 
-
 LANES = 2
 """Parts of a clip whose key frames are searched beside each other; not the number of cores, on which no result may
 depend."""
@@ -112,18 +111,19 @@ class LimbSearch:
         The `frame` is only read where the pose is another than when the row was searched.
         """
         pose = passed.poses[row].copy()
-        if not self._knows_rivals(row, pose):
+        if not self.knows_rivals(row, pose):
             views = self.views(on_device(frame()), pose)
             self._note_rivals(row, views, pose, self.held_otherwise(views, pose, lane), passed.energy)
         return self._rivals[row][1]
 
-    def _knows_rivals(self, row: int, pose: Float[np.ndarray, "dof"]) -> bool:
+    def knows_rivals(self, row: int, pose: Float[np.ndarray, "dof"]) -> bool:
+        """Whether rivals of a pose in a row were searched already."""
         return row in self._rivals and np.array_equal(self._rivals[row][0], pose)
 
     def _note_rivals(
         self, row: int, views: Views, pose: Float[np.ndarray, "dof"], found: HeldOtherwise, energy: float
     ) -> None:
-        if not self._knows_rivals(row, pose):
+        if not self.knows_rivals(row, pose):
             self._rivals[row] = pose, self._rivals_among(pose, *self._ways(views, pose, found, energy), energy)
 
     def _ways(
@@ -311,7 +311,7 @@ class LimbSearch:
 def in_lanes(function: Callable[[int, int], Found], rows: Sequence[int]) -> list[Found]:
     """What a function makes of each row, given with its lane: each lane takes a part of the rows, in order."""
     if len(rows) < LANES:
-        return [function(0, row) for row in rows]  # which has all cores
+        return [function(0, row) for row in rows]  # within a lane it would have half of the cores
     parts = [part.tolist() for part in np.array_split(np.asarray(rows), LANES)]
 
     def of_lane(lane: int) -> list[Found]:

@@ -138,7 +138,9 @@ class _Revising:
         if search is None:
             return
         rivals = lambda lane, row: search.rivals(partial(self._frame, row), self.passed, row, lane)
-        self.known.revision.rivals |= dict(zip(rows, in_lanes(_reported(rivals, len(rows), report), rows), strict=True))
+        changed = [row for row in rows if not search.knows_rivals(row, self.passed.poses[row])]
+        in_lanes(_reported(rivals, len(changed), report), changed)
+        self.known.revision.rivals |= {row: rivals(0, row) for row in rows}
 
     def take_known(self, poses: Float[np.ndarray, "frame dof"], misplaced: Misplaced | None) -> None:
         """Take what the poses of another pass of the clip explain better, by stretches in which the passes differ."""
